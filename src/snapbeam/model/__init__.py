@@ -1,0 +1,1 @@
+"""What the physicist writes down (beam, contact, shaker) and its reduction to N modes."""

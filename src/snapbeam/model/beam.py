@@ -1,0 +1,157 @@
+"""The beam: geometry, material and how far it is compressed."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from snapbeam.model.modes import wavenumbers
+from snapbeam.validate import InputError, finite, positive
+
+__all__ = ["Beam"]
+
+_NOT_GIVEN: Any = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Beam:
+    """A clamped-clamped Euler-Bernoulli beam of rectangular section under axial compression.
+
+    Exactly one of ``buckling_level`` and ``axial_load`` is given; the other follows from Eqs. (2)-(3),
+
+        b^2 = 4 L^2 (P - P_cr) / (pi^2 E S),    P_cr = 4 pi^2 E I / L^2,
+
+    and both can be read afterwards.
+
+    Parameters
+    ----------
+    length : float
+        Distance L between the clamps, m.
+    thickness : float
+        Thickness h in the direction of bending, m.
+    width : float
+        Width of the section, m.
+    density : float
+        Mass density rho, kg/m^3.
+    young_modulus : float
+        Young's modulus E, Pa.
+    buckling_level : float
+        Height b of the buckled beam at its centre, m, greater than 0.  It reads 0 if the beam was given
+        an ``axial_load`` that does not buckle it.
+    axial_load : float
+        Axial load P, N, compression positive.  Below the critical load the beam is straight; a
+        negative load is tension.
+
+    Raises
+    ------
+    InputError
+        If a value is not finite or not positive where it must be, or if both or neither of
+        ``buckling_level`` and ``axial_load`` are given.
+    """
+
+    length: float
+    thickness: float
+    width: float
+    density: float
+    young_modulus: float
+    buckling_level: float = _NOT_GIVEN
+    axial_load: float = _NOT_GIVEN
+    _given: str = dataclasses.field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        units = {
+            "length": "m",
+            "thickness": "m",
+            "width": "m",
+            "density": "kg/m^3",
+            "young_modulus": "Pa",
+        }
+        for name, unit in units.items():
+            self._set(name, positive(name, getattr(self, name), unit))
+        if (self.buckling_level is None) == (self.axial_load is None):
+            raise InputError(
+                f"buckling_level = {self.buckling_level!r}, axial_load = {self.axial_load!r}: "
+                "give exactly one of the two, the other follows from it"
+            )
+        # tension per square of the buckling level: P - P_cr = stretch b^2
+        stretch = math.pi**2 * self.young_modulus * self.area / (4.0 * self.length**2)
+        if self.axial_load is None:
+            level = positive("buckling_level", self.buckling_level, "m")
+            self._set("_given", "buckling_level")
+            self._set("axial_load", self.critical_load + stretch * level**2)
+        else:
+            load = finite("axial_load", self.axial_load, "a finite number of N, compression positive")
+            level = math.sqrt(max(load - self.critical_load, 0.0) / stretch)
+            self._set("_given", "axial_load")
+            self._set("axial_load", load)
+        self._set("buckling_level", level)
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    def replace(self, **changes: float) -> Beam:
+        """Return a beam with some parameters changed.
+
+        Of ``buckling_level`` and ``axial_load`` the one the beam was made with is kept, unless either
+        is among the *changes*.
+
+        Raises
+        ------
+        InputError
+            For a name that is no parameter of a beam, and as for a new beam.
+        """
+        names = [field.name for field in dataclasses.fields(self) if field.init]
+        for name in changes:
+            if name not in names:
+                raise InputError(f"{name}: no parameter of a beam; must be one of {', '.join(names)}")
+        kept = {name: getattr(self, name) for name in names if name not in ("buckling_level", "axial_load")}
+        if not {"buckling_level", "axial_load"} & set(changes):
+            kept[self._given] = getattr(self, self._given)
+        return Beam(**(kept | changes))
+
+    @property
+    def area(self) -> float:
+        """Area S of the section, m^2."""
+        return self.thickness * self.width
+
+    @property
+    def second_moment(self) -> float:
+        """Second moment of area I = width h^3 / 12, m^4."""
+        return self.width * self.thickness**3 / 12.0
+
+    @property
+    def radius_of_gyration(self) -> float:
+        """Radius of gyration r = sqrt(I/S) of the section, m."""
+        return self.thickness / math.sqrt(12.0)
+
+    @property
+    def mass_per_length(self) -> float:
+        """Mass per length rho S, kg/m."""
+        return self.density * self.area
+
+    @property
+    def bending_stiffness(self) -> float:
+        """Bending stiffness E I, N m^2."""
+        return self.young_modulus * self.second_moment
+
+    @property
+    def tension_stiffness(self) -> float:
+        """Stiffness gamma = E S / (2 L) of the midplane stretching, N/m (Eq. 15)."""
+        return self.young_modulus * self.area / (2.0 * self.length)
+
+    @property
+    def critical_load(self) -> float:
+        """First critical load P_cr = 4 pi^2 E I / L^2, N (Eq. 3)."""
+        return self.bending_stiffness * (2.0 * math.pi / self.length) ** 2
+
+    @property
+    def second_critical_load(self) -> float:
+        """Second critical load E I k_2^2 = 2.0457 P_cr, N, at which the antisymmetric mode buckles."""
+        return self.bending_stiffness * float(wavenumbers(2, self.length)[1]) ** 2
+
+    @property
+    def is_buckled(self) -> bool:
+        """Whether the axial load exceeds the critical load, so that the beam is bistable."""
+        return self.buckling_level > 0.0

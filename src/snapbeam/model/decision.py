@@ -1,0 +1,101 @@
+"""When the future class of a run is certain: the energy a beam in the far well needs to leave it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.model.reduction import ReducedModel
+
+__all__ = ["decidable_energy", "least_energy_at"]
+
+# Energy kept in hand, as a share of the barrier: far more than the energy error of a free flight (1e-6).
+_RESERVE = 1e-3
+_ITERATIONS = 90
+
+
+def least_energy_at(model: ReducedModel, location: ArrayLike, displacement: ArrayLike) -> NDArray[np.float64]:
+    """Least potential energy of any shape that passes through a point, with U = 0 for the straight beam.
+
+    With c_i = phi_i(x_s) and S_1(Lambda) = sum c_i^2/(E I k_i^2 - Lambda), the least energy of a shape with
+    w(x_s) = r is the greatest value of
+
+        r^2/(2 S_1(Lambda)) - (P - Lambda)^2/(4 gamma)
+
+    over Lambda below the first zero of S_1: Lagrange duality with the tension as the multiplier, and no
+    gap, since the energy is convex in the shape once the tension is fixed below the load that buckles the
+    beam pinned at x_s.  Any Lambda gives a valid lower bound.
+
+    Parameters
+    ----------
+    location : array_like
+        x_s, each in (0, 1).
+    displacement : array_like
+        r, m; broadcast against *location*.
+
+    Returns
+    -------
+    array of the broadcast shape, J
+    """
+    x, r = np.broadcast_arrays(np.asarray(location, float), np.asarray(displacement, float))
+    places, which = np.unique(x.ravel(), return_inverse=True)
+    squares = np.array([model.shape_at(float(place)) ** 2 for place in places])
+    k0, gamma = np.asarray(model.stiffness), model.tension_stiffness
+    pinned = np.array([_pinned(square, k0) for square in squares])[which]
+    squares, heights = squares[which], r.ravel() ** 2
+
+    def bound(mu: NDArray[np.float64]) -> NDArray[np.float64]:
+        with np.errstate(divide="ignore"):
+            inverse = 1.0 / np.sum(squares / (k0 - mu[:, None]), axis=1)
+        value: NDArray[np.float64] = 0.5 * heights * inverse - mu * mu / (4.0 * gamma)
+        return value
+
+    # golden section on a concave function; mu = Lambda - P
+    high = pinned
+    scale = np.abs(k0[0]) + 2.0 * np.sqrt(gamma * heights * np.abs(k0).max())
+    low = np.minimum(-4.0 * scale, high - 4.0 * scale)
+    ratio = 0.5 * (np.sqrt(5.0) - 1.0)
+    for _ in range(_ITERATIONS):
+        a, b = high - ratio * (high - low), low + ratio * (high - low)
+        left = bound(a) > bound(b)
+        low, high = np.where(left, low, a), np.where(left, b, high)
+    return bound(0.5 * (low + high)).reshape(x.shape)
+
+
+def _pinned(square: NDArray[np.float64], k0: NDArray[np.float64]) -> float:
+    """Load, less P, that buckles the beam pinned at the point: S_1's first zero or the lowest untouched mode."""
+    from scipy.optimize import brentq
+
+    touched = square > 1e-20 * square.max()
+    free = np.sort(k0[~touched])
+    poles = np.sort(k0[touched])
+    lowest_free = float(free[0]) if free.size else np.inf
+    if poles.size < 2:
+        return lowest_free if np.isfinite(lowest_free) else float(poles[0] + 1e6 * abs(poles[0]))
+    gap = poles[1] - poles[0]
+    zero = brentq(
+        lambda mu: float(np.sum(square[touched] / (k0[touched] - mu))),
+        poles[0] + 1e-13 * gap,
+        poles[1] - 1e-13 * gap,
+        xtol=1e-12 * gap,
+    )
+    return min(float(zero), lowest_free)
+
+
+def decidable_energy(
+    model: ReducedModel, location: NDArray[np.float64], highest: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Energy above the well below which a beam in the far well stays there for ever, J.
+
+    Free flight only loses energy, and the shaker rises to *highest* (m) at most: with less than this energy
+    the beam can neither pass the lowest saddle nor come down to the shaker.  -inf where that can never
+    be said: the shaker rises above the well, or the structure is not a buckled beam.
+    """
+    if model.beam is None or not model.is_bistable:
+        return np.full(location.shape, -np.inf)
+    reach = np.maximum(highest, 0.0)
+    barrier = model.barrier_energy
+    limit = np.minimum(least_energy_at(model, location, reach), barrier)
+    well = np.abs(np.array([float(model.shape_at(float(x)) @ model.equilibrium) for x in location]))
+    energy = limit - model.well_energy - _RESERVE * (barrier - model.well_energy)
+    return np.where(reach < well, energy, -np.inf)

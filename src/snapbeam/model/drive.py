@@ -1,0 +1,78 @@
+"""The shaker: a tip that moves as prescribed and pushes the beam where they touch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.validate import InputError, choice, finite_array, nonnegative, positive, within
+
+__all__ = ["Shaker", "quasi_static_threshold"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shaker:
+    """A shaker whose tip has a sinusoidal velocity and starts in contact with the beam at rest (Eq. 16).
+
+    With the buckling level b and the first natural frequency omega_1, both of the model in use, the
+    tip moves as
+
+        w_s(t) = w_b(x_s, 0) + (V b omega_1 / omega) sin(omega t),    omega = Omega omega_1.
+
+    Parameters
+    ----------
+    frequency_ratio : float
+        Excitation frequency over the first natural frequency, Omega, greater than 0.
+    velocity_amplitude : float
+        Velocity amplitude over b omega_1, V; 0 is a shaker at rest.
+    location : float
+        Position of the tip over the length of the beam, x_s, in (0, 1).
+    side : {"below", "above"}
+        Side of the beam the shaker pushes from.  ``"below"``: it pushes upward on the beam at rest in
+        its lower well.  ``"above"`` is the mirror image, downward on the upper well.
+    """
+
+    frequency_ratio: float
+    velocity_amplitude: float
+    location: float = 1.0 / 2.1
+    side: str = "below"
+
+    def __post_init__(self) -> None:
+        checked = {
+            "frequency_ratio": positive("frequency_ratio", self.frequency_ratio),
+            "velocity_amplitude": nonnegative("velocity_amplitude", self.velocity_amplitude),
+            "location": within("location", self.location, 0.0, 1.0),
+            "side": choice("side", self.side, ("below", "above")),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+
+def quasi_static_threshold(location: ArrayLike, frequency_ratio: ArrayLike) -> NDArray[np.float64]:
+    """Velocity amplitude V_QS1 at which a slow shaker carries one mode over the unstable equilibrium.
+
+    Eq. (21), V_QS1 = Omega phi_1(x_s)/phi_1(1/2) = Omega (1 - cos 2 pi x_s)/2: the shaker's highest
+    position reaches the straight beam.
+
+    Parameters
+    ----------
+    location : array_like
+        x_s, each in (0, 1).
+    frequency_ratio : array_like
+        Omega, each greater than 0.  The two broadcast against each other.
+
+    Returns
+    -------
+    array of the broadcast shape
+    """
+    x = finite_array("location", location)
+    ratio = finite_array("frequency_ratio", frequency_ratio)
+    if ((x <= 0.0) | (x >= 1.0)).any():
+        bad = x[(x <= 0.0) | (x >= 1.0)].flat[0]
+        raise InputError(f"location = {bad:g}: must lie in (0, 1)")
+    if (ratio <= 0.0).any():
+        raise InputError(f"frequency_ratio = {ratio[ratio <= 0.0].flat[0]:g}: must be greater than 0")
+    threshold: NDArray[np.float64] = np.asarray(ratio * np.sin(np.pi * x) ** 2)
+    return threshold

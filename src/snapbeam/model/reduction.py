@@ -1,0 +1,344 @@
+"""From a beam to numbers with names: mass, stiffness, wells, linear modes and damping; no time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.model.beam import Beam
+from snapbeam.model.linear import LinearModes, linear_modes_of_beam, linear_modes_of_structure
+from snapbeam.model.modes import MAX_MODES, BucklingModes
+from snapbeam.model.structure import Structure, checked_structure, damping_ratios
+from snapbeam.validate import InputError, InputTypeError, integer, within
+
+__all__ = ["ReducedModel"]
+
+_Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReducedModel:
+    """N modal amplitudes alpha with a mass, a stiffness and one tension term: the left side of Eq. (11),
+
+        m alpha'' + K0 alpha + gamma (alpha . alpha) alpha = phi(x_s) f,
+
+    whose potential energy is U = alpha . K0 alpha / 2 + gamma (alpha . alpha)^2 / 4.  Made by
+    :meth:`from_beam` or :meth:`from_matrices`; arrays are read-only.
+
+    Attributes
+    ----------
+    mass : array of shape (N, N)
+        Mass matrix m; kg m for a beam, whose displacement w = alpha . phi (m) has alpha and phi in m^0.5.
+    stiffness : array of shape (N,) or (N, N)
+        Linear stiffness K0 of the straight structure, N for a beam: its diagonal, or the full matrix if one
+        was given.
+    tension_stiffness : float
+        gamma, N/m for a beam.
+    equilibrium : array of shape (N,)
+        Amplitudes at rest in the lower well, (-sqrt((P - P_cr)/gamma), 0, ...); zeros if monostable.
+    length_scale : float or None
+        Length that normalises displacements, m: the buckling level b; None for a straight beam.
+    damping_ratio : array of shape (N,)
+        Damping ratio of each linear mode about a well, by ascending frequency.
+    center_shape : array of shape (N,)
+        phi_i at the centre, whose displacement tells the wells apart.
+    contact_shape : array of shape (N,) or None
+        phi_i at the shaker if it does not depend on the location (given by matrices).
+    beam : Beam or None
+        What the model was reduced from.
+    given_reference_freq : float or None
+        Frequency to normalise with, Hz, if it is not the first natural frequency.
+    """
+
+    mass: _Array
+    stiffness: _Array
+    tension_stiffness: float
+    equilibrium: _Array
+    length_scale: float | None
+    damping_ratio: _Array
+    center_shape: _Array
+    contact_shape: _Array | None = None
+    beam: Beam | None = None
+    given_reference_freq: float | None = None
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    @classmethod
+    def from_beam(cls, beam: Beam, modes: int = 32, damping_ratio: ArrayLike = 0.005) -> ReducedModel:
+        """Galerkin reduction of a beam on its first buckling modes (Eqs. 10-15).
+
+        In the wavenumbers k_i the matrices are closed forms.  With c_ij = 2 for two symmetric modes,
+        2/3 for two antisymmetric ones and 0 otherwise,
+
+            m_ij = rho S (delta_ij + c_ij) / (k_i k_j),    K0_i = E I k_i^2 - P,    gamma = E S/(2 L).
+
+        Parameters
+        ----------
+        beam : Beam
+        modes : int
+            Number of modes N, 1 to 256.
+        damping_ratio : float or array of shape (N,)
+            Damping ratio of the linear modes about a well, each in [0, 1).
+
+        Raises
+        ------
+        InputError
+            For a number of modes or a damping ratio out of range.
+        """
+        if not isinstance(beam, Beam):
+            raise InputTypeError(f"beam = {beam!r}: must be a Beam")
+        count = integer("modes", modes, 1, MAX_MODES)
+        shapes = BucklingModes(beam.length, count)
+        k = shapes.wavenumber
+        mass = beam.mass_per_length * (np.eye(count) + _coupling(shapes.parity)) / np.outer(k, k)
+        gamma = beam.tension_stiffness
+        equilibrium = np.zeros(count)
+        # alpha_1 = -b/phi_1(1/2); K0 from E I (k_i^2 - k_1^2) - (P - P_cr), free of cancellation
+        equilibrium[0] = -math.pi * beam.buckling_level / math.sqrt(2.0 * beam.length)
+        if beam.is_buckled:
+            stiffness = beam.bending_stiffness * (k**2 - k[0] ** 2) - gamma * equilibrium[0] ** 2
+        else:
+            stiffness = beam.bending_stiffness * k**2 - beam.axial_load
+        return cls(
+            mass=mass,
+            stiffness=stiffness,
+            tension_stiffness=gamma,
+            equilibrium=equilibrium,
+            length_scale=beam.buckling_level if beam.is_buckled else None,
+            damping_ratio=damping_ratios(damping_ratio, count),
+            center_shape=shapes.shape(0.5 * beam.length),
+            beam=beam,
+        )
+
+    @classmethod
+    def from_matrices(
+        cls,
+        mass: ArrayLike,
+        stiffness: ArrayLike,
+        *,
+        contact_shape: ArrayLike,
+        center_shape: ArrayLike | None = None,
+        tension_stiffness: float = 0.0,
+        equilibrium: ArrayLike | None = None,
+        length_scale: float = 1.0,
+        damping_ratio: ArrayLike = 0.0,
+        reference_freq: float | None = None,
+    ) -> ReducedModel:
+        """A model of any structure, given by its matrices; a free mass (stiffness 0) is one.
+
+        Parameters
+        ----------
+        mass : array of shape (N, N)
+            Mass matrix, symmetric and positive definite.
+        stiffness : array of shape (N,) or (N, N)
+            Linear stiffness of the unstressed structure: a diagonal or a symmetric matrix.
+        contact_shape : array of shape (N,)
+            Displacement under the shaker per unit of each coordinate.
+        center_shape : array of shape (N,), optional
+            The same for the point whose sign tells the wells apart; the contact point if not given.
+        tension_stiffness : float
+            gamma of the term gamma (alpha . alpha) alpha, at least 0.
+        equilibrium : array of shape (N,), optional
+            Coordinates at rest in the lower well (where the displacement of the centre is not
+            positive); zeros if not given.  It must be a stable equilibrium.
+        length_scale : float
+            Length that normalises displacements, m.
+        damping_ratio : float or array of shape (N,)
+            Damping ratio of each linear mode about the equilibrium, each in [0, 1).
+        reference_freq : float, optional
+            Frequency that normalises the excitation, Hz; needed if the first natural frequency is 0.
+
+        Raises
+        ------
+        InputError
+            For matrices of the wrong shape, not symmetric or not positive definite, values that are not
+            finite or out of range, or an equilibrium that is none or is unstable.
+        """
+        given = checked_structure(
+            Structure(
+                mass=mass,
+                stiffness=stiffness,
+                contact_shape=contact_shape,
+                center_shape=center_shape,
+                tension_stiffness=tension_stiffness,
+                equilibrium=equilibrium,
+                length_scale=length_scale,
+                damping_ratio=damping_ratio,
+                reference_freq=reference_freq,
+            )
+        )
+        model = cls(**given)
+        model._linear_modes()  # refuses an unstable equilibrium here rather than at its first use
+        return model
+
+    # ------------------------------------------------------------------ shapes
+
+    @property
+    def modes(self) -> int:
+        """Number of modes N."""
+        return self.equilibrium.size
+
+    def shape_at(self, location: float) -> _Array:
+        """phi_i at a location x_s in (0, 1) of the length; shape (N,), m^0.5.
+
+        A model given by matrices has its one contact point and returns it whatever the location.
+        """
+        location = within("location", location, 0.0, 1.0)
+        if self.beam is None:
+            assert self.contact_shape is not None
+            return self.contact_shape
+        return BucklingModes(self.beam.length, self.modes).shape(location * self.beam.length)
+
+    def contact_mass(self, location: float) -> float:
+        """Mass met by an impulse at *location*, kg: 1/(phi . m^-1 phi).
+
+        It falls like rho S L / N as modes are added.
+        """
+        return float(1.0 / np.sum((self.linear_modes.T @ self.shape_at(location)) ** 2))
+
+    # ------------------------------------------------------------------ linear modes about a well
+
+    def _linear_modes(self) -> LinearModes:
+        if self.beam is not None:
+            return linear_modes_of_beam(self.beam, self.modes)
+        return linear_modes_of_structure(self.mass, self.stiffness, self.tension_stiffness, self.equilibrium)
+
+    @cached_property
+    def _linear(self) -> LinearModes:
+        return self._linear_modes()
+
+    @property
+    def omega(self) -> _Array:
+        """Angular natural frequencies about a well, rad/s, ascending, shape (N,)."""
+        return self._linear.omega
+
+    @cached_property
+    def natural_freq(self) -> _Array:
+        """Natural frequencies about a well, Hz, ascending, shape (N,)."""
+        freq: _Array = self.omega / (2.0 * math.pi)
+        freq.setflags(write=False)
+        return freq
+
+    @property
+    def linear_modes(self) -> _Array:
+        """Linear modes about a well, the columns of V with V^T m V = Id, shape (N, N)."""
+        return self._linear.vectors
+
+    @property
+    def parity(self) -> NDArray[np.int_]:
+        """+1 for each symmetric linear mode, -1 for each antisymmetric one, 0 if not known; shape (N,)."""
+        return self._linear.parity
+
+    @cached_property
+    def tension_matrix(self) -> _Array:
+        """G = V^T V, through which the tension couples the linear modes; exactly 0 across parities."""
+        return _symmetric(self.linear_modes.T @ self.linear_modes)
+
+    @cached_property
+    def damping_matrix(self) -> _Array:
+        """C = m V diag(2 zeta omega) V^T m, the same about both wells, shape (N, N)."""
+        mv = self.mass @ self.linear_modes
+        return _symmetric((mv * (2.0 * self.damping_ratio * self.omega)) @ mv.T)
+
+    @property
+    def reference_freq(self) -> float:
+        """Frequency that normalises the excitation, Hz: the first natural one unless one was given.
+
+        Raises
+        ------
+        InputError
+            If that frequency is 0 (a free mass, or a beam at its critical load) and none was given.
+        """
+        if self.given_reference_freq is not None:
+            return self.given_reference_freq
+        first = float(self.natural_freq[0])
+        if first == 0.0:
+            raise InputError(
+                "reference_freq is not given and the first natural frequency is 0: "
+                "give reference_freq in Hz, greater than 0"
+            )
+        return first
+
+    # ------------------------------------------------------------------ energy and wells
+
+    def potential_energy(self, alpha: ArrayLike) -> _Array:
+        """Potential energy, J, of amplitudes of shape (..., N); 0 for the straight structure."""
+        a = np.asarray(alpha, dtype=np.float64)
+        bent = a * self.stiffness if self.stiffness.ndim == 1 else a @ self.stiffness
+        square = np.sum(a * a, axis=-1)
+        energy: _Array = 0.5 * np.sum(a * bent, axis=-1) + 0.25 * self.tension_stiffness * square**2
+        return energy
+
+    def kinetic_energy(self, alpha_velocity: ArrayLike) -> _Array:
+        """Kinetic energy, J, of amplitude velocities of shape (..., N)."""
+        v = np.asarray(alpha_velocity, dtype=np.float64)
+        energy: _Array = 0.5 * np.sum(v * (v @ self.mass), axis=-1)
+        return energy
+
+    @property
+    def wells(self) -> _Array:
+        """Amplitudes at the two wells, lower first, shape (2, N); both are 0 if monostable."""
+        return np.stack((self.equilibrium, -self.equilibrium))
+
+    @property
+    def is_bistable(self) -> bool:
+        """Whether the structure has two wells."""
+        return bool(np.any(self.equilibrium != 0.0))
+
+    def require_bistable(self, what: str) -> None:
+        """Refuse a structure with a single equilibrium, naming *what* needs two wells."""
+        if self.is_bistable:
+            return
+        if self.beam is None:
+            raise InputError(f"{what} needs a bistable structure: give an equilibrium other than zero")
+        raise InputError(
+            f"{what} needs a buckled beam: axial_load = {self.beam.axial_load:g} N must exceed the critical "
+            f"load of {self.beam.critical_load:g} N"
+        )
+
+    @property
+    def well_energy(self) -> float:
+        """Potential energy of either well, J: -(P - P_cr)^2/(4 gamma) for a buckled beam, 0 if straight."""
+        return float(self.potential_energy(self.equilibrium))
+
+    @cached_property
+    def barrier_energy(self) -> float:
+        """Energy of the lowest saddle between the wells, J.
+
+        Every equilibrium lies along an eigenvector of K0 with an eigenvalue kappa < 0, at the energy
+        -kappa^2/(4 gamma), or at 0.  The wells belong to the lowest eigenvalue and the lowest saddle
+        to the second, E I k_2^2 - P, if it is negative; otherwise it is the straight state, at 0.
+
+        Raises
+        ------
+        InputError
+            If the structure has no second well.
+        """
+        self.require_bistable("barrier_energy")
+        kappa = np.sort(self.stiffness if self.stiffness.ndim == 1 else np.linalg.eigvalsh(self.stiffness))
+        second = min(float(kappa[1]), 0.0) if kappa.size > 1 else 0.0
+        return -(second**2) / (4.0 * self.tension_stiffness) + 0.0
+
+
+def _symmetric(matrix: _Array) -> _Array:
+    """A matrix symmetric but for rounding, made exactly so and read-only."""
+    symmetric: _Array = 0.5 * (matrix + matrix.T)
+    symmetric.setflags(write=False)
+    return symmetric
+
+
+def _coupling(parity: NDArray[np.int_]) -> _Array:
+    """c_ij of the mass matrix: 2 between symmetric modes, 2/3 between antisymmetric ones."""
+    symmetric = (parity > 0).astype(np.float64)
+    antisymmetric = 1.0 - symmetric
+    coupling: _Array = 2.0 * np.outer(symmetric, symmetric) + 2.0 / 3.0 * np.outer(
+        antisymmetric, antisymmetric
+    )
+    return coupling
