@@ -1,0 +1,63 @@
+"""Compositions of kicks and exact linear flows: the coefficients, as data.
+
+A step h is  B(b_0 h) A(a_0 h) B(b_1 h) ... A(a_s h) B(b_s h):  A is the exact flow of the damped linear
+modes, B a kick by the forces that depend on position alone (tension, contact).  Both tables are
+Runge-Kutta-Nystrom splittings of Blanes and Moan, J. Comput. Appl. Math. 142 (2002) 313-330, Table 3:
+SRKN_6^b of order 4 and SRKN_11^b of order 6.  Their orders here are measured in the tests.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["COMPOSITIONS", "TURNS", "Composition", "slot_length"]
+
+TURNS = 16
+"""Room for one number per kick, a multiple of the lanes' width."""
+
+
+def slot_length(order: int, size: int) -> int:
+    """Length in memory of what one length of step needs, with rows of *size*."""
+    return (COMPOSITIONS[order].flow.size + 1) // 2 * 4 * size + 2 * TURNS
+
+
+class Composition(NamedTuple):
+    """One splitting: *flow* (S,) and *kick* (S + 1,) weights, palindromic, each summing to one."""
+
+    flow: NDArray[np.float64]
+    kick: NDArray[np.float64]
+    elapsed: NDArray[np.float64]
+    """Fraction of the step that has passed at each kick, padded with zeros to TURNS."""
+    distinct: NDArray[np.int64]
+    """Which of the distinct flow lengths each flow is, shape (S,): the flows are palindromic."""
+
+
+def _palindromic(flow_half: list[float], kick_half: list[float], stages: int) -> Composition:
+    flow, kick = np.empty(stages), np.empty(stages + 1)
+    for i, weight in enumerate(flow_half):
+        flow[i] = flow[stages - 1 - i] = weight
+    for i, weight in enumerate(kick_half):
+        kick[i] = kick[stages - i] = weight
+    distinct = np.minimum(np.arange(stages), stages - 1 - np.arange(stages))
+    elapsed = np.zeros(TURNS)
+    elapsed[1 : stages + 1] = np.cumsum(flow)
+    elapsed[stages] = 1.0
+    return Composition(flow, kick, elapsed, distinct.astype(np.int64))
+
+
+def _fourth() -> Composition:
+    a = [0.245298957184271, 0.604872665711080]
+    b = [0.0829844064174052, 0.396309801498368, -0.0390563049223486]
+    return _palindromic([*a, 0.5 - sum(a)], [*b, 1.0 - 2.0 * sum(b)], 6)
+
+
+def _sixth() -> Composition:
+    a = [0.123229775946271, 0.290553797799558, -0.127049212625417, -0.246331761062075, 0.357208872795928]
+    b = [0.0414649985182624, 0.198128671918067, -0.0400061921041533, 0.0752539843015807, -0.0115113874206879]
+    return _palindromic([*a, 1.0 - 2.0 * sum(a)], [*b, 0.5 - sum(b)], 11)
+
+
+COMPOSITIONS = {4: _fourth(), 6: _sixth()}

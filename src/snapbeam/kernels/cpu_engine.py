@@ -1,0 +1,121 @@
+"""The CPU engine's driver: threads that take runs from a queue."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.codes import RunStatus
+from snapbeam.kernels.composition import COMPOSITIONS, slot_length
+from snapbeam.kernels.cpu import Outputs, march_many, march_one
+from snapbeam.kernels.ensemble import Ensemble
+from snapbeam.kernels.fields import Counts, Numbers, Ticks
+
+__all__ = ["record", "run_ensemble", "usable_cores"]
+
+_Array = NDArray[np.float64]
+_CHUNK_STEPS = 300_000
+"""Flight steps per task: a fraction of a second, so that progress is smooth and Ctrl-C prompt."""
+_ALIGNMENT = 64
+
+
+def usable_cores() -> int:
+    """Cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1
+
+
+def _memory(ensemble: Ensemble) -> _Array:
+    """A copy of the structure's rows with room to work in, aligned to whole registers."""
+    packed, plan = ensemble.packed, ensemble.plan
+    size = packed.layout.size
+    work = 10 * size + (plan.finest + 2) * slot_length(plan.order, size) + 8 * size
+    total = packed.layout.work + work
+    raw = np.zeros(total + _ALIGNMENT // 8)
+    first = (-raw.ctypes.data % _ALIGNMENT) // 8
+    memory: _Array = raw[first : first + total]
+    memory[: packed.layout.work] = packed.memory
+    return memory
+
+
+def _nothing(size: int) -> Outputs:
+    return Outputs(np.empty(0), np.empty((0, size)), np.empty((0, 6)), np.empty((0, 4)), False)
+
+
+def _empty(runs: int) -> tuple[NDArray[np.int64], _Array]:
+    counts = np.zeros((runs, len(Counts)), dtype=np.int64)
+    counts[:, Counts.STATUS] = RunStatus.NOT_RUN
+    numbers = np.zeros((runs, len(Numbers)))
+    numbers[:, Numbers.LAST_CROSSING] = np.nan
+    numbers[:, Numbers.DECIDED_AT] = np.nan
+    return counts, numbers
+
+
+def run_ensemble(
+    ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
+) -> tuple[NDArray[np.int64], _Array]:
+    """March every run of an ensemble.
+
+    Runs are handed out longest first, a chunk at a time; what a run gives does not depend on which thread
+    marched it or on what it was marched with.
+
+    Returns
+    -------
+    counts : int64 array of shape (runs, len(Counts))
+    numbers : float64 array of shape (runs, len(Numbers))
+    """
+    packed, plan = ensemble.packed, ensemble.plan
+    counts, numbers = _empty(ensemble.size)
+    work = ensemble.work
+    order = np.argsort(-work, kind="stable")
+    cuts = np.unique(np.cumsum(work[order]) // _CHUNK_STEPS, return_index=True)[1][1:]
+    chunks = np.split(order, cuts)
+
+    def march_chunk(which: NDArray[np.int64]) -> int:
+        march_many(
+            _memory(ensemble), packed.blocks, packed.layout, COMPOSITIONS[plan.order], ensemble.contact_rows,
+            ensemble.starts, ensemble.reals, ensemble.ticks, plan.coarsest, plan.finest, ensemble.max_steps,
+            counts, numbers, which, _nothing(packed.layout.size),
+        )
+        return which.size
+
+    done = 0
+    with ThreadPoolExecutor(threads or usable_cores()) as pool:
+        pending: set[Future[int]] = {pool.submit(march_chunk, chunk) for chunk in chunks}
+        try:
+            while pending:
+                finished, pending = wait(pending, return_when=FIRST_COMPLETED)
+                done += sum(future.result() for future in finished)
+                if progress is not None:
+                    progress(done, ensemble.size)
+        except BaseException:
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+    return counts, numbers
+
+
+def record(
+    ensemble: Ensemble, run: int, times: _Array, impacts: int, ledger: bool
+) -> tuple[NDArray[np.int64], _Array, Outputs]:
+    """March one run and write down what happens at *times* and in its first *impacts* impacts."""
+    packed, plan = ensemble.packed, ensemble.plan
+    counts, numbers = _empty(1)
+    size = packed.layout.size
+    outputs = Outputs(
+        times, np.full((times.size, size), np.nan), np.full((times.size, 6), np.nan),
+        np.full((impacts, 4), np.nan), ledger,
+    )
+    ticks = ensemble.ticks[run]
+    march_one(
+        _memory(ensemble), packed.blocks, packed.layout, COMPOSITIONS[plan.order],
+        ensemble.contact_rows[ticks[Ticks.CONTACT_ROW]], ensemble.starts[ticks[Ticks.START_ROW]],
+        ensemble.reals[run], ticks, plan.coarsest, plan.finest, ensemble.max_steps,
+        counts[0], numbers[0], outputs,
+    )
+    return counts[0], numbers[0], outputs

@@ -1,0 +1,126 @@
+"""What an engine is asked for and what it answers: many runs of one structure, by arrays.
+
+An engine is a function ``engine(ensemble, outputs_of, progress)``; :data:`snapbeam.kernels.engines` names
+them.  Nothing above this module knows how an engine steps.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.kernels.fields import Reals, Ticks
+from snapbeam.kernels.packing import Packed, pack
+from snapbeam.kernels.plan import Plan
+from snapbeam.model.contact import HertzContact
+from snapbeam.model.decision import decidable_energy
+from snapbeam.model.reduction import ReducedModel
+from snapbeam.validate import InputError
+
+__all__ = ["Ensemble", "Start", "make_ensemble"]
+
+_Array = NDArray[np.float64]
+_SUBDIVISION = 1 << 20
+"""Ticks of a flight step, so that halved steps and located events are whole numbers of ticks."""
+_FAR_AWAY = -1e30
+"""Penetration, m, of a shaker that is not there."""
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Runs of one structure, one plan and one side, ready for an engine."""
+
+    packed: Packed
+    plan: Plan
+    contact_rows: _Array
+    """V^T phi of every location, shape (locations, rows)."""
+    starts: _Array
+    """q and p of every start, shape (starts, 2 rows)."""
+    reals: _Array
+    """Shape (runs, len(Reals))."""
+    ticks: NDArray[np.int64]
+    """Shape (runs, len(Ticks))."""
+    max_steps: int
+
+    @property
+    def size(self) -> int:
+        """Number of runs."""
+        return self.reals.shape[0]
+
+    @property
+    def work(self) -> _Array:
+        """Expected work of each run in flight steps, shape (runs,)."""
+        return self.ticks[:, Ticks.END] / self.ticks[:, Ticks.STEP]
+
+
+class Start(NamedTuple):
+    """Amplitudes and their velocities at time zero, each of shape (N,)."""
+
+    alpha: _Array
+    velocity: _Array
+
+
+def make_ensemble(
+    model: ReducedModel,
+    contact: HertzContact | None,
+    plan: Plan,
+    *,
+    frequency_ratio: _Array,
+    velocity_amplitude: _Array,
+    location: _Array,
+    side: str,
+    cycles: int,
+    reference_freq: float,
+    early_decision: bool,
+    start: Start | None = None,
+    max_steps: int = 10**10,
+) -> Ensemble:
+    """Arrange runs, given by arrays of one length, for an engine.
+
+    With ``contact`` None nothing strikes the beam, and *frequency_ratio* only sets what a cycle is.
+    """
+    packed = pack(model, side)
+    layout, sign = packed.layout, packed.sign
+    scale = model.length_scale
+    if scale is None:
+        model.require_bistable("a run")
+        raise InputError("length_scale is not known")
+    if start is None:
+        start = Start(packed.equilibrium, np.zeros(model.modes))
+    q, p = packed.modal(start.alpha, start.velocity)
+    places, which = np.unique(location, return_inverse=True)
+    shapes = np.array([model.shape_at(float(x)) for x in places])
+    rows = np.array([packed.row(shape) for shape in shapes])
+    runs = frequency_ratio.size
+    omega_1 = 2.0 * math.pi * reference_freq
+    omega = frequency_ratio * omega_1
+    period = 2.0 * math.pi / omega
+    steps = np.ceil(period / plan.step * (1.0 - 1e-12)).astype(np.int64)
+
+    reals = np.zeros((runs, len(Reals)))
+    reals[:, Reals.OFFSET] = (rows @ q)[which] if contact is not None else _FAR_AWAY
+    reals[:, Reals.AMPLITUDE] = velocity_amplitude * scale * omega_1 / omega
+    reals[:, Reals.OMEGA] = omega
+    reals[:, Reals.STIFFNESS] = 0.0 if contact is None else contact.stiffness
+    rest = sign * (shapes @ packed.equilibrium)[which]
+    reals[:, Reals.REST_CONTACT] = rest
+    reals[:, Reals.REST_CENTER] = sign * float(model.center_shape @ packed.equilibrium)
+    ticks = np.zeros((runs, len(Ticks)), dtype=np.int64)
+    ticks[:, Ticks.STEP] = _SUBDIVISION
+    ticks[:, Ticks.PERIOD] = steps * _SUBDIVISION
+    reals[:, Reals.TICK] = period / ticks[:, Ticks.PERIOD]
+    ticks[:, Ticks.END] = ticks[:, Ticks.PERIOD] * cycles
+    ticks[:, Ticks.LAST_QUARTER] = ticks[:, Ticks.END] // 4 * 3
+    ticks[:, Ticks.CONTACT_ROW] = which
+    ticks[:, Ticks.DECIDE_CROSSINGS] = -1
+    reals[:, Reals.DECIDE_ENERGY] = -math.inf
+    if early_decision:
+        ticks[:, Ticks.DECIDE_CROSSINGS] = cycles // 20
+        highest = rest + reals[:, Reals.OFFSET] + reals[:, Reals.AMPLITUDE]
+        reals[:, Reals.DECIDE_REACH] = np.maximum(highest, 0.0)
+        reals[:, Reals.DECIDE_ENERGY] = decidable_energy(model, location, highest)
+    return Ensemble(packed, plan, rows, np.concatenate((q, p))[None], reals, ticks, max_steps)
