@@ -1,0 +1,308 @@
+"""One run, recorded: the beam, the shaker, and everything that can be read off them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.codes import RunStatus
+from snapbeam.kernels import cpu_engine
+from snapbeam.kernels.engines import resolve
+from snapbeam.kernels.ensemble import Ensemble, Start, make_ensemble
+from snapbeam.kernels.fields import Counts, Numbers, Reals
+from snapbeam.kernels.plan import Plan, plan_steps
+from snapbeam.model.contact import HertzContact
+from snapbeam.model.drive import Shaker
+from snapbeam.model.reduction import ReducedModel
+from snapbeam.provenance import made_by
+from snapbeam.response import Response, statistics_of
+from snapbeam.trajectory import trajectory_dataset
+from snapbeam.validate import InputError, InputTypeError, finite_array, integer, positive
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Run", "simulate"]
+
+_Array = NDArray[np.float64]
+
+_SAMPLES_PER_CYCLE = 200
+"""Regular samples of a run per cycle of the excitation or of the first mode, whichever is the faster."""
+_SAMPLES_PER_IMPACT = 24
+"""Extra samples from the onset to the release of each impact."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A recorded run: ``dataset`` (time series), ``response`` (class and statistics), ``impacts`` (a table)."""
+
+    dataset: xr.Dataset
+    response: Response
+    impacts: xr.Dataset
+
+
+def simulate(
+    model: ReducedModel,
+    shaker: Shaker | None = None,
+    contact: HertzContact | None = None,
+    cycles: int = 200,
+    *,
+    step: float | None = None,
+    accuracy: str = "map",
+    engine: str = "auto",
+    initial_state: tuple[ArrayLike, ArrayLike] | None = None,
+    sample_times: ArrayLike | None = None,
+    early_decision: bool = False,
+    reference_freq: float | None = None,
+) -> Run:
+    """Integrate one run and record it.
+
+    The beam starts at rest in the well on the shaker's far side, the shaker's tip touching it (Eqs. 11-18).
+    Without a shaker the beam vibrates freely from *initial_state*, and a cycle is one of the first mode.
+
+    Parameters
+    ----------
+    model : ReducedModel
+    shaker : Shaker, optional
+    contact : HertzContact, optional
+        Needed with a shaker.
+    cycles : int
+        Cycles of excitation, at least 1.
+    step : float, optional
+        Step in free flight, s; steps in contact scale with it.  The default follows from the model and
+        the contact; its error is on the docs' page on accuracy.
+    accuracy : {"map", "reference"}
+        ``"map"``: order 4.  ``"reference"``: order 6 and much shorter steps, to check others with.
+    engine : {"auto", "cpu"}
+        What integrates; one recorded run is always the CPU's work.
+    initial_state : pair of arrays of shape (N,), optional
+        Modal amplitudes alpha (m^0.5) and their velocities (m^0.5/s) at the start, in place of the well at
+        rest.  The shaker starts in touch with the beam wherever it is.
+    sample_times : array_like, optional
+        Instants to record, s, ascending, from 0 to the end of the run.  By default 200 per cycle of the
+        excitation or of the first mode, and 24 more in each impact.
+    early_decision : bool
+        End the run once its class is certain; statistics other than the class then stop there.
+    reference_freq : float, optional
+        Frequency in Hz that stands for omega_1 in Omega and V; the model's first natural frequency if not
+        given.
+
+    Returns
+    -------
+    Run
+
+    Raises
+    ------
+    InputError
+        For bad input.  A run that fails numerically does not raise: ``run.response.status`` says why.
+    """
+    ensemble, reference, plan = _single_run(
+        model, shaker, contact, cycles, step, accuracy, engine, initial_state, early_decision, reference_freq
+    )
+    tick, period = ensemble.reals[0, Reals.TICK], 2.0 * math.pi / ensemble.reals[0, Reals.OMEGA]
+    end = period * cycles
+    asked = None if sample_times is None else _checked_times(sample_times, end)
+    counts, numbers, outputs = cpu_engine.record(ensemble, 0, np.empty(0), 0, False)
+    counts, numbers, outputs = cpu_engine.record(
+        ensemble, 0, np.empty(0), int(counts[Counts.IMPACTS]), False
+    )
+    table = outputs.impacts
+    times = _default_times(end, min(period, 1.0 / reference), table) if asked is None else asked
+    reached = min(float(counts[Counts.TIME] * tick), end)
+    if counts[Counts.STATUS] != RunStatus.OK:
+        times = times[times <= reached]
+    _, _, outputs = cpu_engine.record(ensemble, 0, times, 0, True)
+    response = Response.from_statistics(
+        statistics_of(ensemble, counts[None, :], numbers[None, :], cycles)
+    )
+    attrs = _attributes(model, shaker, contact, cycles, plan, reference, early_decision, response)
+    attrs["gross_work"] = float(numbers[Numbers.GROSS_WORK])
+    return Run(
+        dataset=_dataset(ensemble, shaker, times, period, outputs, attrs),
+        response=response,
+        impacts=_impact_table(table, attrs),
+    )
+
+
+def _single_run(
+    model: ReducedModel,
+    shaker: Shaker | None,
+    contact: HertzContact | None,
+    cycles: int,
+    step: float | None,
+    accuracy: str,
+    engine: str,
+    initial_state: tuple[ArrayLike, ArrayLike] | None,
+    early_decision: bool,
+    reference_freq: float | None,
+) -> tuple[Ensemble, float, Plan]:
+    """Everything that is asked of :func:`simulate`, checked, as an ensemble of one run."""
+    check_system(model, contact, shaker)
+    cycles = integer("cycles", cycles, 1, 10**7)
+    resolve(engine)
+    start = None if initial_state is None else _checked_start(model, initial_state)
+    if shaker is None and start is None:
+        raise InputError("shaker = None: a beam that nothing strikes needs an initial_state to move")
+    reference = model.reference_freq if reference_freq is None else positive("reference_freq", reference_freq)
+    drive = shaker if shaker is not None else Shaker(frequency_ratio=1.0, velocity_amplitude=0.0)
+    struck = contact if shaker is not None else None
+    plan = plan_steps(model, struck, drive.location, step=step, accuracy=accuracy)
+    ensemble = make_ensemble(
+        model,
+        struck,
+        plan,
+        frequency_ratio=np.array([drive.frequency_ratio]),
+        velocity_amplitude=np.array([drive.velocity_amplitude]),
+        location=np.array([drive.location]),
+        side=drive.side,
+        cycles=cycles,
+        reference_freq=reference,
+        early_decision=bool(early_decision),
+        start=start,
+    )
+    return ensemble, reference, plan
+
+
+def check_system(model: Any, contact: Any, shaker: Any = None) -> None:
+    """Refuse what is no model, contact or shaker, and a model that cannot be struck."""
+    if not isinstance(model, ReducedModel):
+        raise InputTypeError(f"model = {model!r}: must be a ReducedModel")
+    if shaker is not None and not isinstance(shaker, Shaker):
+        raise InputTypeError(f"shaker = {shaker!r}: must be a Shaker")
+    if contact is not None and not isinstance(contact, HertzContact):
+        raise InputTypeError(f"contact = {contact!r}: must be a HertzContact")
+    if shaker is not None and contact is None:
+        raise InputError("contact = None: a shaker needs a HertzContact")
+    if model.length_scale is None:
+        model.require_bistable("a run")
+
+
+def _checked_start(model: ReducedModel, initial_state: tuple[ArrayLike, ArrayLike]) -> Start:
+    try:
+        alpha, velocity = initial_state
+    except (TypeError, ValueError):
+        raise InputTypeError("initial_state: must be a pair of arrays, amplitudes and velocities") from None
+    parts = []
+    for name, value in (("amplitudes", alpha), ("velocities", velocity)):
+        array = finite_array(f"initial_state {name}", value, 1)
+        if array.size != model.modes:
+            raise InputError(f"initial_state {name} of shape {array.shape}: must have shape ({model.modes},)")
+        parts.append(array)
+    return Start(*parts)
+
+
+def _checked_times(sample_times: ArrayLike, end: float) -> _Array:
+    times = finite_array("sample_times", sample_times, 1)
+    if times.size == 0:
+        raise InputError("sample_times = []: must hold at least one instant")
+    if (np.diff(times) <= 0.0).any():
+        raise InputError("sample_times: must be strictly increasing")
+    if times[0] < 0.0 or times[-1] > end * (1.0 + 1e-9):
+        raise InputError(
+            f"sample_times from {times[0]:g} to {times[-1]:g} s: must lie within the run, 0 to {end:g} s"
+        )
+    return times
+
+
+def _default_times(end: float, fastest_period: float, impacts: _Array) -> _Array:
+    regular = np.linspace(0.0, end, math.ceil(end / fastest_period * _SAMPLES_PER_CYCLE) + 1)
+    inside = impacts[:, :1] + impacts[:, 1:2] * np.linspace(0.0, 1.0, _SAMPLES_PER_IMPACT)
+    return np.unique(np.concatenate((regular, np.clip(inside.ravel(), 0.0, end))))
+
+
+def _dataset(
+    ensemble: Ensemble, shaker: Shaker | None, times: _Array, period: float, outputs: Any, attrs: dict[str, Any]
+) -> xr.Dataset:
+    packed = ensemble.packed
+    model, sign = packed.model, packed.sign
+    scale = model.length_scale
+    assert scale is not None
+    values = outputs.values
+    alpha = packed.amplitudes(outputs.rows)
+    location = attrs.get("location", 0.5)
+    displacement = alpha @ model.shape_at(location) / scale
+    variables: dict[str, _Array] = {
+        "displacement": displacement,
+        "center_displacement": alpha @ model.center_shape / scale,
+    }
+    if shaker is not None:
+        penetration = values[:, 0] / scale
+        variables |= {
+            "shaker_displacement": displacement + sign * penetration,
+            "penetration": penetration,
+            "contact_force": values[:, 1],
+        }
+    variables |= {"modal_amplitude": alpha, "energy_beam": values[:, 2]}
+    if shaker is not None:
+        variables |= {"energy_contact": values[:, 3], "work_shaker": values[:, 4]}
+    variables["energy_dissipated"] = values[:, 5]
+    return trajectory_dataset(times, times / period, attrs=attrs, **variables)
+
+
+def _impact_table(table: _Array, attrs: dict[str, Any]) -> xr.Dataset:
+    import xarray as xr
+
+    columns = (
+        ("onset", "s", "onset of the impact"),
+        ("duration", "s", "duration of the impact"),
+        ("peak_force", "N", "peak contact force"),
+        ("impulse", "N s", "impulse on the beam"),
+    )
+    data = {
+        name: ("impact", table[:, i], {"units": units, "long_name": words})
+        for i, (name, units, words) in enumerate(columns)
+    }
+    return xr.Dataset(data, {"impact": np.arange(1, len(table) + 1)}, attrs)
+
+
+def describe_system(
+    model: ReducedModel, contact: HertzContact | None, plan: Plan, reference_freq: float
+) -> dict[str, Any]:
+    """The parameters of a model, its contact and its steps, as attributes of a file."""
+    damping = model.damping_ratio
+    attrs: dict[str, Any] = {
+        "modes": model.modes,
+        "damping_ratio": float(damping[0]) if np.all(damping == damping[0]) else damping.tolist(),
+        "length_scale": model.length_scale,
+        "reference_freq": reference_freq,
+        "step": plan.step,
+        "order": plan.order,
+        "longest_contact_step": plan.step / 2**plan.coarsest,
+        "shortest_contact_step": plan.step / 2**plan.finest,
+    }
+    if contact is not None:
+        attrs["contact_stiffness"] = contact.stiffness
+    if model.beam is not None:
+        beam = model.beam
+        for name in ("length", "thickness", "width", "density", "young_modulus", "axial_load", "buckling_level"):
+            attrs[f"beam_{name}"] = getattr(beam, name)
+    return attrs
+
+
+def _attributes(
+    model: ReducedModel,
+    shaker: Shaker | None,
+    contact: HertzContact | None,
+    cycles: int,
+    plan: Plan,
+    reference: float,
+    early_decision: bool,
+    response: Response,
+) -> dict[str, Any]:
+    attrs: dict[str, Any] = {"title": "run of a struck bistable beam", "cycles": cycles, "engine": "cpu"}
+    attrs |= describe_system(model, contact, plan, reference)
+    if shaker is not None:
+        attrs |= {
+            "frequency_ratio": shaker.frequency_ratio,
+            "velocity_amplitude": shaker.velocity_amplitude,
+            "location": shaker.location,
+            "side": shaker.side,
+        }
+    attrs["early_decision"] = int(early_decision)
+    attrs["response"] = response.response.label
+    attrs["status"] = f"{response.status.name}: {response.status.advice}"
+    return attrs | made_by(attrs)
