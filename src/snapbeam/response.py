@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.codes import ResponseClass, RunStatus
-from snapbeam.kernels.fields import Counts, Numbers
+from snapbeam.kernels.fields import Counts, Numbers, Reals
 from snapbeam.validate import InputError
 
 if TYPE_CHECKING:
@@ -74,8 +74,9 @@ def classify(
 class Response:
     """What one run did, in a few numbers (displacements in units of b).
 
-    A run that failed has ``response`` UNKNOWN and a ``status`` whose ``advice`` says why.  A run decided early
-    (``decided_at`` in seconds, NaN otherwise) has the certain class, but extremes and counts that stop there.
+    A run that failed has ``response`` UNKNOWN and a ``status`` whose ``advice`` says why.  A run decided
+    early (``decided_at`` in seconds, NaN otherwise) has the certain class, but extremes and counts that stop
+    there.
     ``end_is_final`` says whether the energy at the end is below the barrier; ``final_well`` is the sign of
     w(1/2) at the end.
     """
@@ -109,8 +110,6 @@ def statistics_of(
     ensemble: Ensemble, counts: NDArray[np.int64], numbers: NDArray[np.float64], cycles: int
 ) -> dict[str, NDArray[np.generic]]:
     """What an engine counted, in the units and signs of a map; arrays of shape (runs,) by name."""
-    from snapbeam.kernels.fields import Reals
-
     model, sign = ensemble.packed.model, ensemble.packed.sign
     scale = model.length_scale
     assert scale is not None

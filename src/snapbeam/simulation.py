@@ -15,7 +15,7 @@ from snapbeam.kernels.engines import resolve
 from snapbeam.kernels.ensemble import Ensemble, Start, make_ensemble
 from snapbeam.kernels.fields import Counts, Numbers, Reals
 from snapbeam.kernels.plan import Plan, plan_steps
-from snapbeam.model.contact import HertzContact
+from snapbeam.model.contact import HertzContact, Restitution
 from snapbeam.model.drive import Shaker
 from snapbeam.model.reduction import ReducedModel
 from snapbeam.provenance import made_by
@@ -32,13 +32,15 @@ _Array = NDArray[np.float64]
 
 _SAMPLES_PER_CYCLE = 200
 """Regular samples of a run per cycle of the excitation or of the first mode, whichever is the faster."""
-_SAMPLES_PER_IMPACT = 24
+_LEAST_PER_IMPACT, _MOST_PER_IMPACT = 24, 96
 """Extra samples from the onset to the release of each impact."""
+_BLOW = 12
+"""Contact steps after the onset within which a long contact is sampled densely: its first blow."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A recorded run: ``dataset`` (time series), ``response`` (class and statistics), ``impacts`` (a table)."""
+    """A recorded run: time series, class with statistics, and a table of impacts."""
 
     dataset: xr.Dataset
     response: Response
@@ -48,7 +50,7 @@ class Run:
 def simulate(
     model: ReducedModel,
     shaker: Shaker | None = None,
-    contact: HertzContact | None = None,
+    contact: HertzContact | Restitution | None = None,
     cycles: int = 200,
     *,
     step: float | None = None,
@@ -68,8 +70,8 @@ def simulate(
     ----------
     model : ReducedModel
     shaker : Shaker, optional
-    contact : HertzContact, optional
-        Needed with a shaker.
+    contact : HertzContact or Restitution, optional
+        Needed with a shaker; Restitution with a model of one mode only.
     cycles : int
         Cycles of excitation, at least 1.
     step : float, optional
@@ -84,7 +86,7 @@ def simulate(
         rest.  The shaker starts in touch with the beam wherever it is.
     sample_times : array_like, optional
         Instants to record, s, ascending, from 0 to the end of the run.  By default 200 per cycle of the
-        excitation or of the first mode, and 24 more in each impact.
+        excitation or of the first mode, and at least 24 more in each impact.
     early_decision : bool
         End the run once its class is certain; statistics other than the class then stop there.
     reference_freq : float, optional
@@ -107,18 +109,18 @@ def simulate(
     end = period * cycles
     asked = None if sample_times is None else _checked_times(sample_times, end)
     counts, numbers, outputs = cpu_engine.record(ensemble, 0, np.empty(0), 0, False)
-    counts, numbers, outputs = cpu_engine.record(
-        ensemble, 0, np.empty(0), int(counts[Counts.IMPACTS]), False
-    )
+    counts, numbers, outputs = cpu_engine.record(ensemble, 0, np.empty(0), int(counts[Counts.IMPACTS]), False)
     table = outputs.impacts
-    times = _default_times(end, min(period, 1.0 / reference), table) if asked is None else asked
+    if asked is None:
+        contact_step = plan.step / 2**plan.coarsest
+        times = _default_times(end, min(period, 1.0 / reference), table, contact_step)
+    else:
+        times = asked
     reached = min(float(counts[Counts.TIME] * tick), end)
     if counts[Counts.STATUS] != RunStatus.OK:
         times = times[times <= reached]
     _, _, outputs = cpu_engine.record(ensemble, 0, times, 0, True)
-    response = Response.from_statistics(
-        statistics_of(ensemble, counts[None, :], numbers[None, :], cycles)
-    )
+    response = Response.from_statistics(statistics_of(ensemble, counts[None, :], numbers[None, :], cycles))
     attrs = _attributes(model, shaker, contact, cycles, plan, reference, early_decision, response)
     attrs["gross_work"] = float(numbers[Numbers.GROSS_WORK])
     return Run(
@@ -131,7 +133,7 @@ def simulate(
 def _single_run(
     model: ReducedModel,
     shaker: Shaker | None,
-    contact: HertzContact | None,
+    contact: HertzContact | Restitution | None,
     cycles: int,
     step: float | None,
     accuracy: str,
@@ -173,8 +175,13 @@ def check_system(model: Any, contact: Any, shaker: Any = None) -> None:
         raise InputTypeError(f"model = {model!r}: must be a ReducedModel")
     if shaker is not None and not isinstance(shaker, Shaker):
         raise InputTypeError(f"shaker = {shaker!r}: must be a Shaker")
-    if contact is not None and not isinstance(contact, HertzContact):
-        raise InputTypeError(f"contact = {contact!r}: must be a HertzContact")
+    if contact is not None and not isinstance(contact, (HertzContact, Restitution)):
+        raise InputTypeError(f"contact = {contact!r}: must be a HertzContact or a Restitution")
+    if isinstance(contact, Restitution) and model.modes != 1:
+        raise InputError(
+            f"contact = {contact!r} with modes = {model.modes}: Newton's law needs one mode, since the "
+            "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
+        )
     if shaker is not None and contact is None:
         raise InputError("contact = None: a shaker needs a HertzContact")
     if model.length_scale is None:
@@ -208,14 +215,23 @@ def _checked_times(sample_times: ArrayLike, end: float) -> _Array:
     return times
 
 
-def _default_times(end: float, fastest_period: float, impacts: _Array) -> _Array:
-    regular = np.linspace(0.0, end, math.ceil(end / fastest_period * _SAMPLES_PER_CYCLE) + 1)
-    inside = impacts[:, :1] + impacts[:, 1:2] * np.linspace(0.0, 1.0, _SAMPLES_PER_IMPACT)
-    return np.unique(np.concatenate((regular, np.clip(inside.ravel(), 0.0, end))))
+def _default_times(end: float, fastest_period: float, impacts: _Array, contact_step: float) -> _Array:
+    """Regular instants, and in each impact enough to show its force and the first blow of a long one."""
+    parts = [np.linspace(0.0, end, math.ceil(end / fastest_period * _SAMPLES_PER_CYCLE) + 1)]
+    for onset, duration in impacts[:, :2]:
+        count = min(max(math.ceil(duration / contact_step), _LEAST_PER_IMPACT), _MOST_PER_IMPACT)
+        parts.append(onset + np.linspace(0.0, duration, count))
+        parts.append(onset + np.linspace(0.0, min(duration, _BLOW * contact_step), _LEAST_PER_IMPACT))
+    return np.unique(np.clip(np.concatenate(parts), 0.0, end))
 
 
 def _dataset(
-    ensemble: Ensemble, shaker: Shaker | None, times: _Array, period: float, outputs: Any, attrs: dict[str, Any]
+    ensemble: Ensemble,
+    shaker: Shaker | None,
+    times: _Array,
+    period: float,
+    outputs: Any,
+    attrs: dict[str, Any],
 ) -> xr.Dataset:
     packed = ensemble.packed
     model, sign = packed.model, packed.sign
@@ -260,7 +276,7 @@ def _impact_table(table: _Array, attrs: dict[str, Any]) -> xr.Dataset:
 
 
 def describe_system(
-    model: ReducedModel, contact: HertzContact | None, plan: Plan, reference_freq: float
+    model: ReducedModel, contact: HertzContact | Restitution | None, plan: Plan, reference_freq: float
 ) -> dict[str, Any]:
     """The parameters of a model, its contact and its steps, as attributes of a file."""
     damping = model.damping_ratio
@@ -274,11 +290,21 @@ def describe_system(
         "longest_contact_step": plan.step / 2**plan.coarsest,
         "shortest_contact_step": plan.step / 2**plan.finest,
     }
-    if contact is not None:
+    if isinstance(contact, HertzContact):
         attrs["contact_stiffness"] = contact.stiffness
+    elif contact is not None:
+        attrs["restitution_coefficient"] = contact.coefficient
     if model.beam is not None:
         beam = model.beam
-        for name in ("length", "thickness", "width", "density", "young_modulus", "axial_load", "buckling_level"):
+        for name in (
+            "length",
+            "thickness",
+            "width",
+            "density",
+            "young_modulus",
+            "axial_load",
+            "buckling_level",
+        ):
             attrs[f"beam_{name}"] = getattr(beam, name)
     return attrs
 
@@ -286,7 +312,7 @@ def describe_system(
 def _attributes(
     model: ReducedModel,
     shaker: Shaker | None,
-    contact: HertzContact | None,
+    contact: HertzContact | Restitution | None,
     cycles: int,
     plan: Plan,
     reference: float,

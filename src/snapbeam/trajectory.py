@@ -158,5 +158,7 @@ def check_trajectory(dataset: xr.Dataset, require: Iterable[str] = ("displacemen
     steps = np.diff(dataset["time"].values)
     if (steps <= 0.0).any():
         late = int(np.argmax(steps <= 0.0)) + 1
-        raise InputError(f"time[{late}] = {float(dataset['time'][late])!r}: must be later than the one before")
+        raise InputError(
+            f"time[{late}] = {float(dataset['time'][late])!r}: must be later than the one before"
+        )
     return dataset

@@ -105,7 +105,7 @@ def integer(name: str, value: Any, low: int, high: int | None = None) -> int:
     elif isinstance(value, Real):
         if not float(value).is_integer():
             raise _refuse(name, value, allowed)
-        number = int(value)
+        number = int(float(value))
     else:
         raise InputTypeError(f"{name} = {value!r}: must be {allowed}, not {type(value).__name__}")
     if number < low or (high is not None and number > high):
@@ -125,7 +125,10 @@ def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:
 
 def finite_array(name: str, value: Any, ndim: int | None = None) -> NDArray[np.float64]:
     """Return *value* as a float64 array; refuse text, NaN, infinity and a wrong number of dimensions."""
-    raw = np.asarray(value)
+    try:
+        raw = np.asarray(value)
+    except ValueError:
+        raise InputError(f"{name}: must be an array of numbers, not a list of unequal lengths") from None
     if raw.dtype.kind not in "iuf":
         raise InputTypeError(f"{name} = {value!r}: must be an array of numbers, not of {raw.dtype}")
     array = np.array(raw, dtype=np.float64)

@@ -11,16 +11,27 @@ of any other, so results do not depend on batch, order or threads.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from snapbeam.codes import RunStatus
 from snapbeam.kernels.composition import TURNS
-from snapbeam.kernels.cpu_step import Impactor, look_inside, observe, prepare, take_step
-from snapbeam.kernels.fields import Counts, Numbers, Reals, Ticks
+from snapbeam.kernels.cpu_step import look_inside, observe, prepare, take_step
+from snapbeam.kernels.fields import Counts, Numbers, Ticks
+from snapbeam.kernels.march_parts import (
+    PIECES,
+    change_well,
+    contact_level,
+    count_in_step,
+    finish_impact,
+    first_entry,
+    flight_level,
+    safe_for,
+    seen_from,
+    set_up,
+    track_extremes,
+)
 from snapbeam.kernels.physics import contact_energy, contact_force, tension_energy, tension_factors
 from snapbeam.kernels.rows import (
     acceleration_rows,
@@ -30,180 +41,15 @@ from snapbeam.kernels.rows import (
     speed_bound,
     tension_rows,
 )
-from snapbeam.kernels.statistics import count_crossings, extremes, first_fall, first_rise, sign_of, turning_point
+from snapbeam.kernels.statistics import extremes, first_fall, sign_of, turning_point
 
-__all__ = ["Clock", "Outputs", "march", "march_many", "march_one"]
+__all__ = ["march", "march_many"]
 
 _march = njit(cache=True, error_model="numpy", nogil=True)
 
 _OK, _DECIDED, _RUNNING = int(RunStatus.OK), int(RunStatus.DECIDED), int(RunStatus.RUNNING)
 _NOT_FINITE, _STEP_LIMIT = int(RunStatus.NOT_FINITE), int(RunStatus.STEP_LIMIT)
 _TWO_PI = 2.0 * math.pi
-
-
-class Clock(NamedTuple):
-    """Time in ticks, the steps that are allowed, and when a run may end early."""
-
-    tick: float
-    """Seconds."""
-    step: int
-    """Flight step."""
-    period: int
-    """Of the drive."""
-    end: int
-    last_quarter: int
-    coarsest: int
-    """Halvings of the flight step that make the longest contact step."""
-    finest: int
-    """Halvings of the flight step that make the shortest contact step."""
-    max_steps: int
-    decide_energy: float
-    """Energy above the well below which a beam in the far well stays there; -inf: never decide."""
-    decide_reach: float
-    """Highest future position of the shaker, or 0 if that is higher."""
-    decide_crossings: int
-    """Crossings in the last quarter beyond which the response is continuous; -1: never decide."""
-
-
-class Outputs(NamedTuple):
-    """Where a march writes what is asked of it; arrays of length 0 ask for nothing."""
-
-    times: NDArray[np.float64]
-    """Instants to record, s, ascending."""
-    rows: NDArray[np.float64]
-    """q at those instants, shape (instants, rows)."""
-    values: NDArray[np.float64]
-    """Penetration, contact force, beam energy, contact energy, work and dissipation, shape (instants, 6)."""
-    impacts: NDArray[np.float64]
-    """Onset, duration, greatest penetration and impulse of each impact, shape (impacts, 4)."""
-    ledger: bool
-    """Whether to integrate the dissipation."""
-
-
-# How contact steps are graded: a step is at most this share of the time since the onset, and of the time to
-# the release at the present rate.
-_GRADING = 0.5
-_RELEASE = 0.5
-# Safety of the bound on the speed of a signal, and for how many steps it is trusted.
-_MARGIN = 1.25
-_TRUST = 8
-# Flight steps are halved where the squared slopes differ from those of the well by more than this many times
-# the well's own, and again at every doubling.
-_STRETCH = 4.0
-# Pieces per period of the fastest mode when a step is looked into.
-_PIECES = 5.0
-
-
-@_march
-def _finish_impact(counts, numbers, outputs, stiffness, end, tick):
-    """Enter the contact that ends at tick *end* in the statistics, unless nothing was pressed."""
-    deepest = numbers[Numbers.DEEPEST]
-    if deepest > 0.0:
-        duration = (end - counts[Counts.ONSET]) * tick
-        force = contact_force(stiffness, deepest)
-        at = counts[Counts.IMPACTS]
-        if at < outputs.impacts.shape[0]:
-            outputs.impacts[at, 0] = counts[Counts.ONSET] * tick
-            outputs.impacts[at, 1] = duration
-            outputs.impacts[at, 2] = force
-            outputs.impacts[at, 3] = numbers[Numbers.IMPULSE]
-        counts[Counts.IMPACTS] += 1
-        numbers[Numbers.CONTACT_TIME] += duration
-        numbers[Numbers.PEAK_FORCE] = max(numbers[Numbers.PEAK_FORCE], force)
-    counts[Counts.TOUCHING] = 0
-    numbers[Numbers.DEEPEST] = 0.0
-    numbers[Numbers.IMPULSE] = 0.0
-
-
-@_march
-def _safe_for(distance, bound, shaker_speed, acceleration, step):
-    """For how long a signal at *distance* from zero cannot reach it, at most a few steps."""
-    horizon = _TRUST * step
-    speed = _MARGIN * bound + shaker_speed + abs(acceleration) * horizon
-    if speed * horizon <= distance:
-        return horizon
-    return distance / speed
-
-
-@_march
-def _contact_level(clock, elapsed, d, dv):
-    """Halvings of the flight step for a step in contact: graded from the onset and towards the release."""
-    want = _GRADING * elapsed
-    if dv < 0.0:
-        want = min(want, -_RELEASE * d / dv)
-    level = clock.coarsest
-    while level < clock.finest and (clock.step >> level) * clock.tick > want:
-        level += 1
-    return level
-
-
-@_march
-def _flight_level(clock, stretch, stretch_at_rest):
-    """Halvings of the flight step for a beam stretched far beyond its wells."""
-    level = 0
-    reach = _STRETCH * stretch_at_rest
-    while level < clock.finest and stretch_at_rest > 0.0 and abs(stretch) > reach:
-        reach *= 2.0
-        level += 1
-    return level
-
-
-@_march
-def _first_entry(seen, pieces, piece):
-    """When the penetration first becomes positive inside a step that was looked into; -1 if it does not."""
-    for i in range(pieces):
-        rise = first_rise(seen[i, 0], seen[i, 1], seen[i + 1, 0], seen[i + 1, 1], piece)
-        if rise >= 0.0:
-            return (i + rise) * piece
-    return -1.0
-
-
-@_march
-def _count_in_step(counts, numbers, clock, start, length, c, cv, c1, cv1, seen, rest, pieces, piece):
-    """Count zero crossings of the centre in a step, through what was seen inside it."""
-    left, left_rate, begun = c, cv, 0.0
-    i = 1
-    while True:
-        if i < pieces and i * piece < length:
-            right, right_rate, ended = rest + seen[i, 2], seen[i, 3], i * piece
-        else:
-            right, right_rate, ended = c1, cv1, length
-        found, last, side = count_crossings(counts[Counts.SIDE], left, left_rate, right, right_rate, ended - begun)
-        counts[Counts.SIDE] = side
-        if found > 0:
-            when = start * clock.tick + begun + last * (ended - begun)
-            counts[Counts.CROSSINGS] += found
-            numbers[Numbers.LAST_CROSSING] = when
-            if when > clock.last_quarter * clock.tick:
-                counts[Counts.CROSSINGS_LAST_QUARTER] += found
-        if ended >= length:
-            return
-        left, left_rate, begun = right, right_rate, ended
-        i += 1
-
-
-@_march
-def _change_well(memory, blocks, layout, home, q, k, r):
-    """Take the other well as the origin: exact, since the structure is the same about both.
-
-    About the well that the beam is in, the linear flow holds most of the motion of every mode; about
-    the far one, modes faster than the step would be held in place by kicks alone.
-    """
-    for row in range(layout.size):
-        memory[q + row] -= home * memory[layout.shift + row]
-        memory[layout.g + row] = -memory[layout.g + row]
-    gq, qr = tension_rows(memory, blocks, layout, q, r)
-    along_g, along_r = tension_factors(layout.gamma, gq, qr)
-    acceleration_rows(memory, layout, along_g, along_r, r, k)
-    return 2.0 * gq + qr
-
-
-@_march
-def _seen_from(impactor, home, rest):
-    """The shaker as seen from the well *home*: +1 the one the run began in, -1 the other."""
-    return Impactor(
-        impactor.offset + (1.0 - home) * rest, impactor.amplitude, impactor.omega, impactor.stiffness
-    )
 
 
 @_march
@@ -230,8 +76,8 @@ def march(memory, blocks, layout, composition, struck, rests, clock, counts, num
     fastest = struck.omega
     for row in range(size):
         fastest = max(fastest, memory[layout.omega + row])
-    finest_look = _TWO_PI / (_PIECES * fastest)
-    step_pieces = max(4, int(math.ceil(step_time / finest_look)))
+    finest_look = _TWO_PI / (PIECES * fastest)
+    step_pieces = max(4, math.ceil(step_time / finest_look))
     flow_coefficients(memory, layout, step_time / step_pieces, look_slot)
     seen = np.empty((step_pieces + 1, 4))
     shaker_speed = struck.amplitude * struck.omega
@@ -258,17 +104,17 @@ def march(memory, blocks, layout, composition, struck, rests, clock, counts, num
     status = _OK
     while t < clock.end:
         if layout.stretch > 0.0 and c * rest_center < 0.0:
-            stretch = _change_well(memory, blocks, layout, home, q, k, r)
+            stretch = change_well(memory, blocks, layout, home, q, k, r)
             home = -home
-            impactor = _seen_from(struck, home, rests[0])
+            impactor = seen_from(struck, home, rests[0])
             rest_contact, rest_center = home * rests[0], home * rests[1]
         if counts[Counts.STEPS] >= clock.max_steps:
             status = _STEP_LIMIT
             break
         counts[Counts.STEPS] += 1
-        level = _flight_level(clock, stretch, layout.stretch)
+        level = flight_level(clock, stretch, layout.stretch)
         if touching:
-            level = max(level, _contact_level(clock, (t - counts[Counts.ONSET]) * tick, d, dv))
+            level = max(level, contact_level(clock, (t - counts[Counts.ONSET]) * tick, d, dv))
         ticks, at = step >> level, coefficients + level * slot
         if t + ticks > clock.end:
             ticks, at = clock.end - t, cut_slot
@@ -276,8 +122,23 @@ def march(memory, blocks, layout, composition, struck, rests, clock, counts, num
         phase = _TWO_PI * ((t % clock.period) / clock.period)
         length = ticks * tick
         done = take_step(
-            memory, blocks, layout, composition, impactor, at, length, phase, touching, ledger,
-            q, p, k, q1, p1, k1, r,
+            memory,
+            blocks,
+            layout,
+            composition,
+            impactor,
+            at,
+            length,
+            phase,
+            touching,
+            ledger,
+            q,
+            p,
+            k,
+            q1,
+            p1,
+            k1,
+            r,
         )
         w1, wv1, d1, dv1, c1, cv1 = observe(memory, layout, impactor, phase + impactor.omega * length, q1, p1)
         if not math.isfinite(d1 + dv1):
@@ -296,21 +157,21 @@ def march(memory, blocks, layout, composition, struck, rests, clock, counts, num
             if t + ticks > safe_gap:
                 bound = speed_bound(memory, layout, layout.contact, q, p)
                 push = dot(memory, size, layout.contact, k)
-                safe_gap = t + int(_safe_for(-d, bound, shaker_speed, push, step_time) / tick)
+                safe_gap = t + int(safe_for(-d, bound, shaker_speed, push, step_time) / tick)
             if t + ticks > safe_center:
                 bound = speed_bound(memory, layout, layout.center, q, p)
                 push = dot(memory, size, layout.center, k)
-                safe_center = t + int(_safe_for(abs(c), bound, 0.0, push, step_time) / tick)
+                safe_center = t + int(safe_for(abs(c), bound, 0.0, push, step_time) / tick)
             if t + ticks > min(safe_gap, safe_center):
                 look, pieces = look_slot, step_pieces
                 if ticks != step:
                     look += 4 * size
-                    pieces = max(2, int(math.ceil(length / finest_look)))
+                    pieces = max(2, math.ceil(length / finest_look))
                     flow_coefficients(memory, layout, length / pieces, look)
                 piece = length / pieces
                 look_inside(memory, layout, impactor, look, pieces, piece, phase, q, p, k, k1, q2, p2, seen)
                 if t + ticks > safe_gap:
-                    entry = _first_entry(seen, pieces, piece)
+                    entry = first_entry(seen, pieces, piece)
                     if entry >= 0.0:
                         event, cut = True, min(ticks, int(entry / tick))
                         if cut < 1:
@@ -321,8 +182,23 @@ def march(memory, blocks, layout, composition, struck, rests, clock, counts, num
             ticks, length = cut, cut * tick
             prepare(memory, layout, composition, impactor, length, cut_slot)
             done = take_step(
-                memory, blocks, layout, composition, impactor, cut_slot, length, phase, touching, ledger,
-                q, p, k, q1, p1, k1, r,
+                memory,
+                blocks,
+                layout,
+                composition,
+                impactor,
+                cut_slot,
+                length,
+                phase,
+                touching,
+                ledger,
+                q,
+                p,
+                k,
+                q1,
+                p1,
+                k1,
+                r,
             )
             w1, wv1, d1, dv1, c1, cv1 = observe(
                 memory, layout, impactor, phase + impactor.omega * length, q1, p1
@@ -337,8 +213,23 @@ def march(memory, blocks, layout, composition, struck, rests, clock, counts, num
             part = min(max(0.0, outputs.times[sample] - t * tick), length)
             prepare(memory, layout, composition, impactor, part, cut_slot)
             here = take_step(
-                memory, blocks, layout, composition, impactor, cut_slot, part, phase, touching, ledger,
-                q, p, k, q2, p2, k2, r,
+                memory,
+                blocks,
+                layout,
+                composition,
+                impactor,
+                cut_slot,
+                part,
+                phase,
+                touching,
+                ledger,
+                q,
+                p,
+                k,
+                q2,
+                p2,
+                k2,
+                r,
             )
             depth = observe(memory, layout, impactor, phase + impactor.omega * part, q2, p2)[2]
             energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, here[0], here[1])
@@ -365,23 +256,31 @@ def march(memory, blocks, layout, composition, struck, rests, clock, counts, num
                 part = turn * length
                 prepare(memory, layout, composition, impactor, part, cut_slot)
                 take_step(
-                    memory, blocks, layout, composition, impactor, cut_slot, part, phase, True, False,
-                    q, p, k, q2, p2, k2, r,
+                    memory,
+                    blocks,
+                    layout,
+                    composition,
+                    impactor,
+                    cut_slot,
+                    part,
+                    phase,
+                    True,
+                    False,
+                    q,
+                    p,
+                    k,
+                    q2,
+                    p2,
+                    k2,
+                    r,
                 )
                 depth = observe(memory, layout, impactor, phase + impactor.omega * part, q2, p2)[2]
                 deepest = max(deepest, depth)
             numbers[Numbers.DEEPEST] = deepest
         numbers[Numbers.DISSIPATED] += done[5]
-        low, high = extremes(w, wv, w1, wv1, length)
-        numbers[Numbers.MIN_DISPLACEMENT] = min(numbers[Numbers.MIN_DISPLACEMENT], low)
-        numbers[Numbers.MAX_DISPLACEMENT] = max(numbers[Numbers.MAX_DISPLACEMENT], high)
-        low, high = extremes(c, cv, c1, cv1, length)
-        numbers[Numbers.MIN_CENTER] = min(numbers[Numbers.MIN_CENTER], low)
-        numbers[Numbers.MAX_CENTER] = max(numbers[Numbers.MAX_CENTER], high)
+        track_extremes(numbers, w, wv, w1, wv1, c, cv, c1, cv1, length)
         if touching or t + ticks > safe_center:
-            _count_in_step(
-                counts, numbers, clock, t, length, c, cv, c1, cv1, seen, rest_center, pieces, piece
-            )
+            count_in_step(counts, numbers, clock, t, length, c, cv, c1, cv1, seen, rest_center, pieces, piece)
 
         # accept
         q, q1 = q1, q
@@ -393,7 +292,7 @@ def march(memory, blocks, layout, composition, struck, rests, clock, counts, num
         if event:
             safe_gap, safe_center = t, t
             if touching:
-                _finish_impact(counts, numbers, outputs, impactor.stiffness, t, tick)
+                finish_impact(counts, numbers, outputs, impactor.stiffness, t, tick)
                 touching = False
                 d = min(d, 0.0)
             else:
@@ -408,7 +307,7 @@ def march(memory, blocks, layout, composition, struck, rests, clock, counts, num
             status = _DECIDED
             break
     if touching:
-        _finish_impact(counts, numbers, outputs, impactor.stiffness, t, tick)
+        finish_impact(counts, numbers, outputs, impactor.stiffness, t, tick)
     if status == _DECIDED:
         numbers[Numbers.DECIDED_AT] = t * tick
     gq, qr = tension_rows(memory, blocks, layout, q, r)
@@ -418,7 +317,7 @@ def march(memory, blocks, layout, composition, struck, rests, clock, counts, num
         + contact_energy(impactor.stiffness, d)
     )
     if home < 0.0:
-        _change_well(memory, blocks, layout, home, q, k, r)
+        change_well(memory, blocks, layout, home, q, k, r)
     for row in range(size):
         q_end, p_end = memory[q + row], memory[p + row]
         memory[layout.work + row], memory[layout.work + size + row] = q_end, p_end
@@ -426,37 +325,34 @@ def march(memory, blocks, layout, composition, struck, rests, clock, counts, num
 
 
 @_march
-def march_one(
-    memory, blocks, layout, composition, contact_row, start, reals, ticks, coarsest, finest, max_steps,
-    counts, numbers, outputs,
-):
-    """March one run as its columns describe it; *memory* belongs to the caller's thread."""
-    size = layout.size
-    for row in range(size):
-        memory[layout.contact + row] = contact_row[row]
-    for row in range(2 * size):
-        memory[layout.work + row] = start[row]
-    impactor = Impactor(
-        reals[Reals.OFFSET], reals[Reals.AMPLITUDE], reals[Reals.OMEGA], reals[Reals.STIFFNESS]
-    )
-    clock = Clock(
-        reals[Reals.TICK], ticks[Ticks.STEP], ticks[Ticks.PERIOD], ticks[Ticks.END], ticks[Ticks.LAST_QUARTER],
-        coarsest, finest, max_steps,
-        reals[Reals.DECIDE_ENERGY], reals[Reals.DECIDE_REACH], ticks[Ticks.DECIDE_CROSSINGS],
-    )
-    rests = (reals[Reals.REST_CONTACT], reals[Reals.REST_CENTER])
-    march(memory, blocks, layout, composition, impactor, rests, clock, counts, numbers, outputs)
-
-
-@_march
 def march_many(
-    memory, blocks, layout, composition, contact_rows, starts, reals, ticks, coarsest, finest, max_steps,
-    counts, numbers, which, outputs,
+    memory,
+    blocks,
+    layout,
+    composition,
+    contact_rows,
+    starts,
+    reals,
+    ticks,
+    coarsest,
+    finest,
+    max_steps,
+    counts,
+    numbers,
+    which,
+    outputs,
 ):
-    """March the runs *which*, one after the other."""
+    """March the runs *which*, one after the other; *memory* belongs to the caller's thread."""
     for i in which:
-        march_one(
-            memory, blocks, layout, composition, contact_rows[ticks[i, Ticks.CONTACT_ROW]],
-            starts[ticks[i, Ticks.START_ROW]], reals[i], ticks[i], coarsest, finest, max_steps,
-            counts[i], numbers[i], outputs,
+        impactor, clock, rests = set_up(
+            memory,
+            layout,
+            contact_rows[ticks[i, Ticks.CONTACT_ROW]],
+            starts[ticks[i, Ticks.START_ROW]],
+            reals[i],
+            ticks[i],
+            coarsest,
+            finest,
+            max_steps,
         )
+        march(memory, blocks, layout, composition, impactor, rests, clock, counts[i], numbers[i], outputs)

@@ -5,15 +5,17 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.codes import RunStatus
 from snapbeam.kernels.composition import COMPOSITIONS, slot_length
-from snapbeam.kernels.cpu import Outputs, march_many, march_one
+from snapbeam.kernels.cpu import march_many
 from snapbeam.kernels.ensemble import Ensemble
-from snapbeam.kernels.fields import Counts, Numbers, Ticks
+from snapbeam.kernels.fields import Counts, Numbers
+from snapbeam.kernels.march_parts import Outputs
 
 __all__ = ["record", "run_ensemble", "usable_cores"]
 
@@ -57,6 +59,37 @@ def _empty(runs: int) -> tuple[NDArray[np.int64], _Array]:
     return counts, numbers
 
 
+def _march(
+    ensemble: Ensemble,
+    counts: NDArray[np.int64],
+    numbers: _Array,
+    which: NDArray[np.int64],
+    outputs: Outputs,
+) -> None:
+    """March the runs *which* in this thread by the law of impact that the ensemble has."""
+    march: Any = march_many
+    if ensemble.restitution:
+        from snapbeam.kernels.restitution import march_restitution_many as march
+    packed, plan = ensemble.packed, ensemble.plan
+    march(
+        _memory(ensemble),
+        packed.blocks,
+        packed.layout,
+        COMPOSITIONS[plan.order],
+        ensemble.contact_rows,
+        ensemble.starts,
+        ensemble.reals,
+        ensemble.ticks,
+        plan.coarsest,
+        plan.finest,
+        ensemble.max_steps,
+        counts,
+        numbers,
+        which,
+        outputs,
+    )
+
+
 def run_ensemble(
     ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
 ) -> tuple[NDArray[np.int64], _Array]:
@@ -70,7 +103,7 @@ def run_ensemble(
     counts : int64 array of shape (runs, len(Counts))
     numbers : float64 array of shape (runs, len(Numbers))
     """
-    packed, plan = ensemble.packed, ensemble.plan
+    packed = ensemble.packed
     counts, numbers = _empty(ensemble.size)
     work = ensemble.work
     order = np.argsort(-work, kind="stable")
@@ -78,11 +111,7 @@ def run_ensemble(
     chunks = np.split(order, cuts)
 
     def march_chunk(which: NDArray[np.int64]) -> int:
-        march_many(
-            _memory(ensemble), packed.blocks, packed.layout, COMPOSITIONS[plan.order], ensemble.contact_rows,
-            ensemble.starts, ensemble.reals, ensemble.ticks, plan.coarsest, plan.finest, ensemble.max_steps,
-            counts, numbers, which, _nothing(packed.layout.size),
-        )
+        _march(ensemble, counts, numbers, which, _nothing(packed.layout.size))
         return which.size
 
     done = 0
@@ -104,18 +133,14 @@ def record(
     ensemble: Ensemble, run: int, times: _Array, impacts: int, ledger: bool
 ) -> tuple[NDArray[np.int64], _Array, Outputs]:
     """March one run and write down what happens at *times* and in its first *impacts* impacts."""
-    packed, plan = ensemble.packed, ensemble.plan
-    counts, numbers = _empty(1)
-    size = packed.layout.size
+    size = ensemble.packed.layout.size
     outputs = Outputs(
-        times, np.full((times.size, size), np.nan), np.full((times.size, 6), np.nan),
-        np.full((impacts, 4), np.nan), ledger,
+        times,
+        np.full((times.size, size), np.nan),
+        np.full((times.size, 6), np.nan),
+        np.full((impacts, 4), np.nan),
+        ledger,
     )
-    ticks = ensemble.ticks[run]
-    march_one(
-        _memory(ensemble), packed.blocks, packed.layout, COMPOSITIONS[plan.order],
-        ensemble.contact_rows[ticks[Ticks.CONTACT_ROW]], ensemble.starts[ticks[Ticks.START_ROW]],
-        ensemble.reals[run], ticks, plan.coarsest, plan.finest, ensemble.max_steps,
-        counts[0], numbers[0], outputs,
-    )
-    return counts[0], numbers[0], outputs
+    all_counts, all_numbers = _empty(ensemble.size)
+    _march(ensemble, all_counts, all_numbers, np.array([run]), outputs)
+    return all_counts[run], all_numbers[run], outputs

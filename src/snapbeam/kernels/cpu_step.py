@@ -54,7 +54,7 @@ def prepare(memory, layout, composition, impactor, length, at):
 
 @_step
 def observe(memory, layout, impactor, phase, q, p):
-    """Displacement of the contact point from rest and its rate; penetration and its rate; then the centre's."""
+    """Contact point from rest and its rate; penetration and its rate; centre from rest and its rate."""
     sine, cosine = sincos(phase)
     motion, velocity = shaker_motion(impactor.amplitude, impactor.omega, sine, cosine)
     w, rate, c, c_rate = signals(memory, layout, q, p)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from snapbeam.kernels.fields import Reals, Ticks
 from snapbeam.kernels.packing import Packed, pack
 from snapbeam.kernels.plan import Plan
-from snapbeam.model.contact import HertzContact
+from snapbeam.model.contact import HertzContact, Restitution
 from snapbeam.model.decision import decidable_energy
 from snapbeam.model.reduction import ReducedModel
 from snapbeam.validate import InputError
@@ -45,6 +45,8 @@ class Ensemble:
     ticks: NDArray[np.int64]
     """Shape (runs, len(Ticks))."""
     max_steps: int
+    restitution: bool
+    """Whether the stiffness column is a coefficient of restitution: Newton's law of impact, one mode."""
 
     @property
     def size(self) -> int:
@@ -64,9 +66,16 @@ class Start(NamedTuple):
     velocity: _Array
 
 
+def contact_parameter(contact: HertzContact | Restitution | None) -> float:
+    """The one number of a law of impact: contact stiffness, coefficient of restitution, or 0 for none."""
+    if contact is None:
+        return 0.0
+    return contact.coefficient if isinstance(contact, Restitution) else contact.stiffness
+
+
 def make_ensemble(
     model: ReducedModel,
-    contact: HertzContact | None,
+    contact: HertzContact | Restitution | None,
     plan: Plan,
     *,
     frequency_ratio: _Array,
@@ -84,7 +93,7 @@ def make_ensemble(
     With ``contact`` None nothing strikes the beam, and *frequency_ratio* only sets what a cycle is.
     """
     packed = pack(model, side)
-    layout, sign = packed.layout, packed.sign
+    sign = packed.sign
     scale = model.length_scale
     if scale is None:
         model.require_bistable("a run")
@@ -105,7 +114,7 @@ def make_ensemble(
     reals[:, Reals.OFFSET] = (rows @ q)[which] if contact is not None else _FAR_AWAY
     reals[:, Reals.AMPLITUDE] = velocity_amplitude * scale * omega_1 / omega
     reals[:, Reals.OMEGA] = omega
-    reals[:, Reals.STIFFNESS] = 0.0 if contact is None else contact.stiffness
+    reals[:, Reals.STIFFNESS] = contact_parameter(contact)
     rest = sign * (shapes @ packed.equilibrium)[which]
     reals[:, Reals.REST_CONTACT] = rest
     reals[:, Reals.REST_CENTER] = sign * float(model.center_shape @ packed.equilibrium)
@@ -118,9 +127,10 @@ def make_ensemble(
     ticks[:, Ticks.CONTACT_ROW] = which
     ticks[:, Ticks.DECIDE_CROSSINGS] = -1
     reals[:, Reals.DECIDE_ENERGY] = -math.inf
-    if early_decision:
+    newton = isinstance(contact, Restitution)
+    if early_decision and not newton:
         ticks[:, Ticks.DECIDE_CROSSINGS] = cycles // 20
         highest = rest + reals[:, Reals.OFFSET] + reals[:, Reals.AMPLITUDE]
         reals[:, Reals.DECIDE_REACH] = np.maximum(highest, 0.0)
         reals[:, Reals.DECIDE_ENERGY] = decidable_energy(model, location, highest)
-    return Ensemble(packed, plan, rows, np.concatenate((q, p))[None], reals, ticks, max_steps)
+    return Ensemble(packed, plan, rows, np.concatenate((q, p))[None], reals, ticks, max_steps, newton)

@@ -21,7 +21,18 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_model
 
-__all__ = ["WIDTH", "fma", "lanes_sum", "load", "select_less", "splat", "spread_at", "store", "vabs", "vfloor"]
+__all__ = [
+    "WIDTH",
+    "fma",
+    "lanes_sum",
+    "load",
+    "select_less",
+    "splat",
+    "spread_at",
+    "store",
+    "vabs",
+    "vfloor",
+]
 
 WIDTH = 8
 
@@ -137,14 +148,14 @@ def spread(value: Any) -> Any:
 
 
 @overload(spread)
-def _spread(value):  # type: ignore[no-untyped-def]
+def _spread(value):
     if _is_lanes(value):
         return lambda value: value
     return lambda value: splat(value)
 
 
 @overload(fma)
-def _fma(a, b, c):  # type: ignore[no-untyped-def]
+def _fma(a, b, c):
     if any(map(_is_lanes, (a, b, c))):
         return lambda a, b, c: _lanes_fma(spread(a), spread(b), spread(c))
     return lambda a, b, c: _scalar_fma(a, b, c)
@@ -156,7 +167,7 @@ def select_less(a: Any, b: Any, yes: Any, no: Any) -> Any:
 
 
 @overload(select_less)
-def _select_less(a, b, yes, no):  # type: ignore[no-untyped-def]
+def _select_less(a, b, yes, no):
     if any(map(_is_lanes, (a, b, yes, no))):
         return lambda a, b, yes, no: _lanes_select(spread(a), spread(b), spread(yes), spread(no))
     return lambda a, b, yes, no: yes if a < b else no
@@ -217,7 +228,7 @@ def _arithmetic(python_operator: Any, llvm_name: str) -> None:
         return LANES(LANES, LANES), codegen
 
     @overload(python_operator)
-    def implementation(a, b):  # type: ignore[no-untyped-def]
+    def implementation(a, b):
         if isinstance(a, Lanes) and isinstance(b, Lanes):
             return lambda a, b: lanewise(a, b)
         if isinstance(a, Lanes) and isinstance(b, (types.Float, types.Integer)):

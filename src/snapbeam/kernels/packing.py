@@ -110,5 +110,6 @@ def pack(model: ReducedModel, side: str) -> Packed:
         np.concatenate(strips),
     ]
     starts = np.concatenate(([0], np.cumsum([piece.size for piece in pieces])))
-    layout = Layout(size, *(int(start) for start in starts), gamma=float(model.tension_stiffness), stretch=float(equilibrium @ equilibrium))
+    stretch = float(equilibrium @ equilibrium)
+    layout = Layout._make((size, *map(int, starts), float(model.tension_stiffness), stretch))
     return packed._replace(memory=np.concatenate(pieces), layout=layout)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from snapbeam.model.contact import HertzContact
+from snapbeam.model.contact import HertzContact, Restitution
 from snapbeam.model.reduction import ReducedModel
 from snapbeam.validate import choice, positive
 
@@ -17,6 +17,8 @@ __all__ = ["ACCURACIES", "Plan", "plan_steps"]
 # flow is exact, for the rate at which the tension detunes the modes (radians per step).
 _FASTEST = 0.3
 _DETUNING = 0.0248
+_FREE_SHARE = 1.0 / 16.0
+"""Of the reference period, for a structure without stiffness."""
 # Contact: longest step over the duration of an impact at the speed 0.2 b omega_1, and how many halvings below
 # it the shortest step is, by order.
 _CONTACT_SHARE = 1.0 / 6.0
@@ -51,7 +53,7 @@ def _detuning_rate(model: ReducedModel) -> float:
 
 def plan_steps(
     model: ReducedModel,
-    contact: HertzContact | None,
+    contact: HertzContact | Restitution | None,
     location: float,
     *,
     step: float | None = None,
@@ -73,8 +75,10 @@ def plan_steps(
     limits = [_FASTEST / fastest if fastest > 0.0 else math.inf]
     limits.append(_DETUNING / detuning if detuning > 0.0 else 0.0 if fastest > 0.0 else math.inf)
     flight = max(limits)
+    if math.isinf(flight):
+        flight = _FREE_SHARE / model.reference_freq
     impact = flight
-    if contact is not None:
+    if isinstance(contact, HertzContact):
         mass = model.contact_mass(location)
         speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_freq
         impact = _CONTACT_SHARE * contact.impact_duration(mass, speed)

@@ -63,7 +63,7 @@ def least_energy_at(model: ReducedModel, location: ArrayLike, displacement: Arra
 
 
 def _pinned(square: NDArray[np.float64], k0: NDArray[np.float64]) -> float:
-    """Load, less P, that buckles the beam pinned at the point: S_1's first zero or the lowest untouched mode."""
+    """Load, less P, that buckles the beam pinned at the point: S_1's first zero, or an untouched mode."""
     from scipy.optimize import brentq
 
     touched = square > 1e-20 * square.max()
