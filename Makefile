@@ -1,0 +1,74 @@
+# make map   sets up an environment and computes the map of response types (map.nc, map.png)
+# make test  sets up everything the tests need and runs them
+
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+
+# Of the map; override on the command line, e.g. make map MODES=1 CYCLES=1000
+MODES ?= 32
+CYCLES ?= 200
+FREQUENCY_RATIO ?= 0.1:4:64
+VELOCITY_AMPLITUDE ?= 0.01:0.65:40
+LOCATION ?= 0.47619
+MAP ?= map.nc
+PLOT ?= map.png
+
+.PHONY: help map test test-slow lint docs bench clean
+
+help:
+	@echo "make map        compute the response map ($(MAP), $(PLOT)); variables: MODES CYCLES FREQUENCY_RATIO"
+	@echo "                VELOCITY_AMPLITUDE LOCATION MAP PLOT"
+	@echo "make test       lint, types, import contracts and the tests"
+	@echo "make test-slow  the tests that take longer"
+	@echo "make docs       the documentation, in docs/_build/html"
+	@echo "make bench      the benchmarks"
+	@echo "make clean      remove what was built (not the environment, not results)"
+
+$(BIN)/python:
+	$(PYTHON) -m venv $(VENV)
+
+# One stamp per set of packages: a second make installs nothing again.
+$(VENV)/.installed-run: pyproject.toml constraints.txt | $(BIN)/python
+	$(PIP) install --constraint constraints.txt --editable .
+	@touch $@
+
+$(VENV)/.installed-test: pyproject.toml constraints.txt $(VENV)/.installed-run
+	$(PIP) install --constraint constraints.txt --editable ".[dev,lab,cluster,video]"
+	@touch $@
+
+$(VENV)/.installed-docs: pyproject.toml constraints.txt $(VENV)/.installed-run
+	$(PIP) install --constraint constraints.txt --editable ".[docs,lab,cluster,video]"
+	@touch $@
+
+$(VENV)/.installed-bench: pyproject.toml constraints.txt $(VENV)/.installed-test
+	$(PIP) install --constraint constraints.txt --editable ".[bench]"
+	@touch $@
+
+map: $(VENV)/.installed-run
+	$(BIN)/snapbeam map --modes $(MODES) --cycles $(CYCLES) --frequency-ratio $(FREQUENCY_RATIO) \
+		--velocity-amplitude $(VELOCITY_AMPLITUDE) --location $(LOCATION) -o $(MAP) --plot $(PLOT)
+
+lint: $(VENV)/.installed-test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: lint
+	$(BIN)/python -m pytest -m "not slow" --durations=15
+
+test-slow: $(VENV)/.installed-test
+	$(BIN)/python -m pytest -m slow --durations=15
+
+docs: $(VENV)/.installed-docs
+	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html
+
+bench: $(VENV)/.installed-bench
+	$(BIN)/python -m benchmarks
+
+clean:
+	rm -rf build dist docs/_build docs/gallery docs/sg_execution_times.rst .pytest_cache .mypy_cache \
+		.ruff_cache .import_linter_cache .hypothesis
+	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,54 @@
+"""The program: its commands, its version and how it ends."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from snapbeam.cli.frequencies import frequencies
+from snapbeam.cli.info import info
+from snapbeam.cli.map import compute_map
+from snapbeam.cli.paper import paper
+from snapbeam.cli.plot import plot
+from snapbeam.cli.simulate import simulate
+from snapbeam.provenance import __version__
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="snapbeam",
+    help="Impact dynamics of bistable buckled beams: what a shaker that hits a buckled beam makes it do.",
+    epilog="Every parameter left out takes the value of Rouleau et al., J. Sound Vib. (2024), 118291.",
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("map")(compute_map)
+app.command("simulate")(simulate)
+app.command("frequencies")(frequencies)
+app.command("plot")(plot)
+app.command("paper")(paper)
+app.command("info")(info)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"snapbeam {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _program(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version and stop.", callback=_print_version, is_eager=True),
+    ] = False,
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the program on the arguments of the process."""
+    app()

@@ -1,0 +1,139 @@
+"""``snapbeam calibrate``: the model's beam from measured frequencies, decays and collisions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from snapbeam.cli import lab
+from snapbeam.cli import options as opt
+from snapbeam.cli.console import door, file_line, out
+
+__all__ = ["calibrate"]
+
+_MEASURED = "Measured (instead of, or beside, the file)"
+_FIT = "Fit"
+
+
+def _list_option(about: str) -> Any:
+    return typer.Option(help=about, metavar="F,F", rich_help_panel=_MEASURED)
+
+
+@door
+def calibrate(
+    ctx: typer.Context,
+    measurements: Annotated[
+        Path | None,
+        typer.Argument(help="TOML file with a section named measured.", metavar="[MEASUREMENTS]"),
+    ] = None,
+    straight: Annotated[
+        str | None, _list_option("Natural frequencies without load, Hz.")
+    ] = None,
+    lower_well: Annotated[str | None, _list_option("About the lower well, Hz.")] = None,
+    upper_well: Annotated[str | None, _list_option("About the upper well, Hz.")] = None,
+    damping: Annotated[str | None, _list_option("Damping ratios from free decays.")] = None,
+    frequency_se: Annotated[
+        float | None, opt.number_option("Standard error of these frequencies, Hz (0.5 %).", _MEASURED)
+    ] = None,
+    measured_thickness: Annotated[
+        float | None, opt.number_option("Thickness by gauge, m, to compare with.", _MEASURED)
+    ] = None,
+    measured_buckling_level: Annotated[
+        float | None, opt.number_option("Buckling level by gauge, m, to compare with.", _MEASURED)
+    ] = None,
+    config: opt.ConfigFile = None,
+    fit: Annotated[
+        str | None,
+        typer.Option(
+            help="What to fit, among thickness, young_modulus, density, length, buckling_level; by default "
+            "what the measurements ask for.",
+            metavar="NAME,NAME", rich_help_panel=_FIT,
+        ),
+    ] = None,
+    modes: opt.Modes = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="TOML file for snapbeam map --config to write.",
+            metavar="FILE", rich_help_panel="Output",
+        ),
+    ] = None,
+    plot: opt.Plot = None,
+    report: lab.Report = None,
+) -> None:  # fmt: skip
+    """Fit thickness and buckling level to measured natural frequencies, and say what the data leave open.
+
+    Parameters that are not fitted come from --config, or from the measurements' own section beam, or are the
+    paper's.
+
+    Example: snapbeam calibrate --straight 80,221 --lower-well 81.3 --upper-well 80.5 --measured-thickness
+    0.44e-3 --measured-buckling-level 0.5e-3 -o beam.toml
+    """
+    from rich.table import Table
+
+    from snapbeam.config import config_from_mapping, override
+    from snapbeam.experiment.calibration import Measurements, load_measurements
+    from snapbeam.experiment.calibration import calibrate as fit_beam
+    from snapbeam.experiment.calibration_words import with_error
+    from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
+    from snapbeam.files import check_writable
+    from snapbeam.validate import InputError
+
+    for name, path, suffixes in (
+        ("output", output, (".toml",)), ("plot", plot, FIGURE_SUFFIXES), ("json", report, (".json",)),
+    ):  # fmt: skip
+        if path is not None:
+            check_writable(path, name, suffixes)
+    settings = opt.configured({"config": config, "modes": modes})
+    given: dict[str, Any] = {}
+    if measurements is not None:
+        from_file, sections = load_measurements(measurements)
+        given = {name: getattr(from_file, name) for name in from_file.__dataclass_fields__}
+        config_from_mapping(sections, str(measurements))
+        settings = override(settings, sections)
+    for name, text in (
+        ("straight_freq", straight), ("lower_well_freq", lower_well), ("upper_well_freq", upper_well),
+        ("damping_ratio", damping),
+    ):  # fmt: skip
+        if text is not None:
+            given[name] = lab.numbers(name, text)
+            given[f"{name}_se"] = frequency_se if "freq" in name else None
+    for name, value in (("thickness", measured_thickness), ("buckling_level", measured_buckling_level)):
+        if value is not None:
+            given[name] = value
+    if not given:
+        raise InputError("measurements: give a TOML file, or frequencies as options; see --help")
+    chosen = tuple(name.strip() for name in fit.split(",")) if fit else None
+    result = fit_beam(Measurements(**given), settings.beam.build(), fit=chosen, modes=settings.model.modes)
+    console = out()
+    for name in result.values:
+        console.print(f"  {name:<20}{with_error(result, name)}")
+    if result.damping_ratio is not None:
+        console.print(f"  {'damping_ratio':<20}{result.damping_ratio:.5g} +- {result.damping_ratio_se:.2g}")
+    if result.contact_stiffness is not None:
+        told = f"{result.contact_stiffness:.4g} +- {result.contact_stiffness_se:.2g} N/m^1.5"
+        console.print(f"  {'contact stiffness':<20}{told}")
+    table = Table(box=None, pad_edge=False)
+    for title in ("", "measured (Hz)", "model (Hz)", "difference (standard errors)"):
+        table.add_column(title, justify="right" if title else "left")
+    for item in result.residuals:
+        measured = f"{item.measured:.4g} +- {item.standard_error:.2g}"
+        table.add_row(item.name, measured, f"{item.model:.3f}", f"{item.deviation:+.2f}")
+    console.print(table)
+    for text in result.findings:
+        console.print(f"- {text}")
+    for text in result.warnings:
+        console.print(f"[yellow]beware:[/] {text}")
+    if output is not None:
+        result.write_config(output)
+        console.print(f"Written: {file_line(output)}")
+    if plot is not None:
+        from snapbeam.figures.calibration import plot_calibration
+
+        save_figure(plot_calibration(result), plot)
+        console.print(f"Written: {file_line(plot)}")
+    if report is not None:
+        lab.write_report(report, result.summary())
+        console.print(f"Written: {file_line(report)}")

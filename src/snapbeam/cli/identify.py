@@ -1,0 +1,106 @@
+"""``snapbeam identify``: natural frequencies and damping ratios from a free decay."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from snapbeam.cli import lab
+from snapbeam.cli import options as opt
+from snapbeam.cli.console import door, file_line, out
+
+__all__ = ["identify"]
+
+_DECAY = "Decay"
+
+
+@door
+def identify(
+    signal: lab.SignalFile,
+    modes: Annotated[int, opt.count_option("How many modes to look for (1).", _DECAY)] = 1,
+    frequencies: Annotated[
+        str | None,
+        typer.Option(
+            help="Rough frequencies of the modes, Hz, instead of --modes.",
+            metavar="F,F",
+            rich_help_panel=_DECAY,
+        ),
+    ] = None,
+    method: Annotated[
+        str, typer.Option(help="fit, hilbert, log_decrement, or all.", rich_help_panel=_DECAY)
+    ] = "fit",
+    start: Annotated[float | None, opt.number_option("Start of the free decay, s.", _DECAY)] = None,
+    stop: Annotated[float | None, opt.number_option("End of the free decay, s.", _DECAY)] = None,
+    soften: Annotated[
+        bool,
+        typer.Option("--soften/--linear", help="Let frequency depend on amplitude.", rich_help_panel=_DECAY),
+    ] = True,
+    buckling_level: Annotated[
+        float | None,
+        opt.number_option("b, m: hold the softening near that of one mode, 0.75 (a/b)^2.", _DECAY),
+    ] = None,
+    channel: lab.Channel = None,
+    units: lab.Units = None,
+    sensitivity: lab.Sensitivity = None,
+    sampling_freq: lab.SamplingFreq = None,
+    plot: opt.Plot = None,
+    report: lab.Report = None,
+) -> None:
+    """Identify natural frequency, damping ratio and softening from a free decay, with standard errors.
+
+    The frequency is that of vanishing amplitude: about a well a buckled beam softens.
+
+    Example: snapbeam identify decay.csv --start 0.12 --method all --plot decay.png --json lower.json
+    """
+    from rich.table import Table
+
+    from snapbeam.experiment.identification import METHODS, identify_decay
+    from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
+    from snapbeam.files import check_writable
+    from snapbeam.validate import choice
+
+    if plot is not None:
+        check_writable(plot, "plot", FIGURE_SUFFIXES)
+    if report is not None:
+        check_writable(report, "json", (".json",))
+    choice("method", method, (*METHODS, "all"))
+    data = lab.open_signal(signal, channel, units, sensitivity, sampling_freq)
+    rough = lab.numbers("frequencies", frequencies) or None
+    fits = {
+        name: identify_decay(
+            data, modes=modes, frequencies=rough, method=name, start=start, stop=stop, soften=soften,
+            buckling_level=buckling_level,
+        )
+        for name in (METHODS if method == "all" else (method,))
+    }  # fmt: skip
+    first = next(iter(fits.values()))
+    console = out()
+    console.print(
+        f"{signal.name}: {first.start:.4g} to {first.stop:.4g} s, {first.snr:.1f} dB above noise at the start"
+    )
+    table = Table(box=None, pad_edge=False)
+    for title in ("method", "mode", "frequency (Hz)", "damping (%)", "amplitude", "softening"):
+        table.add_column(title, justify="left" if title == "method" else "right", no_wrap=True)
+    for name, fit in fits.items():
+        for i, mode in enumerate(fit.modes):
+            table.add_row(
+                name if i == 0 else "",
+                str(i + 1),
+                f"{mode.natural_freq:.4f} +- {mode.natural_freq_se:.4f}",
+                f"{100 * mode.damping_ratio:.4f} +- {100 * mode.damping_ratio_se:.4f}",
+                f"{mode.amplitude:.4g} {fit.units}",
+                f"{mode.softening * mode.amplitude**2:.4f}" if i == 0 else "",
+            )
+    console.print(table)
+    console.print("softening: relative fall of the first frequency at the starting amplitude")
+    for note in dict.fromkeys(note for fit in fits.values() for note in fit.notes):
+        console.print(f"[yellow]note[/] {note}")
+    if plot is not None:
+        from snapbeam.figures.identification import plot_decay
+
+        save_figure(plot_decay(data, first), plot)
+        console.print(f"Written: {file_line(plot)}")
+    if report is not None:
+        lab.write_report(report, {name: fit.summary() for name, fit in fits.items()})
+        console.print(f"Written: {file_line(report)}")

@@ -1,0 +1,100 @@
+"""What the laboratory commands share: the options of a signal file, and reports as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from snapbeam.cli import options as opt
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "Channel", "Report", "SamplingFreq", "Sensitivity", "SignalFile", "Units", "numbers", "open_signal",
+    "write_report",
+]  # fmt: skip
+
+_SIGNAL = "Signal"
+_OUTPUT = "Output"
+
+SignalFile = Annotated[
+    Path,
+    typer.Argument(help="CSV, WAV, UFF-58, TDMS, HDF5 or NumPy file of a time series.", metavar="SIGNAL"),
+]
+Channel = Annotated[
+    str | None,
+    typer.Option(help="Name of the channel, or its number from 0.", rich_help_panel=_SIGNAL, metavar="NAME"),
+]
+Units = Annotated[
+    str | None,
+    typer.Option(
+        help="Unit of the numbers where the file does not say, such as mm/s.", rich_help_panel=_SIGNAL
+    ),
+]
+Sensitivity = Annotated[
+    str | None,
+    typer.Option(
+        help="What a volt, or full scale (FS) of a sound file, stands for: '125 mm/s/V', '0.5 m/s/FS'.",
+        rich_help_panel=_SIGNAL,
+    ),
+]
+SamplingFreq = Annotated[
+    float | None,
+    opt.number_option("Samples per second, Hz, where the file does not say.", _SIGNAL),
+]
+Report = Annotated[
+    Path | None,
+    typer.Option(
+        "--json", help="JSON file of the figures to write.", rich_help_panel=_OUTPUT, metavar="FILE"
+    ),
+]
+
+
+def open_signal(
+    path: Path, channel: str | None, units: str | None, sensitivity: str | None, sampling_freq: float | None
+) -> xr.DataArray:
+    """Read a signal; a channel given as a whole number is counted, unless one has that name."""
+    from snapbeam.experiment.signal_files import read_channels, read_signal
+
+    chosen: str | int | None = channel
+    if channel is not None and channel.isdigit():
+        names = [entry["name"] for entry in read_channels(path, sampling_freq)]
+        chosen = channel if channel in names else int(channel)
+    return read_signal(path, chosen, units=units, sensitivity=sensitivity, sampling_freq=sampling_freq)
+
+
+def numbers(name: str, text: str | None) -> tuple[float, ...]:
+    """Return numbers separated by commas; none if there is no text."""
+    from snapbeam.validate import InputError
+
+    if text is None:
+        return ()
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"{name} = {text!r}: must be numbers separated by commas") from None
+
+
+def write_report(path: Path, summary: dict[str, Any]) -> None:
+    """Write plain numbers and words to a JSON file, whole or not at all; what is not finite becomes null."""
+    from snapbeam.files import atomic_path, check_writable
+
+    target = check_writable(path, "json", (".json",))
+    with atomic_path(target) as temporary:
+        text = json.dumps(_plain(summary), indent=2, ensure_ascii=False, allow_nan=False)
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value

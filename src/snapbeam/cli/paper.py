@@ -1,0 +1,102 @@
+"""``snapbeam paper``: a figure of the paper, or the table of its claims, from nothing."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snapbeam.cli import options as opt
+from snapbeam.cli.console import door, duration, errors, file_line, out
+
+__all__ = ["paper"]
+
+
+@door
+def paper(
+    figure: Annotated[
+        str,
+        typer.Argument(
+            help="fig2 to fig8, figA9, figB10, si5 (an animation), low_frequency, sensitivity, claims (the table of "
+            "what the paper says and what is measured), or all.",
+            metavar="FIGURE",
+        ),
+    ],
+    full: Annotated[
+        bool,
+        typer.Option(
+            "--full/--quick", help="At the size of the paper, some up to an hour, or as a sketch in seconds."
+        ),
+    ] = False,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="Folder to write to; made if missing.", metavar="DIR")
+    ] = Path(),
+    data: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of data computed before (fig6.nc, ...), to draw and measure from; what is not there is "
+            "computed.",
+            metavar="DIR",
+        ),
+    ] = None,
+    dots: opt.Dots = None,
+    measured: Annotated[
+        list[Path] | None,
+        typer.Option(help="NetCDF file of a measured run, three times, for fig4.", metavar="FILE"),
+    ] = None,
+) -> None:
+    """Compute and draw a figure of the paper, or measure its claims.
+
+    Example: snapbeam paper fig6 --full -o figures
+    """
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from snapbeam.paper import FIGURES, Results
+    from snapbeam.paper.claims import write_claims
+    from snapbeam.validate import InputError, choice
+
+    choice("figure", figure, (*FIGURES, "claims", "all"))
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"output = {str(output)!r}: cannot be made, {error.strerror or error}") from error
+    size = "full" if full else "quick"
+    results = Results(size, read=data, write=output if full else None, progress=_Tell())
+    names = [name for name in FIGURES if figure in (name, "all")]
+    for name in names:
+        start = time.monotonic()
+        given = {"dots": dots} if dots is not None and name in ("fig6", "fig7", "fig8") else {}
+        if measured and name == "fig4":
+            given["measured"] = [str(file) for file in measured]
+        files = FIGURES[name].write(output, results=results, **given)
+        out().print(f"{name}: {FIGURES[name].about} ({size}, {duration(time.monotonic() - start)})")
+        for file in files:
+            out().print(f"  {file_line(file)}")
+    if dots is not None and not {"fig6", "fig7", "fig8"} & set(names):
+        raise InputError(f"dots: {figure} shows no measured responses; fig6, fig7 and fig8 do")
+    if figure in ("claims", "all"):
+        rows, files = write_claims(output, results)
+        verdicts = [row.verdict for row in rows]
+        counts = ", ".join(f"{verdicts.count(kind)} {kind}" for kind in dict.fromkeys(verdicts))
+        out().print(f"claims ({size}): {counts}")
+        for file in files:
+            out().print(f"  {file_line(file)}")
+
+
+class _Tell:
+    """Says on standard error how far each map is, a line for each tenth of the work."""
+
+    def __init__(self) -> None:
+        self.tenths: dict[str, int] = {}
+        self.start: dict[str, float] = {}
+
+    def __call__(self, what: str, done: int, total: int) -> None:
+        self.start.setdefault(what, time.monotonic())
+        tenths = 10 * done // total if total else 10
+        if tenths > self.tenths.get(what, 0):
+            self.tenths[what] = tenths
+            elapsed = duration(time.monotonic() - self.start[what])
+            errors().print(f"{what}: {done} of {total}, {elapsed}")

@@ -1,0 +1,170 @@
+"""What a map and a run say, for a person to read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.markup import escape
+from rich.table import Table
+
+from snapbeam.cli.console import duration, file_line
+from snapbeam.codes import ResponseClass, RunStatus
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "class_table",
+    "deepest_notch",
+    "lowest_interwell",
+    "map_summary",
+    "parameter_table",
+    "status_lines",
+]
+
+_AXES = ("frequency_ratio", "velocity_amplitude", "location")
+
+
+def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | None = None) -> RenderableType:
+    """Return the classes, the lowest interwell amplitude, what failed, the files and what to try next."""
+    attrs = dataset.attrs
+    runs = dataset["response"].size
+    head = (
+        f"{_count(runs, 'run')} of {_count(attrs['modes'], 'mode')} over {_count(attrs['cycles'], 'cycle')}"
+    )
+    if elapsed is not None:
+        head += f" in {duration(elapsed)} ({runs / max(elapsed, 1e-9):.3g} runs/s)"
+    lines = [head]
+    low = lowest_interwell(dataset)
+    if low is None:
+        lines_after = ["No run snapped through: raise the velocity amplitude."]
+    else:
+        lines_after = [f"Lowest interwell velocity amplitude: {_where(low, attrs)}"]
+        notch = deepest_notch(dataset)
+        if notch is not None:
+            lines_after.append(f"Deepest notch of the threshold: {_where(notch, attrs)}")
+            low = notch
+    lines_after += status_lines(dataset)
+    lines_after += [f"Written: {file_line(path)}" for path in files]
+    lines_after += ["Next:", *(f"  {line}" for line in _suggestions(dataset, files, low))]
+    return Group(*lines, class_table(dataset), *lines_after)
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def class_table(dataset: xr.Dataset) -> Table:
+    """Return the number and the share of runs of each class."""
+    kinds = np.asarray(dataset["response"].values)
+    table = Table(box=None, pad_edge=False)
+    table.add_column("response")
+    table.add_column("runs", justify="right")
+    table.add_column("share", justify="right")
+    for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
+        count = int((kinds == kind).sum())
+        if count or kind is not ResponseClass.UNKNOWN:
+            table.add_row(kind.label, str(count), f"{100.0 * count / kinds.size:.1f} %")
+    return table
+
+
+def lowest_interwell(dataset: xr.Dataset) -> dict[str, float] | None:
+    """Return the coordinates of the interwell run of least velocity amplitude, or None."""
+    response = dataset["response"]
+    coordinates = np.broadcast_arrays(
+        *(dataset[name].broadcast_like(response).transpose(*response.dims).values for name in _AXES)
+    )
+    interwell = response.values >= ResponseClass.TRANSIENT_1
+    if not interwell.any():
+        return None
+    at = np.unravel_index(np.argmin(np.where(interwell, coordinates[1], np.inf)), response.shape)
+    return {name: float(values[at]) for name, values in zip(_AXES, coordinates, strict=True)}
+
+
+def deepest_notch(dataset: xr.Dataset) -> dict[str, float] | None:
+    """Return where the interwell threshold over frequency dips deepest, or None if it has no dip.
+
+    The depth of a dip is its prominence: how far the threshold rises on both sides before it falls lower.
+    """
+    from scipy.signal import find_peaks
+
+    response = dataset["response"].squeeze()
+    if set(response.dims) != {"frequency_ratio", "velocity_amplitude"}:
+        return None
+    velocity = dataset["velocity_amplitude"]
+    interwell = response >= ResponseClass.TRANSIENT_1
+    threshold = velocity.where(interwell).min("velocity_amplitude").fillna(float(velocity.max())).values
+    dips, shape = find_peaks(-threshold, prominence=float(np.ptp(velocity.values)) / 50.0)
+    if not dips.size:
+        return None
+    at = dips[np.argmax(shape["prominences"])]
+    place = {
+        "frequency_ratio": float(dataset["frequency_ratio"][at]),
+        "velocity_amplitude": float(threshold[at]),
+    }
+    return place | {"location": float(dataset["location"].squeeze())}
+
+
+def _where(point: dict[str, float], attrs: dict[str, Any]) -> str:
+    omega, velocity, location = (point[name] for name in _AXES)
+    text = f"V = {velocity:.4g} at Omega = {omega:.4g}, x_s = {location:.4g}"
+    freq, level = attrs.get("reference_freq"), attrs.get("beam_buckling_level")
+    if freq and level:
+        text += f" ({2e3 * np.pi * freq * level * velocity:.3g} mm/s at {omega * freq:.4g} Hz)"
+    return text
+
+
+def status_lines(dataset: xr.Dataset) -> list[str]:
+    """Return one line for each way runs failed, with what to do about it."""
+    if "status" not in dataset:
+        return []
+    codes = np.asarray(dataset["status"].values)
+    lines = []
+    for status in RunStatus:
+        count = int((codes == status).sum())
+        if count and status not in (RunStatus.OK, RunStatus.DECIDED):
+            lines.append(f"[bold red]{count} failed[/] ({status.name}): {status.advice}")
+    decided = int((codes == RunStatus.DECIDED).sum())
+    if decided:
+        lines.append(f"{decided} of {codes.size} runs ended early, their class being certain.")
+    return lines
+
+
+def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, float] | None) -> list[str]:
+    common = f"--modes {dataset.attrs['modes']} --cycles {dataset.attrs['cycles']}"
+    lines = []
+    if low is not None:
+        omega, velocity, location = (low[name] for name in _AXES)
+        lines.append(
+            f"see that run      snapbeam simulate {common} --frequency-ratio {omega:.4g} "
+            f"--velocity-amplitude {velocity:.4g} --location {location:.5g} --plot run.png"
+        )
+        if dataset.sizes.get("frequency_ratio", 1) > 1 and dataset.sizes.get("velocity_amplitude", 1) > 1:
+            lines.append(
+                f"look closer       snapbeam map {common} "
+                f"--frequency-ratio {0.8 * omega:.3g}:{1.2 * omega:.3g}:40 "
+                f"--velocity-amplitude {0.5 * velocity:.3g}:{2.0 * velocity:.3g}:40 "
+                f"--location {location:.5g} -o closer.nc --plot closer.png"
+            )
+    if files:
+        lines.append(f"draw it again     snapbeam plot {escape(str(files[0]))} --threshold-line -o map.pdf")
+        lines.append(
+            f'open it           python -c "import xarray; print(xarray.open_dataset({str(files[0])!r}))"'
+        )
+    return lines
+
+
+def parameter_table(attrs: dict[str, Any]) -> Table:
+    """Return the attributes of a file, one a row."""
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, value in attrs.items():
+        table.add_row(
+            str(name), escape(f"{value:.10g}" if isinstance(value, (float, np.floating)) else str(value))
+        )
+    return table

@@ -1,0 +1,18 @@
+"""Pictures of results; they compute nothing."""
+
+from snapbeam.figures.dots import Dots, read_dots
+from snapbeam.figures.response_map import class_handles, plot_response_map
+from snapbeam.figures.run import plot_run
+from snapbeam.figures.style import CLASS_COLORS, house_style, new_figure, save_figure
+
+__all__ = [
+    "CLASS_COLORS",
+    "Dots",
+    "class_handles",
+    "house_style",
+    "new_figure",
+    "plot_response_map",
+    "plot_run",
+    "read_dots",
+    "save_figure",
+]

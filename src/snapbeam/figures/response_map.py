@@ -1,0 +1,220 @@
+"""The map of response types over two of frequency, amplitude and location (Figs. 6-8 of the paper)."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from snapbeam.codes import ResponseClass
+from snapbeam.figures.dots import Dots
+from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_figure
+from snapbeam.model.drive import quasi_static_threshold
+from snapbeam.validate import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["class_handles", "plot_response_map"]
+
+_Array = NDArray[np.float64]
+
+AXES = ("frequency_ratio", "location", "velocity_amplitude")
+"""Coordinates of a map; the one that comes first here is drawn across, the other upward."""
+
+_LABELS = {
+    "frequency_ratio": r"Excitation frequency $\Omega$",
+    "location": r"Shaker location $x_\mathrm{s}$",
+    "velocity_amplitude": r"Velocity amplitude $V$",
+}
+_SYMBOLS = {"frequency_ratio": r"$\Omega$", "location": r"$x_\mathrm{s}$", "velocity_amplitude": "$V$"}
+_NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
+
+
+def plot_response_map(
+    dataset: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    dots: Dots | None = None,
+    threshold_line: bool = False,
+    legend: bool = True,
+) -> Axes:
+    """Draw the response class of every run of a map as one cell.
+
+    Cell borders lie midway between the points of an axis, the outermost as far out as the next one in (but
+    not below zero, nor beyond the end of the beam).
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A map with two axes of more than one point among ``frequency_ratio``, ``location`` and
+        ``velocity_amplitude``, and the variable ``response``.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure one column wide by default.
+    dots : Dots, optional
+        Measured responses, drawn as dots in the colours of their classes.  Those measured at another value
+        of the map's fixed coordinate (by more than 2 %) are left out, with a warning.
+    threshold_line : bool
+        Whether to draw the quasi-static threshold V_QS1 of one mode (Eq. 21), dashed.
+    legend : bool
+        Whether to say below the map what the colours mean, and how many of the runs have each.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset is no map of two axes.
+    """
+    across, upward, kinds = _two_axes(dataset)
+    x, y = (np.asarray(dataset[name].values, dtype=np.float64) for name in (across, upward))
+    edges = _edges(x, across), _edges(y, upward)
+    fixed = {name: _scalar(dataset, name) for name in AXES if name not in (across, upward)}
+    with house_style():
+        own = new_figure("single", 92.0 if legend else 70.0) if ax is None else None
+        if own is not None:
+            ax = own.add_subplot()
+        assert ax is not None
+        order = sorted(CLASS_COLORS)
+        ax.pcolormesh(
+            edges[0],
+            edges[1],
+            kinds,
+            cmap=ListedColormap([CLASS_COLORS[kind] for kind in order]),
+            norm=BoundaryNorm(np.arange(order[0] - 0.5, order[-1] + 1.0), len(order)),
+            rasterized=True,
+        )
+        ax.set(xlabel=_LABELS[across], ylabel=_LABELS[upward])
+        fix_ticks(ax)
+        ax.set_title(_subtitle(dataset, fixed), loc="left")
+        handles = class_handles(kinds)
+        ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+        if threshold_line:
+            handles.append(_draw_threshold(ax, across, upward, fixed))
+        if dots is not None:
+            handles.append(_draw_dots(ax, dots, across, upward, fixed))
+        if legend and own is not None:
+            own.legend(handles=handles, loc="outside lower center", ncols=2)
+        elif legend:
+            ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2)
+    return ax
+
+
+def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
+    if "response" not in dataset:
+        raise InputError(f"no map: it has no variable 'response' among {list(map(str, dataset.variables))}")
+    response = dataset["response"].squeeze()
+    named = [name for name in AXES if name in response.dims]
+    if len(named) != 2 or response.ndim != 2:
+        sizes = ", ".join(f"{name} {size}" for name, size in response.sizes.items()) or "none"
+        raise InputError(
+            f"a map is drawn over two axes of more than one point among {', '.join(AXES)}; "
+            f"this one has {sizes}: select one point of the others, as with dataset.isel(location=0)"
+        )
+    return named[0], named[1], response.transpose(named[1], named[0]).values
+
+
+def _scalar(dataset: xr.Dataset, name: str) -> float | None:
+    return float(dataset[name].squeeze()) if name in dataset.coords else None
+
+
+def _edges(points: _Array, name: str) -> _Array:
+    middle = 0.5 * (points[1:] + points[:-1])
+    first = max(2.0 * points[0] - middle[0], 0.0)
+    last = min(2.0 * points[-1] - middle[-1], 1.0 if name == "location" else np.inf)
+    return np.concatenate([[first], middle, [last]])
+
+
+def _subtitle(dataset: xr.Dataset, fixed: dict[str, float | None]) -> str:
+    parts = []
+    if "modes" in dataset.attrs:
+        parts.append(f"$N$ = {int(dataset.attrs['modes'])}")
+    if "cycles" in dataset.attrs:
+        parts.append(f"{int(dataset.attrs['cycles'])} cycles")
+    parts += [f"{_SYMBOLS[name]} = {value:.4g}" for name, value in fixed.items() if value is not None]
+    return ", ".join(parts)
+
+
+def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]:
+    """Return what a legend needs to say which colour is which class.
+
+    Parameters
+    ----------
+    kinds : int8 array, optional
+        Classes of runs, whose shares then stand beside the names; unknown ones are named if there are any.
+    """
+    handles: list[Patch | Line2D] = []
+    for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
+        count = 0 if kinds is None else int((kinds == kind).sum())
+        if count or kind is not ResponseClass.UNKNOWN:
+            label = kind.label if kinds is None else f"{kind.label}, {_percent(count, kinds.size)}"
+            handles.append(Patch(facecolor=CLASS_COLORS[kind], edgecolor="black", linewidth=0.4, label=label))
+    return handles
+
+
+def _percent(count: int, total: int) -> str:
+    share = 100.0 * count / total
+    return "<0.1 %" if 0.0 < share < 0.1 else f"{share:.1f} %"
+
+
+def _draw_threshold(ax: Axes, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+    x = np.linspace(*ax.get_xlim(), 402)[1:-1]
+    if (across, upward) == ("frequency_ratio", "location"):
+        height = np.linspace(*ax.get_ylim(), 402)[1:-1]
+        line = _given(fixed, "velocity_amplitude") / quasi_static_threshold(height, 1.0), height
+    elif across == "location":
+        line = x, quasi_static_threshold(x, _given(fixed, "frequency_ratio"))
+    else:
+        line = x, quasi_static_threshold(_given(fixed, "location"), x)
+    ax.plot(*line, color="white", linewidth=1.8)
+    label = r"quasi-static, $V_\mathrm{QS1}$"
+    return ax.plot(*line, color="black", linewidth=0.9, dashes=(4, 2), label=label)[0]
+
+
+def _given(fixed: dict[str, float | None], name: str) -> float:
+    value = fixed[name]
+    if value is None:
+        raise InputError(f"threshold_line: needs the map's {name}, which the dataset does not say")
+    return value
+
+
+def _draw_dots(ax: Axes, dots: Dots, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+    keep = np.ones(len(dots), dtype=bool)
+    for name, value in fixed.items():
+        there = getattr(dots, name)
+        if value is not None:
+            keep &= np.isnan(there) | (np.abs(there - value) <= _NEAR * abs(value))
+    for name in (across, upward):
+        keep &= ~np.isnan(getattr(dots, name))
+    if not keep.all():
+        named = ", ".join(f"{name} = {value:.4g}" for name, value in fixed.items() if value is not None)
+        warnings.warn(
+            f"{int((~keep).sum())} of {len(dots)} measured points do not belong to {named} and are left out",
+            stacklevel=3,
+        )
+    colors = [CLASS_COLORS[ResponseClass(int(kind))] for kind in dots.response[keep]]
+    where = getattr(dots, across)[keep], getattr(dots, upward)[keep]
+    outside = (
+        (where[0] < ax.get_xlim()[0])
+        | (where[0] > ax.get_xlim()[1])
+        | (where[1] < ax.get_ylim()[0])
+        | (where[1] > ax.get_ylim()[1])
+    )
+    if outside.any():
+        warnings.warn(
+            f"{int(outside.sum())} of {len(dots)} measured points lie outside the map", stacklevel=3
+        )
+    ax.scatter(*where, s=26, c="white", linewidths=0.0, zorder=3)
+    ax.scatter(*where, s=14, c=colors, edgecolors="black", linewidths=0.6, zorder=4)
+    return Line2D(
+        [], [], linestyle="", marker="o", markersize=4, markerfacecolor="white", markeredgecolor="black",
+        markeredgewidth=0.6, label=f"measured, {int(keep.sum())}",
+    )  # fmt: skip

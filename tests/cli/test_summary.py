@@ -1,0 +1,62 @@
+"""What the program says of a map, against maps whose answers are known."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pytest
+import xarray as xr
+from rich.console import Console
+
+from snapbeam.cli.summary import class_table, deepest_notch, lowest_interwell, map_summary, status_lines
+from snapbeam.codes import ResponseClass, RunStatus
+
+
+def text(*renderables):
+    console = Console(width=200, file=io.StringIO(), soft_wrap=True)
+    console.print(*renderables, sep="\n")
+    return console.file.getvalue()
+
+
+def test_shares(synthetic_map):
+    kinds = synthetic_map["response"].values
+    rows = text(class_table(synthetic_map)).splitlines()
+    assert rows[1].split() == ["intrawell", str((kinds == 0).sum()), f"{100 * (kinds == 0).mean():.1f}", "%"]
+    assert rows[-1].split() == ["unknown", "1", "0.1", "%"]
+    assert sum(int(row.rsplit(maxsplit=3)[1]) for row in rows[1:]) == kinds.size
+
+
+def test_lowest_interwell_and_notch(synthetic_map):
+    kinds, velocity = synthetic_map["response"].values, synthetic_map["velocity_amplitude"].values
+    low = lowest_interwell(synthetic_map)
+    assert low["velocity_amplitude"] == velocity[(kinds >= 1).any(axis=0)].min()
+    assert low["location"] == pytest.approx(1.0 / 2.1)
+    notch = deepest_notch(synthetic_map)
+    assert notch["frequency_ratio"] == pytest.approx(1.2, abs=0.15)
+    assert notch["velocity_amplitude"] == low["velocity_amplitude"]
+    quiet = xr.zeros_like(synthetic_map)
+    assert lowest_interwell(quiet) is None and deepest_notch(quiet) is None
+    assert deepest_notch(synthetic_map.isel(frequency_ratio=0)) is None
+
+
+def test_what_is_said(synthetic_map, tmp_path):
+    path = tmp_path / "map.nc"
+    path.write_bytes(bytes(200_000))
+    said = text(map_summary(synthetic_map, [path], 50.0))
+    assert said.startswith("1000 runs of 32 modes over 200 cycles in 50 s (20 runs/s)")
+    assert "Deepest notch of the threshold: V = " in said and "mm/s at" in said
+    assert "map.nc (0.20 MB)" in said
+    assert "snapbeam map --modes 32 --cycles 200 --frequency-ratio" in said
+    quiet = text(map_summary(xr.zeros_like(synthetic_map).assign_attrs(synthetic_map.attrs), []))
+    assert "No run snapped through: raise the velocity amplitude." in quiet
+
+
+def test_failed_runs_come_with_advice(synthetic_map):
+    status = np.zeros(synthetic_map["response"].shape, dtype=np.int8)
+    status[0, :3] = RunStatus.NOT_FINITE
+    status[1] = RunStatus.DECIDED
+    lines = status_lines(synthetic_map.assign(status=(synthetic_map["response"].dims, status)))
+    assert lines[0].startswith("[bold red]3 failed[/] (NOT_FINITE): ") and "smaller step" in lines[0]
+    assert lines[1] == "25 of 1000 runs ended early, their class being certain."
+    assert ResponseClass.UNKNOWN.label in text(class_table(synthetic_map))

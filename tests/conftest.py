@@ -1,0 +1,56 @@
+"""Shared ground: results made by formula, so that pictures and files are tested without any mechanics."""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from snapbeam.codes import ResponseClass
+from snapbeam.trajectory import trajectory_dataset
+
+
+@pytest.fixture
+def synthetic_map():
+    """A map over frequency ratio and velocity amplitude whose classes are known point by point."""
+    ratio = np.linspace(0.1, 4.0, 40)
+    velocity = np.linspace(0.01, 0.65, 25)
+    x, y = np.meshgrid(ratio, velocity, indexing="ij")
+    threshold = 0.10 + 0.06 * x - 0.09 * np.exp(-(((x - 1.2) / 0.3) ** 2))
+    kinds = np.where(y > threshold, ResponseClass.TRANSIENT_2, ResponseClass.INTRAWELL)
+    kinds = np.where((y > threshold) & (np.sin(37.0 * x * y) > 0.4), ResponseClass.TRANSIENT_1, kinds)
+    kinds = np.where((x < 0.8) & (y > 0.9 * x + 0.15), ResponseClass.CONTINUOUS, kinds)
+    kinds[-1, -1] = ResponseClass.UNKNOWN
+    return xr.Dataset(
+        {"response": (("frequency_ratio", "velocity_amplitude"), kinds.astype(np.int8))},
+        {
+            "frequency_ratio": ("frequency_ratio", ratio, {"units": "1"}),
+            "velocity_amplitude": ("velocity_amplitude", velocity, {"units": "1"}),
+            "location": 1.0 / 2.1,
+        },
+        {"modes": 32, "cycles": 200, "reference_freq": 81.853, "beam_buckling_level": 0.335e-3},
+    )
+
+
+@pytest.fixture
+def synthetic_run():
+    """Ten cycles of a beam that is hit once a cycle and rings down between."""
+    cycle = np.linspace(0.0, 10.0, 20_001)
+    freq = 100.0
+    phase = cycle % 1.0
+    shaker = -1.0 + 0.15 * np.sin(2.0 * np.pi * cycle)
+    depth = np.where((phase > 0.10) & (phase < 0.15), 4e-3 * np.sin(np.pi * (phase - 0.10) / 0.05), 0.0)
+    beam = np.where(depth > 0.0, shaker - depth, shaker + 0.3 * np.sin(np.pi * ((phase - 0.15) % 1.0)) ** 2)
+    return trajectory_dataset(
+        cycle / freq,
+        cycle,
+        displacement=beam,
+        center_displacement=1.02 * beam,
+        shaker_displacement=shaker,
+        penetration=shaker - beam,
+        contact_force=4e8 * np.maximum(0.335e-3 * depth, 0.0) ** 1.5,
+    )
