@@ -6,9 +6,11 @@ is classed, and maps show where it snaps.
 
 from snapbeam.codes import ResponseClass, RunStatus
 from snapbeam.maps.grid import response_map
+from snapbeam.maps.long import long_map
+from snapbeam.maps.threshold import threshold_curve
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import HertzContact, Restitution
-from snapbeam.model.drive import Shaker, quasi_static_threshold
+from snapbeam.model.drive import RecordedDrive, Shaker, quasi_static_threshold
 from snapbeam.model.frequencies import exact_natural_freq
 from snapbeam.model.reduction import ReducedModel
 from snapbeam.provenance import __version__
@@ -21,6 +23,7 @@ __all__ = [
     "HertzContact",
     "InputError",
     "InputTypeError",
+    "RecordedDrive",
     "ReducedModel",
     "Response",
     "ResponseClass",
@@ -31,7 +34,9 @@ __all__ = [
     "__version__",
     "classify",
     "exact_natural_freq",
+    "long_map",
     "quasi_static_threshold",
     "response_map",
     "simulate",
+    "threshold_curve",
 ]

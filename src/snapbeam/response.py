@@ -107,7 +107,7 @@ class Response:
 
 
 def statistics_of(
-    ensemble: Ensemble, counts: NDArray[np.int64], numbers: NDArray[np.float64], cycles: int
+    ensemble: Ensemble, counts: NDArray[np.int64], numbers: NDArray[np.float64], cycles: float
 ) -> dict[str, NDArray[np.generic]]:
     """What an engine counted, in the units and signs of a map; arrays of shape (runs,) by name."""
     model, sign = ensemble.packed.model, ensemble.packed.sign

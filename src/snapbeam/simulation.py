@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.codes import RunStatus
 from snapbeam.kernels import cpu_engine
 from snapbeam.kernels.engines import resolve
-from snapbeam.kernels.ensemble import Ensemble, Start, make_ensemble
-from snapbeam.kernels.fields import Counts, Numbers, Reals
+from snapbeam.kernels.ensemble import Ensemble, Start, make_ensemble, with_recorded_drive
+from snapbeam.kernels.fields import Counts, Numbers, Reals, Ticks
 from snapbeam.kernels.plan import Plan, plan_steps
 from snapbeam.model.contact import HertzContact, Restitution
-from snapbeam.model.drive import Shaker
+from snapbeam.model.drive import RecordedDrive, Shaker
 from snapbeam.model.reduction import ReducedModel
 from snapbeam.provenance import made_by
 from snapbeam.response import Response, statistics_of
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 __all__ = ["Run", "simulate"]
 
 _Array = NDArray[np.float64]
+
+_CYCLES = 200
 
 _SAMPLES_PER_CYCLE = 200
 """Regular samples of a run per cycle of the excitation or of the first mode, whichever is the faster."""
@@ -49,9 +51,9 @@ class Run:
 
 def simulate(
     model: ReducedModel,
-    shaker: Shaker | None = None,
+    shaker: Shaker | RecordedDrive | None = None,
     contact: HertzContact | Restitution | None = None,
-    cycles: int = 200,
+    cycles: int | None = None,
     *,
     step: float | None = None,
     accuracy: str = "map",
@@ -69,11 +71,11 @@ def simulate(
     Parameters
     ----------
     model : ReducedModel
-    shaker : Shaker, optional
+    shaker : Shaker or RecordedDrive, optional
     contact : HertzContact or Restitution, optional
         Needed with a shaker; Restitution with a model of one mode only.
-    cycles : int
-        Cycles of excitation, at least 1.
+    cycles : int, optional
+        Cycles of excitation, at least 1; 200 by default, and with a recorded drive as many as it holds.
     step : float, optional
         Step in free flight, s; steps in contact scale with it.  The default follows from the model and
         the contact; its error is on the docs' page on accuracy.
@@ -105,8 +107,10 @@ def simulate(
     ensemble, reference, plan = _single_run(
         model, shaker, contact, cycles, step, accuracy, engine, initial_state, early_decision, reference_freq
     )
-    tick, period = ensemble.reals[0, Reals.TICK], 2.0 * math.pi / ensemble.reals[0, Reals.OMEGA]
-    end = period * cycles
+    tick = float(ensemble.reals[0, Reals.TICK])
+    end = tick * int(ensemble.ticks[0, Ticks.END])
+    period = _period(shaker, reference)
+    lasted = end / period
     asked = None if sample_times is None else _checked_times(sample_times, end)
     counts, numbers, outputs = cpu_engine.record(ensemble, 0, np.empty(0), 0, False)
     counts, numbers, outputs = cpu_engine.record(ensemble, 0, np.empty(0), int(counts[Counts.IMPACTS]), False)
@@ -120,8 +124,8 @@ def simulate(
     if counts[Counts.STATUS] != RunStatus.OK:
         times = times[times <= reached]
     _, _, outputs = cpu_engine.record(ensemble, 0, times, 0, True)
-    response = Response.from_statistics(statistics_of(ensemble, counts[None, :], numbers[None, :], cycles))
-    attrs = _attributes(model, shaker, contact, cycles, plan, reference, early_decision, response)
+    response = Response.from_statistics(statistics_of(ensemble, counts[None, :], numbers[None, :], lasted))
+    attrs = _attributes(model, shaker, contact, lasted, plan, reference, early_decision, response)
     attrs["gross_work"] = float(numbers[Numbers.GROSS_WORK])
     return Run(
         dataset=_dataset(ensemble, shaker, times, period, outputs, attrs),
@@ -132,9 +136,9 @@ def simulate(
 
 def _single_run(
     model: ReducedModel,
-    shaker: Shaker | None,
+    shaker: Shaker | RecordedDrive | None,
     contact: HertzContact | Restitution | None,
-    cycles: int,
+    cycles: int | None,
     step: float | None,
     accuracy: str,
     engine: str,
@@ -144,13 +148,24 @@ def _single_run(
 ) -> tuple[Ensemble, float, Plan]:
     """Everything that is asked of :func:`simulate`, checked, as an ensemble of one run."""
     check_system(model, contact, shaker)
-    cycles = integer("cycles", cycles, 1, 10**7)
+    if cycles is not None:
+        cycles = integer("cycles", cycles, 1, 10**7)
     resolve(engine)
     start = None if initial_state is None else _checked_start(model, initial_state)
     if shaker is None and start is None:
         raise InputError("shaker = None: a beam that nothing strikes needs an initial_state to move")
     reference = model.reference_freq if reference_freq is None else positive("reference_freq", reference_freq)
-    drive = shaker if shaker is not None else Shaker(frequency_ratio=1.0, velocity_amplitude=0.0)
+    if isinstance(shaker, Shaker):
+        drive = shaker
+    elif shaker is None:
+        drive = Shaker(frequency_ratio=1.0, velocity_amplitude=0.0)
+    else:
+        drive = Shaker(
+            frequency_ratio=shaker.frequency / reference,
+            velocity_amplitude=0.0,
+            location=shaker.location,
+            side=shaker.side,
+        )
     struck = contact if shaker is not None else None
     plan = plan_steps(model, struck, drive.location, step=step, accuracy=accuracy)
     ensemble = make_ensemble(
@@ -161,20 +176,38 @@ def _single_run(
         velocity_amplitude=np.array([drive.velocity_amplitude]),
         location=np.array([drive.location]),
         side=drive.side,
-        cycles=cycles,
+        cycles=cycles or _CYCLES,
         reference_freq=reference,
         early_decision=bool(early_decision),
         start=start,
     )
+    if isinstance(shaker, RecordedDrive):
+        ensemble = with_recorded_drive(ensemble, shaker, _recorded_duration(shaker, cycles))
     return ensemble, reference, plan
+
+
+def _recorded_duration(drive: RecordedDrive, cycles: int | None) -> float:
+    if cycles is None:
+        return drive.duration
+    if cycles / drive.frequency > drive.duration * (1.0 + 1e-9):
+        held = drive.duration * drive.frequency
+        raise InputError(f"cycles = {cycles}: must be at most the {held:.1f} cycles of the recorded drive")
+    return min(cycles / drive.frequency, drive.duration)
+
+
+def _period(shaker: Shaker | RecordedDrive | None, reference: float) -> float:
+    """Seconds of one cycle."""
+    if isinstance(shaker, RecordedDrive):
+        return 1.0 / shaker.frequency
+    return 1.0 / (reference * (1.0 if shaker is None else shaker.frequency_ratio))
 
 
 def check_system(model: Any, contact: Any, shaker: Any = None) -> None:
     """Refuse what is no model, contact or shaker, and a model that cannot be struck."""
     if not isinstance(model, ReducedModel):
         raise InputTypeError(f"model = {model!r}: must be a ReducedModel")
-    if shaker is not None and not isinstance(shaker, Shaker):
-        raise InputTypeError(f"shaker = {shaker!r}: must be a Shaker")
+    if shaker is not None and not isinstance(shaker, (Shaker, RecordedDrive)):
+        raise InputTypeError(f"shaker = {shaker!r}: must be a Shaker or a RecordedDrive")
     if contact is not None and not isinstance(contact, (HertzContact, Restitution)):
         raise InputTypeError(f"contact = {contact!r}: must be a HertzContact or a Restitution")
     if isinstance(contact, Restitution) and model.modes != 1:
@@ -227,7 +260,7 @@ def _default_times(end: float, fastest_period: float, impacts: _Array, contact_s
 
 def _dataset(
     ensemble: Ensemble,
-    shaker: Shaker | None,
+    shaker: Shaker | RecordedDrive | None,
     times: _Array,
     period: float,
     outputs: Any,
@@ -311,23 +344,29 @@ def describe_system(
 
 def _attributes(
     model: ReducedModel,
-    shaker: Shaker | None,
+    shaker: Shaker | RecordedDrive | None,
     contact: HertzContact | Restitution | None,
-    cycles: int,
+    cycles: float,
     plan: Plan,
     reference: float,
     early_decision: bool,
     response: Response,
 ) -> dict[str, Any]:
-    attrs: dict[str, Any] = {"title": "run of a struck bistable beam", "cycles": cycles, "engine": "cpu"}
+    attrs: dict[str, Any] = {
+        "title": "run of a struck bistable beam",
+        "cycles": round(cycles, 9),
+        "engine": "cpu",
+    }
     attrs |= describe_system(model, contact, plan, reference)
-    if shaker is not None:
+    if isinstance(shaker, Shaker):
         attrs |= {
             "frequency_ratio": shaker.frequency_ratio,
             "velocity_amplitude": shaker.velocity_amplitude,
-            "location": shaker.location,
-            "side": shaker.side,
         }
+    elif shaker is not None:
+        attrs |= {"drive": "recorded", "frequency_ratio": shaker.frequency / reference}
+    if shaker is not None:
+        attrs |= {"location": shaker.location, "side": shaker.side}
     attrs["early_decision"] = int(early_decision)
     attrs["response"] = response.response.label
     attrs["status"] = f"{response.status.name}: {response.status.advice}"

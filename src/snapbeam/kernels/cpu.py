@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from snapbeam.codes import RunStatus
+from snapbeam.kernels.compile import compiled
 from snapbeam.kernels.composition import TURNS
 from snapbeam.kernels.cpu_step import look_inside, observe, prepare, take_step
 from snapbeam.kernels.fields import Counts, Numbers, Ticks
@@ -45,14 +45,12 @@ from snapbeam.kernels.statistics import extremes, first_fall, sign_of, turning_p
 
 __all__ = ["march", "march_many"]
 
-_march = njit(cache=True, error_model="numpy", nogil=True)
-
 _OK, _DECIDED, _RUNNING = int(RunStatus.OK), int(RunStatus.DECIDED), int(RunStatus.RUNNING)
 _NOT_FINITE, _STEP_LIMIT = int(RunStatus.NOT_FINITE), int(RunStatus.STEP_LIMIT)
 _TWO_PI = 2.0 * math.pi
 
 
-@_march
+@compiled
 def march(memory, blocks, layout, composition, struck, rests, clock, counts, numbers, outputs):
     """March one trajectory to its end; the state and the statistics are kept in the arrays given.
 
@@ -324,7 +322,7 @@ def march(memory, blocks, layout, composition, struck, rests, clock, counts, num
     counts[Counts.TIME], counts[Counts.STATUS], counts[Counts.SAMPLES] = t, status, sample
 
 
-@_march
+@compiled
 def march_many(
     memory,
     blocks,

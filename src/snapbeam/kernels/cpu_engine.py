@@ -16,6 +16,7 @@ from snapbeam.kernels.cpu import march_many
 from snapbeam.kernels.ensemble import Ensemble
 from snapbeam.kernels.fields import Counts, Numbers
 from snapbeam.kernels.march_parts import Outputs
+from snapbeam.kernels.rows import Layout
 
 __all__ = ["record", "run_ensemble", "usable_cores"]
 
@@ -38,12 +39,22 @@ def _memory(ensemble: Ensemble) -> _Array:
     packed, plan = ensemble.packed, ensemble.plan
     size = packed.layout.size
     work = 10 * size + (plan.finest + 2) * slot_length(plan.order, size) + 8 * size
-    total = packed.layout.work + work
+    drive = ensemble.drive_table
+    total = packed.layout.work + work + drive.size
     raw = np.zeros(total + _ALIGNMENT // 8)
     first = (-raw.ctypes.data % _ALIGNMENT) // 8
     memory: _Array = raw[first : first + total]
     memory[: packed.layout.work] = packed.memory
+    memory[total - drive.size :] = drive
     return memory
+
+
+def _layout(ensemble: Ensemble, end: int) -> Layout:
+    """The layout of a memory that ends at *end*, with a recorded drive where there is one."""
+    size = ensemble.drive_table.size
+    return ensemble.packed.layout._replace(
+        drive=end - size, drive_samples=size // 2, drive_interval=ensemble.drive_interval
+    )
 
 
 def _nothing(size: int) -> Outputs:
@@ -71,10 +82,11 @@ def _march(
     if ensemble.restitution:
         from snapbeam.kernels.restitution import march_restitution_many as march
     packed, plan = ensemble.packed, ensemble.plan
+    memory = _memory(ensemble)
     march(
-        _memory(ensemble),
+        memory,
         packed.blocks,
-        packed.layout,
+        _layout(ensemble, memory.size),
         COMPOSITIONS[plan.order],
         ensemble.contact_rows,
         ensemble.starts,

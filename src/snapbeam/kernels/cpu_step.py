@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from numba import njit
-
+from snapbeam.kernels.compile import compiled, inlined
 from snapbeam.kernels.composition import TURNS
 from snapbeam.kernels.lanes import WIDTH, load, store
-from snapbeam.kernels.physics import contact_force, shaker_motion, sincos, tension_factors
+from snapbeam.kernels.physics import (
+    contact_force,
+    recorded_motion,
+    shaker_motion,
+    sincos,
+    tension_factors,
+)
 from snapbeam.kernels.rows import (
     acceleration_rows,
     dot,
@@ -24,8 +29,6 @@ from snapbeam.kernels.rows import (
 
 __all__ = ["Impactor", "look_inside", "observe", "prepare", "take_step"]
 
-_step = njit(cache=True, error_model="numpy", nogil=True)
-
 
 class Impactor(NamedTuple):
     """The shaker's tip and its contact, seen from the side it pushes from.
@@ -39,7 +42,7 @@ class Impactor(NamedTuple):
     stiffness: float
 
 
-@_step
+@compiled
 def prepare(memory, layout, composition, impactor, length, at):
     """What a step of *length* needs, from *at* on: its distinct flows and the drive's turn at each kick."""
     size = layout.size
@@ -52,16 +55,29 @@ def prepare(memory, layout, composition, impactor, length, at):
         store(memory, at + TURNS + i, cosine)
 
 
-@_step
+@inlined
+def _tip(memory, layout, impactor, phase):
+    """Displacement of the shaker since the start and its velocity, sinusoidal or as recorded."""
+    if layout.drive_samples > 0:
+        at = min(phase / (impactor.omega * layout.drive_interval), layout.drive_samples - 1.0)
+        i = min(int(at), layout.drive_samples - 2)
+        row = layout.drive + 2 * i
+        return recorded_motion(
+            at - i, layout.drive_interval, memory[row], memory[row + 1], memory[row + 2], memory[row + 3]
+        )
+    sine, cosine = sincos(phase)
+    return shaker_motion(impactor.amplitude, impactor.omega, sine, cosine)
+
+
+@compiled
 def observe(memory, layout, impactor, phase, q, p):
     """Contact point from rest and its rate; penetration and its rate; centre from rest and its rate."""
-    sine, cosine = sincos(phase)
-    motion, velocity = shaker_motion(impactor.amplitude, impactor.omega, sine, cosine)
+    motion, velocity = _tip(memory, layout, impactor, phase)
     w, rate, c, c_rate = signals(memory, layout, q, p)
     return w, rate, impactor.offset + motion - w, velocity - rate, c, c_rate
 
 
-@_step
+@compiled
 def take_step(
     memory, blocks, layout, composition, impactor, at, length, phase, touching, ledger, q, p, k, q1, p1, k1, r
 ):
@@ -81,9 +97,13 @@ def take_step(
         weight = composition.kick[stage] * length
         here = q1 if stage > 0 else q
         if touching:
-            sine, cosine = memory[turns + stage], memory[turns + TURNS + stage]
-            sine, cosine = sine0 * cosine + cosine0 * sine, cosine0 * cosine - sine0 * sine
-            motion, velocity = shaker_motion(impactor.amplitude, impactor.omega, sine, cosine)
+            if layout.drive_samples > 0:
+                now = phase + composition.elapsed[stage] * length * impactor.omega
+                motion, velocity = _tip(memory, layout, impactor, now)
+            else:
+                sine, cosine = memory[turns + stage], memory[turns + TURNS + stage]
+                sine, cosine = sine0 * cosine + cosine0 * sine, cosine0 * cosine - sine0 * sine
+                motion, velocity = shaker_motion(impactor.amplitude, impactor.omega, sine, cosine)
             tip = impactor.offset + motion
             force = contact_force(impactor.stiffness, tip - dot(memory, size, layout.contact, here))
             impulse += weight * force
@@ -115,7 +135,7 @@ def take_step(
     return gq, qr, impulse, work, gross, dissipated
 
 
-@_step
+@compiled
 def look_inside(memory, layout, impactor, flow, pieces, piece, phase, q, p, k, k1, q1, p1, seen):
     """Follow a free step in *pieces* short ones, each one exact linear flow, and note what is seen.
 
@@ -137,6 +157,8 @@ def look_inside(memory, layout, impactor, flow, pieces, piece, phase, q, p, k, k
     for i in range(pieces + 1):
         done = i / pieces
         motion, velocity = shaker_motion(impactor.amplitude, impactor.omega, sine, cosine)
+        if layout.drive_samples > 0:
+            motion, velocity = _tip(memory, layout, impactor, phase + i * piece * impactor.omega)
         owed = half if i > 0 else 0.0
         seen[i, 0] = impactor.offset + motion - w
         seen[i, 1] = velocity - rate - owed * ((1.0 - done) * contact0 + done * contact1)

@@ -7,7 +7,7 @@ them.  Nothing above this module knows how an engine steps.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,14 +18,17 @@ from snapbeam.kernels.packing import Packed, pack
 from snapbeam.kernels.plan import Plan
 from snapbeam.model.contact import HertzContact, Restitution
 from snapbeam.model.decision import decidable_energy
+from snapbeam.model.drive import RecordedDrive
 from snapbeam.model.reduction import ReducedModel
 from snapbeam.validate import InputError
 
-__all__ = ["Ensemble", "Start", "make_ensemble"]
+__all__ = ["Ensemble", "Start", "make_ensemble", "with_recorded_drive"]
 
 _Array = NDArray[np.float64]
 _SUBDIVISION = 1 << 20
 """Ticks of a flight step, so that halved steps and located events are whole numbers of ticks."""
+_RECORD_MARGIN = 1.5
+"""Greatest speed of the cubic through a record over the greatest recorded one, at most."""
 _FAR_AWAY = -1e30
 """Penetration, m, of a shaker that is not there."""
 
@@ -47,6 +50,10 @@ class Ensemble:
     max_steps: int
     restitution: bool
     """Whether the stiffness column is a coefficient of restitution: Newton's law of impact, one mode."""
+    drive_table: _Array = field(default_factory=lambda: np.empty(0))
+    """Displacement (m, from its start) and velocity (m/s) of a recorded drive, sample after sample."""
+    drive_interval: float = 1.0
+    """Seconds between those samples."""
 
     @property
     def size(self) -> int:
@@ -134,3 +141,23 @@ def make_ensemble(
         reals[:, Reals.DECIDE_REACH] = np.maximum(highest, 0.0)
         reals[:, Reals.DECIDE_ENERGY] = decidable_energy(model, location, highest)
     return Ensemble(packed, plan, rows, np.concatenate((q, p))[None], reals, ticks, max_steps, newton)
+
+
+def with_recorded_drive(ensemble: Ensemble, drive: RecordedDrive, duration: float) -> Ensemble:
+    """The ensemble of one run, driven by a record for *duration* seconds instead of by a sinusoid."""
+    reals, ticks = ensemble.reals.copy(), ensemble.ticks.copy()
+    steps = math.ceil(duration / ensemble.plan.step * (1.0 - 1e-12))
+    ticks[:, Ticks.PERIOD] = ticks[:, Ticks.END] = steps * _SUBDIVISION
+    ticks[:, Ticks.LAST_QUARTER] = ticks[:, Ticks.END] // 4 * 3
+    ticks[:, Ticks.DECIDE_CROSSINGS] = -1
+    reals[:, Reals.TICK] = duration / ticks[:, Ticks.PERIOD]
+    reals[:, Reals.DECIDE_ENERGY] = -math.inf
+    # the phase of a record is 2 pi t / duration; the amplitude only bounds its speed
+    reals[:, Reals.OMEGA] = 2.0 * math.pi / duration
+    sign = ensemble.packed.sign
+    moved = sign * (drive.displacement - drive.displacement[0])
+    reals[:, Reals.AMPLITUDE] = _RECORD_MARGIN * np.abs(drive.velocity).max() / reals[:, Reals.OMEGA]
+    table = np.column_stack((moved, sign * drive.velocity)).ravel()
+    return replace(
+        ensemble, reals=reals, ticks=ticks, drive_table=table, drive_interval=1.0 / drive.sampling_freq
+    )

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from snapbeam.kernels.compile import compiled
 from snapbeam.kernels.cpu_step import Impactor
 from snapbeam.kernels.fields import Counts, Numbers, Reals, Ticks
 from snapbeam.kernels.physics import contact_force, tension_factors
@@ -29,8 +29,6 @@ __all__ = [
     "set_up",
     "track_extremes",
 ]
-
-_part = njit(cache=True, error_model="numpy", nogil=True)
 
 
 class Clock(NamedTuple):
@@ -86,7 +84,7 @@ _STRETCH = 4.0
 PIECES = 5.0
 
 
-@_part
+@compiled
 def set_up(memory, layout, contact_row, start, reals, ticks, coarsest, finest, max_steps):
     """Put one run's contact row and start into memory; returns its shaker, clock and rests."""
     for row in range(layout.size):
@@ -112,7 +110,7 @@ def set_up(memory, layout, contact_row, start, reals, ticks, coarsest, finest, m
     return impactor, clock, (reals[Reals.REST_CONTACT], reals[Reals.REST_CENTER])
 
 
-@_part
+@compiled
 def finish_impact(counts, numbers, outputs, stiffness, end, tick):
     """Enter the contact that ends at tick *end* in the statistics, unless nothing was pressed."""
     deepest = numbers[Numbers.DEEPEST]
@@ -133,7 +131,7 @@ def finish_impact(counts, numbers, outputs, stiffness, end, tick):
     numbers[Numbers.IMPULSE] = 0.0
 
 
-@_part
+@compiled
 def safe_for(distance, bound, shaker_speed, acceleration, step):
     """For how long a signal at *distance* from zero cannot reach it, at most a few steps."""
     horizon = _TRUST * step
@@ -143,7 +141,7 @@ def safe_for(distance, bound, shaker_speed, acceleration, step):
     return distance / speed
 
 
-@_part
+@compiled
 def contact_level(clock, elapsed, d, dv):
     """Halvings of the flight step for a step in contact: graded from the onset and towards the release."""
     want = _GRADING * elapsed
@@ -155,7 +153,7 @@ def contact_level(clock, elapsed, d, dv):
     return level
 
 
-@_part
+@compiled
 def flight_level(clock, stretch, stretch_at_rest):
     """Halvings of the flight step for a beam stretched far beyond its wells."""
     level = 0
@@ -166,7 +164,7 @@ def flight_level(clock, stretch, stretch_at_rest):
     return level
 
 
-@_part
+@compiled
 def first_entry(seen, pieces, piece):
     """When the penetration first becomes positive inside a step that was looked into; -1 if it does not."""
     for i in range(pieces):
@@ -176,7 +174,7 @@ def first_entry(seen, pieces, piece):
     return -1.0
 
 
-@_part
+@compiled
 def count_in_step(counts, numbers, clock, start, length, c, cv, c1, cv1, seen, rest, pieces, piece):
     """Count zero crossings of the centre in a step, through what was seen inside it."""
     left, left_rate, begun = c, cv, 0.0
@@ -202,7 +200,7 @@ def count_in_step(counts, numbers, clock, start, length, c, cv, c1, cv1, seen, r
         i += 1
 
 
-@_part
+@compiled
 def track_extremes(numbers, w, wv, w1, wv1, c, cv, c1, cv1, length):
     """Widen the extremes of the contact point (w) and of the centre (c) by a step."""
     low, high = extremes(w, wv, w1, wv1, length)
@@ -213,7 +211,7 @@ def track_extremes(numbers, w, wv, w1, wv1, c, cv, c1, cv1, length):
     numbers[Numbers.MAX_CENTER] = max(numbers[Numbers.MAX_CENTER], high)
 
 
-@_part
+@compiled
 def change_well(memory, blocks, layout, home, q, k, r):
     """Take the other well as the origin: exact, since the structure is the same about both.
 
@@ -229,7 +227,7 @@ def change_well(memory, blocks, layout, home, q, k, r):
     return 2.0 * gq + qr
 
 
-@_part
+@compiled
 def seen_from(impactor, home, rest):
     """The shaker as seen from the well *home*: +1 the one the run began in, -1 the other."""
     return Impactor(

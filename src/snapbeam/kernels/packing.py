@@ -92,7 +92,7 @@ def pack(model: ReducedModel, side: str) -> Packed:
     packed = Packed(
         memory=np.empty(0),
         blocks=np.array(blocks, dtype=np.int64),
-        layout=Layout(*range(13)),
+        layout=Layout(*range(16)),
         rows=rows,
         equilibrium=equilibrium,
         model=model,
@@ -111,5 +111,5 @@ def pack(model: ReducedModel, side: str) -> Packed:
     ]
     starts = np.concatenate(([0], np.cumsum([piece.size for piece in pieces])))
     stretch = float(equilibrium @ equilibrium)
-    layout = Layout._make((size, *map(int, starts), float(model.tension_stiffness), stretch))
+    layout = Layout._make((size, *map(int, starts), float(model.tension_stiffness), stretch, 0, 0, 1.0))
     return packed._replace(memory=np.concatenate(pieces), layout=layout)

@@ -13,8 +13,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from snapbeam.kernels.compile import inlined
 from snapbeam.kernels.lanes import fma, select_less, vfloor
 
 __all__ = [
@@ -22,6 +21,7 @@ __all__ = [
     "contact_force",
     "decay",
     "mode_energy",
+    "recorded_motion",
     "rotate",
     "rotation",
     "shaker_motion",
@@ -31,15 +31,13 @@ __all__ = [
     "tension_factors",
 ]
 
-compiled = njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
-
 # pi/2 in three parts of 33 bits each, so that k * part is exact for |k| < 2^20.
 _HALF_PI_1 = 1.5707963267341256
 _HALF_PI_2 = 6.077100506303966e-11
 _HALF_PI_3 = 2.0222662487959506e-21
 
 
-@compiled
+@inlined
 def contact_force(stiffness, penetration):
     """Hertz's force f = kc d^(3/2), none when apart (Eq. 17)."""
     if penetration > 0.0:
@@ -47,7 +45,7 @@ def contact_force(stiffness, penetration):
     return 0.0
 
 
-@compiled
+@inlined
 def contact_energy(stiffness, penetration):
     """Energy stored in the contact, (2/5) kc d^(5/2): the integral of Eq. (17)."""
     if penetration > 0.0:
@@ -55,7 +53,7 @@ def contact_energy(stiffness, penetration):
     return 0.0
 
 
-@compiled
+@inlined
 def tension_factors(gamma, gq, qr):
     """How much of g and of r = Gq the midplane stretching pulls with.
 
@@ -65,32 +63,32 @@ def tension_factors(gamma, gq, qr):
     return -gamma * qr, -gamma * (2.0 * gq + qr)
 
 
-@compiled
+@inlined
 def tension_acceleration(along_g, along_r, g, r):
     """Modal acceleration by the change of midplane tension, beyond what the linear modes hold."""
     return fma(along_g, g, along_r * r)
 
 
-@compiled
+@inlined
 def tension_energy(gamma, gq, qr):
     """Potential energy beyond the quadratic part, gamma (gq qr + qr^2 / 4)."""
     return gamma * qr * (gq + 0.25 * qr)
 
 
-@compiled
+@inlined
 def mode_energy(omega, q, p):
     """Energy of linear modes, (p^2 + omega^2 q^2) / 2."""
     oq = omega * q
     return 0.5 * fma(p, p, oq * oq)
 
 
-@compiled
+@inlined
 def rotate(a_first, a_second, q, p):
     """One row of the flow of a linear mode."""
     return fma(a_first, q, a_second * p)
 
 
-@compiled
+@inlined
 def rotation(damping, omega_squared, cosine, sine_over, decayed):
     """The exact flow of a damped linear mode over a time.
 
@@ -106,7 +104,7 @@ def rotation(damping, omega_squared, cosine, sine_over, decayed):
     return a11, a12, a21, a22
 
 
-@compiled
+@inlined
 def sincos(x):
     """Sine and cosine from additions and multiplications alone, the same in lanes and in scalars.
 
@@ -144,7 +142,7 @@ def sincos(x):
     return sine, cosine
 
 
-@compiled
+@inlined
 def decay(x):
     """exp(-x) for |x| <= 4 from multiplications and additions alone, within 2e-14 of it."""
     y = x * -0.0625
@@ -166,10 +164,23 @@ def decay(x):
     return e * e
 
 
-@compiled
+@inlined
 def shaker_motion(amplitude, omega, sine, cosine):
     """Displacement from the start and velocity of the shaker at a phase (Eq. 16).
 
     w_s(t) - w_s(0) = A sin(omega t) with A = V b omega_1 / omega.
     """
     return amplitude * sine, amplitude * omega * cosine
+
+
+@inlined
+def recorded_motion(s, interval, w0, v0, w1, v1):
+    """Displacement and velocity of a recorded drive between two samples, at the share *s* of the interval.
+
+    The cubic that matches both displacements and both velocities, and its own derivative.
+    """
+    a, b = v0 * interval, v1 * interval
+    rise = w1 - w0
+    c2, c3 = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
+    displacement = w0 + s * (a + s * (c2 + s * c3))
+    return displacement, (a + s * (2.0 * c2 + s * 3.0 * c3)) / interval

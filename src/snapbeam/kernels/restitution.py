@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from snapbeam.codes import RunStatus
+from snapbeam.kernels.compile import compiled
 from snapbeam.kernels.composition import TURNS
 from snapbeam.kernels.cpu_step import look_inside, observe, prepare, take_step
 from snapbeam.kernels.fields import Counts, Numbers, Ticks
@@ -32,8 +32,6 @@ from snapbeam.kernels.statistics import sign_of
 
 __all__ = ["march_restitution", "march_restitution_many"]
 
-_march = njit(cache=True, error_model="numpy", nogil=True)
-
 _OK, _NOT_FINITE, _STEP_LIMIT = int(RunStatus.OK), int(RunStatus.NOT_FINITE), int(RunStatus.STEP_LIMIT)
 _TWO_PI = 2.0 * math.pi
 _PIECES = 16
@@ -42,7 +40,7 @@ _STICK = 1.0 / 512.0
 """Share of a flight step: where the next impact would follow sooner than this, the bodies stick."""
 
 
-@_march
+@compiled
 def _hold(memory, blocks, layout, impactor, phase, q, p, k, r):
     """Put the mode where the shaker is; returns the contact force that holds it there, g.q and q.Gq."""
     sine, cosine = sincos(phase)
@@ -61,7 +59,7 @@ def _hold(memory, blocks, layout, impactor, phase, q, p, k, r):
     return (acceleration - free) / c, gq, qr
 
 
-@_march
+@compiled
 def _enter(counts, numbers, outputs, onset, duration, force, impulse):
     """Enter an impact (duration 0, no finite force) or a time of sticking in the statistics."""
     at = counts[Counts.IMPACTS]
@@ -74,7 +72,7 @@ def _enter(counts, numbers, outputs, onset, duration, force, impulse):
     numbers[Numbers.CONTACT_TIME] += duration
 
 
-@_march
+@compiled
 def march_restitution(memory, blocks, layout, composition, struck, rests, clock, counts, numbers, outputs):
     """March a single mode to its end; arguments as :func:`snapbeam.kernels.cpu.march`.
 
@@ -290,7 +288,7 @@ def march_restitution(memory, blocks, layout, composition, struck, rests, clock,
     counts[Counts.TIME], counts[Counts.STATUS], counts[Counts.SAMPLES] = t, status, sample
 
 
-@_march
+@compiled
 def march_restitution_many(
     memory,
     blocks,

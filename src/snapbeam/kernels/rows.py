@@ -11,8 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from numba import njit
-
+from snapbeam.kernels.compile import compiled, inlined
 from snapbeam.kernels.lanes import (
     WIDTH,
     fma,
@@ -39,8 +38,6 @@ __all__ = [
     "speed_bound",
     "tension_rows",
 ]
-
-_rows = njit(cache=True, error_model="numpy", nogil=True, forceinline=True)
 
 
 class Layout(NamedTuple):
@@ -69,9 +66,15 @@ class Layout(NamedTuple):
     """Tension stiffness, Eq. (15)."""
     stretch: float
     """Squared slopes of the beam in a well, alpha_eq . alpha_eq; 0 if there is one well only."""
+    drive: int
+    """Where a recorded drive begins: displacement and velocity of each sample in turn."""
+    drive_samples: int
+    """Samples of the recorded drive; 0: the drive is sinusoidal."""
+    drive_interval: float
+    """Seconds between samples."""
 
 
-@_rows
+@inlined
 def tension_rows(memory, blocks, layout, q, r):
     """r = G q; returns g.q and q.r.
 
@@ -125,7 +128,7 @@ def tension_rows(memory, blocks, layout, q, r):
     return lanes_sum(total_g), lanes_sum(total_r)
 
 
-@_rows
+@inlined
 def dot(memory, size, a, b):
     """a.b over a row."""
     total = splat(0.0)
@@ -134,7 +137,7 @@ def dot(memory, size, a, b):
     return lanes_sum(total)
 
 
-@_rows
+@inlined
 def acceleration_rows(memory, layout, along_g, along_r, r, k):
     """k = the modal acceleration by the change of tension."""
     for row in range(0, layout.size, WIDTH):
@@ -142,7 +145,7 @@ def acceleration_rows(memory, layout, along_g, along_r, r, k):
         store(memory, k + row, tension_acceleration(along_g, along_r, g_row, load(memory, r + row)))
 
 
-@_rows
+@inlined
 def kick_rows(memory, layout, weight, k, force, p_from, p_to):
     """p_to = p_from + weight (k + c force), c the contact's row."""
     for row in range(0, layout.size, WIDTH):
@@ -150,7 +153,7 @@ def kick_rows(memory, layout, weight, k, force, p_from, p_to):
         store(memory, p_to + row, fma(weight, total, load(memory, p_from + row)))
 
 
-@_rows
+@inlined
 def kick_and_flow(memory, layout, flow, weight, along_g, along_r, r, force, q, p):
     """In place: p += weight (tension + c force), then one flow of every linear mode."""
     size = layout.size
@@ -164,7 +167,7 @@ def kick_and_flow(memory, layout, flow, weight, along_g, along_r, r, force, q, p
         store(memory, p + row, rotate(load(memory, at), load(memory, at + size), q_row, kicked))
 
 
-@_rows
+@inlined
 def flow_rows(memory, size, flow, q_from, p_from, q_to, p_to):
     """One flow of every linear mode."""
     for row in range(0, size, WIDTH):
@@ -174,7 +177,7 @@ def flow_rows(memory, size, flow, q_from, p_from, q_to, p_to):
         store(memory, p_to + row, rotate(load(memory, at), load(memory, at + size), q_row, p_row))
 
 
-@_rows
+@inlined
 def modal_energy(memory, layout, q, p):
     """Quadratic part of the energy, the sum of (p^2 + omega^2 q^2)/2."""
     total = splat(0.0)
@@ -184,7 +187,7 @@ def modal_energy(memory, layout, q, p):
     return lanes_sum(total)
 
 
-@_rows
+@inlined
 def speed_bound(memory, layout, c, q, p):
     """A speed that c.q cannot exceed by the linear flow alone: sum |c_j| (|p_j| + |omega_j q_j|)."""
     total = splat(0.0)
@@ -194,7 +197,7 @@ def speed_bound(memory, layout, c, q, p):
     return lanes_sum(total)
 
 
-@_rows
+@inlined
 def signals(memory, layout, q, p):
     """Displacement of the contact point and of the centre from rest and their rates: c.q, c.p, e.q, e.p."""
     cq, cp, eq, ep = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
@@ -206,7 +209,7 @@ def signals(memory, layout, q, p):
     return lanes_sum(cq), lanes_sum(cp), lanes_sum(eq), lanes_sum(ep)
 
 
-@_rows
+@inlined
 def glide(memory, layout, flow, weight0, k0, weight1, k1, q, p):
     """In place: p += weight0 k0 + weight1 k1, then one flow; returns the signals, as :func:`signals`."""
     size = layout.size
@@ -226,7 +229,7 @@ def glide(memory, layout, flow, weight0, k0, weight1, k1, q, p):
     return lanes_sum(cq), lanes_sum(cp), lanes_sum(eq), lanes_sum(ep)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled
 def flow_coefficients(memory, layout, length, at):
     """Rows a11, a12, a21, a22 of the exact flow over *length* seconds, written from *at* on."""
     size = layout.size

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 
-from snapbeam.kernels.physics import compiled
+from snapbeam.kernels.compile import inlined
 
 __all__ = ["count_crossings", "extremes", "first_fall", "first_rise", "sign_of", "turning_point"]
 
 
-@compiled
+@inlined
 def cubic(u0, v0, u1, v1, h):
     """Coefficients (c0, c1, c2, c3) of the Hermite cubic in s on [0, 1]."""
     a, b = v0 * h, v1 * h
@@ -21,12 +21,12 @@ def cubic(u0, v0, u1, v1, h):
     return u0, a, 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
 
 
-@compiled
+@inlined
 def _at(c0, c1, c2, c3, s):
     return c0 + s * (c1 + s * (c2 + s * c3))
 
 
-@compiled
+@inlined
 def turning_point(u0, v0, u1, v1, h):
     """Where in (0, 1) the cubic turns, given slopes of opposite sign; -1 if they are not."""
     if not v0 * v1 < 0.0:
@@ -52,7 +52,7 @@ def turning_point(u0, v0, u1, v1, h):
     return s
 
 
-@compiled
+@inlined
 def root(c0, c1, c2, c3, low, high):
     """The root of the cubic in [low, high], whose ends must have opposite signs."""
     below = _at(c0, c1, c2, c3, low)
@@ -75,7 +75,7 @@ def root(c0, c1, c2, c3, low, high):
     return s
 
 
-@compiled
+@inlined
 def first_rise(u0, v0, u1, v1, h):
     """Where in [0, 1] the cubic first rises through zero, starting at or below it; -1 if nowhere."""
     c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
@@ -94,14 +94,14 @@ def first_rise(u0, v0, u1, v1, h):
     return -1.0
 
 
-@compiled
+@inlined
 def first_fall(u0, v0, u1, v1, h):
     """Where in (0, 1) the cubic first falls through zero, given that it starts above and ends at or below."""
     c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
     return root(c0, c1, c2, c3, 0.0, 1.0)
 
 
-@compiled
+@inlined
 def sign_of(u, otherwise):
     """-1 or 1, the sign of *u*; *otherwise* where it is exactly zero."""
     if u > 0.0:
@@ -111,7 +111,7 @@ def sign_of(u, otherwise):
     return otherwise
 
 
-@compiled
+@inlined
 def count_crossings(side, u0, v0, u1, v1, h):
     """Zero crossings of the cubic, given the *side* (-1, 1; 0: none yet) it was last seen on.
 
@@ -136,7 +136,7 @@ def count_crossings(side, u0, v0, u1, v1, h):
     return count, last, there
 
 
-@compiled
+@inlined
 def extremes(u0, v0, u1, v1, h):
     """Least and greatest value of the cubic on [0, 1]."""
     low, high = min(u0, u1), max(u0, u1)

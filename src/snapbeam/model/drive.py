@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.validate import InputError, choice, finite_array, nonnegative, positive, within
 
-__all__ = ["Shaker", "quasi_static_threshold"]
+__all__ = ["RecordedDrive", "Shaker", "quasi_static_threshold"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,6 +48,70 @@ class Shaker:
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedDrive:
+    """A measured motion of the shaker in place of a sinusoidal one, its start-up transient included.
+
+    The motion between samples is the cubic that matches displacement and velocity at both; the tip touches
+    the resting beam at the first sample, whose displacement is taken as zero.
+
+    Parameters
+    ----------
+    displacement, velocity : array_like of shape (samples,)
+        Displacement (m) and velocity (m/s), positive towards the beam's upper well; they must belong
+        together: over each interval the displacement changes by the velocities' mean, within a tenth
+        of the greatest change.
+    sampling_freq : float
+        Samples per second, Hz.
+    frequency : float
+        Nominal frequency of the excitation, Hz: what a cycle is.
+    location : float
+        Position of the tip over the length of the beam, x_s, in (0, 1).
+    side : {"below", "above"}
+        Side of the beam the shaker pushes from.
+    """
+
+    displacement: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    sampling_freq: float
+    frequency: float
+    location: float = 1.0 / 2.1
+    side: str = "below"
+
+    def __post_init__(self) -> None:
+        displacement = finite_array("displacement", self.displacement, 1)
+        velocity = finite_array("velocity", self.velocity, 1)
+        rate = positive("sampling_freq", self.sampling_freq, "Hz")
+        if displacement.size < 4 or displacement.shape != velocity.shape:
+            raise InputError(
+                f"displacement of shape {displacement.shape}, velocity of shape {velocity.shape}: must be "
+                "equal and hold at least 4 samples"
+            )
+        change = np.diff(displacement)
+        mean = 0.5 * (velocity[1:] + velocity[:-1]) / rate
+        worst = float(np.abs(change - mean).max())
+        if worst > 0.1 * max(float(np.abs(change).max()), 1e-30):
+            raise InputError(
+                f"velocity: does not belong to displacement: over one interval they differ by {worst:.3g} m; "
+                "resample both from one record"
+            )
+        checked = {
+            "displacement": displacement,
+            "velocity": velocity,
+            "sampling_freq": rate,
+            "frequency": positive("frequency", self.frequency, "Hz"),
+            "location": within("location", self.location, 0.0, 1.0),
+            "side": choice("side", self.side, ("below", "above")),
+        }
+        for name, value in checked.items():
+            object.__setattr__(self, name, value)
+
+    @property
+    def duration(self) -> float:
+        """Length of the record, s."""
+        return (self.displacement.size - 1) / self.sampling_freq
 
 
 def quasi_static_threshold(location: ArrayLike, frequency_ratio: ArrayLike) -> NDArray[np.float64]:

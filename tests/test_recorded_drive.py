@@ -1,0 +1,69 @@
+"""A recorded motion of the shaker as the drive."""
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam import paper
+
+RATE = 20_000.0
+
+
+@pytest.fixture(scope="module")
+def model():
+    return sb.ReducedModel.from_beam(paper.BEAM, modes=4)
+
+
+def sine_record(model, ratio, amplitude, cycles, side="below"):
+    first = model.reference_freq
+    frequency = ratio * first
+    omega = 2.0 * np.pi * frequency
+    stroke = amplitude * model.length_scale * first / frequency
+    sign = 1.0 if side == "below" else -1.0
+    t = np.arange(int((cycles + 0.5) / frequency * RATE)) / RATE
+    return sb.RecordedDrive(
+        displacement=sign * stroke * np.sin(omega * t),
+        velocity=sign * stroke * omega * np.cos(omega * t),
+        sampling_freq=RATE,
+        frequency=frequency,
+        side=side,
+    )
+
+
+@pytest.mark.parametrize("side", ["below", "above"])
+def test_a_recorded_sine_is_the_sinusoidal_shaker(model, side):
+    shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.05, side=side)
+    times = np.linspace(0.0, 7.9 / (1.21 * model.reference_freq), 900)
+    exact = sb.simulate(model, shaker, paper.CONTACT, cycles=8, sample_times=times)
+    drive = sine_record(model, 1.21, 0.05, 8, side)
+    run = sb.simulate(model, drive, paper.CONTACT, cycles=8, sample_times=times)
+    assert run.response.impacts == exact.response.impacts
+    for name, bound in (("displacement", 1e-5), ("shaker_displacement", 1e-8)):
+        assert float(abs(run.dataset[name] - exact.dataset[name]).max()) < bound
+
+
+def test_the_whole_record_is_the_default_and_more_is_refused(model):
+    drive = sine_record(model, 1.0, 0.05, 3)
+    run = sb.simulate(model, drive, paper.CONTACT)
+    assert run.dataset.attrs["cycles"] == pytest.approx(drive.duration * drive.frequency)
+    assert run.dataset.attrs["drive"] == "recorded"
+    with pytest.raises(sb.InputError, match=r"cycles = 9.*at most the 3\.\d cycles"):
+        sb.simulate(model, drive, paper.CONTACT, cycles=9)
+
+
+def test_the_ledger_closes(model):
+    drive = sine_record(model, 1.21, 0.18, 6)
+    ds = sb.simulate(model, drive, paper.CONTACT, cycles=6).dataset
+    residual = ds.energy_beam + ds.energy_contact + ds.energy_dissipated - ds.work_shaker
+    assert float(abs(residual).max()) < 1e-4 * ds.attrs["gross_work"]
+
+
+def test_bad_records_are_refused():
+    wave = np.sin(np.linspace(0.0, 6.0, 50))
+    good = {"sampling_freq": 100.0, "frequency": 1.0}
+    with pytest.raises(sb.InputError, match="does not belong to displacement"):
+        sb.RecordedDrive(displacement=wave, velocity=wave, **good)
+    with pytest.raises(sb.InputError, match="at least 4 samples"):
+        sb.RecordedDrive(displacement=wave, velocity=wave[:-1], **good)
+    with pytest.raises(sb.InputError, match="must be finite"):
+        sb.RecordedDrive(displacement=np.full(9, np.nan), velocity=np.zeros(9), **good)

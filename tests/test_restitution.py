@@ -1,0 +1,96 @@
+"""Newton's law of impact for one mode: energy, bouncing, sticking, and why it takes one mode."""
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam import paper
+
+
+@pytest.fixture(scope="module")
+def one_mode():
+    return sb.ReducedModel.from_beam(paper.BEAM, modes=1)
+
+
+def ledger(run):
+    ds = run.dataset
+    residual = ds.energy_beam + ds.energy_contact + ds.energy_dissipated - ds.work_shaker
+    return float(abs(residual).max()) / ds.attrs["gross_work"]
+
+
+def test_free_mass_rebounds_with_its_coefficient():
+    mass, speed = 0.01, 0.1
+    model = sb.ReducedModel.from_matrices(
+        [[mass]], [0.0], contact_shape=[1.0], length_scale=1e-3, reference_freq=100.0
+    )
+    wall = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0)
+    for coefficient in (0.25, 0.5, 1.0):
+        run = sb.simulate(model, wall, sb.Restitution(coefficient), cycles=1, initial_state=([0.0], [-speed]))
+        assert run.impacts.impulse.values == pytest.approx([(1.0 + coefficient) * mass * speed], rel=1e-12)
+        last = run.dataset.displacement.values * 1e-3
+        slope = np.diff(last)[-1] / np.diff(run.dataset.time.values)[-1]
+        assert slope == pytest.approx(coefficient * speed, rel=1e-9)
+
+
+@pytest.mark.parametrize("coefficient", [0.0, 0.3, 0.9, 1.0])
+@pytest.mark.parametrize(("ratio", "amplitude"), [(1.21, 0.18), (0.5, 0.3)])
+def test_ledger_closes_and_the_tip_stays_outside(one_mode, coefficient, ratio, amplitude):
+    shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=amplitude)
+    run = sb.simulate(one_mode, shaker, sb.Restitution(coefficient), cycles=20)
+    assert run.response.status is sb.RunStatus.OK
+    assert ledger(run) < 1e-4
+    assert float(run.dataset.penetration.max()) < 2e-3  # of b: one cubic against the exact flow inside a step
+
+
+def test_a_plastic_impact_sticks_until_the_force_would_pull(one_mode):
+    shaker = sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05)
+    run = sb.simulate(one_mode, shaker, sb.Restitution(0.0), cycles=4)
+    assert run.response.contact_share > 0.3
+    together = run.impacts.duration.values > 0.0
+    assert together.any()
+    assert (run.impacts.peak_force.values[together] > 0.0).all()
+    force = run.dataset.contact_force.values
+    assert force.min() > -1e-8 * force.max() - 1e-8  # N: within a tick of the release
+    held = force > 0.0
+    assert abs(run.dataset.penetration.values[held]).max() < 1e-12
+
+
+def test_mirror_image_is_exact(one_mode):
+    runs = [
+        sb.simulate(
+            one_mode,
+            sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18, side=side),
+            sb.Restitution(0.6),
+            cycles=20,
+        )
+        for side in ("below", "above")
+    ]
+    below, above = (run.dataset.modal_amplitude.values for run in runs)
+    assert np.array_equal(below, -above)
+    assert runs[0].response.crossings == runs[1].response.crossings
+
+
+def test_a_map_takes_the_law(one_mode):
+    ds = sb.response_map(
+        one_mode, sb.Restitution(0.6), frequency_ratio=[0.8, 1.2], velocity_amplitude=[0.05, 0.3], cycles=10
+    )
+    assert ds.attrs["restitution_coefficient"] == 0.6
+    assert (ds.response >= 0).all()
+    run = sb.simulate(
+        one_mode, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.3), sb.Restitution(0.6), cycles=10
+    )
+    assert int(ds.crossings[1, 1]) == run.response.crossings
+
+
+def test_many_modes_are_refused_and_the_reason_is_true():
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=8)
+    shaker = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1)
+    with pytest.raises(sb.InputError, match=r"modes = 8.*one mode.*falls to zero"):
+        sb.simulate(model, shaker, sb.Restitution(0.5), cycles=1)
+    beam = paper.BEAM
+    total = beam.mass_per_length * beam.length
+    masses = {
+        n: sb.ReducedModel.from_beam(beam, modes=n).contact_mass(paper.LOCATION) for n in (1, 16, 64, 256)
+    }
+    assert masses[1] > masses[16] > masses[64] > masses[256]
+    assert masses[256] * 256 == pytest.approx(total, rel=0.1)  # falls like rho S L / N
