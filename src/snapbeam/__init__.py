@@ -4,6 +4,7 @@ A clamped-clamped beam pressed past buckling is struck by a shaker; its reduced 
 is classed, and maps show where it snaps.
 """
 
+from snapbeam.accuracy import Accuracy, conditioning
 from snapbeam.codes import ResponseClass, RunStatus
 from snapbeam.maps.grid import response_map
 from snapbeam.maps.long import long_map
@@ -19,6 +20,7 @@ from snapbeam.simulation import Run, simulate
 from snapbeam.validate import InputError, InputTypeError
 
 __all__ = [
+    "Accuracy",
     "Beam",
     "HertzContact",
     "InputError",
@@ -33,6 +35,7 @@ __all__ = [
     "Shaker",
     "__version__",
     "classify",
+    "conditioning",
     "exact_natural_freq",
     "long_map",
     "quasi_static_threshold",

@@ -116,7 +116,7 @@ def statistics_of(
     status = counts[:, Counts.STATUS]
     good = (status == RunStatus.OK) | (status == RunStatus.DECIDED)
     crossings, last = counts[:, Counts.CROSSINGS], counts[:, Counts.CROSSINGS_LAST_QUARTER]
-    response = classify(crossings, last, cycles, counts[:, Counts.SIDE])
+    response = classify(crossings, last, cycles, -ensemble.first_side * counts[:, Counts.SIDE])
     duration = counts[:, Counts.TIME] * ensemble.reals[:, Reals.TICK]
     barrier = model.barrier_energy - model.well_energy if model.is_bistable else np.inf
 

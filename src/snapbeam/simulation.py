@@ -9,19 +9,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.accuracy import Accuracy, steps_for
 from snapbeam.codes import RunStatus
 from snapbeam.kernels import cpu_engine
 from snapbeam.kernels.engines import resolve
-from snapbeam.kernels.ensemble import Ensemble, Start, make_ensemble, with_recorded_drive
+from snapbeam.kernels.ensemble import Ensemble
 from snapbeam.kernels.fields import Counts, Numbers, Reals, Ticks
-from snapbeam.kernels.plan import Plan, plan_steps
+from snapbeam.kernels.plan import Plan
 from snapbeam.model.contact import HertzContact, Restitution
 from snapbeam.model.drive import RecordedDrive, Shaker
 from snapbeam.model.reduction import ReducedModel
+from snapbeam.one_run import one_run
 from snapbeam.provenance import made_by
 from snapbeam.response import Response, statistics_of
 from snapbeam.trajectory import trajectory_dataset
-from snapbeam.validate import InputError, InputTypeError, finite_array, integer, positive
+from snapbeam.validate import InputError, finite_array
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,8 +31,6 @@ if TYPE_CHECKING:
 __all__ = ["Run", "simulate"]
 
 _Array = NDArray[np.float64]
-
-_CYCLES = 200
 
 _SAMPLES_PER_CYCLE = 200
 """Regular samples of a run per cycle of the excitation or of the first mode, whichever is the faster."""
@@ -42,11 +42,13 @@ _BLOW = 12
 
 @dataclass(frozen=True)
 class Run:
-    """A recorded run: time series, class with statistics, and a table of impacts."""
+    """A recorded run: time series, class with statistics, a table of impacts, and what an asked tolerance gave."""
 
     dataset: xr.Dataset
     response: Response
     impacts: xr.Dataset
+    accuracy: Accuracy | None = None
+    """None if no tolerance was asked for."""
 
 
 def simulate(
@@ -56,6 +58,7 @@ def simulate(
     cycles: int | None = None,
     *,
     step: float | None = None,
+    tolerance: float | None = None,
     accuracy: str = "map",
     engine: str = "auto",
     initial_state: tuple[ArrayLike, ArrayLike] | None = None,
@@ -79,6 +82,10 @@ def simulate(
     step : float, optional
         Step in free flight, s; steps in contact scale with it.  The default follows from the model and
         the contact; its error is on the docs' page on accuracy.
+    tolerance : float, optional
+        Greatest error allowed in the displacement of the contact point and of the centre, in b, from 1e-10 to
+        0.1: the steps are refined until two runs agree, as far as the problem's conditioning lets any
+        integrator promise it; ``run.accuracy`` says what was reached.  In place of *step* and *accuracy*.
     accuracy : {"map", "reference"}
         ``"map"``: order 4.  ``"reference"``: order 6 and much shorter steps, to check others with.
     engine : {"auto", "cpu"}
@@ -88,7 +95,8 @@ def simulate(
         rest.  The shaker starts in touch with the beam wherever it is.
     sample_times : array_like, optional
         Instants to record, s, ascending, from 0 to the end of the run.  By default 200 per cycle of the
-        excitation or of the first mode, and at least 24 more in each impact.
+        excitation or of the first mode, and at least 24 more in each impact.  Instants that a run which was
+        decided early or failed did not reach are NaN, with ``valid`` = 0.
     early_decision : bool
         End the run once its class is certain; statistics other than the class then stop there.
     reference_freq : float, optional
@@ -104,12 +112,21 @@ def simulate(
     InputError
         For bad input.  A run that fails numerically does not raise: ``run.response.status`` says why.
     """
-    ensemble, reference, plan = _single_run(
-        model, shaker, contact, cycles, step, accuracy, engine, initial_state, early_decision, reference_freq
-    )
+    resolve(engine)
+    asked_run = one_run(model, shaker, contact, cycles, initial_state, early_decision, reference_freq)
+    reached_accuracy = None
+    if tolerance is None:
+        plan = asked_run.plan(step, accuracy)
+    else:
+        if step is not None or accuracy != "map":
+            raise InputError(
+                f"tolerance = {tolerance!r} with step = {step!r}, accuracy = {accuracy!r}: give one"
+            )
+        plan, reached_accuracy = steps_for(tolerance, asked_run)
+    ensemble, reference = asked_run.ensemble(plan), asked_run.reference_freq
     tick = float(ensemble.reals[0, Reals.TICK])
     end = tick * int(ensemble.ticks[0, Ticks.END])
-    period = _period(shaker, reference)
+    period = asked_run.period
     lasted = end / period
     asked = None if sample_times is None else _checked_times(sample_times, end)
     counts, numbers, outputs = cpu_engine.record(ensemble, 0, np.empty(0), 0, False)
@@ -121,118 +138,20 @@ def simulate(
     else:
         times = asked
     reached = min(float(counts[Counts.TIME] * tick), end)
-    if counts[Counts.STATUS] != RunStatus.OK:
+    if asked is None and counts[Counts.STATUS] != RunStatus.OK:
         times = times[times <= reached]
     _, _, outputs = cpu_engine.record(ensemble, 0, times, 0, True)
     response = Response.from_statistics(statistics_of(ensemble, counts[None, :], numbers[None, :], lasted))
     attrs = _attributes(model, shaker, contact, lasted, plan, reference, early_decision, response)
     attrs["gross_work"] = float(numbers[Numbers.GROSS_WORK])
+    if reached_accuracy is not None:
+        attrs |= reached_accuracy.attributes()
     return Run(
         dataset=_dataset(ensemble, shaker, times, period, outputs, attrs),
         response=response,
         impacts=_impact_table(table, attrs),
+        accuracy=reached_accuracy,
     )
-
-
-def _single_run(
-    model: ReducedModel,
-    shaker: Shaker | RecordedDrive | None,
-    contact: HertzContact | Restitution | None,
-    cycles: int | None,
-    step: float | None,
-    accuracy: str,
-    engine: str,
-    initial_state: tuple[ArrayLike, ArrayLike] | None,
-    early_decision: bool,
-    reference_freq: float | None,
-) -> tuple[Ensemble, float, Plan]:
-    """Everything that is asked of :func:`simulate`, checked, as an ensemble of one run."""
-    check_system(model, contact, shaker)
-    if cycles is not None:
-        cycles = integer("cycles", cycles, 1, 10**7)
-    resolve(engine)
-    start = None if initial_state is None else _checked_start(model, initial_state)
-    if shaker is None and start is None:
-        raise InputError("shaker = None: a beam that nothing strikes needs an initial_state to move")
-    reference = model.reference_freq if reference_freq is None else positive("reference_freq", reference_freq)
-    if isinstance(shaker, Shaker):
-        drive = shaker
-    elif shaker is None:
-        drive = Shaker(frequency_ratio=1.0, velocity_amplitude=0.0)
-    else:
-        drive = Shaker(
-            frequency_ratio=shaker.frequency / reference,
-            velocity_amplitude=0.0,
-            location=shaker.location,
-            side=shaker.side,
-        )
-    struck = contact if shaker is not None else None
-    plan = plan_steps(model, struck, drive.location, step=step, accuracy=accuracy)
-    ensemble = make_ensemble(
-        model,
-        struck,
-        plan,
-        frequency_ratio=np.array([drive.frequency_ratio]),
-        velocity_amplitude=np.array([drive.velocity_amplitude]),
-        location=np.array([drive.location]),
-        side=drive.side,
-        cycles=cycles or _CYCLES,
-        reference_freq=reference,
-        early_decision=bool(early_decision),
-        start=start,
-    )
-    if isinstance(shaker, RecordedDrive):
-        ensemble = with_recorded_drive(ensemble, shaker, _recorded_duration(shaker, cycles))
-    return ensemble, reference, plan
-
-
-def _recorded_duration(drive: RecordedDrive, cycles: int | None) -> float:
-    if cycles is None:
-        return drive.duration
-    if cycles / drive.frequency > drive.duration * (1.0 + 1e-9):
-        held = drive.duration * drive.frequency
-        raise InputError(f"cycles = {cycles}: must be at most the {held:.1f} cycles of the recorded drive")
-    return min(cycles / drive.frequency, drive.duration)
-
-
-def _period(shaker: Shaker | RecordedDrive | None, reference: float) -> float:
-    """Seconds of one cycle."""
-    if isinstance(shaker, RecordedDrive):
-        return 1.0 / shaker.frequency
-    return 1.0 / (reference * (1.0 if shaker is None else shaker.frequency_ratio))
-
-
-def check_system(model: Any, contact: Any, shaker: Any = None) -> None:
-    """Refuse what is no model, contact or shaker, and a model that cannot be struck."""
-    if not isinstance(model, ReducedModel):
-        raise InputTypeError(f"model = {model!r}: must be a ReducedModel")
-    if shaker is not None and not isinstance(shaker, (Shaker, RecordedDrive)):
-        raise InputTypeError(f"shaker = {shaker!r}: must be a Shaker or a RecordedDrive")
-    if contact is not None and not isinstance(contact, (HertzContact, Restitution)):
-        raise InputTypeError(f"contact = {contact!r}: must be a HertzContact or a Restitution")
-    if isinstance(contact, Restitution) and model.modes != 1:
-        raise InputError(
-            f"contact = {contact!r} with modes = {model.modes}: Newton's law needs one mode, since the "
-            "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
-        )
-    if shaker is not None and contact is None:
-        raise InputError("contact = None: a shaker needs a HertzContact")
-    if model.length_scale is None:
-        model.require_bistable("a run")
-
-
-def _checked_start(model: ReducedModel, initial_state: tuple[ArrayLike, ArrayLike]) -> Start:
-    try:
-        alpha, velocity = initial_state
-    except (TypeError, ValueError):
-        raise InputTypeError("initial_state: must be a pair of arrays, amplitudes and velocities") from None
-    parts = []
-    for name, value in (("amplitudes", alpha), ("velocities", velocity)):
-        array = finite_array(f"initial_state {name}", value, 1)
-        if array.size != model.modes:
-            raise InputError(f"initial_state {name} of shape {array.shape}: must have shape ({model.modes},)")
-        parts.append(array)
-    return Start(*parts)
 
 
 def _checked_times(sample_times: ArrayLike, end: float) -> _Array:
@@ -289,7 +208,15 @@ def _dataset(
     if shaker is not None:
         variables |= {"energy_contact": values[:, 3], "work_shaker": values[:, 4]}
     variables["energy_dissipated"] = values[:, 5]
+    valid = np.isfinite(values[:, 2:]).all(axis=1) & np.isfinite(alpha).all(axis=1)
+    if not valid.all():
+        variables = {name: np.where(_like(valid, array), array, np.nan) for name, array in variables.items()}
+        variables["valid"] = valid.astype(np.int8)
     return trajectory_dataset(times, times / period, attrs=attrs, **variables)
+
+
+def _like(valid: NDArray[np.bool_], array: _Array) -> NDArray[np.bool_]:
+    return valid if array.ndim == 1 else valid[:, None]
 
 
 def _impact_table(table: _Array, attrs: dict[str, Any]) -> xr.Dataset:

@@ -21,6 +21,7 @@ __all__ = [
     "choice",
     "finite",
     "finite_array",
+    "flag",
     "integer",
     "nonnegative",
     "positive",
@@ -111,6 +112,13 @@ def integer(name: str, value: Any, low: int, high: int | None = None) -> int:
     if number < low or (high is not None and number > high):
         raise _refuse(name, value, allowed)
     return number
+
+
+def flag(name: str, value: Any) -> bool:
+    """Return *value* if it is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputTypeError(f"{name} = {value!r}: must be True or False, not {type(value).__name__}")
+    return bool(value)
 
 
 def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:

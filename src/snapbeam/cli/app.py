@@ -6,12 +6,18 @@ from typing import Annotated
 
 import typer
 
+from snapbeam.cli.calibrate import calibrate
+from snapbeam.cli.compare import compare
 from snapbeam.cli.frequencies import frequencies
+from snapbeam.cli.identify import identify
 from snapbeam.cli.info import info
 from snapbeam.cli.map import compute_map
 from snapbeam.cli.paper import paper
 from snapbeam.cli.plot import plot
 from snapbeam.cli.simulate import simulate
+from snapbeam.cli.threshold import threshold
+from snapbeam.cli.track import track
+from snapbeam.cli.vibrometer import vibrometer
 from snapbeam.provenance import __version__
 
 __all__ = ["app", "main"]
@@ -26,10 +32,16 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("map")(compute_map)
+app.command("threshold")(threshold)
 app.command("simulate")(simulate)
 app.command("frequencies")(frequencies)
 app.command("plot")(plot)
 app.command("paper")(paper)
+app.command("track")(track)
+app.command("vibrometer")(vibrometer)
+app.command("identify")(identify)
+app.command("calibrate")(calibrate)
+app.command("compare")(compare)
 app.command("info")(info)
 
 

@@ -25,8 +25,20 @@ from rich.text import Text
 
 from snapbeam.validate import InputError
 
-__all__ = ["INTERRUPTED", "REFUSED", "door", "duration", "errors", "file_line", "out", "progress"]
+__all__ = [
+    "FAILED",
+    "INTERRUPTED",
+    "REFUSED",
+    "door",
+    "duration",
+    "errors",
+    "file_line",
+    "out",
+    "pace",
+    "progress",
+]
 
+FAILED = 1
 REFUSED = 2
 INTERRUPTED = 130
 
@@ -56,6 +68,11 @@ def door(command: Callable[_P, _R]) -> Callable[_P, _R]:
         except InputError as error:
             errors().print(f"[bold red]error:[/] {escape(str(error))}")
             raise typer.Exit(REFUSED) from None
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            errors().print(f"[bold red]error:[/] {escape(str(error))}")
+            raise typer.Exit(FAILED) from None
         except KeyboardInterrupt:
             errors().print("interrupted; no file was left half written")
             raise typer.Exit(INTERRUPTED) from None
@@ -90,10 +107,11 @@ class _RateColumn(ProgressColumn):
     def render(self, task: Task) -> Text:
         if not task.completed or not task.elapsed or task.total is None:
             return Text("starting")
-        return Text(_pace(int(task.completed), int(task.total), task.elapsed))
+        return Text(pace(int(task.completed), int(task.total), task.elapsed))
 
 
-def _pace(done: int, total: int, elapsed: float) -> str:
+def pace(done: int, total: int, elapsed: float) -> str:
+    """Return runs per second and the time left, in words."""
     rate = done / max(elapsed, 1e-9)
     left = f", {duration((total - done) / rate)} left" if 0 < done < total else ""
     return f"{rate:.3g} runs/s{left}"
@@ -127,4 +145,4 @@ class _Lines:
         if tenths <= self.tenths:
             return
         self.tenths = tenths
-        self.console.print(f"{done} of {total} runs, {_pace(done, total, time.monotonic() - self.start)}")
+        self.console.print(f"{done} of {total} runs, {pace(done, total, time.monotonic() - self.start)}")

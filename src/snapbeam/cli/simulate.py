@@ -37,6 +37,15 @@ def simulate(
     side: Annotated[
         str | None, typer.Option(help="Side it pushes from: below or above.", rich_help_panel=_SHAKER)
     ] = None,
+    drive: Annotated[
+        Path | None,
+        typer.Option(
+            help="Recorded drive in place of the sinusoidal one: the file that snapbeam vibrometer "
+            "--drive-output wrote.",
+            rich_help_panel=_SHAKER,
+            metavar="FILE",
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -44,6 +53,15 @@ def simulate(
         ),
     ] = None,
     plot: opt.Plot = None,
+    animate: Annotated[
+        Path | None,
+        typer.Option(
+            help="Animation to write, .mp4 or .gif: the moving beam beside the waveform, with slow motion about "
+            "the hardest impact of the window.",
+            rich_help_panel="Output",
+            metavar="FILE",
+        ),
+    ] = None,
     window: opt.Window = None,
     modes: opt.Modes = None,
     damping_ratio: opt.DampingRatio = None,
@@ -69,26 +87,39 @@ def simulate(
     """
     from snapbeam.files import check_writable
 
-    drive = {
+    sine = {
         "frequency_ratio": frequency_ratio,
         "velocity_amplitude": velocity_amplitude,
         "location": location,
         "side": side,
     }
-    settings = opt.configured(ctx.params, shaker=drive)
+    settings = opt.configured(ctx.params, shaker=sine)
     if output is not None:
         check_writable(output, "output", (".nc",))
     if plot is not None:
         from snapbeam.figures.style import FIGURE_SUFFIXES
 
         check_writable(plot, "plot", FIGURE_SUFFIXES)
+    if animate is not None:
+        from snapbeam.figures.animation import ANIMATION_SUFFIXES
+
+        check_writable(animate, "animate", ANIMATION_SUFFIXES)
     part = opt.parse_window(window)
 
     import snapbeam as sb
 
     model = sb.ReducedModel.from_beam(settings.beam.build(), **settings.model.model_dump())
     start = time.monotonic()
-    run = sb.simulate(model, settings.shaker.build(), settings.contact.build(), **opt.run_arguments(settings))
+    arguments = opt.run_arguments(settings)
+    shaker: sb.Shaker | sb.RecordedDrive = settings.shaker.build()
+    if drive is not None:
+        if frequency_ratio is not None or velocity_amplitude is not None:
+            raise sb.InputError("frequency_ratio, velocity_amplitude: must be left out with a recorded drive")
+        shaker = sb.RecordedDrive.from_dataset(
+            _recorded(drive), location=settings.shaker.location, side=settings.shaker.side
+        )
+        arguments["cycles"] = cycles
+    run = sb.simulate(model, shaker, settings.contact.build(), **arguments)
     elapsed = time.monotonic() - start
     console = out()
     console.print(_told(run, elapsed))
@@ -98,6 +129,8 @@ def simulate(
         console.print(f"Written: {file_line(write_map(run.dataset, output))}")
     if plot is not None:
         console.print(f"Written: {file_line(draw_run(run.dataset, plot, part))}")
+    if animate is not None:
+        console.print(f"Written: {file_line(_animated(run.dataset, animate, part))}")
 
 
 def draw_run(dataset: xr.Dataset, path: Path, window: tuple[float, float] | None) -> Path:
@@ -108,6 +141,28 @@ def draw_run(dataset: xr.Dataset, path: Path, window: tuple[float, float] | None
     from snapbeam.figures import plot_run, save_figure
 
     return save_figure(plot_run(dataset, window), path)
+
+
+def _recorded(path: Path) -> xr.Dataset:
+    import xarray as xr
+
+    from snapbeam.validate import InputError
+
+    try:
+        return xr.load_dataset(path, engine="h5netcdf")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"drive = {path.name!r}: must be a NetCDF file of a recorded drive ({error})"
+        ) from None
+
+
+def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | None) -> Path:
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from snapbeam.figures.animation import animate_run
+
+    return animate_run(dataset, path, window)
 
 
 def _told(run: Any, elapsed: float) -> str:

@@ -4,6 +4,7 @@ from snapbeam.figures.dots import Dots, read_dots
 from snapbeam.figures.response_map import class_handles, plot_response_map
 from snapbeam.figures.run import plot_run
 from snapbeam.figures.style import CLASS_COLORS, house_style, new_figure, save_figure
+from snapbeam.figures.threshold import plot_threshold
 
 __all__ = [
     "CLASS_COLORS",
@@ -13,6 +14,7 @@ __all__ = [
     "new_figure",
     "plot_response_map",
     "plot_run",
+    "plot_threshold",
     "read_dots",
     "save_figure",
 ]

@@ -40,8 +40,8 @@ def frame_times(
 ) -> _Array:
     """Times of a run, s, that the frames of an animation show.
 
-    The window passes evenly in *duration* seconds, but that the hardest impact in it, with half its length before
-    and after, is stretched to *slow_motion* seconds of its own.
+    The window passes evenly in *duration* seconds, but that the hardest impact in it, with half its length
+    before and after, is stretched to *slow_motion* seconds of its own.
 
     Parameters
     ----------
@@ -79,12 +79,12 @@ def animate_run(
     fps: float = 25.0,
     progress: Callable[[int, int], object] | None = None,
 ) -> Path:
-    """Write an animation of a run: the whole beam and the shaker, and their waveform with the present instant.
+    """Write an animation of a run: beam and shaker, and their waveform with the present instant.
 
-    Parameters are those of :func:`frame_times`, and *path*, ending in ``.mp4`` (H.264) or ``.gif``, and *progress*,
-    called as ``progress(frames done, frames in all)``.  The shape of the beam is the sum of its modal amplitudes
-    times the buckling modes, interpolated between samples; a run without amplitudes (a measured one)
-    shows the points of the beam and the shaker that meet.
+    Parameters are those of :func:`frame_times`, and *path*, ending in ``.mp4`` (H.264) or ``.gif``, and
+    *progress*, called as ``progress(frames done, frames in all)``.  The shape of the beam is the sum of its
+    modal amplitudes times the buckling modes, interpolated between samples; a run without amplitudes (a
+    measured one) shows the points of the beam and the shaker that meet.
 
     Returns
     -------
@@ -130,9 +130,12 @@ def _pictures(frames: Iterable[Figure]) -> Iterator[NDArray[np.uint8]]:
     for figure in frames:
         if last is not None and figure is not last:
             plt.close(last)
-        last = figure
-        figure.set_dpi(_DOTS_PER_INCH)
         canvas = FigureCanvasAgg(figure)
+        if figure is not last:
+            figure.set_dpi(_DOTS_PER_INCH)
+            canvas.draw()
+            figure.set_layout_engine("none")  # what is laid out stays where it is
+        last = figure
         canvas.draw()
         picture = np.asarray(canvas.buffer_rgba())[..., :3]
         yield np.ascontiguousarray(picture[: picture.shape[0] // 2 * 2, : picture.shape[1] // 2 * 2])
@@ -141,7 +144,10 @@ def _pictures(frames: Iterable[Figure]) -> Iterator[NDArray[np.uint8]]:
 
 
 def _write_mp4(pictures: Iterator[NDArray[np.uint8]], path: Path, rate: float) -> None:
-    import imageio_ffmpeg
+    try:
+        import imageio_ffmpeg
+    except ImportError as error:
+        raise InputError("an MP4 needs imageio-ffmpeg: pip install 'snapbeam[video]'") from error
 
     writer: Any = None
     shown = max(rate, 5.0)  # players skip through files of less than a few frames a second
@@ -169,7 +175,9 @@ def _write_gif(pictures: Iterator[NDArray[np.uint8]], path: Path, rate: float) -
     ]
     if not images:
         raise InputError("frames: must hold at least one figure")
-    images[0].save(path, save_all=True, append_images=images[1:], duration=1000.0 / rate, loop=0, optimize=True)
+    images[0].save(
+        path, save_all=True, append_images=images[1:], duration=1000.0 / rate, loop=0, optimize=True
+    )
 
 
 def _span(dataset: xr.Dataset, window: tuple[float, float] | None) -> tuple[float, float]:
@@ -181,7 +189,9 @@ def _span(dataset: xr.Dataset, window: tuple[float, float] | None) -> tuple[floa
     cycle = dataset["cycle"].values
     inside = (cycle >= window[0]) & (cycle <= window[1])
     if inside.sum() < 2:
-        raise InputError(f"window = {window}: must hold at least two samples of a run of {cycle[-1]:g} cycles")
+        raise InputError(
+            f"window = {window}: must hold at least two samples of a run of {cycle[-1]:g} cycles"
+        )
     return float(time[inside][0]), float(time[inside][-1])
 
 

@@ -10,14 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
-from matplotlib.patches import Patch
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.codes import ResponseClass
 from snapbeam.figures.style import CLASS_COLORS
 from snapbeam.validate import InputError, finite_array
 
-__all__ = ["cell_edges", "class_cells", "class_handles", "figure_legend", "panel_letters"]
+__all__ = ["cell_edges", "class_cells", "figure_legend", "panel_letters"]
 
 _Array = NDArray[np.float64]
 
@@ -40,7 +38,7 @@ def panel_letters(axes: Iterable[Axes], first: str = "A", *, offset: float = -16
 
 
 def cell_edges(points: ArrayLike, low: float = -np.inf, high: float = np.inf) -> _Array:
-    """Borders midway between the points of an axis; the outermost as far out as the next one in, within limits."""
+    """Borders midway between the points of an axis; the outermost as far out as the next one in."""
     x = finite_array("points", points, 1)
     if x.size < 2:
         raise InputError(f"points = {x.tolist()}: must be at least two")
@@ -68,17 +66,6 @@ def class_cells(ax: Axes, x: ArrayLike, y: ArrayLike, kinds: ArrayLike) -> None:
         norm=BoundaryNorm(np.arange(order[0] - 0.5, order[-1] + 1.0), len(order)),
         rasterized=True,
     )
-
-
-def class_handles(kinds: ArrayLike | None = None) -> list[Artist]:
-    """Legend entries of the four classes, and of the unknown one if *kinds* holds any."""
-    shown = [kind for kind in sorted(ResponseClass) if kind is not ResponseClass.UNKNOWN]
-    if kinds is not None and (np.asarray(kinds) == ResponseClass.UNKNOWN).any():
-        shown.append(ResponseClass.UNKNOWN)
-    return [
-        Patch(facecolor=CLASS_COLORS[kind], edgecolor="black", linewidth=0.4, label=kind.label)
-        for kind in shown
-    ]
 
 
 def figure_legend(figure: Figure, handles: Sequence[Artist], columns: int = 4) -> Legend:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from snapbeam.codes import ResponseClass
+from snapbeam.figures.agreement import draw_agreement
 from snapbeam.figures.dots import Dots
+from snapbeam.figures.panels import cell_edges, class_cells
 from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_figure
 from snapbeam.model.drive import quasi_static_threshold
 from snapbeam.validate import InputError
@@ -28,7 +29,7 @@ _Array = NDArray[np.float64]
 AXES = ("frequency_ratio", "location", "velocity_amplitude")
 """Coordinates of a map; the one that comes first here is drawn across, the other upward."""
 
-_LABELS = {
+AXIS_LABELS = {
     "frequency_ratio": r"Excitation frequency $\Omega$",
     "location": r"Shaker location $x_\mathrm{s}$",
     "velocity_amplitude": r"Velocity amplitude $V$",
@@ -48,7 +49,8 @@ def plot_response_map(
     """Draw the response class of every run of a map as one cell.
 
     Cell borders lie midway between the points of an axis, the outermost as far out as the next one in (but
-    not below zero, nor beyond the end of the beam).
+    not below zero, nor beyond the end of the beam).  Cells of a map with repeats are the paler the fewer
+    of them agree (``class_share``).
 
     Parameters
     ----------
@@ -76,26 +78,23 @@ def plot_response_map(
     """
     across, upward, kinds = _two_axes(dataset)
     x, y = (np.asarray(dataset[name].values, dtype=np.float64) for name in (across, upward))
-    edges = _edges(x, across), _edges(y, upward)
+    edges = tuple(
+        cell_edges(points, 0.0, 1.0 if name == "location" else np.inf)
+        for points, name in ((x, across), (y, upward))
+    )
     fixed = {name: _scalar(dataset, name) for name in AXES if name not in (across, upward)}
     with house_style():
         own = new_figure("single", 92.0 if legend else 70.0) if ax is None else None
         if own is not None:
             ax = own.add_subplot()
         assert ax is not None
-        order = sorted(CLASS_COLORS)
-        ax.pcolormesh(
-            edges[0],
-            edges[1],
-            kinds,
-            cmap=ListedColormap([CLASS_COLORS[kind] for kind in order]),
-            norm=BoundaryNorm(np.arange(order[0] - 0.5, order[-1] + 1.0), len(order)),
-            rasterized=True,
-        )
-        ax.set(xlabel=_LABELS[across], ylabel=_LABELS[upward])
+        class_cells(ax, edges[0], edges[1], kinds)
+        ax.set(xlabel=AXIS_LABELS[across], ylabel=AXIS_LABELS[upward])
         fix_ticks(ax)
         ax.set_title(_subtitle(dataset, fixed), loc="left")
         handles = class_handles(kinds)
+        if "class_share" in dataset:
+            handles.append(draw_agreement(ax, dataset, (across, upward), edges))
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
         if threshold_line:
             handles.append(_draw_threshold(ax, across, upward, fixed))
@@ -124,13 +123,6 @@ def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
 
 def _scalar(dataset: xr.Dataset, name: str) -> float | None:
     return float(dataset[name].squeeze()) if name in dataset.coords else None
-
-
-def _edges(points: _Array, name: str) -> _Array:
-    middle = 0.5 * (points[1:] + points[:-1])
-    first = max(2.0 * points[0] - middle[0], 0.0)
-    last = min(2.0 * points[-1] - middle[-1], 1.0 if name == "location" else np.inf)
-    return np.concatenate([[first], middle, [last]])
 
 
 def _subtitle(dataset: xr.Dataset, fixed: dict[str, float | None]) -> str:

@@ -49,8 +49,13 @@ def annotated_video(
     progress
         Called with (frames done, frames in all).
     """
-    import imageio_ffmpeg
-
+    try:
+        import cv2  # noqa: F401
+        import imageio_ffmpeg
+    except ImportError as error:
+        raise InputError(
+            f"path = {str(path)!r}: a video needs {error.name} (pip install 'snapbeam[lab,video]')"
+        ) from error
     target = check_writable(path, "path", (".mp4", ".mov", ".avi"))
     rate = positive("play_rate", play_rate, "Hz")
     every = integer("every", every, 1)

@@ -27,6 +27,7 @@ __all__ = ["Ensemble", "Start", "make_ensemble", "with_recorded_drive"]
 _Array = NDArray[np.float64]
 _SUBDIVISION = 1 << 20
 """Ticks of a flight step, so that halved steps and located events are whole numbers of ticks."""
+_MOST_TICKS = 2.0**61
 _RECORD_MARGIN = 1.5
 """Greatest speed of the cubic through a record over the greatest recorded one, at most."""
 _FAR_AWAY = -1e30
@@ -61,6 +62,15 @@ class Ensemble:
         return self.reals.shape[0]
 
     @property
+    def first_side(self) -> NDArray[np.int64]:
+        """-1 for a run that starts in the well away from which the shaker pushes, +1 for the other one."""
+        layout = self.packed.layout
+        center = self.packed.memory[layout.center : layout.center + layout.size]
+        moved = (self.starts[:, : layout.size] @ center)[self.ticks[:, Ticks.START_ROW]]
+        side: NDArray[np.int64] = np.where(self.reals[:, Reals.REST_CENTER] + moved > 0.0, 1, -1)
+        return side
+
+    @property
     def work(self) -> _Array:
         """Expected work of each run in flight steps, shape (runs,)."""
         return self.ticks[:, Ticks.END] / self.ticks[:, Ticks.STEP]
@@ -78,6 +88,25 @@ def contact_parameter(contact: HertzContact | Restitution | None) -> float:
     if contact is None:
         return 0.0
     return contact.coefficient if isinstance(contact, Restitution) else contact.stiffness
+
+
+def whole_steps(period: _Array, step: float, cycles: int) -> NDArray[np.int64]:
+    """Flight steps in each period, the step made a little shorter to fit.
+
+    Raises
+    ------
+    InputError
+        If a run has more steps than can be counted in ticks.
+    """
+    steps = np.ceil(period / step * (1.0 - 1e-12))
+    most = float(steps.max()) * cycles
+    if most > _MOST_TICKS / _SUBDIVISION:
+        raise InputError(
+            f"step = {step:g} s with cycles = {cycles} of up to {float(period.max()):g} s: makes {most:.2g} steps, "
+            f"must be at most {_MOST_TICKS / _SUBDIVISION:.2g}"
+        )
+    whole: NDArray[np.int64] = steps.astype(np.int64)
+    return whole
 
 
 def make_ensemble(
@@ -115,7 +144,7 @@ def make_ensemble(
     omega_1 = 2.0 * math.pi * reference_freq
     omega = frequency_ratio * omega_1
     period = 2.0 * math.pi / omega
-    steps = np.ceil(period / plan.step * (1.0 - 1e-12)).astype(np.int64)
+    steps = whole_steps(period, plan.step, cycles)
 
     reals = np.zeros((runs, len(Reals)))
     reals[:, Reals.OFFSET] = (rows @ q)[which] if contact is not None else _FAR_AWAY
@@ -146,7 +175,7 @@ def make_ensemble(
 def with_recorded_drive(ensemble: Ensemble, drive: RecordedDrive, duration: float) -> Ensemble:
     """The ensemble of one run, driven by a record for *duration* seconds instead of by a sinusoid."""
     reals, ticks = ensemble.reals.copy(), ensemble.ticks.copy()
-    steps = math.ceil(duration / ensemble.plan.step * (1.0 - 1e-12))
+    steps = whole_steps(np.array([duration]), ensemble.plan.step, 1)
     ticks[:, Ticks.PERIOD] = ticks[:, Ticks.END] = steps * _SUBDIVISION
     ticks[:, Ticks.LAST_QUARTER] = ticks[:, Ticks.END] // 4 * 3
     ticks[:, Ticks.DECIDE_CROSSINGS] = -1

@@ -1,7 +1,9 @@
 """Running statistics of a signal known by its values and slopes, shared by every engine.
 
 Between two instants a signal is taken as the cubic that matches both values and both slopes (Hermite);
-with s in [0, 1] and h the interval, u(s) = c0 + c1 s + c2 s^2 + c3 s^3.
+with s in [0, 1] and h the interval, u(s) = c0 + c1 s + c2 s^2 + c3 s^3.  Intervals are taken short enough that
+the cubic turns at most once inside, which it does where its slopes at the ends have opposite signs; a
+second turn, with slopes of one sign, is not looked for.
 """
 
 from __future__ import annotations

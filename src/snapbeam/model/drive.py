@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.validate import InputError, choice, finite_array, nonnegative, positive, within
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["RecordedDrive", "Shaker", "quasi_static_threshold"]
 
@@ -107,6 +111,40 @@ class RecordedDrive:
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_dataset(
+        cls, dataset: xr.Dataset, *, location: float = 1.0 / 2.1, side: str = "below"
+    ) -> RecordedDrive:
+        """A drive from what :func:`snapbeam.experiment.recorded_drive` returns, or from a file of it.
+
+        *dataset* has ``displacement`` (m) and ``velocity`` (m/s) over an even ``time`` (s), and the nominal
+        ``frequency`` (Hz) among its attributes.
+        """
+        missing = [name for name in ("time", "displacement", "velocity") if name not in dataset.variables]
+        if missing or "frequency" not in dataset.attrs:
+            raise InputError(
+                f"dataset without {', '.join(missing) or 'attribute frequency'}: must be a recorded drive with "
+                "time, displacement, velocity and frequency"
+            )
+        for name, unit in (("time", "s"), ("displacement", "m"), ("velocity", "m/s")):
+            given = dataset[name].attrs.get("units", unit)
+            if given != unit:
+                raise InputError(f"{name} with units {given!r}: must be in {unit!r}")
+        time = finite_array("time", dataset["time"].values, 1)
+        if time.size < 4:
+            raise InputError(f"time of {time.size} samples: must hold at least 4")
+        interval = (time[-1] - time[0]) / (time.size - 1)
+        if not interval > 0.0 or np.abs(np.diff(time) - interval).max() > 1e-6 * interval:
+            raise InputError("time: must be evenly spaced and increasing")
+        return cls(
+            displacement=dataset["displacement"].values,
+            velocity=dataset["velocity"].values,
+            sampling_freq=1.0 / interval,
+            frequency=float(dataset.attrs["frequency"]),
+            location=location,
+            side=side,
+        )
 
     @property
     def duration(self) -> float:

@@ -1,0 +1,75 @@
+"""``snapbeam track`` from a file to displacements, pictures and words."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+import xarray as xr
+from typer.testing import CliRunner
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "experiment"))
+from lab_waveforms import BUCKLING_LEVEL, FRAME_RATE, PIXEL, errors_px, impacts, rms
+
+from snapbeam.cli.track import track
+from snapbeam.experiment.synthetic import render_recording
+from snapbeam.experiment.synthetic_setup import SyntheticCamera, SyntheticStage
+
+app = typer.Typer()
+app.command()(track)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A synthetic recording and the path of its file."""
+    time, beam, shaker, *_ = impacts(2)
+    recording = render_recording(
+        time, beam, shaker, camera=SyntheticCamera(frame_rate=FRAME_RATE, pixel_size=PIXEL, shape=(160, 64)),
+        stage=SyntheticStage(shaker_width=0.8e-3), glare_frames=[40],
+    )  # fmt: skip
+    return recording, recording.write(tmp_path_factory.mktemp("cli") / "test.cihx")
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_the_whole_command(recorded, tmp_path):
+    recording, path = recorded
+    out, picture, report = tmp_path / "t.nc", tmp_path / "frame.png", tmp_path / "quality.pdf"
+    result = run(
+        path, "-o", out, "--buckling-level", BUCKLING_LEVEL, "--picture", picture, "--frame", 40, "--report",
+        report, "--rest-displacement", 1e-3 * float(recording.truth["displacement_mm"][0]), "--region",
+        "0:158,0:64",
+        "--video", tmp_path / "t.mp4", "--video-every", 20,
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    assert "glare: 1 frame" in result.output and "frames/s" in result.output
+    for file in (out, picture, report, tmp_path / "t.mp4"):
+        assert file.stat().st_size > 1000 and file.name in result.output
+    with xr.open_dataset(out, engine="h5netcdf") as dataset:
+        assert rms(errors_px(dataset, recording.truth, "displacement_mm")) < 0.1
+        assert dataset["displacement"].attrs["units"] == "b"
+        assert dataset.attrs["source"] == "test.cihx"
+        np.testing.assert_array_equal(dataset["flags"].values.nonzero()[0], [40])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--region", "0:5"), "region"),
+        (("--region", "a:b,c:d"), "region"),
+        (("--frame", "9999", "--picture", "frame.png"), "frame"),
+        (("--output", "out.csv"), "output"),
+        (("--picture", "frame.gif"), "picture"),
+        (("--video", "frame.gif"), "video"),
+        (("--side", "front"), "side"),
+        (("--pixel-size", "-1"), "pixel_size"),
+    ],
+)
+def test_refusals_are_one_line_and_leave_no_file(recorded, tmp_path, monkeypatch, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    result = run(recorded[1], *arguments)
+    assert result.exit_code == 2 and message in result.output
+    assert "Traceback" not in result.output and list(tmp_path.iterdir()) == []

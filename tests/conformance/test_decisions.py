@@ -1,0 +1,52 @@
+"""Classes: parity of the crossings, and runs that end early because theirs is certain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from snapbeam.codes import ResponseClass, RunStatus
+
+
+def compare(march, model, given, cycles: int) -> tuple[int, set[int]]:
+    """Check runs with and without early decisions; returns how many were decided, and the classes."""
+    full = march(model, **given, cycles=cycles).statistics
+    early = march(model, **given, cycles=cycles, early_decision=True).statistics
+    assert (full["status"] == RunStatus.OK).all()
+    np.testing.assert_array_equal(early["response"], full["response"])
+
+    odd = full["crossings"] % 2 == 1
+    continuous = full["response"] == ResponseClass.CONTINUOUS
+    np.testing.assert_array_equal(full["final_well"] == 1, odd)
+    np.testing.assert_array_equal(
+        (full["response"] == ResponseClass.TRANSIENT_2) & ~continuous, odd & ~continuous
+    )
+    np.testing.assert_array_equal(full["response"] == ResponseClass.INTRAWELL, full["crossings"] == 0)
+    np.testing.assert_array_equal(continuous, full["crossings_last_quarter"] * 20 > cycles)
+
+    decided = early["status"] == RunStatus.DECIDED
+    np.testing.assert_array_equal(np.isfinite(early["decided_at"]), decided)
+    for name in full:
+        np.testing.assert_array_equal(early[name][~decided], full[name][~decided], err_msg=name)
+    second = decided & (full["response"] == ResponseClass.TRANSIENT_2)
+    np.testing.assert_array_equal(early["crossings"][second], full["crossings"][second])
+    np.testing.assert_array_equal(full["final_well"][second], 1)
+    return int(decided.sum()), set(full["response"].tolist())
+
+
+@pytest.mark.parametrize(
+    ("modes", "runs", "cycles"), [(1, 1500, 20), (2, 300, 20), (8, 120, 16), (32, 40, 12)]
+)
+def test_early_decisions(march, model_of, draw, modes, runs, cycles) -> None:
+    decided, classes = compare(march, model_of(modes), draw(runs, 100 + modes), cycles)
+    assert decided > runs // 20
+    if runs > 100:
+        assert classes == {0, 1, 2, 3}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("modes", "runs", "cycles"), [(1, 5000, 100), (8, 800, 60), (32, 300, 60)])
+def test_many_early_decisions(march, model_of, draw, modes, runs, cycles) -> None:
+    decided, classes = compare(march, model_of(modes), draw(runs, 200 + modes), cycles)
+    assert decided > runs // 10
+    assert classes == {0, 1, 2, 3}

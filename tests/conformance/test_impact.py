@@ -1,0 +1,69 @@
+"""A free mass against a shaker at rest: Hertz's impact, whose duration and force are known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from snapbeam import paper
+from snapbeam.kernels.ensemble import Start
+from snapbeam.kernels.fields import Counts, Numbers
+from snapbeam.model.reduction import ReducedModel
+
+MASS, SPEED = 2.0e-3, 0.05
+
+
+def thrown(stiffness: float = 0.0) -> ReducedModel:
+    return ReducedModel.from_matrices(
+        [[MASS]], [stiffness], contact_shape=[1.0], length_scale=0.335e-3, reference_freq=80.0
+    )
+
+
+@pytest.mark.parametrize("speed", [0.005, 0.05, 0.5])
+def test_free_mass(march, speed) -> None:
+    """Duration 2.94328 d_max/v, peak force kc d_max^1.5, unit restitution, no work by a shaker at rest."""
+    end = march(thrown(), start=Start(np.zeros(1), np.array([-speed])))
+    depth = paper.CONTACT.max_penetration(MASS, speed)
+    assert end.counts[0, Counts.IMPACTS] == 1
+    assert end.numbers[0, Numbers.CONTACT_TIME] == pytest.approx(2.94328 * depth / speed, rel=2e-4)
+    peak = paper.CONTACT.stiffness * depth**1.5
+    assert end.numbers[0, Numbers.PEAK_FORCE] == pytest.approx(peak, rel=5e-4)
+    restitution = math.sqrt(end.numbers[0, Numbers.ENERGY] / (0.5 * MASS * speed**2))
+    assert restitution == pytest.approx(1.0, abs=2e-4)
+    assert end.numbers[0, Numbers.WORK] == 0.0
+    assert end.numbers[0, Numbers.GROSS_WORK] == 0.0
+
+
+def test_reference_accuracy(march) -> None:
+    end = march(thrown(), start=Start(np.zeros(1), np.array([-SPEED])), accuracy="reference")
+    duration = paper.CONTACT.impact_duration(MASS, SPEED)
+    assert end.numbers[0, Numbers.CONTACT_TIME] == pytest.approx(duration, rel=1e-6)
+    assert end.numbers[0, Numbers.ENERGY] == pytest.approx(0.5 * MASS * SPEED**2, rel=1e-6)
+
+
+def test_order_in_contact(march) -> None:
+    """The d^1.5 edge holds any fixed order to about 2.5; here the mean over five halvings."""
+    duration = paper.CONTACT.impact_duration(MASS, SPEED)
+    steps = duration * 2.0 ** np.arange(3, -3, -1)
+    errors = []
+    for step in steps:
+        end = march(thrown(), start=Start(np.zeros(1), np.array([-SPEED])), step=float(step))
+        errors.append(abs(end.numbers[0, Numbers.ENERGY] / (0.5 * MASS * SPEED**2) - 1.0))
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] >= 2.5, errors
+
+
+def test_onset_is_located(march) -> None:
+    """A mass on a spring leaves the shaker and is back after half a period, as fast as it left."""
+    omega = 2.0 * math.pi * 80.0
+    end = march(
+        thrown(MASS * omega**2), start=Start(np.zeros(1), np.array([SPEED])), frequency_ratio=1.0, cycles=1
+    )
+    # half a period of flight, the impact, and of the second flight what is left of the cycle
+    half = math.pi / omega
+    duration = paper.CONTACT.impact_duration(MASS, SPEED)
+    assert end.counts[0, Counts.IMPACTS] == 1
+    assert end.numbers[0, Numbers.CONTACT_TIME] == pytest.approx(duration, rel=1e-3)
+    assert duration < 0.1 * half
+    assert end.numbers[0, Numbers.MAX_DISPLACEMENT] == pytest.approx(SPEED / omega, rel=3e-5)

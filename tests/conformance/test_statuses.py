@@ -1,0 +1,67 @@
+"""Runs that fail: a status that says why, no class, no numbers that look like results."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from snapbeam.codes import ResponseClass, RunStatus
+from snapbeam.kernels.ensemble import Start
+from snapbeam.validate import InputError
+
+NOT_GIVEN = (
+    "min_displacement",
+    "max_displacement",
+    "min_center_displacement",
+    "max_center_displacement",
+    "peak_force",
+    "contact_share",
+    "decided_at",
+)
+
+
+def assert_unknown(statistics, at: int, status: RunStatus) -> None:
+    assert statistics["status"][at] == status
+    assert statistics["response"][at] == ResponseClass.UNKNOWN
+    assert not statistics["end_is_final"][at]
+    for name in NOT_GIVEN:
+        assert np.isnan(statistics[name][at]), name
+    assert len(RunStatus(status).advice) > 20
+
+
+def test_step_limit(march, model_of) -> None:
+    """A run that needs more steps than allowed is unknown; its neighbours are what they would be alone."""
+    model, slow_and_fast = model_of(1), [0.05, 3.0]
+    free = march(model, frequency_ratio=slow_and_fast, velocity_amplitude=0.1, cycles=4)
+    bound = march(model, frequency_ratio=slow_and_fast, velocity_amplitude=0.1, cycles=4, max_steps=1500)
+    assert_unknown(bound.statistics, 0, RunStatus.STEP_LIMIT)
+    np.testing.assert_array_equal(bound.numbers[1], free.numbers[1])
+    np.testing.assert_array_equal(bound.counts[1], free.counts[1])
+    assert (free.statistics["status"] == RunStatus.OK).all()
+
+
+@pytest.mark.parametrize("modes", [1, 8])
+def test_not_finite(march, model_of, modes) -> None:
+    """A start beyond all numbers overflows, and is said to."""
+    model = model_of(modes)
+    start = Start(np.full(modes, 1e200), np.zeros(modes))
+    lost = march(model, None, cycles=2, start=start)
+    assert_unknown(lost.statistics, 0, RunStatus.NOT_FINITE)
+    again = march(model, frequency_ratio=1.21, velocity_amplitude=[0.1, 0.2], cycles=2, start=start)
+    assert_unknown(again.statistics, 1, RunStatus.NOT_FINITE)
+
+
+def test_a_run_too_long_for_its_ticks_is_not_called_finished(march, model_of) -> None:
+    """10^7 cycles at Omega = 1e-5 in steps of 1e-5 s are more ticks than an integer holds."""
+    given = {
+        "frequency_ratio": 1e-5,
+        "velocity_amplitude": 0.1,
+        "cycles": 10**7,
+        "step": 1e-5,
+        "max_steps": 1000,
+    }
+    try:
+        status = march(model_of(1), **given).statistics["status"][0]
+    except InputError:
+        return
+    assert status != RunStatus.OK

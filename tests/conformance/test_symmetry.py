@@ -1,0 +1,46 @@
+"""The mirror image of a run is the run, negated, to the last bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from snapbeam.kernels.ensemble import Start
+
+MIRRORED = {
+    "min_displacement": "max_displacement",
+    "min_center_displacement": "max_center_displacement",
+    "final_well": "final_well",
+}
+
+
+def assert_mirrored(below, above) -> None:
+    np.testing.assert_array_equal(below.counts, above.counts)
+    np.testing.assert_array_equal(below.numbers, above.numbers)
+    first, second = below.statistics, above.statistics
+    for name, values in first.items():
+        other = MIRRORED.get(name) or {v: k for k, v in MIRRORED.items()}.get(name)
+        expected = values if other is None else -first[other]
+        np.testing.assert_array_equal(second[name], expected, err_msg=name)
+    assert (first["crossings"] > 0).any()
+
+
+@pytest.mark.parametrize(("modes", "runs", "cycles"), [(1, 40, 20), (2, 20, 10), (8, 12, 6), (32, 8, 5)])
+def test_shaker_from_the_other_side(march, model_of, draw, modes, runs, cycles) -> None:
+    given = draw(runs, modes)
+    assert_mirrored(
+        *(march(model_of(modes), **given, side=side, cycles=cycles) for side in ("below", "above"))
+    )
+
+
+@pytest.mark.parametrize("modes", [2, 32])
+def test_negated_start(march, model_of, draw, modes) -> None:
+    model, given = model_of(modes), draw(6, 7)
+    rng = np.random.default_rng(modes)
+    alpha = model.equilibrium + 0.02 * np.abs(model.equilibrium[0]) * rng.standard_normal(modes) / np.arange(
+        1, modes + 1
+    )
+    velocity = model.linear_modes[:, 0] * np.sqrt(1.5 * (model.barrier_energy - model.well_energy))
+    below = march(model, **given, cycles=4, start=Start(alpha, velocity))
+    above = march(model, **given, cycles=4, start=Start(-alpha, -velocity), side="above")
+    assert_mirrored(below, above)

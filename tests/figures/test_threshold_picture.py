@@ -1,0 +1,89 @@
+"""Pictures of threshold bands and of how sure a point of a map is."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.colors import to_rgb
+
+from snapbeam.codes import ResponseClass
+from snapbeam.figures import CLASS_COLORS, plot_response_map, plot_threshold, save_figure
+from snapbeam.validate import InputError
+
+
+@pytest.fixture(autouse=True)
+def _close():
+    yield
+    plt.close("all")
+
+
+@pytest.fixture
+def curve():
+    ratio = np.linspace(0.2, 3.0, 15)
+    first = np.stack((0.2 + 0.05 * np.sin(ratio), 0.25 + 0.02 * ratio))
+    first[0, 4] = np.nan
+    dims = ("modes", "frequency_ratio")
+    return xr.Dataset(
+        {"first_interwell": (dims, first), "always_interwell": (dims, first + 0.03)},
+        {
+            "modes": [1, 32],
+            "frequency_ratio": ratio,
+            "velocity_amplitude": np.linspace(0.0, 0.6, 61),
+            "location": 0.4,
+        },
+        {"cycles": 200},
+    )
+
+
+def test_band(curve):
+    ax = plot_threshold(curve)
+    lines = {line.get_label(): line for line in ax.lines}
+    np.testing.assert_array_equal(lines["$N$ = 32"].get_ydata(), curve["first_interwell"].values[1])
+    quasi_static = lines[r"quasi-static, $V_\mathrm{QS1}$"]
+    np.testing.assert_allclose(
+        quasi_static.get_ydata(), curve["frequency_ratio"] * np.sin(np.pi * 0.4) ** 2, rtol=1e-12
+    )
+    assert ax.get_xlabel().startswith("Excitation frequency") and "V" in ax.get_ylabel()
+    assert ax.get_title("left") == "200 cycles, steps of 0.01 in $V$"
+    assert len(ax.collections) == 2
+    assert ax.get_ylim() == pytest.approx((0.0, 1.4 * 0.34))
+    one = plot_threshold(curve.isel(modes=1), quasi_static=False)
+    assert len(one.lines) == 1
+
+
+def test_what_is_no_threshold(curve):
+    with pytest.raises(InputError, match="no threshold curve among"):
+        plot_threshold(curve.drop_vars("first_interwell"))
+
+
+def test_paler_where_repeats_disagree(synthetic_map, tmp_path):
+    kinds = synthetic_map["response"]
+    classes = xr.DataArray([int(k) for k in ResponseClass], dims="response_class")
+    share = xr.where(kinds == classes, 1.0, 0.0)
+    unsure = (kinds["frequency_ratio"] > 2.0) & (kinds["velocity_amplitude"] < 0.1)
+    share = xr.where(unsure, 0.5 * share + 0.5 * (classes == 3), share)
+    share = share.transpose(*kinds.dims, "response_class").assign_coords(response_class=classes)
+    ax = plot_response_map(synthetic_map.assign(class_share=share), legend=False)
+    path = save_figure(ax.figure, tmp_path / "map.png")
+    image = plt.imread(path)[..., :3]
+    ax.figure.set_dpi(300)
+    ax.figure.canvas.draw()
+
+    def seen(x, y):
+        column, row = ax.transData.transform((x, y)).astype(int)
+        return image[image.shape[0] - 1 - row, column]
+
+    color = np.array(to_rgb(CLASS_COLORS[ResponseClass.INTRAWELL]))
+    np.testing.assert_allclose(seen(1.0, 0.01667), color, atol=0.02)
+    np.testing.assert_allclose(seen(3.0, 0.01667), color + 0.425 * (1.0 - color), atol=0.02)
+
+
+def test_legend_says_how_many_disagree(synthetic_map):
+    kinds = synthetic_map["response"]
+    classes = xr.DataArray([int(k) for k in ResponseClass], dims="response_class")
+    share = xr.where(kinds == classes, 1.0, 0.0).assign_coords(response_class=classes)
+    ax = plot_response_map(synthetic_map.assign(class_share=share))
+    texts = [text.get_text() for text in ax.figure.legends[0].get_texts()]
+    assert texts[-1] == "paler: repeats disagree, 0.0 %"

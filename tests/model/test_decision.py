@@ -1,0 +1,81 @@
+"""The energy below which a beam in the far well is certain to stay."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from snapbeam.model.decision import decidable_energy, least_energy_at
+from snapbeam.model.parameters import BEAM
+from snapbeam.model.reduction import ReducedModel
+
+
+def brute_force(model: ReducedModel, location: float, displacement: float) -> float:
+    """Least potential energy of any amplitudes with w(x_s) = r, from many starts, in units of the barrier."""
+    shape = model.shape_at(location)
+    scale = np.abs(model.equilibrium[0])
+    unit = -model.well_energy
+    # alpha = particular + null(shape) z
+    particular = shape * displacement / (shape @ shape)
+    null = np.linalg.svd(shape[None, :])[2][1:].T
+
+    def energy(z: np.ndarray) -> tuple[float, np.ndarray]:
+        alpha = particular + null @ z * scale
+        slope = (model.stiffness + model.tension_stiffness * (alpha @ alpha)) * alpha
+        return float(model.potential_energy(alpha)) / unit, null.T @ slope * scale / unit
+
+    rng = np.random.default_rng(0)
+    starts = rng.normal(size=(12, model.modes - 1)) * (1.0 / np.arange(1, model.modes) ** 2)
+    ends = [
+        minimize(energy, z, jac=True, method="BFGS", options={"gtol": 1e-10, "maxiter": 5000}) for z in starts
+    ]
+    return min(float(end.fun) for end in ends) * unit
+
+
+@pytest.mark.parametrize("modes", [2, 8])
+@pytest.mark.parametrize("location", [0.25, 1.0 / 2.1])
+@pytest.mark.parametrize("height", [0.0, 0.2, 0.5, 0.8])
+def test_least_energy_matches_brute_force(modes: int, location: float, height: float) -> None:
+    model = ReducedModel.from_beam(BEAM, modes)
+    displacement = height * BEAM.buckling_level
+    bound = float(least_energy_at(model, location, displacement))
+    assert bound == pytest.approx(
+        brute_force(model, location, displacement), rel=1e-6, abs=1e-6 * -model.well_energy
+    )
+
+
+@pytest.mark.parametrize("modes", [1, 2, 8, 32])
+def test_least_energy_is_a_lower_bound_reached_in_the_well(modes: int) -> None:
+    model = ReducedModel.from_beam(BEAM, modes)
+    rng = np.random.default_rng(modes)
+    shapes = rng.normal(size=(300, modes)) / np.arange(1, modes + 1) ** 2 * 2.0 * np.abs(model.equilibrium[0])
+    places = rng.choice([0.2, 0.35, 0.5, 0.7], 300)
+    heights = np.array([model.shape_at(x) @ a for x, a in zip(places, shapes, strict=True)])
+    bound = least_energy_at(model, places, heights)
+    assert (model.potential_energy(shapes) >= bound - 1e-9 * -model.well_energy).all()
+    well = np.array([model.shape_at(x) @ -model.equilibrium for x in (0.2, 0.5)])
+    np.testing.assert_allclose(least_energy_at(model, [0.2, 0.5], well), model.well_energy, rtol=1e-9)
+    np.testing.assert_array_equal(least_energy_at(model, 0.3, well), least_energy_at(model, 0.3, -well))
+
+
+def test_decidable_energy() -> None:
+    """Less than the barrier and less the higher the shaker reaches; never where it reaches the well."""
+    model = ReducedModel.from_beam(BEAM, 8)
+    highest = np.linspace(-1.0, 1.2, 23) * BEAM.buckling_level
+    energy = decidable_energy(model, np.full(23, 0.5), highest)
+    barrier = model.barrier_energy - model.well_energy
+    possible = np.isfinite(energy)
+    np.testing.assert_array_equal(possible, highest < BEAM.buckling_level * (1.0 - 1e-12))
+    assert (energy[possible] < barrier).all()
+    assert (np.diff(energy[possible]) <= 0.0).all()
+    # away from the centre touching the shaker may take less than the saddle
+    aside = decidable_energy(model, np.array([0.25]), np.array([0.0]))
+    assert aside[0] < energy[np.searchsorted(highest, 0.0)]
+
+
+def test_decides_nothing_for_structures_given_by_matrices() -> None:
+    model = ReducedModel.from_matrices(
+        [[1.0]], [-1.0], contact_shape=[1.0], tension_stiffness=1.0, equilibrium=[-1.0]
+    )
+    assert decidable_energy(model, np.array([0.5]), np.array([0.0]))[0] == -np.inf

@@ -1,0 +1,73 @@
+"""What a run refuses, and the words it does it in."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+import snapbeam as sb
+from snapbeam import paper
+
+BUCKLED = sb.ReducedModel.from_beam(paper.BEAM, 2)
+STRAIGHT = sb.ReducedModel.from_beam(paper.STRAIGHT_BEAM, 2)
+SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        (
+            {"model": STRAIGHT},
+            sb.InputError,
+            r"needs a buckled beam: axial_load = 0 N must exceed .* 24.3685 N",
+        ),
+        ({"model": paper.BEAM}, sb.InputTypeError, r"model = Beam\(.*: must be a ReducedModel"),
+        ({"shaker": 1.21}, sb.InputTypeError, "shaker = 1.21: must be a Shaker"),
+        ({"shaker": None}, sb.InputError, "shaker = None: .* needs an initial_state"),
+        ({"contact": None}, sb.InputError, "contact = None: a shaker needs a HertzContact"),
+        ({"contact": 4e8}, sb.InputTypeError, "contact = 400000000.0: must be a HertzContact"),
+        ({"cycles": 0}, sb.InputError, r"cycles = 0: must be an integer in \[1, 10000000\]"),
+        ({"cycles": -3}, sb.InputError, "cycles = -3: must be an integer"),
+        ({"cycles": 1.5}, sb.InputError, "cycles = 1.5: must be an integer"),
+        ({"cycles": "200"}, sb.InputTypeError, "cycles = '200': must be an integer .* not str"),
+        ({"cycles": math.inf}, sb.InputError, "cycles = inf: must be an integer"),
+        ({"step": 0.0}, sb.InputError, "step = 0.0: must be a finite number greater than 0 s"),
+        ({"step": math.nan}, sb.InputError, "step = nan: must be a finite number greater than 0 s"),
+        ({"step": "1e-6"}, sb.InputTypeError, "step = '1e-6': must be .* not str"),
+        ({"accuracy": "best"}, sb.InputError, "accuracy = 'best': must be one of 'map', 'reference'"),
+        ({"engine": "abacus"}, sb.InputError, "engine = 'abacus': must be one of 'auto', 'cpu'"),
+        (
+            {"reference_freq": -80.0},
+            sb.InputError,
+            "reference_freq = -80.0: must be a finite number greater than 0",
+        ),
+        ({"initial_state": 5}, sb.InputTypeError, "initial_state: must be a pair of arrays"),
+        (
+            {"initial_state": ([0.0], [0.0])},
+            sb.InputError,
+            r"amplitudes of shape \(1,\): must have shape \(2,\)",
+        ),
+        (
+            {"initial_state": ([0, 0], [0, math.nan])},
+            sb.InputError,
+            r"velocities\[1\] = .*nan.*: must be finite",
+        ),
+        (
+            {"initial_state": ("ab", "cd")},
+            sb.InputTypeError,
+            "amplitudes = 'ab': must be an array of numbers",
+        ),
+        ({"sample_times": []}, sb.InputError, r"sample_times = \[\]: must hold at least one instant"),
+        ({"sample_times": [0.0, 0.0]}, sb.InputError, "sample_times: must be strictly increasing"),
+        ({"sample_times": [-1.0, 0.0]}, sb.InputError, "from -1 to 0 s: must lie within the run, 0 to"),
+        ({"sample_times": [0.0, 9.0]}, sb.InputError, "from 0 to 9 s: must lie within the run, 0 to"),
+        ({"sample_times": [math.nan]}, sb.InputError, r"sample_times\[0\] = .*nan.*: must be finite"),
+        ({"sample_times": ["soon"]}, sb.InputTypeError, "sample_times = .*: must be an array of numbers"),
+    ],
+)
+def test_refusals(changes: dict[str, Any], error: type[Exception], message: str) -> None:
+    given: dict[str, Any] = {"model": BUCKLED, "shaker": SHAKER, "contact": paper.CONTACT, "cycles": 1}
+    with pytest.raises(error, match=message):
+        sb.simulate(**(given | changes))
