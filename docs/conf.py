@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+from typing import Any
+
 from snapbeam.provenance import __version__
+
+# Figures of the paper are drawn from full-size data that were computed once.
+DATA = Path(__file__).parent / "data"
+os.environ["SNAPBEAM_PAPER_DATA"] = str(DATA)
+os.environ.setdefault("MPLBACKEND", "Agg")
 
 project = "snapbeam"
 author = "The snapbeam developers"
@@ -17,7 +26,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "gallery/**/*.ipynb", "gallery/**/*.py", "gallery/**/*.json"]
+exclude_patterns = ["_build", "data", "gallery/**/*.ipynb", "gallery/**/*.py", "gallery/**/*.json"]
 templates_path: list[str] = []
 
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
@@ -39,3 +48,24 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "min_reported_time": 60,
 }
+
+
+def draw_paper(app: Any) -> None:
+    """Draw every figure of the paper for the page on its reproduction."""
+    import matplotlib.pyplot as plt
+
+    from snapbeam import paper
+    from snapbeam.figures import save_figure
+
+    folder = Path(app.srcdir) / "_paper"
+    folder.mkdir(exist_ok=True)
+    for name, recipe in paper.FIGURES.items():
+        for suffix in (".png", ".pdf"):
+            figure = recipe(results=paper.shared_results())
+            save_figure(figure, folder / f"{name}{suffix}")
+            plt.close(figure)
+
+
+def setup(app: Any) -> None:
+    """Connect to Sphinx."""
+    app.connect("builder-inited", draw_paper)

@@ -42,7 +42,7 @@ _LABELS = {
 
 
 class RunStatus(IntEnum):
-    """How a run ended.  Anything but ``OK`` and ``DECIDED`` leaves the response class unknown."""
+    """How a run ended.  All but ``OK``, ``DECIDED`` and ``INFERRED`` leave the response class unknown."""
 
     OK = 0
     DECIDED = 1
@@ -50,6 +50,7 @@ class RunStatus(IntEnum):
     NOT_FINITE = 3
     STEP_LIMIT = 4
     NOT_RUN = 5
+    INFERRED = 6
 
     @property
     def advice(self) -> str:
@@ -66,4 +67,5 @@ _ADVICE = {
     RunStatus.STEP_LIMIT: "used more steps than allowed, as happens when the contact is far stiffer than the "
     "default step expects; use a larger step or a softer contact",
     RunStatus.NOT_RUN: "never started: the task that held this point failed or was skipped",
+    RunStatus.INFERRED: "not run: the points around it in a refined map are all of this class",
 }

@@ -88,7 +88,7 @@ def simulate(
         integrator promise it; ``run.accuracy`` says what was reached.  In place of *step* and *accuracy*.
     accuracy : {"map", "reference"}
         ``"map"``: order 4.  ``"reference"``: order 6 and much shorter steps, to check others with.
-    engine : {"auto", "cpu"}
+    engine : {"auto", "cpu", "cuda"}
         What integrates; one recorded run is always the CPU's work.
     initial_state : pair of arrays of shape (N,), optional
         Modal amplitudes alpha (m^0.5) and their velocities (m^0.5/s) at the start, in place of the well at

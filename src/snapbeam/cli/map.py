@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from snapbeam.cli import long
 from snapbeam.cli import options as opt
-from snapbeam.cli.console import door, out, progress
+from snapbeam.cli.console import FAILED, door, out, progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,6 +60,15 @@ def compute_map(
     engine: opt.Engine = None,
     early_decision: opt.EarlyDecision = None,
     threads: opt.Threads = None,
+    store: long.StoreOption = None,
+    verify: long.Verify = False,
+    cluster: long.ClusterOption = None,
+    refine: long.Refine = None,
+    replicas: long.Replicas = None,
+    replica_size: long.ReplicaSize = None,
+    halve_step: long.HalveStep = False,
+    chunk: long.Chunk = None,
+    log: long.Log = None,
     length: opt.Length = None,
     thickness: opt.Thickness = None,
     width: opt.Width = None,
@@ -83,13 +93,14 @@ def compute_map(
         "velocity_amplitude": velocity_amplitude,
         "location": location,
     }
-    settings = opt.configured(ctx.params, map=axes)
+    given = dict(ctx.params)
+    settings = long.resumed(given, opt.configured(given, map=axes))
     points = settings.map.axes()
     check_writable(output, "output", (".nc",))
     if plot is not None:
         _check_plot(plot, points)
 
-    from snapbeam import ReducedModel, response_map
+    from snapbeam import ReducedModel, long_map, response_map
 
     beam = settings.beam.build()
     model = ReducedModel.from_beam(beam, **settings.model.model_dump())
@@ -98,13 +109,35 @@ def compute_map(
     arguments: dict[str, Any] = points | opt.run_arguments(settings)
     total = math.prod(1 if isinstance(values, float) else len(values) for values in points.values())
     start = time.monotonic()
-    with progress(total) as report:
-        dataset = response_map(model, settings.contact.build(), **arguments, threads=threads, progress=report)
+    further = long.long_arguments(given)
+    contact = settings.contact.build()
+    if not further and log is None:
+        with progress(total) as say:
+            dataset = response_map(model, contact, **arguments, threads=threads, progress=say)
+        write_map(dataset, output)
+        lines: list[str] = []
+    else:
+        from snapbeam.maps.long import Tally
+
+        tally = Tally()
+        further |= {} if verify else {"output": output}
+        further |= {"config": long.kept_config(settings, given), "tally": tally, "threads": threads}
+        with long.report(total, log) as say:
+            dataset = long_map(model, contact, **arguments, **further, progress=say.progress, note=say.note)
+            lines = long.tally_lines(tally, store, time.monotonic() - start)
+            for line in lines:
+                say.log(line)
+        if verify:
+            out().print(*lines, sep="\n", markup=False)
+            raise typer.Exit(FAILED if tally.failed else 0)
     elapsed = time.monotonic() - start
-    files = [write_map(dataset, output)]
+    files = [output]
     if plot is not None:
         files.append(draw_map(dataset, plot, overlay, threshold_line))
-    out().print(map_summary(dataset, files, elapsed))
+    out().print(map_summary(dataset, files, None if store is not None else elapsed))
+    out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")
+    if further and tally.failed:
+        raise typer.Exit(FAILED)
 
 
 def _check_plot(path: Path, points: dict[str, Axis]) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -19,8 +19,8 @@ def paper(
     figure: Annotated[
         str,
         typer.Argument(
-            help="fig2 to fig8, figA9, figB10, si5 (an animation), low_frequency, sensitivity, claims (the table of "
-            "what the paper says and what is measured), or all.",
+            help="fig2 to fig8, figA9, figB10, si5 (an animation), low_frequency, sensitivity, claims (the "
+            "table of what the paper says and what is measured), or all.",
             metavar="FIGURE",
         ),
     ],
@@ -36,8 +36,8 @@ def paper(
     data: Annotated[
         Path | None,
         typer.Option(
-            help="Folder of data computed before (fig6.nc, ...), to draw and measure from; what is not there is "
-            "computed.",
+            help="Folder of data computed before (fig6.nc, ...), to draw and measure from; what is not "
+            "there is computed.",
             metavar="DIR",
         ),
     ] = None,
@@ -66,17 +66,19 @@ def paper(
     size = "full" if full else "quick"
     results = Results(size, read=data, write=output if full else None, progress=_Tell())
     names = [name for name in FIGURES if figure in (name, "all")]
+    if dots is not None and not {"fig6", "fig7", "fig8"} & set(names):
+        raise InputError(f"dots: {figure} shows no measured responses; fig6, fig7 and fig8 do")
     for name in names:
         start = time.monotonic()
-        given = {"dots": dots} if dots is not None and name in ("fig6", "fig7", "fig8") else {}
+        given: dict[str, Any] = (
+            {"dots": dots} if dots is not None and name in ("fig6", "fig7", "fig8") else {}
+        )
         if measured and name == "fig4":
             given["measured"] = [str(file) for file in measured]
         files = FIGURES[name].write(output, results=results, **given)
         out().print(f"{name}: {FIGURES[name].about} ({size}, {duration(time.monotonic() - start)})")
         for file in files:
             out().print(f"  {file_line(file)}")
-    if dots is not None and not {"fig6", "fig7", "fig8"} & set(names):
-        raise InputError(f"dots: {figure} shows no measured responses; fig6, fig7 and fig8 do")
     if figure in ("claims", "all"):
         rows, files = write_claims(output, results)
         verdicts = [row.verdict for row in rows]

@@ -126,11 +126,17 @@ def status_lines(dataset: xr.Dataset) -> list[str]:
     lines = []
     for status in RunStatus:
         count = int((codes == status).sum())
-        if count and status not in (RunStatus.OK, RunStatus.DECIDED):
+        if count and status not in (RunStatus.OK, RunStatus.DECIDED, RunStatus.INFERRED):
             lines.append(f"[bold red]{count} failed[/] ({status.name}): {status.advice}")
     decided = int((codes == RunStatus.DECIDED).sum())
     if decided:
         lines.append(f"{decided} of {codes.size} runs ended early, their class being certain.")
+    inferred = int((codes == RunStatus.INFERRED).sum())
+    if inferred:
+        lines.append(
+            f"{codes.size - inferred} of {codes.size} points were run, "
+            "the others inferred from their neighbours."
+        )
     return lines
 
 

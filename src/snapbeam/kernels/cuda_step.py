@@ -9,13 +9,13 @@ unlike its neighbours a trajectory steps.  A sum has one order, fixed by the num
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
-from numba import config, cuda
+from numba import cuda
 
 from snapbeam.kernels.composition import COMPOSITIONS
+from snapbeam.kernels.cuda_block import device, sums, synchroniser
 from snapbeam.kernels.lanes import fma
 from snapbeam.kernels.physics import (
     contact_force,
@@ -28,50 +28,7 @@ from snapbeam.kernels.physics import (
     tension_factors,
 )
 
-__all__ = ["PARTS", "SIMULATED", "Block", "Functions", "Mode", "device", "functions", "shared", "stride_of"]
-
-SIMULATED = bool(config.ENABLE_CUDASIM)
-"""Whether Numba's simulator stands in for a device."""
-PARTS = 4
-"""Partial sums that every thread adds up for itself at the end of a sum over the block."""
-
-
-def device(function: Callable[..., Any]) -> Any:
-    """Compile for the device, always within the caller: arrays held in registers cannot cross a call."""
-    options: dict[str, Any] = {} if SIMULATED else {"forceinline": True}
-    return cuda.jit(device=True, **options)(function)
-
-
-def shared(function: Any) -> Any:
-    """A function that the CPU engine compiled, for use on the device, where it is compiled anew.
-
-    The simulator's arrays are none that compiled code takes: there the function runs as plain Python.
-    """
-    return function.py_func if SIMULATED else function
-
-
-def stride_of(threads: int) -> int:
-    """Length of a row of terms to be summed; rows begin in different banks of the shared memory."""
-    return max(threads, PARTS) + PARTS
-
-
-class Block(NamedTuple):
-    """What the threads of a block have in common, and each one's place in it."""
-
-    index: int
-    lane: int
-    terms: Any
-    """Shared: four rows of numbers to be summed, each :func:`stride_of` long."""
-    parts: Any
-    """Shared: the partial sums."""
-    values: Any
-    """Shared: q of all modes."""
-    place: int
-    """Where this thread's q stands in *values*."""
-    first: int
-    """Where the q of the first mode that the tension couples to this one stands."""
-    coupling: Any
-    """This mode's column of G, over the modes it is coupled to; in registers."""
+__all__ = ["Functions", "Mode", "functions"]
 
 
 class Mode(NamedTuple):
@@ -90,6 +47,7 @@ class Functions(NamedTuple):
 
     distinct: int
     """Distinct flows of a step."""
+    synchronise: Any
     sum_one: Any
     sum_four: Any
     tension: Any
@@ -100,69 +58,14 @@ class Functions(NamedTuple):
     look_inside: Any
 
 
-def _sums(threads: int) -> tuple[Any, Any, Any, Any]:
-    """Sums over the block of one, two, three and four numbers a thread."""
-    stride, span = stride_of(threads), max(threads, PARTS)
-
-    @device
-    def gather(block, count):
-        cuda.syncthreads()
-        i = block.lane
-        while i < PARTS * count:
-            at = (i // PARTS) * stride + i % PARTS
-            total = block.terms[at]
-            for row in range(PARTS, span, PARTS):
-                total += block.terms[at + row]
-            block.parts[i] = total
-            i += threads
-        cuda.syncthreads()
-
-    @device
-    def total(block, which):
-        at = which * PARTS
-        return (block.parts[at] + block.parts[at + 1]) + (block.parts[at + 2] + block.parts[at + 3])
-
-    @device
-    def sum_one(block, a):
-        block.terms[block.lane] = a
-        gather(block, 1)
-        return total(block, 0)
-
-    @device
-    def sum_two(block, a, b):
-        block.terms[block.lane] = a
-        block.terms[stride + block.lane] = b
-        gather(block, 2)
-        return total(block, 0), total(block, 1)
-
-    @device
-    def sum_three(block, a, b, c):
-        block.terms[block.lane] = a
-        block.terms[stride + block.lane] = b
-        block.terms[2 * stride + block.lane] = c
-        gather(block, 3)
-        return total(block, 0), total(block, 1), total(block, 2)
-
-    @device
-    def sum_four(block, a, b, c, d):
-        block.terms[block.lane] = a
-        block.terms[stride + block.lane] = b
-        block.terms[2 * stride + block.lane] = c
-        block.terms[3 * stride + block.lane] = d
-        gather(block, 4)
-        return total(block, 0), total(block, 1), total(block, 2), total(block, 3)
-
-    return sum_one, sum_two, sum_three, sum_four
-
-
-def _flows(order: int, threads: int) -> tuple[Any, Any]:
+def _flows(order: int, threads: int, synchronise: Any) -> tuple[Any, Any]:
     """The exact flow of a mode over a time, and all that a step of one length needs."""
     composition = COMPOSITIONS[order]
     stages, weights, elapsed = composition.flow.size, composition.flow, composition.elapsed
     distinct = (stages + 1) // 2
 
     @device
-    def flow_into(block, mode, length, flows, at):
+    def flow_into(block, mode, length, at):
         if mode.damping * abs(length) > 4.0 or mode.omega_damped == 0.0:
             sine, cosine = sincos(mode.omega_damped * length)
             over = sine / mode.omega_damped if mode.omega_damped > 0.0 else length
@@ -172,24 +75,24 @@ def _flows(order: int, threads: int) -> tuple[Any, Any]:
             over = sine / mode.omega_damped
             decayed = decay(mode.damping * length)
         a11, a12, a21, a22 = rotation(mode.damping, mode.omega_squared, cosine, over, decayed)
-        flows[block.index, at, 0, block.lane] = a11
-        flows[block.index, at, 1, block.lane] = a12
-        flows[block.index, at, 2, block.lane] = a21
-        flows[block.index, at, 3, block.lane] = a22
+        block.flows[at, 0, block.lane] = a11
+        block.flows[at, 1, block.lane] = a12
+        block.flows[at, 2, block.lane] = a21
+        block.flows[at, 3, block.lane] = a22
 
     @device
-    def prepare(block, mode, drive_omega, length, flows, turns, slot):
+    def prepare(block, mode, drive_omega, length, slot):
         flow = cuda.const.array_like(weights)
         passed = cuda.const.array_like(elapsed)
         for i in range(distinct):
-            flow_into(block, mode, flow[i] * length, flows, slot * distinct + i)
+            flow_into(block, mode, flow[i] * length, slot * distinct + i)
         i = block.lane
         while i <= stages:
             sine, cosine = sincos(passed[i] * (length * drive_omega))
-            turns[block.index, slot, 0, i] = sine
-            turns[block.index, slot, 1, i] = cosine
+            block.turns[slot, 0, i] = sine
+            block.turns[slot, 1, i] = cosine
             i += threads
-        cuda.syncthreads()
+        synchronise()
 
     return flow_into, prepare
 
@@ -200,20 +103,21 @@ def functions(order: int, threads: int, columns: int) -> Functions:
     composition = COMPOSITIONS[order]
     stages, kick_weights, which_flow = composition.flow.size, composition.kick, composition.distinct
     distinct = (stages + 1) // 2
-    sum_one, sum_two, sum_three, sum_four = _sums(threads)
-    flow_into, prepare = _flows(order, threads)
+    synchronise = synchroniser(threads)
+    sum_one, sum_two, sum_three, sum_four = sums(threads, synchronise)
+    flow_into, prepare = _flows(order, threads, synchronise)
 
     @device
     def tension(block, q):
         """This mode's part of G q; a sum over the block must follow before the next."""
-        block.values[block.place] = q
-        cuda.syncthreads()
+        block.values[0] = q
+        synchronise()
         a, b, c, d = 0.0, 0.0, 0.0, 0.0
         for j in range(0, columns, 4):
-            a = fma(block.coupling[j], block.values[block.first + j], a)
-            b = fma(block.coupling[j + 1], block.values[block.first + j + 1], b)
-            c = fma(block.coupling[j + 2], block.values[block.first + j + 2], c)
-            d = fma(block.coupling[j + 3], block.values[block.first + j + 3], d)
+            a = fma(block.coupling[j], block.near[j], a)
+            b = fma(block.coupling[j + 1], block.near[j + 1], b)
+            c = fma(block.coupling[j + 2], block.near[j + 2], c)
+            d = fma(block.coupling[j + 3], block.near[j + 3], d)
         return (a + b) + (c + d)
 
     @device
@@ -226,15 +130,15 @@ def functions(order: int, threads: int, columns: int) -> Functions:
         return w, rate, impactor.offset + motion - w, velocity - rate, c, c_rate
 
     @device
-    def press(block, impactor, turns, slot, stage, sine0, cosine0, cq):
+    def press(block, impactor, slot, stage, sine0, cosine0, cq):
         """Contact force at a kick, and the velocity of the tip."""
-        sine, cosine = turns[block.index, slot, 0, stage], turns[block.index, slot, 1, stage]
+        sine, cosine = block.turns[slot, 0, stage], block.turns[slot, 1, stage]
         sine, cosine = sine0 * cosine + cosine0 * sine, cosine0 * cosine - sine0 * sine
         motion, velocity = shaker_motion(impactor.amplitude, impactor.omega, sine, cosine)
         return contact_force(impactor.stiffness, impactor.offset + motion - cq), velocity
 
     @device
-    def take_step(block, mode, g, gamma, impactor, flows, turns, slot, length, phase, touching, q, p, k):
+    def take_step(block, mode, g, gamma, impactor, slot, length, phase, touching, q, p, k):
         """As :func:`snapbeam.kernels.cpu_step.take_step`, of this thread's mode.
 
         Returns q, p and k at the end, g.q and q.Gq there, and the step's impulse, work and gross work.
@@ -247,23 +151,22 @@ def functions(order: int, threads: int, columns: int) -> Functions:
         if touching:
             sine0, cosine0 = sincos(phase)
             cq = sum_one(block, mode.contact * q)
-            force, velocity = press(block, impactor, turns, slot, 0, sine0, cosine0, cq)
+            force, velocity = press(block, impactor, slot, 0, sine0, cosine0, cq)
             impulse = weight * force
             work = weight * force * velocity
             gross = weight * abs(force * velocity)
         p = fma(weight, fma(force, mode.contact, k), p)
         gq, qr = 0.0, 0.0
         for stage in range(1, stages + 1):
-            flow = slot * distinct + flow_of[stage - 1]
-            index, lane = block.index, block.lane
-            turned = rotate(flows[index, flow, 0, lane], flows[index, flow, 1, lane], q, p)
-            p = rotate(flows[index, flow, 2, lane], flows[index, flow, 3, lane], q, p)
+            flow = block.flows[slot * distinct + flow_of[stage - 1]]
+            turned = rotate(flow[0, block.lane], flow[1, block.lane], q, p)
+            p = rotate(flow[2, block.lane], flow[3, block.lane], q, p)
             q = turned
             r = tension(block, q)
             weight = kick[stage] * length
             if touching:
                 gq, qr, cq = sum_three(block, g * q, r * q, mode.contact * q)
-                force, velocity = press(block, impactor, turns, slot, stage, sine0, cosine0, cq)
+                force, velocity = press(block, impactor, slot, stage, sine0, cosine0, cq)
                 impulse += weight * force
                 work += weight * force * velocity
                 gross += weight * abs(force * velocity)
@@ -275,35 +178,34 @@ def functions(order: int, threads: int, columns: int) -> Functions:
         return q, p, k, gq, qr, impulse, work, gross
 
     @device
-    def look_inside(block, mode, impactor, flows, at, pieces, piece, phase, q, p, k, k1, seen):
+    def look_inside(block, mode, impactor, at, pieces, piece, phase, q, p, k, k1):
         """As :func:`snapbeam.kernels.cpu_step.look_inside`; *at* is the flow over one piece."""
         contact0, contact1, center0, center1 = sum_four(
             block, mode.contact * k, mode.contact * k1, mode.center * k, mode.center * k1
         )
         turn_sine, turn_cosine = sincos(impactor.omega * piece)
         sine, cosine = sincos(phase)
-        index, lane = block.index, block.lane
-        half = 0.5 * piece
+        flow, half = block.flows[at], 0.5 * piece
         for i in range(pieces + 1):
             w, rate, c, c_rate = sum_four(
                 block, mode.contact * q, mode.contact * p, mode.center * q, mode.center * p
             )
             done = i / pieces
-            if lane == 0:
+            if block.lane == 0:
                 owed = half if i > 0 else 0.0
                 motion, velocity = shaker_motion(impactor.amplitude, impactor.omega, sine, cosine)
-                seen[index, i, 0] = impactor.offset + motion - w
-                seen[index, i, 1] = velocity - rate - owed * ((1.0 - done) * contact0 + done * contact1)
-                seen[index, i, 2] = c
-                seen[index, i, 3] = c_rate + owed * ((1.0 - done) * center0 + done * center1)
+                block.seen[i, 0] = impactor.offset + motion - w
+                block.seen[i, 1] = velocity - rate - owed * ((1.0 - done) * contact0 + done * contact1)
+                block.seen[i, 2] = c
+                block.seen[i, 3] = c_rate + owed * ((1.0 - done) * center0 + done * center1)
             kick = piece if i > 0 else half
             p = fma(kick * (1.0 - done), k, fma(kick * done, k1, p))
-            turned = rotate(flows[index, at, 0, lane], flows[index, at, 1, lane], q, p)
-            p = rotate(flows[index, at, 2, lane], flows[index, at, 3, lane], q, p)
+            turned = rotate(flow[0, block.lane], flow[1, block.lane], q, p)
+            p = rotate(flow[2, block.lane], flow[3, block.lane], q, p)
             q = turned
             sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine
-        cuda.syncthreads()
+        synchronise()
 
     return Functions(
-        distinct, sum_one, sum_four, tension, flow_into, prepare, observe, take_step, look_inside
+        distinct, synchronise, sum_one, sum_four, tension, flow_into, prepare, observe, take_step, look_inside
     )

@@ -46,9 +46,10 @@ def least_energy_at(model: ReducedModel, location: ArrayLike, displacement: Arra
     squares, heights = squares[which], r.ravel() ** 2
 
     def bound(mu: NDArray[np.float64]) -> NDArray[np.float64]:
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             inverse = 1.0 / np.sum(squares / (k0 - mu[:, None]), axis=1)
-        value: NDArray[np.float64] = 0.5 * heights * inverse - mu * mu / (4.0 * gamma)
+            held = np.where(heights > 0.0, 0.5 * heights * inverse, 0.0)
+        value: NDArray[np.float64] = held - mu * mu / (4.0 * gamma)
         return value
 
     # golden section on a concave function; mu = Lambda - P

@@ -1,4 +1,14 @@
-"""The paper by name: its beam, contact and parameters."""
+"""The paper by name: its beam and runs, each of its figures as a recipe, and each of its claims measured.
+
+A recipe computes its data by the public interface alone and draws them:
+
+>>> from snapbeam import paper
+>>> figure = paper.fig2()  # doctest: +SKIP
+>>> paper.fig6.write("out", size="quick")  # doctest: +SKIP
+
+``size="quick"`` is a sketch for tests (small grids, few modes, few cycles), ``"full"`` what the
+documentation shows. :func:`snapbeam.paper.claims.measure_claims` measures what the paper says.
+"""
 
 from snapbeam.model.parameters import (
     BEAM,
@@ -10,14 +20,52 @@ from snapbeam.model.parameters import (
     MODES,
     STRAIGHT_BEAM,
 )
+from snapbeam.paper.recipe import Recipe, Results, shared_results
 
 __all__ = [
     "BEAM",
     "CONTACT",
     "CYCLES",
     "DAMPING_RATIO",
+    "FIGURES",
     "LOCATION",
     "LONG_CYCLES",
     "MODES",
     "STRAIGHT_BEAM",
+    "Recipe",
+    "Results",
+    "fig2",
+    "fig3",
+    "fig4",
+    "fig5",
+    "fig6",
+    "fig7",
+    "fig8",
+    "figA9",
+    "figB10",
+    "low_frequency",
+    "sensitivity",
+    "shared_results",
+    "si5",
 ]
+
+fig2 = Recipe("fig2", "the beam and the shaker, with their symbols")
+fig3 = Recipe("fig3", "a waveform, a shallow penetration closer, and the contact force")
+fig4 = Recipe("fig4", "three kinds of waveform, measured and simulated")
+fig5 = Recipe("fig5", "a snap-through: waveform, shapes of the beam, modal amplitudes")
+fig6 = Recipe("fig6", "response over frequency and amplitude after 200 cycles, 1 and 32 modes")
+fig7 = Recipe("fig7", "response over frequency and amplitude after 1000 cycles, 1 and 32 modes")
+fig8 = Recipe("fig8", "response over location and amplitude, 1 and 32 modes")
+figA9 = Recipe("figA9", "error of the natural frequencies over the number of modes")
+figB10 = Recipe("figB10", "greatest displacement over frequency at two drives, 1 and 32 modes")
+si5 = Recipe("si5", "response over location and amplitude as modes are added (animation)")
+low_frequency = Recipe("low_frequency", "threshold over the quasi-static one at low frequency")
+sensitivity = Recipe("sensitivity", "how the map changes with what the paper leaves open")
+
+FIGURES: dict[str, Recipe] = {
+    recipe.name: recipe
+    for recipe in (
+        fig2, fig3, fig4, fig5, fig6, fig7, fig8, figA9, figB10, si5, low_frequency, sensitivity,
+    )
+}  # fmt: skip
+"""Every recipe by name: the figures of the paper, its fifth video, and two more that its claims need."""

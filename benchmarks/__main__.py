@@ -1,0 +1,67 @@
+"""``python -m benchmarks [part ...] [--quick] [-o FOLDER]``."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from benchmarks import ensemble, requests, scaling, work_precision
+from benchmarks.peers import PEERS, methods
+
+_PARTS = {
+    "work-precision": work_precision.run,
+    "ensemble": ensemble.run,
+    "scaling": scaling.run,
+    "requests": requests.run,
+}
+
+
+def _regressions(folder: Path, quick: bool) -> int:
+    """The quick times that pytest-benchmark keeps and compares."""
+    try:
+        import pytest
+        import pytest_benchmark  # noqa: F401
+    except ImportError as error:
+        print(f"regressions left out: {error}")
+        return 0
+    here = str(Path(__file__).with_name("regressions.py"))
+    storage = f"--benchmark-storage=file://{folder / 'regressions'}"
+    options = ["--benchmark-autosave", "--benchmark-compare-fail=min:25%", storage]
+    if any((folder / "regressions").glob("*/*.json")):
+        options.append("--benchmark-compare")
+    else:
+        del options[1]
+    if quick:
+        options = ["--benchmark-disable"]
+    return int(pytest.main([here, "-q", "-p", "no:cacheprovider", "-o", "addopts=", *options]))
+
+
+def main() -> int:
+    """Run the parts asked for."""
+    parts = [*_PARTS, "peers", "regressions"]
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks", description="snapbeam beside other integrators"
+    )
+    parser.add_argument("part", nargs="*", help=f"any of {', '.join(parts)}; by default all but the last two")
+    parser.add_argument("--quick", action="store_true", help="few repeats, short runs: does everything work")
+    parser.add_argument("-o", "--output", type=Path, default=Path("bench"), metavar="FOLDER")
+    asked = parser.parse_args()
+    unknown = [part for part in asked.part if part not in parts]
+    if unknown:
+        parser.error(f"part = {unknown[0]!r}: must be one of {', '.join(parts)}")
+    asked.output.mkdir(parents=True, exist_ok=True)
+    status = 0
+    for part in asked.part or _PARTS:
+        if part == "peers":
+            for peer in PEERS:
+                found = methods(peer)
+                print(found if isinstance(found, str) else f"{peer}: {', '.join(m.name for m in found)}")
+        elif part == "regressions":
+            status = _regressions(asked.output, asked.quick) or status
+        else:
+            _PARTS[part](asked.output, asked.quick)
+    return status
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

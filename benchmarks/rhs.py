@@ -1,0 +1,93 @@
+"""The right-hand side that the peers integrate, compiled, from the package's own eight-wide rows.
+
+The state is (q / q0, p / (q0 omega_s)) in the padded modal rows of the package, of order one, so that one
+absolute tolerance suits every component.  With modal damping a right-hand side needs one dense product per
+parity in either form: the modal form has it in the tension (G q), the diagonal-plus-rank-one form of the mass
+matrix in the damping (m^-1 C).  The modal form is used, with the package's own product.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from benchmarks.cases import CONTACT, Case
+from snapbeam.kernels.physics import contact_force, sincos, tension_factors
+from snapbeam.kernels.rows import dot, tension_rows
+
+__all__ = ["CompiledSystem", "aligned", "compiled_system"]
+
+_Array = NDArray[np.float64]
+_ALIGNMENT = 64
+
+
+def aligned(size: int) -> _Array:
+    """Zeros that begin where a whole register can be loaded at once."""
+    raw = np.zeros(size + _ALIGNMENT // 8)
+    first = (-raw.ctypes.data % _ALIGNMENT) // 8
+    return raw[first : first + size]
+
+
+@dataclass(frozen=True)
+class CompiledSystem:
+    """A compiled right-hand side and what it reads."""
+
+    function: Any
+    """``function(t, u, du, memory)`` writes du; all arrays of float64."""
+    memory: _Array
+    start: _Array
+    """State at rest in the well, with the shaker in touch."""
+    rows: NDArray[np.int64]
+    """Where q of each linear mode stands in the state."""
+    scale: float
+    """q0."""
+
+    def coordinates(self, states: _Array) -> _Array:
+        """Modal coordinates q of states of shape (..., size)."""
+        return np.asarray(self.scale * states[..., self.rows])
+
+
+def compiled_system(case: Case, weight: float) -> CompiledSystem:
+    """The equations of *case* for a general-purpose integrator.
+
+    *weight* is omega_s / omega_1: how much looser the absolute tolerance is on velocities.  Each method is
+    given the one that serves it best.
+    """
+    ensemble = case.ensemble(case.default_plan(), 1)
+    packed, reals = ensemble.packed, ensemble.reals[0]
+    layout, blocks = packed.layout, packed.blocks
+    size, work = layout.size, layout.work
+    memory = aligned(work + 2 * size)
+    memory[:work] = packed.memory[:work]
+    memory[layout.contact : layout.contact + size] = ensemble.contact_rows[0]
+    start_q = ensemble.starts[0][:size]
+    scale = float(case.model.length_scale / np.abs(ensemble.contact_rows[0]).max())
+    rate = weight * float(case.model.omega[0])
+    offset, amplitude, omega = float(reals[0]), float(reals[1]), float(reals[2])
+    stiffness = CONTACT.stiffness
+    gamma = layout.gamma
+    q, r = work, work + size
+    squared, damping, g, contact = layout.omega_squared, layout.damping, layout.g, layout.contact
+    inverse = 1.0 / (scale * rate)
+
+    @njit(error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, nogil=True)
+    def function(t: float, u: _Array, du: _Array, memory: _Array) -> None:
+        for i in range(size):
+            memory[q + i] = scale * u[i]
+        gq, qr = tension_rows(memory, blocks, layout, q, r)
+        along_g, along_r = tension_factors(gamma, gq, qr)
+        sine, _ = sincos(omega * t)
+        depth = offset + amplitude * sine - dot(memory, size, contact, q)
+        force = contact_force(stiffness, depth)
+        for i in range(size):
+            du[i] = rate * u[size + i]
+            pull = along_g * memory[g + i] + along_r * memory[r + i] + force * memory[contact + i]
+            pull -= memory[squared + i] * memory[q + i]
+            du[size + i] = inverse * pull - 2.0 * memory[damping + i] * u[size + i]
+
+    start = np.concatenate((start_q / scale, np.zeros(size)))
+    return CompiledSystem(function, memory, start, packed.rows, scale)

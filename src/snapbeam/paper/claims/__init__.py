@@ -1,0 +1,62 @@
+"""What the paper says, measured: each claim a function with a rule, all of them a table."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from snapbeam.paper.claims.table import VERDICTS, Claim, write_table
+from snapbeam.validate import InputError
+
+if TYPE_CHECKING:
+    from snapbeam.paper.recipe import Results
+
+__all__ = ["VERDICTS", "Claim", "measure_claims", "write_claims"]
+
+
+def measure_claims(results: Results) -> list[Claim]:
+    """Measure every claim, in the order of the table.
+
+    Parameters
+    ----------
+    results : Results
+        The data of the recipes, stored or computed; their size is the size of the measurement.  Verdicts of
+        the size ``"quick"`` exercise the rules and mean nothing else.
+    """
+    from snapbeam.paper.claims import contact, frequencies, locations, maps, unsaid, waveforms
+
+    functions = (
+        frequencies.natural_frequencies,
+        frequencies.misprint,
+        maps.notches,
+        maps.thresholds,
+        maps.long_runs,
+        maps.low_frequency,
+        locations.one_mode,
+        locations.many_modes,
+        locations.added_modes,
+        waveforms.resonances,
+        waveforms.snap_through,
+        frequencies.convergence,
+        contact.restitution,
+        frequencies.dynamic_basis,
+        waveforms.central_shaker,
+        locations.transient_window,
+        contact.stiffness,
+        unsaid.reference_frequency,
+        unsaid.contact_stiffness,
+        unsaid.damping,
+        unsaid.end_rule,
+        unsaid.tolerance,
+    )
+    return [claim for function in functions for claim in function(results)]
+
+
+def write_claims(folder: str | os.PathLike[str], results: Results) -> tuple[list[Claim], list[Path]]:
+    """Measure every claim and write the table as Markdown, CSV and JSON; returns the rows and the files."""
+    target = Path(folder)
+    if not target.is_dir():
+        raise InputError(f"folder = {str(folder)!r}: must be an existing folder")
+    rows = measure_claims(results)
+    return rows, write_table(rows, target, results.size)

@@ -1,0 +1,209 @@
+"""Fig. 4: three kinds of waveform, recorded and simulated, at parameters that are searched for.
+
+Rows: a non-periodic intrawell response, a transient interwell one with a single snap-through, and one with
+several, all at one frequency.  Left: files of measured runs if they are given; otherwise a synthetic
+recording of each simulated run, drawn as a camera at 10 000 frames a second would see it and tracked like a
+measured one.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import snapbeam as sb
+from snapbeam.figures.panels import panel_letters
+from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
+from snapbeam.model.parameters import BEAM, CYCLES, LOCATION
+from snapbeam.paper.system import class_map, paper_model, paper_run
+from snapbeam.trajectory import check_trajectory
+from snapbeam.validate import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from snapbeam.paper.recipe import Results
+
+__all__ = ["KINDS", "OPTIONS", "compute", "draw", "read_measured"]
+
+_Array = NDArray[np.float64]
+
+OPTIONS = ("measured",)
+KINDS = {
+    "intrawell": "non-periodic intrawell",
+    "single": "transient interwell, one snap-through",
+    "several": "transient interwell, several snap-throughs",
+}
+_SHOWN = 20  # cycles
+_FRAME_RATE = 10_000.0
+_REST_FRAMES = 40
+
+
+def compute(results: Results) -> dict[str, xr.Dataset]:
+    """The map that was searched, the three runs, and a tracked synthetic recording of each."""
+    modes, cycles = results.pick(4, 32), results.pick(40, CYCLES)
+    amplitude = results.pick(np.linspace(0.05, 0.3, 6), np.linspace(0.04, 0.4, 37))
+    ratio = results.pick(np.array([1.4]), np.linspace(0.8, 2.0, 13))
+    searched = class_map(
+        results,
+        "fig4",
+        paper_model(modes),
+        frequency_ratio=ratio,
+        velocity_amplitude=amplitude,
+        cycles=cycles,
+    )
+    chosen = _choose(searched, modes, cycles)
+    found = {"searched": searched}
+    for kind, (omega, drive) in chosen.items():
+        run = paper_run(modes, omega, drive, _SHOWN)
+        names = ["displacement", "center_displacement", "shaker_displacement"]
+        found[kind] = run.dataset[names]
+        found[f"{kind}_recorded"] = _recorded(run.dataset)
+    return found
+
+
+def _choose(searched: xr.Dataset, modes: int, cycles: int) -> dict[str, tuple[float, float]]:
+    """Omega and V of each kind, by a rule.
+
+    At each frequency: the smallest V that snaps through exactly once and stays, within the cycles shown; the
+    smallest above it that snaps at least three times and settles; and of the three greatest intrawell V below
+    the threshold the one that repeats itself worst.  The frequency is the one at which that is worst.
+    """
+    best: tuple[float, dict[str, tuple[float, float]]] | None = None
+    for omega in searched.frequency_ratio.values:
+        column = searched.sel(frequency_ratio=omega)
+        kind, crossings = column.response.values, column.crossings.values
+        drive = column.velocity_amplitude.values
+        snapped = np.flatnonzero(kind > sb.ResponseClass.INTRAWELL)
+        settled = kind == sb.ResponseClass.TRANSIENT_2
+        if not snapped.size or snapped[0] == 0:
+            continue
+        single = [
+            i
+            for i in np.flatnonzero(settled & (crossings == 1))
+            if _last_crossing(modes, omega, drive[i]) < 0.7
+        ][:1]
+        several = [
+            i
+            for i in np.flatnonzero(settled & (crossings >= 3))
+            if single and i > single[0] and _last_crossing(modes, omega, drive[i]) < 0.8
+        ][:1]
+        if not several:
+            continue
+        below = range(max(snapped[0] - 3, 0), snapped[0])
+        scatter = {i: _scatter(modes, omega, drive[i], min(cycles, 60)) for i in below}
+        worst = max(scatter, key=lambda i: scatter[i])
+        if best is None or scatter[worst] > best[0]:
+            rows = (worst, single[0], several[0])
+            best = (
+                scatter[worst],
+                {name: (float(omega), float(drive[i])) for name, i in zip(KINDS, rows, strict=True)},
+            )
+    if best is None:
+        raise InputError("fig4: no frequency of the grid has all three kinds of response")
+    return best[1]
+
+
+def _last_crossing(modes: int, omega: float, drive: float) -> float:
+    """Time of the last crossing over the time shown."""
+    response = paper_run(modes, float(omega), float(drive), _SHOWN, sample_times=[0.0]).response
+    if not response.crossings:
+        return float("inf")
+    return response.last_crossing * omega * paper_model(modes).reference_freq / _SHOWN
+
+
+def _scatter(modes: int, omega: float, drive: float, cycles: int) -> float:
+    """Standard deviation of the displacement once a cycle, over the second half of a run, in b."""
+    period = 1.0 / (omega * paper_model(modes).reference_freq)
+    times = period * np.arange(cycles // 2, cycles)
+    return float(
+        paper_run(modes, float(omega), float(drive), cycles, sample_times=times).dataset.displacement.std()
+    )
+
+
+def _recorded(run: xr.Dataset) -> xr.Dataset:
+    """What a camera would have recorded of a run, tracked."""
+    from snapbeam.experiment.recording import open_recording
+    from snapbeam.experiment.synthetic_run import render_run
+    from snapbeam.experiment.synthetic_setup import SyntheticCamera
+    from snapbeam.experiment.tracking import track
+
+    camera = SyntheticCamera(frame_rate=_FRAME_RATE, shape=(288, 96))
+    recording = render_run(run, camera=camera, rest_frames=_REST_FRAMES)
+    with tempfile.TemporaryDirectory() as folder:
+        file = recording.write(Path(folder) / "synthetic.cihx")
+        with open_recording(file) as frames:
+            tracked = track(
+                frames, buckling_level=BEAM.buckling_level, location=LOCATION, rest_frames=_REST_FRAMES
+            )
+    tracked = tracked[["displacement", "shaker_displacement", "valid"]]
+    frequency = float(run.attrs["frequency_ratio"]) * float(run.attrs["reference_freq"])
+    cycle = (tracked.time.values - _REST_FRAMES / _FRAME_RATE) * frequency
+    tracked = tracked.assign_coords(
+        cycle=("time", cycle, {"units": "1", "long_name": "cycles of excitation"})
+    )
+    tracked.attrs["title"] = "synthetic recording of a simulated run, tracked"
+    return tracked
+
+
+def read_measured(path: str | os.PathLike[str]) -> xr.Dataset:
+    """A measured run: NetCDF with ``displacement`` and ``shaker_displacement``, in b, over ``time``."""
+    import xarray as xr
+
+    try:
+        dataset = xr.load_dataset(path, engine="h5netcdf")
+    except (OSError, ValueError) as error:
+        raise InputError(f"measured = {str(path)!r}: cannot be read, {error}") from error
+    return check_trajectory(dataset, require=("displacement", "shaker_displacement"))
+
+
+def draw(results: Results, measured: Sequence[str | os.PathLike[str]] | None = None) -> Figure:
+    """Two columns, recorded and simulated, of three rows."""
+    data = results["fig4"]
+    if measured is not None and len(measured) != len(KINDS):
+        raise InputError(f"measured: must be three files, one a kind of waveform, not {len(measured)}")
+    left = [data[f"{kind}_recorded"] if measured is None else read_measured(measured[i])
+            for i, kind in enumerate(KINDS)]  # fmt: skip
+    with house_style():
+        figure = new_figure("double", 132.0)
+        axes = figure.subplots(3, 2, sharey=True, sharex=measured is None)
+        for (first, second), recorded, (kind, words) in zip(axes, left, KINDS.items(), strict=True):
+            run = data[kind]
+            _waveform(first, recorded)
+            _waveform(second, run)
+            first.set_ylabel("Displacement $w$")
+            place = (
+                rf"$\Omega$ = {run.attrs['frequency_ratio']:.4g}, $V$ = {run.attrs['velocity_amplitude']:.4g}"
+            )
+            second.set_title(f"{words}\n{place}", loc="left")
+        title = "synthetic recording, tracked" if measured is None else "measured"
+        axes[0, 0].set_title(title, loc="left")
+        for ax in axes[-1]:
+            ax.set_xlabel(_across(ax))
+        handles, labels = axes[0, 1].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+        fix_ticks(*axes.ravel())
+        panel_letters(axes.ravel())
+    return figure
+
+
+def _waveform(ax: Axes, run: Any) -> None:
+    cycles = "cycle" in run.variables
+    x = run["cycle"].values if cycles else 1e3 * run["time"].values
+    ax.axhline(0.0, color="0.75", linewidth=0.5)
+    ax.plot(x, run.displacement, color=BEAM_COLOR, label=r"beam $w_\mathrm{b}(x_\mathrm{s})$", linewidth=0.8)
+    ax.plot(x, run.shaker_displacement, color=SHAKER_COLOR, label=r"shaker $w_\mathrm{s}$", linewidth=0.8)
+    ax.set_xlim(0.0 if cycles else x[0], min(x[-1], _SHOWN) if cycles else x[-1])
+    ax.set_gid("cycles" if cycles else "time")
+
+
+def _across(ax: Axes) -> str:
+    return r"Cycles of excitation $\tau$" if ax.get_gid() == "cycles" else "Time (ms)"

@@ -1,0 +1,155 @@
+"""Fig. 5: a snap-through at Omega = 1.21, V = 0.18: waveform, shapes of the beam, modes, modal amplitudes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.figures.panels import panel_letters
+from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
+from snapbeam.model.parameters import MODES
+from snapbeam.paper.system import paper_model, paper_run, shapes_along
+from snapbeam.validate import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from snapbeam.paper.recipe import Results
+
+__all__ = ["FREQUENCY_RATIO", "VELOCITY_AMPLITUDE", "compute", "draw", "snap_times"]
+
+_Array = NDArray[np.float64]
+
+FREQUENCY_RATIO, VELOCITY_AMPLITUDE = 1.21, 0.18
+_CYCLES = 16
+_SAMPLES = 400  # a cycle
+_MODE_COLORS = ("#000000", "#B03A27", "#2E7EBB", "#E0A030")
+_AROUND = 0.9  # cycles shown before and after the snap-through
+
+
+def compute(results: Results) -> dict[str, xr.Dataset]:
+    """The run over the cycles shown, and the shapes along the beam."""
+    import xarray as xr
+
+    modes = MODES  # a sketch too: with half of them the beam does not snap within these cycles
+    model = paper_model(modes)
+    period = 1.0 / (FREQUENCY_RATIO * model.reference_freq)
+    times = np.linspace(0.0, _CYCLES * period, _CYCLES * _SAMPLES + 1)
+    run = paper_run(modes, FREQUENCY_RATIO, VELOCITY_AMPLITUDE, _CYCLES, sample_times=times)
+    names = ["displacement", "center_displacement", "shaker_displacement", "contact_force", "modal_amplitude"]
+    x, shapes = shapes_along(model, 161)
+    along = xr.Dataset(
+        {"shape": (("position", "mode"), shapes, {"units": "m^0.5", "long_name": "buckling modes phi"})},
+        {"position": ("position", x, {"units": "L"}), "mode": run.dataset.mode},
+        {"length_scale": model.length_scale, "rest_amplitude": float(model.equilibrium[0])},
+    )
+    return {"run": run.dataset[names], "shapes": along}
+
+
+def snap_times(run: xr.Dataset) -> _Array:
+    """Times, s, at which the first modal amplitude passes zero, interpolated between samples."""
+    first, time = run.modal_amplitude.values[:, 0].astype(float), run.time.values
+    at = np.flatnonzero(np.sign(first[:-1]) * np.sign(first[1:]) < 0)
+    share = first[at] / (first[at] - first[at + 1])
+    return np.asarray(time[at] + share * (time[at + 1] - time[at]))
+
+
+def draw(results: Results) -> Figure:
+    """The four panels."""
+    run, along = results["fig5"]["run"], results["fig5"]["shapes"]
+    cycle, time = run.cycle.values, run.time.values
+    period = float(time[-1] / cycle[-1])
+    snaps = snap_times(run)
+    if snaps.size == 0:
+        raise InputError("fig5: the run does not snap through, so that there is nothing to show")
+    first = snaps[0] / period
+    inside = snaps[snaps < snaps[0] + 0.5 * period] / period
+    marks = np.array([inside[0] - 0.15, inside[0], inside[-1] + 1e-9, inside[-1] + 0.15])
+    if inside.size == 1:
+        marks[2] = inside[0] + 0.05
+    rest = abs(float(along.attrs["rest_amplitude"]))
+    with house_style():
+        figure = new_figure("double", 125.0)
+        rows = figure.add_gridspec(2, 1, height_ratios=(1.15, 1.0))
+        upper = rows[0].subgridspec(1, 2, width_ratios=(1.4, 1.0))
+        lower = rows[1].subgridspec(1, 2, width_ratios=(1.0, 1.4))
+        wave, snapshots = (figure.add_subplot(upper[at]) for at in range(2))
+        modes, amplitudes = (figure.add_subplot(lower[at]) for at in range(2))
+        _waveform(wave, run, marks, first)
+        _snapshots(snapshots, run, along, marks)
+        _modes(modes, along)
+        _amplitudes(amplitudes, run, marks, first, rest)
+        fix_ticks(wave, snapshots, modes, amplitudes)
+        panel_letters([wave, snapshots, modes, amplitudes])
+    return figure
+
+
+def _waveform(ax: Axes, run: xr.Dataset, marks: _Array, first: float) -> None:
+    cycle, w = run.cycle.values, run.center_displacement.values
+    ax.plot(cycle, w, color=BEAM_COLOR, label="beam, centre")
+    ax.plot(cycle, run.shaker_displacement, color=SHAKER_COLOR, label=r"shaker $w_\mathrm{s}$")
+    ax.set(xlabel=r"Cycles of excitation $\tau$", ylabel="Displacement $w$", xlim=(cycle[0], cycle[-1]))
+    ax.set_ylim(-1.35, 2.0)
+    ax.legend(loc="upper right", ncols=2)
+    _numbers(ax, cycle, w, marks)
+    start = max(np.floor(first) - 3.0, 0.0)
+    inset = ax.inset_axes((0.09, 0.52, 0.34, 0.38))
+    part = (cycle >= start) & (cycle <= start + 1.0)
+    high = w[part] >= np.quantile(w[part], 0.35)
+    inset.plot(cycle[part], w[part], color=BEAM_COLOR, linewidth=0.7)
+    inset.set(xlim=(start, start + 1.0), ylim=(w[part][high].min(), w[part].max() + 0.02))
+    inset.tick_params(labelsize=6, width=0.5, length=2)
+    ax.indicate_inset_zoom(inset, edgecolor="0.4", linewidth=0.5)
+
+
+def _numbers(ax: Axes, cycle: _Array, curve: _Array, marks: _Array) -> None:
+    offsets = ((-6, -3), (-7, 5), (7, -7), (7, 0))
+    for number, (at, offset) in enumerate(zip(marks, offsets, strict=True), 1):
+        y = float(np.interp(at, cycle, curve))
+        ax.plot(at, y, "o", markersize=2.5, color=SHAKER_COLOR, markeredgewidth=0)
+        ax.annotate(
+            str(number), (at, y), offset, textcoords="offset points", fontsize=7, ha="center", va="center"
+        )
+
+
+def _snapshots(ax: Axes, run: xr.Dataset, along: xr.Dataset, marks: _Array) -> None:
+    x, shapes, scale = along.position.values, along["shape"].values, float(along.attrs["length_scale"])
+    alpha, cycle = run.modal_amplitude.values, run.cycle.values
+    ax.axhline(0.0, color="0.7", linewidth=0.5)
+    styles = (("-", "0.0"), ("--", "#B03A27"), ("-.", "#2E7EBB"), ("-", "0.55"))
+    for number, (at, (dashes, color)) in enumerate(zip(marks, styles, strict=True), 1):
+        now = np.array([np.interp(at, cycle, column) for column in alpha.T])
+        ax.plot(x, shapes @ now / scale, dashes, color=color, label=str(number))
+    ax.set(xlabel="Position $x/L$", ylabel="Displacement $w$", xlim=(0.0, 1.0))
+    ax.legend(loc="upper left", ncols=4, handlelength=1.8, columnspacing=0.8)
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + 0.18 * (high - low))
+
+
+def _modes(ax: Axes, along: xr.Dataset) -> None:
+    x, shapes = along.position.values, along["shape"].values
+    ax.axhline(0.0, color="0.7", linewidth=0.5)
+    for i in range(min(3, shapes.shape[1])):
+        ax.plot(x, shapes[:, i] / np.abs(shapes[:, 0]).max(), color=_MODE_COLORS[i], label=rf"$\phi_{i + 1}$")
+    ax.set(xlabel="Position $x/L$", ylabel=r"Buckling mode $\phi_i\,/\,\phi_1(L/2)$", xlim=(0.0, 1.0))
+    ax.legend(loc="upper right", ncols=1)
+
+
+def _amplitudes(ax: Axes, run: xr.Dataset, marks: _Array, first: float, rest: float) -> None:
+    cycle, alpha = run.cycle.values, run.modal_amplitude.values.astype(float) / rest
+    near = (cycle >= first - _AROUND) & (cycle <= marks[2] + _AROUND)
+    others = np.sqrt(np.sum(alpha[:, 1:] ** 2, axis=1))
+    ax.fill_between(
+        cycle[near], 0.0, 1.0, where=(others > np.abs(alpha[:, 0]))[near], color="0.88", lw=0,
+        transform=ax.get_xaxis_transform(), label=r"$|\alpha_1|$ less than the rest",
+    )  # fmt: skip
+    for i in range(min(4, alpha.shape[1])):
+        ax.plot(cycle[near], alpha[near, i], color=_MODE_COLORS[i], label=rf"$\alpha_{i + 1}$")
+    _numbers(ax, cycle, alpha[:, 0], marks)
+    ax.set(xlabel=r"Cycles of excitation $\tau$", ylabel=r"Modal amplitude $\alpha_i\,/\,|\alpha_1(0)|$")
+    ax.set_xlim(cycle[near][0], cycle[near][-1])
+    ax.legend(loc="upper left", ncols=1)

@@ -1,0 +1,59 @@
+"""Fig. 7: classes over frequency and amplitude after 1000 cycles, and what changed since 200."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from snapbeam.figures.panels import figure_legend, panel_letters
+from snapbeam.figures.response_map import plot_response_map
+from snapbeam.figures.style import house_style, new_figure
+from snapbeam.model.parameters import LONG_CYCLES
+from snapbeam.paper.recipes.fig6 import frequency_maps, measured_dots
+from snapbeam.paper.system import legend_handles
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from snapbeam.paper.recipe import Results
+
+__all__ = ["OPTIONS", "compute", "draw"]
+
+OPTIONS = ("dots",)
+
+
+def compute(results: Results) -> dict[str, xr.Dataset]:
+    """The two maps after 1000 cycles."""
+    return frequency_maps(results, "fig7", results.pick(120, LONG_CYCLES))
+
+
+def draw(results: Results, dots: str | os.PathLike[str] | None = None) -> Figure:
+    """Above, the maps with the quasi-static threshold; below, the new class of the points that changed."""
+    long, short = results["fig7"], results["fig6"]
+    with house_style():
+        figure = new_figure("double", 150.0)
+        axes = figure.subplots(2, 2, sharex=True, sharey=True)
+        for (above, below), name in zip(axes.T, long, strict=True):
+            ds = long[name]
+            plot_response_map(ds, above, dots=measured_dots(dots, ds), threshold_line=True, legend=False)
+            changed = ds.response.values != short[name].response.values
+            plot_response_map(
+                ds.assign(response=ds.response.where(changed)), below, threshold_line=True, legend=False
+            )
+            cycles = int(short[name].attrs["cycles"])
+            below.set_title(
+                f"changed since {cycles} cycles: {100.0 * changed.mean():.1f} % of points", loc="left"
+            )
+            above.set_xlabel("")
+        for ax in axes[:, 1]:
+            ax.set_ylabel("")
+        line = axes[0, 0].lines[-1]
+        line.set_label(r"$V_\mathrm{QS1}$ (Eq. 21)")
+        panel_letters(axes.ravel())
+        kinds = np.stack([ds.response.values for ds in long.values()])
+        figure_legend(figure, [*legend_handles(kinds), line], 5)
+    return figure

@@ -1,0 +1,58 @@
+"""The data of a recipe in one compressed NetCDF file, a group for each dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from snapbeam.files import atomic_path, check_writable
+from snapbeam.validate import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["load_results", "save_results"]
+
+
+def save_results(results: Mapping[str, xr.Dataset], path: Path, size: str) -> Path:
+    """Write datasets, by name, with 32-bit floats; coordinates keep their 64 bits.
+
+    Every dataset keeps the attributes that say what it was computed from and by what.
+    """
+    import xarray as xr
+
+    target = check_writable(path, "output", (".nc",))
+    groups, encoding = {}, {}
+    for name, dataset in results.items():
+        compact = dataset.copy()
+        packed: dict[str, dict[str, object]] = {}
+        for key, variable in dataset.data_vars.items():
+            if variable.dtype == bool:
+                compact[key] = variable.astype(np.int8).assign_attrs(variable.attrs)
+            packed[str(key)] = {"zlib": True, "complevel": 9, "shuffle": True} if variable.ndim else {}
+            if variable.dtype == np.float64 and variable.ndim:
+                packed[str(key)]["dtype"] = "float32"
+        groups[f"/{name}"], encoding[f"/{name}"] = compact, packed
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs["paper_size"] = size
+    with atomic_path(target) as temporary:
+        tree.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+    return target
+
+
+def load_results(path: Path, size: str | None = None) -> dict[str, xr.Dataset]:
+    """Read what :func:`save_results` wrote; refuse a file of another *size*."""
+    import xarray as xr
+
+    try:
+        with xr.open_datatree(path, engine="h5netcdf") as tree:
+            tree.load()
+    except (OSError, ValueError) as error:
+        raise InputError(f"data = {str(path)!r}: cannot be read, {error}") from error
+    there = tree.attrs.get("paper_size")
+    if size is not None and there != size:
+        raise InputError(f"data = {str(path)!r}: is of size {there!r}, not {size!r}")
+    return {name: node.to_dataset() for name, node in tree.children.items()}

@@ -1,0 +1,120 @@
+"""What several recipes share: the paper's model, its maps and its shapes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import snapbeam as sb
+from snapbeam.model.parameters import BEAM, CONTACT, DAMPING_RATIO, LOCATION
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.artist import Artist
+
+    from snapbeam.paper.recipe import Results
+
+__all__ = ["KEPT", "class_map", "legend_handles", "paper_model", "paper_run", "relative_map", "shapes_along"]
+
+_Array = NDArray[np.float64]
+
+KEPT = ("response", "status", "crossings", "end_is_final", "decided_at")
+"""What is kept of a map that is run for its classes."""
+
+
+def paper_model(modes: int, damping_ratio: ArrayLike = DAMPING_RATIO) -> sb.ReducedModel:
+    """The paper's beam on its first *modes* buckling modes."""
+    return sb.ReducedModel.from_beam(BEAM, modes=modes, damping_ratio=damping_ratio)
+
+
+def paper_run(
+    modes: int, frequency_ratio: float, velocity_amplitude: float, cycles: int, **more: Any
+) -> sb.Run:
+    """One run of the paper's beam and shaker."""
+    location = more.pop("location", LOCATION)
+    shaker = sb.Shaker(
+        frequency_ratio=frequency_ratio, velocity_amplitude=velocity_amplitude, location=location
+    )
+    return sb.simulate(paper_model(modes), shaker, CONTACT, cycles=cycles, **more)
+
+
+def class_map(results: Results, what: str, model: sb.ReducedModel, **axes: Any) -> xr.Dataset:
+    """A map of classes of the paper's shaker on *model*, each run ended once its class is certain."""
+    contact = axes.pop("contact", CONTACT)
+    axes = {"location": LOCATION, "early_decision": True, **axes}
+    ds = sb.response_map(model, contact, progress=results.progress(what), **axes)
+    return ds[list(KEPT)]
+
+
+def relative_map(
+    results: Results,
+    what: str,
+    modes: int,
+    frequency_ratio: float,
+    locations: _Array,
+    relative: _Array,
+    cycles: int,
+) -> xr.Dataset:
+    """Classes over location and V/V_QS1(x_s), with V as a coordinate of two dimensions.
+
+    The relative amplitude follows the limit of the map, V < 2 V_QS1(x_s), which a rectangle in V would leave
+    half empty.
+    """
+    import xarray as xr
+
+    model = paper_model(modes)
+    columns = []
+    for at, x in enumerate(locations):
+        static = float(sb.quasi_static_threshold(x, frequency_ratio))
+        ds = sb.response_map(
+            model,
+            CONTACT,
+            frequency_ratio=frequency_ratio,
+            velocity_amplitude=relative * static,
+            location=float(x),
+            cycles=cycles,
+            early_decision=True,
+        )
+        amplitude = ds["velocity_amplitude"].values
+        ds = ds[list(KEPT)].rename(velocity_amplitude="relative_amplitude")
+        ds = ds.assign_coords(
+            relative_amplitude=("relative_amplitude", relative, {"units": "1", "long_name": "V/V_QS1"}),
+            velocity_amplitude=(
+                "relative_amplitude",
+                amplitude,
+                {"units": "1", "long_name": "velocity amplitude V"},
+            ),
+        )
+        columns.append(ds)
+        results.progress(what)(at + 1, len(locations))
+    joined = xr.concat(
+        columns,
+        dim="location",
+        coords=["velocity_amplitude"],
+        compat="equals",
+        combine_attrs="drop_conflicts",
+    )
+    joined.attrs.pop("location", None)
+    return joined
+
+
+def legend_handles(kinds: ArrayLike) -> list[Artist]:
+    """Legend entries of the response classes, the unknown one only if *kinds* holds it."""
+    from matplotlib.patches import Patch
+
+    from snapbeam.figures import CLASS_COLORS, class_handles
+
+    handles: list[Artist] = list(class_handles())
+    unknown = sb.ResponseClass.UNKNOWN
+    if (np.asarray(kinds) == unknown).any():
+        handles.append(Patch(facecolor=CLASS_COLORS[unknown], edgecolor="black", label=unknown.label))
+    return handles
+
+
+def shapes_along(model: sb.ReducedModel, points: int = 201) -> tuple[_Array, _Array]:
+    """Positions x/L from end to end, and the shapes there, (points, N); both ends are clamped."""
+    x = np.linspace(0.0, 1.0, points)
+    inside = np.array([model.shape_at(float(at)) for at in x[1:-1]])
+    return x, np.pad(inside, ((1, 1), (0, 0)))
