@@ -15,6 +15,9 @@ LOCATION ?= 0.47619
 MAP ?= map.nc
 PLOT ?= map.png
 
+# Where the benchmarks write; the docs show what is in docs/images
+BENCH ?= out/bench
+
 .PHONY: help map test test-slow lint docs bench clean
 
 help:
@@ -23,7 +26,7 @@ help:
 	@echo "make test       lint, types, import contracts and the tests"
 	@echo "make test-slow  the tests that take longer"
 	@echo "make docs       the documentation, in docs/_build/html"
-	@echo "make bench      the benchmarks"
+	@echo "make bench      the benchmarks, in out/bench; variable: BENCH"
 	@echo "make clean      remove what was built (not the environment, not results)"
 
 $(BIN)/python:
@@ -44,6 +47,8 @@ $(VENV)/.installed-docs: pyproject.toml constraints.txt $(VENV)/.installed-run
 
 $(VENV)/.installed-bench: pyproject.toml constraints.txt $(VENV)/.installed-test
 	$(PIP) install --constraint constraints.txt --editable ".[bench]"
+	$(PIP) install --constraint constraints.txt --editable ".[bench-fortran]" \
+		|| echo "numbalsoda left out: building it needs a Fortran compiler"
 	@touch $@
 
 map: $(VENV)/.installed-run
@@ -66,7 +71,7 @@ docs: $(VENV)/.installed-docs
 	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html
 
 bench: $(VENV)/.installed-bench
-	$(BIN)/python -m benchmarks
+	$(BIN)/python -m benchmarks -o $(BENCH)
 
 clean:
 	rm -rf build dist docs/_build docs/gallery docs/_paper docs/sg_execution_times.rst .pytest_cache .mypy_cache \

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from benchmarks import ensemble, requests, scaling, work_precision
+from benchmarks import ensemble, requests, scaling, tried, work_precision
 from benchmarks.peers import PEERS, methods
 
 _PARTS = {
@@ -13,6 +13,7 @@ _PARTS = {
     "ensemble": ensemble.run,
     "scaling": scaling.run,
     "requests": requests.run,
+    "tried": tried.run,
 }
 
 
@@ -44,7 +45,7 @@ def main() -> int:
     )
     parser.add_argument("part", nargs="*", help=f"any of {', '.join(parts)}; by default all but the last two")
     parser.add_argument("--quick", action="store_true", help="few repeats, short runs: does everything work")
-    parser.add_argument("-o", "--output", type=Path, default=Path("bench"), metavar="FOLDER")
+    parser.add_argument("-o", "--output", type=Path, default=Path("out/bench"), metavar="FOLDER")
     asked = parser.parse_args()
     unknown = [part for part in asked.part if part not in parts]
     if unknown:

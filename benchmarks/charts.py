@@ -39,7 +39,7 @@ def work_precision_chart(data: dict[str, Any], path: Path) -> None:
     points = list(data["points"])
     with house_style():
         figure = new_figure("double", 92.0)
-        axes = figure.subplots(1, len(points), sharey=True)
+        axes = figure.subplots(1, len(points), sharex=True, sharey=True)
         for ax, point in zip(axes, points, strict=True):
             for method, (marker, line) in _MARKS.items():
                 mine = [r for r in data["records"] if r["point"] == point and r["method"] == method]
@@ -98,7 +98,7 @@ def requests_chart(data: dict[str, Any], path: Path) -> None:
             ylabel="error measured up to the horizon (b)",
         )
         ax.grid(True, color="#E4E4E4", linewidth=0.4)
-        ax.legend(loc="upper left")
+        ax.legend(loc="lower right")
         save_figure(figure, path)
 
 
@@ -108,22 +108,24 @@ def scaling_chart(data: dict[str, Any], path: Path) -> None:
         figure = new_figure("double", 70.0)
         left, middle, right = figure.subplots(1, 3)
         runs, modes = data["runs"], data["modes"]
-        left.plot([r["runs"] for r in runs], [r["microseconds"] for r in runs], "o-", color="#000000")
+        left.plot(
+            [r["runs"] for r in runs], [r["microseconds"] for r in runs], "o-", color="#000000", markersize=4
+        )
         left.set(xscale="log", xlabel="runs", ylabel=r"time per run ($\mathrm{\mu}$s)")
         left.set_ylim(0.0, 1.4 * max(r["microseconds"] for r in runs))
         count = [r["modes"] for r in modes]
-        middle.plot(count, [r["milliseconds"] for r in modes], "o-", color="#000000")
+        middle.plot(count, [r["milliseconds"] for r in modes], "o-", color="#000000", markersize=4)
         middle.set(xscale="log", yscale="log", xlabel="modes $N$", ylabel="time per 200 cycles (ms)")
         for name, words, marker, color in (
             ("modal_nanoseconds", "modal, dense per parity", "s-", "#B03A27"),
             ("rank_one_nanoseconds", "rank one, undamped", "^--", "#16245E"),
         ):
-            right.plot(count, [r[name] for r in modes], marker, color=color, label=words)
+            right.plot(count, [r[name] for r in modes], marker, color=color, markersize=4, label=words)
         right.set(xscale="log", yscale="log", xlabel="modes $N$", ylabel="time per acceleration (ns)")
         right.legend(loc="upper left")
         for ax in (left, middle, right):
             ax.grid(True, color="#E4E4E4", linewidth=0.4)
         for ax in (middle, right):
             ax.set_xticks(count, [str(n) for n in count])
-            ax.minorticks_off()
+            ax.xaxis.minorticks_off()
         save_figure(figure, path)

@@ -110,9 +110,11 @@ def _throughput(modes: int, size: int, early: bool, repeats: int) -> dict[str, A
 
 
 def _scipy(size: int, records: list[dict[str, Any]]) -> dict[str, Any]:
-    """scipy on the first points of the sample, and snapbeam on the same."""
+    """scipy on a few points, evenly spread over the frequencies of the sample, and snapbeam on the same."""
     points = sample(records[0]["runs"])
-    few = {name: values[:size] for name, values in points.items()}
+    order = np.argsort(points["frequency_ratio"])
+    chosen = order[((np.arange(size) + 0.5) / size * order.size).astype(int)]
+    few = {name: values[chosen] for name, values in points.items()}
     ours = {early: _time(ensemble_of(32, few, early), 3)[0].seconds / size for early in (False, True)}
     found = methods("scipy")
     assert not isinstance(found, str)

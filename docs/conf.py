@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,9 @@ from snapbeam.provenance import __version__
 
 # Figures of the paper are drawn from full-size data that were computed once.
 DATA = Path(__file__).parent / "data"
-os.environ["SNAPBEAM_PAPER_DATA"] = str(DATA)
+os.environ.setdefault("SNAPBEAM_PAPER_DATA", str(DATA))
 os.environ.setdefault("MPLBACKEND", "Agg")
+logging.getLogger("fontTools").setLevel(logging.WARNING)
 
 project = "snapbeam"
 author = "The snapbeam developers"

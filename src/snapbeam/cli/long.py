@@ -185,8 +185,9 @@ def report(total: int, log: Path | None) -> Iterator[Report]:
 
 def tally_lines(tally: Tally, store: Path | None, elapsed: float) -> list[str]:
     """Return what happened, in words."""
-    lines = [f"{tally.runs} runs computed in {duration(elapsed)}"] if store is not None else []
+    lines = []
     if store is not None:
+        lines.append(f"{tally.runs} runs computed in {duration(elapsed)}")
         lines.append(
             f"Store {store}: {tally.tasks} tasks, {tally.kept} done before, {tally.computed} computed now, "
             f"{len(tally.damaged)} damaged, {len(tally.failed)} given up"

@@ -134,7 +134,7 @@ def compute_map(
     files = [output]
     if plot is not None:
         files.append(draw_map(dataset, plot, overlay, threshold_line))
-    out().print(map_summary(dataset, files, None if store is not None else elapsed))
+    out().print(map_summary(dataset, files, None if further else elapsed))
     out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")
     if further and tally.failed:
         raise typer.Exit(FAILED)

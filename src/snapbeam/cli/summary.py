@@ -33,9 +33,9 @@ def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | Non
     """Return the classes, the lowest interwell amplitude, what failed, the files and what to try next."""
     attrs = dataset.attrs
     runs = dataset["response"].size
-    head = (
-        f"{_count(runs, 'run')} of {_count(attrs['modes'], 'mode')} over {_count(attrs['cycles'], 'cycle')}"
-    )
+    noun = "point" if "computed" in dataset or "class_share" in dataset else "run"
+    modes, cycles = _count(attrs["modes"], "mode"), _count(attrs["cycles"], "cycle")
+    head = f"{_count(runs, noun)} of {modes} over {cycles}"
     if elapsed is not None:
         head += f" in {duration(elapsed)} ({runs / max(elapsed, 1e-9):.3g} runs/s)"
     lines = [head]

@@ -85,7 +85,7 @@ class Difference:
 
     ``changed``: the class; ``snapped``: whether it is interwell; ``at_border``: of the changed points, those
     with a neighbour of another class in the first map; ``share``: the greatest change of the share of a
-    class; ``threshold``: median of the ratio of the interwell thresholds, second over first.
+    class; ``threshold``: ratio of the mean interwell thresholds, second over first.
     """
 
     changed: float
@@ -110,11 +110,12 @@ def compare_maps(first: xr.Dataset, second: xr.Dataset) -> Difference:
         border[tuple(lower)] |= step
         border[tuple(upper)] |= step
     shares = [abs(class_share(a, kind) - class_share(b, kind)) for kind in ResponseClass]
-    ratio = interwell_threshold(second) / interwell_threshold(first)
+    curves = [interwell_threshold(ds) for ds in (first, second)]
+    both = np.isfinite(curves[0]) & np.isfinite(curves[1])
     return Difference(
         changed=float(changed.mean()),
         snapped=float((is_interwell(a) != is_interwell(b)).mean()),
         at_border=float(border[changed].mean()) if changed.any() else float("nan"),
         share=max(shares),
-        threshold=float(np.nanmedian(ratio)),
+        threshold=float(curves[1][both].mean() / curves[0][both].mean()) if both.any() else float("nan"),
     )

@@ -1,0 +1,66 @@
+"""The full-size data of the documentation: complete, small, and traceable to what made them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from snapbeam import paper
+from snapbeam.codes import ResponseClass
+from snapbeam.paper.store import load_results
+
+DATA = Path(__file__).parents[2] / "docs" / "data"
+
+
+@pytest.mark.parametrize("name", paper.FIGURES)
+def test_says_what_made_it(name):
+    for dataset in load_results(DATA / f"{name}.nc", "full").values():
+        if "response" in dataset:
+            assert not (dataset.response == ResponseClass.UNKNOWN).any() or name == "low_frequency"
+            for attribute in ("snapbeam_version", "command", "created", "modes", "cycles", "reference_freq"):
+                assert attribute in dataset.attrs
+            assert "/" not in dataset.attrs["command"].replace("docs/data", "")
+
+
+def test_is_small():
+    assert sum(file.stat().st_size for file in DATA.iterdir()) < 8e6
+    assert {file.suffix for file in DATA.iterdir()} <= {".nc", ".md", ".csv", ".json"}
+
+
+@pytest.mark.parametrize(("name", "cycles"), [("fig6", 200), ("fig7", 1000)])
+def test_frequency_maps_are_of_full_size(name, cycles):
+    maps = load_results(DATA / f"{name}.nc", "full")
+    assert [int(ds.attrs["modes"]) for ds in maps.values()] == [1, 32]
+    for ds in maps.values():
+        assert ds.response.shape == (160, 66) and ds.attrs["cycles"] == cycles
+        assert float(ds.frequency_ratio[-1]) == 4.0 and float(ds.velocity_amplitude[-1]) == 0.65
+
+
+def test_location_maps_are_of_full_size():
+    maps = load_results(DATA / "fig8.nc", "full")
+    assert len(maps) == 6
+    for ds in maps.values():
+        assert min(ds.response.shape) >= 60 and ds.attrs["cycles"] == 200
+
+
+def test_a_point_of_the_map_is_computed_again():
+    """A regular response, far from any border, comes out as it is stored."""
+    from snapbeam.paper.system import class_map, paper_model
+
+    stored = load_results(DATA / "fig6.nc", "full")["modes_1"]
+    part = stored.isel(frequency_ratio=[100, 101], velocity_amplitude=[2, 3])
+    again = class_map(
+        paper.Results(), "again", paper_model(1), cycles=200,
+        frequency_ratio=part.frequency_ratio.values, velocity_amplitude=part.velocity_amplitude.values,
+    )  # fmt: skip
+    np.testing.assert_array_equal(again.response.values, part.response.values)
+
+
+@pytest.mark.parametrize("name", ["fig2", "fig6", "fig8", "figA9"])
+def test_draws(name):
+    figure = paper.FIGURES[name]("full", data=DATA)
+    assert figure.axes
+    plt.close(figure)
