@@ -11,7 +11,6 @@ from snapbeam.provenance import __version__
 
 # Figures of the paper are drawn from full-size data that were computed once.
 DATA = Path(__file__).parent / "data"
-os.environ.setdefault("SNAPBEAM_PAPER_DATA", str(DATA))
 os.environ.setdefault("MPLBACKEND", "Agg")
 logging.getLogger("fontTools").setLevel(logging.WARNING)
 
@@ -61,9 +60,12 @@ def draw_paper(app: Any) -> None:
 
     folder = Path(app.srcdir) / "_paper"
     folder.mkdir(exist_ok=True)
+    quick = paper.Results("quick")
     for name, recipe in paper.FIGURES.items():
+        kept = (DATA / f"{name}.nc").exists()
+        results = paper.Results("full", read=DATA) if kept else quick
         for suffix in (".png", ".pdf"):
-            figure = recipe(results=paper.shared_results())
+            figure = recipe(results=results)
             save_figure(figure, folder / f"{name}{suffix}")
             plt.close(figure)
 
