@@ -17,7 +17,6 @@ import numpy as np
 import snapbeam as sb
 import snapbeam.experiment as lab
 from snapbeam import paper
-from snapbeam.experiment.recorded_drive import recorded_drive
 from snapbeam.figures.calibration import plot_calibration
 from snapbeam.figures.compare import plot_dot_comparison, plot_waveform_comparison
 from snapbeam.figures.dots import Dots
@@ -128,7 +127,7 @@ figure = plot_drive(signal, drive)
 # contrast of the edges and the noise, written as a Photron header with 12-bit pixels. The recording begins 30 ms, or
 # three cycles, before the shaker: without some rest nobody can tell the first cycle from the second.
 
-motion = sb.RecordedDrive.from_dataset(recorded_drive(true_velocity, 1e5), location=paper.LOCATION)
+motion = sb.RecordedDrive.from_dataset(lab.recorded_drive(true_velocity, 1e5), location=paper.LOCATION)
 truth = sb.simulate(truth_model, motion, paper.CONTACT, cycles=cycles)
 camera = lab.SyntheticCamera(shape=(192, 64), snr_db=30.0)
 stage = lab.SyntheticStage(shaker_width=0.4e-3)
@@ -180,7 +179,7 @@ with house_style():
 
 model = sb.ReducedModel.from_beam(calibration.beam, modes=8, damping_ratio=calibration.damping_ratio)
 recorded = sb.RecordedDrive.from_dataset(
-    recorded_drive(signal, 1e5, measurement=drive), location=paper.LOCATION
+    lab.recorded_drive(signal, 1e5, measurement=drive), location=paper.LOCATION
 )
 simulated = sb.simulate(model, recorded, paper.CONTACT, cycles=cycles)
 

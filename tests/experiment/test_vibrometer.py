@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from snapbeam.experiment.alignment import align
-from snapbeam.experiment.recorded_drive import recorded_drive
+from snapbeam.experiment.drive_record import recorded_drive
 from snapbeam.experiment.signals import Samples, make_signal
 from snapbeam.experiment.sine_fit import fit_sine, spectral_peak
 from snapbeam.experiment.vibrometer import displacement_from_velocity, measure_drive

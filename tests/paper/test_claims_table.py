@@ -11,7 +11,7 @@ import pytest
 import snapbeam as sb
 from snapbeam import paper
 from snapbeam.codes import ResponseClass
-from snapbeam.paper.claims import VERDICTS, Claim, write_claims
+from snapbeam.paper.claims import VERDICTS, Claim, measure_claims, write_claims
 from snapbeam.paper.recipes.sensitivity import buckling_mode_damping
 from snapbeam.paper.thresholds import compare_maps, interwell_threshold, threshold_notch
 from snapbeam.validate import InputError
@@ -67,7 +67,7 @@ def test_claims_are_written_and_say_what_was_found(tmp_path):
         assert [entry["verdict"] for entry in csv.DictReader(stream)] == [row.verdict for row in rows]
     table = [line for line in (tmp_path / "claims.md").read_text().splitlines() if line.startswith("|")]
     assert len(table) == len(rows) + 2
-    assert all(line.replace("\\|", "").count("|") == 7 for line in table)
+    assert all(line.replace("\\|", "").count("|") == 8 for line in table)
     for row in rows:
         assert row.measured and row.uncertainty and row.rule
         assert "nan" not in row.measured
@@ -81,3 +81,12 @@ def test_verdicts_are_a_closed_list():
     assert VERDICTS == ("holds", "in part", "fails", "open")
     with pytest.raises(InputError, match="verdict"):
         Claim("1", "a", "b", "c", "d", "perhaps", "e")
+
+
+def test_a_sketch_stands_in_for_what_is_not_stored(tmp_path):
+    stored = paper.Results("full", read=tmp_path, compute=False)
+    with pytest.raises(InputError, match="fig6: is not among the stored data"):
+        stored["fig6"]
+    rows = measure_claims(stored, paper.shared_results())
+    sizes = {row.number: row.size for row in rows}
+    assert sizes["1a"] == "full" and sizes["2a"] == "quick"

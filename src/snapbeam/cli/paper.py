@@ -41,6 +41,14 @@ def paper(
             metavar="DIR",
         ),
     ] = None,
+    stored: Annotated[
+        bool,
+        typer.Option(
+            "--stored",
+            help="For claims: the full-size data of --data where there are any, sketches elsewhere; each row "
+            "says which.",
+        ),
+    ] = False,
     dots: opt.Dots = None,
     measured: Annotated[
         list[Path] | None,
@@ -80,7 +88,11 @@ def paper(
         for file in files:
             out().print(f"  {file_line(file)}")
     if figure in ("claims", "all"):
-        rows, files = write_claims(output, results)
+        if stored:
+            kept = Results("full", read=data, progress=_Tell(), compute=False)
+            rows, files = write_claims(output, kept, Results("quick", progress=_Tell()))
+        else:
+            rows, files = write_claims(output, results)
         verdicts = [row.verdict for row in rows]
         counts = ", ".join(f"{verdicts.count(kind)} {kind}" for kind in dict.fromkeys(verdicts))
         out().print(f"claims ({size}): {counts}")

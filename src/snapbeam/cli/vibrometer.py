@@ -100,7 +100,7 @@ def vibrometer(
         }
         console.print(f"  alignment    {alignment.description}")
     if drive_output is not None:
-        from snapbeam.experiment.recorded_drive import recorded_drive
+        from snapbeam.experiment.drive_record import recorded_drive
 
         resampled = recorded_drive(data, drive_sampling_freq or 1e5, measurement=drive)
         with atomic_path(drive_output) as temporary:

@@ -29,7 +29,7 @@ _HOMES = {
     "contact_onsets": "onsets",
     "tracking_quality": "quality",
     "tracking_report": "quality",
-    "recorded_drive": "recorded_drive",
+    "recorded_drive": "drive_record",
     "Recording": "recording",
     "open_recording": "recording",
     "read_channels": "signal_files",

@@ -16,13 +16,17 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-__all__ = ["DATA_VARIABLE", "SIZES", "Recipe", "Results", "shared_results"]
+__all__ = ["DATA_VARIABLE", "SIZES", "MissingResults", "Recipe", "Results", "shared_results"]
 
 SIZES = ("quick", "full")
 DATA_VARIABLE = "SNAPBEAM_PAPER_DATA"
 """Environment variable with the folder of full-size data, for examples."""
 
 Progress = Callable[[str, int, int], object]
+
+
+class MissingResults(InputError):
+    """Data that are not stored and were not to be computed."""
 
 
 class Results:
@@ -39,6 +43,8 @@ class Results:
         Folder to which computed data are written.
     progress : callable, optional
         Called as ``progress(what, done, total)``.
+    compute : bool
+        Whether to compute what is not stored; if not, asking for it raises :class:`MissingResults`.
     """
 
     def __init__(
@@ -48,7 +54,9 @@ class Results:
         read: str | os.PathLike[str] | None = None,
         write: str | os.PathLike[str] | None = None,
         progress: Progress | None = None,
+        compute: bool = True,
     ) -> None:
+        self._compute = compute
         self.size = choice("size", size, SIZES)
         self._read = None if read is None else Path(read)
         self._write = None if write is None else Path(write)
@@ -82,6 +90,8 @@ class Results:
             if stored is not None and stored.is_file():
                 self._known[name] = load_results(stored, self.size)
                 self._files[name] = stored
+            elif not self._compute:
+                raise MissingResults(f"{name}: is not among the stored data")
             else:
                 self._known[name] = module.compute(self)
                 if self._write is not None:

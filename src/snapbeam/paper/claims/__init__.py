@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from snapbeam.paper.claims.table import VERDICTS, Claim, write_table
+from snapbeam.paper.recipe import MissingResults
 from snapbeam.validate import InputError
 
 if TYPE_CHECKING:
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["VERDICTS", "Claim", "measure_claims", "write_claims"]
 
 
-def measure_claims(results: Results) -> list[Claim]:
+def measure_claims(results: Results, sketch: Results | None = None) -> list[Claim]:
     """Measure every claim, in the order of the table.
 
     Parameters
@@ -23,6 +25,8 @@ def measure_claims(results: Results) -> list[Claim]:
     results : Results
         The data of the recipes, stored or computed; their size is the size of the measurement.  Verdicts of
         the size ``"quick"`` exercise the rules and mean nothing else.
+    sketch : Results, optional
+        What to measure a claim on if *results* lack its data and do not compute them; each row says its size.
     """
     from snapbeam.paper.claims import contact, frequencies, locations, maps, unsaid, waveforms
 
@@ -50,13 +54,26 @@ def measure_claims(results: Results) -> list[Claim]:
         unsaid.end_rule,
         unsaid.tolerance,
     )
-    return [claim for function in functions for claim in function(results)]
+    rows: list[Claim] = []
+    for function in functions:
+        used = results
+        try:
+            found = function(results)
+        except MissingResults:
+            if sketch is None:
+                raise
+            used = sketch
+            found = function(sketch)
+        rows += [replace(claim, size=used.size) for claim in found]
+    return rows
 
 
-def write_claims(folder: str | os.PathLike[str], results: Results) -> tuple[list[Claim], list[Path]]:
+def write_claims(
+    folder: str | os.PathLike[str], results: Results, sketch: Results | None = None
+) -> tuple[list[Claim], list[Path]]:
     """Measure every claim and write the table as Markdown, CSV and JSON; returns the rows and the files."""
     target = Path(folder)
     if not target.is_dir():
         raise InputError(f"folder = {str(folder)!r}: must be an existing folder")
-    rows = measure_claims(results)
+    rows = measure_claims(results, sketch)
     return rows, write_table(rows, target, results.size)

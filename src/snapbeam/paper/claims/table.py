@@ -23,7 +23,7 @@ class Claim:
     """What the paper says, what was measured by which rule, and whether they agree.
 
     ``verdict``: ``holds``, ``in part``, ``fails``, or ``open`` for what the paper does not say and whose
-    influence is measured instead.
+    influence is measured instead.  ``size``: whether it was measured at the size of the paper or on a sketch.
     """
 
     number: str
@@ -34,6 +34,7 @@ class Claim:
     verdict: str
     rule: str
     remark: str = ""
+    size: str = "full"
 
     def __post_init__(self) -> None:
         choice("verdict", self.verdict, VERDICTS)
@@ -59,12 +60,12 @@ def write_table(claims: Sequence[Claim], folder: Path, size: str) -> list[Path]:
 
 def _markdown(claims: Sequence[Claim]) -> str:
     lines = [
-        "| # | the paper says | paper | measured | uncertainty | verdict |",
-        "|---|---|---|---|---|---|",
+        "| # | the paper says | paper | measured | uncertainty | verdict | size |",
+        "|---|---|---|---|---|---|---|",
     ]
     for claim in claims:
         cells = (claim.number, claim.statement, claim.paper, claim.measured, claim.uncertainty)
-        lines.append("| " + " | ".join(map(_cell, cells)) + f" | **{claim.verdict}** |")
+        lines.append("| " + " | ".join(map(_cell, cells)) + f" | **{claim.verdict}** | {claim.size} |")
     lines += ["", "**How each was measured, and what to make of it**", ""]
     for claim in claims:
         remark = f" {claim.remark}" if claim.remark else ""

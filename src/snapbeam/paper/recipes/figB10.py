@@ -40,13 +40,16 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     return found
 
 
-def maxima(ds: xr.Dataset, level: int, prominence: float = 0.02) -> list[tuple[float, float]]:
-    """Local maxima (Omega, displacement) of one drive that stand out by *prominence* (b), highest first."""
+def maxima(ds: xr.Dataset, level: int, prominence: float = 0.1) -> list[tuple[float, float]]:
+    """Local maxima (Omega, displacement) of one drive that stand out, highest first.
+
+    *prominence* is how far they stand out at least, over the range of the curve.
+    """
     from scipy.signal import find_peaks
 
     ratio: NDArray[np.float64] = ds.frequency_ratio.values
     curve = ds.max_displacement.values[:, level].astype(float)
-    peaks, _ = find_peaks(curve, prominence=prominence)
+    peaks, _ = find_peaks(curve, prominence=prominence * float(np.ptp(curve)))
     return sorted(((float(ratio[i]), float(curve[i])) for i in peaks), key=lambda peak: -peak[1])
 
 
