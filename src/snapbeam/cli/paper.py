@@ -95,7 +95,7 @@ def paper(
             rows, files = write_claims(output, results)
         verdicts = [row.verdict for row in rows]
         counts = ", ".join(f"{verdicts.count(kind)} {kind}" for kind in dict.fromkeys(verdicts))
-        out().print(f"claims ({"stored" if stored else size}): {counts}")
+        out().print(f"claims ({'stored' if stored else size}): {counts}")
         for file in files:
             out().print(f"  {file_line(file)}")
 
