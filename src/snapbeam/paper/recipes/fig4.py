@@ -43,6 +43,7 @@ KINDS = {
     "several": "transient interwell, several snap-throughs",
 }
 _SHOWN = 20  # cycles
+_TRIED = 12  # transient responses of a frequency that are looked at closely
 _FRAME_RATE = 10_000.0
 _REST_FRAMES = 40
 
@@ -73,9 +74,9 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 def _choose(searched: xr.Dataset, modes: int, cycles: int) -> dict[str, tuple[float, float]]:
     """Omega and V of each kind, by a rule.
 
-    At each frequency: the smallest V that snaps through exactly once and stays, within the cycles shown; the
-    smallest above it that snaps at least three times and settles; and of the three greatest intrawell V below
-    the threshold the one that repeats itself worst.  The frequency is the one at which that is worst.
+    At each frequency: the smallest V that snaps through exactly once; the smallest above it that changes wells at
+    least three times, both settled in the second well within the cycles shown; and of the three greatest intrawell
+    V below the threshold the one that repeats itself worst.  The frequency is the one at which that is worst.
     """
     best: tuple[float, dict[str, tuple[float, float]]] | None = None
     for omega in searched.frequency_ratio.values:
@@ -86,16 +87,12 @@ def _choose(searched: xr.Dataset, modes: int, cycles: int) -> dict[str, tuple[fl
         settled = kind == sb.ResponseClass.TRANSIENT_2
         if not snapped.size or snapped[0] == 0:
             continue
-        single = [
-            i
-            for i in np.flatnonzero(settled & (crossings == 1))
-            if _last_crossing(modes, omega, drive[i]) < 0.7
-        ][:1]
-        several = [
-            i
-            for i in np.flatnonzero(settled & (crossings >= 3))
-            if single and i > single[0] and _last_crossing(modes, omega, drive[i]) < 0.8
-        ][:1]
+        candidates = np.flatnonzero(settled & (crossings % 2 == 1))
+        swings = {i: _swings(modes, omega, drive[i]) for i in candidates[:_TRIED]}
+        single = [i for i in swings if crossings[i] == 1 and swings[i] == 1][:1]
+        several = [i for i in swings if single and i > single[0] and swings[i] >= 3 and swings[i] % 2 == 1][
+            :1
+        ]
         if not several:
             continue
         below = range(max(snapped[0] - 3, 0), snapped[0])
@@ -112,12 +109,18 @@ def _choose(searched: xr.Dataset, modes: int, cycles: int) -> dict[str, tuple[fl
     return best[1]
 
 
-def _last_crossing(modes: int, omega: float, drive: float) -> float:
-    """Time of the last crossing over the time shown."""
-    response = paper_run(modes, float(omega), float(drive), _SHOWN, sample_times=[0.0]).response
-    if not response.crossings:
-        return float("inf")
-    return response.last_crossing * omega * paper_model(modes).reference_freq / _SHOWN
+def _swings(modes: int, omega: float, drive: float) -> int:
+    """How often the beam changes wells within the cycles shown; 0 if it has not settled by four fifths of them.
+
+    A well is reached half way from the straight beam, so that grazing zero is no snap-through.
+    """
+    run = paper_run(modes, float(omega), float(drive), _SHOWN)
+    response = run.response
+    if not response.end_is_final or response.last_crossing > 0.8 * float(run.dataset.time[-1]):
+        return 0
+    centre = run.dataset.center_displacement.values
+    wells = np.sign(centre[np.abs(centre) > 0.5])
+    return int((wells[1:] != wells[:-1]).sum())
 
 
 def _scatter(modes: int, omega: float, drive: float, cycles: int) -> float:
