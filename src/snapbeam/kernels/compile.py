@@ -31,7 +31,8 @@ _FINGERPRINT = _fingerprint()
 
 
 def _compile(function: Callable[..., Any], **options: Any) -> Any:
-    dispatcher = njit(cache=True, error_model="numpy", nogil=True, **options)(function)
+    options |= {"error_model": "numpy", "nogil": True, "_nrt": False}
+    dispatcher = njit(cache=True, **options)(function)
     cache = dispatcher._cache
     try:
         cache._cache_file = IndexDataCacheFile(
@@ -40,7 +41,7 @@ def _compile(function: Callable[..., Any], **options: Any) -> Any:
             source_stamp=cache._impl.locator.get_source_stamp(),
         )
     except AttributeError:  # no place to keep compiled code, or a Numba that keeps it otherwise
-        return njit(error_model="numpy", nogil=True, **options)(function)
+        return njit(**options)(function)
     return dispatcher
 
 

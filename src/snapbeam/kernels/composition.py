@@ -13,10 +13,30 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["COMPOSITIONS", "TURNS", "Composition", "slot_length"]
+__all__ = ["COMPOSITIONS", "TURNS", "Composition", "Stages", "in_memory", "slot_length"]
 
 TURNS = 16
 """Room for one number per kick, a multiple of the lanes' width."""
+
+
+class Stages(NamedTuple):
+    """A composition as a march finds it in its memory: plain numbers, since passing arrays costs time."""
+
+    count: int
+    """Flows of a step; there is one kick more."""
+    flow: int
+    """Where the flow weights begin."""
+    kick: int
+    elapsed: int
+
+
+def in_memory(order: int, at: int) -> tuple[Stages, NDArray[np.float64]]:
+    """The composition of *order*, and the numbers that it needs in memory from *at* on."""
+    composition = COMPOSITIONS[order]
+    numbers = np.zeros(3 * TURNS)
+    for i, weights in enumerate((composition.flow, composition.kick, composition.elapsed)):
+        numbers[i * TURNS : i * TURNS + weights.size] = weights
+    return Stages(composition.flow.size, at, at + TURNS, at + 2 * TURNS), numbers
 
 
 def slot_length(order: int, size: int) -> int:

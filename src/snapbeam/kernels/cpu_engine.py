@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -11,17 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.codes import RunStatus
-from snapbeam.kernels.composition import COMPOSITIONS, slot_length
+from snapbeam.kernels.composition import Stages, in_memory, slot_length
 from snapbeam.kernels.cpu import march_many
 from snapbeam.kernels.ensemble import Ensemble
-from snapbeam.kernels.fields import Counts, Numbers
-from snapbeam.kernels.march_parts import Outputs
+from snapbeam.kernels.fields import Counts, Numbers, Reals
+from snapbeam.kernels.lanes import WIDTH
+from snapbeam.kernels.march_parts import PIECES, Outputs
 from snapbeam.kernels.rows import Layout
 
 __all__ = ["record", "run_ensemble", "usable_cores"]
 
 _Array = NDArray[np.float64]
-_CHUNK_STEPS = 300_000
+_CHUNK_STEPS = 3_000_000
 """Flight steps per task: a fraction of a second, so that progress is smooth and Ctrl-C prompt."""
 _ALIGNMENT = 64
 
@@ -34,27 +36,29 @@ def usable_cores() -> int:
         return os.cpu_count() or 1
 
 
-def _memory(ensemble: Ensemble) -> _Array:
-    """A copy of the structure's rows with room to work in, aligned to whole registers."""
-    packed, plan = ensemble.packed, ensemble.plan
-    size = packed.layout.size
+def _memory(ensemble: Ensemble) -> tuple[_Array, tuple[Layout, Layout], Stages]:
+    """A copy of the structure's rows with room for two runs, aligned to whole registers, and where is what."""
+    packed, plan, drive = ensemble.packed, ensemble.plan, ensemble.drive_table
+    size, first = packed.layout.size, packed.layout
     work = 10 * size + (plan.finest + 2) * slot_length(plan.order, size) + 8 * size
-    drive = ensemble.drive_table
-    total = packed.layout.work + work + drive.size
-    raw = np.zeros(total + _ALIGNMENT // 8)
-    first = (-raw.ctypes.data % _ALIGNMENT) // 8
-    memory: _Array = raw[first : first + total]
-    memory[: packed.layout.work] = packed.memory
-    memory[total - drive.size :] = drive
-    return memory
-
-
-def _layout(ensemble: Ensemble, end: int) -> Layout:
-    """The layout of a memory that ends at *end*, with a recorded drive where there is one."""
-    size = ensemble.drive_table.size
-    return ensemble.packed.layout._replace(
-        drive=end - size, drive_samples=size // 2, drive_interval=ensemble.drive_interval
+    second = first._replace(
+        g=first.work + work, contact=first.work + work + size, work=first.work + work + 2 * size
     )
+    stages, weights = in_memory(plan.order, second.work + work)
+    first_drive = stages.flow + weights.size
+    raw = np.zeros(first_drive + drive.size + _ALIGNMENT // 8)
+    skipped = (-raw.ctypes.data % _ALIGNMENT) // 8
+    memory: _Array = raw[skipped : skipped + first_drive + drive.size]
+    memory[: first.work] = packed.memory
+    memory[second.g : second.g + size] = memory[first.g : first.g + size]
+    memory[stages.flow : first_drive] = weights
+    memory[first_drive:] = drive
+    recorded = {
+        "drive": first_drive,
+        "drive_samples": drive.size // 2,
+        "drive_interval": ensemble.drive_interval,
+    }
+    return memory, (first._replace(**recorded), second._replace(**recorded)), stages
 
 
 def _nothing(size: int) -> Outputs:
@@ -82,12 +86,14 @@ def _march(
     if ensemble.restitution:
         from snapbeam.kernels.restitution import march_restitution_many as march
     packed, plan = ensemble.packed, ensemble.plan
-    memory = _memory(ensemble)
+    memory, layouts, stages = _memory(ensemble)
+    fastest = max(float(packed.model.omega.max()), float(ensemble.reals[:, Reals.OMEGA].max()))
+    pieces = max(16, math.ceil(PIECES * fastest * plan.step / (2.0 * math.pi)) + 1)
     march(
         memory,
         packed.blocks,
-        _layout(ensemble, memory.size),
-        COMPOSITIONS[plan.order],
+        layouts,
+        stages,
         ensemble.contact_rows,
         ensemble.starts,
         ensemble.reals,
@@ -98,6 +104,8 @@ def _march(
         counts,
         numbers,
         which,
+        np.empty((pieces + 1, 4)),
+        np.empty(pieces * 4 * WIDTH),
         outputs,
     )
 

@@ -41,7 +41,7 @@ from snapbeam.kernels.physics import (
     tension_energy,
     tension_factors,
 )
-from snapbeam.kernels.statistics import extremes, first_fall, sign_of, turning_point
+from snapbeam.kernels.statistics import first_fall, sign_of, turning_point, widened
 
 __all__ = ["march_kernel"]
 
@@ -278,8 +278,8 @@ def march_kernel(order: int, threads: int, columns: int, warps: int = RESIDENT_W
                             continue
                     if touching:
                         deepest = max(deepest, d1)
-                        turn = turning_point(d, dv, d1, dv1, length)
-                        if turn > 0.0 and dv > 0.0 and extremes(d, dv, d1, dv1, length)[1] > deepest:
+                        turn = turning_point(d, dv, d1, dv1, length) if dv > 0.0 else -1.0
+                        if turn > 0.0 and widened(d, deepest, d, dv, d1, dv1, length)[1] > deepest:
                             here, slot, purpose = turn * length, cut_slot, _DEEPEST
                             continue
                     break

@@ -12,7 +12,7 @@ from snapbeam.kernels.cpu_step import Impactor
 from snapbeam.kernels.fields import Counts, Numbers, Reals, Ticks
 from snapbeam.kernels.physics import contact_force, tension_factors
 from snapbeam.kernels.rows import acceleration_rows, tension_rows
-from snapbeam.kernels.statistics import count_crossings, extremes, first_rise
+from snapbeam.kernels.statistics import count_crossings, first_rise, widened
 
 __all__ = [
     "PIECES",
@@ -203,12 +203,12 @@ def count_in_step(counts, numbers, clock, start, length, c, cv, c1, cv1, seen, r
 @compiled
 def track_extremes(numbers, w, wv, w1, wv1, c, cv, c1, cv1, length):
     """Widen the extremes of the contact point (w) and of the centre (c) by a step."""
-    low, high = extremes(w, wv, w1, wv1, length)
-    numbers[Numbers.MIN_DISPLACEMENT] = min(numbers[Numbers.MIN_DISPLACEMENT], low)
-    numbers[Numbers.MAX_DISPLACEMENT] = max(numbers[Numbers.MAX_DISPLACEMENT], high)
-    low, high = extremes(c, cv, c1, cv1, length)
-    numbers[Numbers.MIN_CENTER] = min(numbers[Numbers.MIN_CENTER], low)
-    numbers[Numbers.MAX_CENTER] = max(numbers[Numbers.MAX_CENTER], high)
+    numbers[Numbers.MIN_DISPLACEMENT], numbers[Numbers.MAX_DISPLACEMENT] = widened(
+        numbers[Numbers.MIN_DISPLACEMENT], numbers[Numbers.MAX_DISPLACEMENT], w, wv, w1, wv1, length
+    )
+    numbers[Numbers.MIN_CENTER], numbers[Numbers.MAX_CENTER] = widened(
+        numbers[Numbers.MIN_CENTER], numbers[Numbers.MAX_CENTER], c, cv, c1, cv1, length
+    )
 
 
 @compiled

@@ -17,6 +17,11 @@ __all__ = ["Packed", "pack"]
 
 _Array = NDArray[np.float64]
 
+_LONGEST_DECAY = 4.0
+"""zeta omega t up to which :func:`~snapbeam.kernels.physics.decay` is accurate."""
+_SLOWEST = 1e-12
+"""Stands for no damping, 1/s."""
+
 
 class Packed(NamedTuple):
     """A structure in rows, and the way there and back."""
@@ -92,7 +97,7 @@ def pack(model: ReducedModel, side: str) -> Packed:
     packed = Packed(
         memory=np.empty(0),
         blocks=np.array(blocks, dtype=np.int64),
-        layout=Layout(*range(16)),
+        layout=Layout(*range(len(Layout._fields))),
         rows=rows,
         equilibrium=equilibrium,
         model=model,
@@ -111,5 +116,9 @@ def pack(model: ReducedModel, side: str) -> Packed:
     ]
     starts = np.concatenate(([0], np.cumsum([piece.size for piece in pieces])))
     stretch = float(equilibrium @ equilibrium)
-    layout = Layout._make((size, *map(int, starts), float(model.tension_stiffness), stretch, 0, 0, 1.0))
+    moving = bool(np.all(omega * np.sqrt(1.0 - zeta * zeta) > 0.0))
+    gentle = _LONGEST_DECAY / max(float((zeta * omega).max()), _SLOWEST) if moving else 0.0
+    layout = Layout._make(
+        (size, *map(int, starts), float(model.tension_stiffness), stretch, gentle, 0, 0, 1.0)
+    )
     return packed._replace(memory=np.concatenate(pieces), layout=layout)

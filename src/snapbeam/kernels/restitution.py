@@ -10,12 +10,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from snapbeam.codes import RunStatus
 from snapbeam.kernels.compile import compiled
 from snapbeam.kernels.composition import TURNS
-from snapbeam.kernels.cpu_step import look_inside, observe, prepare, take_step
+from snapbeam.kernels.cpu_step import Step, look_inside, observe, prepare, take_step
 from snapbeam.kernels.fields import Counts, Numbers, Ticks
 from snapbeam.kernels.march_parts import (
     change_well,
@@ -73,23 +71,24 @@ def _enter(counts, numbers, outputs, onset, duration, force, impulse):
 
 
 @compiled
-def march_restitution(memory, blocks, layout, composition, struck, rests, clock, counts, numbers, outputs):
+def march_restitution(
+    memory, blocks, layout, stages, struck, rests, clock, seen, parts, counts, numbers, outputs
+):
     """March a single mode to its end; arguments as :func:`snapbeam.kernels.cpu.march`.
 
     The contact stiffness of *struck* is read as the coefficient of restitution.
     """
     size = layout.size
-    slot = (composition.flow.size + 1) // 2 * 4 * size + 2 * TURNS
+    slot = (stages.count + 1) // 2 * 4 * size + 2 * TURNS
     q, p, k = layout.work, layout.work + size, layout.work + 2 * size
     q1, p1, k1 = q + 3 * size, p + 3 * size, k + 3 * size
     q2, p2, k2 = q + 6 * size, p + 6 * size, k + 6 * size
     r = q + 9 * size
     cut_slot = layout.work + 10 * size
     look_slot = cut_slot + slot
-    restitution = struck.stiffness
+    restitution, times = struck.stiffness, outputs.times
     tick, step = clock.tick, clock.step
     c_row = memory[layout.contact]
-    seen = np.empty((_PIECES + 1, 4))
     home, impactor, rest_contact, rest_center = 1.0, struck, rests[0], rests[1]
     t = 0
     w, wv, d, dv, c, cv = observe(memory, layout, impactor, 0.0, q, p)
@@ -111,7 +110,7 @@ def march_restitution(memory, blocks, layout, composition, struck, rests, clock,
             memory[p] += blow
             lost = blow / c_row * (wv + dv) - (0.5 * memory[p] * memory[p] - before)
             numbers[Numbers.DISSIPATED] += lost
-            _enter(counts, numbers, outputs, t * tick, 0.0, np.nan, blow / c_row)
+            _enter(counts, numbers, outputs, t * tick, 0.0, math.nan, blow / c_row)
             phase = _TWO_PI * ((t % clock.period) / clock.period)
             force, _, _ = _hold(memory, blocks, layout, impactor, phase, q2, p2, k2, r)
             if restitution * dv <= 0.5 * force * c_row * c_row * _STICK * step * tick:
@@ -167,29 +166,21 @@ def march_restitution(memory, blocks, layout, composition, struck, rests, clock,
                 dissipated += weight * 2.0 * memory[layout.damping] * memory[p1] * memory[p1]
                 peak = max(peak, force)
         else:
-            prepare(memory, layout, composition, impactor, length, cut_slot)
+            prepare(memory, layout, stages, impactor, length, cut_slot)
             done = take_step(
                 memory,
                 blocks,
                 layout,
-                composition,
+                stages,
                 impactor,
-                cut_slot,
-                length,
-                phase,
-                False,
+                Step(ticks, cut_slot, length, phase, False, q, p, k, q1, p1, k1, r),
                 True,
-                q,
-                p,
-                k,
-                q1,
-                p1,
-                k1,
-                r,
             )
             pieces, piece = _PIECES, length / _PIECES
             flow_coefficients(memory, layout, piece, look_slot)
-            look_inside(memory, layout, impactor, look_slot, pieces, piece, phase, q, p, k, k1, q2, p2, seen)
+            look_inside(
+                memory, layout, impactor, look_slot, pieces, piece, phase, q, p, k, k1, parts, True, seen
+            )
             seen[0, 0] = min(seen[0, 0], 0.0)
             entry = first_entry(seen, pieces, piece) if d < 0.0 or dv < 0.0 else 0.0
             if entry >= 0.0:
@@ -197,25 +188,15 @@ def march_restitution(memory, blocks, layout, composition, struck, rests, clock,
                 cut = max(1, min(ticks, int(entry / tick)))
                 if cut < ticks:
                     ticks, length = cut, cut * tick
-                    prepare(memory, layout, composition, impactor, length, cut_slot)
+                    prepare(memory, layout, stages, impactor, length, cut_slot)
                     done = take_step(
                         memory,
                         blocks,
                         layout,
-                        composition,
+                        stages,
                         impactor,
-                        cut_slot,
-                        length,
-                        phase,
-                        False,
+                        Step(ticks, cut_slot, length, phase, False, q, p, k, q1, p1, k1, r),
                         True,
-                        q,
-                        p,
-                        k,
-                        q1,
-                        p1,
-                        k1,
-                        r,
                     )
             dissipated = done[5]
         w1, wv1, d1, dv1, c1, cv1 = observe(memory, layout, impactor, phase + impactor.omega * length, q1, p1)
@@ -223,35 +204,25 @@ def march_restitution(memory, blocks, layout, composition, struck, rests, clock,
             status = _NOT_FINITE
             break
         w1, c1 = w1 + rest_contact, c1 + rest_center
-        while sample < outputs.times.size:
-            if outputs.times[sample] > (t + ticks) * tick and t + ticks < clock.end:
+        while sample < times.size:
+            if times[sample] > (t + ticks) * tick and t + ticks < clock.end:
                 break
-            part = min(max(0.0, outputs.times[sample] - t * tick), length)
+            part = min(max(0.0, times[sample] - t * tick), length)
             there = phase + impactor.omega * part
             force, share = 0.0, part / length
             if stuck:
                 force, here_g, here_r = _hold(memory, blocks, layout, impactor, there, q2, p2, k2, r)
                 lost = dissipated * share
             else:
-                prepare(memory, layout, composition, impactor, part, cut_slot)
+                prepare(memory, layout, stages, impactor, part, cut_slot)
                 here = take_step(
                     memory,
                     blocks,
                     layout,
-                    composition,
+                    stages,
                     impactor,
-                    cut_slot,
-                    part,
-                    phase,
-                    False,
+                    Step(ticks, cut_slot, part, phase, False, q, p, k, q2, p2, k2, r),
                     True,
-                    q,
-                    p,
-                    k,
-                    q2,
-                    p2,
-                    k2,
-                    r,
                 )
                 here_g, here_r, lost = here[0], here[1], here[5]
             for row in range(size):
@@ -292,8 +263,8 @@ def march_restitution(memory, blocks, layout, composition, struck, rests, clock,
 def march_restitution_many(
     memory,
     blocks,
-    layout,
-    composition,
+    layouts,
+    stages,
     contact_rows,
     starts,
     reals,
@@ -304,9 +275,12 @@ def march_restitution_many(
     counts,
     numbers,
     which,
+    seen,
+    parts,
     outputs,
 ):
-    """March the runs *which*, one after the other; *memory* belongs to the caller's thread."""
+    """March the runs *which*, one after the other; *memory*, *seen* and *parts* belong to the caller's thread."""
+    layout = layouts[0]
     for i in which:
         impactor, clock, rests = set_up(
             memory,
@@ -320,5 +294,16 @@ def march_restitution_many(
             max_steps,
         )
         march_restitution(
-            memory, blocks, layout, composition, impactor, rests, clock, counts[i], numbers[i], outputs
+            memory,
+            blocks,
+            layout,
+            stages,
+            impactor,
+            rests,
+            clock,
+            seen,
+            parts,
+            counts[i],
+            numbers[i],
+            outputs,
         )

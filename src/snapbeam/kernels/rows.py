@@ -37,6 +37,7 @@ __all__ = [
     "signals",
     "speed_bound",
     "tension_rows",
+    "tension_rows_twice",
 ]
 
 
@@ -66,12 +67,22 @@ class Layout(NamedTuple):
     """Tension stiffness, Eq. (15)."""
     stretch: float
     """Squared slopes of the beam in a well, alpha_eq . alpha_eq; 0 if there is one well only."""
+    gentle: float
+    """Longest flow, s, that polynomials serve; 0 if there is an overdamped or a still mode."""
     drive: int
     """Where a recorded drive begins: displacement and velocity of each sample in turn."""
     drive_samples: int
     """Samples of the recorded drive; 0: the drive is sinusoidal."""
     drive_interval: float
     """Seconds between samples."""
+
+
+@inlined
+def _close_rows(memory, g, q, r, row, product, total_g, total_r):
+    """Keep eight rows of G q; add their part to g.q and q.Gq."""
+    store(memory, r + row, product)
+    q_row = load(memory, q + row)
+    return fma(load(memory, g + row), q_row, total_g), fma(product, q_row, total_r)
 
 
 @inlined
@@ -104,13 +115,8 @@ def tension_rows(memory, blocks, layout, q, r):
                 at += 8 * WIDTH
                 here += 4
             low, high = (low0 + low1) + (low2 + low3), (high0 + high1) + (high2 + high3)
-            store(memory, r + row, low)
-            store(memory, r + row + WIDTH, high)
-            q_low, q_high = load(memory, q + row), load(memory, q + row + WIDTH)
-            total_g = fma(load(memory, g + row), q_low, total_g)
-            total_r = fma(low, q_low, total_r)
-            total_g = fma(load(memory, g + row + WIDTH), q_high, total_g)
-            total_r = fma(high, q_high, total_r)
+            total_g, total_r = _close_rows(memory, g, q, r, row, low, total_g, total_r)
+            total_g, total_r = _close_rows(memory, g, q, r, row + WIDTH, high, total_g, total_r)
             row += 2 * WIDTH
         if row < stop:
             even_sum, odd_sum = splat(0.0), splat(0.0)
@@ -120,12 +126,80 @@ def tension_rows(memory, blocks, layout, q, r):
                 odd_sum = fma(load(memory, at + WIDTH), spread_at(memory, here + 1), odd_sum)
                 at += 2 * WIDTH
                 here += 2
-            both = even_sum + odd_sum
-            store(memory, r + row, both)
-            q_row = load(memory, q + row)
-            total_g = fma(load(memory, g + row), q_row, total_g)
-            total_r = fma(both, q_row, total_r)
+            total_g, total_r = _close_rows(memory, g, q, r, row, even_sum + odd_sum, total_g, total_r)
     return lanes_sum(total_g), lanes_sum(total_r)
+
+
+@inlined
+def tension_rows_twice(memory, blocks, layout_a, q_a, r_a, layout_b, q_b, r_b):
+    """:func:`tension_rows` for two states at once, bit for bit, with G read only once."""
+    at = layout_a.tension
+    g_a, g_b, ar, br = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+    for block in range(0, blocks.size, 3):
+        row, stop, columns = blocks[block], blocks[block + 1], blocks[block + 2]
+        first, last = row, row + columns
+        while row + 2 * WIDTH <= stop:
+            al0, ah0, al1, ah1 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+            al2, ah2, al3, ah3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+            bl0, bh0, bl1, bh1 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+            bl2, bh2, bl3, bh3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+            column = first
+            while column < last:
+                a0, a1 = spread_at(memory, q_a + column), spread_at(memory, q_a + column + 1)
+                b0, b1 = spread_at(memory, q_b + column), spread_at(memory, q_b + column + 1)
+                low, high = load(memory, at), load(memory, at + WIDTH)
+                al0, ah0, bl0, bh0 = (
+                    fma(low, a0, al0),
+                    fma(high, a0, ah0),
+                    fma(low, b0, bl0),
+                    fma(high, b0, bh0),
+                )
+                low, high = load(memory, at + 2 * WIDTH), load(memory, at + 3 * WIDTH)
+                al1, ah1, bl1, bh1 = (
+                    fma(low, a1, al1),
+                    fma(high, a1, ah1),
+                    fma(low, b1, bl1),
+                    fma(high, b1, bh1),
+                )
+                a2, a3 = spread_at(memory, q_a + column + 2), spread_at(memory, q_a + column + 3)
+                b2, b3 = spread_at(memory, q_b + column + 2), spread_at(memory, q_b + column + 3)
+                low, high = load(memory, at + 4 * WIDTH), load(memory, at + 5 * WIDTH)
+                al2, ah2, bl2, bh2 = (
+                    fma(low, a2, al2),
+                    fma(high, a2, ah2),
+                    fma(low, b2, bl2),
+                    fma(high, b2, bh2),
+                )
+                low, high = load(memory, at + 6 * WIDTH), load(memory, at + 7 * WIDTH)
+                al3, ah3, bl3, bh3 = (
+                    fma(low, a3, al3),
+                    fma(high, a3, ah3),
+                    fma(low, b3, bl3),
+                    fma(high, b3, bh3),
+                )
+                at += 8 * WIDTH
+                column += 4
+            low, high = (al0 + al1) + (al2 + al3), (ah0 + ah1) + (ah2 + ah3)
+            g_a, ar = _close_rows(memory, layout_a.g, q_a, r_a, row, low, g_a, ar)
+            g_a, ar = _close_rows(memory, layout_a.g, q_a, r_a, row + WIDTH, high, g_a, ar)
+            low, high = (bl0 + bl1) + (bl2 + bl3), (bh0 + bh1) + (bh2 + bh3)
+            g_b, br = _close_rows(memory, layout_b.g, q_b, r_b, row, low, g_b, br)
+            g_b, br = _close_rows(memory, layout_b.g, q_b, r_b, row + WIDTH, high, g_b, br)
+            row += 2 * WIDTH
+        if row < stop:
+            a_even, a_odd, b_even, b_odd = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+            column = first
+            while column < last:
+                even, odd = load(memory, at), load(memory, at + WIDTH)
+                a_even = fma(even, spread_at(memory, q_a + column), a_even)
+                b_even = fma(even, spread_at(memory, q_b + column), b_even)
+                a_odd = fma(odd, spread_at(memory, q_a + column + 1), a_odd)
+                b_odd = fma(odd, spread_at(memory, q_b + column + 1), b_odd)
+                at += 2 * WIDTH
+                column += 2
+            g_a, ar = _close_rows(memory, layout_a.g, q_a, r_a, row, a_even + a_odd, g_a, ar)
+            g_b, br = _close_rows(memory, layout_b.g, q_b, r_b, row, b_even + b_odd, g_b, br)
+    return lanes_sum(g_a), lanes_sum(ar), lanes_sum(g_b), lanes_sum(br)
 
 
 @inlined
@@ -210,34 +284,41 @@ def signals(memory, layout, q, p):
 
 
 @inlined
-def glide(memory, layout, flow, weight0, k0, weight1, k1, q, p):
-    """In place: p += weight0 k0 + weight1 k1, then one flow; returns the signals, as :func:`signals`."""
+def glide(memory, layout, flow, pieces, piece, q, p, k0, k1, center, parts):
+    """A free step in short pieces: signals at the end of each, one mode a lane, into *parts*.
+
+    Row by row of modes, so that a row stays in registers all the way.  At the border of pieces i and i + 1
+    stands a kick by the tension's acceleration, linear from k0 to k1 (half a kick at the first).  Piece i
+    leaves c.q, c.p and, if *center*, e.q and e.p, each still eight sums, at ``parts[32 i]``.
+    """
     size = layout.size
-    cq, cp, eq, ep = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
     for row in range(0, size, WIDTH):
-        kicked = fma(weight1, load(memory, k1 + row), load(memory, p + row))
-        kicked = fma(weight0, load(memory, k0 + row), kicked)
-        old, at = load(memory, q + row), flow + row
-        q_row = rotate(load(memory, at), load(memory, at + size), old, kicked)
-        at += 2 * size
-        p_row = rotate(load(memory, at), load(memory, at + size), old, kicked)
-        store(memory, q + row, q_row)
-        store(memory, p + row, p_row)
+        q_row, p_row = load(memory, q + row), load(memory, p + row)
+        k0_row, k1_row = load(memory, k0 + row), load(memory, k1 + row)
+        a11, a12 = load(memory, flow + row), load(memory, flow + size + row)
+        a21, a22 = load(memory, flow + 2 * size + row), load(memory, flow + 3 * size + row)
         c_row, e_row = load(memory, layout.contact + row), load(memory, layout.center + row)
-        cq, cp = fma(c_row, q_row, cq), fma(c_row, p_row, cp)
-        eq, ep = fma(e_row, q_row, eq), fma(e_row, p_row, ep)
-    return lanes_sum(cq), lanes_sum(cp), lanes_sum(eq), lanes_sum(ep)
+        for i in range(pieces):
+            done, kick, at = i / pieces, piece if i > 0 else 0.5 * piece, 4 * WIDTH * i
+            kicked = fma(kick * done, k1_row, p_row)
+            kicked = fma(kick * (1.0 - done), k0_row, kicked)
+            p_row = rotate(a21, a22, q_row, kicked)
+            q_row = rotate(a11, a12, q_row, kicked)
+            if row == 0:
+                for j in range(4):
+                    store(parts, at + j * WIDTH, splat(0.0))
+            store(parts, at, fma(c_row, q_row, load(parts, at)))
+            store(parts, at + WIDTH, fma(c_row, p_row, load(parts, at + WIDTH)))
+            if center:
+                store(parts, at + 2 * WIDTH, fma(e_row, q_row, load(parts, at + 2 * WIDTH)))
+                store(parts, at + 3 * WIDTH, fma(e_row, p_row, load(parts, at + 3 * WIDTH)))
 
 
 @compiled
 def flow_coefficients(memory, layout, length, at):
     """Rows a11, a12, a21, a22 of the exact flow over *length* seconds, written from *at* on."""
     size = layout.size
-    gentle = True
-    for j in range(size):
-        if memory[layout.damping + j] * abs(length) > 4.0 or memory[layout.omega_damped + j] == 0.0:
-            gentle = False
-    if gentle:
+    if abs(length) < layout.gentle:
         for row in range(0, size, WIDTH):
             damped, sigma = load(memory, layout.omega_damped + row), load(memory, layout.damping + row)
             squared = load(memory, layout.omega_squared + row)
