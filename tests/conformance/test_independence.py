@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from snapbeam.codes import RunStatus
 from snapbeam.kernels.ensemble import Start
 from snapbeam.kernels.fields import Counts, Numbers, Reals
 from snapbeam.model.reduction import ReducedModel
@@ -27,6 +28,16 @@ def test_order_batch_and_threads(march, model_of, draw, modes, runs, cycles) -> 
     check(np.random.default_rng(3).permutation(runs)[: runs // 2])
     for alone in (0, runs // 2, runs - 1):
         check(np.array([alone]))
+
+
+@pytest.mark.parametrize(("modes", "runs"), [(1, 5), (12, 4), (32, 3)])
+def test_runs_that_end_at_the_same_step(march, model_of, modes, runs) -> None:
+    """Equal runs are equal, and none is left out where those marched side by side end together."""
+    given = {"frequency_ratio": np.full(runs, 1.3), "velocity_amplitude": np.full(runs, 0.25)}
+    many = march(model_of(modes), **given, cycles=3, threads=1)
+    assert (many.statistics["status"] == RunStatus.OK).all()
+    np.testing.assert_array_equal(many.counts, np.tile(many.counts[:1], (runs, 1)))
+    np.testing.assert_array_equal(many.numbers, np.tile(many.numbers[:1], (runs, 1)))
 
 
 def test_cycles_beyond_the_last_do_not_change_the_first(march, model_of) -> None:

@@ -14,29 +14,30 @@ from scipy.integrate import quad
 
 from snapbeam.kernels.lanes import WIDTH, fma, lanes_sum, load, select_less, store, vabs, vfloor
 from snapbeam.kernels.physics import (
+    circle,
     contact_energy,
     contact_force,
-    decay,
+    decay_less_one,
     mode_energy,
-    rotate,
     rotation,
     shaker_motion,
     sincos,
     tension_acceleration,
     tension_energy,
     tension_factors,
+    turned,
 )
 
 
 @njit
 def over_scalars(x, y, z, out):
     for i in range(x.size):
-        out[0, i], out[1, i] = sincos(x[i])
-        out[2, i] = decay(y[i])
+        out[0, i], out[1, i], out[13, i] = circle(x[i])
+        out[2, i] = decay_less_one(y[i])
         out[3, i], out[4, i], out[5, i], out[6, i] = rotation(
-            z[i], x[i] * x[i], out[1, i], out[0, i], out[2, i]
+            z[i], x[i] * x[i], out[0, i], out[13, i], out[2, i]
         )
-        out[7, i] = rotate(x[i], y[i], z[i], x[i])
+        out[7, i] = turned(x[i], y[i], z[i], x[i])
         out[8, i] = mode_energy(x[i], y[i], z[i])
         out[9, i] = tension_acceleration(0.3, -0.7, y[i], z[i])
         out[10, i] = fma(x[i], y[i], z[i])
@@ -50,22 +51,23 @@ def over_lanes(x, y, z, out):
     flat = out.reshape(out.size)
     for i in range(0, size, 8):
         a, b, c = load(x, i), load(y, i), load(z, i)
-        sine, cosine = sincos(a)
-        e = decay(b)
+        sine, cosine, less_one = circle(a)
+        e = decay_less_one(b)
         store(flat, i, sine)
         store(flat, size + i, cosine)
         store(flat, 2 * size + i, e)
-        a11, a12, a21, a22 = rotation(c, a * a, cosine, sine, e)
+        a11, a12, a21, a22 = rotation(c, a * a, sine, less_one, e)
         store(flat, 3 * size + i, a11)
         store(flat, 4 * size + i, a12)
         store(flat, 5 * size + i, a21)
         store(flat, 6 * size + i, a22)
-        store(flat, 7 * size + i, rotate(a, b, c, a))
+        store(flat, 7 * size + i, turned(a, b, c, a))
         store(flat, 8 * size + i, mode_energy(a, b, c))
         store(flat, 9 * size + i, tension_acceleration(0.3, -0.7, b, c))
         store(flat, 10 * size + i, fma(a, b, c))
         store(flat, 11 * size + i, select_less(a, b, 1.0, -1.0))
         store(flat, 12 * size + i, vfloor(a) + vabs(b))
+        store(flat, 13 * size + i, less_one)
 
 
 @njit
@@ -80,7 +82,7 @@ def evaluated():
     x = np.concatenate((near, rng.uniform(-30.0, 30.0, 3000), rng.uniform(-1e5, 1e5, 3000)))
     x = np.ascontiguousarray(x[: x.size // WIDTH * WIDTH])
     y, z = rng.uniform(-4.0, 4.0, x.size), rng.uniform(0.0, 2.0, x.size)
-    scalars, lanes = np.zeros((13, x.size)), np.zeros((13, x.size))
+    scalars, lanes = np.zeros((14, x.size)), np.zeros((14, x.size))
     over_scalars(x, y, z, scalars)
     over_lanes(x, y, z, lanes)
     return x, y, z, scalars, lanes
@@ -103,23 +105,32 @@ def test_sine_and_cosine(evaluated) -> None:
     wide = x.astype(np.longdouble)
     assert np.abs(values[0] - np.sin(wide)).max() < 3e-16
     assert np.abs(values[1] - np.cos(wide)).max() < 3e-16
+    assert np.abs(values[13] - (np.cos(wide) - 1.0)).max() < 4e-16
 
 
 def test_decay(evaluated) -> None:
-    """exp(-x) within 2e-14 of itself."""
+    """exp(-x) - 1 within 2e-14 of exp(-x)."""
     _, y, _, values, _ = evaluated
-    assert np.abs(values[2] / np.exp(-y) - 1.0).max() < 2e-14
+    assert np.abs((values[2] - np.expm1(-y)) / np.exp(-y)).max() < 2e-14
+
+
+@given(st.floats(1e-9, 0.1))
+@settings(max_examples=50, deadline=None, derandomize=True)
+def test_flows_near_the_identity_keep_their_digits(x: float) -> None:
+    """cos x - 1 and exp(-x) - 1 are accurate relative to themselves, however small x is."""
+    assert circle(x)[2] == pytest.approx(-2.0 * math.sin(0.5 * x) ** 2, rel=3e-16 * 4)
+    assert decay_less_one(x) == pytest.approx(math.expm1(-x), rel=2e-15)
 
 
 @pytest.mark.parametrize(("omega", "zeta"), [(500.0, 0.005), (2.4e5, 0.005), (100.0, 0.9), (3.0, 0.0)])
 def test_rotation_is_the_exact_flow(omega: float, zeta: float) -> None:
     """The rows are the exponential of q' = p, p' = -omega^2 q - 2 zeta omega p."""
     time, damped = 0.7 / omega, omega * math.sqrt(1.0 - zeta**2)
-    sine, cosine = sincos(damped * time)
-    rows = rotation(zeta * omega, omega**2, cosine, sine / damped, decay(zeta * omega * time))
+    sine, _, less_one = circle(damped * time)
+    rows = rotation(zeta * omega, omega**2, sine / damped, less_one, decay_less_one(zeta * omega * time))
     scale = np.diag([1.0, 1.0 / omega])
     exact = scipy.linalg.expm(time * np.array([[0.0, 1.0], [-(omega**2), -2.0 * zeta * omega]]))
-    got = scale @ np.reshape(rows, (2, 2)) @ np.linalg.inv(scale)
+    got = scale @ (np.reshape(rows, (2, 2)) + np.eye(2)) @ np.linalg.inv(scale)
     np.testing.assert_allclose(got, scale @ exact @ np.linalg.inv(scale), atol=2e-14)
 
 

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from snapbeam.kernels.statistics import (
     count_crossings,
     cubic,
-    extremes,
     first_fall,
     first_rise,
     sign_of,
     turning_point,
+    widened,
 )
 
 VALUES = st.floats(-2.0, 2.0).map(lambda x: round(x, 6))
@@ -57,7 +57,7 @@ def test_turning_point_and_extremes(u0: float, v0: float, u1: float, v1: float, 
     """A cubic whose slopes at the ends differ in sign turns once; where they do not, its ends are taken."""
     u = sampled(u0, v0, u1, v1, 1.0)
     turn = turning_point(u0, v0 / h, u1, v1 / h, h)
-    low, high = extremes(u0, v0 / h, u1, v1 / h, h)
+    low, high = widened(math.inf, -math.inf, u0, v0 / h, u1, v1 / h, h)
     if v0 * v1 >= 0.0:
         assert turn == -1.0
         assert (low, high) == (min(u0, u1), max(u0, u1))

@@ -442,7 +442,7 @@ def march_many(
     run_b, now_b = run_a, now_a
     step_a, step_b, done_a, done_b = _NO_STEP, _NO_STEP, _NOTHING_DONE, _NOTHING_DONE
     live_a = True
-    while live_a or live_b:
+    while live_a or live_b or following < which.size:
         if not live_a and following < which.size:
             i_a = which[following]
             data = (

@@ -18,14 +18,15 @@ from snapbeam.kernels.composition import COMPOSITIONS
 from snapbeam.kernels.cuda_block import device, sums, synchroniser
 from snapbeam.kernels.lanes import fma
 from snapbeam.kernels.physics import (
+    circle,
     contact_force,
-    decay,
-    rotate,
+    decay_less_one,
     rotation,
     shaker_motion,
     sincos,
     tension_acceleration,
     tension_factors,
+    turned,
 )
 
 __all__ = ["Functions", "Mode", "functions"]
@@ -66,15 +67,14 @@ def _flows(order: int, threads: int, synchronise: Any) -> tuple[Any, Any]:
 
     @device
     def flow_into(block, mode, length, at):
+        sine, _, less_one = circle(mode.omega_damped * length)
         if mode.damping * abs(length) > 4.0 or mode.omega_damped == 0.0:
-            sine, cosine = sincos(mode.omega_damped * length)
             over = sine / mode.omega_damped if mode.omega_damped > 0.0 else length
-            decayed = math.exp(-mode.damping * length)
+            lost = math.expm1(-mode.damping * length)
         else:
-            sine, cosine = sincos(mode.omega_damped * length)
             over = sine / mode.omega_damped
-            decayed = decay(mode.damping * length)
-        a11, a12, a21, a22 = rotation(mode.damping, mode.omega_squared, cosine, over, decayed)
+            lost = decay_less_one(mode.damping * length)
+        a11, a12, a21, a22 = rotation(mode.damping, mode.omega_squared, over, less_one, lost)
         block.flows[at, 0, block.lane] = a11
         block.flows[at, 1, block.lane] = a12
         block.flows[at, 2, block.lane] = a21
@@ -159,9 +159,9 @@ def functions(order: int, threads: int, columns: int) -> Functions:
         gq, qr = 0.0, 0.0
         for stage in range(1, stages + 1):
             flow = block.flows[slot * distinct + flow_of[stage - 1]]
-            turned = rotate(flow[0, block.lane], flow[1, block.lane], q, p)
-            p = rotate(flow[2, block.lane], flow[3, block.lane], q, p)
-            q = turned
+            moved = turned(q, flow[0, block.lane], flow[1, block.lane], p)
+            p = turned(p, flow[3, block.lane], flow[2, block.lane], q)
+            q = moved
             r = tension(block, q)
             weight = kick[stage] * length
             if touching:
@@ -200,9 +200,9 @@ def functions(order: int, threads: int, columns: int) -> Functions:
                 block.seen[i, 3] = c_rate + owed * ((1.0 - done) * center0 + done * center1)
             kick = piece if i > 0 else half
             p = fma(kick * (1.0 - done), k, fma(kick * done, k1, p))
-            turned = rotate(flow[0, block.lane], flow[1, block.lane], q, p)
-            p = rotate(flow[2, block.lane], flow[3, block.lane], q, p)
-            q = turned
+            moved = turned(q, flow[0, block.lane], flow[1, block.lane], p)
+            p = turned(p, flow[3, block.lane], flow[2, block.lane], q)
+            q = moved
             sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine
         synchronise()
 

@@ -17,18 +17,19 @@ from snapbeam.kernels.compile import inlined
 from snapbeam.kernels.lanes import fma, select_less, vfloor
 
 __all__ = [
+    "circle",
     "contact_energy",
     "contact_force",
-    "decay",
+    "decay_less_one",
     "mode_energy",
     "recorded_motion",
-    "rotate",
     "rotation",
     "shaker_motion",
     "sincos",
     "tension_acceleration",
     "tension_energy",
     "tension_factors",
+    "turned",
 ]
 
 # pi/2 in three parts of 33 bits each, so that k * part is exact for |k| < 2^20.
@@ -83,30 +84,41 @@ def mode_energy(omega, q, p):
 
 
 @inlined
-def rotate(a_first, a_second, q, p):
-    """One row of the flow of a linear mode."""
-    return fma(a_first, q, a_second * p)
+def turned(own, own_less_one, across, other):
+    """One row of the flow of a linear mode, its diagonal stored less one.
+
+    Over a short step a slow mode hardly moves: its flow is nearly the identity, and rounded as such it would
+    be off by the same bit at every step, a false damping or frequency of 1e-11.
+    """
+    return own + fma(own_less_one, own, across * other)
 
 
 @inlined
-def rotation(damping, omega_squared, cosine, sine_over, decayed):
+def rotation(damping, omega_squared, sine_over, cosine_less_one, decay_less_one):
     """The exact flow of a damped linear mode over a time.
 
-    With sigma = zeta omega, omega_d = omega sqrt(1 - zeta^2), ``cosine`` = cos(omega_d t), ``sine_over``
-    = sin(omega_d t)/omega_d and ``decayed`` = exp(-sigma t), returns the rows (a11, a12, a21, a22) of
-    (q, p)(t) = A (q, p)(0).
+    With sigma = zeta omega, omega_d = omega sqrt(1 - zeta^2), ``sine_over`` = sin(omega_d t)/omega_d,
+    ``cosine_less_one`` = cos(omega_d t) - 1 and ``decay_less_one`` = exp(-sigma t) - 1, returns the rows
+    (a11 - 1, a12, a21, a22 - 1) of (q, p)(t) = A (q, p)(0).
     """
-    ds = damping * sine_over
-    a11 = decayed * (cosine + ds)
+    ds, decayed = damping * sine_over, 1.0 + decay_less_one
+    a11 = fma(decayed, cosine_less_one + ds, decay_less_one)
     a12 = decayed * sine_over
     a21 = (0.0 - omega_squared) * a12
-    a22 = decayed * (cosine - ds)
+    a22 = fma(decayed, cosine_less_one - ds, decay_less_one)
     return a11, a12, a21, a22
 
 
 @inlined
 def sincos(x):
-    """Sine and cosine from additions and multiplications alone, the same in lanes and in scalars.
+    """Sine and cosine from additions and multiplications alone; see :func:`circle`."""
+    sine, cosine, _ = circle(x)
+    return sine, cosine
+
+
+@inlined
+def circle(x):
+    """Sine, cosine and cosine - 1 from additions and multiplications alone, the same in lanes and in scalars.
 
     Argument reduction in three steps and Taylor polynomials on [-pi/4, pi/4]; within 3e-16 for
     |x| < 1e5.
@@ -131,6 +143,7 @@ def sincos(x):
     c = fma(z, c, -1.388888888888889e-03)
     c = fma(z, c, 4.166666666666666e-02)
     c = fma(z, c, -0.5)
+    c_less_one = z * c
     c = fma(z, c, 1.0)
     quadrant = k - 4.0 * vfloor(0.25 * k)
     odd = quadrant - 2.0 * vfloor(0.5 * quadrant)
@@ -139,12 +152,12 @@ def sincos(x):
     middle = quadrant - 1.5
     sine = sine * select_less(middle, 0.0, 1.0, -1.0)
     cosine = cosine * select_less(middle * middle, 1.0, -1.0, 1.0)
-    return sine, cosine
+    return sine, cosine, select_less(quadrant, 0.5, c_less_one, cosine - 1.0)
 
 
 @inlined
-def decay(x):
-    """exp(-x) for |x| <= 4 from multiplications and additions alone, within 2e-14 of it."""
+def decay_less_one(x):
+    """exp(-x) - 1 for |x| <= 4 from multiplications and additions alone, within 2e-14 of exp(-x)."""
     y = x * -0.0625
     e = fma(y, 2.08767569878681e-09, 2.505210838544172e-08)
     e = fma(y, e, 2.755731922398589e-07)
@@ -157,11 +170,11 @@ def decay(x):
     e = fma(y, e, 1.666666666666667e-01)
     e = fma(y, e, 0.5)
     e = fma(y, e, 1.0)
-    e = fma(y, e, 1.0)
-    e = e * e
-    e = e * e
-    e = e * e
-    return e * e
+    e = y * e
+    e = e * (e + 2.0)
+    e = e * (e + 2.0)
+    e = e * (e + 2.0)
+    return e * (e + 2.0)
 
 
 @inlined

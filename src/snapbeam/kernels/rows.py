@@ -22,7 +22,14 @@ from snapbeam.kernels.lanes import (
     store,
     vabs,
 )
-from snapbeam.kernels.physics import decay, mode_energy, rotate, rotation, sincos, tension_acceleration
+from snapbeam.kernels.physics import (
+    circle,
+    decay_less_one,
+    mode_energy,
+    rotation,
+    tension_acceleration,
+    turned,
+)
 
 __all__ = [
     "Layout",
@@ -236,9 +243,9 @@ def kick_and_flow(memory, layout, flow, weight, along_g, along_r, r, force, q, p
         k = fma(force, load(memory, layout.contact + row), k)
         kicked = fma(weight, k, load(memory, p + row))
         q_row, at = load(memory, q + row), flow + row
-        store(memory, q + row, rotate(load(memory, at), load(memory, at + size), q_row, kicked))
+        store(memory, q + row, turned(q_row, load(memory, at), load(memory, at + size), kicked))
         at += 2 * size
-        store(memory, p + row, rotate(load(memory, at), load(memory, at + size), q_row, kicked))
+        store(memory, p + row, turned(kicked, load(memory, at + size), load(memory, at), q_row))
 
 
 @inlined
@@ -246,9 +253,9 @@ def flow_rows(memory, size, flow, q_from, p_from, q_to, p_to):
     """One flow of every linear mode."""
     for row in range(0, size, WIDTH):
         q_row, p_row, at = load(memory, q_from + row), load(memory, p_from + row), flow + row
-        store(memory, q_to + row, rotate(load(memory, at), load(memory, at + size), q_row, p_row))
+        store(memory, q_to + row, turned(q_row, load(memory, at), load(memory, at + size), p_row))
         at += 2 * size
-        store(memory, p_to + row, rotate(load(memory, at), load(memory, at + size), q_row, p_row))
+        store(memory, p_to + row, turned(p_row, load(memory, at + size), load(memory, at), q_row))
 
 
 @inlined
@@ -302,8 +309,8 @@ def glide(memory, layout, flow, pieces, piece, q, p, k0, k1, center, parts):
             done, kick, at = i / pieces, piece if i > 0 else 0.5 * piece, 4 * WIDTH * i
             kicked = fma(kick * done, k1_row, p_row)
             kicked = fma(kick * (1.0 - done), k0_row, kicked)
-            p_row = rotate(a21, a22, q_row, kicked)
-            q_row = rotate(a11, a12, q_row, kicked)
+            p_row = turned(kicked, a22, a21, q_row)
+            q_row = turned(q_row, a11, a12, kicked)
             if row == 0:
                 for j in range(4):
                     store(parts, at + j * WIDTH, splat(0.0))
@@ -316,14 +323,15 @@ def glide(memory, layout, flow, pieces, piece, q, p, k0, k1, center, parts):
 
 @compiled
 def flow_coefficients(memory, layout, length, at):
-    """Rows a11, a12, a21, a22 of the exact flow over *length* seconds, written from *at* on."""
+    """Rows a11 - 1, a12, a21, a22 - 1 of the exact flow over *length* seconds, written from *at* on."""
     size = layout.size
     if abs(length) < layout.gentle:
         for row in range(0, size, WIDTH):
             damped, sigma = load(memory, layout.omega_damped + row), load(memory, layout.damping + row)
             squared = load(memory, layout.omega_squared + row)
-            sine, cosine = sincos(damped * length)
-            a11, a12, a21, a22 = rotation(sigma, squared, cosine, sine / damped, decay(sigma * length))
+            sine, _, less_one = circle(damped * length)
+            lost = decay_less_one(sigma * length)
+            a11, a12, a21, a22 = rotation(sigma, squared, sine / damped, less_one, lost)
             store(memory, at + row, a11)
             store(memory, at + size + row, a12)
             store(memory, at + 2 * size + row, a21)
@@ -331,10 +339,10 @@ def flow_coefficients(memory, layout, length, at):
         return
     for j in range(size):
         damped, sigma = memory[layout.omega_damped + j], memory[layout.damping + j]
-        sine, cosine = sincos(damped * length)
+        sine, _, less_one = circle(damped * length)
         over = sine / damped if damped > 0.0 else length
         squared = memory[layout.omega_squared + j]
-        a11, a12, a21, a22 = rotation(sigma, squared, cosine, over, math.exp(-sigma * length))
+        a11, a12, a21, a22 = rotation(sigma, squared, over, less_one, math.expm1(-sigma * length))
         memory[at + j] = a11
         memory[at + size + j] = a12
         memory[at + 2 * size + j] = a21
