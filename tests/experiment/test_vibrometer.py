@@ -90,6 +90,17 @@ def test_the_start_is_found_and_described():
     assert "overshoot" in start.description and drive.summary()["accepted"] is True
 
 
+@pytest.mark.parametrize("ramp", [0.0, 0.01])
+def test_the_start_of_a_record_without_noise(ramp):
+    """Sums as large as one over the square of no noise must not hide where the motion begins."""
+    time = np.arange(0.0, 0.5, 5e-5)
+    moving = np.clip(time - 0.1003, 0.0, None)
+    swell = 1.0 - np.exp(-moving / ramp) if ramp else 1.0
+    signal = make_signal(0.1 * swell * np.sin(2.0 * np.pi * 100.0 * moving), "m/s", 20_000.0)
+    start = measure_drive(signal).startup
+    assert abs(start.onset - 0.1003) <= 2.0 * start.onset_uncertainty
+
+
 def test_a_steady_start_and_a_start_outside_the_record():
     prompt = measure_drive(record(over=0.0)[0]).startup
     assert prompt.duration == 0.0 and prompt.overshoot == 0.0 and "at once" in prompt.description

@@ -104,39 +104,44 @@ def file_line(path: Path) -> str:
 
 
 class _RateColumn(ProgressColumn):
+    def __init__(self, what: str) -> None:
+        super().__init__()
+        self.what = what
+
     def render(self, task: Task) -> Text:
         if not task.completed or not task.elapsed or task.total is None:
             return Text("starting")
-        return Text(pace(int(task.completed), int(task.total), task.elapsed))
+        return Text(pace(int(task.completed), int(task.total), task.elapsed, self.what))
 
 
-def pace(done: int, total: int, elapsed: float) -> str:
-    """Return runs per second and the time left, in words."""
+def pace(done: int, total: int, elapsed: float, what: str = "runs") -> str:
+    """Return runs, or whatever else is counted, per second and the time left, in words."""
     rate = done / max(elapsed, 1e-9)
     left = f", {duration((total - done) / rate)} left" if 0 < done < total else ""
-    return f"{rate:.3g} runs/s{left}"
+    return f"{rate:.3g} {what}/s{left}"
 
 
 @contextmanager
-def progress(total: int) -> Iterator[Callable[[int, int], None]]:
+def progress(total: int, task: str = "map", what: str = "runs") -> Iterator[Callable[[int, int], None]]:
     """Give a function of (runs done, runs in all) that shows how far it is, how fast, and what is left.
 
-    A bar on a terminal; elsewhere a line for each tenth of the work.
+    *task* names the work, *what* is counted.  A bar on a terminal; elsewhere a line for each tenth of the work.
     """
     console = errors()
     if console.is_terminal:
-        columns = (TextColumn("map"), BarColumn(), MofNCompleteColumn(), _RateColumn())
+        columns = (TextColumn(task), BarColumn(), MofNCompleteColumn(), _RateColumn(what))
         with Progress(*columns, console=console, transient=True) as bar:
-            task = bar.add_task("map", total=total)
-            yield lambda done, runs: bar.update(task, completed=done, total=runs)
+            shown = bar.add_task(task, total=total)
+            yield lambda done, all_of_them: bar.update(shown, completed=done, total=all_of_them)
     else:
-        console.print(f"{total} runs to compute")
-        yield _Lines(console)
+        console.print(f"{total} {what} to compute")
+        yield _Lines(console, what)
 
 
 class _Lines:
-    def __init__(self, console: Console) -> None:
+    def __init__(self, console: Console, what: str) -> None:
         self.console = console
+        self.what = what
         self.start = time.monotonic()
         self.tenths = 0
 
@@ -145,4 +150,5 @@ class _Lines:
         if tenths <= self.tenths:
             return
         self.tenths = tenths
-        self.console.print(f"{done} of {total} runs, {pace(done, total, time.monotonic() - self.start)}")
+        spent = pace(done, total, time.monotonic() - self.start, self.what)
+        self.console.print(f"{done} of {total} {self.what}, {spent}")

@@ -152,7 +152,7 @@ def track(
     ) as opened:
         if picture is not None:
             integer("frame", frame, 0, len(opened) - 1)
-        with progress(len(opened)) as tell:
+        with progress(len(opened), "track", "frames") as tell:
             dataset = track_recording(
                 opened,
                 buckling_level=buckling_level,
@@ -183,7 +183,7 @@ def track(
         if video is not None:
             from snapbeam.figures.tracking_video import annotated_video
 
-            with progress(len(opened)) as tell:
+            with progress(len(opened), "video", "frames") as tell:
                 files.append(annotated_video(opened, dataset, video, every=video_every, progress=tell))
     console = out()
     console.print(tracking_report(dataset), markup=False)

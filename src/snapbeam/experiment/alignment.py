@@ -51,7 +51,10 @@ class Alignment:
     @property
     def description(self) -> str:
         """The alignment in words."""
-        text = f"t_camera = t_vibrometer + {self.delay:.7f} s (standard error {self.delay_se:.1e} s)"
+        sign = "-" if self.delay < 0.0 else "+"
+        text = (
+            f"t_camera = t_vibrometer {sign} {abs(self.delay):.7f} s (standard error {self.delay_se:.1e} s)"
+        )
         if not self.certain:
             text += (
                 f"; whole cycles of {self.period:.6g} s remain open: the start of the motion is not in both "

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 __all__ = ["DriveMeasurement", "StartUp", "displacement_from_velocity", "measure_drive"]
 
 _Array = NDArray[np.float64]
+_NOISE_FLOOR = 1e-6
+"""Of the amplitude: a record without noise is taken to have this much, or the sums that find its start
+would lose it to rounding."""
 SNR_LIMIT = 15.0
 
 
@@ -286,7 +289,7 @@ def _onset(samples: Samples, first: int, rough: SineFit) -> tuple[float | None, 
     if quiet.size < max(8, width // 8):
         return None, 0.0
     rest = float(np.median(quiet))
-    noise = max(float(np.std(quiet)), 1e-9 * rough.amplitude)
+    noise = max(float(np.std(quiet)), _NOISE_FLOOR * rough.amplitude)
     level = rough.amplitude / math.sqrt(2.0)
     if noise > 0.5 * level:
         return None, 0.0

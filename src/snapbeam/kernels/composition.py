@@ -22,7 +22,7 @@ TURNS = 16
 class Stages(NamedTuple):
     """A composition as a march finds it in its memory: plain numbers, since passing arrays costs time."""
 
-    count: int
+    flows: int
     """Flows of a step; there is one kick more."""
     flow: int
     """Where the flow weights begin."""

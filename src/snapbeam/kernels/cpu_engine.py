@@ -53,12 +53,10 @@ def _memory(ensemble: Ensemble) -> tuple[_Array, tuple[Layout, Layout], Stages]:
     memory[second.g : second.g + size] = memory[first.g : first.g + size]
     memory[stages.flow : first_drive] = weights
     memory[first_drive:] = drive
-    recorded = {
-        "drive": first_drive,
-        "drive_samples": drive.size // 2,
-        "drive_interval": ensemble.drive_interval,
-    }
-    return memory, (first._replace(**recorded), second._replace(**recorded)), stages
+    samples, interval = drive.size // 2, ensemble.drive_interval
+    first = first._replace(drive=first_drive, drive_samples=samples, drive_interval=interval)
+    second = second._replace(drive=first_drive, drive_samples=samples, drive_interval=interval)
+    return memory, (first, second), stages
 
 
 def _nothing(size: int) -> Outputs:

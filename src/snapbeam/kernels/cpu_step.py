@@ -47,7 +47,7 @@ class Impactor(NamedTuple):
 def prepare(memory, layout, stages, impactor, length, at):
     """What a step of *length* needs, from *at* on: its distinct flows and the drive's turn at each kick."""
     size = layout.size
-    for i in range((stages.count + 1) // 2):
+    for i in range((stages.flows + 1) // 2):
         flow_coefficients(memory, layout, memory[stages.flow + i] * length, at)
         at += 4 * size
     for i in range(0, TURNS, WIDTH):
@@ -141,7 +141,7 @@ def _last(memory, layout, step, weight, along_g, along_r, force):
 @compiled
 def take_step(memory, blocks, layout, stages, impactor, step, ledger):
     """Advance (q, p) with tension acceleration k by a step into (q1, p1, k1); dissipation if *ledger*."""
-    last, size = stages.count, layout.size
+    last, size = stages.flows, layout.size
     q1, p1, k1, r = step.q1, step.p1, step.k1, step.r
     turns = step.at + ((last + 1) // 2) * 4 * size
     sine0, cosine0 = 0.0, 1.0
@@ -190,7 +190,7 @@ def take_two(memory, blocks, stages, layout_a, impactor_a, a, layout_b, impactor
 
     A single trajectory leaves the processor waiting for sums most of the time; the other one uses that time.
     """
-    last, size = stages.count, layout_a.size
+    last, size = stages.flows, layout_a.size
     turns = ((last + 1) // 2) * 4 * size
     sine_a, cosine_a, sine_b, cosine_b = 0.0, 1.0, 0.0, 1.0
     if a.touching:

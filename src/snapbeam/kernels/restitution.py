@@ -79,7 +79,7 @@ def march_restitution(
     The contact stiffness of *struck* is read as the coefficient of restitution.
     """
     size = layout.size
-    slot = (stages.count + 1) // 2 * 4 * size + 2 * TURNS
+    slot = (stages.flows + 1) // 2 * 4 * size + 2 * TURNS
     q, p, k = layout.work, layout.work + size, layout.work + 2 * size
     q1, p1, k1 = q + 3 * size, p + 3 * size, k + 3 * size
     q2, p2, k2 = q + 6 * size, p + 6 * size, k + 6 * size
