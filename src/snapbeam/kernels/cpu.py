@@ -21,7 +21,7 @@ from snapbeam.kernels.cpu_run import Now, begin, cut_slot, finish
 from snapbeam.kernels.cpu_settle import settle
 from snapbeam.kernels.cpu_step import Done, Step, prepare, take_step, take_two
 from snapbeam.kernels.fields import Counts
-from snapbeam.kernels.march_parts import change_well, contact_level, flight_level, seen_from
+from snapbeam.kernels.march_parts import change_well, contact_level, flight_level, seen_from, ticks_of
 
 __all__ = ["march_many"]
 
@@ -39,11 +39,11 @@ def choose(memory, blocks, layout, stages, run, now, counts):
         stretch = change_well(memory, blocks, layout, home, now.q, now.k, layout.work + 9 * layout.size)
         home = -home
     counts[Counts.STEPS] += 1
-    level = flight_level(clock, stretch, layout.stretch)
+    level = flight_level(clock, now.quiet, stretch, layout.stretch)
     if now.touching:
         elapsed = (t - counts[Counts.ONSET]) * clock.tick
         level = max(level, contact_level(clock, elapsed, now.d, now.dv))
-    ticks, at = clock.step >> level, run.coefficients + level * run.slot
+    ticks, at = ticks_of(clock, level), run.coefficients + (level + 1) * run.slot
     if t + ticks > clock.end:
         ticks, at = clock.end - t, cut_slot(run)
         prepare(memory, layout, stages, run.struck, ticks * clock.tick, at)
@@ -51,7 +51,7 @@ def choose(memory, blocks, layout, stages, run, now, counts):
     r, length = layout.work + 9 * layout.size, ticks * clock.tick
     step = Step(ticks, at, length, phase, now.touching, now.q, now.p, now.k, now.q1, now.p1, now.k1, r)
     now = Now(
-        t, now.q, now.p, now.k, now.q1, now.p1, now.k1, home, stretch, now.w, now.wv, now.d, now.dv, now.c,
+        t, now.q, now.p, now.k, now.q1, now.p1, now.k1, home, stretch, now.quiet, now.w, now.wv, now.d, now.dv, now.c,
         now.cv, now.touching, now.safe_gap, now.safe_center, now.sample, now.status
     )  # fmt: skip
     return now, step

@@ -40,7 +40,7 @@ def _memory(ensemble: Ensemble) -> tuple[_Array, tuple[Layout, Layout], Stages]:
     """A copy of the structure's rows with room for two runs, aligned to whole registers, and where is what."""
     packed, plan, drive = ensemble.packed, ensemble.plan, ensemble.drive_table
     size, first = packed.layout.size, packed.layout
-    work = 10 * size + (plan.finest + 2) * slot_length(plan.order, size) + 8 * size
+    work = 10 * size + (plan.finest + 3) * slot_length(plan.order, size) + 8 * size
     second = first._replace(
         g=first.work + work, contact=first.work + work + size, work=first.work + work + 2 * size
     )
@@ -86,7 +86,7 @@ def _march(
     packed, plan = ensemble.packed, ensemble.plan
     memory, layouts, stages = _memory(ensemble)
     fastest = max(float(packed.model.omega.max()), float(ensemble.reals[:, Reals.OMEGA].max()))
-    pieces = max(16, math.ceil(PIECES * fastest * plan.step / (2.0 * math.pi)) + 1)
+    pieces = 2 * max(8, math.ceil(PIECES * fastest * plan.step / (2.0 * math.pi)) + 1)
     march(
         memory,
         packed.blocks,

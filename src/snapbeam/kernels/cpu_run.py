@@ -10,7 +10,7 @@ from snapbeam.kernels.compile import compiled, inlined
 from snapbeam.kernels.composition import TURNS
 from snapbeam.kernels.cpu_step import Impactor, observe, prepare
 from snapbeam.kernels.fields import Counts, Numbers, Ticks
-from snapbeam.kernels.march_parts import PIECES, Clock, change_well, finish_impact, set_up
+from snapbeam.kernels.march_parts import PIECES, Clock, change_well, finish_impact, is_quiet, set_up
 from snapbeam.kernels.physics import contact_energy, tension_energy, tension_factors
 from snapbeam.kernels.rows import acceleration_rows, flow_coefficients, modal_energy, tension_rows
 from snapbeam.kernels.statistics import sign_of
@@ -37,7 +37,7 @@ class Run(NamedTuple):
     step_time: float
     """Of the flight step, s."""
     coefficients: int
-    """Where the prepared steps begin, one for each level."""
+    """Where the prepared steps begin, one for each level from -1 on."""
     slot: int
     """Length of one."""
     spare: int
@@ -58,6 +58,8 @@ class Now(NamedTuple):
     home: float
     """+1 in the well the run began in, -1 in the other: the origin of q."""
     stretch: float
+    quiet: bool
+    """Whether its energy is so low that longer steps serve."""
     w: float
     """Displacement of the contact point, and its rate."""
     wv: float
@@ -80,7 +82,7 @@ class Now(NamedTuple):
 @inlined
 def cut_slot(run):
     """Where a step of any other length is prepared."""
-    return run.coefficients + (run.clock.finest + 1) * run.slot
+    return run.coefficients + (run.clock.finest + 2) * run.slot
 
 
 @inlined
@@ -102,8 +104,8 @@ def begin(memory, blocks, layout, stages, asked, i, limits, counts, numbers):
     q, p, k = layout.work, layout.work + size, layout.work + 2 * size
     r, coefficients = layout.work + 9 * size, layout.work + 10 * size
     step_time = clock.step * clock.tick
-    for level in range(clock.finest + 1):
-        prepare(memory, layout, stages, struck, step_time / (1 << level), coefficients + level * slot)
+    for level in range(clock.finest + 2):
+        prepare(memory, layout, stages, struck, 2.0 * step_time / (1 << level), coefficients + level * slot)
     fastest = struck.omega
     for row in range(size):
         fastest = max(fastest, memory[layout.omega + row])
@@ -139,7 +141,9 @@ def begin(memory, blocks, layout, stages, asked, i, limits, counts, numbers):
     numbers[Numbers.DEEPEST] = max(d, 0.0)
     status = _RUNNING if t < clock.end else _OK
     q1, p1, k1, stretch = q + 3 * size, p + 3 * size, k + 3 * size, 2.0 * gq + qr
-    now = Now(t, q, p, k, q1, p1, k1, 1.0, stretch, w, wv, d, dv, c, cv, touching, t, t, 0, status)
+    energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
+    quiet = is_quiet(energy, layout.gamma, layout.stretch)
+    now = Now(t, q, p, k, q1, p1, k1, 1.0, stretch, quiet, w, wv, d, dv, c, cv, touching, t, t, 0, status)
     return run, now
 
 

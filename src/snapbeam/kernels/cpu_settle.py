@@ -13,6 +13,7 @@ from snapbeam.kernels.march_parts import (
     count_in_step,
     finish_impact,
     first_entry,
+    is_quiet,
     safe_for,
     seen_from,
     track_extremes,
@@ -89,8 +90,8 @@ def settle(memory, blocks, layout, stages, run, now, step, done, room, counts, n
     w1, wv1, d1, dv1, c1, cv1 = observe(memory, layout, impactor, phase + impactor.omega * length, q1, p1)
     if not math.isfinite(d1 + dv1):
         return Now(
-            t, q, p, k, q1, p1, k1, now.home, now.stretch, w, wv, d, dv, c, cv, touching, safe_gap, safe_center,
-            now.sample, _NOT_FINITE
+            t, q, p, k, q1, p1, k1, now.home, now.stretch, now.quiet, w, wv, d, dv, c, cv, touching, safe_gap,
+            safe_center, now.sample, _NOT_FINITE
         )  # fmt: skip
 
     # where the step meets or leaves the contact, if it does
@@ -113,7 +114,9 @@ def settle(memory, blocks, layout, stages, run, now, step, done, room, counts, n
             safe_center = t + int(safe_for(abs(c), bound, 0.0, push, run.step_time) / tick)
         if t + ticks > min(safe_gap, safe_center):
             look, pieces = look_slot(run), run.step_pieces
-            if ticks != clock.step:
+            if ticks == 2 * clock.step:
+                pieces *= 2
+            elif ticks != clock.step:
                 look += 4 * size
                 pieces = max(2, math.ceil(length / run.finest_look))
                 flow_coefficients(memory, layout, length / pieces, look)
@@ -130,8 +133,8 @@ def settle(memory, blocks, layout, stages, run, now, step, done, room, counts, n
                         counts[Counts.TOUCHING], counts[Counts.ONSET] = 1, t
                         status = _STEP_LIMIT if counts[Counts.STEPS] >= clock.max_steps else _RUNNING
                         return Now(
-                            t, q, p, k, q1, p1, k1, now.home, now.stretch, w, wv, d, dv, c, cv, True, safe_gap,
-                            safe_center, now.sample, status
+                            t, q, p, k, q1, p1, k1, now.home, now.stretch, now.quiet, w, wv, d, dv, c, cv, True,
+                            safe_gap, safe_center, now.sample, status
                         )  # fmt: skip
     if cut < ticks:
         ticks, length = cut, cut * tick
@@ -168,6 +171,7 @@ def settle(memory, blocks, layout, stages, run, now, step, done, room, counts, n
     # accept
     t += ticks
     status = _RUNNING if t < end else _OK
+    quiet, released = now.quiet, event and touching
     if event:
         safe_gap, safe_center = t, t
         if touching:
@@ -177,15 +181,17 @@ def settle(memory, blocks, layout, stages, run, now, step, done, room, counts, n
         else:
             touching = True
             counts[Counts.TOUCHING], counts[Counts.ONSET] = 1, t
-    elif not touching and now.home < 0.0 and (counts[Counts.STEPS] & 15) == 0 and w1 > clock.decide_reach:
+    if released or (not touching and (counts[Counts.STEPS] & 7) == 0):
         energy = modal_energy(memory, layout, q1, p1) + tension_energy(layout.gamma, done.gq, done.qr)
-        if c1 > 0.0 and energy < clock.decide_energy:
-            status = _DECIDED
+        quiet = is_quiet(energy, layout.gamma, layout.stretch)
+        if not event and now.home < 0.0 and (counts[Counts.STEPS] & 15) == 0 and w1 > clock.decide_reach:
+            if c1 > 0.0 and energy < clock.decide_energy:
+                status = _DECIDED
     if clock.decide_crossings >= 0 and counts[Counts.CROSSINGS_LAST_QUARTER] > clock.decide_crossings:
         status = _DECIDED
     if status == _RUNNING and counts[Counts.STEPS] >= clock.max_steps:
         status = _STEP_LIMIT
     return Now(
-        t, q1, p1, k1, q, p, k, now.home, 2.0 * done.gq + done.qr, w1, wv1, d1, dv1, c1, cv1, touching, safe_gap,
+        t, q1, p1, k1, q, p, k, now.home, 2.0 * done.gq + done.qr, quiet, w1, wv1, d1, dv1, c1, cv1, touching, safe_gap,
         safe_center, sample, status
     )  # fmt: skip

@@ -30,8 +30,10 @@ from snapbeam.kernels.march_parts import (
     finish_impact,
     first_entry,
     flight_level,
+    is_quiet,
     safe_for,
     seen_from,
+    ticks_of,
     track_extremes,
 )
 from snapbeam.kernels.physics import (
@@ -99,8 +101,8 @@ def march_kernel(order: int, threads: int, columns: int, warps: int = RESIDENT_W
             flows[index], turns[index], seen[index],
         )  # fmt: skip
         shift = structure[6, lane]
-        cut_slot = finest + 1
-        whole_look = (finest + 2) * distinct
+        cut_slot = finest + 2
+        whole_look = (finest + 3) * distinct
         unrecorded = Unrecorded(numbers[:0])
         run = slots[index]
         left = budget
@@ -141,8 +143,8 @@ def march_kernel(order: int, threads: int, columns: int, warps: int = RESIDENT_W
             shaker_speed = struck.amplitude * struck.omega
 
             if fresh:
-                for level in range(finest + 1):
-                    prepare(block, mode, struck.omega, step_time / (1 << level), level)
+                for level in range(finest + 2):
+                    prepare(block, mode, struck.omega, 2.0 * step_time / (1 << level), level)
                 flow_into(block, mode, step_time / step_pieces, whole_look)
                 start = whole[Ticks.START_ROW]
                 q, p = starts[start, 0, lane], starts[start, 1, lane]
@@ -161,7 +163,7 @@ def march_kernel(order: int, threads: int, columns: int, warps: int = RESIDENT_W
                 w += rest_contact
                 c += rest_center
                 touching = d > 0.0 or (d == 0.0 and dv > 0.0)
-                onset, safe_gap, safe_center = t, t, t
+                onset, safe_gap, safe_center, quiet = t, t, t, False
                 deepest = max(d, 0.0)
                 if lane == 0:
                     own[Counts.STATUS] = _RUNNING
@@ -175,7 +177,7 @@ def march_kernel(order: int, threads: int, columns: int, warps: int = RESIDENT_W
                 w, wv, d, dv = kept[index, 0], kept[index, 1], kept[index, 2], kept[index, 3]
                 c, cv, gq, qr = kept[index, 4], kept[index, 5], kept[index, 6], kept[index, 7]
                 touching, onset = own[Counts.TOUCHING] != 0, own[Counts.ONSET]
-                safe_gap, safe_center = marks[index, 0], marks[index, 1]
+                safe_gap, safe_center, quiet = marks[index, 0], marks[index, 1], marks[index, 3] != 0
                 deepest = book[Numbers.DEEPEST]
             synchronise()
 
@@ -195,19 +197,21 @@ def march_kernel(order: int, threads: int, columns: int, warps: int = RESIDENT_W
                     impactor = seen_from(struck, home, at_contact)
                     rest_contact, rest_center = home * at_contact, home * at_center
                 if change or fresh:
-                    fresh = False
                     r = tension(block, q)
                     gq, qr, _, _ = sum_four(block, g * q, r * q, 0.0, 0.0)
                     along_g, along_r = tension_factors(gamma, gq, qr)
                     k = tension_acceleration(along_g, along_r, g, r)
+                if fresh:
+                    energy = sum_one(block, mode_energy(mode.omega, q, p)) + tension_energy(gamma, gq, qr)
+                    fresh, quiet = False, is_quiet(energy, gamma, rest_stretch)
                 if steps >= max_steps:
                     status = _STEP_LIMIT
                     break
                 steps += 1
-                level = flight_level(clock, 2.0 * gq + qr, rest_stretch)
+                level = flight_level(clock, quiet, 2.0 * gq + qr, rest_stretch)
                 if touching:
                     level = max(level, contact_level(clock, (t - onset) * tick, d, dv))
-                span, slot = step >> level, level
+                span, slot = ticks_of(clock, level), level + 1
                 if t + span > clock.end:
                     span, slot = clock.end - t, cut_slot
                 phase = _TWO_PI * ((t % clock.period) / clock.period)
@@ -259,7 +263,9 @@ def march_kernel(order: int, threads: int, columns: int, warps: int = RESIDENT_W
                                     safe_center = t + int(safe / tick)
                             if t + span > min(safe_gap, safe_center):
                                 look, pieces = whole_look, step_pieces
-                                if span != step:
+                                if span == 2 * step:
+                                    pieces *= 2
+                                elif span != step:
                                     look += 1
                                     pieces = max(2, math.ceil(length / finest_look))
                                     flow_into(block, mode, length / pieces, look)
@@ -320,6 +326,7 @@ def march_kernel(order: int, threads: int, columns: int, warps: int = RESIDENT_W
                 t += span
                 w, wv, d, dv, c, cv = w1, wv1, d1, dv1, c1, cv1
                 gq, qr = gq1, qr1
+                released = event and touching
                 if event:
                     safe_gap, safe_center = t, t
                     if touching:
@@ -331,11 +338,13 @@ def march_kernel(order: int, threads: int, columns: int, warps: int = RESIDENT_W
                         touching, onset = True, t
                         if lane == 0:
                             own[Counts.TOUCHING], own[Counts.ONSET] = 1, t
-                elif not touching and home < 0.0 and (steps & 15) == 0 and w > clock.decide_reach:
+                if released or (not touching and (steps & 7) == 0):
                     energy = sum_one(block, mode_energy(mode.omega, q, p)) + tension_energy(gamma, gq, qr)
-                    if c > 0.0 and energy < clock.decide_energy:
-                        status = _DECIDED
-                        break
+                    quiet = is_quiet(energy, gamma, rest_stretch)
+                    if not event and home < 0.0 and (steps & 15) == 0 and w > clock.decide_reach:
+                        if c > 0.0 and energy < clock.decide_energy:
+                            status = _DECIDED
+                            break
                 if counted and clock.decide_crossings >= 0:
                     synchronise()
                     if own[Counts.CROSSINGS_LAST_QUARTER] > clock.decide_crossings:
@@ -347,7 +356,8 @@ def march_kernel(order: int, threads: int, columns: int, warps: int = RESIDENT_W
             if status == _RUNNING:
                 modes_kept[index, 0, lane], modes_kept[index, 1, lane], modes_kept[index, 2, lane] = q, p, k
                 if lane == 0:
-                    marks[index, 0], marks[index, 1], marks[index, 2] = safe_gap, safe_center, int(home)
+                    marks[index, 0], marks[index, 1] = safe_gap, safe_center
+                    marks[index, 2], marks[index, 3] = int(home), int(quiet)
                     kept[index, 0], kept[index, 1], kept[index, 2], kept[index, 3] = w, wv, d, dv
                     kept[index, 4], kept[index, 5], kept[index, 6], kept[index, 7] = c, cv, gq, qr
             else:

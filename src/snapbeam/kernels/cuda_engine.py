@@ -77,7 +77,7 @@ def _most_pieces(ensemble: Ensemble, structure: DeviceStructure) -> int:
 
     step_time = float((ensemble.reals[:, Reals.TICK] * ensemble.ticks[:, Ticks.STEP]).max())
     fastest = max(float(structure.values[0].max()), float(ensemble.reals[:, Reals.OMEGA].max()))
-    return max(4, math.ceil(step_time * PIECES * fastest / (2.0 * math.pi))) + 2
+    return 2 * (max(4, math.ceil(step_time * PIECES * fastest / (2.0 * math.pi))) + 2)
 
 
 class Options(NamedTuple):
@@ -143,14 +143,14 @@ class _Launch:
 
         plan, threads, blocks = self.ensemble.plan, self.structure.threads, self.blocks
         distinct = (COMPOSITIONS[plan.order].flow.size + 1) // 2
-        flows = (plan.finest + 2) * distinct + 2
+        flows = (plan.finest + 3) * distinct + 2
         return (
             cuda.to_device(np.full(blocks, -1, dtype=np.int64)),
             cuda.to_device(np.zeros((blocks, MARKS), dtype=np.int64)),
             cuda.to_device(np.zeros((blocks, KEPT))),
             cuda.device_array((blocks, 3, threads), dtype=np.float64),
             cuda.device_array((blocks, flows, 4, threads), dtype=np.float64),
-            cuda.device_array((blocks, plan.finest + 2, 2, TURNS), dtype=np.float64),
+            cuda.device_array((blocks, plan.finest + 3, 2, TURNS), dtype=np.float64),
             cuda.device_array((blocks, self.pieces + 1, 4), dtype=np.float64),
         )
 

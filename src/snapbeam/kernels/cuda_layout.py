@@ -34,7 +34,7 @@ FEWEST_THREADS = 16
 """Of a block on a device, where fewer would leave lanes of the warp idle all the same."""
 STRUCTURE = ("omega", "omega_squared", "omega_damped", "damping", "g", "center", "shift")
 """Rows of the structure, by their names in :class:`snapbeam.kernels.rows.Layout`."""
-MARKS = 3
+MARKS = 4
 """Integers, and"""
 KEPT = 8
 """floats that a run laid down keeps beside its counts and numbers."""

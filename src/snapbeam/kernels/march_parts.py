@@ -24,9 +24,11 @@ __all__ = [
     "finish_impact",
     "first_entry",
     "flight_level",
+    "is_quiet",
     "safe_for",
     "seen_from",
     "set_up",
+    "ticks_of",
     "track_extremes",
 ]
 
@@ -80,6 +82,9 @@ _TRUST = 8
 # Flight steps are halved where the squared slopes differ from those of the well by more than this many times
 # the well's own, and again at every doubling.
 _STRETCH = 4.0
+# Below this share of the energy of the barrier, free flight takes steps of twice the length: what the steps
+# must resolve is how far the tension swings, and that goes with the root of the energy.
+_QUIET = 0.2
 # Pieces per period of the fastest mode when a step is looked into.
 PIECES = 5.0
 
@@ -154,8 +159,25 @@ def contact_level(clock, elapsed, d, dv):
 
 
 @compiled
-def flight_level(clock, stretch, stretch_at_rest):
-    """Halvings of the flight step for a beam stretched far beyond its wells."""
+def is_quiet(energy, gamma, stretch_at_rest):
+    """Whether a beam of this energy above the well stays far below the barrier, gamma s^2 / 4 for squared slopes s.
+
+    Without impact and damping the energy is constant, so that the length of the steps is.
+    """
+    return energy < _QUIET * 0.25 * gamma * stretch_at_rest * stretch_at_rest
+
+
+@compiled
+def ticks_of(clock, level):
+    """Length of the step of a level, in ticks: halvings of the flight step, or -1 for twice its length."""
+    return clock.step << 1 if level < 0 else clock.step >> level
+
+
+@compiled
+def flight_level(clock, quiet, stretch, stretch_at_rest):
+    """Halvings of the flight step for a beam stretched far beyond its wells; -1 if it is quiet."""
+    if quiet:
+        return -1
     level = 0
     reach = _STRETCH * stretch_at_rest
     while level < clock.finest and stretch_at_rest > 0.0 and abs(stretch) > reach:

@@ -131,7 +131,7 @@ def march_restitution(
         gq, qr = tension_rows(memory, blocks, layout, q, r)
         along_g, along_r = tension_factors(layout.gamma, gq, qr)
         acceleration_rows(memory, layout, along_g, along_r, r, k)
-        ticks = min(step >> flight_level(clock, 2.0 * gq + qr, layout.stretch), clock.end - t)
+        ticks = min(step >> flight_level(clock, False, 2.0 * gq + qr, layout.stretch), clock.end - t)
         phase = _TWO_PI * ((t % clock.period) / clock.period)
         length = ticks * tick
         released, dissipated, work, gross = False, 0.0, 0.0, 0.0
