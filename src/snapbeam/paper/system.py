@@ -65,7 +65,7 @@ def relative_map(
     import xarray as xr
 
     model = paper_model(modes)
-    columns = []
+    columns, made = [], []
     for at, x in enumerate(locations):
         static = float(sb.quasi_static_threshold(x, frequency_ratio))
         ds = sb.response_map(
@@ -78,6 +78,7 @@ def relative_map(
             early_decision=True,
         )
         amplitude = ds["velocity_amplitude"].values
+        made.append(ds.attrs["created"])
         ds = ds[list(KEPT)].rename(velocity_amplitude="relative_amplitude")
         ds = ds.assign_coords(
             relative_amplitude=("relative_amplitude", relative, {"units": "1", "long_name": "V/V_QS1"}),
@@ -97,6 +98,8 @@ def relative_map(
         combine_attrs="drop_conflicts",
     )
     joined.attrs.pop("location", None)
+    # a column is a map of its own, with its own time and parameters
+    joined.attrs["created"] = made[-1]
     return joined
 
 
