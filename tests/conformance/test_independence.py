@@ -11,7 +11,7 @@ from snapbeam.kernels.fields import Counts, Numbers, Reals
 from snapbeam.model.reduction import ReducedModel
 
 
-@pytest.mark.parametrize(("modes", "runs", "cycles"), [(1, 60, 12), (8, 16, 5), (32, 10, 3)])
+@pytest.mark.parametrize(("modes", "runs", "cycles"), [(1, 60, 12), (8, 16, 5), (32, 10, 3), (40, 6, 1)])
 def test_order_batch_and_threads(march, model_of, draw, modes, runs, cycles) -> None:
     model, given = model_of(modes), draw(runs, 11)
     whole = march(model, **given, cycles=cycles, threads=2)

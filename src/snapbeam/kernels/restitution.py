@@ -74,7 +74,7 @@ def _enter(counts, numbers, outputs, onset, duration, force, impulse):
 def march_restitution(
     memory, blocks, layout, stages, struck, rests, clock, seen, parts, counts, numbers, outputs
 ):
-    """March a single mode to its end; arguments as :func:`snapbeam.kernels.cpu.march`.
+    """March a single mode to its end; *rests* are the displacements of contact point and centre at rest.
 
     The contact stiffness of *struck* is read as the coefficient of restitution.
     """
