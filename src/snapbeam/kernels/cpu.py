@@ -2,9 +2,9 @@
 
 In free flight a trajectory takes steps of a fixed length, or of twice that while its energy is low, as many as
 a bound on the speed of the gap says are safe; near the shaker it looks inside each step with a resolution finer
-than the fastest mode, and a step that would enter the contact is cut where it does.  In contact, steps grow from the onset and shrink
-towards the release, which is located too, so that the d^(3/2) edges of the force fall between steps.  Time is
-an integer number of ticks; the phase of the drive comes from that integer alone.
+than the fastest mode, and a step that would enter the contact is cut where it does.  In contact, steps grow
+from the onset and shrink towards the release, which is located too, so that the d^(3/2) edges of the force fall
+between steps.  Time is an integer number of ticks; the phase of the drive comes from that integer alone.
 
 A kick waits for the sums of the one before, so that one trajectory alone leaves a core waiting.  Two are
 marched side by side, a step of each at a time; when one ends, the next run takes its place.  They share nothing
