@@ -57,8 +57,7 @@ def test_location_maps_are_of_full_size(name):
     maps = load_results(DATA / f"{name}.nc", "full")
     assert len(maps) == 6
     for ds in maps.values():
-        least = 40 if float(ds.frequency_ratio) < 0.1 else 60
-        assert min(ds.response.shape) >= least and ds.attrs["cycles"] == 200
+        assert min(ds.response.shape) >= 60 and ds.attrs["cycles"] == 200
 
 
 def test_a_point_of_the_map_is_computed_again():

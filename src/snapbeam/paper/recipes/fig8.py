@@ -42,17 +42,12 @@ def relative_amplitudes(count: int) -> _Array:
 
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
-    """Six maps; the beam is symmetric, so that half of it suffices.
-
-    At the smallest frequency, where a run of 200 cycles takes a core a second and the border is smooth, the
-    points are fewer.
-    """
+    """Six maps; the beam is symmetric, so that half of it suffices."""
     found = {}
     for ratio in FREQUENCY_RATIOS:
-        full = 40 if ratio < 0.1 else 60
-        points = results.pick(10, full)
+        points = results.pick(10, 60)
         locations = np.linspace(0.5 / points, 0.5, points)
-        relative = relative_amplitudes(results.pick(12, full))
+        relative = relative_amplitudes(results.pick(12, 60))
         for modes in (1, results.pick(4, 32)):
             # slow runs at the smallest frequency need fewer cycles for a sketch
             cycles = results.pick(4 if ratio < 0.1 else 30, CYCLES)
