@@ -59,6 +59,20 @@ def test_least_energy_is_a_lower_bound_reached_in_the_well(modes: int) -> None:
     np.testing.assert_array_equal(least_energy_at(model, 0.3, well), least_energy_at(model, 0.3, -well))
 
 
+def test_one_mode_passes_a_point_in_one_shape_only() -> None:
+    """Its least energy there is its energy, zero on the line between the clamps."""
+    model = ReducedModel.from_beam(BEAM, 1)
+    places, heights = (
+        np.array([0.5, 0.3, 0.5, 0.4, 0.6]),
+        np.array([0.0, 0.0, 0.3, 0.9, -1.1]) * BEAM.buckling_level,
+    )
+    amplitude = heights / np.array([model.shape_at(x)[0] for x in places])
+    energy = model.potential_energy(amplitude[:, None])
+    np.testing.assert_allclose(
+        least_energy_at(model, places, heights), energy, rtol=1e-9, atol=1e-9 * -model.well_energy
+    )
+
+
 def test_decidable_energy() -> None:
     """Less than the barrier and less the higher the shaker reaches; never where it reaches the well."""
     model = ReducedModel.from_beam(BEAM, 8)

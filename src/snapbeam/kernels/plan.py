@@ -27,6 +27,9 @@ _PLACES = np.linspace(0.02, 0.5, 25).tolist()
 """Where the mass met by an impulse is looked at; the other half of the beam is its mirror image."""
 _HALVINGS = {4: 2, 6: 6}
 _MOST_HALVINGS = 5
+_CONTACT_TURN = math.pi
+"""Of the fastest mode in the longest contact step, rad: the contact moves every mode, and beyond half a turn
+its kicks come in step with the fastest ones."""
 
 ACCURACIES = ("map", "reference")
 
@@ -85,6 +88,8 @@ def plan_steps(
         speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_freq
         impact = _CONTACT_SHARE * contact.impact_duration(mass, speed)
         flight = min(flight, impact * 2**_MOST_HALVINGS)
+        if fastest > 0.0:
+            impact = min(impact, _CONTACT_TURN / fastest)
     coarsest = max(0, math.ceil(math.log2(flight / impact)))
     order = 4 if accuracy == "map" else 6
     if accuracy == "reference":
