@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from benchmarks import ensemble, requests, scaling, tried, work_precision
+from benchmarks import ensemble, levels, requests, scaling, tried, work_precision
 from benchmarks.peers import PEERS, methods
 
 _PARTS = {
@@ -13,6 +13,7 @@ _PARTS = {
     "ensemble": ensemble.run,
     "scaling": scaling.run,
     "requests": requests.run,
+    "levels": levels.run,
     "tried": tried.run,
 }
 

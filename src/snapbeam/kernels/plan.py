@@ -26,6 +26,9 @@ _CONTACT_SPEED = 0.2
 _PLACES = np.linspace(0.02, 0.5, 25).tolist()
 """Where the mass met by an impulse is looked at; the other half of the beam is its mirror image."""
 _HALVINGS = {4: 2, 6: 6}
+# Level "reference": how many times shorter, and how far the fastest mode may turn in a flight step, rad.
+_SHORTER = 6.0
+_FREE_TURN = 4.0
 _MOST_HALVINGS = 5
 _CONTACT_TURN = math.pi
 """Of the fastest mode in the longest contact step, rad: the contact moves every mode, and beyond half a turn
@@ -73,7 +76,8 @@ def plan_steps(
     step : float, optional
         Flight step in seconds, instead of the default; contact steps scale with it.
     accuracy : {"map", "reference"}
-        ``"map"``: order 4.  ``"reference"``: order 6 and steps six times shorter, to check others with.
+        ``"map"``: order 4.  ``"reference"``: order 6, and steps six times shorter or, with many modes, shorter
+        still in flight, to check others with.
     """
     choice("accuracy", accuracy, ACCURACIES)
     fastest, detuning = float(model.omega.max()), _detuning_rate(model)
@@ -93,7 +97,9 @@ def plan_steps(
     coarsest = max(0, math.ceil(math.log2(flight / impact)))
     order = 4 if accuracy == "map" else 6
     if accuracy == "reference":
-        flight /= 6.0
+        flight /= _SHORTER
+        while fastest * flight > _FREE_TURN:
+            flight, coarsest = 0.5 * flight, max(0, coarsest - 1)
     if step is not None:
         flight = positive("step", step, "s")
     return Plan(order, flight, coarsest, coarsest + _HALVINGS[order])

@@ -1,0 +1,71 @@
+"""The two named levels: their error over random points of the plane of Fig. 6, for few modes and many."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.cases import REQUEST_POINTS, Case
+from benchmarks.report import save, table
+
+__all__ = ["run"]
+
+_SEED = 5
+_MODES = (1, 2, 4, 8, 16, 32, 64, 128)
+_RANDOM = 14
+_PROMISED = {"map": 1e-3, "reference": 1e-8}
+_ALLOWED = 0.1
+"""Share of the promised error up to which the response to a relative change of V by 1e-13 may go."""
+
+
+def _points(count: int) -> list[tuple[float, float]]:
+    """The points of the requests, and random ones; seed fixed."""
+    random = np.random.default_rng(_SEED)
+    frequency, velocity = random.uniform(0.4, 4.0, _RANDOM), random.uniform(0.05, 0.65, _RANDOM)
+    drawn = zip(frequency.round(3), velocity.round(3), strict=True)
+    return [*REQUEST_POINTS, *((float(a), float(b)) for a, b in drawn)][:count]
+
+
+def run(folder: Path, quick: bool) -> None:
+    """Measure and write ``levels``."""
+    points = _points(3 if quick else len(REQUEST_POINTS) + _RANDOM)
+    records: list[dict[str, Any]] = []
+    for modes in (1, 8) if quick else _MODES:
+        for point in points:
+            case = Case(modes, *point)
+            for level in _PROMISED:
+                error = case.error(case.displacement(case.default_plan(level)))
+                records.append(
+                    {
+                        "modes": modes,
+                        "point": case.label,
+                        "level": level,
+                        "error": error,
+                        "conditioning": case.conditioning,
+                    }
+                )
+    rows: list[list[object]] = []
+    for modes in dict.fromkeys(r["modes"] for r in records):
+        for level, promised in _PROMISED.items():
+            here = [r for r in records if (r["modes"], r["level"]) == (modes, level)]
+            fair = [r for r in here if r["conditioning"] <= _ALLOWED * promised]
+            errors = np.array([r["error"] for r in fair])
+            worst = sorted(fair, key=lambda r: -float(r["error"]))[:3]
+            rows.append(
+                [
+                    modes,
+                    level,
+                    f"{np.median(errors):.0e}",
+                    f"{int((errors <= promised).sum())} of {len(fair)}",
+                    ", ".join(f"{r['error']:.0e} at {r['point']}" for r in worst),
+                ]
+            )
+    text = table(("modes", "level", "median e5", "within 1e-3 or 1e-8", "greatest three"), rows)
+    text += (
+        f"\n{len(points)} points: those of the requests, and random ones. Counted are those at which the response "
+        "to a relative change of V by 1e-13 stays below a tenth of 1e-3 or 1e-8. Measured against half the steps of "
+        'level "reference", so that the errors of that level itself are known to about a sixtieth of them.\n'
+    )
+    save(folder, "levels", quick, {"seed": _SEED, "points": points, "records": records}, text)
