@@ -24,7 +24,10 @@ __all__ = ["record", "run_ensemble", "usable_cores"]
 
 _Array = NDArray[np.float64]
 _CHUNK_STEPS = 3_000_000
-"""Flight steps per task: a fraction of a second, so that progress is smooth and Ctrl-C prompt."""
+"""Flight steps per task at most: a second or so, so that progress is smooth and Ctrl-C prompt."""
+_CHUNKS = 4
+"""Tasks per thread at least, of _FEW runs each at least, so that the threads end together."""
+_FEW = 4
 _ALIGNMENT = 64
 
 
@@ -124,8 +127,11 @@ def run_ensemble(
     packed = ensemble.packed
     counts, numbers = _empty(ensemble.size)
     work = ensemble.work
+    threads = threads or usable_cores()
     order = np.argsort(-work, kind="stable")
-    cuts = np.unique(np.cumsum(work[order]) // _CHUNK_STEPS, return_index=True)[1][1:]
+    share = work.sum() / max(1.0, min(threads * _CHUNKS, ensemble.size / _FEW))
+    chunk = _CHUNK_STEPS if threads == 1 else min(_CHUNK_STEPS, share)
+    cuts = np.unique(np.cumsum(work[order]) // chunk, return_index=True)[1][1:]
     chunks = np.split(order, cuts)
 
     def march_chunk(which: NDArray[np.int64]) -> int:
@@ -133,7 +139,7 @@ def run_ensemble(
         return which.size
 
     done = 0
-    with ThreadPoolExecutor(threads or usable_cores()) as pool:
+    with ThreadPoolExecutor(threads) as pool:
         pending: set[Future[int]] = {pool.submit(march_chunk, chunk) for chunk in chunks}
         try:
             while pending:
