@@ -111,6 +111,15 @@ def _march(
     )
 
 
+def _chunks(work: _Array, threads: int) -> list[NDArray[np.int64]]:
+    """The runs of each task, longest first: tasks of so little *work* that every thread gets several."""
+    order = np.argsort(-work, kind="stable")
+    share = work.sum() / max(1.0, min(threads * _CHUNKS, work.size / _FEW))
+    most = _CHUNK_STEPS if threads == 1 else min(_CHUNK_STEPS, share)
+    cuts = np.unique(np.cumsum(work[order]) // most, return_index=True)[1][1:]
+    return np.split(order, cuts)
+
+
 def run_ensemble(
     ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
 ) -> tuple[NDArray[np.int64], _Array]:
@@ -126,13 +135,7 @@ def run_ensemble(
     """
     packed = ensemble.packed
     counts, numbers = _empty(ensemble.size)
-    work = ensemble.work
     threads = threads or usable_cores()
-    order = np.argsort(-work, kind="stable")
-    share = work.sum() / max(1.0, min(threads * _CHUNKS, ensemble.size / _FEW))
-    chunk = _CHUNK_STEPS if threads == 1 else min(_CHUNK_STEPS, share)
-    cuts = np.unique(np.cumsum(work[order]) // chunk, return_index=True)[1][1:]
-    chunks = np.split(order, cuts)
 
     def march_chunk(which: NDArray[np.int64]) -> int:
         _march(ensemble, counts, numbers, which, _nothing(packed.layout.size))
@@ -140,7 +143,9 @@ def run_ensemble(
 
     done = 0
     with ThreadPoolExecutor(threads) as pool:
-        pending: set[Future[int]] = {pool.submit(march_chunk, chunk) for chunk in chunks}
+        pending: set[Future[int]] = {
+            pool.submit(march_chunk, chunk) for chunk in _chunks(ensemble.work, threads)
+        }
         try:
             while pending:
                 finished, pending = wait(pending, return_when=FIRST_COMPLETED)
