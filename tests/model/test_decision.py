@@ -59,6 +59,22 @@ def test_least_energy_is_a_lower_bound_reached_in_the_well(modes: int) -> None:
     np.testing.assert_array_equal(least_energy_at(model, 0.3, well), least_energy_at(model, 0.3, -well))
 
 
+@pytest.mark.parametrize("modes", [1, 2, 8, 32])
+@pytest.mark.parametrize("location", [0.01, 0.1, 0.25, 0.5])
+def test_hardly_displaced_is_hardly_more_energy(modes: int, location: float) -> None:
+    """Where the pinned beam is already buckled, the best tension lies at a zero of the sum: no rounding shows."""
+    model = ReducedModel.from_beam(BEAM, modes)
+    heights = np.concatenate(([0.0], np.geomspace(1e-18, 1e-3, 46))) * BEAM.buckling_level
+    bound = least_energy_at(model, np.full(heights.size, location), heights)
+    unit = -model.well_energy
+    assert np.isfinite(bound).all()
+    assert (model.well_energy * (1.0 + 1e-9) <= bound).all()
+    # nowhere ten times as steep as over the whole
+    rise = (bound - bound[0]) / unit
+    slope = np.abs(rise[-1]) / heights[-1]
+    assert (np.abs(rise) <= 10.0 * slope * heights + 1e-9).all()
+
+
 def test_one_mode_passes_a_point_in_one_shape_only() -> None:
     """Its least energy there is its energy, zero on the line between the clamps."""
     model = ReducedModel.from_beam(BEAM, 1)
