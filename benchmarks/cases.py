@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.kernels import cpu_engine
-from snapbeam.kernels.ensemble import Ensemble, make_ensemble
-from snapbeam.kernels.plan import Plan, plan_steps
+from snapbeam.engines.cpu import driver as cpu_engine
+from snapbeam.engines.ensemble import Ensemble, make_ensemble
+from snapbeam.engines.plan import Plan, plan_steps
 
 __all__ = [
     "CONTACT",

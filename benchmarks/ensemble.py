@@ -12,11 +12,11 @@ from benchmarks.peers import methods
 from benchmarks.report import save, table
 from benchmarks.timing import Timing, measure
 from snapbeam import paper
-from snapbeam.codes import RunStatus
-from snapbeam.kernels import cpu_engine
-from snapbeam.kernels.ensemble import Ensemble, make_ensemble
-from snapbeam.kernels.fields import Counts, Numbers, Reals, Ticks
-from snapbeam.kernels.plan import plan_steps
+from snapbeam.core.codes import RunStatus
+from snapbeam.engines.columns import Counts, Numbers, Reals, Ticks
+from snapbeam.engines.cpu import driver as cpu_engine
+from snapbeam.engines.ensemble import Ensemble, make_ensemble
+from snapbeam.engines.plan import plan_steps
 
 __all__ = ["run", "sample"]
 

@@ -25,15 +25,16 @@ import numpy as np
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.codes import ResponseClass
-from snapbeam.kernels import cpu_engine, cuda_engine
-from snapbeam.kernels.composition import COMPOSITIONS
-from snapbeam.kernels.cuda_engine import Options
-from snapbeam.kernels.cuda_layout import device_structure
-from snapbeam.kernels.ensemble import Ensemble, make_ensemble
-from snapbeam.kernels.fields import Counts, Numbers
-from snapbeam.kernels.plan import plan_steps
-from snapbeam.response import statistics_of
+from snapbeam.core.codes import ResponseClass
+from snapbeam.engines.columns import Counts, Numbers
+from snapbeam.engines.cpu import driver as cpu_engine
+from snapbeam.engines.cuda import driver as cuda_engine
+from snapbeam.engines.cuda.driver import Options
+from snapbeam.engines.cuda.layout import device_structure
+from snapbeam.engines.ensemble import Ensemble, make_ensemble
+from snapbeam.engines.plan import plan_steps
+from snapbeam.engines.scalar.composition import COMPOSITIONS
+from snapbeam.runs.response import statistics_of
 
 CONTACT = sb.HertzContact(stiffness=4e8)
 LOCATION = 1 / 2.1

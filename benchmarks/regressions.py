@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks.cases import Case
 from benchmarks.ensemble import ensemble_of, sample
-from snapbeam.kernels import cpu_engine
+from snapbeam.engines.cpu import driver as cpu_engine
 from snapbeam.model.decision import decidable_energy
 
 

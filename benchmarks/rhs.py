@@ -16,8 +16,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from benchmarks.cases import CONTACT, Case
-from snapbeam.kernels.physics import contact_force, sincos, tension_factors
-from snapbeam.kernels.rows import dot, tension_rows
+from snapbeam.engines.cpu.rows import dot, tension_rows
+from snapbeam.engines.scalar.physics import contact_force, sincos, tension_factors
 
 __all__ = ["CompiledSystem", "aligned", "compiled_system"]
 

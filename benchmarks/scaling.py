@@ -17,13 +17,13 @@ from benchmarks.ensemble import ensemble_of, sample
 from benchmarks.report import save, table
 from benchmarks.rhs import aligned
 from benchmarks.timing import measure
-from snapbeam.kernels import cpu_engine
-from snapbeam.kernels.composition import COMPOSITIONS
-from snapbeam.kernels.fields import Counts
-from snapbeam.kernels.lanes import WIDTH, fma, lanes_sum, load, splat, store
-from snapbeam.kernels.packing import pack
-from snapbeam.kernels.physics import tension_factors
-from snapbeam.kernels.rows import acceleration_rows, tension_rows
+from snapbeam.engines.columns import Counts
+from snapbeam.engines.cpu import driver as cpu_engine
+from snapbeam.engines.cpu.memory import pack
+from snapbeam.engines.cpu.rows import acceleration_rows, tension_rows
+from snapbeam.engines.scalar.composition import COMPOSITIONS
+from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, splat, store
+from snapbeam.engines.scalar.physics import tension_factors
 from snapbeam.model.modes import BucklingModes
 
 __all__ = ["run"]

@@ -14,12 +14,12 @@ from benchmarks.cases import Case, model_of
 from benchmarks.report import save, table
 from benchmarks.rhs import aligned
 from benchmarks.timing import measure
-from snapbeam.kernels import cpu_engine
-from snapbeam.kernels.composition import COMPOSITIONS, TURNS, Composition
-from snapbeam.kernels.fields import Numbers
-from snapbeam.kernels.packing import pack
-from snapbeam.kernels.plan import Plan
-from snapbeam.kernels.rows import tension_rows
+from snapbeam.engines.columns import Numbers
+from snapbeam.engines.cpu import driver as cpu_engine
+from snapbeam.engines.cpu.memory import pack
+from snapbeam.engines.cpu.rows import tension_rows
+from snapbeam.engines.plan import Plan
+from snapbeam.engines.scalar.composition import COMPOSITIONS, TURNS, Composition
 
 __all__ = ["run"]
 

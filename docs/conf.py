@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import Any
 
-from snapbeam.provenance import __version__
+from snapbeam.core.provenance import __version__
 
 # Figures of the paper are drawn from full-size data that were computed once.
 DATA = Path(__file__).parent / "data"

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from snapbeam.codes import ResponseClass
-from snapbeam.trajectory import trajectory_dataset
+from snapbeam.core.codes import ResponseClass
+from snapbeam.runs.schema import trajectory_dataset
 
 
 @pytest.fixture

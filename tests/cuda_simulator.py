@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.kernels.cuda_engine import Options
-from snapbeam.kernels.ensemble import Ensemble
+from snapbeam.engines.cuda.driver import Options
+from snapbeam.engines.ensemble import Ensemble
 
 __all__ = ["Job", "march_in_simulator"]
 
@@ -48,7 +48,7 @@ def march_in_simulator(
 
 
 def _answer(asked: Path, answered: Path) -> None:
-    from snapbeam.kernels import cuda_engine
+    from snapbeam.engines.cuda import driver as cuda_engine
 
     sys.setswitchinterval(1e-5)
     results = []

@@ -12,7 +12,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from snapbeam.cli import app
-from snapbeam.provenance import __version__
+from snapbeam.core.provenance import __version__
 
 MAP = (
     "map",

@@ -10,7 +10,7 @@ import xarray as xr
 from rich.console import Console
 
 from snapbeam.cli.summary import class_table, deepest_notch, lowest_interwell, map_summary, status_lines
-from snapbeam.codes import ResponseClass, RunStatus
+from snapbeam.core.codes import ResponseClass, RunStatus
 
 
 def text(*renderables):

@@ -9,12 +9,12 @@ import typer
 import xarray as xr
 from typer.testing import CliRunner
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "experiment"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "lab"))
 from lab_waveforms import BUCKLING_LEVEL, FRAME_RATE, PIXEL, errors_px, impacts, rms
 
 from snapbeam.cli.track import track
-from snapbeam.experiment.synthetic import render_recording
-from snapbeam.experiment.synthetic_setup import SyntheticCamera, SyntheticStage
+from snapbeam.lab.synthetic.recording import render_recording
+from snapbeam.lab.synthetic.setup import SyntheticCamera, SyntheticStage
 
 app = typer.Typer()
 app.command()(track)

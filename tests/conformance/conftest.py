@@ -11,13 +11,13 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam import paper
-from snapbeam.kernels.engines import ENGINES, resolve
-from snapbeam.kernels.ensemble import Ensemble, Start, make_ensemble
-from snapbeam.kernels.plan import plan_steps
+from snapbeam.core.validate import InputError
+from snapbeam.engines.ensemble import Ensemble, Start, make_ensemble
+from snapbeam.engines.plan import plan_steps
+from snapbeam.engines.registry import ENGINES, resolve
 from snapbeam.model.contact import HertzContact
 from snapbeam.model.reduction import ReducedModel
-from snapbeam.response import statistics_of
-from snapbeam.validate import InputError
+from snapbeam.runs.response import statistics_of
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from snapbeam.codes import RunStatus
-from snapbeam.kernels.ensemble import Start
-from snapbeam.kernels.fields import Counts, Numbers
+from snapbeam.core.codes import RunStatus
+from snapbeam.engines.columns import Counts, Numbers
+from snapbeam.engines.ensemble import Start
 from snapbeam.model.decision import RESERVE
 
 REGULAR = [(1.4, 0.02), (0.1, 0.05)]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from snapbeam import paper
-from snapbeam.kernels.ensemble import Start
-from snapbeam.kernels.fields import Counts, Numbers
+from snapbeam.engines.columns import Counts, Numbers
+from snapbeam.engines.ensemble import Start
 from snapbeam.model.reduction import ReducedModel
 
 MASS, SPEED = 2.0e-3, 0.05

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.codes import RunStatus
-from snapbeam.kernels.ensemble import Start
-from snapbeam.kernels.fields import Counts, Numbers, Reals
+from snapbeam.core.codes import RunStatus
+from snapbeam.engines.columns import Counts, Numbers, Reals
+from snapbeam.engines.ensemble import Start
 from snapbeam.model.reduction import ReducedModel
 
 

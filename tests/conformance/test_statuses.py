@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.codes import ResponseClass, RunStatus
-from snapbeam.kernels.ensemble import Start
-from snapbeam.validate import InputError
+from snapbeam.core.codes import ResponseClass, RunStatus
+from snapbeam.core.validate import InputError
+from snapbeam.engines.ensemble import Start
 
 NOT_GIVEN = (
     "min_displacement",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.kernels.ensemble import Start
+from snapbeam.engines.ensemble import Start
 
 MIRRORED = {
     "min_displacement": "max_displacement",

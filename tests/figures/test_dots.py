@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from snapbeam.codes import ResponseClass
+from snapbeam.core.codes import ResponseClass
+from snapbeam.core.validate import InputError
 from snapbeam.figures import read_dots
-from snapbeam.validate import InputError
 
 
 def table(tmp_path, text):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from snapbeam.codes import ResponseClass
+from snapbeam.core.codes import ResponseClass
+from snapbeam.core.validate import InputError
 from snapbeam.figures import CLASS_COLORS, Dots, class_handles, plot_response_map, save_figure
-from snapbeam.validate import InputError
 
 
 @pytest.fixture(autouse=True)

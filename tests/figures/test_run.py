@@ -8,8 +8,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from snapbeam.core.validate import InputError
 from snapbeam.figures import plot_run, save_figure
-from snapbeam.validate import InputError
 
 
 @pytest.fixture(autouse=True)

@@ -8,9 +8,9 @@ import pytest
 import xarray as xr
 from matplotlib.colors import to_rgb
 
-from snapbeam.codes import ResponseClass
+from snapbeam.core.codes import ResponseClass
+from snapbeam.core.validate import InputError
 from snapbeam.figures import CLASS_COLORS, plot_response_map, plot_threshold, save_figure
-from snapbeam.validate import InputError
 
 
 @pytest.fixture(autouse=True)

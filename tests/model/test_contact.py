@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.model.contact import HertzContact, Restitution
-from snapbeam.validate import InputError, InputTypeError
 
 
 def test_from_materials() -> None:

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from snapbeam.model.decision import decidable_energy, least_energy_at
-from snapbeam.model.parameters import BEAM
+from snapbeam.model.paper_values import BEAM
 from snapbeam.model.reduction import ReducedModel
 
 

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.model.drive import Shaker, quasi_static_threshold
 from snapbeam.model.modes import BucklingModes
-from snapbeam.model.parameters import BEAM, LOCATION
-from snapbeam.validate import InputError, InputTypeError
+from snapbeam.model.paper_values import BEAM, LOCATION
 
 
 def test_shaker() -> None:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from snapbeam.core.validate import InputError
 from snapbeam.model.modes import BucklingModes, wavenumbers
-from snapbeam.validate import InputError
 
 LENGTH = 0.161
 

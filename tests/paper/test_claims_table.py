@@ -10,11 +10,11 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.codes import ResponseClass
+from snapbeam.core.codes import ResponseClass
+from snapbeam.core.validate import InputError
 from snapbeam.paper.claims import VERDICTS, Claim, measure_claims, write_claims
 from snapbeam.paper.recipes.sensitivity import buckling_mode_damping
-from snapbeam.paper.thresholds import compare_maps, interwell_threshold, threshold_notch
-from snapbeam.validate import InputError
+from snapbeam.sweeps.analysis import compare_maps, interwell_threshold, threshold_notch
 
 
 def test_threshold_of_a_known_map(synthetic_map):

@@ -9,7 +9,7 @@ import pytest
 import scipy.linalg
 
 from snapbeam.model.frequencies import exact_natural_freq
-from snapbeam.model.parameters import BEAM, MODES, STRAIGHT_BEAM
+from snapbeam.model.paper_values import BEAM, MODES, STRAIGHT_BEAM
 from snapbeam.model.reduction import ReducedModel
 
 # Hz, as printed in section 3.2 for N = 32

@@ -11,11 +11,11 @@ from matplotlib.colors import to_hex
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.codes import ResponseClass
+from snapbeam.core.codes import ResponseClass
+from snapbeam.core.validate import InputError
 from snapbeam.figures import CLASS_COLORS
 from snapbeam.paper.recipes import fig4, fig5, fig8, figB10
 from snapbeam.paper.store import load_results
-from snapbeam.validate import InputError
 
 
 @pytest.fixture

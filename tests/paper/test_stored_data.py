@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from snapbeam import paper
-from snapbeam.codes import ResponseClass
+from snapbeam.core.codes import ResponseClass
 from snapbeam.paper.store import load_results
 
 DATA = Path(__file__).parents[2] / "docs" / "data"

@@ -18,7 +18,7 @@ from snapbeam.cli.simulate import simulate
 from snapbeam.cli.threshold import threshold
 from snapbeam.cli.track import track
 from snapbeam.cli.vibrometer import vibrometer
-from snapbeam.provenance import __version__
+from snapbeam.core.provenance import __version__
 
 __all__ = ["app", "main"]
 

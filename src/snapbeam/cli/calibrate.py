@@ -74,12 +74,12 @@ def calibrate(
     from rich.table import Table
 
     from snapbeam.config import config_from_mapping, override
-    from snapbeam.experiment.calibration import Measurements, load_measurements
-    from snapbeam.experiment.calibration import calibrate as fit_beam
-    from snapbeam.experiment.calibration_words import with_error
+    from snapbeam.core.files import check_writable
+    from snapbeam.core.validate import InputError
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
-    from snapbeam.files import check_writable
-    from snapbeam.validate import InputError
+    from snapbeam.lab.calibration.calibrate import Measurements, load_measurements
+    from snapbeam.lab.calibration.calibrate import calibrate as fit_beam
+    from snapbeam.lab.calibration.report import with_error
 
     for name, path, suffixes in (
         ("output", output, (".toml",)), ("plot", plot, FIGURE_SUFFIXES), ("json", report, (".json",)),

@@ -11,7 +11,7 @@ from snapbeam.cli import lab
 from snapbeam.cli import options as opt
 from snapbeam.cli.console import door, file_line, out
 from snapbeam.cli.info import open_result
-from snapbeam.codes import ResponseClass
+from snapbeam.core.codes import ResponseClass
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,8 +49,8 @@ def compare(
 
     Example: snapbeam compare tests.csv map.nc --plot agreement.png
     """
+    from snapbeam.core.files import check_writable
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
-    from snapbeam.files import check_writable
 
     if plot is not None:
         check_writable(plot, "plot", FIGURE_SUFFIXES)
@@ -81,8 +81,8 @@ def compare(
 def _dots(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None]:
     from rich.table import Table
 
-    from snapbeam.experiment.compare import compare_dots
-    from snapbeam.figures.dots import read_dots
+    from snapbeam.lab.compare.dots import read_dots
+    from snapbeam.lab.compare.maps import compare_dots
 
     attrs = dataset.attrs
     dots = read_dots(
@@ -129,12 +129,12 @@ def _run(
     window: tuple[float, float] | None,
     draw: bool,
 ) -> tuple[dict, Figure | None]:
-    from snapbeam.experiment.compare_runs import compare_waveforms
-    from snapbeam.experiment.measured_response import measure_response
+    from snapbeam.lab.compare.response import measure_response
+    from snapbeam.lab.compare.waveforms import compare_waveforms
 
     onsets = None
     if "penetration_mm" in run:
-        from snapbeam.experiment.onsets import contact_onsets
+        from snapbeam.lab.tracking.onsets import contact_onsets
 
         onsets = contact_onsets(run)["onset"].values
     result = compare_waveforms(run, model, frequency, start=start, measured_onsets=onsets)

@@ -23,7 +23,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from snapbeam.validate import InputError
+from snapbeam.core.validate import InputError
 
 __all__ = [
     "FAILED",

@@ -34,7 +34,7 @@ def frequencies(
     from rich.table import Table
 
     from snapbeam import ReducedModel, exact_natural_freq
-    from snapbeam.validate import integer
+    from snapbeam.core.validate import integer
 
     count = integer("count", count, 1, 200)
     settings = opt.configured(ctx.params)

@@ -55,10 +55,10 @@ def identify(
     """
     from rich.table import Table
 
-    from snapbeam.experiment.identification import METHODS, identify_decay
+    from snapbeam.core.files import check_writable
+    from snapbeam.core.validate import choice
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
-    from snapbeam.files import check_writable
-    from snapbeam.validate import choice
+    from snapbeam.lab.decay.identify import METHODS, identify_decay
 
     if plot is not None:
         check_writable(plot, "plot", FIGURE_SUFFIXES)

@@ -43,7 +43,7 @@ def open_result(file: Path) -> xr.Dataset:
     """Return the dataset in a file, read into memory; refuse what is no NetCDF file of results."""
     import xarray as xr
 
-    from snapbeam.validate import InputError
+    from snapbeam.core.validate import InputError
 
     if not file.is_file():
         raise InputError(f"file = {str(file)!r}: no such file")

@@ -59,7 +59,7 @@ def open_signal(
     path: Path, channel: str | None, units: str | None, sensitivity: str | None, sampling_freq: float | None
 ) -> xr.DataArray:
     """Read a signal; a channel given as a whole number is counted, unless one has that name."""
-    from snapbeam.experiment.signal_files import read_channels, read_signal
+    from snapbeam.lab.signals.files import read_channels, read_signal
 
     chosen: str | int | None = channel
     if channel is not None and channel.isdigit():
@@ -70,7 +70,7 @@ def open_signal(
 
 def numbers(name: str, text: str | None) -> tuple[float, ...]:
     """Return numbers separated by commas; none if there is no text."""
-    from snapbeam.validate import InputError
+    from snapbeam.core.validate import InputError
 
     if text is None:
         return ()
@@ -82,7 +82,7 @@ def numbers(name: str, text: str | None) -> tuple[float, ...]:
 
 def write_report(path: Path, summary: dict[str, Any]) -> None:
     """Write plain numbers and words to a JSON file, whole or not at all; what is not finite becomes null."""
-    from snapbeam.files import atomic_path, check_writable
+    from snapbeam.core.files import atomic_path, check_writable
 
     target = check_writable(path, "json", (".json",))
     with atomic_path(target) as temporary:

@@ -15,7 +15,7 @@ from snapbeam.cli.console import duration, errors, pace, progress
 
 if TYPE_CHECKING:
     from snapbeam.config import Config
-    from snapbeam.maps.long import Tally
+    from snapbeam.sweeps.stored import Tally
 
 __all__ = [
     "Chunk",
@@ -100,8 +100,8 @@ def resumed(given: dict[str, Any], settings: Config) -> Config:
     Options of the map that the store keeps are put into *given* where they were left out.
     """
     from snapbeam.config import config_from_mapping
-    from snapbeam.maps.store import read_stored_config
-    from snapbeam.validate import InputError
+    from snapbeam.core.validate import InputError
+    from snapbeam.sweeps.keep.store import read_stored_config
 
     if given["store"] is None or settings.model_dump(exclude_unset=True):
         return settings
@@ -160,7 +160,7 @@ class Report:
         """Append a line with the time to the log file, if there is one."""
         if self._log is None:
             return
-        from snapbeam.provenance import created_now
+        from snapbeam.core.provenance import created_now
 
         with self._log.open("a", encoding="utf-8") as stream:
             stream.write(f"{created_now()}  {text}\n")
@@ -169,7 +169,7 @@ class Report:
 @contextmanager
 def report(total: int, log: Path | None) -> Iterator[Report]:
     """Give a report of a map of *total* points; refuse, before any work, a log that cannot be written."""
-    from snapbeam.files import check_writable
+    from snapbeam.core.files import check_writable
 
     if log is not None:
         check_writable(log, "log")

@@ -86,7 +86,7 @@ def compute_map(
     0.01:0.65:40 --location 1/2.1 -o map.nc --plot map.png
     """
     from snapbeam.cli.summary import map_summary
-    from snapbeam.files import check_writable
+    from snapbeam.core.files import check_writable
 
     axes = {
         "frequency_ratio": frequency_ratio,
@@ -117,7 +117,7 @@ def compute_map(
         write_map(dataset, output)
         lines: list[str] = []
     else:
-        from snapbeam.maps.long import Tally
+        from snapbeam.sweeps.stored import Tally
 
         tally = Tally()
         further |= {} if verify else {"output": output}
@@ -141,9 +141,9 @@ def compute_map(
 
 
 def _check_plot(path: Path, points: dict[str, Axis]) -> None:
+    from snapbeam.core.files import check_writable
+    from snapbeam.core.validate import InputError
     from snapbeam.figures.style import FIGURE_SUFFIXES
-    from snapbeam.files import check_writable
-    from snapbeam.validate import InputError
 
     check_writable(path, "plot", FIGURE_SUFFIXES)
     axes = [name for name, values in points.items() if not isinstance(values, float) and len(values) > 1]
@@ -158,14 +158,14 @@ def read_overlay(dots: Path | None, reference_freq: float | None, buckling_level
     """Return the measured points of a CSV file, normalised, or None."""
     if dots is None:
         return None
-    from snapbeam.figures.dots import read_dots
+    from snapbeam.lab.compare.dots import read_dots
 
     return read_dots(dots, reference_freq=reference_freq, buckling_level=buckling_level)
 
 
 def write_map(dataset: xr.Dataset, path: Path) -> Path:
     """Write a map to a NetCDF file, whole or not at all."""
-    from snapbeam.files import atomic_path
+    from snapbeam.core.files import atomic_path
 
     with atomic_path(path) as temporary:
         dataset.to_netcdf(temporary, engine="h5netcdf")

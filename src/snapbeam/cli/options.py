@@ -159,7 +159,7 @@ def run_arguments(config: Config) -> dict[str, Any]:
 
 def parse_window(text: str | None) -> tuple[float, float] | None:
     """Return ``first:last`` as two numbers."""
-    from snapbeam.validate import InputError, finite
+    from snapbeam.core.validate import InputError, finite
 
     if text is None:
         return None

@@ -62,9 +62,9 @@ def paper(
     import matplotlib
 
     matplotlib.use("Agg")
+    from snapbeam.core.validate import InputError, choice
     from snapbeam.paper import FIGURES, Results
     from snapbeam.paper.claims import write_claims
-    from snapbeam.validate import InputError, choice
 
     choice("figure", figure, (*FIGURES, "claims", "all"))
     try:

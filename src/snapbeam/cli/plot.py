@@ -32,9 +32,9 @@ def plot(
     """Draw a map or a run again: other format, measured dots, one slice of a map of three axes."""
     from snapbeam.cli.map import draw_map, read_overlay
     from snapbeam.cli.simulate import draw_run
+    from snapbeam.core.files import check_writable
+    from snapbeam.core.validate import InputError
     from snapbeam.figures.style import FIGURE_SUFFIXES
-    from snapbeam.files import check_writable
-    from snapbeam.validate import InputError
 
     check_writable(output, "output", FIGURE_SUFFIXES)
     dataset = open_result(file)

@@ -85,7 +85,7 @@ def simulate(
     Example: snapbeam simulate --frequency-ratio 1.21 --velocity-amplitude 0.18 -o run.nc --plot run.png
     --window 0:20
     """
-    from snapbeam.files import check_writable
+    from snapbeam.core.files import check_writable
 
     sine = {
         "frequency_ratio": frequency_ratio,
@@ -146,7 +146,7 @@ def draw_run(dataset: xr.Dataset, path: Path, window: tuple[float, float] | None
 def _recorded(path: Path) -> xr.Dataset:
     import xarray as xr
 
-    from snapbeam.validate import InputError
+    from snapbeam.core.validate import InputError
 
     try:
         return xr.load_dataset(path, engine="h5netcdf")
@@ -166,7 +166,7 @@ def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | Non
 
 
 def _told(run: Any, elapsed: float) -> str:
-    from snapbeam.codes import ResponseClass, RunStatus
+    from snapbeam.core.codes import ResponseClass, RunStatus
 
     answer = run.response
     kind, status = ResponseClass(int(answer.response)), RunStatus(int(answer.status))

@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from snapbeam.cli.console import duration, file_line
-from snapbeam.codes import ResponseClass, RunStatus
+from snapbeam.core.codes import ResponseClass, RunStatus
 
 if TYPE_CHECKING:
     import xarray as xr

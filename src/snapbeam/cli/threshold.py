@@ -85,7 +85,7 @@ def threshold(
     Example: snapbeam threshold --modes 1,32 --frequency-ratio 0.1:4:64 --velocity-amplitude 0.005:0.64:128
     -o threshold.nc --plot threshold.png
     """
-    from snapbeam.files import check_writable
+    from snapbeam.core.files import check_writable
 
     axes = {
         "frequency_ratio": frequency_ratio,
@@ -126,7 +126,7 @@ def threshold(
 
 
 def _counts(text: str) -> list[int]:
-    from snapbeam.validate import InputError, integer
+    from snapbeam.core.validate import InputError, integer
 
     try:
         return [integer("modes", int(part), 1, 256) for part in text.split(",")]

@@ -18,7 +18,7 @@ _OUTPUT = "Output"
 
 
 def _numbers(name: str, text: str | None, count: int) -> tuple[int, ...] | None:
-    from snapbeam.validate import InputError
+    from snapbeam.core.validate import InputError
 
     if text is None:
         return None
@@ -124,8 +124,8 @@ def track(
     Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
     frame.png --report quality.png
     """
-    from snapbeam.files import atomic_path, check_writable
-    from snapbeam.validate import integer
+    from snapbeam.core.files import atomic_path, check_writable
+    from snapbeam.core.validate import integer
 
     check_writable(output, "output", (".nc",))
     if picture is not None or report is not None:
@@ -138,9 +138,9 @@ def track(
         check_writable(video, "video", (".mp4", ".mov", ".avi"))
     integer("frame", frame, 0)
     integer("video_every", video_every, 1)
-    from snapbeam.experiment.quality import tracking_report
-    from snapbeam.experiment.recording import open_recording
-    from snapbeam.experiment.tracking import track as track_recording
+    from snapbeam.lab.camera.recording import open_recording
+    from snapbeam.lab.tracking.quality import tracking_report
+    from snapbeam.lab.tracking.track import track as track_recording
 
     part = _numbers("region", region, 4)
     start = time.monotonic()

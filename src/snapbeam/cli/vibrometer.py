@@ -58,9 +58,9 @@ def vibrometer(
 
     Example: snapbeam vibrometer velocity.csv --frequency 100 --plot drive.png --json drive.json
     """
-    from snapbeam.experiment.vibrometer import SNR_LIMIT, measure_drive
+    from snapbeam.core.files import atomic_path, check_writable
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
-    from snapbeam.files import atomic_path, check_writable
+    from snapbeam.lab.drive.vibrometer import SNR_LIMIT, measure_drive
 
     for name, path, suffixes in (
         ("plot", plot, FIGURE_SUFFIXES),
@@ -87,7 +87,7 @@ def vibrometer(
     for note in drive.notes:
         console.print(f"  [yellow]note[/]         {note}")
     if camera is not None:
-        from snapbeam.experiment.alignment import align
+        from snapbeam.lab.drive.align import align
 
         alignment = align(_shaker_of(camera), data, frequency)
         summary["alignment"] = {
@@ -100,7 +100,7 @@ def vibrometer(
         }
         console.print(f"  alignment    {alignment.description}")
     if drive_output is not None:
-        from snapbeam.experiment.drive_record import recorded_drive
+        from snapbeam.lab.drive.record import recorded_drive
 
         resampled = recorded_drive(data, drive_sampling_freq or 1e5, measurement=drive)
         with atomic_path(drive_output) as temporary:
@@ -121,8 +121,8 @@ def _shaker_of(path: Path) -> xr.DataArray:
     import numpy as np
 
     from snapbeam.cli.info import open_result
-    from snapbeam.experiment.signals import make_signal
-    from snapbeam.validate import InputError
+    from snapbeam.core.validate import InputError
+    from snapbeam.lab.signals.signal import make_signal
 
     tracked = open_result(path)
     if "shaker_displacement_mm" not in tracked or "time" not in tracked.coords:

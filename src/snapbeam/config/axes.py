@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.validate import InputError, InputTypeError, axis
+from snapbeam.core.validate import InputError, InputTypeError, axis
 
 __all__ = ["Axis", "parse_axis"]
 

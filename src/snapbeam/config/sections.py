@@ -9,12 +9,12 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
 from snapbeam.config.axes import Axis, parse_axis
+from snapbeam.core.validate import integer, positive, within
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import HertzContact
 from snapbeam.model.drive import Shaker
 from snapbeam.model.modes import MAX_MODES
-from snapbeam.model.parameters import BEAM, CONTACT, CYCLES, DAMPING_RATIO, LOCATION, MODES
-from snapbeam.validate import integer, positive, within
+from snapbeam.model.paper_values import BEAM, CONTACT, CYCLES, DAMPING_RATIO, LOCATION, MODES
 
 __all__ = [
     "BeamSection",

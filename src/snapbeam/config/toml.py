@@ -13,8 +13,8 @@ import tomli_w
 from pydantic import BaseModel, ValidationError
 
 from snapbeam.config.sections import Config, units_of
-from snapbeam.files import atomic_path, check_writable
-from snapbeam.validate import InputError
+from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.validate import InputError
 
 __all__ = ["config_from_mapping", "dump_config", "load_config", "override"]
 

@@ -1,10 +1,10 @@
 """Pictures of results; they compute nothing."""
 
-from snapbeam.figures.dots import Dots, read_dots
 from snapbeam.figures.response_map import class_handles, plot_response_map
 from snapbeam.figures.run import plot_run
 from snapbeam.figures.style import CLASS_COLORS, house_style, new_figure, save_figure
 from snapbeam.figures.threshold import plot_threshold
+from snapbeam.lab.compare.dots import Dots, read_dots
 
 __all__ = [
     "CLASS_COLORS",

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from numpy.typing import NDArray
 
+from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.validate import InputError, integer, nonnegative, positive
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.files import atomic_path, check_writable
-from snapbeam.trajectory import check_trajectory
-from snapbeam.validate import InputError, integer, nonnegative, positive
+from snapbeam.runs.schema import check_trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +46,7 @@ def frame_times(
     Parameters
     ----------
     dataset : xarray.Dataset
-        A run that follows :data:`snapbeam.trajectory.SCHEMA`.
+        A run that follows :data:`snapbeam.runs.schema.SCHEMA`.
     window : pair of float, optional
         First and last cycle; everything by default.
     duration : float

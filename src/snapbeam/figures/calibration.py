@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
 
 if TYPE_CHECKING:
-    from snapbeam.experiment.calibration import Calibration
+    from snapbeam.lab.calibration.calibrate import Calibration
 
 __all__ = ["plot_calibration"]
 

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from snapbeam.figures.dots import Dots
+from snapbeam.core.validate import InputError, finite
 from snapbeam.figures.response_map import plot_response_map
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.validate import InputError, finite
+from snapbeam.lab.compare.dots import Dots
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from snapbeam.experiment.compare import DotComparison
-    from snapbeam.experiment.compare_runs import WaveformComparison
+    from snapbeam.lab.compare.maps import DotComparison
+    from snapbeam.lab.compare.waveforms import WaveformComparison
 
 __all__ = ["plot_dot_comparison", "plot_waveform_comparison"]
 

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from snapbeam.experiment.signals import check_signal
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
+from snapbeam.lab.signals.signal import check_signal
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from snapbeam.experiment.decay_model import DecayFit
+    from snapbeam.lab.decay.model import DecayFit
 
 __all__ = ["plot_decay"]
 
@@ -28,7 +28,7 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
     signal : xarray.DataArray
         The free decay.
     fit : DecayFit
-        What :func:`snapbeam.experiment.identification.identify_decay` made of it.
+        What :func:`snapbeam.lab.decay.identify.identify_decay` made of it.
     """
     samples = check_signal(signal)
     part = (samples.time >= fit.start) & (samples.time <= fit.stop)

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.core.validate import InputError, finite_array
 from snapbeam.figures.style import CLASS_COLORS
-from snapbeam.validate import InputError, finite_array
 
 __all__ = ["cell_edges", "class_cells", "figure_legend", "panel_letters"]
 

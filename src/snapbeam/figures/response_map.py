@@ -11,13 +11,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from snapbeam.codes import ResponseClass
+from snapbeam.core.codes import ResponseClass
+from snapbeam.core.validate import InputError
 from snapbeam.figures.agreement import draw_agreement
-from snapbeam.figures.dots import Dots
 from snapbeam.figures.panels import cell_edges, class_cells
 from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_figure
+from snapbeam.lab.compare.dots import Dots
 from snapbeam.model.drive import quasi_static_threshold
-from snapbeam.validate import InputError
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
+from snapbeam.core.validate import InputError, finite
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.trajectory import check_trajectory
-from snapbeam.validate import InputError, finite
+from snapbeam.runs.schema import check_trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,7 +36,7 @@ def plot_run(dataset: xr.Dataset, window: tuple[float, float] | None = None) -> 
     Parameters
     ----------
     dataset : xarray.Dataset
-        A run that follows :data:`snapbeam.trajectory.SCHEMA`.
+        A run that follows :data:`snapbeam.runs.schema.SCHEMA`.
     window : pair of float, optional
         First and last cycle to draw; everything by default.
 

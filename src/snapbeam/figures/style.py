@@ -11,9 +11,9 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from snapbeam.codes import ResponseClass
-from snapbeam.files import atomic_path, check_writable
-from snapbeam.validate import choice, positive
+from snapbeam.core.codes import ResponseClass
+from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.validate import choice, positive
 
 __all__ = [
     "BEAM_COLOR",

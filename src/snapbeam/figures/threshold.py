@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
+from snapbeam.core.validate import InputError
 from snapbeam.figures.response_map import AXIS_LABELS
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
 from snapbeam.model.drive import quasi_static_threshold
-from snapbeam.validate import InputError
 
 if TYPE_CHECKING:
     import xarray as xr

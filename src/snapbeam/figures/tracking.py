@@ -8,16 +8,16 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from snapbeam.experiment.flags import FrameFlag
-from snapbeam.experiment.quality import check_tracked, tracking_quality
-from snapbeam.experiment.scene import Orientation
+from snapbeam.core.validate import InputError, integer
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
-from snapbeam.validate import InputError, integer
+from snapbeam.lab.tracking.flags import FrameFlag
+from snapbeam.lab.tracking.quality import check_tracked, tracking_quality
+from snapbeam.lab.tracking.scene import Orientation
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from snapbeam.experiment.recording import Recording
+    from snapbeam.lab.camera.recording import Recording
 
 __all__ = ["found_edges", "plot_frame", "plot_tracking_quality"]
 
@@ -77,7 +77,7 @@ def plot_frame(recording: Recording, dataset: xr.Dataset, frame: int = 0) -> Fig
     Parameters
     ----------
     recording, dataset
-        An open recording and what :func:`snapbeam.experiment.track` made of it.
+        An open recording and what :func:`snapbeam.lab.track` made of it.
     frame
         Number of the frame, counted from 0.
     """

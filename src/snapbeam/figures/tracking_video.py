@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.experiment.quality import check_tracked
+from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.validate import InputError, integer, positive
 from snapbeam.figures.tracking import flag_words, found_edges
-from snapbeam.files import atomic_path, check_writable
-from snapbeam.validate import InputError, integer, positive
+from snapbeam.lab.tracking.quality import check_tracked
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from snapbeam.experiment.recording import Recording
+    from snapbeam.lab.camera.recording import Recording
 
 __all__ = ["annotated_video"]
 
@@ -39,7 +39,7 @@ def annotated_video(
     Parameters
     ----------
     recording, dataset
-        An open recording and what :func:`snapbeam.experiment.track` made of it.
+        An open recording and what :func:`snapbeam.lab.track` made of it.
     path
         File to write, ``.mp4``, ``.mov`` or ``.avi`` (H.264).
     play_rate

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from snapbeam.experiment.signals import check_signal
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
+from snapbeam.lab.signals.signal import check_signal
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from snapbeam.experiment.vibrometer import DriveMeasurement
+    from snapbeam.lab.drive.vibrometer import DriveMeasurement
 
 __all__ = ["plot_drive"]
 

@@ -7,8 +7,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from snapbeam.core.validate import InputError, finite, positive
 from snapbeam.model.modes import wavenumbers
-from snapbeam.validate import InputError, finite, positive
 
 __all__ = ["Beam"]
 

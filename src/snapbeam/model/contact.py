@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from snapbeam.validate import InputError, InputTypeError, nonnegative, positive, within
+from snapbeam.core.validate import InputError, InputTypeError, nonnegative, positive, within
 
 __all__ = ["HertzContact", "Restitution"]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.validate import InputError, choice, finite_array, nonnegative, positive, within
+from snapbeam.core.validate import InputError, choice, finite_array, nonnegative, positive, within
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -116,7 +116,7 @@ class RecordedDrive:
     def from_dataset(
         cls, dataset: xr.Dataset, *, location: float = 1.0 / 2.1, side: str = "below"
     ) -> RecordedDrive:
-        """A drive from what :func:`snapbeam.experiment.recorded_drive` returns, or from a file of it.
+        """A drive from what :func:`snapbeam.lab.recorded_drive` returns, or from a file of it.
 
         *dataset* has ``displacement`` (m) and ``velocity`` (m/s) over an even ``time`` (s), and the nominal
         ``frequency`` (Hz) among its attributes.

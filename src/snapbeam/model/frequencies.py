@@ -19,8 +19,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.validate import InputTypeError, integer
 from snapbeam.model.beam import Beam
-from snapbeam.validate import InputTypeError, integer
 
 __all__ = ["exact_natural_freq"]
 

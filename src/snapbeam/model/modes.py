@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.validate import InputError, finite_array, integer, positive
+from snapbeam.core.validate import InputError, finite_array, integer, positive
 
 __all__ = ["MAX_MODES", "BucklingModes", "wavenumbers"]
 

@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.core.validate import InputError, InputTypeError, integer, within
 from snapbeam.model.beam import Beam
 from snapbeam.model.linear import LinearModes, linear_modes_of_beam, linear_modes_of_structure
+from snapbeam.model.matrices import Structure, checked_structure, damping_ratios
 from snapbeam.model.modes import MAX_MODES, BucklingModes
-from snapbeam.model.structure import Structure, checked_structure, damping_ratios
-from snapbeam.validate import InputError, InputTypeError, integer, within
 
 __all__ = ["ReducedModel"]
 

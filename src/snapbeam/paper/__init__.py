@@ -10,7 +10,7 @@ A recipe computes its data by the public interface alone and draws them:
 documentation shows. :func:`snapbeam.paper.claims.measure_claims` measures what the paper says.
 """
 
-from snapbeam.model.parameters import (
+from snapbeam.model.paper_values import (
     BEAM,
     CONTACT,
     CYCLES,

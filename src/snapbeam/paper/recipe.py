@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snapbeam.validate import InputError, choice
+from snapbeam.core.validate import InputError, choice
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.files import atomic_path, check_writable
-from snapbeam.validate import InputError
+from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.validate import InputError
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import snapbeam as sb
-from snapbeam.model.parameters import BEAM, CONTACT, DAMPING_RATIO, LOCATION
+from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION
 
 if TYPE_CHECKING:
     import xarray as xr

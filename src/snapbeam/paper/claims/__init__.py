@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from snapbeam.core.validate import InputError
 from snapbeam.paper.claims.table import VERDICTS, Claim, write_table
 from snapbeam.paper.recipe import MissingResults
-from snapbeam.validate import InputError
 
 if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results

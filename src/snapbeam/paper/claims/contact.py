@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.model.parameters import CONTACT, LOCATION
+from snapbeam.model.paper_values import CONTACT, LOCATION
 from snapbeam.paper.claims.table import Claim
 from snapbeam.paper.recipes.sensitivity import tip_contact
 from snapbeam.paper.system import paper_model, paper_run

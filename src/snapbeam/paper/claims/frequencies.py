@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import snapbeam as sb
-from snapbeam.model.parameters import BEAM, MODES, STRAIGHT_BEAM
+from snapbeam.model.paper_values import BEAM, MODES, STRAIGHT_BEAM
 from snapbeam.paper.claims.table import Claim
 from snapbeam.paper.system import paper_model
 

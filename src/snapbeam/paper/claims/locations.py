@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 import snapbeam as sb
-from snapbeam.codes import ResponseClass
+from snapbeam.core.codes import ResponseClass
 from snapbeam.figures.panels import cell_edges
 from snapbeam.paper.claims.table import Claim
-from snapbeam.paper.thresholds import interwell_threshold
+from snapbeam.sweeps.analysis import interwell_threshold
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.codes import ResponseClass
-from snapbeam.model.parameters import LOCATION
+from snapbeam.core.codes import ResponseClass
+from snapbeam.model.paper_values import LOCATION
 from snapbeam.paper.claims.table import Claim
-from snapbeam.paper.thresholds import (
+from snapbeam.sweeps.analysis import (
     class_share,
     compare_maps,
     interwell_threshold,

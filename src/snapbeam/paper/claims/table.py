@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
-from snapbeam.files import atomic_path, check_writable
-from snapbeam.provenance import made_by
-from snapbeam.validate import choice
+from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.provenance import made_by
+from snapbeam.core.validate import choice
 
 __all__ = ["VERDICTS", "Claim", "write_table"]
 

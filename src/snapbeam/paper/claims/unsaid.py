@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.codes import ResponseClass
-from snapbeam.model.parameters import CONTACT, DAMPING_RATIO
+from snapbeam.core.codes import ResponseClass
+from snapbeam.model.paper_values import CONTACT, DAMPING_RATIO
 from snapbeam.paper.claims.table import Claim
 from snapbeam.paper.recipes.sensitivity import buckling_mode_damping
 from snapbeam.paper.system import paper_model
-from snapbeam.paper.thresholds import Difference, compare_maps, is_interwell
+from snapbeam.sweeps.analysis import Difference, compare_maps, is_interwell
 
 if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.patches import FancyArrowPatch, Polygon, Rectangle
 
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
-from snapbeam.model.parameters import BEAM, LOCATION
+from snapbeam.model.paper_values import BEAM, LOCATION
 from snapbeam.paper.system import paper_model, shapes_along
 
 if TYPE_CHECKING:

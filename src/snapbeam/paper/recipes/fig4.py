@@ -18,12 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
+from snapbeam.core.validate import InputError
 from snapbeam.figures.panels import panel_letters
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.parameters import BEAM, CYCLES, LOCATION
+from snapbeam.model.paper_values import BEAM, CYCLES, LOCATION
 from snapbeam.paper.system import class_map, paper_model, paper_run
-from snapbeam.trajectory import check_trajectory
-from snapbeam.validate import InputError
+from snapbeam.runs.schema import check_trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -134,10 +134,10 @@ def _scatter(modes: int, omega: float, drive: float, cycles: int) -> float:
 
 def _recorded(run: xr.Dataset) -> xr.Dataset:
     """What a camera would have recorded of a run, tracked."""
-    from snapbeam.experiment.recording import open_recording
-    from snapbeam.experiment.synthetic_run import render_run
-    from snapbeam.experiment.synthetic_setup import SyntheticCamera
-    from snapbeam.experiment.tracking import track
+    from snapbeam.lab.camera.recording import open_recording
+    from snapbeam.lab.synthetic.run import render_run
+    from snapbeam.lab.synthetic.setup import SyntheticCamera
+    from snapbeam.lab.tracking.track import track
 
     camera = SyntheticCamera(frame_rate=_FRAME_RATE, shape=(288, 96))
     recording = render_run(run, camera=camera, rest_frames=_REST_FRAMES)

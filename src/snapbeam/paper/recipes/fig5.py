@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.validate import InputError
 from snapbeam.figures.panels import panel_letters
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.parameters import MODES
+from snapbeam.model.paper_values import MODES
 from snapbeam.paper.system import paper_model, paper_run, shapes_along
-from snapbeam.validate import InputError
 
 if TYPE_CHECKING:
     import xarray as xr

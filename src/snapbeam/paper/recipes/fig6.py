@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.figures.dots import Dots
 from snapbeam.figures.panels import figure_legend, panel_letters
 from snapbeam.figures.response_map import plot_response_map
 from snapbeam.figures.style import house_style, new_figure
-from snapbeam.model.parameters import BEAM, CYCLES
+from snapbeam.lab.compare.dots import Dots
+from snapbeam.model.paper_values import BEAM, CYCLES
 from snapbeam.paper.system import class_map, legend_handles, paper_model
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 
 def measured_dots(dots: str | os.PathLike[str] | None, ds: xr.Dataset) -> Dots | None:
     """The measured responses of a CSV table, normalised as the map is."""
-    from snapbeam.figures.dots import read_dots
+    from snapbeam.lab.compare.dots import read_dots
 
     if dots is None:
         return None

@@ -9,7 +9,7 @@ import numpy as np
 from snapbeam.figures.panels import figure_legend, panel_letters
 from snapbeam.figures.response_map import plot_response_map
 from snapbeam.figures.style import house_style, new_figure
-from snapbeam.model.parameters import LONG_CYCLES
+from snapbeam.model.paper_values import LONG_CYCLES
 from snapbeam.paper.recipes.fig6 import frequency_maps, measured_dots
 from snapbeam.paper.system import legend_handles
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.figures.dots import Dots
 from snapbeam.figures.panels import cell_edges, class_cells, figure_legend, panel_letters
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.parameters import CYCLES, LOCATION
+from snapbeam.lab.compare.dots import Dots
+from snapbeam.model.paper_values import CYCLES, LOCATION
 from snapbeam.paper.recipes.fig6 import measured_dots
 from snapbeam.paper.system import legend_handles, paper_model, relative_map, shapes_along
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import snapbeam as sb
+from snapbeam.core.provenance import made_by
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
-from snapbeam.model.parameters import BEAM, MODES
+from snapbeam.model.paper_values import BEAM, MODES
 from snapbeam.paper.system import paper_model
-from snapbeam.provenance import made_by
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam.figures.panels import panel_letters
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
-from snapbeam.model.parameters import CONTACT, LOCATION, LONG_CYCLES
+from snapbeam.model.paper_values import CONTACT, LOCATION, LONG_CYCLES
 from snapbeam.paper.system import paper_model
 
 if TYPE_CHECKING:

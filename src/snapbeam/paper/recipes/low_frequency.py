@@ -8,9 +8,9 @@ import numpy as np
 
 import snapbeam as sb
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
-from snapbeam.model.parameters import CYCLES, LOCATION
+from snapbeam.model.paper_values import CYCLES, LOCATION
 from snapbeam.paper.system import class_map, paper_model
-from snapbeam.paper.thresholds import interwell_threshold
+from snapbeam.sweeps.analysis import interwell_threshold
 
 if TYPE_CHECKING:
     import xarray as xr

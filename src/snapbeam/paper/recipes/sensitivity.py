@@ -16,9 +16,9 @@ import snapbeam as sb
 from snapbeam.figures.panels import figure_legend, panel_letters
 from snapbeam.figures.response_map import plot_response_map
 from snapbeam.figures.style import house_style, new_figure
-from snapbeam.model.parameters import CYCLES, DAMPING_RATIO
+from snapbeam.model.paper_values import CYCLES, DAMPING_RATIO
 from snapbeam.paper.system import class_map, legend_handles, paper_model
-from snapbeam.paper.thresholds import compare_maps
+from snapbeam.sweeps.analysis import compare_maps
 
 if TYPE_CHECKING:
     import xarray as xr

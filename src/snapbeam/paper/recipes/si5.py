@@ -9,7 +9,7 @@ import numpy as np
 
 from snapbeam.figures.panels import figure_legend, panel_letters
 from snapbeam.figures.style import house_style, new_figure
-from snapbeam.model.parameters import CYCLES
+from snapbeam.model.paper_values import CYCLES
 from snapbeam.paper.recipes.fig8 import draw_relative_map, relative_amplitudes
 from snapbeam.paper.system import legend_handles, relative_map
 

@@ -1,0 +1,1 @@
+"""The CUDA engine: a block of threads a trajectory."""

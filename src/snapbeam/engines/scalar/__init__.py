@@ -1,0 +1,1 @@
+"""What every engine compiles: the physics, signals, decisions and compositions, as functions of numbers."""

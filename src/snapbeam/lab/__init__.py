@@ -1,0 +1,64 @@
+"""The laboratory: recordings, vibrometer signals, identification, calibration and comparison.
+
+The public names are loaded when they are first used, so that none of the laboratory's libraries is needed before.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+_HOMES = {
+    "Alignment": "drive.align",
+    "align": "drive.align",
+    "Calibration": "calibration.calibrate",
+    "ContactTest": "calibration.calibrate",
+    "Measurements": "calibration.calibrate",
+    "calibrate": "calibration.calibrate",
+    "load_measurements": "calibration.calibrate",
+    "MeasuredDots": "compare.maps",
+    "compare_dots": "compare.maps",
+    "compare_waveforms": "compare.waveforms",
+    "write_photron": "camera.write",
+    "write_video": "camera.write",
+    "compare_wells": "decay.identify",
+    "identify_decay": "decay.identify",
+    "MeasuredResponse": "compare.response",
+    "measure_response": "compare.response",
+    "FrameFlag": "tracking.flags",
+    "contact_onsets": "tracking.onsets",
+    "tracking_quality": "tracking.quality",
+    "tracking_report": "tracking.quality",
+    "recorded_drive": "drive.record",
+    "Recording": "camera.recording",
+    "open_recording": "camera.recording",
+    "read_channels": "signals.files",
+    "read_signal": "signals.files",
+    "write_signal": "signals.files",
+    "from_sep5": "signals.signal",
+    "make_signal": "signals.signal",
+    "to_sep5": "signals.signal",
+    "SineFit": "signals.sine_fit",
+    "fit_sine": "signals.sine_fit",
+    "SyntheticCamera": "synthetic.recording",
+    "SyntheticStage": "synthetic.recording",
+    "render_recording": "synthetic.recording",
+    "render_run": "synthetic.run",
+    "render_vibrometer": "synthetic.run",
+    "track": "tracking.track",
+    "DriveMeasurement": "drive.vibrometer",
+    "displacement_from_velocity": "drive.vibrometer",
+    "measure_drive": "drive.vibrometer",
+}
+
+__all__ = sorted(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,1 @@
+"""A beam's parameters from what was measured on it."""

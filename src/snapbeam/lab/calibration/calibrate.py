@@ -1,0 +1,344 @@
+"""The model's beam from measured frequencies, decays and collisions, with uncertainties and in plain words.
+
+The paper adjusts the thickness to the straight beam's frequencies and the buckling level to those about the
+wells (section 3.3).  Here both are fitted at once by least squares, and what the data cannot tell is said.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.config import config_from_mapping, dump_config
+from snapbeam.core.validate import InputError, InputTypeError, choice, integer
+from snapbeam.lab.calibration import report as words
+from snapbeam.lab.calibration.fit import directions, search, sensitivity
+from snapbeam.lab.calibration.measurements import ContactTest, Measurements, load_measurements
+from snapbeam.model.beam import Beam
+from snapbeam.model.paper_values import BEAM, MODES
+from snapbeam.model.reduction import ReducedModel
+
+__all__ = ["Calibration", "ContactTest", "Measurements", "Residual", "calibrate", "load_measurements"]
+
+_Array = NDArray[np.float64]
+FITTED = ("thickness", "young_modulus", "density", "length", "buckling_level")
+
+
+@dataclass(frozen=True)
+class Residual:
+    """One measured frequency [Hz] beside the model's, and their difference in standard errors."""
+
+    name: str
+    measured: float
+    standard_error: float
+    model: float
+
+    @property
+    def deviation(self) -> float:
+        """(model - measured)/standard error."""
+        return (self.model - self.measured) / self.standard_error
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibrated beam.
+
+    ``beam`` is the result; ``values`` and ``standard_errors`` hold the fitted parameters by name (SI), in the
+    order of ``correlation``; a parameter that the data do not determine has no entry in ``standard_errors``
+    and is named in ``undetermined``.  ``scatter`` is the root of chi-square per degree of freedom by which
+    standard errors were raised, 1 if the data agree.  ``well_freq``, ``start_well_freq``, ``gauge_well_freq``
+    [Hz] are the first frequency about a well of the result, of the beam the fit started from, and of the
+    result with the gauge's geometry; ``either_well`` holds the buckling level [m] that each well alone would
+    ask for.  ``findings`` and ``warnings`` say in words what was found and what to beware of.
+    """
+
+    beam: Beam
+    start: Beam
+    values: dict[str, float]
+    standard_errors: dict[str, float]
+    correlation: _Array = field(repr=False)
+    undetermined: tuple[str, ...]
+    residuals: tuple[Residual, ...]
+    scatter: float
+    degrees_of_freedom: int
+    modes: int
+    damping_ratio: float | None
+    damping_ratio_se: float | None
+    contact_stiffness: float | None
+    contact_stiffness_se: float | None
+    well_freq: float | None
+    start_well_freq: float | None
+    gauge_well_freq: float | None
+    either_well: tuple[float, ...]
+    findings: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    def sections(self) -> dict[str, dict[str, Any]]:
+        """The result as the sections of a parameter file."""
+        beam: dict[str, Any] = {
+            name: float(getattr(self.beam, name))
+            for name in ("length", "thickness", "width", "density", "young_modulus")
+        }
+        if self.beam.is_buckled:
+            beam["buckling_level"] = float(self.beam.buckling_level)
+        else:
+            beam["axial_load"] = float(self.beam.axial_load)
+        sections: dict[str, dict[str, Any]] = {"beam": beam, "model": {"modes": self.modes}}
+        if self.damping_ratio is not None:
+            sections["model"]["damping_ratio"] = self.damping_ratio
+        if self.contact_stiffness is not None:
+            sections["contact"] = {"stiffness": self.contact_stiffness}
+        return sections
+
+    def summary(self) -> dict[str, Any]:
+        """The figures as plain numbers and words, in SI, for a JSON file."""
+        return {
+            "values": dict(self.values),
+            "standard_errors": dict(self.standard_errors),
+            "undetermined": list(self.undetermined),
+            "correlation": self.correlation.tolist(),
+            "residuals": [{**dataclasses.asdict(r), "deviation": r.deviation} for r in self.residuals],
+            "scatter": self.scatter,
+            "degrees_of_freedom": self.degrees_of_freedom,
+            "damping_ratio": self.damping_ratio,
+            "damping_ratio_se": self.damping_ratio_se,
+            "contact_stiffness": self.contact_stiffness,
+            "contact_stiffness_se": self.contact_stiffness_se,
+            "well_freq": self.well_freq,
+            "start_well_freq": self.start_well_freq,
+            "gauge_well_freq": self.gauge_well_freq,
+            "either_well": list(self.either_well),
+            "findings": list(self.findings),
+            "warnings": list(self.warnings),
+        }
+
+    def write_config(self, path: str | os.PathLike[str]) -> None:
+        """Write the parameter file that ``snapbeam map --config`` reads, with the findings as comments."""
+        told = [f"{name} = {words.with_error(self, name)}" for name in self.values]
+        comment = ["Calibrated from measurements.", *told, *self.findings]
+        comment += [f"Warning: {text}" for text in self.warnings]
+        dump_config(config_from_mapping(self.sections()), path, "\n".join(comment))
+
+
+def calibrate(
+    measured: Measurements,
+    beam: Beam = BEAM,
+    *,
+    fit: tuple[str, ...] | None = None,
+    modes: int = MODES,
+) -> Calibration:
+    """Fit a beam to what was measured of it.
+
+    Parameters
+    ----------
+    measured : Measurements
+    beam : Beam
+        What is known of the beam, and where the fit starts; parameters that are not fitted are kept.  Its own
+        frequencies are compared with the measured ones in the findings.
+    fit : tuple of str, optional
+        Which of thickness, young_modulus, density, length and buckling_level to fit.  By default the
+        thickness if there are frequencies of the straight beam, and the buckling level if there are any
+        about a well.
+    modes : int
+        Number of buckling modes of the model, which is that used for maps.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    InputError
+        If nothing was measured that the parameters could be fitted to, or an argument is unusable.
+
+    Notes
+    -----
+    Weighted least squares in the logarithms of the parameters (``scipy.optimize.least_squares``).  The
+    covariance is that of the linearised fit, raised by chi-square per degree of freedom where that exceeds 1.
+    A combination of parameters to which no measured frequency responds is found from the singular values of
+    the sensitivities; its parameters stay as near to the start as they can and get no standard error.
+    """
+    if not isinstance(measured, Measurements):
+        raise InputTypeError(f"measured: must be Measurements, not {type(measured).__name__}")
+    if not isinstance(beam, Beam):
+        raise InputTypeError(f"beam: must be a Beam, not {type(beam).__name__}")
+    count = integer("modes", modes, 1, 256)
+    data = _data(measured, count)
+    names = _fitted(measured, fit)
+    if not data and names:
+        raise InputError(f"measured: no frequency to fit {', '.join(names)} to")
+    wells = bool(measured.lower_well_freq or measured.upper_well_freq)
+    if wells and not beam.is_buckled:
+        raise InputError(
+            "beam: is straight, but frequencies about wells were measured; give a buckling_level"
+        )
+    begin = np.array([math.log(getattr(beam, name)) for name in names])
+    target = np.array([item.measured for item in data])
+    errors = np.array([item.standard_error for item in data])
+
+    def frequencies(logs: _Array) -> _Array:
+        return _model(_changed(beam, names, logs), data, count)
+
+    def residual(logs: _Array) -> _Array:
+        return (frequencies(logs) - target) / errors
+
+    logs = begin
+    covariance = np.zeros((0, 0))
+    undetermined: tuple[str, ...] = ()
+    warnings: list[str] = []
+    scatter, freedom = 1.0, len(data)
+    if names:
+        keep = directions(sensitivity(frequencies, begin, errors))
+        freedom = len(data) - keep.shape[1]
+        logs = search(residual, begin, keep, names, freedom)
+        jacobian = sensitivity(frequencies, logs, errors)
+        chi = float(np.sum(residual(logs) ** 2))
+        scatter = max(1.0, math.sqrt(chi / freedom)) if freedom > 0 else 1.0
+        inner = np.linalg.inv((jacobian @ keep).T @ (jacobian @ keep))
+        covariance = keep @ inner @ keep.T * scatter**2
+        undetermined = tuple(name for i, name in enumerate(names) if (keep @ keep.T)[i, i] < 1.0 - 1e-4)
+        warnings += words.link_warnings(names, covariance, undetermined)
+        if freedom <= 0:
+            warnings.append("as many parameters as measured values: nothing is left to check the model with")
+    result = _changed(beam, names, logs)
+    fitted = _model(result, data, count)
+    residuals = tuple(
+        Residual(item.name, item.measured, item.standard_error, float(f))
+        for item, f in zip(data, fitted, strict=True)
+    )
+    values = {name: math.exp(log) for name, log in zip(names, logs, strict=True)}
+    spread = np.sqrt(np.diag(covariance))
+    standard = {
+        name: values[name] * float(s)
+        for name, s in zip(names, spread, strict=True)
+        if name not in undetermined
+    }
+    correlation = (
+        covariance / np.outer(spread, spread) if names and (spread > 0.0).all() else np.eye(len(names))
+    )
+    damping, damping_se = _mean(measured.damping_ratio, measured.damping_ratio_se, 0.1)
+    tests = [test.stiffness() for test in measured.contact]
+    contact, contact_se = _mean(tuple(k for k, _ in tests), tuple(se for _, se in tests) or None, 0.1)
+    gauges = {name: getattr(measured, name) for name in ("thickness", "buckling_level")}
+    gauges = {name: value for name, value in gauges.items() if value is not None}
+    answer = Calibration(
+        beam=result,
+        start=beam,
+        values=values,
+        standard_errors=standard,
+        correlation=correlation,
+        undetermined=undetermined,
+        residuals=residuals,
+        scatter=scatter,
+        degrees_of_freedom=freedom,
+        modes=count,
+        damping_ratio=damping,
+        damping_ratio_se=damping_se,
+        contact_stiffness=contact,
+        contact_stiffness_se=contact_se,
+        well_freq=_first_freq(result, count) if wells else None,
+        start_well_freq=_first_freq(beam, count) if wells else None,
+        gauge_well_freq=_first_freq(result.replace(**gauges), count) if wells and gauges else None,
+        either_well=_either_well(result, measured, count),
+        findings=(),
+        warnings=(),
+    )
+    told = words.warnings(answer, measured)
+    return dataclasses.replace(
+        answer, findings=tuple(words.findings(answer, measured)), warnings=(*warnings, *told)
+    )
+
+
+@dataclass(frozen=True)
+class _Datum:
+    name: str
+    state: str
+    mode: int
+    measured: float
+    standard_error: float
+
+
+def _data(measured: Measurements, modes: int) -> list[_Datum]:
+    data = []
+    for state, word in (("straight", "straight"), ("lower_well", "lower well"), ("upper_well", "upper well")):
+        values = getattr(measured, f"{state}_freq")
+        errors = getattr(measured, f"{state}_freq_se") or [words.ASSUMED * value for value in values]
+        if len(values) > modes:
+            raise InputError(f"{state}_freq: {len(values)} frequencies for a model of {modes} modes")
+        for i, (value, error) in enumerate(zip(values, errors, strict=True)):
+            data.append(_Datum(f"{word}, mode {i + 1}", state, i, value, error))
+    return data
+
+
+def _fitted(measured: Measurements, fit: tuple[str, ...] | None) -> list[str]:
+    wells = bool(measured.lower_well_freq or measured.upper_well_freq)
+    if fit is None:
+        return ["thickness"] * bool(measured.straight_freq) + ["buckling_level"] * wells
+    if isinstance(fit, str) or len(set(fit)) < len(fit):
+        raise InputError(f"fit = {fit!r}: must be a tuple of different names among {', '.join(FITTED)}")
+    for name in fit:
+        choice("fit", name, FITTED)
+    if "buckling_level" in fit and not wells:
+        raise InputError("fit: the buckling_level needs a frequency measured about a well")
+    return list(fit)
+
+
+def _changed(beam: Beam, names: list[str], logs: _Array) -> Beam:
+    changes = {name: math.exp(log) for name, log in zip(names, logs, strict=True)}
+    return beam.replace(**changes) if changes else beam
+
+
+def _model(beam: Beam, data: list[_Datum], modes: int) -> _Array:
+    states = {item.state == "straight" for item in data}
+    freq = {
+        straight: ReducedModel.from_beam(
+            beam.replace(axial_load=0.0) if straight else beam, modes
+        ).natural_freq
+        for straight in states
+    }
+    return np.array([freq[item.state == "straight"][item.mode] for item in data])
+
+
+def _first_freq(beam: Beam, modes: int) -> float:
+    return float(ReducedModel.from_beam(beam, modes).natural_freq[0])
+
+
+def _either_well(beam: Beam, measured: Measurements, modes: int) -> tuple[float, ...]:
+    """Buckling level [m] that the first frequency of each well alone asks for; empty if they agree."""
+    from scipy.optimize import newton
+
+    wells = (measured.lower_well_freq, measured.upper_well_freq)
+    if not all(wells) or wells[0][0] == wells[1][0]:
+        return ()
+    level, levels = beam.buckling_level, []
+    here = _first_freq(beam, modes)
+    for goal in (values[0] for values in wells):
+
+        def miss(factor: float, goal: float = goal) -> float:
+            return _first_freq(beam.replace(buckling_level=abs(factor) * level), modes) / goal - 1.0
+
+        try:
+            levels.append(level * float(newton(miss, 1.0, x1=goal / here + 1e-6, tol=1e-7, maxiter=12)))
+        except RuntimeError:  # no level gives that frequency
+            return ()
+    return tuple(levels)
+
+
+def _mean(
+    values: tuple[float, ...] | Any, errors: tuple[float, ...] | Any, assumed: float
+) -> tuple[float | None, float | None]:
+    """Weighted mean and its standard error, raised by the scatter of the values where that is larger."""
+    if not values:
+        return None, None
+    x = np.asarray(values, dtype=np.float64)
+    s = np.asarray(errors, dtype=np.float64) if errors is not None else assumed * x
+    weight = 1.0 / s**2
+    mean = float(np.sum(weight * x) / weight.sum())
+    spread = float(np.sqrt(np.sum(weight * (x - mean) ** 2) / max(x.size - 1, 1)))
+    return mean, float(1.0 / np.sqrt(weight.sum())) * max(1.0, spread)

@@ -1,0 +1,1 @@
+"""Recordings of a high-speed camera: read, checked, written."""

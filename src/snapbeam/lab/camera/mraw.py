@@ -1,0 +1,97 @@
+"""The pixels of Photron recordings: 8, 12 or 16 bits each, decoded a frame at a time.
+
+The 12-bit packing follows what pyMRAW (J. Javh, J. Slavič, ladisk/pyMRAW) reads; frames are decoded here
+one by one, so that a recording larger than memory can be read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.core.validate import InputError
+from snapbeam.lab.camera.photron import CameraHeader
+
+__all__ = ["check_size", "frame_bytes", "pack_12bit", "read_mraw", "unpack_12bit"]
+
+
+def unpack_12bit(packed: NDArray[np.uint8]) -> NDArray[np.uint16]:
+    """Unpack 12-bit pixels, two in three bytes with the most significant bits first.
+
+    ``packed`` is a flat array of bytes whose length is a multiple of three.
+    """
+    first, middle, last = packed.reshape(-1, 3).T
+    pixels = np.empty(packed.size // 3 * 2, dtype=np.uint16)
+    pixels[0::2] = (first.astype(np.uint16) << 4) | (middle >> 4)
+    pixels[1::2] = ((middle & 0x0F).astype(np.uint16) << 8) | last
+    return pixels
+
+
+def pack_12bit(pixels: NDArray[np.uint16]) -> NDArray[np.uint8]:
+    """Pack pixels of 12 bits, an even number of them; the inverse of :func:`unpack_12bit`."""
+    flat = np.ascontiguousarray(pixels).reshape(-1, 2)
+    packed = np.empty((flat.shape[0], 3), dtype=np.uint8)
+    packed[:, 0] = flat[:, 0] >> 4
+    packed[:, 1] = ((flat[:, 0] & 0x0F) << 4) | (flat[:, 1] >> 8)
+    packed[:, 2] = flat[:, 1] & 0xFF
+    return packed.reshape(-1)
+
+
+def check_size(header: CameraHeader) -> None:
+    """Refuse pixels whose file size is not what the header says."""
+    mraw = header.mraw
+    try:
+        found = mraw.stat().st_size
+    except OSError as error:
+        raise InputError(f"{mraw}: cannot be read ({error.strerror})") from None
+    expected = header.frame_count * header.width * header.height * header.stored_bits // 8
+    if found != expected:
+        state = "is truncated" if found < expected else "is larger than its header says"
+        raise InputError(
+            f"{mraw}: {state}: {found} bytes, but the fields width, height, total frame and bit depth of "
+            f"{header.path.name} ({header.width} x {header.height} x {header.frame_count} at "
+            f"{header.stored_bits} bits) ask for {expected}"
+        )
+
+
+def read_mraw(
+    header: CameraHeader, start: int, stop: int, rows: tuple[int, int]
+) -> NDArray[np.uint8] | NDArray[np.uint16]:
+    """Read frames ``start`` to ``stop`` of the given rows, right-aligned to the effective bits."""
+    bits, width, height = header.stored_bits, header.width, header.height
+    count, wanted = stop - start, rows[1] - rows[0]
+    out: NDArray[Any] = np.empty((count, wanted, width), dtype=np.uint8 if bits == 8 else np.uint16)
+    try:
+        with open(header.mraw, "rb") as file:
+            for frame in range(count):
+                first = ((start + frame) * height + rows[0]) * width
+                last = first + wanted * width
+                head = first % 2 if bits == 12 else 0
+                tail = last % 2 if bits == 12 else 0
+                file.seek((first - head) * bits // 8)
+                raw = np.frombuffer(file.read((last + tail - first + head) * bits // 8), dtype=np.uint8)
+                if raw.size * 8 != (last + tail - first + head) * bits:
+                    raise InputError(f"{header.mraw}: ends inside frame {start + frame}")
+                pixels: NDArray[Any]
+                if bits == 12:
+                    pixels = unpack_12bit(raw)[head : head + wanted * width]
+                else:
+                    pixels = raw.view("<u2") if bits == 16 else raw
+                out[frame] = pixels.reshape(wanted, width)
+    except OSError as error:
+        raise InputError(f"{header.mraw}: cannot be read ({error.strerror})") from None
+    if header.effective_side == "higher" and header.effective_bits < bits:
+        out >>= bits - header.effective_bits
+    return out
+
+
+def frame_bytes(frames: Iterable[NDArray[np.integer]], bits: int) -> Iterable[bytes]:
+    """The bytes of each frame as they stand in a .mraw file of 8, 12 or 16 bits."""
+    for frame in frames:
+        if bits == 12:
+            yield pack_12bit(frame.astype(np.uint16)).tobytes()
+        else:
+            yield frame.astype("<u2" if bits == 16 else np.uint8).tobytes()

@@ -1,0 +1,1 @@
+"""Measured responses beside simulated ones: classes, maps, waveforms."""

@@ -1,0 +1,202 @@
+"""A measured run beside a simulated one, on one clock: waveforms, spectra, impacts (Fig. 4 of the paper)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.core.validate import InputError, positive
+from snapbeam.lab.signals.signal import Samples
+from snapbeam.lab.signals.sine_fit import SineFit, fit_sine
+from snapbeam.runs.schema import check_trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["WaveformComparison", "compare_waveforms"]
+
+_Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WaveformComparison:
+    """A measured and a simulated run over the same cycles of excitation.
+
+    ``waveforms`` over ``cycle``: displacement and shaker displacement of both [b].  ``spectra`` over
+    ``frequency_ratio`` (multiples of the excitation): amplitude spectra of the two displacements [b].
+    ``shift`` [cycles] was added to the measured clock.  ``rms_difference`` [b] and ``correlation`` are
+    those of the beam, ``shaker_rms_difference`` [b] that of the shaker; ``measured_rms`` and
+    ``simulated_rms`` [b] are the beam's motion about its mean.
+    """
+
+    waveforms: xr.Dataset
+    spectra: xr.Dataset
+    shift: float
+    rms_difference: float
+    correlation: float
+    shaker_rms_difference: float
+    measured_rms: float
+    simulated_rms: float
+    amplitude_ratio: float
+    measured_impacts: _Array
+    simulated_impacts: _Array
+
+
+def compare_waveforms(
+    measured: xr.Dataset,
+    simulated: xr.Dataset,
+    frequency: float | None = None,
+    *,
+    start: float | None = None,
+    cycles: tuple[float, float] | None = None,
+    measured_onsets: ArrayLike | None = None,
+    simulated_onsets: ArrayLike | None = None,
+) -> WaveformComparison:
+    """Put a measured run beside a simulated one, aligned by the phase of the shaker.
+
+    Parameters
+    ----------
+    measured, simulated : xarray.Dataset
+        Runs (see :mod:`snapbeam.runs.schema`) with ``displacement`` and ``shaker_displacement`` [b].
+    frequency : float, optional
+        Excitation frequency [Hz] of the measured run, where it has no coordinate ``cycle``.
+    start : float, optional
+        Start of the excitation in the measured run [s]; it says which cycle is the first, the phase of the
+        shaker says the rest.  The first sample if left out.
+    cycles : (float, float), optional
+        The part to compare, counted from the start; all that both have if left out.
+    measured_onsets, simulated_onsets : array_like, optional
+        Times of impacts [s], to be shown over cycles.
+
+    Raises
+    ------
+    InputError
+        If a run lacks the shaker, the two share fewer than two cycles, or no frequency is known.
+    """
+    import xarray as xr
+
+    for name, run in (("measured", measured), ("simulated", simulated)):
+        try:
+            check_trajectory(run, require=("displacement", "shaker_displacement"))
+        except InputError as error:
+            raise InputError(f"{name}: {error}") from error
+    clock, rate = _clock(measured, frequency, start)
+    if "cycle" not in simulated.coords:
+        raise InputError("simulated: must have the coordinate cycle")
+    model_clock = np.asarray(simulated["cycle"].values, dtype=np.float64)
+    model_rate = _cycles_per_second(simulated)
+    seen = _shaker_sine(measured, clock)
+    wanted = _shaker_sine(simulated, model_clock)
+    # cos(2 pi cycle + phase) of the measured shaker must turn with that of the simulated one
+    turn = (seen.phase - wanted.phase) / (2.0 * math.pi)
+    shift = (turn + 0.5) % 1.0 - 0.5
+    clock = clock + shift
+    low, high = max(clock[0], model_clock[0], 0.0), min(clock[-1], model_clock[-1])
+    if cycles is not None:
+        low, high = max(low, float(cycles[0])), min(high, float(cycles[1]))
+    if high - low < 2.0:
+        raise InputError(f"runs share {max(high - low, 0.0):.1f} cycles: must share at least 2")
+    step = max(float(np.median(np.diff(clock))), 1.0 / 400.0)
+    grid = low + step * np.arange(int((high - low) / step + 1e-9) + 1)
+    columns = {
+        "measured_displacement": _on(grid, clock, measured["displacement"].values),
+        "simulated_displacement": _on(grid, model_clock, simulated["displacement"].values),
+        "measured_shaker": _on(grid, clock, measured["shaker_displacement"].values),
+        "simulated_shaker": _on(grid, model_clock, simulated["shaker_displacement"].values),
+    }
+    waveforms = xr.Dataset(
+        {name: ("cycle", value, {"units": "b"}) for name, value in columns.items()},
+        {"cycle": ("cycle", grid, {"long_name": "cycles of excitation", "units": "1"})},
+    )
+    one, two = columns["measured_displacement"], columns["simulated_displacement"]
+    both = np.isfinite(one) & np.isfinite(two)
+    if both.sum() < 16:
+        raise InputError("measured: hardly any valid sample in the cycles that both runs have")
+    shaker = columns["measured_shaker"] - columns["simulated_shaker"]
+    shaker = shaker[np.isfinite(shaker)]
+    spread = float(np.std(one[both])), float(np.std(two[both]))
+    same = float(np.corrcoef(one[both], two[both])[0, 1]) if min(spread) > 0.0 else math.nan
+    return WaveformComparison(
+        waveforms=waveforms,
+        spectra=_spectra(grid, step, columns),
+        shift=shift,
+        rms_difference=float(np.sqrt(np.mean((one[both] - two[both]) ** 2))),
+        correlation=same,
+        shaker_rms_difference=float(np.std(shaker)),
+        measured_rms=spread[0],
+        simulated_rms=spread[1],
+        amplitude_ratio=seen.amplitude / wanted.amplitude,
+        measured_impacts=_impacts(
+            measured_onsets, start or float(measured["time"][0]), rate, shift, low, high
+        ),
+        simulated_impacts=_impacts(simulated_onsets, 0.0, model_rate, 0.0, low, high),
+    )
+
+
+def _clock(run: xr.Dataset, frequency: float | None, start: float | None) -> tuple[_Array, float]:
+    time = np.asarray(run["time"].values, dtype=np.float64)
+    if frequency is None:
+        if "cycle" not in run.coords:
+            raise InputError("measured: has no coordinate cycle; state frequency (Hz)")
+        return np.asarray(run["cycle"].values, dtype=np.float64), _cycles_per_second(run)
+    rate = positive("frequency", frequency, "Hz")
+    begin = float(time[0]) if start is None else float(start)
+    return (time - begin) * rate, rate
+
+
+def _cycles_per_second(run: xr.Dataset) -> float:
+    time, cycle = run["time"].values, run["cycle"].values
+    return float((cycle[-1] - cycle[0]) / (time[-1] - time[0]))
+
+
+def _shaker_sine(run: xr.Dataset, clock: _Array) -> SineFit:
+    """The shaker's sine over cycles, fitted to the later two thirds of the run."""
+    values = np.asarray(run["shaker_displacement"].values, dtype=np.float64)
+    good = np.isfinite(values) & (clock >= 0.0)
+    if good.sum() < 64:
+        raise InputError("run: the shaker was measured in fewer than 64 samples after the start")
+    span = clock[good][-1] - clock[good][0]
+    if span < 3.0:
+        raise InputError(f"run: {span:.1f} cycles of the shaker: must be at least 3")
+    begin = clock[good][0] + span / 3.0 if span > 6.0 else clock[good][0]
+    count = int(min((clock[good][-1] - begin) * 64, 20_000))
+    even = begin + (clock[good][-1] - begin) * np.arange(count) / count
+    samples = Samples(np.interp(even, clock[good], values[good]), even, count / (clock[good][-1] - begin))
+    return fit_sine(samples, 1.0, 1, fixed=True)
+
+
+def _on(grid: _Array, clock: _Array, values: NDArray[Any]) -> _Array:
+    """Values on a grid by straight lines, NaN where a neighbouring sample is missing."""
+    good = np.isfinite(values)
+    result = np.interp(grid, clock[good], np.asarray(values, dtype=np.float64)[good])
+    missing = np.interp(grid, clock, (~good).astype(np.float64)) > 0.0
+    result[missing] = np.nan
+    return result
+
+
+def _spectra(grid: _Array, step: float, columns: dict[str, _Array]) -> xr.Dataset:
+    import xarray as xr
+
+    window = np.hanning(grid.size)
+    data = {}
+    for name in ("measured_displacement", "simulated_displacement"):
+        values = columns[name]
+        good = np.isfinite(values)
+        filled = np.where(good, values, np.interp(grid, grid[good], values[good]))
+        amplitude = 2.0 * np.abs(np.fft.rfft((filled - filled.mean()) * window)) / window.sum()
+        data[name] = ("frequency_ratio", amplitude, {"units": "b"})
+    ratio = np.fft.rfftfreq(grid.size, step)
+    return xr.Dataset(data, {"frequency_ratio": ("frequency_ratio", ratio, {"units": "1"})})
+
+
+def _impacts(
+    onsets: ArrayLike | None, start: float, rate: float, shift: float, low: float, high: float
+) -> _Array:
+    if onsets is None:
+        return np.empty(0)
+    at = (np.asarray(onsets, dtype=np.float64) - start) * rate + shift
+    return at[(at >= low) & (at <= high)]

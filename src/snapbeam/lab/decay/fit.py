@@ -1,0 +1,208 @@
+"""Decay by nonlinear least squares: all modes at once, amplitudes eliminated, priors on the law.
+
+The nonlinear unknowns of a mode are its frequency, damping ratio and softening; amplitudes, phases, the mean
+shift and the second harmonic of a softening mode are linear and solved for inside (variable projection, Golub
+and Pereyra, SIAM J. Numer. Anal. 10, 1973).  lmfit does the iteration and the covariance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.core.validate import InputError
+from snapbeam.lab.decay.model import ModeEstimate, law_priors
+from snapbeam.lab.signals.signal import Samples
+from snapbeam.lab.signals.sine_fit import white_variance
+
+__all__ = ["FitResult", "explain", "fit_decay"]
+
+_Array = NDArray[np.float64]
+
+
+class FitResult(NamedTuple):
+    """Modes, what they leave, and the noise: near the first mode (of ``explain``: the last) and overall."""
+
+    modes: list[ModeEstimate]
+    residual: _Array
+    noise_near: float
+    noise_rms: float
+
+
+def fit_decay(
+    samples: Samples,
+    guesses: list[ModeEstimate],
+    units: str,
+    *,
+    soften: bool = True,
+    known: tuple[float, float] | None = None,
+) -> FitResult:
+    """Fit decaying modes to a signal, starting from *guesses* (the first is the one that softens most).
+
+    Parameters
+    ----------
+    samples : Samples
+    guesses : list of ModeEstimate
+    units : str
+        Unit of the signal; tells displacement from velocity.
+    soften : bool
+        Whether frequencies may depend on amplitude.
+    known : (float, float), optional
+        Softening kappa of the first mode and its standard deviation, known beforehand.
+
+    Raises
+    ------
+    InputError
+        If lmfit finds no minimum.
+    """
+    import lmfit
+
+    t = samples.time - samples.time[0]
+    y = samples.values
+    prior = law_priors(units)
+    parameters = lmfit.Parameters()
+    for i, guess in enumerate(guesses):
+        parameters.add(
+            f"f{i}", guess.natural_freq, min=0.5 * guess.natural_freq, max=1.5 * guess.natural_freq
+        )
+        parameters.add(f"z{i}", max(guess.damping_ratio, 1e-6), min=1e-9, max=0.5)
+        if soften:
+            start = guess.softening * guesses[0].amplitude ** 2
+            parameters.add(f"s{i}", float(np.clip(start, -0.4, 0.4)), min=-0.5, max=0.5)
+    if soften:
+        for name, (mean, _) in prior.items():
+            parameters.add(name, mean)
+    trifle = 1e-12 * float(np.abs(y).max())
+    sigma = max(explain(samples, guesses, units, soften).noise_near, trifle)
+
+    def residual(value: dict[str, float]) -> _Array:
+        design = _design(t, value, len(guesses), soften)
+        solution = _solve(design, y)
+        parts = [(y - design @ solution) / sigma]
+        if soften:
+            parts.append(np.array([(value[k] - m) / sd for k, (m, sd) in prior.items()]))
+            if known is not None:
+                square = float(solution[1] ** 2 + solution[2] ** 2)
+                parts.append(np.array([(value["s0"] / square - known[0]) / known[1]]))
+        return np.concatenate(parts)
+
+    def wrapped(p: lmfit.Parameters) -> _Array:
+        return residual(p.valuesdict())
+
+    search = lmfit.Minimizer(wrapped, parameters, scale_covar=False, calc_covar=False)
+    value = dict(search.leastsq(xtol=1e-9, ftol=1e-9).params.valuesdict())
+    design = _design(t, value, len(guesses), soften)
+    solution = _solve(design, y)
+    rest = y - design @ solution
+    fitted = [value[f"f{i}"] for i in range(len(guesses))]
+    lines = [0.0, *fitted, *(2.0 * f for f in fitted)]
+    free = design.shape[1] + len(parameters)
+    near = [math.sqrt(white_variance(rest, samples.sampling_freq, f, lines, free)) for f in fitted]
+    sigma = max(near[0], trifle)
+    error = _errors(residual, value)
+    linear = _linear_errors(design, sigma)
+    modes = []
+    columns = _columns(len(guesses), soften)
+    for i in range(len(guesses)):
+        c, s = solution[columns[i]], solution[columns[i] + 1]
+        amplitude = math.hypot(c, s)
+        stretch = near[i] / near[0] if near[0] > 0.0 else 1.0
+        first = math.hypot(solution[1], solution[2])
+        modes.append(
+            ModeEstimate(
+                natural_freq=value[f"f{i}"],
+                natural_freq_se=error[f"f{i}"] * stretch,
+                damping_ratio=value[f"z{i}"],
+                damping_ratio_se=error[f"z{i}"] * stretch,
+                amplitude=amplitude,
+                amplitude_se=float(linear[columns[i]]) * stretch,
+                phase=math.atan2(-s, c),
+                softening=value[f"s{i}"] / first**2 if soften else 0.0,
+                softening_se=error[f"s{i}"] * stretch / first**2 if soften else 0.0,
+                method="fit",
+            )
+        )
+    rms = math.sqrt(float(rest @ rest) / max(y.size - free, 1))
+    return FitResult(modes, rest, near[0], rms)
+
+
+def explain(samples: Samples, modes: list[ModeEstimate], units: str, soften: bool) -> FitResult:
+    """What given modes leave of a signal, their amplitudes and phases fitted, all else kept."""
+    t = samples.time - samples.time[0]
+    first = modes[0].amplitude ** 2
+    value = {name: mean for name, (mean, _) in law_priors(units).items()}
+    for i, mode in enumerate(modes):
+        value |= {f"f{i}": mode.natural_freq, f"z{i}": mode.damping_ratio, f"s{i}": mode.softening * first}
+    design = _design(t, value, len(modes), soften)
+    rest = samples.values - design @ _solve(design, samples.values)
+    free = design.shape[1] + 3 * len(modes)
+    frequencies = [mode.natural_freq for mode in modes]
+    lines = [0.0, *frequencies, *(2.0 * f for f in frequencies)]
+    near = math.sqrt(white_variance(rest, samples.sampling_freq, frequencies[-1], lines, free))
+    return FitResult(modes, rest, near, math.sqrt(float(rest @ rest) / max(t.size - free, 1)))
+
+
+def _errors(residual: Callable[[dict[str, float]], _Array], value: dict[str, float]) -> dict[str, float]:
+    """Standard errors from the Jacobian at the minimum, by central differences."""
+    columns = []
+    for name, center in value.items():
+        step = {"f": 1e-7 * center, "z": 1e-4 * center}.get(name[0], 1e-5)
+        sides = [residual({**value, name: center + sign * step}) for sign in (1.0, -1.0)]
+        columns.append((sides[0] - sides[1]) / (2.0 * step))
+    jacobian = np.column_stack(columns)
+    scale = np.linalg.norm(jacobian, axis=0)
+    if not np.isfinite(jacobian).all() or not (scale > 0.0).all():
+        raise InputError("signal: the fit of decaying modes found no minimum; fewer modes may be there")
+    inverse = np.linalg.pinv((jacobian / scale).T @ (jacobian / scale), rcond=1e-14)
+    return dict(zip(value, np.sqrt(np.diag(inverse)) / scale, strict=True))
+
+
+def _columns(count: int, soften: bool) -> list[int]:
+    """First column of each mode in the design: cosine, sine, and for the first the mean shift and 2 theta."""
+    return [1 + 2 * i + (3 if soften and i > 0 else 0) for i in range(count)]
+
+
+def _design(t: _Array, value: dict[str, float], count: int, soften: bool) -> _Array:
+    columns = [np.ones_like(t)]
+    omega0 = 2.0 * math.pi * value["f0"]
+    delta0 = value["z0"] * omega0
+    fall = np.exp(-2.0 * delta0 * t)
+    steep = max(delta0, 1e-12)
+    first = (1.0 - fall) / (2.0 * steep)
+    second = (1.0 - fall**2) / (4.0 * steep)
+    for i in range(count):
+        omega = 2.0 * math.pi * value[f"f{i}"]
+        zeta = value[f"z{i}"]
+        envelope = np.exp(-zeta * omega * t)
+        clock = t
+        if soften:
+            s = value[f"s{i}"]
+            clock = t - s * first - (value["q"] * s * s * second if i == 0 else 0.0)
+            if i == 0:
+                envelope = envelope * (1.0 + value["r"] * s * fall)
+        turn = np.exp(1j * (omega * math.sqrt(1.0 - zeta * zeta)) * clock)
+        columns += [envelope * turn.real, envelope * turn.imag]
+        if soften and i == 0:
+            double = turn * turn
+            columns += [fall, fall * double.real, fall * double.imag]
+    return np.column_stack(columns)
+
+
+def _solve(design: _Array, y: _Array) -> _Array:
+    scale = np.linalg.norm(design, axis=0)
+    scale[scale == 0.0] = 1.0
+    gram = (design.T @ design) / np.outer(scale, scale)
+    solution: _Array = np.linalg.lstsq(gram, (design.T @ y) / scale, rcond=1e-12)[0] / scale
+    return solution
+
+
+def _linear_errors(design: _Array, sigma: float) -> _Array:
+    scale = np.linalg.norm(design, axis=0)
+    scale[scale == 0.0] = 1.0
+    inverse = np.linalg.pinv((design.T @ design) / np.outer(scale, scale), rcond=1e-12)
+    errors: _Array = np.sqrt(np.diag(inverse)) / scale * sigma
+    return errors

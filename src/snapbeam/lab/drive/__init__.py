@@ -1,0 +1,1 @@
+"""The vibrometer's record of the shaker, aligned with the camera's and made into a drive."""

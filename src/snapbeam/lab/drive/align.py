@@ -1,0 +1,220 @@
+"""Camera and vibrometer on one clock.
+
+The shaker's own motion is in both records.  Its phase gives the delay to a small part of a sample, but only
+up to whole cycles; the start of the motion tells the cycles apart.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.core.validate import InputError, finite
+from snapbeam.lab.drive.vibrometer import DriveMeasurement, displacement_from_velocity, measure_drive
+from snapbeam.lab.signals.signal import Samples, check_signal
+from snapbeam.lab.signals.sine_fit import SineFit, fit_sine
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Alignment", "align"]
+
+_Array = NDArray[np.float64]
+_CERTAIN = 25.0  # chi-square by which the best cycle must beat the next
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """How to bring a vibrometer record to the camera's clock: t_camera = t_vibrometer + delay.
+
+    ``delay`` and ``delay_se`` in s; ``polarity`` is -1 if a motion that is positive for one is negative for
+    the other; ``gain``, the camera's amplitude over the vibrometer's, is 1 if both are calibrated;
+    ``clock_difference``, the camera's frequency over the vibrometer's less 1, and its standard error;
+    ``certain`` says whether the start of the motion told the cycle, ``margin`` by what chi-square.
+    """
+
+    delay: float
+    delay_se: float
+    polarity: int
+    gain: float
+    gain_se: float
+    clock_difference: float
+    clock_difference_se: float
+    certain: bool
+    margin: float
+    period: float
+
+    @property
+    def description(self) -> str:
+        """The alignment in words."""
+        sign = "-" if self.delay < 0.0 else "+"
+        text = (
+            f"t_camera = t_vibrometer {sign} {abs(self.delay):.7f} s (standard error {self.delay_se:.1e} s)"
+        )
+        if not self.certain:
+            text += (
+                f"; whole cycles of {self.period:.6g} s remain open: the start of the motion is not in both "
+                "records, or does not tell them apart"
+            )
+        if abs(self.clock_difference) > 4.0 * self.clock_difference_se:
+            text += f"; the clocks differ by {self.clock_difference:.1e}"
+        if abs(self.gain - 1.0) > max(4.0 * self.gain_se, 0.01):
+            text += f"; the camera sees {self.gain:.4f} times the vibrometer's amplitude: check the scales"
+        return text
+
+
+def align(
+    camera: xr.DataArray,
+    vibrometer: xr.DataArray,
+    frequency: float | None = None,
+    *,
+    polarity: int | None = None,
+    near: float | None = None,
+) -> Alignment:
+    """Find the delay between a camera's and a vibrometer's record of the same shaker motion.
+
+    Parameters
+    ----------
+    camera : xarray.DataArray
+        Displacement of the shaker [m]; times are the middles of the exposures.
+    vibrometer : xarray.DataArray
+        Velocity [m/s] or displacement [m] of the shaker.
+    frequency : float, optional
+        The excitation frequency [Hz] as set, used as a guess.
+    polarity : {1, -1}, optional
+        Whether the two count the same direction as positive; found from the start of the motion if left out.
+    near : float, optional
+        A delay [s] known beforehand to better than half a cycle, as from a common trigger; it then decides
+        the cycle.
+
+    Raises
+    ------
+    InputError
+        If a signal is unfit, or the two do not oscillate at the same frequency.
+    """
+    if polarity not in (None, 1, -1):
+        raise InputError(f"polarity = {polarity!r}: must be 1, -1 or None")
+    check_signal(camera, "m", "camera")
+    seen = measure_drive(camera, frequency)
+    check_signal(vibrometer, ("m/s", "m"), "vibrometer")
+    moved, felt = vibrometer, measure_drive(vibrometer, frequency)
+    if vibrometer.attrs["units"] == "m/s":
+        moved = displacement_from_velocity(vibrometer, felt)
+        felt_fit = fit_sine(_window(moved, felt.steady.start, felt.steady.stop), felt.steady.frequency)
+    else:
+        felt_fit = felt.steady
+    one, two = seen.steady, felt_fit
+    difference = one.frequency / two.frequency - 1.0
+    difference_se = math.hypot(one.frequency_se, two.frequency_se) / two.frequency
+    if abs(difference) > max(1e-3, 6.0 * difference_se):
+        raise InputError(
+            f"camera and vibrometer: {one.frequency:.6g} and {two.frequency:.6g} Hz: must be the same motion"
+        )
+    period = 1.0 / two.frequency
+    signs = (1, -1) if polarity is None else (polarity,)
+    candidates = _candidates(camera, moved, seen, felt, felt_fit, signs)
+    if near is not None:
+        goal = finite("near", near)
+        half = 0.5 * period
+        delay, sign, _ = min(candidates, key=lambda c: abs((c[0] - goal + half) % period - half))
+        delay += round((goal - delay) / period) * period
+        certain, margin = True, math.inf
+    else:
+        ranked = sorted(candidates, key=lambda c: c[2])
+        delay, sign, best = ranked[0]
+        margin = ranked[1][2] - best if len(ranked) > 1 else math.inf
+        certain = margin > _CERTAIN and math.isfinite(best)
+    delay, delay_se = _refine(camera, moved, seen, felt, delay, sign)
+    gain = one.amplitude / two.amplitude
+    return Alignment(
+        delay=delay,
+        delay_se=delay_se,
+        polarity=sign,
+        gain=gain,
+        gain_se=gain * math.hypot(one.amplitude_se / one.amplitude, two.amplitude_se / two.amplitude),
+        clock_difference=difference,
+        clock_difference_se=difference_se,
+        certain=certain,
+        margin=margin,
+        period=period,
+    )
+
+
+def _window(signal: xr.DataArray, start: float, stop: float) -> Samples:
+    samples = check_signal(signal)
+    inside = (samples.time >= start) & (samples.time < stop)
+    return Samples(samples.values[inside], samples.time[inside], samples.sampling_freq)
+
+
+def _candidates(
+    camera: xr.DataArray,
+    moved: xr.DataArray,
+    seen: DriveMeasurement,
+    felt: DriveMeasurement,
+    felt_fit: SineFit,
+    signs: tuple[int, ...],
+) -> list[tuple[float, int, float]]:
+    """Delay, polarity and chi-square about the start, for each whole cycle that is possible."""
+    from scipy.interpolate import CubicSpline
+
+    one, two = seen.steady, felt_fit
+    period = 1.0 / two.frequency
+    eye, ear = check_signal(camera), check_signal(moved)
+    middle = 0.5 * (one.start + one.stop)
+    known = seen.startup is not None and felt.startup is not None
+    first = seen.startup.onset if seen.startup else float(eye.time[0])
+    # a first guess of the delay; the camera's phase at t is the vibrometer's at t - delay
+    coarse = seen.startup.onset - felt.startup.onset if seen.startup and felt.startup else 0.0
+    settle = max((m.startup.cycles for m in (seen, felt) if m.startup), default=0.0) + 4.0
+    begin, end = first - 2.0 * period, first + settle * period
+    inside = (eye.time >= begin) & (eye.time <= end)
+    time, values = eye.time[inside], eye.values[inside] - one.offset
+    spline = CubicSpline(ear.time, ear.values - two.offset, extrapolate=False)
+    noise = one.noise_rms**2 + two.noise_rms**2
+    noise = max(noise, (1e-6 * one.amplitude) ** 2)
+    found = []
+    for sign in signs:
+        turn = two.phase_at(middle - coarse) - one.phase_at(middle) + (0.0 if sign > 0 else math.pi)
+        shift = (turn + math.pi) % (2.0 * math.pi) - math.pi
+        base = coarse + shift / (2.0 * math.pi * two.frequency)
+        for cycle in range(-3, 4):
+            delay = base + cycle * period
+            other = sign * spline(time - delay)
+            both = np.isfinite(other)
+            if known and both.sum() >= 0.5 * time.size:
+                x, y = other[both], values[both]
+                gain = float(x @ y / (x @ x)) if x @ x > 0.0 else 0.0
+                chi = float(np.mean((y - gain * x) ** 2)) * time.size / noise
+            else:
+                chi = math.inf if known else abs(cycle) * 1e-3 + (0.0 if sign == signs[0] else 1e-4)
+            found.append((delay, sign, chi))
+    return found
+
+
+def _refine(
+    camera: xr.DataArray,
+    moved: xr.DataArray,
+    seen: DriveMeasurement,
+    felt: DriveMeasurement,
+    delay: float,
+    sign: int,
+) -> tuple[float, float]:
+    """The delay from the phases over the time both records share, and its standard error."""
+    start = max(seen.steady.start, felt.steady.start + delay)
+    stop = min(seen.steady.stop, felt.steady.stop + delay)
+    common = felt.steady.frequency
+    if (stop - start) * common < 5.0:
+        raise InputError(
+            f"camera and vibrometer share {(stop - start) * common:.1f} steady cycles: must be 5"
+        )
+    one = fit_sine(_window(camera, start, stop), common, fixed=True)
+    two = fit_sine(_window(moved, start - delay, stop - delay), common, fixed=True)
+    middle = 0.5 * (start + stop)
+    turn = two.phase_at(middle - delay) - one.phase_at(middle) + (0.0 if sign > 0 else math.pi)
+    shift = (turn + math.pi) % (2.0 * math.pi) - math.pi
+    se = math.hypot(one.phase_se, two.phase_se) / (2.0 * math.pi * common)
+    return delay + shift / (2.0 * math.pi * common), se

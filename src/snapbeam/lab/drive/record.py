@@ -1,0 +1,108 @@
+"""A measured drive made ready for the model: drift-free, band-limited, resampled without adding energy."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from snapbeam.core.validate import InputError, positive
+from snapbeam.lab.drive.vibrometer import DriveMeasurement, displacement_from_velocity, measure_drive
+from snapbeam.lab.signals.signal import check_signal
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["recorded_drive"]
+
+
+def recorded_drive(
+    velocity: xr.DataArray,
+    sampling_freq: float,
+    *,
+    bandwidth: float | None = None,
+    measurement: DriveMeasurement | None = None,
+) -> xr.Dataset:
+    """Resample a measured drive, start-up transient included, for use in the model, without adding energy.
+
+    The drift-free displacement is low-passed without phase shift to *bandwidth*, resampled through a
+    band-limited interpolation, and differentiated, so that displacement and velocity belong together.  The
+    gain of the filter is at most 1 at every frequency.  At ends that are not at rest half the filter's length
+    is left out, where it would have had to invent samples.
+
+    Parameters
+    ----------
+    velocity : xarray.DataArray
+        Velocity of the shaker [m/s].
+    sampling_freq : float
+        Samples per second [Hz] of the result.
+    bandwidth : float, optional
+        Highest frequency kept [Hz]; ten times the excitation frequency if left out, and never more than 0.4
+        of the measured sampling rate.
+    measurement : DriveMeasurement, optional
+        That of this velocity; measured here if left out.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``displacement`` [m] and ``velocity`` [m/s] over ``time`` [s], which begins at the onset if there is
+        one; the displacement there is its zero.
+
+    Raises
+    ------
+    InputError
+        If the result could not hold the bandwidth, or the record is too short for the filter.
+    """
+    import xarray as xr
+    from scipy.interpolate import CubicSpline
+    from scipy.signal import fftconvolve, firwin, kaiserord, resample_poly
+
+    samples = check_signal(velocity, "m/s", "velocity")
+    rate = positive("sampling_freq", sampling_freq, "Hz")
+    drive = measurement or measure_drive(velocity)
+    top = 0.4 * samples.sampling_freq
+    wanted = 10.0 * drive.steady.frequency if bandwidth is None else positive("bandwidth", bandwidth, "Hz")
+    band = min(wanted, top)
+    if band < 1.5 * drive.steady.frequency:
+        raise InputError(
+            f"bandwidth = {band:g} Hz: must be 1.5 times the excitation, {drive.steady.frequency:g} Hz"
+        )
+    if rate < 2.5 * band:
+        raise InputError(
+            f"sampling_freq = {rate:g} Hz: must be at least 2.5 times the bandwidth, {band:g} Hz"
+        )
+    position = displacement_from_velocity(velocity, drive).values
+    nyquist = samples.sampling_freq / 2.0
+    width = 0.25 * band
+    length, beta = kaiserord(80.0, width / nyquist)
+    length |= 1
+    half = length // 2
+    if position.size < 4 * length:
+        raise InputError(f"velocity: {position.size} samples: must be {4 * length} for {band:g} Hz")
+    taps = firwin(length, band + width / 2.0, window=("kaiser", beta), fs=samples.sampling_freq)
+    taps /= np.abs(np.fft.rfft(taps, 16 * length)).max()
+    smooth = fftconvolve(np.pad(position, half, mode="edge"), taps, mode="valid")
+    fine = resample_poly(smooth, 8, 1, window=("kaiser", 8.0), padtype="line")
+    grid = samples.time[0] + np.arange(fine.size) / (8.0 * samples.sampling_freq)
+    spline = CubicSpline(grid, fine)
+    trim = (half + 16) / samples.sampling_freq
+    last = samples.time[-1]
+    end = float(last if last - drive.stop > trim else last - trim)
+    start = drive.startup.onset if drive.startup else float(samples.time[0]) + trim
+    time = start + np.arange(int((end - start) * rate) + 1) / rate
+    zero = float(spline(start)) if drive.startup else 0.0
+    speed = spline.derivative()(time)
+    return xr.Dataset(
+        {
+            "displacement": ("time", spline(time) - zero, {"units": "m", "long_name": "shaker displacement"}),
+            "velocity": ("time", speed, {"units": "m/s", "long_name": "shaker velocity"}),
+        },
+        {"time": ("time", time - start, {"units": "s", "long_name": "time since the start"})},
+        {
+            "frequency": drive.steady.frequency,
+            "velocity_amplitude": drive.steady.amplitude,
+            "bandwidth": band,
+            "begins_at_rest": int(drive.startup is not None),
+            "source_start": start,
+        },
+    )

@@ -1,0 +1,1 @@
+"""Records of sensors: read from the formats that laboratories have, and their sines fitted."""

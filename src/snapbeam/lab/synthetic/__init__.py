@@ -1,0 +1,1 @@
+"""Recordings and signals with a known truth."""

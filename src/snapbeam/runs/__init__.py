@@ -1,0 +1,1 @@
+"""One run: asked for, integrated, recorded, classed, kept."""

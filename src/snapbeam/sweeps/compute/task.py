@@ -1,0 +1,172 @@
+"""What one task computes: the runs of some points, as two plain tables."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.core.codes import ResponseClass, RunStatus
+from snapbeam.core.provenance import canonical_json, parameter_hash
+from snapbeam.runs.response import STATISTICS
+from snapbeam.sweeps.replicas import Replicas, perturbed_starts
+from snapbeam.sweeps.sweep import MapSetup, Points, Progress, response_flags, variable_attributes
+
+__all__ = ["CLASSES", "Columns", "Recipe"]
+
+CLASSES = tuple(ResponseClass)
+"""Classes in the order in which repeats are counted."""
+_COUNTS = tuple(f"runs_{kind.name.lower()}" for kind in CLASSES)
+_HALVED = "response_half_step"
+
+
+class Columns(NamedTuple):
+    """Results of runs: whole numbers and real numbers, a row a run."""
+
+    integers: NDArray[np.int32]
+    numbers: NDArray[np.float64]
+
+    def content_hash(self) -> str:
+        """SHA-256 of what the tables hold."""
+        digest = hashlib.sha256()
+        tables: tuple[tuple[NDArray[Any], str], ...] = ((self.integers, "<i4"), (self.numbers, "<f8"))
+        for table, kind in tables:
+            digest.update(f"{table.shape}".encode())
+            digest.update(np.ascontiguousarray(table, dtype=kind).tobytes())
+        return digest.hexdigest()
+
+
+@dataclass(frozen=True, eq=False)
+class Recipe:
+    """How the points of a map become rows of results, repeats included."""
+
+    setup: MapSetup
+    replicas: Replicas | None = None
+
+    @cached_property
+    def integers(self) -> tuple[str, ...]:
+        """Names of the columns of whole numbers."""
+        names = [name for name, (kind, _, _) in STATISTICS.items() if kind != "float64"]
+        if self.replicas is not None:
+            names += [*_COUNTS, _HALVED] if self.replicas.halve_step else _COUNTS
+        return tuple(names)
+
+    @cached_property
+    def numbers(self) -> tuple[str, ...]:
+        """Names of the columns of real numbers."""
+        return tuple(name for name, (kind, _, _) in STATISTICS.items() if kind == "float64")
+
+    @property
+    def runs_per_point(self) -> int:
+        """Runs that a point takes."""
+        return 1 if self.replicas is None else self.replicas.runs
+
+    @cached_property
+    def parameters(self) -> dict[str, Any]:
+        """Everything the numbers depend on, plain: what two maps must share to be one."""
+        setup = self.setup
+        parameters = setup.description() | {name: values.tolist() for name, values in setup.grid.axes.items()}
+        parameters |= setup.grid.scalars
+        if setup.model.beam is None:
+            parameters["natural_freq"] = [float(f"{value:.9g}") for value in setup.model.natural_freq]
+        if self.replicas is not None:
+            parameters["replicas"] = self.replicas.count
+            parameters["replica_size"] = self.replicas.size
+            parameters["replica_seed"] = self.replicas.seed
+            parameters["halve_step"] = self.replicas.halve_step
+        return parameters
+
+    @cached_property
+    def parameter_hash(self) -> str:
+        """SHA-256 of :attr:`parameters`."""
+        return parameter_hash(self.parameters)
+
+    def task_hash(self, points: Points) -> str:
+        """SHA-256 of the parameters and of the points of one task."""
+        places = {name: values.tolist() for name, values in points.items()}
+        return hashlib.sha256((self.parameter_hash + canonical_json(places)).encode()).hexdigest()
+
+    def model_hash(self) -> str:
+        """SHA-256 of the model's numbers, which may differ in their last digits between processors."""
+        model = self.setup.model
+        digest = hashlib.sha256()
+        for values in (model.mass, model.stiffness, model.omega, model.linear_modes, model.equilibrium):
+            digest.update(np.ascontiguousarray(values).tobytes())
+        return digest.hexdigest()
+
+    def compute(
+        self, points: Points, threads: int | None = None, progress: Progress | None = None
+    ) -> Columns:
+        """Integrate every run of *points*, repeats included."""
+        setup, size = self.setup, next(iter(points.values())).size
+        total = size * self.runs_per_point
+        before = 0
+
+        def report(done: int, _: int) -> None:
+            if progress is not None:
+                progress((before + done) // self.runs_per_point, size)
+
+        results = setup.march(points, threads, report)
+        if self.replicas is not None:
+            repeats = [results["response"]]
+            for start in perturbed_starts(setup.model, self.replicas, setup.side):
+                before += size
+                repeats.append(setup.march(points, threads, report, start=start)["response"])
+            if self.replicas.halve_step:
+                before = total - size
+                finer = setup.plan._replace(step=0.5 * setup.plan.step)
+                repeats.append(setup.march(points, threads, report, plan=finer)["response"])
+                results[_HALVED] = repeats[-1]
+            kinds = np.array(repeats)
+            results |= {
+                name: (kinds == kind).sum(axis=0) for name, kind in zip(_COUNTS, CLASSES, strict=True)
+            }
+        return Columns(
+            np.stack([results[name] for name in self.integers], axis=1).astype(np.int32),
+            np.stack([results[name] for name in self.numbers], axis=1).astype(np.float64),
+        )
+
+    def unfinished(self, size: int, status: RunStatus = RunStatus.NOT_RUN) -> Columns:
+        """Rows of points that were not computed: class unknown, and the status that says why."""
+        integers = np.zeros((size, len(self.integers)), dtype=np.int32)
+        integers[:, self.integers.index("response")] = ResponseClass.UNKNOWN
+        integers[:, self.integers.index("status")] = status
+        if _HALVED in self.integers:
+            integers[:, self.integers.index(_HALVED)] = ResponseClass.UNKNOWN
+        return Columns(integers, np.full((size, len(self.numbers)), np.nan))
+
+    def variables(self) -> dict[str, tuple[str, bool, dict[str, Any]]]:
+        """Kind, whether there is one value a class, and attributes of each variable of the map."""
+        variables = {name: (STATISTICS[name][0], False, variable_attributes(name)) for name in STATISTICS}
+        if self.replicas is not None:
+            labels = {"units": "1", "long_name": "share of the runs of a point, by response class"}
+            variables["class_share"] = ("float64", True, labels)
+            if self.replicas.halve_step:
+                labels = {"units": "1", "long_name": "response class with the step halved"}
+                variables[_HALVED] = ("int8", False, labels | response_flags())
+        return variables
+
+    def values(self, name: str, columns: Columns) -> NDArray[Any]:
+        """One variable of the map from rows of results, shape (runs,) or (runs, classes)."""
+        if name == "class_share":
+            first = self.integers.index(_COUNTS[0])
+            counts = columns.integers[:, first : first + len(CLASSES)]
+            total = counts.sum(axis=1, keepdims=True)
+            return np.where(total > 0, counts / np.maximum(total, 1), np.nan)
+        kind = self.variables()[name][0]
+        if name in self.numbers:
+            return columns.numbers[:, self.numbers.index(name)].astype(kind)
+        return columns.integers[:, self.integers.index(name)].astype(kind)
+
+    def join(self, parts: Iterable[Columns]) -> Columns:
+        """Rows of several parts as one."""
+        whole = [self.unfinished(0), *parts]
+        return Columns(
+            np.concatenate([part.integers for part in whole]),
+            np.concatenate([part.numbers for part in whole]),
+        )

@@ -1,0 +1,333 @@
+"""A map on disk while it is computed: Zarr for the numbers, a ledger for what is done, a lock for the writer.
+
+Layout of the folder::
+
+    map.json       the parameters
+    ledger.jsonl   one record a finished task, written after its data and synced
+    lock           held while a process writes
+    runs.zarr/     a group a stage; in it ``integers`` and ``numbers``, a row a run, a chunk a task
+
+What is done is read from the ledger and the hash of the data, never from the data's fill values.
+"""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections import Counter
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+
+from snapbeam.core.provenance import __version__, canonical_json, parameter_hash
+from snapbeam.core.validate import InputError, integer
+from snapbeam.sweeps.compute.task import Columns, Recipe
+from snapbeam.sweeps.compute.tasks import Stage, chunk_size
+from snapbeam.sweeps.keep.durable import StoreError, StoreLock, durable_write, member, refuse_links
+from snapbeam.sweeps.keep.ledger import Ledger, Record
+
+__all__ = ["MapStore", "processor_name", "read_stored_config"]
+
+_FORMAT = {"format": "snapbeam map", "format_version": 1}
+_DATA = "runs.zarr"
+_TABLES = ("integers", "numbers")
+_KNOWN = {"map.json", "ledger.jsonl", "lock", _DATA}
+
+
+def processor_name() -> str:
+    """The type of the processor that compiled code is made for; results are bit-identical on one type."""
+    from llvmlite import binding
+
+    return str(binding.get_host_cpu_name())
+
+
+class MapStore:
+    """The store of one map, open for writing.  Use it as a context manager: it holds the store's lock.
+
+    Parameters
+    ----------
+    path : path
+        Folder of the store; made if it is not there, in a folder that is.
+    recipe : Recipe
+        What is computed.
+    chunk : int, optional
+        Points of a task of a new store.
+    config : dict, optional
+        The parameter file that made the map, kept so that it can be resumed without it.
+
+    Raises
+    ------
+    InputError
+        If the folder is no store, holds links, or holds a map of other parameters (the differences are
+        listed).
+    StoreError
+        If another process writes it, or its description is damaged.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        recipe: Recipe,
+        chunk: int | None = None,
+        config: dict[str, Any] | None = None,
+    ) -> None:
+        self.path = _store_folder(path)
+        self.recipe = recipe
+        if chunk is not None:
+            chunk = integer("chunk", chunk, 1, 10**7)
+        self.path.mkdir(exist_ok=True)
+        refuse_links(self.path)
+        self._lock = StoreLock(self.path / "lock").__enter__()
+        try:
+            self.chunk = self._describe(chunk, config)
+            self.ledger = Ledger(self.path / "ledger.jsonl")
+        except BaseException:
+            self.close()
+            raise
+        self.damaged: list[tuple[str, int]] = []
+        """Tasks whose data did not match the ledger when this store was opened."""
+        self._arrays: dict[str, Any] = {}
+        self._processor = processor_name()
+        self._model = recipe.model_hash()
+        self._warn_of_mixture()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let another process write the store."""
+        self._lock.__exit__(None, None, None)
+
+    def _describe(self, chunk: int | None, config: dict[str, Any] | None) -> int:
+        file = self.path / "map.json"
+        wanted = json.loads(canonical_json(self.recipe.parameters))
+        if file.exists():
+            held = _read_description(file)
+            _refuse_other(self.path, held["parameters"], wanted)
+            return int(held["chunk"])
+        if any(entry.name not in _KNOWN for entry in self.path.iterdir()):
+            raise InputError(f"store = {str(self.path)!r}: is not empty and holds no map")
+        setup = self.recipe.setup
+        chunk = chunk_size(setup.grid.size, setup.engine) if chunk is None else chunk
+        held = _FORMAT | {"parameters": wanted, "parameter_hash": parameter_hash(wanted), "chunk": chunk}
+        if config is not None:
+            held["config"] = config
+        durable_write(file, (json.dumps(held, indent=1) + "\n").encode())
+        return chunk
+
+    def _warn_of_mixture(self) -> None:
+        for record in self.ledger.records.values():
+            if record.state == "done" and (record.version, record.processor, record.model) != (
+                __version__,
+                self._processor,
+                self._model,
+            ):
+                warnings.warn(
+                    f"the store was begun with snapbeam {record.version} on a {record.processor} processor "
+                    f"and goes on with snapbeam {__version__} on {self._processor}: its points are equal to "
+                    "rounding, not bit for bit",
+                    stacklevel=4,
+                )
+                return
+
+    def open_stage(self, stage: Stage) -> None:
+        """Check every finished task of a stage against the ledger, and drop those that are damaged."""
+        from snapbeam.sweeps.keep.tables import open_tables
+
+        member(stage.name)
+        self._arrays[stage.name] = open_tables(self.path / _DATA, stage, self.recipe)
+        for task in range(stage.tasks):
+            record = self.ledger.records.get((stage.name, task))
+            if record is None or record.state != "done":
+                continue
+            if (
+                record.parameters != self.recipe.task_hash(stage.points(task))
+                or self._load(stage, task) is None
+            ):
+                del self.ledger.records[stage.name, task]
+                self.damaged.append((stage.name, task))
+
+    def pending(self, stage: Stage) -> list[int]:
+        """Tasks of a stage that are not done, those that failed included."""
+        records = self.ledger.records
+        return [
+            task
+            for task in range(stage.tasks)
+            if (record := records.get((stage.name, task))) is None or record.state != "done"
+        ]
+
+    def damaged_in(self, stage: Stage) -> list[int]:
+        """Tasks of a stage that were found damaged when it was opened."""
+        return [task for name, task in self.damaged if name == stage.name]
+
+    def commit(self, stage: Stage, task: int, columns: Columns, processor: str = "") -> None:
+        """Write the results of a task, have them on the disk, and then say in the ledger that it is done."""
+        start, stop = stage.bounds(task)
+        if any(len(table) != stop - start for table in columns):
+            raise StoreError(
+                f"task {task} of stage {stage.name}: {len(columns.integers)} rows, not {stop - start}"
+            )
+        try:
+            for name, table in zip(_TABLES, columns, strict=True):
+                self._arrays[stage.name][name][start:stop] = table
+            self._record(stage, task, "done", columns.content_hash(), processor)
+        except OSError as error:
+            raise self._cannot_write(error) from error
+
+    def fail(self, stage: Stage, task: int, reason: str) -> None:
+        """Say in the ledger that a task could not be computed, and why."""
+        try:
+            self._record(stage, task, "failed", reason, "")
+        except OSError as error:
+            raise self._cannot_write(error) from error
+
+    def _record(self, stage: Stage, task: int, state: str, content: str, processor: str) -> None:
+        setup = self.recipe.setup
+        self.ledger.write(
+            Record(
+                stage=stage.name,
+                task=task,
+                state=state,
+                parameters=self.recipe.task_hash(stage.points(task)),
+                content=content,
+                engine=setup.engine,
+                version=__version__,
+                step=setup.plan.step,
+                processor=processor or self._processor,
+                model=self._model,
+            )
+        )
+
+    def _cannot_write(self, error: OSError) -> StoreError:
+        return StoreError(
+            f"store = {str(self.path)!r}: cannot be written, {error.strerror or error}; no finished task is "
+            "lost: make room and give the same command again"
+        )
+
+    def _load(self, stage: Stage, task: int) -> Columns | None:
+        """The results of a finished task, or None if they are not what the ledger says."""
+        start, stop = stage.bounds(task)
+        try:
+            columns = Columns(*(np.asarray(self._arrays[stage.name][name][start:stop]) for name in _TABLES))
+        except Exception:  # whatever a codec makes of damaged bytes
+            return None
+        return columns if columns.content_hash() == self.ledger.records[stage.name, task].content else None
+
+    def reader(self, stage: Stage) -> StoredResults:
+        """The results of a stage, read as they are asked for."""
+        return StoredResults(self, stage)
+
+    def made_with(self) -> dict[str, str]:
+        """Attributes that say what computed the finished tasks, and how far their numbers can be trusted."""
+        done = [record for record in self.ledger.records.values() if record.state == "done"]
+        kinds = Counter((record.engine, record.version, record.processor, record.model) for record in done)
+        made = "; ".join(
+            f"{count} tasks by engine {engine}, snapbeam {version}, processor {processor}"
+            for (engine, version, processor, _), count in kinds.items()
+        )
+        same = (
+            "bit for bit, whatever the tasks, their order, the threads, the workers and the interruptions"
+            if len(kinds) <= 1
+            else "to rounding: more than one engine, version or type of processor took part"
+        )
+        failed = [record for record in self.ledger.records.values() if record.state == "failed"]
+        attrs = {"computed_by": made, "reproducible": same}
+        if failed:
+            attrs["failed_tasks"] = "; ".join(f"{r.stage} {r.task}: {r.content}" for r in failed)
+        return attrs
+
+
+class StoredResults:
+    """Rows of a stage, read from its store; what is not done is unknown, with the status NOT_RUN."""
+
+    def __init__(self, store: MapStore, stage: Stage) -> None:
+        self.store = store
+        self.stage = stage
+
+    def read(self, start: int, stop: int) -> Columns:
+        """Rows *start* to *stop*, each task checked against the ledger again."""
+        store, stage, parts = self.store, self.stage, []
+        for task in range(start // stage.chunk, -(-stop // stage.chunk)):
+            first, last = stage.bounds(task)
+            record = store.ledger.records.get((stage.name, task))
+            if record is not None and record.state == "done":
+                columns = store._load(stage, task)
+                if columns is None:
+                    raise StoreError(
+                        f"store = {str(store.path)!r}: task {task} of stage {stage.name} was damaged after "
+                        "it was checked; give the same command again to repair it"
+                    )
+            else:
+                columns = store.recipe.unfinished(last - first)
+            cut = slice(max(start - first, 0), min(stop, last) - first)
+            parts.append(Columns(columns.integers[cut], columns.numbers[cut]))
+        return store.recipe.join(parts)
+
+
+def _store_folder(path: str | Path) -> Path:
+    if not isinstance(path, (str, Path)):
+        raise InputError(f"store = {path!r}: must be a folder")
+    folder = Path(path)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"store = {str(path)!r}: must be a folder, not a file")
+    if not folder.parent.is_dir():
+        raise InputError(f"store = {str(path)!r}: {str(folder.parent)!r} is not an existing folder")
+    return folder
+
+
+def _read_description(file: Path) -> dict[str, Any]:
+    damaged = StoreError(
+        f"store = {str(file.parent)!r}: map.json is damaged; put it back from a copy, or start another store"
+    )
+    try:
+        held = json.loads(file.read_bytes())
+        sound = (
+            isinstance(held, dict)
+            and isinstance(held["parameters"], dict)
+            and held["parameter_hash"] == parameter_hash(held["parameters"])
+            and isinstance(held["chunk"], int)
+            and held["chunk"] >= 1
+        )
+    except (ValueError, KeyError):
+        raise damaged from None
+    if not sound:
+        raise damaged
+    if {key: held.get(key) for key in _FORMAT} != _FORMAT:
+        raise InputError(
+            f"store = {str(file.parent)!r}: was written in another format ({held.get('format_version')})"
+        )
+    return held
+
+
+def read_stored_config(path: str | Path) -> dict[str, Any] | None:
+    """The parameter file a store keeps, as nested plain values; None if there is none."""
+    file = _store_folder(path) / "map.json"
+    if not file.exists():
+        return None
+    if file.is_symlink():
+        raise InputError(f"store = {str(path)!r}: 'map.json' is a link or no plain file")
+    config = _read_description(file).get("config")
+    return config if isinstance(config, dict) else None
+
+
+def _refuse_other(path: Path, held: dict[str, Any], wanted: dict[str, Any]) -> None:
+    lines = [
+        f"  {name}: {_brief(held.get(name))} in the store, {_brief(wanted.get(name))} asked for"
+        for name in sorted(held.keys() | wanted.keys())
+        if held.get(name) != wanted.get(name)
+    ]
+    if lines:
+        raise InputError(f"store = {str(path)!r}: holds a map of other parameters\n" + "\n".join(lines))
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, list) and len(value) > 4:
+        return f"{len(value)} points from {value[0]:g} to {value[-1]:g}"
+    return "nothing" if value is None else f"{value!r}"

@@ -1,0 +1,77 @@
+"""How sure is a point: repeats of every run with slightly different starts and with a finer step.
+
+Where neighbouring starts give different classes, the class is a matter of chance; where they agree, it
+is a property of the system.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from snapbeam.core.validate import InputError, integer, positive
+from snapbeam.engines.ensemble import Start
+from snapbeam.model.reduction import ReducedModel
+
+__all__ = ["MEASURING_ERROR", "Replicas", "perturbed_starts"]
+
+MEASURING_ERROR = 12e-6 / 12.0**0.5
+"""Error of a position read to one pixel of the paper's camera, 12 um: the rms of rounding to a pixel, m."""
+
+
+@dataclass(frozen=True)
+class Replicas:
+    """Repeats of every point of a map.
+
+    Attributes
+    ----------
+    count : int
+        Repeats with a changed start, beside the run from rest.
+    size : float
+        Root mean square of the change of the centre displacement, m.
+    halve_step : bool
+        One repeat more, from rest with every step halved.
+    seed : int
+        Chooses the changes.
+    """
+
+    count: int
+    size: float = MEASURING_ERROR
+    halve_step: bool = False
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        integer("replicas", self.count, 0, 10_000)
+        positive("replica_size", self.size, "m")
+        integer("replica_seed", self.seed, 0, 2**63 - 1)
+        if self.count == 0 and not self.halve_step:
+            raise InputError("replicas = 0: must be at least 1, or with the step halved")
+
+    @property
+    def runs(self) -> int:
+        """Runs of each point, the one from rest included."""
+        return 1 + self.count + int(self.halve_step)
+
+
+def perturbed_starts(model: ReducedModel, replicas: Replicas, side: str) -> list[Start]:
+    """Starts of a beam that still rings faintly in all its modes, the same for every point of a map.
+
+    Each linear mode gets a normally distributed displacement and velocity of equal mean energy,
+    q_j ~ N(0, s/omega_j) and q_j' ~ N(0, s), with s such that the displacement of the centre has the
+    root mean square asked for.
+    """
+    sign = 1.0 if side == "below" else -1.0
+    moving = model.omega > 0.0
+    per_unit = np.where(moving, 1.0 / np.where(moving, model.omega, 1.0), 0.0)
+    reach = float(np.sqrt(np.sum(((model.center_shape @ model.linear_modes) * per_unit) ** 2)))
+    if reach == 0.0:
+        raise InputError("replicas: no mode moves the centre, so its start cannot be changed")
+    speed = replicas.size / reach
+    starts = []
+    for repeat in range(replicas.count):
+        generator = np.random.Generator(np.random.Philox(key=[replicas.seed, repeat]))
+        q, velocity = generator.standard_normal((2, model.modes)) * speed
+        alpha = model.equilibrium + model.linear_modes @ (q * per_unit)
+        starts.append(Start(sign * alpha, sign * (model.linear_modes @ velocity)))
+    return starts

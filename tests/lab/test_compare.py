@@ -1,0 +1,210 @@
+"""Measured dots on a map, and a measured run beside a simulated one."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from snapbeam.cli.calibrate import calibrate
+from snapbeam.cli.compare import compare
+from snapbeam.cli.identify import identify
+from snapbeam.cli.vibrometer import vibrometer
+from snapbeam.core.codes import ResponseClass
+from snapbeam.core.validate import InputError
+from snapbeam.figures.compare import plot_dot_comparison, plot_waveform_comparison
+from snapbeam.lab.compare.dots import Dots
+from snapbeam.lab.compare.maps import compare_dots
+from snapbeam.lab.compare.waveforms import compare_waveforms
+from snapbeam.lab.signals.files import write_signal
+from snapbeam.lab.signals.signal import make_signal
+from snapbeam.runs.schema import trajectory_dataset
+
+
+def dots_of(dataset, count: int = 200, seed: int = 0):
+    """Dots that agree with a map, a little off its points."""
+    rng = np.random.default_rng(seed)
+    ratio, velocity = dataset["frequency_ratio"].values, dataset["velocity_amplitude"].values
+    i, j = rng.integers(0, ratio.size, count), rng.integers(0, velocity.size, count)
+    off = rng.uniform(-0.3, 0.3, (2, count))
+    return Dots(
+        ratio[i] + off[0] * (ratio[1] - ratio[0]),
+        velocity[j] + off[1] * (velocity[1] - velocity[0]),
+        np.full(count, 1.0 / 2.1),
+        dataset["response"].values[i, j].astype(np.int8),
+    )
+
+
+def test_dots_from_the_map_agree_with_it(synthetic_map):
+    found = compare_dots(dots_of(synthetic_map), synthetic_map)
+    assert found.agreement == 1.0 and found.snap_agreement == 1.0
+    assert found.used == 200 - int((found.table["measured"] == -1).sum())
+    assert np.trace(found.confusion) == found.used
+    low, high = found.agreement_interval
+    assert 0.97 < low < 1.0 and high == pytest.approx(1.0)
+    assert (found.table["distance"].values[found.table["used"] == 1] == 0.0).all()
+
+
+def test_the_confusion_table_counts_every_swap(synthetic_map):
+    dots = dots_of(synthetic_map)
+    swapped = dots.response.copy()
+    at = np.flatnonzero(swapped == ResponseClass.TRANSIENT_2)[:7]
+    swapped[at] = ResponseClass.INTRAWELL
+    found = compare_dots(
+        Dots(dots.frequency_ratio, dots.velocity_amplitude, dots.location, swapped), synthetic_map
+    )
+    assert found.confusion[ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_2] == 7
+    assert found.agreement == pytest.approx(1.0 - 7.0 / found.used)
+    assert found.snap_agreement == pytest.approx(1.0 - 7.0 / found.used)
+    assert (found.table["distance"].values[at] >= 1.0).all()
+
+
+def test_dots_that_do_not_belong_are_left_out_and_said(synthetic_map):
+    dots = Dots(
+        np.array([1.0, 9.0, 1.0, 1.0, 1.0]),
+        np.array([0.05, 0.05, 0.9, 0.05, 0.05]),
+        np.array([0.476, 0.476, 0.476, 0.3, np.nan]),
+        np.array([0, 0, 0, 0, -1], dtype=np.int8),
+    )
+    found = compare_dots(dots, synthetic_map)
+    assert found.table["used"].values.tolist() == [1, 0, 0, 0, 0]
+    assert len(found.notes) == 3 and "2 of 5" in found.notes[0]
+    empty = compare_dots(Dots(*(np.empty(0),) * 3, np.empty(0, dtype=np.int8)), synthetic_map)
+    assert empty.used == 0 and np.isnan(empty.agreement)
+    with pytest.raises(InputError, match="map"):
+        compare_dots(dots, synthetic_map.drop_vars("response"))
+
+
+def measured_of(run, freq: float = 100.0, start: float = 0.0123, noise: float = 0.01, rate: float = 1e4):
+    """What a camera would have kept of a run that began at *start*."""
+    time = np.arange(int((start + float(run["time"][-1])) * rate)) / rate
+    rng = np.random.default_rng(0)
+    rest = np.clip(time - start, 0.0, None)
+    values = {
+        name: np.interp(rest, run["time"], run[name]) + noise * rng.standard_normal(time.size)
+        for name in ("displacement", "shaker_displacement")
+    }
+    return trajectory_dataset(time, **values)
+
+
+def test_a_run_is_put_beside_itself(synthetic_run):
+    seen = measured_of(synthetic_run)
+    found = compare_waveforms(
+        seen, synthetic_run, 100.0, start=0.0121,
+        measured_onsets=[0.0123 + 0.031], simulated_onsets=[0.031],
+    )  # fmt: skip
+    assert found.shift == pytest.approx(-0.02, abs=0.002)  # the start was said 0.02 cycles early
+    assert found.measured_impacts[0] == pytest.approx(found.simulated_impacts[0], abs=0.01)
+    assert found.rms_difference < 0.02 and found.correlation > 0.98
+    assert found.shaker_rms_difference == pytest.approx(0.01, rel=0.3)
+    assert found.amplitude_ratio == pytest.approx(1.0, abs=0.01)
+    peak = int(np.argmax(found.spectra["measured_displacement"].values))
+    assert found.spectra["frequency_ratio"].values[peak] == pytest.approx(1.0, abs=0.1)
+
+
+def test_dropouts_stay_dropouts(synthetic_run):
+    seen = measured_of(synthetic_run)
+    valid = np.ones(seen.sizes["time"], dtype=np.int8)
+    valid[300:320] = 0
+    seen["valid"] = ("time", valid, {"units": "1"})
+    seen["displacement"].values[300:320] = np.nan
+    found = compare_waveforms(seen, synthetic_run, 100.0, start=0.0123)
+    hidden = np.isnan(found.waveforms["measured_displacement"].values)
+    assert 15 <= hidden.sum() <= 25 and np.isfinite(found.rms_difference)
+    assert np.isfinite(found.spectra["measured_displacement"].values).all()
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"frequency": None}, "frequency"),
+        ({"cycles": (3.0, 4.0)}, "at least 2"),
+        ({"start": 5.0}, "64 samples"),
+        ({"frequency": -1.0}, "frequency"),
+    ],
+)
+def test_runs_that_cannot_be_compared(synthetic_run, change, word):
+    with pytest.raises(InputError, match=word):
+        compare_waveforms(measured_of(synthetic_run), synthetic_run, **{"frequency": 100.0, **change})
+    with pytest.raises(InputError, match="measured: run without shaker_displacement"):
+        compare_waveforms(synthetic_run.drop_vars("shaker_displacement"), synthetic_run)
+
+
+def test_pictures(synthetic_map, synthetic_run):
+    import matplotlib.pyplot as plt
+
+    dots = dots_of(synthetic_map, 40)
+    figure = plot_dot_comparison(synthetic_map, dots, compare_dots(dots, synthetic_map))
+    assert "agree" in figure.axes[1].get_title(loc="left")
+    runs = plot_waveform_comparison(
+        compare_waveforms(measured_of(synthetic_run), synthetic_run, 100.0, start=0.0123), (0.0, 5.0)
+    )
+    assert [ax.get_title(loc="left") for ax in runs.axes[:2]] == ["measured", "simulated"]
+    plt.close("all")
+
+
+# --- the commands -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def program():
+    app = typer.Typer()
+    for command in (vibrometer, identify, calibrate, compare):
+        app.command(command.__name__)(command)
+
+    def call(*arguments):
+        return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+    return call
+
+
+def test_commands_of_signals(program, tmp_path):
+    rng, time = np.random.default_rng(0), np.arange(8000) / 1e4
+    drive = np.where(time > 0.05, 0.03 * np.cos(2.0 * np.pi * 100.0 * (time - 0.05)), 0.0)
+    path = write_signal(tmp_path / "v.csv", make_signal(drive + 1e-3 * rng.standard_normal(8000), "m/s", 1e4))
+    told = program("vibrometer", path, "--plot", tmp_path / "v.png", "--json", tmp_path / "v.json",
+                   "--drive-output", tmp_path / "drive.nc")  # fmt: skip
+    assert told.exit_code == 0, told.output
+    report = json.loads((tmp_path / "v.json").read_text())
+    assert report["accepted"] is True and report["frequency_hz"] == pytest.approx(100.0, abs=0.01)
+    assert (tmp_path / "v.png").stat().st_size > 10_000 and (tmp_path / "drive.nc").exists()
+
+    decay = 1e-4 * np.exp(-2.5 * time) * np.cos(2.0 * np.pi * 81.0 * time) + 1e-6 * rng.standard_normal(8000)
+    path = write_signal(tmp_path / "d.uff", make_signal(decay, "m", 1e4))
+    told = program("identify", path, "--method", "all", "--json", tmp_path / "d.json")
+    assert told.exit_code == 0, told.output
+    report = json.loads((tmp_path / "d.json").read_text())
+    for method in ("fit", "hilbert", "log_decrement"):
+        assert report[method]["modes"][0]["natural_freq"] == pytest.approx(81.0, rel=5e-4)
+    assert program("identify", tmp_path / "none.csv").exit_code == 2
+
+
+def test_command_of_calibration(program, tmp_path):
+    told = program("calibrate", "--straight", "80,221", "--lower-well", "81.3", "--upper-well", "80.5",
+                   "-o", tmp_path / "beam.toml", "--json", tmp_path / "c.json")  # fmt: skip
+    assert told.exit_code == 0, told.output
+    assert "outside the symmetric model" in told.output
+    values = json.loads((tmp_path / "c.json").read_text())["values"]
+    assert values["buckling_level"] == pytest.approx(0.331e-3, abs=0.0005e-3)
+    assert program("calibrate").exit_code == 2
+    assert program("calibrate", "--straight", "80,x").exit_code == 2
+
+
+def test_command_of_comparison(program, tmp_path, synthetic_map, synthetic_run):
+    synthetic_map.to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
+    synthetic_run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
+    (tmp_path / "t.csv").write_text(
+        "frequency_hz,velocity_m_s,location,response\n80,0.002,0.476,intrawell\n100,0.08,0.476,transient 2\n"
+    )
+    told = program("compare", tmp_path / "t.csv", tmp_path / "map.nc", "--json", tmp_path / "t.json")
+    assert told.exit_code == 0, told.output
+    assert json.loads((tmp_path / "t.json").read_text())["used"] == 2
+    told = program("compare", tmp_path / "run.nc", tmp_path / "run.nc", "--json", tmp_path / "r.json")
+    assert told.exit_code == 0, told.output
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert report["rms_difference_b"] == 0.0
+    assert "too short to tell" in report["reasons"][0] and report["measured_response"] == "unknown"
+    assert program("compare", tmp_path / "t.csv", tmp_path / "t.csv").exit_code == 2

@@ -1,0 +1,80 @@
+"""Sub-pixel edges: no bias, near the bound, and honest about what it did not find."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from snapbeam.lab.tracking.edges import edge_profile, fit_edges, fit_line, masked_median, width_calibration
+
+OFFSETS = np.arange(13) - 6.0
+
+
+def test_the_profile_is_the_mean_over_a_pixel_of_the_blurred_step():
+    from scipy.integrate import quad
+    from scipy.special import ndtr
+
+    for offset in (-2.0, -0.3, 0.0, 0.8):
+        mean, _ = quad(lambda v: ndtr(v / 0.7), offset - 0.5, offset + 0.5)
+        assert edge_profile(np.array([offset]), 0.7)[0] == pytest.approx(mean, abs=1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    position=st.floats(-3.0, 3.0),
+    width=st.floats(0.3, 2.0),
+    base=st.floats(-100.0, 4000.0),
+    contrast=st.floats(1.0, 4000.0),
+    sign=st.sampled_from([-1.0, 1.0]),
+)
+def test_without_noise_the_edge_is_found_exactly(position, width, base, contrast, sign):
+    window = base + sign * contrast * edge_profile(OFFSETS - position, width)
+    fit = fit_edges(window[None], width, sign=sign, iterations=8)
+    assert fit.position[0] == pytest.approx(position, abs=1e-4)
+    assert fit.contrast[0] == pytest.approx(contrast, rel=1e-4)
+    assert fit_edges(window[None], width, sign=-sign).position[0] != pytest.approx(position, abs=0.05)
+
+
+@pytest.mark.parametrize("noise", [10 ** (-30 / 20), 10 ** (-15 / 20)])
+def test_bias_and_scatter_in_noise(noise):
+    rng = np.random.default_rng(3)
+    truth = rng.uniform(-0.5, 0.5, 20_000)
+    windows = edge_profile(OFFSETS - truth[:, None], 0.8) + noise * rng.standard_normal((20_000, 13))
+    miss = fit_edges(windows, 0.8).position - truth
+    bound = noise * np.sqrt(2.0 * np.sqrt(np.pi) * np.hypot(0.8, 12**-0.5))
+    assert abs(np.nanmean(miss)) < 4.0 * bound / np.sqrt(truth.size) + 0.003
+    assert np.nanstd(miss) < 1.3 * bound
+    assert np.isnan(miss).mean() < 0.001
+
+
+def test_a_window_without_an_edge_gives_no_position():
+    flat = np.full((1, 13), 7.0)
+    falling = -edge_profile(OFFSETS, 0.8)[None]
+    assert np.isnan(fit_edges(flat, 0.8).position[0])
+    assert np.isnan(fit_edges(falling, 0.8).position[0])
+
+
+def test_width_is_recovered_through_the_calibration():
+    table = width_calibration(0.8, 13)
+    for width in (0.5, 0.8, 1.5, 3.0):
+        apparent = fit_edges(edge_profile(OFFSETS - 0.2, width)[None], 0.8).width
+        assert np.interp(apparent, *table)[0] == pytest.approx(width, rel=0.1)
+
+
+def test_a_line_ignores_a_minority_of_bad_columns():
+    x = np.arange(-10.0, 11.0)
+    y = np.tile(5.0 + 0.1 * x, (2, 1))
+    y[0, [2, 3, 17]] += 8.0
+    value, error, slope, kept = fit_line(x, y, np.ones_like(y, bool), 1.5)
+    np.testing.assert_allclose(value, 5.0, atol=1e-9)
+    np.testing.assert_allclose(slope, 0.1, atol=1e-9)
+    assert kept[0].sum() == 18 and kept[1].all() and (error < 1e-6).all()
+    assert np.isnan(fit_line(x, y, np.zeros_like(y, bool), 1.5)[0]).all()
+
+
+def test_masked_median_agrees_with_numpy():
+    rng = np.random.default_rng(0)
+    values, kept = rng.standard_normal((30, 9)), rng.random((30, 9)) < 0.6
+    kept[0] = False
+    expected = [np.median(row[use]) if use.any() else np.nan for row, use in zip(values, kept, strict=True)]
+    np.testing.assert_allclose(masked_median(values, kept), expected)

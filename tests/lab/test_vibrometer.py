@@ -1,0 +1,213 @@
+"""The shaker's measured motion: sine fit, start-up, integration, alignment, drive for the model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from snapbeam.core.validate import InputError
+from snapbeam.lab.drive.align import align
+from snapbeam.lab.drive.record import recorded_drive
+from snapbeam.lab.drive.vibrometer import displacement_from_velocity, measure_drive
+from snapbeam.lab.signals.signal import Samples, make_signal
+from snapbeam.lab.signals.sine_fit import fit_sine, spectral_peak
+
+V, ONSET, TAU = 0.03, 0.0504, 0.015
+
+
+def shaker(time, freq: float = 100.0, over: float = 0.3):
+    """Displacement and velocity of a shaker that starts at ONSET, *over* times above its steady motion."""
+    s = np.clip(time - ONSET, 0.0, None)
+    w, swell = 2.0 * np.pi * freq, 1.0 + over * np.exp(-s / TAU)
+    x = V / w * np.sin(w * s) * swell
+    v = V * np.cos(w * s) * swell - V / w * np.sin(w * s) * over / TAU * np.exp(-s / TAU)
+    return x, np.where(time >= ONSET, v, 0.0)
+
+
+def record(snr: float = 25.0, freq: float = 100.0, over: float = 0.3, cycles: int = 100, rate=2e4, seed=0):
+    time = np.arange(int((0.1 + cycles / freq) * rate)) / rate
+    x, v = shaker(time, freq, over)
+    noise = V / np.sqrt(2.0) * 10.0 ** (-snr / 20.0)
+    noisy = v + 1e-3 + noise * np.random.default_rng(seed).standard_normal(time.size)
+    return make_signal(noisy, "m/s", rate, name="velocity"), x
+
+
+def test_sine_fit_is_exact_without_noise():
+    time = 0.37 + np.arange(1500) / 1e4
+    y = 0.1 + 0.03 * np.cos(2.0 * np.pi * 99.3 * time + 1.1) + 0.001 * np.cos(4.0 * np.pi * 99.3 * time)
+    fit = fit_sine(Samples(y, time, 1e4))
+    assert fit.frequency == pytest.approx(99.3, rel=1e-11)
+    assert fit.amplitude == pytest.approx(0.03, rel=1e-10)
+    assert fit.phase == pytest.approx(1.1, abs=1e-8)
+    assert fit.offset == pytest.approx(0.1, rel=1e-10)
+    assert fit.distortion == pytest.approx(1.0 / 30.0, rel=1e-8)
+    np.testing.assert_allclose(fit.waveform(time), y, atol=1e-10)
+
+
+def test_standard_errors_of_the_sine_fit_cover_the_truth():
+    rng, time = np.random.default_rng(1), 0.37 + np.arange(1500) / 1e4
+    truth = 0.1 + 0.03 * np.cos(2.0 * np.pi * 99.3 * time + 1.1)
+    scores = []
+    for _ in range(150):
+        fit = fit_sine(Samples(truth + 0.004 * rng.standard_normal(1500), time, 1e4), 99.0, 3)
+        turn = np.angle(np.exp(1j * (fit.phase - 1.1)))
+        scores.append(
+            [
+                (fit.amplitude - 0.03) / fit.amplitude_se,
+                (fit.frequency - 99.3) / fit.frequency_se,
+                turn / fit.phase_se,
+                (fit.offset - 0.1) / fit.offset_se,
+            ]
+        )
+    spread = np.std(scores, axis=0)
+    assert (np.mean(np.abs(scores) < 2.0, axis=0) > 0.90).all()
+    assert (spread > 0.85).all() and (spread < 1.15).all()
+
+
+def test_snr_and_distortion_are_told_apart():
+    time = np.arange(20_000) / 2e4
+    rng = np.random.default_rng(2)
+    y = np.cos(2.0 * np.pi * 100.0 * time) + 0.1 * np.cos(2.0 * np.pi * 300.0 * time + 0.5)
+    fit = fit_sine(Samples(y + np.sqrt(0.5) * 0.1 * rng.standard_normal(time.size), time, 2e4))
+    assert fit.snr == pytest.approx(20.0, abs=0.1)
+    assert fit.distortion == pytest.approx(0.1, rel=0.02)
+    assert fit.sinad == pytest.approx(20.0 - 10.0 * np.log10(2.0), abs=0.1)
+    assert fit.distortion_floor < 0.01
+
+
+def test_the_start_is_found_and_described():
+    signal, _ = record()
+    drive = measure_drive(signal)
+    start = drive.startup
+    assert start.onset == pytest.approx(ONSET, abs=2e-4)
+    assert abs(start.onset - ONSET) <= 2.0 * start.onset_uncertainty
+    assert start.cycles in (2.0, 3.0, 4.0)  # 0.3 exp(-t/15 ms) falls below 5 % after 27 ms
+    assert start.first_cycle_ratio == pytest.approx(1.22, abs=0.02)  # mean of the swell over one cycle
+    assert start.overshoot == pytest.approx(0.22, abs=0.02)
+    assert drive.steady.amplitude == pytest.approx(V, rel=1e-3)
+    assert drive.steady.frequency == pytest.approx(100.0, abs=3.0 * drive.steady.frequency_se)
+    assert drive.accepted and drive.steady.snr == pytest.approx(25.0, abs=0.2)
+    assert "overshoot" in start.description and drive.summary()["accepted"] is True
+
+
+@pytest.mark.parametrize("ramp", [0.0, 0.01])
+def test_the_start_of_a_record_without_noise(ramp):
+    """Sums as large as one over the square of no noise must not hide where the motion begins."""
+    time = np.arange(0.0, 0.5, 5e-5)
+    moving = np.clip(time - 0.1003, 0.0, None)
+    swell = 1.0 - np.exp(-moving / ramp) if ramp else 1.0
+    signal = make_signal(0.1 * swell * np.sin(2.0 * np.pi * 100.0 * moving), "m/s", 20_000.0)
+    start = measure_drive(signal).startup
+    assert abs(start.onset - 0.1003) <= 2.0 * start.onset_uncertainty
+
+
+def test_a_steady_start_and_a_start_outside_the_record():
+    prompt = measure_drive(record(over=0.0)[0]).startup
+    assert prompt.duration == 0.0 and prompt.overshoot == 0.0 and "at once" in prompt.description
+    running = measure_drive(record()[0].isel(time=slice(3000, None)))
+    assert running.startup is None and "in motion" in running.summary()["startup"]
+
+
+@pytest.mark.parametrize(("snr", "accepted"), [(14.0, False), (16.0, True)])
+def test_fifteen_decibels_decide(snr, accepted):
+    drive = measure_drive(record(snr=snr)[0])
+    assert drive.accepted is accepted
+    assert any("noise" in note for note in drive.notes) is not accepted
+
+
+def test_distortion_alone_refuses_a_test():
+    time = np.arange(20_000) / 2e4
+    y = 0.03 * (np.cos(2.0 * np.pi * 100.0 * time) + 0.25 * np.cos(2.0 * np.pi * 200.0 * time))
+    drive = measure_drive(make_signal(y, "m/s", 2e4))
+    assert not drive.accepted and "distortion" in drive.notes[-1]
+    assert drive.steady.snr > 60.0
+
+
+@pytest.mark.parametrize(("snr", "share"), [(60.0, 0.003), (25.0, 0.02)])
+def test_integration_does_not_drift(snr, share):
+    signal, truth = record(snr=snr, cycles=200)
+    found = displacement_from_velocity(signal)
+    size = V / (2.0 * np.pi * 100.0)
+    error = (found.values - truth) / size
+    assert found.attrs["units"] == "m"
+    assert np.std(error) < share and np.abs(error).max() < 8.0 * share
+    late = error[-4000:]
+    assert abs(late.mean()) < share  # plain integration of the 1 mm/s offset ends 40 amplitudes away
+
+
+@pytest.mark.parametrize(
+    ("freq", "over", "polarity", "delay"),
+    [(100.0, 0.3, 1, 0.01234), (300.0, 0.0, -1, -0.0301234), (60.0, 0.3, 1, 0.1)],
+)
+def test_alignment_with_a_camera(freq, over, polarity, delay):
+    signal, _ = record(freq=freq, over=over, cycles=60)
+    time = np.arange(int((0.1 + abs(delay) + 50 / freq) * 1e4)) / 1e4
+    noise = 2e-6 * np.random.default_rng(3).standard_normal(time.size)
+    seen = make_signal(polarity * shaker(time - delay, freq, over)[0] + noise + 1e-3, "m", 1e4)
+    found = align(seen, signal)
+    assert found.certain and found.polarity == polarity
+    assert abs(found.delay - delay) < max(3.0 * found.delay_se, 1e-6)
+    assert found.delay_se < 1e-5  # a tenth of a frame
+    assert found.gain == pytest.approx(1.0, abs=0.02)
+    # with the start out of sight the cycle stays open, unless a trigger tells it
+    cut = seen.isel(time=slice(int((0.07 + max(delay, 0.0)) * 1e4), None))
+    open_cycle = align(cut, signal)
+    assert not open_cycle.certain and "whole cycles" in open_cycle.description
+    turns = (open_cycle.delay - delay) * freq * 2.0
+    assert abs(turns - round(turns)) < 0.05
+    told = align(cut, signal, polarity=polarity, near=delay + 0.2 / freq)
+    assert told.certain and abs(told.delay - delay) < 2e-5
+
+
+def test_alignment_refuses_two_motions():
+    other = make_signal(1e-4 * np.cos(2.0 * np.pi * 90.0 * np.arange(8000) / 1e4), "m", 1e4)
+    with pytest.raises(InputError, match="same motion"):
+        align(other, record()[0])
+
+
+def test_the_recorded_drive_keeps_shape_and_adds_no_energy():
+    signal, _ = record(snr=20.0, cycles=100)
+    drive = recorded_drive(signal, 1e5)
+    truth, _ = shaker(drive["time"].values + drive.attrs["source_start"])
+    size = V / (2.0 * np.pi * 100.0)
+    inner = slice(300, -300)
+    assert np.std((drive["displacement"].values - truth)[inner]) < 0.03 * size
+    measured = signal.values - 1e-3
+    assert np.mean(drive["velocity"].values ** 2) < np.mean(measured[1008:] ** 2)
+    spectrum = np.abs(np.fft.rfft(drive["velocity"].values * np.hanning(drive.sizes["time"]))) ** 2
+    freq = np.fft.rfftfreq(drive.sizes["time"], 1e-5)
+    assert spectrum[freq > 1.3 * drive.attrs["bandwidth"]].sum() < 1e-5 * spectrum.sum()
+    # displacement and velocity belong together
+    slope = np.gradient(drive["displacement"].values, 1e-5)
+    assert np.abs(slope - drive["velocity"].values)[5:-5].max() < 2e-3 * V
+    assert drive["displacement"].values[0] == 0.0 and drive.attrs["begins_at_rest"] == 1
+
+
+def test_resampling_noise_free_is_faithful():
+    signal, _ = record(snr=100.0, over=0.0, cycles=60)
+    drive = recorded_drive(signal, 5e4, bandwidth=4000.0)
+    truth, _ = shaker(drive["time"].values + drive.attrs["source_start"], over=0.0)
+    error = (drive["displacement"].values - truth) / (V / (2.0 * np.pi * 100.0))
+    assert np.std(error[200:]) < 2e-3
+
+
+@pytest.mark.parametrize(
+    ("make", "word"),
+    [
+        (lambda: measure_drive(make_signal(np.zeros(4000), "m/s", 1e4)), "no oscillation"),
+        (lambda: measure_drive(make_signal(np.cos(np.arange(400) * 0.06), "m/s", 1e4)), "at least 8"),
+        (lambda: measure_drive(make_signal(np.cos(np.arange(4000)), "V", 1e4)), "must be in m/s or m"),
+        (lambda: measure_drive(np.zeros(5)), "DataArray"),
+        (lambda: measure_drive(record()[0], 2e4), "half the sampling rate"),
+        (lambda: measure_drive(record()[0], tolerance=0.7), "tolerance"),
+        (lambda: fit_sine(Samples(np.cos(np.arange(100) * 0.06), np.arange(100) / 1e4, 1e4), 95.0), "2"),
+        (lambda: recorded_drive(record()[0], 1500.0), "sampling_freq"),
+        (lambda: recorded_drive(record()[0], 1e5, bandwidth=110.0), "bandwidth"),
+        (lambda: align(record()[0], record()[0]), "units 'm/s'"),
+        (lambda: align(record()[0], record()[0], polarity=0), "polarity"),
+        (lambda: spectral_peak(Samples(np.ones(100), np.arange(100.0), 1.0)), "no oscillation"),
+    ],
+)
+def test_refusals(make, word):
+    with pytest.raises(InputError, match=word):
+        make()

@@ -1,0 +1,216 @@
+"""A map on workers that die: the same numbers, poisonous tasks set apart, nothing open to the network."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import sys
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam.core.codes import ResponseClass, RunStatus
+from snapbeam.core.validate import InputError
+from snapbeam.sweeps.compute.cluster import open_client, parse_cluster, slurm_arguments
+from snapbeam.sweeps.compute.task import Recipe
+from snapbeam.sweeps.compute.tasks import Stage
+from snapbeam.sweeps.compute.workers import ATTEMPTS, ClusterWorkers
+from snapbeam.sweeps.keep.durable import StoreError
+from snapbeam.sweeps.keep.store import MapStore
+from snapbeam.sweeps.stored import StoreBook, Tally, long_map
+from snapbeam.sweeps.sweep import map_setup
+
+CHUNK = 3  # twenty points: seven tasks
+
+
+class Trouble(Recipe):
+    """A recipe whose tasks do harm in the worker: once each, or always."""
+
+    once: ClassVar[dict] = {}
+    always: ClassVar[dict] = {}
+    marks = ""
+
+    def compute(self, points, threads=None, progress=None):
+        first = (float(points["frequency_ratio"][0]), float(points["velocity_amplitude"][0]))
+        harm = self.always.get(first)
+        mark = os.path.join(self.marks, f"{first[0]:.3f}-{first[1]:.3f}")
+        if first in self.once and not os.path.exists(mark):
+            harm = self.once[first]
+        with open(mark, "a") as stream:
+            stream.write(".")
+        if harm == "kill":
+            os.kill(os.getpid(), signal.SIGKILL)
+        elif harm == "segfault":
+            import ctypes
+
+            ctypes.string_at(0)
+        elif harm == "raise":
+            raise RuntimeError("no luck")
+        return super().compute(points, threads, progress)
+
+
+@pytest.fixture(scope="module")
+def client():
+    pytest.importorskip("distributed")
+    import cloudpickle
+
+    cloudpickle.register_pickle_by_value(sys.modules[__name__])
+    with open_client(parse_cluster("local:2")) as client:
+        yield client
+
+
+def trouble(small, folder, once=None, always=None):
+    recipe = Trouble(map_setup(**small))
+    stage = Stage("base", recipe.setup.grid, CHUNK)
+
+    def first(task):
+        points = stage.points(task)
+        return float(points["frequency_ratio"][0]), float(points["velocity_amplitude"][0])
+
+    for name, harm in (("once", once or {}), ("always", always or {})):
+        object.__setattr__(recipe, name, {first(task): kind for task, kind in harm.items()})
+    object.__setattr__(recipe, "marks", str(folder))
+    return recipe, stage
+
+
+def computed(path, recipe, stage, client):
+    tally, said = Tally(), []
+    with MapStore(path, recipe, CHUNK) as store:
+        results = StoreBook(store, ClusterWorkers(client, said.append), tally, said.append).complete(stage)
+        return results.read(0, stage.size), tally, said, store.made_with()
+
+
+def test_nothing_listens_to_the_network(client):
+    addresses = [client.scheduler.address, *client.nthreads()]
+    assert len(addresses) == 3
+    assert all(address.startswith("tcp://127.0.0.1:") for address in addresses)
+    psutil = pytest.importorskip("psutil")
+    me = psutil.Process()
+    for process in (me, *me.children(recursive=True)):
+        heard = [c.laddr.ip for c in process.net_connections("inet") if c.status == psutil.CONN_LISTEN]
+        assert set(heard) <= {"127.0.0.1"}
+
+
+def test_workers_that_are_killed_in_mid_task(tmp_path, small, whole, client):
+    """By SIGKILL and by a segmentation fault: the same numbers, to the last bit."""
+    recipe, stage = trouble(small, tmp_path, once={1: "kill", 4: "segfault"})
+    columns, tally, _, made = computed(tmp_path / "store", recipe, stage, client)
+    assert columns.content_hash() == whole.content_hash()
+    assert tally.computed == 7 and not tally.failed and "failed_tasks" not in made
+    assert sorted(len(file.read_text()) for file in tmp_path.glob("*-*")) == [1, 1, 1, 1, 1, 2, 2]
+
+
+def test_a_poisonous_task_is_set_apart(tmp_path, small, whole, client):
+    recipe, stage = trouble(small, tmp_path, always={2: "kill"}, once={5: "raise"})
+    columns, tally, said, made = computed(tmp_path / "store", recipe, stage, client)
+    assert tally.failed == [("base", 2, f"killed its worker, {ATTEMPTS} times")]
+    assert tally.computed == 6 and any("task 2 was given up" in line for line in said)
+    assert "base 2: killed its worker, 3 times" in made["failed_tasks"]
+    poisoned = slice(2 * CHUNK, 3 * CHUNK)
+    status = recipe.values("status", columns)
+    assert (status[poisoned] == RunStatus.NOT_RUN).all() and (
+        np.delete(status, np.r_[poisoned]) == RunStatus.OK
+    ).all()
+    assert (recipe.values("response", columns)[poisoned] == ResponseClass.UNKNOWN).all()
+    assert sorted(len(file.read_text()) for file in tmp_path.glob("*-*")) == [1, 1, 1, 1, 1, 2, 3]
+    tally = Tally()
+    result = long_map(**small, store=tmp_path / "store", tally=tally)  # here, and without the poison
+    assert tally.kept == 6 and tally.computed == 1
+    np.testing.assert_array_equal(result["response"].values.ravel(), Recipe.values(recipe, "response", whole))
+
+
+def test_workers_that_cannot_compute_at_all(tmp_path, small, client):
+    recipe, stage = trouble(small, tmp_path, always=dict.fromkeys(range(7), "raise"))
+    with pytest.raises(StoreError, match="cannot compute this map: a task raised RuntimeError: no luck"):
+        computed(tmp_path / "store", recipe, stage, client)
+
+
+def test_a_scheduler_that_runs_already(tmp_path, small, whole, client):
+    """The address of a scheduler, through the public function; refined as well."""
+    address = client.scheduler.address
+    result = long_map(**small, store=tmp_path / "store", cluster=address, chunk=4, refine_levels=1)
+    here = long_map(**small, refine_levels=1)
+    for name in here.data_vars:
+        np.testing.assert_array_equal(result[name], here[name])
+    assert "bit for bit" in result.attrs["reproducible"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("local", "must be local:N"),
+        ("local:0", "cluster workers = 0"),
+        ("local:two", "must be a whole number"),
+        ("10.0.0.1:8786", "must be local:N"),
+        ("http://host", "must be local:N"),
+        ("none.toml", "cannot be read"),
+    ],
+)
+def test_clusters_that_are_none(text, message):
+    with pytest.raises(InputError, match=message):
+        parse_cluster(text)
+
+
+SLURM = """[slurm]
+queue = "short"
+cores = 16
+memory = "32GB"
+walltime = "02:00:00"
+interface = "lo"
+jobs = 4
+prologue = ["module load python"]
+"""
+
+
+def test_slurm(tmp_path):
+    file = tmp_path / "slurm.toml"
+    file.write_text(SLURM)
+    cluster = parse_cluster(str(file))
+    assert cluster.kind == "slurm" and cluster.slurm["jobs"] == 4
+    jobqueue = pytest.importorskip("dask_jobqueue")
+    with jobqueue.SLURMCluster(**slurm_arguments(cluster.slurm)) as made:
+        script = made.job_script()
+        assert made.scheduler.address.startswith("tcp://127.0.0.1:")
+    for line in (
+        "#SBATCH -p short",
+        "#SBATCH --cpus-per-task=16",
+        "#SBATCH -t 02:00:00",
+        "module load python",
+    ):
+        assert line in script
+    assert "export OPENBLAS_NUM_THREADS=1" in script
+    assert re.search(r"--nthreads 16 (--nworkers 1 )?", script)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (SLURM.replace('interface = "lo"\n', ""), "interface is missing: the network that the workers reach"),
+        (SLURM.replace("cores = 16", 'cores = "16"'), r"cores = '16': must be of type int"),
+        (SLURM + "nodes = 3\n", "nodes: unknown key; must be one of account, cores"),
+        ("cores = 3\n", r"must hold one section, \[slurm\]"),
+        ("[slurm\n", "is no TOML"),
+    ],
+)
+def test_slurm_files_that_are_wrong(tmp_path, text, message):
+    file = tmp_path / "slurm.toml"
+    file.write_text(text)
+    with pytest.raises(InputError, match=message):
+        parse_cluster(str(file))
+
+
+def test_a_cluster_needs_a_store(small):
+    with pytest.raises(InputError, match="cluster: needs a store"):
+        long_map(**small, cluster="local:2")
+
+
+def test_importing_loads_no_cluster():
+    import subprocess
+
+    code = "import sys, snapbeam; print([m for m in ('dask', 'distributed', 'zarr') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+    assert callable(sb.long_map)

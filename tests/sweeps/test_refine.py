@@ -1,0 +1,152 @@
+"""Refined maps: the points where classes meet are run, the others inferred; both are said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import snapbeam as sb
+from snapbeam.core.codes import RunStatus
+from snapbeam.core.validate import InputError
+from snapbeam.sweeps.compute.task import Columns
+from snapbeam.sweeps.refine import refine, refined_grid
+from snapbeam.sweeps.stored import Tally, long_map
+from snapbeam.sweeps.sweep import Grid
+
+
+class DrawnRecipe:
+    """Classes read off a picture of them, in place of runs."""
+
+    integers, numbers = ("response", "status"), ("peak_force",)
+
+    def __init__(self, grid, classify):
+        self.setup = type("Setup", (), {"grid": grid})
+        self.classify = classify
+
+    def unfinished(self, size, status=RunStatus.NOT_RUN):
+        return Columns(np.full((size, 2), status, dtype=np.int32), np.full((size, 1), np.nan))
+
+    def values(self, name, columns):
+        return columns.integers[:, self.integers.index(name)]
+
+
+class DrawnBook:
+    """Counts what is asked for."""
+
+    def __init__(self, grid, classify):
+        self.recipe = DrawnRecipe(grid, classify)
+        self.chunk = 10
+        self.asked = []
+
+    def complete(self, stage, progress=None):
+        which = np.arange(stage.size) if stage.which is None else stage.which
+        points = stage.grid.take(which)
+        self.asked.append((stage.name, points))
+        classes = self.recipe.classify(**points)
+        rows = Columns(
+            np.stack((classes, np.zeros_like(classes)), axis=1).astype(np.int32), np.ones((stage.size, 1))
+        )
+        return type("Rows", (), {"read": lambda _, a, b: Columns(rows.integers[a:b], rows.numbers[a:b])})()
+
+
+def grid_of(across, upward, **scalars):
+    return Grid({"frequency_ratio": across, "velocity_amplitude": upward}, {"location": 0.4} | scalars)
+
+
+def truth(grid, classify):
+    return classify(**grid.take(np.arange(grid.size))).reshape(grid.shape)
+
+
+def disc(frequency_ratio, velocity_amplitude, location):
+    inside = (frequency_ratio - 1.1) ** 2 + (velocity_amplitude - 0.9) ** 2 < 0.62**2
+    return np.where(inside, 2, 0)
+
+
+def test_a_smooth_boundary_costs_its_length():
+    coarse = grid_of(np.linspace(0.0, 2.0, 11), np.linspace(0.0, 2.0, 9))
+    book = DrawnBook(coarse, disc)
+    grid, results = refine(book, 4)
+    assert grid.shape == (161, 129)
+    np.testing.assert_array_equal(results.columns.integers[:, 0].reshape(grid.shape), truth(grid, disc))
+    assert results.computed.mean() < 0.2
+    status = results.columns.integers[:, 1].reshape(grid.shape)
+    np.testing.assert_array_equal(status == RunStatus.INFERRED, ~results.computed)
+    np.testing.assert_array_equal(np.isnan(results.columns.numbers[:, 0]), ~results.computed.ravel())
+    seen = np.concatenate(
+        [np.stack([p["frequency_ratio"], p["velocity_amplitude"]], 1) for _, p in book.asked]
+    )
+    assert len(np.unique(seen, axis=0)) == len(seen) == results.computed.sum()
+
+
+def test_a_surprise_on_the_border_spreads():
+    """A tongue that enters between the corners of cells is followed as far as it is seen."""
+
+    def tongue(frequency_ratio, velocity_amplitude, location):
+        left = velocity_amplitude < 0.5
+        spike = (np.abs(velocity_amplitude - 1.25) < 0.3) & (frequency_ratio < 7.5)
+        return np.where((frequency_ratio < 1.5) & left | spike, 3, 0)
+
+    coarse = grid_of(np.arange(9.0), np.arange(0.0, 5.0, 2.0))
+    grid, results = refine(DrawnBook(coarse, tongue), 1)
+    found = results.columns.integers[:, 0].reshape(grid.shape)
+    np.testing.assert_array_equal(found, truth(grid, tongue))
+
+
+def test_axes_of_one_point_and_one_axis():
+    single = Grid({"velocity_amplitude": np.linspace(0.0, 2.0, 5)}, {"frequency_ratio": 1.1, "location": 0.4})
+    grid, results = refine(DrawnBook(single, disc), 3)
+    assert grid.shape == (33,)
+    np.testing.assert_array_equal(results.columns.integers[:, 0], truth(grid, disc))
+    assert results.computed.sum() < 16
+    flat = grid_of(np.array([1.1]), np.linspace(0.0, 2.0, 5))
+    grid, results = refine(DrawnBook(flat, disc), 2)
+    assert grid.shape == (1, 17)
+    np.testing.assert_array_equal(results.columns.integers[:, 0].reshape(grid.shape), truth(grid, disc))
+    np.testing.assert_array_equal(refined_grid(single).axes["velocity_amplitude"], np.linspace(0.0, 2.0, 9))
+
+
+def test_three_axes():
+    def ball(frequency_ratio, velocity_amplitude, location):
+        return np.where(frequency_ratio**2 + velocity_amplitude**2 + location**2 < 0.5, 1, 0)
+
+    axes = {name: np.linspace(0.0, 1.0, 5) for name in ("frequency_ratio", "velocity_amplitude", "location")}
+    grid, results = refine(DrawnBook(Grid(axes, {}), ball), 2)
+    np.testing.assert_array_equal(results.columns.integers[:, 0].reshape(grid.shape), truth(grid, ball))
+    assert results.computed.mean() < 0.6
+
+
+def test_computed_points_are_those_of_a_full_map(tmp_path, small):
+    """Bit for bit, in memory and through a store, whole, resumed and cut into other tasks."""
+    refined = long_map(**small, refine_levels=2)
+    assert dict(refined.sizes) == {"frequency_ratio": 17, "velocity_amplitude": 13}
+    computed = refined["computed"]
+    assert 0.2 < float(computed.mean()) < 1.0
+    fine = dict(small, **{name: refined[name].values for name in refined.dims})
+    full = sb.response_map(**fine)
+    for name in full.data_vars:
+        xr.testing.assert_equal(refined[name].where(computed), full[name].where(computed))
+    assert refined.attrs["points_computed"] == int(computed.sum())
+    inferred = ~computed.values
+    assert (refined["status"].values[inferred] == RunStatus.INFERRED).all()
+    assert (refined["response"].values[inferred] >= 0).all()
+    wrong = int((refined["response"] != full["response"]).sum())
+    print(f"{wrong} of {int(inferred.sum())} inferred points differ from the full map")
+    long_map(**small, store=tmp_path / "store", chunk=7)
+    tally = Tally()
+    stored = long_map(
+        **small, store=tmp_path / "store", refine_levels=2, output=tmp_path / "m.nc", tally=tally
+    )
+    xr.testing.assert_equal(stored.load(), refined)
+    assert tally.kept == 3 and tally.computed > 1
+    again = Tally()
+    long_map(**small, store=tmp_path / "store", refine_levels=2, tally=again)
+    assert again.computed == 0 and again.kept == tally.tasks
+    checked = Tally()
+    long_map(**small, store=tmp_path / "store", refine_levels=2, verify=True, tally=checked)
+    assert checked.computed == 0 and not checked.damaged and checked.missing == 0
+
+
+def test_levels_are_checked(small):
+    with pytest.raises(InputError, match="refine_levels = 11: must be an integer in"):
+        long_map(**small, refine_levels=11)

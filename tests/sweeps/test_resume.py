@@ -1,0 +1,215 @@
+"""A map that is stopped, killed or cut otherwise: no finished point is lost, and every number is the same."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+import snapbeam as sb
+from snapbeam.cli import app
+from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION
+from snapbeam.sweeps.compute.task import Recipe
+from snapbeam.sweeps.compute.tasks import Stage, chunk_size
+from snapbeam.sweeps.keep.store import MapStore
+from snapbeam.sweeps.replicas import Replicas
+from snapbeam.sweeps.stored import Tally, long_map
+from snapbeam.sweeps.sweep import map_setup
+
+HERE = Path(__file__).parent
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="kills and forks are POSIX here")
+
+
+def kill_loop(folder, kills, seed):
+    command = [sys.executable, str(HERE / "kill_driver.py"), str(folder), str(kills), str(seed)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=3600)
+    assert done.returncode == 0, done.stderr
+    seen = json.loads(done.stdout.splitlines()[-1])
+    print(seen)
+    assert seen["kills"] >= kills
+    assert {key: seen[key] for key in ("lost", "changed", "wrong", "damaged", "surplus")} == {
+        "lost": 0,
+        "changed": 0,
+        "wrong": 0,
+        "damaged": 0,
+        "surplus": 0,
+    }
+    assert seen["needed"] <= seen["begun"] <= seen["needed"] + seen["kills"]
+
+
+def test_killed_at_thirty_random_instants(tmp_path):
+    """No finished task lost or changed; none computed twice but the one in flight at a kill."""
+    kill_loop(tmp_path, 30, 1)
+
+
+@pytest.mark.slow
+def test_killed_at_two_hundred_random_instants(tmp_path):
+    kill_loop(tmp_path, 200, 2)
+
+
+def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
+    """``snapbeam map --store DIR`` of a killed command: the rest is computed, the file is the same."""
+    monkeypatch.chdir(tmp_path)
+    command = [sys.executable, "-c", "from snapbeam.cli import main; main()", "map", "--modes", "1"]
+    command += ["--cycles", "60", "--frequency-ratio", "0.5:2:8", "--velocity-amplitude", "0.05:0.6:8"]
+    command += ["--store", "store", "--chunk", "4", "--threads", "1", "--log", "map.log", "-o", "map.nc"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    ledger = tmp_path / "store" / "ledger.jsonl"
+    deadline = time.monotonic() + 300.0
+    while not ledger.exists() or ledger.read_text().count("\n") < 2:
+        assert process.poll() is None and time.monotonic() < deadline, process.stderr.read()
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    done = ledger.read_text().count("\n")
+    assert done < 16 and not (tmp_path / "map.nc").exists()
+    again = CliRunner().invoke(app, ["map", "--store", "store", "-o", "map.nc", "--log", "map.log"])
+    assert again.exit_code == 0, again.output
+    assert f"16 tasks, {done} done before, {16 - done} computed now, 0 damaged, 0 given up" in again.stdout
+    log = (tmp_path / "map.log").read_text().splitlines()
+    assert log[0].endswith("map of 64 points") and "T" in log[0].split()[0]
+    assert any(f"{4 * done} of 64 points are done" in line for line in log)
+    assert any("(100.0 %)" in line and "runs/s" in line for line in log)
+    resumed = xr.load_dataset(tmp_path / "map.nc", engine="h5netcdf")
+    model = sb.ReducedModel.from_beam(BEAM, modes=1, damping_ratio=DAMPING_RATIO)
+    whole = sb.response_map(
+        model, CONTACT, cycles=60, frequency_ratio=np.linspace(0.5, 2.0, 8),
+        velocity_amplitude=np.linspace(0.05, 0.6, 8), location=LOCATION,
+    )  # fmt: skip
+    xr.testing.assert_equal(resumed, whole)
+    assert "bit for bit" in resumed.attrs["reproducible"]
+    verified = CliRunner().invoke(app, ["map", "--store", "store", "--verify"])
+    assert verified.exit_code == 0 and "16 done before, 0 computed now, 0 damaged" in verified.stdout
+    refused = CliRunner().invoke(app, ["map", "--store", "store", "--cycles", "61"])
+    assert refused.exit_code == 2 and "cycles: 60 in the store, 61 asked for" in refused.stderr
+
+
+def test_interrupt_keeps_what_is_finished(tmp_path):
+    command = [sys.executable, "-c", "from snapbeam.cli import main; main()", "map", "--modes", "1"]
+    command += ["--cycles", "2000", "--frequency-ratio", "0.5:2:8", "--velocity-amplitude", "0.05:0.6:8"]
+    command += ["--store", "store", "--chunk", "1", "--threads", "1"]
+    process = subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    )
+    ledger = tmp_path / "store" / "ledger.jsonl"
+    deadline = time.monotonic() + 300.0
+    while not ledger.exists():
+        assert process.poll() is None and time.monotonic() < deadline
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    _, messages = process.communicate(timeout=120)
+    assert process.returncode == 130
+    assert "the same command goes on from there" in messages and "Traceback" not in messages
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["store"]
+
+
+@pytest.mark.parametrize("early", [False, True])
+def test_bits_do_not_depend_on_tasks_order_or_threads(tmp_path, small, early):
+    """Over location too, where the rows of a task's structure are computed together, and with repeats."""
+    asked = dict(small, location=[0.21, 0.3, 0.4762], early_decision=early)
+    asked["model"] = sb.ReducedModel.from_beam(asked["model"].beam, modes=4)
+    recipe = Recipe(map_setup(**asked), Replicas(1, halve_step=True))
+    grid = recipe.setup.grid
+    wanted = recipe.compute(grid.take(np.arange(grid.size)), 2).content_hash()
+    for chunk, threads, reverse in ((7, 1, True), (1, 2, False), (60, 3, False)):
+        stage = Stage("base", grid, chunk)
+        with MapStore(tmp_path / f"{chunk}", recipe, chunk) as store:
+            store.open_stage(stage)
+            for task in sorted(store.pending(stage), reverse=reverse):
+                store.commit(stage, task, recipe.compute(stage.points(task), threads))
+            assert store.reader(stage).read(0, grid.size).content_hash() == wanted
+
+
+def test_the_file_is_the_map(tmp_path, small):
+    """Written a block at a time, the file is what xarray would write of the map in memory."""
+    whole = sb.response_map(**small)
+    tally = Tally()
+    stored = long_map(**small, store=tmp_path / "store", chunk=6, output=tmp_path / "a.nc", tally=tally)
+    assert (tally.tasks, tally.kept, tally.computed, tally.runs) == (4, 0, 4, 20)
+    whole.to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
+    expected = xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf")
+    stored = stored.load()
+    assert {key: stored.attrs[key] for key in expected.attrs if key not in ("created", "parameter_hash")} == {
+        key: expected.attrs[key] for key in expected.attrs if key not in ("created", "parameter_hash")
+    }
+    expected.attrs = stored.attrs
+    xr.testing.assert_identical(stored, expected)
+    assert all(stored[name].dtype == expected[name].dtype for name in expected.variables)
+    flat = dict(small, frequency_ratio=1.0, velocity_amplitude=0.4)
+    point = long_map(**flat, store=tmp_path / "point", output=tmp_path / "point.nc")
+    xr.testing.assert_equal(point.load(), sb.response_map(**flat))
+    deep = dict(small, location=[0.3, 0.45])
+    xr.testing.assert_equal(
+        long_map(**deep, store=tmp_path / "deep", output=tmp_path / "deep.nc").load(), sb.response_map(**deep)
+    )
+
+
+def test_task_size():
+    assert chunk_size(100, "cpu") == 64 and chunk_size(10**6, "cpu") == 4096
+    assert chunk_size(100_000, "cpu") == 500
+
+
+MEMORY = """
+import resource, sys
+import numpy as np
+import snapbeam as sb
+side, folder = int(sys.argv[1]), sys.argv[2]
+beam = sb.Beam(length=0.161, thickness=0.4e-3, width=15e-3, density=7800.0, young_modulus=200e9,
+               buckling_level=0.335e-3)
+model = sb.ReducedModel.from_beam(beam, modes=1)
+sb.long_map(model, sb.HertzContact(stiffness=4e8), cycles=1, frequency_ratio=np.linspace(2.0, 4.0, side),
+            velocity_amplitude=np.linspace(0.01, 0.6, 1000), step=2e-3, store=folder + "/store",
+            output=folder + "/map.nc")
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+"""
+
+
+@pytest.mark.slow
+def test_memory_does_not_grow_with_the_map(tmp_path):
+    """A million points: below 1 GiB, and as much as a hundred thousand within a tenth."""
+    peak = {}
+    for side in (100, 1000):
+        folder = tmp_path / str(side)
+        folder.mkdir()
+        done = subprocess.run(
+            [sys.executable, "-c", MEMORY, str(side), str(folder)],
+            capture_output=True,
+            text=True,
+            timeout=7200,
+        )
+        assert done.returncode == 0, done.stderr
+        peak[side] = float(done.stdout)
+    print(f"peak memory: {peak[100]:.0f} MiB for 1e5 points, {peak[1000]:.0f} MiB for 1e6")
+    assert peak[1000] < 1024.0
+    assert peak[1000] < 1.1 * peak[100]
+
+
+@pytest.mark.slow
+def test_a_store_costs_little(tmp_path, small):
+    """Storing takes less than a tenth of computing at N = 32 and 200 cycles, in tasks of the usual size."""
+    asked = dict(small, cycles=200, frequency_ratio=np.linspace(1.0, 3.0, 8))
+    asked["velocity_amplitude"] = np.linspace(0.05, 0.6, 16)
+    asked["model"] = sb.ReducedModel.from_beam(asked["model"].beam, modes=32)
+    recipe = Recipe(map_setup(**asked))
+    computing = storing = 0.0
+    with MapStore(tmp_path / "store", recipe) as store:
+        stage = Stage("base", recipe.setup.grid, store.chunk)
+        store.open_stage(stage)
+        for task in range(stage.tasks):
+            clock = time.monotonic()
+            columns = recipe.compute(stage.points(task), len(os.sched_getaffinity(0)))
+            computing += time.monotonic() - clock
+            clock = time.monotonic()
+            store.commit(stage, task, columns)
+            storing += time.monotonic() - clock
+    print(f"computing {computing:.2f} s, storing {storing:.3f} s: {100.0 * storing / computing:.2f} %")
+    assert storing < 0.1 * computing
