@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
+from snapbeam.runs.response import statistics_of
 
 from snapbeam import paper
 from snapbeam.core.validate import InputError
@@ -17,7 +18,6 @@ from snapbeam.engines.plan import plan_steps
 from snapbeam.engines.registry import ENGINES, resolve
 from snapbeam.model.contact import HertzContact
 from snapbeam.model.reduction import ReducedModel
-from snapbeam.runs.response import statistics_of
 
 
 @dataclass(frozen=True)

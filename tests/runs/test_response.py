@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from snapbeam.runs.response import STATISTICS, Response, classify
 
 import snapbeam as sb
 from snapbeam.core.codes import ResponseClass, RunStatus
-from snapbeam.runs.response import STATISTICS, Response, classify
 
 INTRAWELL, FIRST, SECOND, CONTINUOUS = (
     ResponseClass.INTRAWELL,

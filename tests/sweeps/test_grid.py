@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from snapbeam.runs.response import STATISTICS
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.runs.response import STATISTICS
 
 RATIO, VELOCITY, LOCATION = [0.8, 1.21, 1.6], [0.05, 0.18, 0.3, 0.5], [0.35, 0.5]
 

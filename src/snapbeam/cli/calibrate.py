@@ -10,6 +10,7 @@ import typer
 from snapbeam.cli import lab
 from snapbeam.cli import options as opt
 from snapbeam.cli.console import door, file_line, out
+from snapbeam.cli.parameter_options import configured
 
 __all__ = ["calibrate"]
 
@@ -23,7 +24,6 @@ def _list_option(about: str) -> Any:
 
 @door
 def calibrate(
-    ctx: typer.Context,
     measurements: Annotated[
         Path | None,
         typer.Argument(help="TOML file with a section named measured.", metavar="[MEASUREMENTS]"),
@@ -43,7 +43,10 @@ def calibrate(
     measured_buckling_level: Annotated[
         float | None, opt.number_option("Buckling level by gauge, m, to compare with.", _MEASURED)
     ] = None,
-    config: opt.ConfigFile = None,
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", "-c", help="TOML file of parameters of the beam and the model.", metavar="FILE"),
+    ] = None,
     fit: Annotated[
         str | None,
         typer.Option(
@@ -52,7 +55,7 @@ def calibrate(
             metavar="NAME,NAME", rich_help_panel=_FIT,
         ),
     ] = None,
-    modes: opt.Modes = None,
+    modes: Annotated[int | None, opt.count_option("Number N of buckling modes, 1 to 256.", _FIT)] = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -86,7 +89,7 @@ def calibrate(
     ):  # fmt: skip
         if path is not None:
             check_writable(path, name, suffixes)
-    settings = opt.configured({"config": config, "modes": modes})
+    settings = configured({"config": config, "model.modes": modes})
     given: dict[str, Any] = {}
     if measurements is not None:
         from_file, sections = load_measurements(measurements)
@@ -105,8 +108,10 @@ def calibrate(
             given[name] = value
     if not given:
         raise InputError("measurements: give a TOML file, or frequencies as options; see --help")
+    beam = settings.model.beam
+    assert beam is not None
     chosen = tuple(name.strip() for name in fit.split(",")) if fit else None
-    result = fit_beam(Measurements(**given), settings.beam.build(), fit=chosen, modes=settings.model.modes)
+    result = fit_beam(Measurements(**given), beam, fit=chosen, modes=settings.model.modes)
     console = out()
     for name in result.values:
         console.print(f"  {name:<20}{with_error(result, name)}")

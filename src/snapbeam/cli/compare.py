@@ -10,7 +10,7 @@ import typer
 from snapbeam.cli import lab
 from snapbeam.cli import options as opt
 from snapbeam.cli.console import door, file_line, out
-from snapbeam.cli.info import open_result
+from snapbeam.cli.results import open_result
 from snapbeam.core.codes import ResponseClass
 
 if TYPE_CHECKING:

@@ -120,7 +120,7 @@ def _shaker_of(path: Path) -> xr.DataArray:
     """The shaker's displacement [m] in a tracked recording, over its longest stretch without dropouts."""
     import numpy as np
 
-    from snapbeam.cli.info import open_result
+    from snapbeam.cli.results import open_result
     from snapbeam.core.validate import InputError
     from snapbeam.lab.signals.signal import make_signal
 

@@ -5,19 +5,40 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError, InputTypeError, integer, within
+from snapbeam.core.validate import InputError, InputTypeError, integer, positive, within
 from snapbeam.model.beam import Beam
 from snapbeam.model.linear import LinearModes, linear_modes_of_beam, linear_modes_of_structure
 from snapbeam.model.matrices import Structure, checked_structure, damping_ratios
 from snapbeam.model.modes import MAX_MODES, BucklingModes
+from snapbeam.model.quantity import Quantity
 
-__all__ = ["ReducedModel"]
+__all__ = ["MODEL_QUANTITIES", "ReducedModel"]
 
 _Array = NDArray[np.float64]
+
+MODEL_QUANTITIES: dict[str, tuple[Quantity, Any]] = {
+    "modes": (
+        Quantity("1", "number of buckling modes", kind=int, low=1, high=MAX_MODES, symbol="N"),
+        32,
+    ),
+    "damping_ratio": (
+        Quantity(
+            "1", "damping ratio of every linear mode", low=0.0, high=1.0, closed="left", symbol=r"\zeta",
+            plausible=(0.0, 1.0, "percent"),
+        ),
+        0.005,
+    ),
+    "reference_freq": (
+        Quantity("Hz", "frequency that Omega and V are normalised by", low=0.0, optional=True, symbol="f_1"),
+        None,
+    ),
+}  # fmt: skip
+"""What a reduction takes beside the beam, and its default."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -71,7 +92,13 @@ class ReducedModel:
                 value.setflags(write=False)
 
     @classmethod
-    def from_beam(cls, beam: Beam, modes: int = 32, damping_ratio: ArrayLike = 0.005) -> ReducedModel:
+    def from_beam(
+        cls,
+        beam: Beam,
+        modes: int = 32,
+        damping_ratio: ArrayLike = 0.005,
+        reference_freq: float | None = None,
+    ) -> ReducedModel:
         """Galerkin reduction of a beam on its first buckling modes (Eqs. 10-15).
 
         In the wavenumbers k_i the matrices are closed forms.  With c_ij = 2 for two symmetric modes,
@@ -86,6 +113,8 @@ class ReducedModel:
             Number of modes N, 1 to 256.
         damping_ratio : float or array of shape (N,)
             Damping ratio of the linear modes about a well, each in [0, 1).
+        reference_freq : float, optional
+            Frequency that normalises the excitation, Hz; the first natural frequency by default.
 
         Raises
         ------
@@ -115,6 +144,9 @@ class ReducedModel:
             damping_ratio=damping_ratios(damping_ratio, count),
             center_shape=shapes.shape(0.5 * beam.length),
             beam=beam,
+            given_reference_freq=None
+            if reference_freq is None
+            else positive("reference_freq", reference_freq, "Hz"),
         )
 
     @classmethod

@@ -1,60 +1,99 @@
 """How kernels are compiled, and how the compiled code is kept between runs.
 
-Numba keeps compiled functions on disk and compiles them again when the file they stand in changes.  The
-kernels are compiled into each other across files, so here the name under which they are kept holds a
-fingerprint of all of them: a change anywhere, or another version of the package, never meets old code.
+Functions are compiled into the kernel that calls them, across files and with the law of contact and the drive that
+it marches; a kernel is what is kept on disk.  Numba alone would keep it until the file that it stands in changes.
+Here it is kept under a fingerprint of everything that it bakes in: every file of the engines, the codes, the
+law's and the drive's own files, and the versions of Numba and NumPy.
 """
 
 from __future__ import annotations
 
 import hashlib
+import inspect
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numba
+import numpy as np
 from numba import njit
-from numba.core.caching import IndexDataCacheFile
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-__all__ = ["compiled", "inlined"]
+__all__ = ["INLINE", "compiled", "fingerprint", "inlined", "kernel"]
+
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
+INLINE: dict[str, Any] = {"error_model": "numpy", "forceinline": True}
+"""Options of an overload that is to be written into its callers."""
+
+_PACKAGE = Path(__file__).parents[2]
+_BAKED_IN = ("core/codes.py", "engines/**/*.py")
 
 
-def _fingerprint() -> str:
-    """Of the source of every kernel that is kept on disk, in 16 hexadecimal digits."""
+@cache
+def _package_fingerprint() -> str:
     digest = hashlib.sha256()
-    package = Path(__file__).parents[2]
-    for folder in ("core/codes.py", "engines/*.py", "engines/scalar/*.py", "engines/cpu/*.py"):
-        for path in sorted(package.glob(folder)):
+    for pattern in _BAKED_IN:
+        for path in sorted(_PACKAGE.glob(pattern)):
+            digest.update(path.relative_to(_PACKAGE).as_posix().encode())
             digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    digest.update(f"{numba.__version__} {np.__version__}".encode())
+    return digest.hexdigest()
 
 
-_FINGERPRINT = _fingerprint()
+@cache
+def fingerprint(kinds: tuple[type, ...]) -> str | None:
+    """Of everything that a kernel for these laws and drives bakes in, in 20 hexadecimal digits.
 
-
-def _compile(function: Callable[..., Any], **options: Any) -> Any:
-    options |= {"error_model": "numpy", "nogil": True, "_nrt": False}
-    dispatcher = njit(cache=True, **options)(function)
-    cache = dispatcher._cache
-    try:
-        cache._cache_file = IndexDataCacheFile(
-            cache_path=cache._cache_path,
-            filename_base=f"{cache._impl.filename_base}-{_FINGERPRINT}",
-            source_stamp=cache._impl.locator.get_source_stamp(),
-        )
-    except AttributeError:  # no place to keep compiled code, or a Numba that keeps it otherwise
-        return njit(**options)(function)
-    return dispatcher
+    None if the source of one of them cannot be read, as of a class typed at a prompt.
+    """
+    digest = hashlib.sha256(_package_fingerprint().encode())
+    for kind in kinds:
+        for each in kind.__mro__[:-1]:
+            try:
+                source = inspect.getsourcefile(each)
+                data = Path(source).read_bytes() if source is not None else None
+            except (TypeError, OSError):
+                data = None
+            if data is None:
+                return None
+            digest.update(f"{each.__module__}.{each.__qualname__}".encode())
+            digest.update(data)
+    return digest.hexdigest()[:20]
 
 
 def compiled(function: Callable[..., Any]) -> Any:
-    """Compile a kernel: no Python objects, no global lock, division as the processor does it.
+    """Compile a function that kernels call: no Python objects, no global lock, division as the processor does it.
 
     Nor reference counts, which cost an atomic operation whenever an array is passed on: a kernel allocates nothing,
     and its arrays belong to its caller.
     """
-    return _compile(function)
+    return njit(**_OPTIONS)(function)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
     """As :func:`compiled`, and always written into its callers."""
-    return _compile(function, forceinline=True)
+    return njit(forceinline=True, **_OPTIONS)(function)
+
+
+@cache
+def kernel(function: Callable[..., Any], kinds: tuple[type, ...]) -> Any:
+    """A kernel for some laws of contact and drives, kept on disk under the fingerprint of what it bakes in."""
+    dispatcher = njit(**_OPTIONS)(function)
+    mark = fingerprint(kinds)
+    if mark is None:
+        return dispatcher
+    try:
+        dispatcher.enable_caching()
+        cache_of: FunctionCache = dispatcher._cache
+        cache_of._cache_file = IndexDataCacheFile(
+            cache_path=cache_of._cache_path,
+            filename_base=f"{cache_of._impl.filename_base}-{mark}",
+            source_stamp=cache_of._impl.locator.get_source_stamp(),
+        )
+    except (
+        AttributeError,
+        RuntimeError,
+    ):  # no place to keep compiled code, or a Numba that keeps it otherwise
+        return njit(**_OPTIONS)(function)
+    return dispatcher

@@ -1,13 +1,16 @@
-"""What happens where the shaker touches the beam: Hertz's law and the law of restitution."""
+"""Hertz's law of contact between a sphere and a flat, both elastic."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from snapbeam.core.validate import InputError, InputTypeError, nonnegative, positive, within
+from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.quantity import RUN, quantity
 
-__all__ = ["HertzContact", "Restitution"]
+__all__ = ["HertzContact"]
 
 # Duration of a Hertzian impact of a free mass over (greatest penetration)/(approach velocity):
 # 2 * integral of (1 - u^(5/2))^(-1/2) over (0, 1) = (4/5) B(2/5, 1/2) = 2.94328
@@ -15,7 +18,7 @@ _DURATION = 0.8 * math.sqrt(math.pi) * math.gamma(0.4) / math.gamma(0.9)
 
 
 @dataclass(frozen=True)
-class HertzContact:
+class HertzContact(ContactLaw):
     """Hertz's law of a sphere on a flat, f = k_c d^(3/2) for a penetration d > 0 (Eqs. 17-18).
 
     The law stores energy, (2/5) k_c d^(5/2), and dissipates none.
@@ -26,10 +29,27 @@ class HertzContact:
         Contact stiffness k_c, N/m^1.5.
     """
 
-    stiffness: float
+    stiffness: float = quantity(
+        "N/m^1.5", "contact stiffness", low=0.0, scope=RUN, symbol="k_c", short="contact_stiffness",
+        plausible=(1.0, 1e15, "N/mm^1.5"),
+    )  # fmt: skip
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "stiffness", positive("stiffness", self.stiffness, "N/m^1.5"))
+    name = "hertz"
+
+    @staticmethod
+    def force(law: Any, penetration: float) -> float:
+        """f = k_c d^(3/2) (Eq. 17)."""
+        return law.stiffness * penetration * math.sqrt(penetration)
+
+    @staticmethod
+    def energy(law: Any, penetration: float) -> float:
+        """(2/5) k_c d^(5/2), the integral of Eq. (17)."""
+        return 0.4 * law.stiffness * penetration * penetration * math.sqrt(penetration)
+
+    @staticmethod
+    def slope(law: Any, penetration: float) -> float:
+        """(3/2) k_c d^(1/2)."""
+        return 1.5 * law.stiffness * math.sqrt(penetration)
 
     @classmethod
     def from_materials(
@@ -76,26 +96,6 @@ class HertzContact:
         """
         velocity = positive("velocity", velocity, "m/s")
         return _DURATION * self.max_penetration(mass, velocity) / velocity
-
-
-@dataclass(frozen=True)
-class Restitution:
-    """Newton's law of impact for a single mode: the velocity of separation is e times that of approach.
-
-    The contact lasts no time, so nothing but one mode can use the law (the mass met by a point falls
-    to zero as modes are added).
-
-    Parameters
-    ----------
-    coefficient : float
-        Coefficient of restitution e, in [0, 1].
-    """
-
-    coefficient: float
-
-    def __post_init__(self) -> None:
-        value = within("coefficient", self.coefficient, 0.0, 1.0, closed="both")
-        object.__setattr__(self, "coefficient", value)
 
 
 def _pair(name: str, value: tuple[float, float]) -> list[tuple[int, float]]:

@@ -1,0 +1,86 @@
+"""Statistics that were registered: scalar functions called after every step, one after the other."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from typing import Any
+
+from numba.extending import overload
+
+from snapbeam.engines.outcomes import Passed, Statistic, updated
+from snapbeam.engines.scalar.compile import INLINE, inlined
+
+__all__ = ["Extras", "extras_of_table", "observe"]
+
+
+class Extras:
+    """What a kernel updates beside its own columns; subclasses stand for lists of statistics."""
+
+    rows: tuple[Statistic, ...] = ()
+
+
+_made: dict[tuple[Statistic, ...], Any] = {}
+
+
+def extras_of_table() -> Any:
+    """A value whose type tells a kernel which statistics the table has beside the package's own."""
+    rows = updated()
+    if rows not in _made:
+        owner: Any = type("OwnExtras", (Extras,), {"rows": rows}) if rows else Extras
+        kind = namedtuple("Numbers", ())  # type: ignore[misc]
+        kind.owner = owner  # type: ignore[attr-defined]
+        if not rows:
+            kind.__module__, kind.__qualname__ = __name__, "Extras.Numbers"
+            Extras.Numbers = kind  # type: ignore[attr-defined]
+        _made[rows] = kind()
+    return _made[rows]
+
+
+def observe(
+    extras: Any, book: Any, time: float, length: float, seen: Any, seen1: Any, touching: bool
+) -> None:
+    """Update every registered statistic by a step."""
+    rows = type(extras).owner.rows
+    for row in rows:
+        name = f"own_{row.name}"
+        book[name] = row.update(book[name], _passed.py_func(time, length, seen, seen1, touching))
+
+
+@inlined
+def _passed(time, length, seen, seen1, touching):
+    return Passed(
+        time, length, (seen.w, seen1.w), (seen.wv, seen1.wv), (seen.c, seen1.c), (seen.cv, seen1.cv),
+        (seen.d, seen1.d), touching,
+    )  # fmt: skip
+
+
+def _chain(rows: tuple[Statistic, ...]) -> Any:
+    """The update functions of *rows*, compiled into one."""
+    if not rows:
+
+        @inlined
+        def nothing(book, passed):
+            return
+
+        return nothing
+    name, update, rest = f"own_{rows[0].name}", inlined(rows[0].update), _chain(rows[1:])
+
+    @inlined
+    def one_and_rest(book, passed):
+        book[name] = update(book[name], passed)
+        rest(book, passed)
+
+    return one_and_rest
+
+
+@overload(observe, jit_options=INLINE)
+def _observe(extras, book, time, length, seen, seen1, touching):
+    rows = extras.instance_class.owner.rows
+    if not rows:
+        return lambda extras, book, time, length, seen, seen1, touching: None
+    apply = _chain(rows)
+
+    def implementation(extras, book, time, length, seen, seen1, touching):
+        apply(book, _passed(time, length, seen, seen1, touching))
+
+    return implementation
