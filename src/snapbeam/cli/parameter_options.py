@@ -207,7 +207,7 @@ def configured(given: Mapping[str, Any], **more: Mapping[str, Any]) -> Config:
 
     *more* holds further overrides, by section.
     """
-    from snapbeam.config import Config, load_config, lookup, override
+    from snapbeam.config import Config, load_config, lookup, override, same_axis
     from snapbeam.core.validate import InputError
 
     config = load_config(given["config"]) if given.get("config") is not None else Config()
@@ -237,6 +237,10 @@ def configured(given: Mapping[str, Any], **more: Mapping[str, Any]) -> Config:
         if name in axes:
             raise InputError(f"axis {name}: is given twice")
         axes[name] = value
+    single = {f"{section}.{field}" for section, values in sections.items() for field in values}
+    for name in axes:
+        for same in sorted(same_axis(name) & single):
+            raise InputError(f"{same}: is given as a single value and as an axis")
     if axes:
         sections["axes"] = sections.get("axes", {}) | axes
     return override(config, sections)

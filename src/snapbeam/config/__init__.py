@@ -8,7 +8,7 @@ does, text where a number belongs is refused, and so is a number so far from any
 from snapbeam.config.axes import Axis, parse_axis
 from snapbeam.config.parameters import Parameter, lookup, parameters
 from snapbeam.config.physical import PHYSICAL, from_physical, to_physical
-from snapbeam.config.settings import DEFAULT_AXES, Config, config_from_mapping, override
+from snapbeam.config.settings import DEFAULT_AXES, Config, config_from_mapping, override, same_axis
 from snapbeam.config.toml import config_text, dump_config, load_config
 
 __all__ = [
@@ -26,5 +26,6 @@ __all__ = [
     "override",
     "parameters",
     "parse_axis",
+    "same_axis",
     "to_physical",
 ]

@@ -11,7 +11,7 @@ import numpy as np
 
 from snapbeam.config.axes import parse_axis
 from snapbeam.config.parameters import Parameter, lookup, parameters
-from snapbeam.config.physical import PHYSICAL
+from snapbeam.config.physical import PHYSICAL, physical_name
 from snapbeam.core.validate import InputError
 from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
@@ -26,6 +26,8 @@ MATERIALS = {
     "poisson_ratio": ("1", "Poisson ratios of sphere and beam", None),
 }
 """What a Hertzian stiffness may follow from: unit, words and plausible sizes."""
+_OF_MAP = {"frequency_ratio": "drive", "velocity_amplitude": "drive", "location": "striker"}
+"""Names that a section [map] of version 0.1 may hold, and the sections they belong to."""
 _SYMBOLS = {
     "E": "young_modulus", "L": "length", "N": "modes", "Omega": "frequency_ratio", "P": "axial_load",
     "V": "velocity_amplitude", "b": "buckling_level", "e": "coefficient", "f1": "reference_freq", "h": "thickness",
@@ -39,7 +41,10 @@ def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, A
     lines: list[str] = []
     found: dict[str, dict[str, Any]] = {}
     for section, name, value, shown in _entries(sections, lines):
-        message = _checked(section, name, value, found)
+        if section != "axes" and name in found.get(section, {}):
+            message = f"{name}: is given in two sections"
+        else:
+            message = _checked(section, name, value, found)
         if message:
             lines.append(f"[{shown}] {message}")
     return found, lines
@@ -48,6 +53,8 @@ def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, A
 def _entries(sections: Mapping[str, Any], lines: list[str]) -> list[tuple[str, str, Any, str]]:
     """Section, name and value of everything given, and the section it was given in; faults go to *lines*."""
     found = []
+    shaker = sections.get("shaker")
+    single = set(shaker) if isinstance(shaker, Mapping) else set()
     for section, values in sections.items():
         if section not in (*SECTIONS, "shaker", "map"):
             lines.append(f"[{section}]: unknown section{_nearest(str(section), list(SECTIONS))}")
@@ -55,7 +62,13 @@ def _entries(sections: Mapping[str, Any], lines: list[str]) -> list[tuple[str, s
             lines.append(f"{section} = {values!r}: must be a section [{section}]")
         else:
             for name, value in values.items():
-                found.append((*_place(section, str(name), value), value, section))
+                if section == "map" and name not in _OF_MAP:
+                    lines.append(f"[map] {name}: unknown key{_nearest(str(name), list(_OF_MAP))}")
+                    continue
+                place = _place(section, str(name), value)
+                if section == "map" and name in single:
+                    place = "axes", f"{_OF_MAP[name]}.{name}"  # of the map alone; the other is of single runs
+                found.append((*place, value, section))
     return [(section, name, value, shown) for section, name, value, shown in found]
 
 
@@ -64,11 +77,8 @@ def _place(section: str, name: str, value: Any) -> tuple[str, str]:
     if section == "shaker":
         return ("drive" if name in ("frequency_ratio", "velocity_amplitude") else "striker"), name
     if section == "map":
-        full = {"frequency_ratio": "drive", "velocity_amplitude": "drive", "location": "striker"}.get(name)
         single = isinstance(value, (int, float)) and not isinstance(value, bool)
-        if full is not None and single:
-            return full, name
-        return "axes", name if full is None else f"{full}.{name}"
+        return (_OF_MAP[name], name) if single else ("axes", f"{_OF_MAP[name]}.{name}")
     return section, name
 
 
@@ -112,10 +122,9 @@ def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
         if not math.isfinite(value):
             return f"{name} = {value!r}: must be a finite number{unit}", None
         value = float(value)
-        if item.plausible and value != 0.0 and not item.plausible[0] <= abs(value) <= item.plausible[1]:
-            low, high, meant = item.plausible
-            allowed = f"{low:g} to {high:g}{'' if item.unit == '1' else ' ' + item.unit}"
-            return f"{name} = {value!r}: must be {allowed}; is it given in {meant}?", None
+        message = _implausible(row, name, value)
+        if message:
+            return message, None
     elif item.kind is int and (isinstance(value, bool) or not isinstance(value, int)):
         return f"{name} = {value!r}: must be a whole number{unit}", None
     elif item.kind is str and not isinstance(value, str):
@@ -126,6 +135,16 @@ def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
         return "", item.check(name, value)
     except InputError as error:
         return str(error), None
+
+
+def _implausible(row: Parameter, name: str, value: float) -> str:
+    """What is said of a number so far from any beam that it must be in another unit; nothing of others."""
+    item = row.quantity
+    if not item.plausible or value == 0.0 or item.plausible[0] <= abs(value) <= item.plausible[1]:
+        return ""
+    low, high, meant = item.plausible
+    allowed = f"{low:g} to {high:g}{'' if item.unit == '1' else ' ' + item.unit}"
+    return f"{name} = {value!r}: must be {allowed}; is it given in {meant}?"
 
 
 def _array(name: str, value: Any) -> tuple[str, Any]:
@@ -164,12 +183,21 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
 
 def _checked_axis(name: str, value: Any, own: dict[str, Any]) -> str:
     try:
-        full = name if name in PHYSICAL else lookup(name).name
+        full = physical_name(name) or lookup(name).name
+        rivals = {full, *(key for key, row in PHYSICAL.items() if row.parameter == full)}
+        rivals |= {PHYSICAL[full].parameter} if full in PHYSICAL else set()
+        twice = sorted(rivals & own.keys())
+        if twice:
+            return f"{name}: the same axis is given as {twice[0]}"
         parsed = parsed_axis(full, value)
         if full not in PHYSICAL:
-            row = lookup(full)
+            row, short = lookup(full), full.partition(".")[2]
             for point in (parsed[0], parsed[-1]) if row.quantity.kind is float else parsed:
-                row.quantity.check(full.partition(".")[2], point if isinstance(point, str) else point.item())
+                plain = point if isinstance(point, str) else point.item()
+                row.quantity.check(short, plain)
+                message = _implausible(row, short, plain) if isinstance(plain, float) else ""
+                if message:
+                    return message
     except InputError as error:
         return str(error)
     own[full] = value
@@ -194,13 +222,24 @@ def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
         return ["[contact] give stiffness, or radius, young_modulus and poisson_ratio, not both"]
     if 0 < len(given) < len(MATERIALS):
         return ["[contact] radius, young_modulus and poisson_ratio belong together; one is missing"]
+    if "coefficient" in contact and "law" not in contact and (given or "stiffness" in contact):
+        return ["[contact] give stiffness, of Hertz's law, or coefficient, of Newton's, not both"]
+    for full, row in PHYSICAL.items():
+        section, name, ratio = *full.split("."), row.parameter.partition(".")[2]
+        if {name, ratio} <= found.get(section, {}).keys():
+            return [f"[{section}] give {ratio} or {name}, not both"]
     beam = found.get("beam", {})
     length = beam.get("length", BEAM.length)
+    axes = found.get("axes", {})
     for name in ("thickness", "width", "buckling_level"):
-        if name in beam and beam[name] >= length:
-            return [
-                f"[beam] {name} = {beam[name]:g} m: must be less than length = {length:g} m; is it given in mm?"
-            ]
+        values = [("beam", beam[name])] if name in beam else []
+        if f"beam.{name}" in axes:
+            values.append(("axes", parsed_axis(f"beam.{name}", axes[f"beam.{name}"])[-1]))
+        for section, value in values:
+            if value >= length:
+                return [
+                    f"[{section}] {name} = {value:g} m: must be less than length = {length:g} m; is it given in mm?"
+                ]
     return []
 
 

@@ -9,10 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from snapbeam.config.parameters import lookup
 from snapbeam.core.validate import InputError
 from snapbeam.model.system import System
 
-__all__ = ["PHYSICAL", "Physical", "from_physical", "to_physical"]
+__all__ = [
+    "PHYSICAL",
+    "Physical",
+    "checked_physical",
+    "from_physical",
+    "physical_name",
+    "to_physical",
+    "unit_of",
+]
 
 
 @dataclass(frozen=True)
@@ -33,9 +42,15 @@ PHYSICAL: dict[str, Physical] = {
 """What may be given instead of a ratio, by dotted name."""
 
 
-def _unit_of(system: System, parameter: str) -> float:
-    """What one of a ratio is, SI."""
-    scale = system.scale
+def physical_name(name: str) -> str | None:
+    """The dotted name of a parameter in its physical unit, by itself or by its last part; None if it is none."""
+    found = [full for full in PHYSICAL if name in (full, full.partition(".")[2])]
+    return found[0] if found else None
+
+
+def unit_of(system: System, name: str) -> float:
+    """What a ratio of 1 is in the physical unit of *name*."""
+    scale, parameter = system.scale, PHYSICAL[name].parameter
     if parameter == "drive.frequency_ratio":
         return scale.omega / (2.0 * math.pi)
     if parameter == "drive.velocity_amplitude":
@@ -47,9 +62,28 @@ def _unit_of(system: System, parameter: str) -> float:
 
 def from_physical(system: System, name: str, value: ArrayLike) -> Any:
     """Ratios from values in the physical unit of *name*."""
-    return np.asarray(value, dtype=np.float64) / _unit_of(system, PHYSICAL[name].parameter)
+    return np.asarray(value, dtype=np.float64) / unit_of(system, name)
+
+
+def checked_physical(system: System, name: str, value: float, shown: str) -> float:
+    """The ratio that a value in the physical unit of *name* is, refused, with the name *shown*, where it cannot be.
+
+    Raises
+    ------
+    InputError
+        If the ratio is out of its range; the message says both.
+    """
+    ratio, row = float(from_physical(system, name, value)), lookup(PHYSICAL[name].parameter)
+    short = row.name.partition(".")[2]
+    try:
+        row.quantity.check(short, ratio)
+    except InputError as error:
+        must = str(error).partition(": ")[2]
+        unit = PHYSICAL[name].unit
+        raise InputError(f"{shown} = {value:g} {unit}: is {short} = {ratio:.6g}, which {must}") from None
+    return ratio
 
 
 def to_physical(system: System, name: str, value: ArrayLike) -> Any:
     """Values in the physical unit of *name* from ratios."""
-    return np.asarray(value, dtype=np.float64) * _unit_of(system, PHYSICAL[name].parameter)
+    return np.asarray(value, dtype=np.float64) * unit_of(system, name)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from snapbeam.config.check import MATERIALS, checked_sections, contradictions, parsed_axis, with_section
 from snapbeam.config.parameters import lookup
-from snapbeam.config.physical import PHYSICAL, from_physical
+from snapbeam.config.physical import PHYSICAL, checked_physical, physical_name, unit_of
 from snapbeam.core.validate import InputError
 from snapbeam.model.contact import HertzContact
 from snapbeam.model.integration import Integration
@@ -21,7 +21,7 @@ from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, 
 from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.system import System
 
-__all__ = ["DEFAULT_AXES", "DEFAULT_DRIVE", "Config", "config_from_mapping", "override"]
+__all__ = ["DEFAULT_AXES", "DEFAULT_DRIVE", "Config", "config_from_mapping", "override", "same_axis"]
 
 _Array = NDArray[np.float64]
 Sections = Mapping[str, Mapping[str, Any]]
@@ -30,10 +30,11 @@ DEFAULT_DRIVE = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18}
 DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude": "0.01:0.65:40"}
 """Of a map for which no axis is named."""
 # What stands for the same thing in a section: giving one set takes the other away.
-_RIVALS: dict[str, tuple[set[str], set[str]]] = {
-    "beam": ({"buckling_level"}, {"axial_load"}),
-    "contact": ({"stiffness"}, set(MATERIALS)),
-    "drive": ({"frequency_ratio"}, {"frequency_hz"}),
+_RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
+    "beam": [({"buckling_level"}, {"axial_load"})],
+    "contact": [({"stiffness"}, set(MATERIALS)), ({"coefficient"}, {"stiffness", *MATERIALS})],
+    "drive": [({"frequency_ratio"}, {"frequency_hz"}), ({"velocity_amplitude"}, {"velocity_m_s"})],
+    "striker": [({"location"}, {"location_m"})],
 }
 
 
@@ -113,7 +114,8 @@ class Config:
         system = System.from_mapping(sections)
         if later:
             system = system.replace(**{
-                PHYSICAL[name].parameter: float(from_physical(system, name, value)) for name, value in later.items()
+                PHYSICAL[name].parameter: checked_physical(system, name, value, name.partition(".")[2])
+                for name, value in later.items()
             })  # fmt: skip
         start = self.section("start")
         return (
@@ -145,17 +147,38 @@ class Config:
     def axes(self, default: Mapping[str, str] | None = None) -> dict[str, _Array]:
         """The axes, by dotted name, those in physical units made into ratios; *default* if none is named.
 
-        A single number is no axis: it belongs to the system.
+        A single value makes an axis of one point.
+
+        Raises
+        ------
+        InputError
+            For values in physical units that are out of range.
         """
         given = self.section("axes") or dict(default or {})
         found: dict[str, Any] = {}
         for name, value in given.items():
             parsed = parsed_axis(name, value)
             if name in PHYSICAL:
-                found[PHYSICAL[name].parameter] = from_physical(self.system, name, parsed)
+                ratios = [checked_physical(self.system, name, each, name) for each in parsed.tolist()]
+                found[PHYSICAL[name].parameter] = np.array(ratios)
             else:
                 found[lookup(name).name] = parsed
+        self._require_fixed_units(found)
         return found
+
+    def _require_fixed_units(self, axes: Mapping[str, Any]) -> None:
+        """Refuse numbers in Hz, m/s or m beside an axis that changes what they are a multiple of."""
+        own = [name for name in PHYSICAL if name.partition(".")[2] in self.section(name.partition(".")[0])]
+        for name in [*own, *(name for name in self.section("axes") if name in PHYSICAL)]:
+            for axis, values in axes.items():
+                if axis.partition(".")[0] not in ("beam", "model"):
+                    continue
+                there = [self.system.replace(**{axis: values[at].item()}) for at in (0, -1)]
+                if any(abs(unit_of(each, name) / unit_of(self.system, name) - 1.0) > 1e-9 for each in there):
+                    ratio = PHYSICAL[name].parameter
+                    raise InputError(
+                        f"{name}: is made into {ratio}, whose unit changes along {axis}; give {ratio}"
+                    )
 
     def to_mapping(self) -> dict[str, dict[str, Any]]:
         """What was given, plain, as a file would hold it."""
@@ -190,6 +213,7 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config
             config.model  # noqa: B018
             if config.model.length_scale is not None:
                 config.system  # noqa: B018
+                config.axes()
             config.integration  # noqa: B018
         except InputError as error:
             lines = [with_section(str(error), found)]
@@ -199,14 +223,35 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config
 
 
 def override(config: Config, sections: Mapping[str, Mapping[str, Any]]) -> Config:
-    """The parameters with others laid over them; what they contradict is taken away, None is left alone."""
+    """The parameters with others laid over them; what they contradict is taken away, None is left alone.
+
+    A value takes an axis over the same parameter away.
+    """
     merged: dict[str, dict[str, Any]] = {name: dict(values) for name, values in config.given.items()}
     for section, values in sections.items():
         own = {name: value for name, value in values.items() if value is not None}
         target = merged.setdefault(section, {})
-        for one, other in [_RIVALS[section], _RIVALS[section][::-1]] if section in _RIVALS else []:
+        if section == "axes":
+            for name in own:
+                for same in same_axis(name):
+                    target.pop(same, None)
+        for one, other in [pair for both in _RIVALS.get(section, []) for pair in (both, both[::-1])]:
             if one & own.keys() and not other & own.keys():
                 for name in other:
                     target.pop(name, None)
         target |= own
+        if section != "axes":
+            for name in own:
+                for same in same_axis(f"{section}.{name}"):
+                    merged.get("axes", {}).pop(same, None)
     return config_from_mapping(merged)
+
+
+def same_axis(name: str) -> set[str]:
+    """The dotted names, that in a physical unit among them, of what *name* stands for; none if it is unknown."""
+    try:
+        physical = physical_name(name)
+        full = lookup(name).name if physical is None else PHYSICAL[physical].parameter
+    except InputError:
+        return set()
+    return {full, *(key for key, row in PHYSICAL.items() if row.parameter == full)}
