@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from snapbeam.config import lookup
+from snapbeam.config import Parameter, lookup
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
 from snapbeam.figures.agreement import draw_agreement
@@ -117,24 +117,27 @@ def axis_label(dataset: xr.Dataset, name: str) -> str:
     """What stands along an axis of a picture: words, symbol and unit of the parameter."""
     if name in AXIS_LABELS:
         return AXIS_LABELS[name]
-    full = dataset[name].attrs.get("parameter", name) if name in dataset.coords else name
-    try:
-        return lookup(str(full)).label
-    except InputError:
-        labels = dataset[name].attrs if name in dataset.coords else {}
-        unit = labels.get("units", "1")
-        return f"{labels.get('long_name', name)}{'' if unit == '1' else f' ({unit})'}"
+    row = _parameter(dataset, name)
+    if row is not None:
+        return row.label
+    labels = dataset[name].attrs if name in dataset.coords else {}
+    unit = labels.get("units", "1")
+    return f"{labels.get('long_name', name)}{'' if unit == '1' else f' ({unit})'}"
 
 
 def symbol_of(dataset: xr.Dataset, name: str) -> str:
     """The symbol of an axis, or its name."""
-    if name in dataset.coords and "parameter" in dataset[name].attrs:
-        symbol = lookup(str(dataset[name].attrs["parameter"])).quantity.symbol
-        if symbol:
-            return f"${symbol}$"
-    return {"frequency_ratio": r"$\Omega$", "location": r"$x_\mathrm{s}$", "velocity_amplitude": "$V$"}.get(
-        name, name
-    )
+    row = _parameter(dataset, name)
+    return name if row is None or not row.quantity.symbol else f"${row.quantity.symbol}$"
+
+
+def _parameter(dataset: xr.Dataset, name: str) -> Parameter | None:
+    """The row of the table for an axis: as its coordinate says, or by its name, as in files of version 0.1."""
+    full = dataset[name].attrs.get("parameter", name) if name in dataset.coords else name
+    try:
+        return lookup(str(full))
+    except InputError:
+        return None
 
 
 def _positions(dataset: xr.Dataset, name: str) -> tuple[_Array, list[str] | None]:
