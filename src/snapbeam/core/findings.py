@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -36,11 +37,20 @@ class Finding:
 
 
 _told: set[tuple[str, str]] = set()
+_PACKAGE = __name__.partition(".")[0]
 
 
-def tell(findings: Iterable[Finding], stacklevel: int = 3) -> None:
-    """Warn of each finding, once a process for the same words."""
+def tell(findings: Iterable[Finding]) -> None:
+    """Warn of each finding, once a process for the same words, where the package was called from."""
     for finding in findings:
         if (finding.code, finding.words) not in _told:
             _told.add((finding.code, finding.words))
-            warnings.warn(finding.words, PlausibilityWarning, stacklevel=stacklevel)
+            warnings.warn(finding.words, PlausibilityWarning, stacklevel=_outside())
+
+
+def _outside() -> int:
+    """Level of the stack, as :func:`tell` counts it, of the first caller that is not the package itself."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == _PACKAGE:
+        frame, level = frame.f_back, level + 1
+    return level

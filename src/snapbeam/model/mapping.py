@@ -86,6 +86,7 @@ def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, A
     if "start" in sections:
         values = dict(sections["start"])
         _only(values, "start", list(_START))
+        _needed(values, "start", State)
         parts["start"] = State(**values)
     return parts
 
@@ -96,6 +97,7 @@ def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
         values = dict(sections["beam"])
         _only(values, "beam", [item.name for item in dataclasses.fields(Beam) if item.init])
         _only(own, "model", ["modes", "damping_ratio", "reference_freq"])
+        _needed(values, "beam", Beam)
         return ReducedModel.from_beam(Beam(**values), **own)
     _only(own, "model", [*_MATRICES, "damping_ratio", "reference_freq"])
     for name in ("mass", "stiffness", "contact_shape"):
@@ -111,14 +113,19 @@ def _chosen(values: Mapping[str, Any], section: str, key: str, known: Mapping[st
         raise InputError(f"[{section}] {key} = {name!r}: must be one of {', '.join(map(repr, known))}")
     kind = known[name]
     _only(own, section, [item.name for item in dataclasses.fields(kind)])
-    needed = [
+    _needed(own, section, kind, f" for {key} = {name!r}")
+    return kind(**own)
+
+
+def _needed(values: Mapping[str, Any], section: str, kind: Any, why: str = "") -> None:
+    """Refuse values that leave out what has no default."""
+    missing = [
         item.name
         for item in dataclasses.fields(kind)
-        if item.default is dataclasses.MISSING and item.name not in own
+        if item.init and item.default is dataclasses.MISSING and item.name not in values
     ]
-    if needed:
-        raise InputError(f"[{section}] {', '.join(needed)}: missing for {key} = {name!r}")
-    return kind(**own)
+    if missing:
+        raise InputError(f"[{section}] {', '.join(missing)}: missing{why}")
 
 
 def _only(values: Mapping[str, Any], section: str, known: list[str]) -> None:

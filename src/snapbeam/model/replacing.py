@@ -13,6 +13,7 @@ from snapbeam.model.mapping import SECTIONS
 from snapbeam.model.quantity import quantities
 from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.start import started
+from snapbeam.model.state import State
 
 __all__ = ["replaced"]
 
@@ -48,8 +49,9 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         found["striker"] = dataclasses.replace(striker, drive=drive)
     if "striker" in inside:
         found["striker"] = _changed(found["striker"], "striker", inside["striker"])
-    if found["start"] is not None and found["start"].modes != found["model"].modes:
-        found["start"] = found["start"].with_modes(found["model"].modes)
+    start, model = found["start"], found["model"]
+    if isinstance(start, State) and "start" not in whole and start.modes != model.modes:
+        found["start"] = start.with_modes(model.modes)
     if "start" in inside:
         found["start"] = started(found["model"], found["striker"], found["start"], inside["start"])
     return found

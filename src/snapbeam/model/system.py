@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 import os
@@ -40,7 +41,7 @@ class System:
     striker : Striker, Shaker or RecordedDrive, optional
         Without one the structure vibrates freely from *start*.
     start : State, optional
-        Where runs begin; by default at rest in the well that the striker pushes away from, touched by it.
+        Where runs begin, one state; by default at rest in the well that the striker pushes away from, touched by it.
 
     Raises
     ------
@@ -91,10 +92,16 @@ class System:
         if start is not None:
             if not isinstance(start, State):
                 raise InputTypeError(f"start = {start!r}: must be a State")
+            if start.batch:
+                raise InputError(f"start: a batch of shape {start.batch}: must be one state")
             if start.modes != model.modes:
                 raise InputError(
                     f"start of {start.modes} modes: must have the {model.modes} modes of the model"
                 )
+            # what a system is made of is what it is hashed and saved by: a state's way here is no part of it
+            object.__setattr__(
+                self, "start", dataclasses.replace(start, tangent=None, passed=None, modal=None)
+            )
 
     # ------------------------------------------------------------------ by dotted name
 

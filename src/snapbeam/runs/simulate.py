@@ -116,7 +116,7 @@ def simulate(
     system, integration = asked(model, parts, options)
     if progress is not None and not callable(progress):
         raise InputTypeError(f"progress = {progress!r}: must be callable, as progress(share)")
-    tell(system.findings(), stacklevel=2)
+    tell(system.findings())
     plan, reached = plans_of(system, integration, run_columns(system, {}))[0], None
     if integration.tolerance is not None:
         plan, reached = steps_for(system, integration)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from snapbeam.config.parameters import lookup
 from snapbeam.core.codes import ResponseClass, RunStatus
-from snapbeam.core.findings import tell
+from snapbeam.core.findings import Finding, tell
 from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble, plans_of, run_columns
@@ -241,7 +241,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         )
     points = axes if isinstance(axes, Points) else points_of(axes)
     _require_parameters(system, points)
-    tell(system.findings(), stacklevel=3)
+    tell(_findings(system, points))
     law = type(system.contact) if system.contact is not None else None
     resolved = resolve(
         integration.engine,
@@ -272,6 +272,17 @@ def _require_parameters(system: System, points: Points) -> None:
         and not any(name.startswith("start.") for name in first)
     ):
         raise InputError("striker = None: a beam that nothing strikes needs a start to move from")
+
+
+def _findings(system: System, points: Points) -> Iterator[Finding]:
+    """What is doubtful about the system, or at the ends of what is swept."""
+    yield from system.findings()
+    columns = points.axes if points.axes else points.take(np.arange(points.size))
+    for name, values in columns.items():
+        if values.dtype.kind != "f" or name.startswith(("run.", "start.")):
+            continue
+        for end in (values.min(), values.max()):
+            yield from system.replace(**{name: float(end)}).findings()
 
 
 def variable_attributes(name: str) -> dict[str, Any]:
