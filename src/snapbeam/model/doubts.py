@@ -88,9 +88,9 @@ def _of_modes(model: ReducedModel, beam: Beam) -> list[Finding]:
         Finding(
             "first-mode-antisymmetric",
             f"b/r = {level:.3g}: the lowest mode about a well is antisymmetric (of the beam itself above 6.21), and "
-            f"omega_1, by which Omega and V are normalised, is its frequency ({model.natural_freq[0]:.5g} Hz), although "
-            f"a striker at the centre cannot excite it; set model.reference_freq = {symmetric:.5g} Hz to normalise by "
-            "the first symmetric mode",
+            "omega_1, by which Omega and V are normalised, is its frequency "
+            f"({model.natural_freq[0]:.5g} Hz), although a striker at the centre cannot excite it; set "
+            f"model.reference_freq = {symmetric:.5g} Hz to normalise by the first symmetric mode",
             {"buckling_level_over_radius": level, "symmetric_freq": symmetric},
         )
     ]
