@@ -10,13 +10,10 @@ import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
-from scipy.integrate import quad
 
 from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, select_less, store, vabs, vfloor
 from snapbeam.engines.scalar.physics import (
     circle,
-    contact_energy,
-    contact_force,
     decay_less_one,
     mode_energy,
     rotation,
@@ -132,17 +129,6 @@ def test_rotation_is_the_exact_flow(omega: float, zeta: float) -> None:
     exact = scipy.linalg.expm(time * np.array([[0.0, 1.0], [-(omega**2), -2.0 * zeta * omega]]))
     got = scale @ (np.reshape(rows, (2, 2)) + np.eye(2)) @ np.linalg.inv(scale)
     np.testing.assert_allclose(got, scale @ exact @ np.linalg.inv(scale), atol=2e-14)
-
-
-@given(st.floats(1e-12, 1e-3), st.floats(1e5, 1e12))
-@settings(max_examples=50, deadline=None, derandomize=True)
-def test_contact(depth: float, stiffness: float) -> None:
-    """Hertz's law, and its energy as the work of the force."""
-    assert contact_force(stiffness, depth) == pytest.approx(stiffness * depth**1.5, rel=1e-14)
-    work, _ = quad(lambda u: 2.0 * u * contact_force(stiffness, depth * u * u) * depth, 0.0, 1.0)
-    assert contact_energy(stiffness, depth) == pytest.approx(work, rel=1e-10)
-    assert contact_force(stiffness, -depth) == contact_energy(stiffness, -depth) == 0.0
-    assert contact_force(stiffness, 0.0) == 0.0
 
 
 def test_tension_is_the_gradient_of_its_energy() -> None:
