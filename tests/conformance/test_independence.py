@@ -86,7 +86,7 @@ def test_time_does_not_drift(march) -> None:
     oscillator = ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], reference_freq=1.0)
     cycles = 100_000
     start = State(amplitude=np.zeros(1), velocity=np.ones(1))
-    end = march(oscillator, None, cycles=cycles, start=start, step=0.3)
+    end = march(oscillator, None, cycles=cycles, start=start, step=0.25)
     seconds = end.books["time"][0] * end.ensemble.runs["tick"][0]
     assert seconds == pytest.approx(cycles, rel=1e-15)
     assert end.books["energy"][0] == pytest.approx(0.5, rel=1e-9)

@@ -233,8 +233,11 @@ def _offsets(
     if system.striker is None:
         return np.full(table.size, _FAR_AWAY)
     flat, modal = state.flat(), state.flat().modal
+    position = structure.sign * flat.striker_position - table["rest_contact"]
     if modal is not None and modal.structure == structure.hash:
-        return np.array(np.broadcast_to(modal.offset, (table.size,)))
+        # to the bit, unless the striker now strikes at another place
+        same = structure.sign * (table["rest_contact"] + modal.offset) == flat.striker_position
+        return np.where(same, modal.offset, position)
     pairs = {(int(run["contact_row"]), int(run["start_row"])) for run in table}
     reach = {(place, at): float(rows[place] @ starts[at, 0]) for place, at in pairs}
     touching = np.array([reach[int(run["contact_row"]), int(run["start_row"])] for run in table])
@@ -242,7 +245,6 @@ def _offsets(
     offset = touching - begun
     if "striker.gap" in columns:
         offset = np.where(np.isnan(columns["striker.gap"]), offset, -columns["striker.gap"])
-    position = structure.sign * flat.striker_position - table["rest_contact"]
     return np.asarray(np.where(np.isnan(flat.striker_position), offset, position))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,12 +53,16 @@ def clocked(
     table["finest"] = [plan.finest for plan in plans]
     if isinstance(drive, Recorded):
         turn = np.full(table.size, drive.duration)
-        asked = _asked_cycles(drive, integration, periods)
+        left = 1.0 - table["phase"] / (2.0 * math.pi)
+        asked = _asked_cycles(drive, integration, periods, float(left.min()))
         steps = _whole_steps(turn, lengths, 1.0)
         table["period"] = steps * SUBDIVISION
         table["tick"] = turn / table["period"]
+        held = drive.duration * drive.frequency
+        table["landing"] = np.rint(table["period"] / held)
         share = asked / drive.frequency / drive.duration
-        table["end"] = table["period"] if share >= 1.0 else np.rint(share * table["period"]).astype(np.int64)
+        table["end"] = np.rint(share * table["period"] if periods is None else asked * table["landing"])
+        table["end"] = np.minimum(table["end"], np.rint(left * table["period"]))
         cycles = float(table["end"][0] * table["tick"][0] * drive.frequency)
     else:
         cycles = float(integration.cycles_or_default if periods is None else periods)
@@ -67,18 +72,25 @@ def clocked(
         table["end"] = table["period"] * int(cycles)
         if not cycles.is_integer():
             table["end"] = np.rint(table["period"] * cycles).astype(np.int64)
-    table["landing"] = table["end"] if periods is None else table["period"]
+    if periods is None:
+        table["landing"] = table["end"]
+    elif not isinstance(drive, Recorded):
+        table["landing"] = table["period"]
     table["last_quarter"] = table["end"] // 4 * 3
     return Clocked(cycles)
 
 
-def _asked_cycles(drive: Recorded, integration: Integration, periods: float | None) -> float:
-    held = drive.duration * drive.frequency
+def _asked_cycles(drive: Recorded, integration: Integration, periods: float | None, left: float) -> float:
+    """Cycles to march, of a record of which a share *left* is still to come."""
+    held = drive.duration * drive.frequency * left
     asked = integration.cycles if periods is None else periods
-    if asked is None:
+    if asked is None and held > 0.0:
         return held
-    if asked > held * (1.0 + 1e-9):
-        raise InputError(f"cycles = {asked}: must be at most the {held:.1f} cycles of the recorded drive")
+    if asked is None or asked > held * (1.0 + 1e-9) + 1e-9:
+        of = "of" if left == 1.0 else "that are left of"
+        raise InputError(
+            f"cycles = {asked}: must be at most the {max(held, 0.0):.1f} cycles {of} the recorded drive"
+        )
     return min(float(asked), held)
 
 

@@ -9,11 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.core.codes import RunStatus
 from snapbeam.core.validate import InputError, finite_array
 
 __all__ = ["ModalState", "State"]
 
 _Array = NDArray[np.float64]
+_REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
 
 
 class ModalState(NamedTuple):
@@ -50,7 +52,8 @@ class State:
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitude and velocity that were carried along, k of them.
     passed : mapping, optional
-        What happened on the way here: crossings, impacts, peak_force, ... by name.
+        What happened on the way here: crossings, impacts, peak_force, ... by name.  A state that was not reached,
+        as its ``passed["status"]`` says, is NaN.
     modal : ModalState, optional
         The same in an engine's coordinates.
 
@@ -70,7 +73,7 @@ class State:
     modal: ModalState | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        amplitude = finite_array("state amplitude", self.amplitude)
+        amplitude = _finite_where_known("state amplitude", self.amplitude, self.passed)
         if amplitude.ndim == 0:
             raise InputError(
                 f"state amplitude = {float(amplitude):g}: must be an array of shape (..., modes)"
@@ -78,7 +81,7 @@ class State:
         batch = amplitude.shape[:-1]
         velocity = np.zeros_like(amplitude)
         if self.velocity is not None:
-            velocity = finite_array("state velocity", self.velocity)
+            velocity = _finite_where_known("state velocity", self.velocity, self.passed)
             if velocity.shape != amplitude.shape:
                 raise InputError(
                     f"state velocity of shape {velocity.shape}: must have shape {amplitude.shape}"
@@ -158,6 +161,17 @@ class State:
             amplitude=amplitude, velocity=velocity, phase=self.phase, striker_position=self.striker_position,
             contact_time=self.contact_time,
         )  # fmt: skip
+
+
+def _finite_where_known(name: str, value: ArrayLike, passed: Mapping[str, _Array] | None) -> _Array:
+    """Numbers that are finite, but for states that were not reached, as their status says."""
+    status = None if passed is None else passed.get("status")
+    if status is None:
+        return finite_array(name, value)
+    array = np.array(value, dtype=np.float64)
+    lost = np.isnan(array).all(axis=-1) & ~np.isin(status, _REACHED)
+    finite_array(name, np.where(lost[..., None], 0.0, array))
+    return array
 
 
 def _spread(name: str, array: _Array, batch: tuple[int, ...]) -> _Array:

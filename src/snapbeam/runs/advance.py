@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.core.codes import RunStatus
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, flag, positive
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble
@@ -45,8 +47,8 @@ def advance(
     """Where a system stands some periods of the excitation after it stood in a state.
 
     Steps land on every whole period, and what follows depends on the state there alone: two calls of one period
-    each give, bit for bit, what one call of two periods gives.  :func:`~snapbeam.simulate` does not land in between
-    and agrees to the error of its accuracy level.
+    each give, bit for bit, what one call of two periods gives (under a recorded drive to rounding).
+    :func:`~snapbeam.simulate` does not land in between and agrees to the error of its accuracy level.
 
     Parameters
     ----------
@@ -59,7 +61,7 @@ def advance(
         Small changes of amplitudes (m^0.5) and velocities (m^0.5/s) to carry along by the tangent flow of the same
         steps: k of them for each state, or the same k for all.
     integration : Integration, optional
-        Steps, accuracy, threads.
+        Steps, accuracy, threads.  States go on on the CPU, for *periods*, and no run is decided early.
     every : bool
         Whether to give the states after each period, along a new first dimension, instead of the last one.
     progress : callable, optional
@@ -68,14 +70,14 @@ def advance(
     Returns
     -------
     State
-        With ``passed``, what happened on the way (its statistics have the shape of the batch), and ``tangent``, if
-        some were given.  A state that the engine could not reach has a ``passed["status"]`` that says why, and NaN
-        for numbers.
+        With ``passed``, what happened on the way (its statistics have the shape of the batch; a contact that is
+        still going on is none of the impacts yet), and ``tangent``, if some were given.  A state that the engine could
+        not reach has a ``passed["status"]`` that says why, and NaN for numbers.
 
     Raises
     ------
     InputError
-        For bad input; for tangents under a law of contact whose force jumps.
+        For bad input; for tangents under a law of contact whose force jumps; for more periods than a record holds.
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {system!r}: must be a System")
@@ -94,6 +96,10 @@ def advance(
     if every and not float(span).is_integer():
         raise InputError(f"periods = {span:g} with every = True: must be a whole number")
     flat = state.flat()
+    if integration.tolerance is not None:
+        raise InputError(
+            f"tolerance = {integration.tolerance:g}: is for one run; give steps, or accuracy = 'reference'"
+        )
     ensemble = make_ensemble(system, integration.replace(early_decision=False), start=flat, periods=span)
     _, engine = resolve("cpu")
     vectors = None
@@ -103,6 +109,7 @@ def advance(
         given = _checked_tangent(system, tangent, flat)
         back = system.model.linear_modes.T @ system.model.mass
         landings, moved = engine.march_tangents(ensemble, given @ back.T, integration.threads, progress)
+        moved[~np.isin(landings.books["status"], (int(RunStatus.OK), int(RunStatus.DECIDED)))] = np.nan
         vectors = (moved @ system.model.linear_modes.T).reshape((*state.batch, *moved.shape[1:]))
     found = _states(ensemble, landings, every)
     passed = statistics_of(ensemble, landings.books)
@@ -129,16 +136,28 @@ def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
 
 
 def _states(ensemble: Ensemble, landings: Landings, every: bool) -> list[State]:
-    """States after each period, or after the last one alone."""
-    count = landings.q.shape[1]
-    failed = ~np.isin(landings.books["status"], (0, 1))
+    """States after each period, or after the last one alone; NaN where a run did not come so far."""
+    count, book = landings.q.shape[1], landings.books
+    failed = ~np.isin(book["status"], (int(RunStatus.OK), int(RunStatus.DECIDED)))
     found = []
     for at in range(count) if every else (count - 1,):
         ticks = np.minimum((at + 1) * ensemble.runs["landing"], ensemble.runs["end"])
         q, p = landings.q[:, at].copy(), landings.p[:, at].copy()
-        q[failed], p[failed] = 0.0, 0.0
-        found.append(states_of(ensemble, q, p, landings.home[:, at], landings.contact_ticks[:, at], ticks))
+        lost = failed & ((book["time"] < ticks) | (at == count - 1))
+        q[lost], p[lost] = 0.0, 0.0
+        state = states_of(ensemble, q, p, landings.home[:, at], landings.contact_ticks[:, at], ticks)
+        if lost.any():
+            state = _without(state, lost)
+        found.append(state)
     return found
+
+
+def _without(state: State, lost: NDArray[np.bool_]) -> State:
+    """A batch of which some states were not reached."""
+    amplitude, velocity = state.amplitude.copy(), state.velocity.copy()
+    amplitude[lost], velocity[lost] = np.nan, np.nan
+    status = np.where(lost, int(RunStatus.NOT_RUN), int(RunStatus.OK))
+    return replace(state, amplitude=amplitude, velocity=velocity, passed={"status": status})
 
 
 def _shaped(

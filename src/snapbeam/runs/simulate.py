@@ -133,6 +133,8 @@ def simulate(
     outcome = Outcome.from_statistics(statistics_of(ensemble, recorded.books, lasted))
     if times is None and outcome.status != RunStatus.OK:
         recorded = _reached(recorded, float(recorded.books["time"][0] * run["tick"]))
+        if recorded.times.size == 0:
+            times = np.zeros(1)  # it failed before anything could be written down
     more: dict[str, Any] = _own_attributes(system, integration, lasted)
     more["response"] = outcome.response.label
     more["status"] = f"{outcome.status.name}: {outcome.status.advice}"

@@ -26,7 +26,8 @@ def states_of(
     structure, runs = ensemble.structure, ensemble.runs
     far = (home < 0)[:, None]
     first = np.where(far, q + structure.shift, q)
-    turned = (ticks % runs["period"]) / runs["period"]
+    # a sine comes round after each turn; a record has an end
+    turned = (ticks % runs["period"] if ensemble.drive.harmonic else ticks) / runs["period"]
     tick = runs["tick"]
     return State(
         amplitude=structure.amplitudes(first),

@@ -45,10 +45,13 @@ def _package_fingerprint() -> str:
 def fingerprint(kinds: tuple[type, ...]) -> str | None:
     """Of everything that a kernel for these laws and drives bakes in, in 20 hexadecimal digits.
 
-    None if the source of one of them cannot be read, as of a class typed at a prompt.
+    None if the source of one of them cannot be read, as of a class typed at a prompt, or if it stands for functions
+    from anywhere, as statistics that were registered do: such a kernel is compiled anew in every process.
     """
     digest = hashlib.sha256(_package_fingerprint().encode())
     for kind in kinds:
+        if getattr(kind, "rows", ()):
+            return None
         for each in kind.__mro__[:-1]:
             try:
                 source = inspect.getsourcefile(each)

@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 import pytest
-from snapbeam.runs.response import STATISTICS, Response, classify
 
 import snapbeam as sb
-from snapbeam.core.codes import ResponseClass, RunStatus
+from snapbeam.core.codes import ResponseClass, RunStatus, classify
+from snapbeam.engines.outcomes import STATISTICS
+from snapbeam.runs.outcome import Outcome
 
 INTRAWELL, FIRST, SECOND, CONTINUOUS = (
     ResponseClass.INTRAWELL,
@@ -76,15 +77,34 @@ def test_codes() -> None:
     assert all(len(status.advice) > 10 for status in RunStatus)
 
 
-def test_response_from_statistics() -> None:
+def test_outcome_from_statistics() -> None:
     values = {
-        name: np.array([0, 1]).astype(kind) if kind != "float64" else np.array([math.nan, 0.5])
-        for name, (kind, _, _) in STATISTICS.items()
+        name: np.array([0, 1]).astype(row.dtype) if row.dtype != "float64" else np.array([math.nan, 0.5])
+        for name, row in STATISTICS.items()
     }
-    response = Response.from_statistics(values, 1)
-    assert response.response is ResponseClass.TRANSIENT_1
-    assert response.status is RunStatus.DECIDED
-    assert response.decided_at == 0.5
-    assert response.end_is_final is True
-    assert type(response.crossings) is int
-    assert list(vars(response)) == list(STATISTICS)
+    outcome = Outcome.from_statistics(values, 1)
+    assert outcome.response is ResponseClass.TRANSIENT_1
+    assert outcome.status is RunStatus.DECIDED
+    assert outcome.decided_at == 0.5
+    assert outcome.end_is_final is True
+    assert type(outcome.crossings) is int
+    assert list(outcome) == list(STATISTICS)
+    assert len(outcome) == len(STATISTICS)
+    assert {name: outcome[name] for name in outcome} == {name: getattr(outcome, name) for name in outcome}
+    assert set(STATISTICS) <= set(dir(outcome))
+    assert sb.Response is Outcome
+
+
+def test_outcome_says_what_it_is() -> None:
+    values = {name: np.zeros(1, dtype=row.dtype) for name, row in STATISTICS.items()}
+    outcome = Outcome.from_statistics(values)
+    assert repr(outcome) == "<Outcome intrawell, 0 crossings, 0 impacts>"
+    lines = outcome.table().splitlines()
+    assert len(lines) == len(STATISTICS)
+    assert lines[0].split() == ["response", "intrawell", "response", "class"]
+    (force,) = [line for line in lines if line.startswith("peak_force")]
+    assert force.split() == ["peak_force", "0", "N", "peak", "contact", "force"]
+    with pytest.raises(AttributeError, match="Outcome has no 'crossing'; it has response, status, crossings"):
+        _ = outcome.crossing
+    with pytest.raises(KeyError):
+        outcome["crossing"]
