@@ -85,9 +85,9 @@ def threshold(
     if values is None:
         if name != "drive.velocity_amplitude":
             raise InputError(f"{along}: give the values to choose from, as --axis {along}=start:stop:count")
-        values = parse_axis("velocity_amplitude", _VALUES)
+        values = np.atleast_1d(parse_axis("velocity_amplitude", _VALUES))
     if not [each for each in axes if each != "model.modes"]:
-        axes["drive.frequency_ratio"] = parse_axis("frequency_ratio", "0.1:4:64")
+        axes["drive.frequency_ratio"] = np.atleast_1d(parse_axis("frequency_ratio", "0.1:4:64"))
     axes = dict(sorted(axes.items(), key=lambda item: lookup(item[0]).is_run))
 
     from snapbeam.sweeps.threshold import threshold as find

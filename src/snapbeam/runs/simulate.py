@@ -161,7 +161,7 @@ def _own_attributes(system: System, integration: Integration, lasted: float) -> 
             for name in ("frequency_ratio", "velocity_amplitude")
             if hasattr(striker.drive, name)
         }
-    elif isinstance(striker and striker.drive, RecordedMotion):
+    elif striker is not None and isinstance(striker.drive, RecordedMotion):
         attrs |= {
             "drive": "recorded",
             "frequency_ratio": striker.drive.frequency / system.model.reference_freq,
