@@ -28,12 +28,12 @@ def extras_of_table() -> Any:
     rows = updated()
     if rows not in _made:
         owner: Any = type("OwnExtras", (Extras,), {"rows": rows}) if rows else Extras
-        kind: Any = namedtuple("Numbers", ())  # type: ignore[misc]
-        kind.owner = owner
+        made: Any = _named_tuple("Numbers", ())
+        made.owner = owner
         if not rows:
-            kind.__module__, kind.__qualname__ = __name__, "Extras.Numbers"
-            Extras.Numbers = kind  # type: ignore[attr-defined]
-        _made[rows] = kind()
+            made.__module__, made.__qualname__ = __name__, "Extras.Numbers"
+            owner.Numbers = made
+        _made[rows] = made()
     return _made[rows]
 
 
