@@ -13,7 +13,7 @@ from snapbeam import paper
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
 from snapbeam.paper.claims import VERDICTS, Claim, measure_claims, write_claims
-from snapbeam.paper.recipes.sensitivity import buckling_mode_damping
+from snapbeam.paper.studies.sensitivity import buckling_mode_damping
 from snapbeam.sweeps.analysis import compare_maps, interwell_threshold, threshold_notch
 
 

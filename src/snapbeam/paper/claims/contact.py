@@ -9,7 +9,7 @@ import numpy as np
 
 from snapbeam.model.paper_values import CONTACT, LOCATION
 from snapbeam.paper.claims.table import Claim
-from snapbeam.paper.recipes.sensitivity import tip_contact
+from snapbeam.paper.studies.sensitivity import tip_contact
 from snapbeam.paper.system import paper_model, paper_run
 
 if TYPE_CHECKING:

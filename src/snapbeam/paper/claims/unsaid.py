@@ -9,7 +9,7 @@ import numpy as np
 from snapbeam.core.codes import ResponseClass
 from snapbeam.model.paper_values import CONTACT, DAMPING_RATIO
 from snapbeam.paper.claims.table import Claim
-from snapbeam.paper.recipes.sensitivity import buckling_mode_damping
+from snapbeam.paper.studies.sensitivity import buckling_mode_damping
 from snapbeam.paper.system import paper_model
 from snapbeam.sweeps.analysis import Difference, compare_maps, is_interwell
 
