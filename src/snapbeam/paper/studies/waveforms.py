@@ -36,7 +36,8 @@ _RANGES = ((0.3, 4.0), (0.05, 0.65))
 """Omega and V: Fig. 6 without its slowest and weakest drives, which rarely snap the beam through."""
 _PERIODS = 25  # of the first mode, a run
 _SAMPLES = 400  # a period of the first mode
-_STROBE_PHASES = 8
+_STROBE_PHASES = 16
+_STROBED = 200  # cycles, at most
 
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
@@ -159,14 +160,15 @@ def _table(dim: str, columns: dict[str, tuple[str, str]], rows: _Array, attrs: d
 
 
 def _strobed(results: Results, modes: int, points: _Array, attrs: dict[str, Any]) -> xr.Dataset:
-    """Displacement at the contact at 8 phases of every cycle of the second half of long runs that do not snap."""
+    """Displacement at the contact at 16 phases of the last cycles of long runs that do not snap."""
     import xarray as xr
 
     cycles = results.pick(60, 800)
+    kept_cycles = min(cycles // 2, _STROBED)
     model, found, kept = paper_model(modes), [], []
     for at, (omega, drive) in enumerate(points):
         period = 1.0 / (omega * model.reference_freq)
-        steps = np.arange(_STROBE_PHASES * cycles // 2, _STROBE_PHASES * cycles)
+        steps = np.arange(_STROBE_PHASES * (cycles - kept_cycles), _STROBE_PHASES * cycles)
         run = paper_run(
             modes, float(omega), float(drive), cycles, sample_times=steps * period / _STROBE_PHASES
         )  # fmt: skip
@@ -175,14 +177,14 @@ def _strobed(results: Results, modes: int, points: _Array, attrs: dict[str, Any]
             kept.append((omega, drive))
         results.progress(f"waveforms, {cycles} cycles")(at + 1, len(points))
     words = {"units": "b", "long_name": "beam displacement at the shaker"}
-    shape = (len(found), cycles // 2, _STROBE_PHASES)
+    shape = (len(found), kept_cycles, _STROBE_PHASES)
     record = np.array(found, dtype=np.float64).reshape(shape)
     data: dict[str, Any] = {"displacement": (("run", "cycle", "phase"), record, words)}
     for name, column in zip(
         ("frequency_ratio", "velocity_amplitude"), np.reshape(kept, (-1, 2)).T, strict=True
     ):
         data[name] = (("run",), column, {"units": "1"})
-    return xr.Dataset(data, {"cycle": np.arange(cycles // 2, cycles)}, attrs | {"cycles": cycles})
+    return xr.Dataset(data, {"cycle": np.arange(cycles - kept_cycles, cycles)}, attrs | {"cycles": cycles})
 
 
 def draw(results: Results) -> Figure:
