@@ -101,7 +101,7 @@ def _table(rows: Iterable[Claim], is_open: bool) -> list[str]:
         lines = ["| # | question | measured | for comparison | shown in |", "|---|---|---|---|---|"]
     else:
         lines = [
-            "| # | the paper says | its number | measured | uncertainty | verdict | shown in |",
+            "| # | the paper says | number in the paper | measured | uncertainty | verdict | shown in |",
             "|---|---|---|---|---|---|---|",
         ]
     for row in rows:
@@ -122,7 +122,7 @@ def _link(figures: str) -> str:
 def _details(rows: Iterable[Claim]) -> list[str]:
     lines = []
     for row in rows:
-        verb = "Would matter" if row.verdict == "open" else "Would have failed it"
+        verb = "Matters with" if row.verdict == "open" else "Fails with"
         parts = [f"*{row.source}.*", f"Rule: {row.rule}", f"{verb}: {row.fails}", row.note]
         lines += [row.number, ": " + " ".join(part for part in parts if part), ""]
     return lines

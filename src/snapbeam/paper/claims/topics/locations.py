@@ -61,7 +61,7 @@ def along(results: Results, ratio: float, which: int) -> tuple[_Array, _Array, f
 def _follows(results: Results, ratio: float, which: int, printed: float, narrow: float) -> Finding:
     """Whether a threshold is a printed multiple of V_QS1 at nearly all locations."""
     ds = _map(results, ratio, which)
-    _, curve = relative_threshold(ds)
+    x, curve = relative_threshold(ds)
     step = grid_step(ds, float(np.nanmedian(curve)))
     level = median_of(curve, 0.5 * step)
     low, high = (float(value) for value in np.nanquantile(curve, (0.1, 0.9)))
@@ -69,7 +69,7 @@ def _follows(results: Results, ratio: float, which: int, printed: float, narrow:
     straight = below(high - low, max(narrow * level.value, 2.0 * step))
     return found(
         at_level & straight, at_level | straight, level=level, low=low, high=high, printed=printed,
-        times=level.value / printed,
+        times=level.value / printed, end=float(np.nanmedian(curve[x <= _END])),
     )  # fmt: skip
 
 
@@ -197,12 +197,13 @@ def notch_deepens(results: Results) -> Finding:
 
 def below_static(results: Results) -> Finding:
     """7i: at Omega = 0.625 the thresholds of both models are significantly below V_QS1."""
+    x, _ = relative_threshold(_map(results, _MIDDLE, 1))
     curves = [relative_threshold(_map(results, _MIDDLE, which))[1] for which in (0, 1)]
     one, many = (share(curve < 0.8) for curve in curves)
     levels = [float(np.nanmedian(curve)) for curve in curves]
     return found(
         above(one, 0.95) & above(many, 0.95), above(one, 0.5) & above(many, 0.5), many=many, one=one,
-        level=levels[1], level_one=levels[0],
+        level=levels[1], level_one=levels[0], end=float(np.nanmedian(curves[1][x <= _END])),
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from snapbeam.paper.claims.topics.thresholds import notch_of
 from snapbeam.paper.recipes.figB10 import maxima
 from snapbeam.paper.studies.resonance import ridge
 from snapbeam.paper.system import paper_model
+from snapbeam.sweeps.analysis import interwell_threshold
 
 if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
@@ -148,12 +149,13 @@ def _linked(results: Results, which: int) -> Finding:
     notch = notch_of(ds)
     spread = 0.5 * (notch.high - notch.low) + 0.5 * float(np.diff(ds.frequency_ratio.values).max())
     end = Quantity(float(ratios[-1]), 0.5 * grid)
+    there = float(np.interp(end.value, ds.frequency_ratio.values, interwell_threshold(ds)))
     apart = Quantity(abs(end.value - notch.position), combined(end.uncertainty, spread))
     closing = abs(float(ratios[0]) - notch.position) - apart.value
     towards = above(Quantity(closing, apart.uncertainty), 0.5 * abs(float(ratios[0]) - notch.position))
     return found(
         below(apart.value, 0.05 + apart.uncertainty), towards, apart=apart, end=end, start=float(ratios[0]),
-        drive=float(drives[-1]), notch=notch.position,
+        drive=float(drives[-1]), notch=notch.position, depth=notch.height, there=there,
     )  # fmt: skip
 
 

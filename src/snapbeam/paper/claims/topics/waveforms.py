@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
+from snapbeam.core.codes import ResponseClass
 from snapbeam.model.paper_values import BEAM, LOCATION
 from snapbeam.paper.claims.finding import Finding, Quantity, above, below, found
 from snapbeam.paper.claims.spread import median_of, part, resampled, share
@@ -167,11 +168,27 @@ def similar_amplitude(results: Results) -> Finding:
     )  # fmt: skip
 
 
+def in_order(results: Results) -> Finding:
+    """23c: intrawell, one snap-through, several, as the amplitude grows at one frequency."""
+    searched = results["fig4"]["searched"]
+    settled = searched.response.values == ResponseClass.TRANSIENT_2
+    hits = []
+    for kinds, crossings, second in zip(
+        searched.response.values, searched.crossings.values, settled, strict=True
+    ):
+        once, more = np.flatnonzero(second & (crossings == 1)), np.flatnonzero(second & (crossings >= 3))
+        ordered = once.size > 0 and more.size > 0 and once[0] < more[-1]
+        hits.append(bool(kinds[0] == ResponseClass.INTRAWELL and ordered))
+    value = share(hits)
+    return found(above(value.value, 0.0), share=value, frequencies=len(hits))
+
+
 ROWS = {
     "10a": snaps_through,
     "10b": higher_modes_dominate,
     "23a": not_periodic,
     "23b": similar_amplitude,
+    "23c": in_order,
     "26a": antisymmetric_part,
     "26b": slow_push,
     "27": first_mode_away,
