@@ -9,7 +9,7 @@ numbers of a sketch where no data are stored; those of full size are in the page
 from snapbeam import paper
 from snapbeam.paper.claims import measure_claims, summary
 
-rows = measure_claims(paper.shared_results())
+rows = measure_claims(paper.shared_results(), paper.Results())
 print(summary(rows))
 
 # %%
@@ -23,7 +23,7 @@ for name, quantity in row.quantities.items():
 print(row.verdict)
 
 # %%
-# The natural frequency of one mode is right to a few percent; the frequencies at which a shaker excites the beam
-# most are not, because contact lasts longer the more the beam gives way under the tip.
+# The natural frequency of one mode is right to a few percent; the frequencies at which a shaker moves the beam most
+# are not.  They fall as the shaker moves faster, until the beam snaps through:
 
 figure = paper.resonance(results=paper.shared_results())

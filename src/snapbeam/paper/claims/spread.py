@@ -53,7 +53,7 @@ def resampled(statistic: Callable[[NDArray[np.int64]], float], count: int, *more
     draw = np.random.default_rng(_SEED)
     value = statistic(np.arange(count)) if count else math.nan
     if count < 3:
-        return Quantity(value, abs(value))  # nothing to resample: known to its size
+        return Quantity(value, combined(abs(value), *more))  # nothing to resample: known to its size
     drawn = np.array([statistic(draw.integers(0, count, count)) for _ in range(_DRAWS)])
     drawn = drawn[np.isfinite(drawn)]
     if drawn.size == 0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -69,7 +70,7 @@ def write_table(claims: Sequence[Claim], folder: Path, size: str) -> list[Path]:
     texts = {
         "claims.md": _markdown(claims),
         "claims.csv": _csv(claims),
-        "claims.json": json.dumps(record, indent=1, ensure_ascii=False) + "\n",
+        "claims.json": json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False) + "\n",
     }
     files = []
     for name, text in texts.items():
@@ -81,7 +82,11 @@ def write_table(claims: Sequence[Claim], folder: Path, size: str) -> list[Path]:
 
 
 def _record(claim: Claim) -> dict[str, object]:
-    quantities = {name: quantity._asdict() for name, quantity in claim.quantities.items()}
+    """A row for JSON, which has no number for what was not found."""
+    quantities = {
+        name: {part: value if math.isfinite(value) else None for part, value in quantity._asdict().items()}
+        for name, quantity in claim.quantities.items()
+    }
     return {**asdict(claim), "quantities": quantities}
 
 
