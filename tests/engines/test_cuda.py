@@ -139,7 +139,13 @@ def test_auto_takes_a_device_only_where_it_pays(monkeypatch):
     big = {"runs": 52_000, "cycles": 1000, "modes": 32}
     assert engines.resolve("auto", **big)[0] == "cuda"
     assert engines.resolve("cuda")[0] == "cuda"
-    for less in ({"runs": 1999}, {"cycles": 38}, {"modes": 129}, {"law": sb.Restitution}, {"drive": sb.Recorded}):
+    for less in (
+        {"runs": 1999},
+        {"cycles": 38},
+        {"modes": 129},
+        {"law": sb.Restitution},
+        {"drive": sb.Recorded},
+    ):
         assert engines.resolve("auto", **(big | less))[0] == "cpu", less
     with pytest.raises(InputError, match="more than its 128"):
         engines.resolve("cuda", modes=129)
