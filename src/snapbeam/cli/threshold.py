@@ -95,7 +95,7 @@ def threshold(
     system = settings.system
     system.model.require_bistable("a threshold")
     start = time.monotonic()
-    with progress(1) as report:
+    with progress(None, "threshold", "runs") as report:
         dataset = find(
             system, name, values, axes, settings.integration.replace(threads=threads), search=search,
             share=0.1 if share is None else share, progress=report,

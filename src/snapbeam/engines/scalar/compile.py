@@ -7,18 +7,21 @@ Here it is kept under a fingerprint of everything that it bakes in (:mod:`~snapb
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from numba import njit
+from numba import njit, typeof
+from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from snapbeam.engines.scalar.fingerprint import fingerprint
 from snapbeam.engines.scalar.parts import pipeline
 
-__all__ = ["INLINE", "INLINE_HERE", "compiled", "inlined", "kernel"]
+__all__ = ["INLINE", "INLINE_HERE", "compiled", "inlined", "kernel", "ready"]
 
+_LOG = logging.getLogger("snapbeam")
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
 _PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **pipeline()}
 INLINE: dict[str, Any] = {"error_model": "numpy", "forceinline": True}
@@ -62,3 +65,25 @@ def kernel(function: Callable[..., Any], kinds: tuple[type, ...]) -> Any:
     ):  # no place to keep compiled code, or a Numba that keeps it otherwise
         return njit(**_OPTIONS)(function)
     return dispatcher
+
+
+class _Telling(event.Listener):
+    """Says once that a kernel is being compiled."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.told = False
+
+    def on_start(self, event: Any) -> None:
+        if not self.told:
+            self.told = True
+            _LOG.info("compiling %s, once on this machine: some 15 s", self.name)
+
+    def on_end(self, event: Any) -> None:
+        """Nothing to say."""
+
+
+def ready(march: Any, *arguments: Any) -> None:
+    """Compile a kernel for such arguments, or fetch it from the disk, before anything is timed; says so in the log."""
+    with event.install_listener("numba:compile", _Telling(march.py_func.__name__)):
+        march.compile(tuple(typeof(value) for value in arguments))
