@@ -129,13 +129,20 @@ def test_refusals_of_systems(call, error: type[Exception], message: str) -> None
         call()
 
 
-def test_a_step_that_does_not_resolve_the_first_period_is_refused() -> None:
-    """A quarter of it is the longest: no class is told of a run that saw nothing."""
-    longest = 0.25 / BUCKLED.reference_freq
-    for door in (sb.simulate, lambda system, asked: sb.sweep(system, {"frequency_ratio": [1.0, 1.1]}, asked)):
+@pytest.mark.parametrize("ratio", [0.3, 3.0])
+def test_a_step_that_does_not_resolve_a_period_is_refused(ratio: float) -> None:
+    """A quarter of a cycle and of the first period is the longest: no class is told of a run that saw nothing."""
+    system = SYSTEM.replace(**{"drive.frequency_ratio": ratio})
+    longest = 0.25 / (BUCKLED.reference_freq * max(ratio, 1.0))
+    words = "a cycle of excitation" if ratio > 1.0 else "a period of the first mode"
+    for door in (
+        sb.simulate,
+        lambda system, asked: sb.sweep(system, {"velocity_amplitude": [0.1, 0.2]}, asked),
+    ):
         with pytest.raises(
-            sb.InputError, match=r"step = 1 s: must be at most 0\.003\d+ s, a quarter of the period"
+            sb.InputError, match=r"step = 1 s: does not resolve .*must be at most .*a quarter of it"
         ):
-            door(SYSTEM, sb.Integration(cycles=5, step=1.0))
-        with pytest.raises(sb.InputError, match="a quarter of the period"):
-            door(SYSTEM, sb.Integration(cycles=5, step=1.01 * longest))
+            door(system, sb.Integration(cycles=5, step=1.0))
+        with pytest.raises(sb.InputError, match=f"does not resolve {words}"):
+            door(system, sb.Integration(cycles=5, step=1.01 * longest))
+        door(system, sb.Integration(cycles=1, step=0.99 * longest))

@@ -180,7 +180,7 @@ class LongReport:
         self._bar = bar
         self._log = log
         self._start = self._last = time.monotonic()
-        self._before = 0
+        self._before: int | None = None
         self._quiet = True
 
     def note(self, text: str) -> None:
@@ -191,7 +191,7 @@ class LongReport:
     def progress(self, done: int, total: int) -> None:
         """Say how far the present stage is."""
         now = time.monotonic()
-        if done < self._before:
+        if self._before is None or done < self._before:
             self._start = now
         finished = done >= total and done != self._before
         self._before = done

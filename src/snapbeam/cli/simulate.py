@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from snapbeam.cli import options as opt
-from snapbeam.cli.console import FAILED, door, duration, errors, file_line, out
+from snapbeam.cli.console import FAILED, compiling_told, door, duration, errors, file_line, out
 from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
@@ -91,7 +91,7 @@ def simulate(
         )
         system = system.replace(striker=recorded)
     start = time.monotonic()
-    with _share_done() as progress:
+    with compiling_told(errors()), _share_done() as progress:
         run = sb.simulate(system, integration, progress=progress)
     console = out()
     console.print(_told(run, time.monotonic() - start))

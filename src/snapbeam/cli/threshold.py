@@ -85,9 +85,9 @@ def threshold(
     if values is None:
         if name != "drive.velocity_amplitude":
             raise InputError(f"{along}: give the values to choose from, as --axis {along}=start:stop:count")
-        values = parse_axis("velocity_amplitude", _VALUES)
+        values = np.atleast_1d(parse_axis("velocity_amplitude", _VALUES))
     if not [each for each in axes if each != "model.modes"]:
-        axes["drive.frequency_ratio"] = parse_axis("frequency_ratio", "0.1:4:64")
+        axes["drive.frequency_ratio"] = np.atleast_1d(parse_axis("frequency_ratio", "0.1:4:64"))
     axes = dict(sorted(axes.items(), key=lambda item: lookup(item[0]).is_run))
 
     from snapbeam.sweeps.threshold import threshold as find
@@ -95,7 +95,7 @@ def threshold(
     system = settings.system
     system.model.require_bistable("a threshold")
     start = time.monotonic()
-    with progress(1) as report:
+    with progress(None, "threshold", "runs") as report:
         dataset = find(
             system, name, values, axes, settings.integration.replace(threads=threads), search=search,
             share=0.1 if share is None else share, progress=report,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -90,11 +90,13 @@ class Parameter:
 
 
 def _rows() -> Iterable[Parameter]:
-    for section, kind in (("beam", Beam), ("striker", Striker), ("run", Integration)):
-        yield from _of_class(section, kind)
+    own: tuple[tuple[str, type], ...] = (("beam", Beam), ("striker", Striker), ("run", Integration))
+    for section, part in own:
+        yield from _of_class(section, part)
     for name, (item, default) in MODEL_QUANTITIES.items():
         yield Parameter(f"model.{name}", item.short or name, item, default)
-    for section, known in (("contact", LAWS), ("drive", DRIVES)):
+    several: tuple[tuple[str, Mapping[str, type]], ...] = (("contact", LAWS), ("drive", DRIVES))
+    for section, known in several:
         for kind_name, kind in known.items():
             for row in _of_class(section, kind):
                 yield dataclasses.replace(row, kinds=(kind_name,))

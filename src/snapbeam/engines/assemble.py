@@ -24,7 +24,7 @@ from snapbeam.model.start import rest_state
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 
-__all__ = ["make_ensemble", "plans_of", "run_columns"]
+__all__ = ["cycles_of", "make_ensemble", "plans_of", "run_columns"]
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
@@ -153,6 +153,15 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     return [plans[i] for i in which.ravel()]
 
 
+def cycles_of(system: System, columns: Mapping[str, _Array]) -> _Array:
+    """Seconds of one cycle of excitation of each run, or of the first mode where nothing strikes, shape (runs,)."""
+    runs = next(iter(columns.values())).size if columns else 1
+    if system.striker is None:
+        return 2.0 * math.pi / (np.ones(runs) * system.scale.omega)
+    own = {name[6:]: values for name, values in columns.items() if name.startswith("drive.")}
+    return system.striker.drive.cycle(own or {"": np.zeros(runs)}, system.scale)
+
+
 def _side(system: System, state: State) -> str:
     if system.striker is not None:
         return system.striker.side
@@ -178,8 +187,9 @@ def _drive_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Driv
     scale, striker = system.scale, system.striker
     if striker is None:
         numbers = np.tile([1.0 * scale.omega, 0.0], (runs, 1))
-        period = 2.0 * math.pi / (np.ones(runs) * scale.omega)
-        return _Driven(Sine, numbers, period, np.full(runs, -np.inf), np.zeros(runs), np.empty(0))
+        return _Driven(
+            Sine, numbers, cycles_of(system, columns), np.full(runs, -np.inf), np.zeros(runs), np.empty(0)
+        )
     drive = striker.drive
     own = {name[6:]: values for name, values in columns.items() if name.startswith("drive.")}
     own = own or {"": np.zeros(runs)}
@@ -189,7 +199,7 @@ def _drive_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Driv
     if striker.side == "above":
         highest = drive.mirrored_bounds(own, scale)
     table = np.stack([found[name] for name in drive.number_names], axis=1)
-    return _Driven(type(drive), table, drive.cycle(own, scale), highest, speed, samples)
+    return _Driven(type(drive), table, cycles_of(system, columns), highest, speed, samples)
 
 
 class _Places(NamedTuple):

@@ -14,13 +14,15 @@ from snapbeam.model.drive import Recorded
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 
-__all__ = ["SUBDIVISION", "Clocked", "clocked"]
+__all__ = ["SUBDIVISION", "Clocked", "clocked", "require_resolved"]
 
 _Array = NDArray[np.float64]
 
 SUBDIVISION = 1 << 20
 """Ticks of a flight step."""
 _MOST_TICKS = 2.0**61
+_FEWEST = 4.0
+"""Flight steps, at least, in a cycle of excitation and in a period of the first mode, of a step that was asked for."""
 
 
 class Clocked(NamedTuple):
@@ -46,6 +48,7 @@ def clocked(
     InputError
         If a run has more steps than can be counted in ticks, or a record ends before it.
     """
+    require_resolved(system, integration, cycle)
     lengths = np.array([plan.step for plan in plans])
     drive = system.striker.drive if system.striker is not None else None
     table["step"] = SUBDIVISION
@@ -92,6 +95,24 @@ def _asked_cycles(drive: Recorded, integration: Integration, periods: float | No
             f"cycles = {asked}: must be at most the {max(held, 0.0):.1f} cycles {of} the recorded drive"
         )
     return min(float(asked), held)
+
+
+def require_resolved(system: System, integration: Integration, cycle: _Array) -> None:
+    """Refuse a step that was asked for and does not resolve a *cycle* (s) of excitation or the first mode's period.
+
+    Raises
+    ------
+    InputError
+    """
+    if integration.step is None:
+        return
+    shortest, first = float(cycle.min()), 1.0 / system.model.reference_freq
+    for length, words in ((shortest, "a cycle of excitation"), (first, "a period of the first mode")):
+        if integration.step * _FEWEST > length * (1.0 + 1e-12):
+            raise InputError(
+                f"step = {integration.step:g} s: does not resolve {words} of {length:.4g} s; must be at most "
+                f"{length / _FEWEST:.4g} s, a quarter of it"
+            )
 
 
 def _whole_steps(period: _Array, step: _Array, cycles: float) -> NDArray[np.int64]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from snapbeam.core.validate import InputError, choice, positive
+from snapbeam.core.validate import choice, positive
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.integration import ACCURACIES
 from snapbeam.model.reduction import ReducedModel
@@ -24,8 +24,6 @@ _FREE_SHARE = 1.0 / 16.0
 # it the shortest step is, by order.
 _CONTACT_SHARE = 1.0 / 6.0
 _CONTACT_SPEED = 0.2
-_LONGEST_SHARE = 0.25
-"""Of the reference period: the longest step that may be asked for."""
 _PLACES = np.linspace(0.02, 0.5, 25).tolist()
 """Where the mass met by an impulse is looked at; the other half of the beam is its mirror image."""
 _HALVINGS = {4: 2, 6: 6}
@@ -106,10 +104,4 @@ def plan_steps(
             flight, coarsest = 0.5 * flight, max(0, coarsest - 1)
     if step is not None:
         flight = positive("step", step, "s")
-        longest = _LONGEST_SHARE / model.reference_freq
-        if flight > longest:
-            raise InputError(
-                f"step = {flight:g} s: must be at most {longest:.6g} s, a quarter of the period that Omega is counted "
-                "by, else a run does not resolve it"
-            )
     return Plan(order, flight, coarsest, coarsest + _HALVINGS[order])

@@ -101,7 +101,7 @@ def resolve(
 
         reason = cuda.refusal(modes, law, drive)
         if reason is None and (name == "cuda" or not cuda.simulated()):
-            return "cuda", cuda  # type: ignore[return-value]
+            return "cuda", cuda
         if name == "cuda":
             raise InputError(f"engine = 'cuda': {reason}; use engine='cpu' or 'auto'")
     return "cpu", cpu

@@ -47,8 +47,7 @@ def plot_threshold(
     """
     if "first_interwell" not in dataset or "always_interwell" not in dataset:
         raise InputError(f"no threshold curve among {list(map(str, dataset.variables))}")
-    first = dataset["first_interwell"].squeeze()
-    dims = [str(name) for name in first.dims]
+    dims = [str(name) for name in dataset["first_interwell"].squeeze().dims]
     if not 1 <= len(dims) <= 2:
         raise InputError(
             f"threshold over {dims}: is drawn along one axis, a curve for each point of another one"

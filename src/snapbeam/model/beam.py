@@ -99,7 +99,8 @@ class Beam:
     _given: str = dataclasses.field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        level, load = self.buckling_level, self.axial_load
+        level: float | None = self.buckling_level
+        load: float | None = self.axial_load
         # what followed from the other in the beam that dataclasses.replace starts from is not given
         if isinstance(level, _Derived) and load is not None:
             level = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -105,21 +105,22 @@ class State:
         """Number of modes N."""
         return self.amplitude.shape[-1]
 
-    def __getitem__(self, index: object) -> State:
+    def __getitem__(self, index: Any) -> State:
         """States of a batch."""
         if not self.batch:
             raise InputError(f"state[{index!r}]: this is one state, not a batch")
         modal = self.modal
         if modal is not None:
-            modal = ModalState(*(part[index] for part in modal[:-1]), modal.structure)  # type: ignore[index]
+            parts = (modal.q[index], modal.p[index], modal.home[index], modal.offset[index])
+            modal = ModalState(*parts, modal.structure)
         return State(
-            amplitude=self.amplitude[index],  # type: ignore[index]
-            velocity=self.velocity[index],  # type: ignore[index]
-            phase=self.phase[index],  # type: ignore[index]
-            striker_position=self.striker_position[index],  # type: ignore[index]
-            contact_time=self.contact_time[index],  # type: ignore[index]
-            tangent=None if self.tangent is None else self.tangent[index],  # type: ignore[index]
-            passed=None if self.passed is None else {k: v[index] for k, v in self.passed.items()},  # type: ignore[index]
+            amplitude=self.amplitude[index],
+            velocity=self.velocity[index],
+            phase=self.phase[index],
+            striker_position=self.striker_position[index],
+            contact_time=self.contact_time[index],
+            tangent=None if self.tangent is None else self.tangent[index],
+            passed=None if self.passed is None else {k: v[index] for k, v in self.passed.items()},
             modal=modal,
         )
 

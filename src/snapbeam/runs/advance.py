@@ -18,7 +18,7 @@ from snapbeam.engines.outputs import Landings
 from snapbeam.engines.registry import resolve
 from snapbeam.model.integration import Integration
 from snapbeam.model.start import rest_state
-from snapbeam.model.state import State
+from snapbeam.model.state import ModalState, State
 from snapbeam.model.system import System
 from snapbeam.runs.request import require_motion
 from snapbeam.runs.states import states_of
@@ -176,12 +176,11 @@ def _shaped(
         arrays[name] = stacked.reshape((*shape, *stacked.shape[2:]))
     modal = None
     if all(state.modal is not None for state in found):
-        first = found[0].modal
-        assert first is not None
-        parts = []
-        for i in range(4):
-            stacked = np.stack([state.modal[i] for state in found])  # type: ignore[index]
-            parts.append(stacked.reshape((*shape, *stacked.shape[2:])))
-        modal = type(first)(*parts, first.structure)
+        parts: dict[str, Any] = {}
+        for name in ("q", "p", "home", "offset"):
+            stacked = np.stack([getattr(state.modal, name) for state in found])
+            parts[name] = stacked.reshape((*shape, *stacked.shape[2:]))
+        assert found[0].modal is not None
+        modal = ModalState(**parts, structure=found[0].modal.structure)
     statistics = {name: values.reshape(batch) for name, values in passed.items()}
     return State(**arrays, tangent=tangent, passed=statistics, modal=modal)

@@ -77,7 +77,7 @@ def run_dataset(
         variables |= {"energy_contact": values[:, 3], "work_shaker": values[:, 4]}
     variables["energy_dissipated"] = values[:, 5]
     at = recorded.times
-    valid = np.isfinite(values[:, 2:]).all(axis=1) & np.isfinite(alpha).all(axis=1)
+    valid = np.asarray(np.isfinite(values[:, 2:]).all(axis=1) & np.isfinite(alpha).all(axis=1))
     if times is not None and at.size < times.size:
         missing = times.size - at.size
         at, valid = times, np.concatenate((valid, np.zeros(missing, dtype=bool)))
@@ -90,7 +90,7 @@ def run_dataset(
             name: np.where(valid if array.ndim == 1 else valid[:, None], array, np.nan)
             for name, array in variables.items()
         }
-        variables["valid"] = valid.astype(np.int8)
+        variables["valid"] = np.asarray(valid, dtype=np.int8)
     return trajectory_dataset(at, at / period, attrs=attrs, **variables)
 
 

@@ -85,7 +85,7 @@ def load_run(path: str | os.PathLike[str]) -> Run:
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(f"path = {str(path)!r}: its description is damaged ({error})") from None
     dataset = check_trajectory(dataset.drop_attrs(deep=False).assign_attrs(attrs))
-    values = {name: array.item() for name, array in parts["outcome"].variables.items()}
+    values = {str(name): array.values.item() for name, array in parts["outcome"].variables.items()}
     return Run(dataset, Outcome(values), parts["impacts"], system, integration, accuracy, end)
 
 
@@ -97,8 +97,9 @@ def outcome_dataset(outcome: Outcome) -> xr.Dataset:
     for name, value in outcome.items():
         row = STATISTICS[name]
         labels: dict[str, Any] = {"units": row.unit, "long_name": row.words}
-        kinds = {"response": ResponseClass, "status": RunStatus}.get(name)
-        if kinds is not None:
+        kinds: type[ResponseClass] | type[RunStatus] | None = None
+        if name in ("response", "status"):
+            kinds = ResponseClass if name == "response" else RunStatus
             labels |= code_flags(kinds)
         variables[name] = ((), np.asarray(int(value) if kinds else value).astype(row.dtype), labels)
     return xr.Dataset(variables)
@@ -146,4 +147,7 @@ def _arrays(sections: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
 
 
 def _state(values: dict[str, Any]) -> State:
-    return State(**{name: np.nan if value is None else np.array(value) for name, value in values.items()})
+    given: dict[str, Any] = {
+        name: np.nan if value is None else np.array(value) for name, value in values.items()
+    }
+    return State(**given)

@@ -153,7 +153,7 @@ def check_trajectory(dataset: xr.Dataset, require: Iterable[str] = ("displacemen
         if variable.dims != quantity.dims:
             raise InputError(f"{name} with dimensions {variable.dims}: must have dimensions {quantity.dims}")
         units = variable.attrs.get("units")
-        if _FORMER_UNITS.get(units, units) != quantity.units:
+        if _FORMER_UNITS.get(str(units), units) != quantity.units:
             raise InputError(f"{name} in units {units!r}: must be in {quantity.units!r}")
         good = np.isfinite(variable.values)
         if valid is not None and name not in _COORDINATES:

@@ -125,8 +125,9 @@ def simulate(
     end = float(run["tick"]) * int(run["end"])
     period = cycle_of(system)
     times = None if sample_times is None else _checked_times(sample_times, end)
-    regular = _regular_times(system, end, period) if times is None else times
-    _check_memory(system, ensemble, regular.size, times is None)
+    count = _regular_count(system, end, period) if times is None else times.size
+    _check_memory(system, count, times is None)
+    regular = np.linspace(0.0, end, count) if times is None else times
     _, engine = resolve("cpu")
     recorded = joined(list(engine.record(ensemble, regular, times is None, progress)))
     lasted = end / period
@@ -163,7 +164,7 @@ def _own_attributes(system: System, integration: Integration, lasted: float) -> 
             for name in ("frequency_ratio", "velocity_amplitude")
             if hasattr(striker.drive, name)
         }
-    elif isinstance(striker and striker.drive, RecordedMotion):
+    elif striker is not None and isinstance(striker.drive, RecordedMotion):
         attrs |= {
             "drive": "recorded",
             "frequency_ratio": striker.drive.frequency / system.model.reference_freq,
@@ -174,17 +175,17 @@ def _own_attributes(system: System, integration: Integration, lasted: float) -> 
     return attrs
 
 
-def _regular_times(system: System, end: float, period: float) -> _Array:
+def _regular_count(system: System, end: float, period: float) -> int:
     fastest = min(period, 1.0 / system.model.reference_freq)
     count = end / fastest * _SAMPLES_PER_CYCLE
     if count > 1e9:
         raise InputError(
             f"a run of {count:.3g} samples is too long to record: give sample_times, or fewer cycles"
         )
-    return np.linspace(0.0, end, math.ceil(count) + 1)
+    return math.ceil(count) + 1
 
 
-def _check_memory(system: System, ensemble: Ensemble, samples: int, with_contacts: bool) -> None:
+def _check_memory(system: System, samples: int, with_contacts: bool) -> None:
     """Refuse a run whose samples would not fit, before anything is computed."""
     row = 8 * (4 * system.model.modes + 20)
     size = samples * row * (1.5 if with_contacts else 1.0)

@@ -162,7 +162,7 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
         raise InputError("axes: must name at least one parameter to sweep")
     axes: dict[str, NDArray[Any]] = {}
     for name, values in given.items():
-        row = _swept(name)
+        row = _swept(str(name))
         if row.name in axes:
             raise InputError(f"{name}: stands twice among the axes")
         axes[row.name] = _axis(row, str(name), values)

@@ -15,7 +15,8 @@ from snapbeam.core.codes import ResponseClass, RunStatus
 from snapbeam.core.findings import Finding, tell
 from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.engines.answer import statistics_of
-from snapbeam.engines.assemble import make_ensemble, plans_of, run_columns
+from snapbeam.engines.assemble import cycles_of, make_ensemble, plans_of, run_columns
+from snapbeam.engines.clock import require_resolved
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.engines.plan import Plan
 from snapbeam.engines.registry import resolve
@@ -251,7 +252,18 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         law=law,
         **({} if system.striker is None else {"drive": type(system.striker.drive)}),
     )[0]
-    return SweepSetup(system, integration.replace(engine=resolved), points)
+    setup = SweepSetup(system, integration.replace(engine=resolved), points)
+    if integration.step is not None or "run.step" in points.take(np.zeros(1, dtype=np.int64)):
+        _require_resolved(setup)
+    return setup
+
+
+def _require_resolved(setup: SweepSetup) -> None:
+    """Refuse steps that were asked for and do not resolve some run, before any run."""
+    columns = setup.points.take(np.arange(setup.points.size))
+    for system, integration, _, points in setup.groups(columns):
+        own = {name: values for name, values in points.items() if not name.startswith("start.")}
+        require_resolved(system, integration, cycles_of(system, run_columns(system, own)))
 
 
 def _require_parameters(system: System, points: Points) -> None:

@@ -220,7 +220,7 @@ def _result(
         attrs["points_inferred"] = int(points.size - rows.computed.sum())
         dataset = to_dataset(work, points, rows, attrs)
         labels = {"units": "1", "long_name": "whether the point was run; if not, its class was inferred"}
-        dataset["computed"] = (points.dims, points.arranged(rows.computed), labels)
+        dataset["computed"] = (points.dims, points.arranged(rows.computed.ravel()), labels)
         if target is None:
             return dataset
         with atomic_path(target) as temporary:

@@ -8,7 +8,7 @@ from numba.extending import overload
 
 from snapbeam.engines.cpu.newton import settle_newton
 from snapbeam.engines.cpu.settle import settle
-from snapbeam.engines.scalar.compile import INLINE
+from snapbeam.engines.scalar.compile import INLINE_HERE
 
 __all__ = ["after_step"]
 
@@ -30,7 +30,7 @@ def after_step(
     raise TypeError("after_step runs in compiled code only")
 
 
-@overload(after_step, jit_options=INLINE)
+@overload(after_step, jit_options=INLINE_HERE)
 def _after_step(memory, blocks, place, run, now, step, done, room, book, asked, outputs):
     law = asked.types[asked.fields.index("law")]
     chosen = settle_newton if law.instance_class.owner.impulsive else settle

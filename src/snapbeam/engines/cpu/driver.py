@@ -21,7 +21,7 @@ from snapbeam.engines.cpu.tangent import TANGENT_ROWS, march_tangent
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.outcomes import empty_books
 from snapbeam.engines.outputs import Landings, Last, Recorded
-from snapbeam.engines.scalar.compile import kernel
+from snapbeam.engines.scalar.compile import kernel, ready
 from snapbeam.engines.scalar.decisions import PIECES
 from snapbeam.engines.scalar.extras import extras_of_table
 from snapbeam.engines.scalar.lanes import WIDTH
@@ -131,15 +131,24 @@ def march_tangents(
     march = _kernel(march_tangent, ensemble)
     rows = TANGENT_ROWS + 2 * tangents.shape[1]
 
-    def one_chunk(which: _Integers, kept: Kept) -> None:
+    def arguments(which: _Integers, kept: Kept) -> tuple[Any, ...]:
         memory = lay_out(ensemble, packed, rows)
         first = memory.layouts[1].g - rows * size + TANGENT_ROWS * size
-        march(
-            memory.memory, memory.blocks, memory.layouts[0], memory.stages, _asked(ensemble, packed, memory), which,
-            _room(ensemble), kept, spread, first,
-        )  # fmt: skip
+        asked, room = _asked(ensemble, packed, memory), _room(ensemble)
+        return (
+            memory.memory,
+            memory.blocks,
+            memory.layouts[0],
+            memory.stages,
+            asked,
+            which,
+            room,
+            kept,
+            spread,
+            first,
+        )
 
-    found = _spread_over(ensemble, packed, one_chunk, threads, progress, landings)
+    found = _spread_over(ensemble, packed, march, arguments, threads, progress, landings)
     return found, spread.reshape(*tangents.shape[:2], 2, size)[..., packed.rows]
 
 
@@ -152,25 +161,24 @@ def _march(
     packed = pack(ensemble.structure, ensemble.high_omega)
     march = _kernel(march_many, ensemble)
 
-    def one_chunk(which: _Integers, kept: Kept) -> None:
+    def arguments(which: _Integers, kept: Kept) -> tuple[Any, ...]:
         memory = lay_out(ensemble, packed)
-        march(
-            memory.memory, memory.blocks, memory.layouts, memory.stages, _asked(ensemble, packed, memory), which,
-            _room(ensemble), kept,
-        )  # fmt: skip
+        asked, room = _asked(ensemble, packed, memory), _room(ensemble)
+        return memory.memory, memory.blocks, memory.layouts, memory.stages, asked, which, room, kept
 
-    return _spread_over(ensemble, packed, one_chunk, threads, progress, landings)
+    return _spread_over(ensemble, packed, march, arguments, threads, progress, landings)
 
 
 def _spread_over(
     ensemble: Ensemble,
     packed: Packed,
-    one_chunk: Callable[[_Integers, Kept], None],
+    march: Callable[..., None],
+    arguments: Callable[[_Integers, Kept], tuple[Any, ...]],
     threads: int | None,
     progress: Callable[[int, int], object] | None,
     landings: int,
 ) -> Landings:
-    """Hand the runs to threads, in chunks."""
+    """Hand the runs to threads, in chunks; *arguments* are those of *march*, whose memory is a thread's own."""
     size = packed.layout.size
     kept = Kept(
         empty_books(ensemble.size),
@@ -179,9 +187,12 @@ def _spread_over(
         np.zeros(1, dtype=np.int64),
     )
     threads = threads or usable_cores()
+    ready(march, *arguments(np.zeros(1, dtype=np.int64), kept))
+    if progress is not None:
+        progress(0, ensemble.size)
 
     def march_chunk(which: _Integers) -> int:
-        one_chunk(which, kept)
+        march(*arguments(which, kept))
         return which.size
 
     done = 0
@@ -258,11 +269,12 @@ def record(
         times, np.empty(buffers.samples), np.empty((buffers.samples, 2 * size)),
         np.empty((buffers.samples, VALUES)), np.empty((buffers.impacts, 4)), marks, buffers.most, in_contact,
     )  # fmt: skip
+    arguments = (
+        memory.memory, memory.blocks, memory.layouts[0], memory.stages, asked, room, book, outputs, aside, _SLICE_STEPS,
+    )  # fmt: skip
+    ready(march, *arguments)
     while True:
-        march(
-            memory.memory, memory.blocks, memory.layouts[0], memory.stages, asked, room, book, outputs, aside,
-            _SLICE_STEPS,
-        )  # fmt: skip
+        march(*arguments)
         running = books["status"][0] == RunStatus.RUNNING
         full = books["samples"][0] + buffers.most + 3 > buffers.samples
         held = int(books["impacts"][0] - marks[1])

@@ -2,67 +2,32 @@
 
 Functions are compiled into the kernel that calls them, across files and with the law of contact and the drive that
 it marches; a kernel is what is kept on disk.  Numba alone would keep it until the file that it stands in changes.
-Here it is kept under a fingerprint of everything that it bakes in: every file of the engines, the codes, the
-law's and the drive's own files, and the versions of Numba and NumPy.
+Here it is kept under a fingerprint of everything that it bakes in (:mod:`~snapbeam.engines.scalar.fingerprint`).
 """
 
 from __future__ import annotations
 
-import hashlib
-import inspect
+import logging
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
-import numba
-import numpy as np
-from numba import njit
+from numba import njit, typeof
+from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-__all__ = ["INLINE", "compiled", "fingerprint", "inlined", "kernel"]
+from snapbeam.engines.scalar.fingerprint import fingerprint
+from snapbeam.engines.scalar.parts import pipeline
 
+__all__ = ["INLINE", "INLINE_HERE", "compiled", "inlined", "kernel", "ready"]
+
+_LOG = logging.getLogger("snapbeam")
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
+_PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **pipeline()}
 INLINE: dict[str, Any] = {"error_model": "numpy", "forceinline": True}
-"""Options of an overload that is to be written into its callers."""
-
-_PACKAGE = Path(__file__).parents[2]
-_BAKED_IN = ("core/codes.py", "engines/**/*.py")
-
-
-@cache
-def _package_fingerprint() -> str:
-    digest = hashlib.sha256()
-    for pattern in _BAKED_IN:
-        for path in sorted(_PACKAGE.glob(pattern)):
-            digest.update(path.relative_to(_PACKAGE).as_posix().encode())
-            digest.update(path.read_bytes())
-    digest.update(f"{numba.__version__} {np.__version__}".encode())
-    return digest.hexdigest()
-
-
-@cache
-def fingerprint(kinds: tuple[type, ...]) -> str | None:
-    """Of everything that a kernel for these laws and drives bakes in, in 20 hexadecimal digits.
-
-    None if the source of one of them cannot be read, as of a class typed at a prompt, or if it stands for functions
-    from anywhere, as statistics that were registered do: such a kernel is compiled anew in every process.
-    """
-    digest = hashlib.sha256(_package_fingerprint().encode())
-    for kind in kinds:
-        if getattr(kind, "rows", ()):
-            return None
-        for each in kind.__mro__[:-1]:
-            try:
-                source = inspect.getsourcefile(each)
-                data = Path(source).read_bytes() if source is not None else None
-            except (TypeError, OSError):
-                data = None
-            if data is None:
-                return None
-            digest.update(f"{each.__module__}.{each.__qualname__}".encode())
-            digest.update(data)
-    return digest.hexdigest()[:20]
+"""Options of an overload that is to be written into its callers, on every engine."""
+INLINE_HERE: dict[str, Any] = {**INLINE, **_PART}
+"""The same, for what only the processor's engine calls."""
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -71,12 +36,12 @@ def compiled(function: Callable[..., Any]) -> Any:
     Nor reference counts, which cost an atomic operation whenever an array is passed on: a kernel allocates nothing,
     and its arrays belong to its caller.
     """
-    return njit(**_OPTIONS)(function)
+    return njit(**_PART, **_OPTIONS)(function)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
     """As :func:`compiled`, and always written into its callers."""
-    return njit(forceinline=True, **_OPTIONS)(function)
+    return njit(forceinline=True, **_PART, **_OPTIONS)(function)
 
 
 @cache
@@ -100,3 +65,25 @@ def kernel(function: Callable[..., Any], kinds: tuple[type, ...]) -> Any:
     ):  # no place to keep compiled code, or a Numba that keeps it otherwise
         return njit(**_OPTIONS)(function)
     return dispatcher
+
+
+class _Telling(event.Listener):
+    """Says once that a kernel is being compiled."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.told = False
+
+    def on_start(self, event: Any) -> None:
+        if not self.told:
+            self.told = True
+            _LOG.info("compiling %s, once on this machine: some 15 s", self.name)
+
+    def on_end(self, event: Any) -> None:
+        """Nothing to say."""
+
+
+def ready(march: Any, *arguments: Any) -> None:
+    """Compile a kernel for such arguments, or fetch it from the disk, before anything is timed; says so in the log."""
+    with event.install_listener("numba:compile", _Telling(march.py_func.__name__)):
+        march.compile(tuple(typeof(value) for value in arguments))

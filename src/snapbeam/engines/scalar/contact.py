@@ -31,17 +31,17 @@ def scalar_function(kind: type, name: str) -> Any:
 
 def contact_force(law: Any, penetration: float) -> float:
     """The force on tip and beam, N; none when apart."""
-    return type(law).owner.force(law, penetration) if penetration > 0.0 else 0.0  # type: ignore[attr-defined]
+    return type(law).owner.force(law, penetration) if penetration > 0.0 else 0.0
 
 
 def contact_energy(law: Any, penetration: float) -> float:
     """Energy stored in the contact, J; none when apart."""
-    return type(law).owner.energy(law, penetration) if penetration > 0.0 else 0.0  # type: ignore[attr-defined]
+    return type(law).owner.energy(law, penetration) if penetration > 0.0 else 0.0
 
 
 def contact_slope(law: Any, penetration: float) -> float:
     """Derivative of the force, N/m; none when apart."""
-    return type(law).owner.slope(law, penetration) if penetration > 0.0 else 0.0  # type: ignore[attr-defined]
+    return type(law).owner.slope(law, penetration) if penetration > 0.0 else 0.0
 
 
 def _when_touching(kind: type, name: str) -> Any:
@@ -76,7 +76,7 @@ def peak_force(law: Any, deepest: float) -> float:
     That is the greatest penetration, or, under a law whose impacts last no time, the greatest force while the bodies
     stay together.
     """
-    return deepest if type(law).owner.impulsive else contact_force(law, deepest)  # type: ignore[attr-defined]
+    return deepest if type(law).owner.impulsive else contact_force(law, deepest)
 
 
 @overload(peak_force, jit_options=INLINE)
@@ -88,7 +88,7 @@ def _peak_force(law, deepest):
 
 def is_impulsive(law: Any) -> bool:
     """Whether impacts under the law last no time."""
-    return bool(type(law).owner.impulsive)  # type: ignore[attr-defined]
+    return bool(type(law).owner.impulsive)
 
 
 @overload(is_impulsive, jit_options=INLINE)

@@ -19,6 +19,7 @@ class Extras:
     rows: tuple[Statistic, ...] = ()
 
 
+_named_tuple: Any = namedtuple
 _made: dict[tuple[Statistic, ...], Any] = {}
 
 
@@ -27,12 +28,12 @@ def extras_of_table() -> Any:
     rows = updated()
     if rows not in _made:
         owner: Any = type("OwnExtras", (Extras,), {"rows": rows}) if rows else Extras
-        kind = namedtuple("Numbers", ())  # type: ignore[misc]
-        kind.owner = owner  # type: ignore[attr-defined]
+        made: Any = _named_tuple("Numbers", ())
+        made.owner = owner
         if not rows:
-            kind.__module__, kind.__qualname__ = __name__, "Extras.Numbers"
-            Extras.Numbers = kind  # type: ignore[attr-defined]
-        _made[rows] = kind()
+            made.__module__, made.__qualname__ = __name__, "Extras.Numbers"
+            owner.Numbers = made
+        _made[rows] = made()
     return _made[rows]
 
 
@@ -63,6 +64,7 @@ def _chain(rows: tuple[Statistic, ...]) -> Any:
             return
 
         return nothing
+    assert rows[0].update is not None
     name, update, rest = f"own_{rows[0].name}", inlined(rows[0].update), _chain(rows[1:])
 
     @inlined

@@ -37,11 +37,11 @@ def seen_from(tip, home, rest):
 
 def tip_motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
     """Displacement of the tip from its mid-position, m, and its velocity, m/s."""
-    if type(drive).owner.harmonic:  # type: ignore[attr-defined]
+    if type(drive).owner.harmonic:
         sine, cosine = sincos.py_func(argument)
         motion: tuple[float, float] = shaker_motion.py_func(drive.amplitude, drive.omega, sine, cosine)
         return motion
-    owner: Any = type(drive).owner  # type: ignore[attr-defined]
+    owner: Any = type(drive).owner
     moved: tuple[float, float] = owner.motion(drive, memory, argument)
     return moved
 
@@ -62,10 +62,10 @@ def _tip_motion(drive, memory, argument):
 
 def tip_acceleration(drive: Any, memory: Any, argument: float) -> float:
     """Acceleration of the tip, m/s^2."""
-    if type(drive).owner.harmonic:  # type: ignore[attr-defined]
+    if type(drive).owner.harmonic:
         sine, _ = sincos.py_func(argument)
         return float(-drive.omega * drive.omega * drive.amplitude * sine)
-    owner: Any = type(drive).owner  # type: ignore[attr-defined]
+    owner: Any = type(drive).owner
     return float(owner.acceleration(drive, memory, argument))
 
 
@@ -87,7 +87,7 @@ def turned_motion(
     drive: Any, memory: Any, argument: float, sine: float, cosine: float
 ) -> tuple[float, float]:
     """As :func:`tip_motion`, for a caller that knows the sine and cosine of the argument, or else the argument."""
-    if type(drive).owner.harmonic:  # type: ignore[attr-defined]
+    if type(drive).owner.harmonic:
         motion: tuple[float, float] = shaker_motion.py_func(drive.amplitude, drive.omega, sine, cosine)
         return motion
     return tip_motion(drive, memory, argument)

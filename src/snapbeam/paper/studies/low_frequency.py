@@ -25,7 +25,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     """Classes over V/V_QS1 at each frequency, fine about 1."""
     import xarray as xr
 
-    ratios = results.pick((0.15, 0.4), (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0))
+    ratios = results.pick((0.15, 0.4, 1.0), (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0))
     step = results.pick(0.1, 0.01)
     relative = np.round(np.arange(step, 1.1 + 0.5 * step, step), 6)
     found = {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import shutil
 import subprocess
 import sys
@@ -10,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import snapbeam
-from snapbeam.engines.scalar import compile as compiling
-from snapbeam.engines.scalar.compile import fingerprint
+from snapbeam.engines.scalar import fingerprint as marking
+from snapbeam.engines.scalar.fingerprint import fingerprint
 from snapbeam.model.contact import HertzContact, Restitution
 from snapbeam.model.drive import Recorded, Sine
 
@@ -23,15 +24,15 @@ def copy(tmp_path, monkeypatch) -> Path:
     """A copy of the package whose fingerprint is taken; caches of this process are left as they were."""
     there = tmp_path / "snapbeam"
     shutil.copytree(PACKAGE, there, ignore=shutil.ignore_patterns("__pycache__"))
-    monkeypatch.setattr(compiling, "_PACKAGE", there)
+    monkeypatch.setattr(marking, "_PACKAGE", there)
     yield there
     monkeypatch.undo()
-    compiling._package_fingerprint.cache_clear()
+    marking._package_mark.cache_clear()
     fingerprint.cache_clear()
 
 
 def mark(kinds: tuple[type, ...] = (HertzContact, Sine)) -> str | None:
-    compiling._package_fingerprint.cache_clear()
+    marking._package_mark.cache_clear()
     fingerprint.cache_clear()
     return fingerprint(kinds)
 
@@ -100,20 +101,59 @@ class Spring(ContactLaw):
 """
 
 
-def test_a_law_of_somebody_is_fingerprinted_by_its_own_file(tmp_path, monkeypatch) -> None:
+def law_of(folder: Path, text: str) -> type:
+    """The law in a file of somebody's, read anew."""
+    (folder / "somebodys_law.py").write_text(text)
+    sys.modules.pop("somebodys_law", None)
+    importlib.invalidate_caches()
+    shutil.rmtree(folder / "__pycache__", ignore_errors=True)
+    return importlib.import_module("somebodys_law").Spring
+
+
+def test_a_law_of_somebody_is_marked_by_what_it_computes(tmp_path, monkeypatch) -> None:
+    """Its force, a constant and a function that the force reads; not a comment beside them."""
     monkeypatch.syspath_prepend(str(tmp_path))
-    marks = []
-    for number, factor in enumerate(("1.0", "2.0")):
-        (tmp_path / f"law_{number}.py").write_text(LAW.format(factor=factor, more=""))
-        module = __import__(f"law_{number}")
-        marks.append(fingerprint((module.Spring, Sine)))
-    assert None not in marks and marks[0] != marks[1]
+    plain = LAW.format(factor="1.0", more="")
+    first = fingerprint((law_of(tmp_path, plain), Sine))
+    assert first is not None
+    assert fingerprint((law_of(tmp_path, plain + "\n# a comment\n"), Sine)) == first
+    assert fingerprint((law_of(tmp_path, LAW.format(factor="2.0", more="")), Sine)) != first
+    marks = [
+        fingerprint((law_of(tmp_path, f"FACTOR = {value}\n" + LAW.format(factor="FACTOR", more="")), Sine))
+        for value in (1.0, 2.0)
+    ]
+    called = [
+        fingerprint(
+            (
+                law_of(
+                    tmp_path, f"def twice():\n    return {value}\n" + LAW.format(factor="twice()", more="")
+                ),
+                Sine,
+            )
+        )
+        for value in (1.0, 2.0)
+    ]
+    found = [first, *marks, *called]
+    assert None not in found and len(set(found)) == 5
+
+
+def test_a_statistic_of_somebody_is_never_kept() -> None:
+    """It stands for functions from anywhere; two of them must not share a kernel."""
+    from snapbeam.engines.outcomes import Statistic, register, withdraw
+    from snapbeam.engines.scalar.extras import extras_of_table
+
+    assert fingerprint((HertzContact, Sine, type(extras_of_table()).owner)) is not None
+    register(Statistic("own", "float64", "s", "time marched", lambda r, h: h, update=lambda held, step: held))
+    try:
+        assert fingerprint((HertzContact, Sine, type(extras_of_table()).owner)) is None
+    finally:
+        withdraw("own")
 
 
 def test_a_law_typed_at_a_prompt_is_never_kept() -> None:
     """Its source cannot be read, so nothing tells two of them apart."""
     code = LAW.format(factor="1.0", more="") + (
-        "\nfrom snapbeam.engines.scalar.compile import fingerprint\n"
+        "\nfrom snapbeam.engines.scalar.fingerprint import fingerprint\n"
         "from snapbeam.model.drive import Sine\nprint(fingerprint((Spring, Sine)))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
