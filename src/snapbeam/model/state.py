@@ -106,9 +106,16 @@ class State:
         return self.amplitude.shape[-1]
 
     def __getitem__(self, index: Any) -> State:
-        """States of a batch."""
+        """States of a batch, with what is known of each of them and not of their way as a whole."""
         if not self.batch:
             raise InputError(f"state[{index!r}]: this is one state, not a batch")
+        passed, tangent = self.passed, self.tangent
+        if passed is not None:
+            passed = {
+                name: values[index] for name, values in passed.items() if np.shape(values) == self.batch
+            }
+        if tangent is not None:
+            tangent = tangent[index] if tangent.shape[:-3] == self.batch else None
         modal = self.modal
         if modal is not None:
             parts = (modal.q[index], modal.p[index], modal.home[index], modal.offset[index])
@@ -119,8 +126,8 @@ class State:
             phase=self.phase[index],
             striker_position=self.striker_position[index],
             contact_time=self.contact_time[index],
-            tangent=None if self.tangent is None else self.tangent[index],
-            passed=None if self.passed is None else {k: v[index] for k, v in self.passed.items()},
+            tangent=tangent,
+            passed=passed,
             modal=modal,
         )
 

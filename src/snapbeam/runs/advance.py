@@ -27,6 +27,7 @@ __all__ = ["advance"]
 
 _Array = NDArray[np.float64]
 
+_REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
 PASSED = (
     "status", "crossings", "impacts", "peak_force", "impulse", "shaker_work", "gross_work", "dissipated_energy",
     "min_displacement", "max_displacement", "min_center_displacement", "max_center_displacement", "contact_share",
@@ -63,7 +64,8 @@ def advance(
     integration : Integration, optional
         Steps, accuracy, threads.  States go on on the CPU, for *periods*, and no run is decided early.
     every : bool
-        Whether to give the states after each period, along a new first dimension, instead of the last one.
+        Whether to give the states after each period, along a new first dimension, instead of the last one; their
+        ``passed`` is of the whole way, but for the status, which is of each state.
     progress : callable, optional
         Called as ``progress(done, total)`` with states.
 
@@ -109,7 +111,7 @@ def advance(
         given = _checked_tangent(system, tangent, flat)
         back = system.model.linear_modes.T @ system.model.mass
         landings, moved = engine.march_tangents(ensemble, given @ back.T, integration.threads, progress)
-        moved[~np.isin(landings.books["status"], (int(RunStatus.OK), int(RunStatus.DECIDED)))] = np.nan
+        moved[~np.isin(landings.books["status"], _REACHED)] = np.nan
         vectors = (moved @ system.model.linear_modes.T).reshape((*state.batch, *moved.shape[1:]))
     found = _states(ensemble, landings, every)
     passed = statistics_of(ensemble, landings.books)
@@ -136,9 +138,9 @@ def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
 
 
 def _states(ensemble: Ensemble, landings: Landings, every: bool) -> list[State]:
-    """States after each period, or after the last one alone; NaN where a run did not come so far."""
+    """States after each period, or after the last one alone, with their status; NaN where a run did not come so far."""
     count, book = landings.q.shape[1], landings.books
-    failed = ~np.isin(book["status"], (int(RunStatus.OK), int(RunStatus.DECIDED)))
+    failed = ~np.isin(book["status"], _REACHED)
     found = []
     for at in range(count) if every else (count - 1,):
         ticks = np.minimum((at + 1) * ensemble.runs["landing"], ensemble.runs["end"])
@@ -146,18 +148,11 @@ def _states(ensemble: Ensemble, landings: Landings, every: bool) -> list[State]:
         lost = failed & ((book["time"] < ticks) | (at == count - 1))
         q[lost], p[lost] = 0.0, 0.0
         state = states_of(ensemble, q, p, landings.home[:, at], landings.contact_ticks[:, at], ticks)
-        if lost.any():
-            state = _without(state, lost)
-        found.append(state)
+        amplitude, velocity = state.amplitude.copy(), state.velocity.copy()
+        amplitude[lost], velocity[lost] = np.nan, np.nan
+        status: Any = np.where(lost, book["status"], int(RunStatus.OK)).astype(np.int8)
+        found.append(replace(state, amplitude=amplitude, velocity=velocity, passed={"status": status}))
     return found
-
-
-def _without(state: State, lost: NDArray[np.bool_]) -> State:
-    """A batch of which some states were not reached."""
-    amplitude, velocity = state.amplitude.copy(), state.velocity.copy()
-    amplitude[lost], velocity[lost] = np.nan, np.nan
-    status = np.where(lost, int(RunStatus.NOT_RUN), int(RunStatus.OK))
-    return replace(state, amplitude=amplitude, velocity=velocity, passed={"status": status})
 
 
 def _shaped(
@@ -183,4 +178,7 @@ def _shaped(
         assert found[0].modal is not None
         modal = ModalState(**parts, structure=found[0].modal.structure)
     statistics = {name: values.reshape(batch) for name, values in passed.items()}
+    if every:
+        status = [np.asarray(state.passed["status"]) for state in found if state.passed is not None]
+        statistics["status"] = np.stack(status).reshape(shape)
     return State(**arrays, tangent=tangent, passed=statistics, modal=modal)
