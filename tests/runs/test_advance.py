@@ -247,7 +247,11 @@ def test_a_striker_that_is_moved_strikes_where_it_is() -> None:
     """A state goes on under another location, drive or law: the tip stays where it was in space."""
     system = system_of(4, 1.4, 0.03)
     state = sb.advance(system, periods=3)
-    for changes in ({"striker.location": 0.3}, {"drive.velocity_amplitude": 0.025}, {"contact.stiffness": 1e7}):
+    for changes in (
+        {"striker.location": 0.3},
+        {"drive.velocity_amplitude": 0.025},
+        {"contact.stiffness": 1e7},
+    ):
         other = system.replace(**changes)
         following = sb.advance(other, state, 6)
         same = sb.advance(other, plain(state), 6)
