@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "class_table",
+    "coordinate_text",
     "deepest_notch",
     "lowest_interwell",
     "map_summary",
@@ -28,6 +29,7 @@ __all__ = [
     "status_lines",
 ]
 
+_SYMBOLS = {"frequency_ratio": "Omega", "velocity_amplitude": "V", "location": "x_s", "modes": "N"}
 _PAPER = ("frequency_ratio", "velocity_amplitude", "location")
 
 
@@ -135,17 +137,20 @@ def deepest_notch(dataset: xr.Dataset) -> dict[str, float] | None:
     return place | {"location": float(dataset["location"].squeeze())}
 
 
+def coordinate_text(name: str, value: Any) -> str:
+    """A coordinate in words, by the paper's symbol where it has one: ``V = 0.18``, ``side = below``."""
+    shown = f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{_SYMBOLS.get(name, name)} = {shown}"
+
+
 def _where(point: dict[str, Any], raised: str, attrs: dict[str, Any]) -> str:
     """Coordinates of a point in words, in physical units beside where they are known."""
-    symbols = {"frequency_ratio": "Omega", "velocity_amplitude": "V", "location": "x_s"}
-
-    def one(name: str) -> str:
-        value = point[name]
-        shown = f"{value:.4g}" if isinstance(value, float) else str(value)
-        return f"{symbols.get(name, name)} = {shown}"
-
-    others = [one(name) for name in point if name != raised]
-    text = f"{one(raised)} at {', '.join(others)}" if raised in point else ", ".join(others)
+    others = [coordinate_text(name, point[name]) for name in point if name != raised]
+    text = (
+        f"{coordinate_text(raised, point[raised])} at {', '.join(others)}"
+        if raised in point
+        else ", ".join(others)
+    )
     freq, level = attrs.get("reference_freq"), attrs.get("beam_buckling_level")
     if freq and level and {"frequency_ratio", "velocity_amplitude"} <= point.keys():
         velocity, omega = point["velocity_amplitude"], point["frequency_ratio"]

@@ -21,6 +21,7 @@ from snapbeam.cli.parameter_options import (
     configured,
     with_parameters,
 )
+from snapbeam.cli.summary import coordinate_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -124,16 +125,16 @@ def _summary(dataset: xr.Dataset, elapsed: float) -> list[str]:
 def _curve(curve: xr.Dataset, along: str, across: str, chosen: dict[str, int]) -> list[str]:
     """What one curve shows."""
     first = curve["first_interwell"]
-    named = [f"{name} = {curve[name].item():.4g}" for name in chosen]
+    named = [coordinate_text(name, curve[name].item()) for name in chosen]
     if "modes" in curve.attrs and "modes" not in chosen:
-        named.append(f"modes = {curve.attrs['modes']}")
+        named.append(coordinate_text("modes", int(curve.attrs["modes"])))
     head = f"{', '.join(named)}: " if named else ""
     if bool(first.isnull().all()):
         return [f"{head}no interwell response; raise {along}"]
     at = first.isel({across: int(np.nanargmin(first.values))})
     width = float((curve["always_interwell"] - first).mean())
     lines = [
-        f"{head}lowest threshold {along} = {float(at):.4g} at {across} = {float(at[across]):.4g}; "
+        f"{head}lowest threshold {coordinate_text(along, float(at))} at {coordinate_text(across, at[across].item())}; "
         f"band {width:.2g} wide on average"
     ]
     none = int(first.isnull().sum())

@@ -211,7 +211,7 @@ def parsed_axis(name: str, value: Any) -> Any:
     if row is not None and row.quantity.kind in (str, bool):
         words = value.split(",") if isinstance(value, str) else value
         return np.array([row.quantity.check(short, word) for word in words])
-    return np.atleast_1d(parse_axis(short, value))
+    return np.atleast_1d(parse_axis(short, value, whole=row is not None and row.quantity.kind is int))
 
 
 def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:

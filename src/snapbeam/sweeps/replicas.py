@@ -55,15 +55,19 @@ class Replicas:
         return 1 + self.count + int(self.halve_step)
 
 
-def perturbed_start(system: System, replicas: Replicas, repeat: int) -> State:
+def perturbed_start(system: System, replicas: Replicas, repeat: int, state: State | None = None) -> State:
     """The start of one repeat: a beam that still rings faintly in all its modes, the same for every point of a map.
+
+    It is added to *state*, or a batch of states, or else to the system's own start.
 
     Each linear mode gets a normally distributed displacement and velocity of equal mean energy,
     q_j ~ N(0, s/omega_j) and q_j' ~ N(0, s), with s such that the displacement of the centre has the
     root mean square asked for.
     """
     model = system.model
-    rest = rest_state(model, system.striker) if system.start is None else system.start
+    rest = state if state is not None else system.start
+    if rest is None:
+        rest = rest_state(model, system.striker)
     sign = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
     moving = model.omega > 0.0
     per_unit = np.where(moving, 1.0 / np.where(moving, model.omega, 1.0), 0.0)

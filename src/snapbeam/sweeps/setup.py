@@ -60,7 +60,7 @@ class SweepSetup:
         threads: int | None = None,
         progress: Progress | None = None,
         *,
-        start: Callable[[System], State] | None = None,
+        start: Callable[[System, State | None], State] | None = None,
         step_factor: float = 1.0,
     ) -> dict[str, NDArray[Any]]:
         """Integrate runs and return their statistics, arrays of shape (runs,) by name.
@@ -74,7 +74,8 @@ class SweepSetup:
         threads, progress
             As for an engine.
         start : callable, optional
-            Start of the runs of a system, in place of its own.
+            ``start(system, state) -> State``: where the runs of a system begin instead; *state* is where the
+            points say, None if they say nothing of it.
         step_factor : float
             Times the length of every step.
         """
@@ -82,7 +83,9 @@ class SweepSetup:
         found: dict[str, NDArray[Any]] = {}
         done = 0
         for system, integration, which, points in self.groups(columns):
-            state = self._start(system, points) if start is None else start(system)
+            state = self._start(system, points)
+            if start is not None:
+                state = start(system, state)
             own = {name: values for name, values in points.items() if not name.startswith("start.")}
             ensemble = make_ensemble(system, integration, own, start=state, step_factor=step_factor)
 

@@ -73,7 +73,7 @@ class PointWork:
     @cached_property
     def parameters(self) -> dict[str, Any]:
         """Everything the numbers depend on, plain: what two maps must share to be one."""
-        found = self.setup.identity()
+        found = self.setup.identity() | {"statistics": list(STATISTICS)}
         if self.replicas is not None:
             found["replicas"] = {
                 "count": self.replicas.count,
@@ -119,8 +119,8 @@ class PointWork:
             for repeat in range(replicas.count):
                 before += size
 
-                def start(system: System, number: int = repeat) -> State:
-                    return perturbed_start(system, replicas, number)
+                def start(system: System, state: State | None, number: int = repeat) -> State:
+                    return perturbed_start(system, replicas, number, state)
 
                 repeats.append(setup.march(points, threads, report, start=start)["response"])
             if replicas.halve_step:
