@@ -160,6 +160,10 @@ REFUSALS = [
         {"axes": {"beam.density": "7.5:8:3"}},
         "[axes] density = 7.5: must be 10 to 30000 kg/m^3; is it given in g/cm^3?",
     ),
+    (
+        {"axes": {"modes": "1,x"}},
+        "[axes] modes = '1,x': must be a whole number, whole numbers separated by commas",
+    ),
     ({"axes": {"model.modes": "1:32:3"}}, "[axes] modes = 16.5: must be an integer in [1, 256]"),
     ({"axes": {"striker.side": "below,left"}}, "[axes] side = 'left': must be one of 'below', 'above'"),
     (

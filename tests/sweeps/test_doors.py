@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from snapbeam.runs.response import STATISTICS
 
 import snapbeam as sb
 from snapbeam import paper
+from snapbeam.engines.outcomes import STATISTICS
 
 RATIO, VELOCITY, LOCATION = [0.8, 1.21, 1.6], [0.05, 0.18, 0.3, 0.5], [0.35, 0.5]
 
@@ -37,9 +37,9 @@ def test_dataset() -> None:
     assert ds.response.shape == (3, 4, 2)
     assert ds.response.dtype == np.int8
     assert set(ds.data_vars) == set(STATISTICS)
-    for name, (kind, units, words) in STATISTICS.items():
-        assert ds[name].dtype == np.dtype(kind)
-        assert (ds[name].attrs["units"], ds[name].attrs["long_name"]) == (units, words)
+    for name, row in STATISTICS.items():
+        assert ds[name].dtype == np.dtype(row.dtype)
+        assert (ds[name].attrs["units"], ds[name].attrs["long_name"]) == (row.unit, row.words)
     np.testing.assert_array_equal(ds.velocity_amplitude, VELOCITY)
     system = {"modes", "damping_ratio", "contact_stiffness", "beam_length", "beam_thickness", "side"}
     made = {"cycles", "reference_freq", "step", "engine", "snapbeam_version", "title", "created", "command"}
@@ -67,7 +67,7 @@ def test_every_point_is_its_run(modes: int) -> None:
             shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=VELOCITY[j])
             response = sb.simulate(model_of(modes), shaker, paper.CONTACT, 4).response
             point = {name: ds[name].values[i, j].item() for name in STATISTICS}
-            np.testing.assert_equal(point, vars(response))
+            np.testing.assert_equal(point, dict(response))
 
 
 def test_parts_and_threads() -> None:
@@ -190,7 +190,7 @@ def test_refuses_what_is_no_system() -> None:
     axes = {"frequency_ratio": 1.0, "velocity_amplitude": 0.1, "cycles": 1}
     with pytest.raises(sb.InputError, match="needs a buckled beam: axial_load = 0 N must exceed"):
         sb.response_map(sb.ReducedModel.from_beam(paper.STRAIGHT_BEAM, 2), paper.CONTACT, **axes)
-    with pytest.raises(sb.InputError, match="contact = None: must be a HertzContact"):
+    with pytest.raises(sb.InputError, match="contact = None: must be a law of contact, such as HertzContact"):
         sb.response_map(model_of(1), None, **axes)  # type: ignore[arg-type]
     with pytest.raises(sb.InputTypeError, match="model = 'beam': must be a ReducedModel"):
         sb.response_map("beam", paper.CONTACT, **axes)  # type: ignore[arg-type]
