@@ -73,7 +73,7 @@ def make_ensemble(
     if state.batch and runs in (1, state.batch[0]):
         runs = state.batch[0]
     columns = {name: np.array(np.broadcast_to(values, (runs,))) for name, values in columns.items()}
-    structure = structure_of(system.model, _side(system, state))
+    structure = structure_of(system.model, _side(system, state, goes_on=periods is not None))
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
     if step_factor != 1.0:
         plans = [each._replace(step=step_factor * each.step) for each in plans]
@@ -162,9 +162,12 @@ def cycles_of(system: System, columns: Mapping[str, _Array]) -> _Array:
     return system.striker.drive.cycle(own or {"": np.zeros(runs)}, system.scale)
 
 
-def _side(system: System, state: State) -> str:
+def _side(system: System, state: State, goes_on: bool) -> str:
     if system.striker is not None:
         return system.striker.side
+    if goes_on:
+        # the same from call to call, whichever well it comes to
+        return "below"
     # seen from the well the beam starts in, so that mirror images are mirrored to the bit
     first = state.flat()[0]
     return "above" if float(first.amplitude @ system.model.center_shape) > 0.0 else "below"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.config.parameters import Parameter, lookup
+from snapbeam.config.parameters import Parameter, lookup, parameters, short_names
+from snapbeam.config.physical import PHYSICAL, physical_name
 from snapbeam.core.provenance import array_hash
 from snapbeam.core.validate import InputError, InputTypeError, axis, finite_array
 
@@ -42,6 +44,11 @@ class Grid:
         """The axes in the order in which points are counted."""
         structural = [name for name in self.axes if not lookup(name).is_run]
         return (*structural, *(name for name in self.axes if name not in structural))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What differs among the points."""
+        return tuple(self.axes)
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -90,6 +97,11 @@ class PointList:
     def axes(self) -> dict[str, NDArray[Any]]:
         """None of its own."""
         return {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What differs among the points."""
+        return tuple(self.columns)
 
     @property
     def dims(self) -> tuple[str, ...]:
@@ -141,7 +153,8 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
     given : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
         A mapping makes a grid: parameters by dotted name, or by the name that datasets use, with strictly increasing
         numbers, or different words.  A dataset with one-dimensional variables along one dimension, or a data frame,
-        makes a list; its columns that are no parameters are kept as labels.
+        makes a list; its columns that are no parameters are kept as labels, unless their names are almost those of
+        parameters.
 
     Raises
     ------
@@ -202,11 +215,12 @@ def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
                 values = np.full(_length(columns), values)
             else:
                 raise InputError(f"{name} of shape {values.shape}: a list of points must have one dimension")
-        try:
-            row = _swept(name)
-        except InputError:
+        if _is_label(name):
             labels[name] = values
             continue
+        row = _swept(name)
+        if row.name in known:
+            raise InputError(f"{name}: stands twice among the points, as {row.name} too")
         item = row.quantity
         if item.kind in (str, bool):
             known[row.name] = np.array([item.check(name, value) for value in values.tolist()])
@@ -221,6 +235,34 @@ def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
     if len(set(lengths.values())) > 1 or min(lengths.values()) == 0:
         raise InputError(f"points of lengths {lengths}: must be equal, and at least one")
     return PointList(known, labels)
+
+
+def _is_label(name: str) -> bool:
+    """Whether a column of a table of points is no parameter; refused if it looks as if it were meant to be one.
+
+    Raises
+    ------
+    InputError
+        For a parameter in a physical unit, and for a name that differs from a parameter's by a slip.
+    """
+    physical = physical_name(name)
+    if physical is not None:
+        ratio = lookup(PHYSICAL[physical].parameter).short
+        raise InputError(f"{name}: give {ratio}, which snapbeam.config.from_physical makes of it")
+    table = parameters()
+    known = [*table, *short_names(), *(full.partition(".")[2] for full in table)]
+    if name in known:
+        return False
+    try:
+        lookup(name)
+    except InputError:
+        close = difflib.get_close_matches(name, known, 1, 0.85)
+        if close:
+            raise InputError(
+                f"{name}: no parameter; did you mean {close[0]!r}?  Give a column that is only a label another name"
+            ) from None
+        return True
+    return False
 
 
 def _length(columns: Mapping[str, NDArray[Any]]) -> int:

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from snapbeam.config.parameters import lookup
 from snapbeam.core.codes import ResponseClass, RunStatus
-from snapbeam.core.findings import Finding, tell
+from snapbeam.core.findings import tell
 from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.engines.answer import statistics_of
-from snapbeam.engines.assemble import cycles_of, make_ensemble, plans_of, run_columns
-from snapbeam.engines.clock import require_resolved
+from snapbeam.engines.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.engines.plan import Plan
 from snapbeam.engines.registry import resolve
+from snapbeam.model.drive import Recorded
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import quantities
 from snapbeam.model.start import started
@@ -27,7 +27,8 @@ from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.runs.describe import attributes_of
 from snapbeam.runs.save import code_flags
-from snapbeam.sweeps.points import Columns, Points, points_of
+from snapbeam.sweeps.checks import findings_of, require_every_structure, require_parameters
+from snapbeam.sweeps.points import Columns, Grid, Points, points_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,26 +84,31 @@ class SweepSetup:
         found: dict[str, NDArray[Any]] = {}
         done = 0
         for system, integration, which, points in self.groups(columns):
-            state = self._start(system, points)
+            state = self.start_of(system, points)
             if start is not None:
                 state = start(system, state)
             own = {name: values for name, values in points.items() if not name.startswith("start.")}
-            ensemble = make_ensemble(system, integration, own, start=state, step_factor=step_factor)
+            for part in _alike(system, state, which.size):
+                columns_of_part = {name: values[part] for name, values in own.items()}
+                begun = state[part] if state is not None and state.batch else state
+                ensemble = make_ensemble(
+                    system, integration, columns_of_part, start=begun, step_factor=step_factor
+                )
 
-            def report(inside: int, _: int, before: int = done) -> None:
-                if progress is not None:
-                    progress(before + inside, total)
+                def report(inside: int, _: int, before: int = done) -> None:
+                    if progress is not None:
+                        progress(before + inside, total)
 
-            engine = resolve(
-                integration.engine,
-                modes=system.model.modes,
-                law=ensemble.law,
-                drive=ensemble.drive,
-            )[1]
-            books = engine.run_ensemble(ensemble, threads, report)
-            for name, values in statistics_of(ensemble, books).items():
-                found.setdefault(name, np.zeros(total, dtype=values.dtype))[which] = values
-            done += which.size
+                engine = resolve(
+                    integration.engine,
+                    modes=system.model.modes,
+                    law=ensemble.law,
+                    drive=ensemble.drive,
+                )[1]
+                books = engine.run_ensemble(ensemble, threads, report)
+                for name, values in statistics_of(ensemble, books).items():
+                    found.setdefault(name, np.zeros(total, dtype=values.dtype))[which[part]] = values
+                done += part.size
         return found
 
     def groups(
@@ -122,10 +128,12 @@ class SweepSetup:
         for key, members in keys.items():
             which = np.array(members)
             changes = dict(zip(structural, key, strict=True))
-            system, integration = self.neighbour(changes)
+            try:
+                system, integration = self.neighbour(changes)
+            except InputError as error:
+                where = ", ".join(f"{name} = {value}" for name, value in changes.items())
+                raise InputError(f"at {where}: {error}") from None
             points = {name: np.asarray(columns[name][which], dtype=np.float64) for name in own}
-            if not points:
-                points = {"striker.location": np.full(which.size, self._location(system))}
             yield system, integration, which, points
 
     def neighbour(self, changes: dict[str, Any]) -> tuple[System, Integration]:
@@ -136,11 +144,8 @@ class SweepSetup:
         return system, self.integration.replace(**of_run) if of_run else self.integration
 
     @staticmethod
-    def _location(system: System) -> float:
-        return 0.5 if system.striker is None else system.striker.location
-
-    @staticmethod
-    def _start(system: System, points: dict[str, NDArray[np.float64]]) -> State | None:
+    def start_of(system: System, points: dict[str, NDArray[np.float64]]) -> State | None:
+        """Where runs of a system begin, if the points say something of it."""
         own = {name[6:]: values for name, values in points.items() if name.startswith("start.")}
         return started(system.model, system.striker, system.start, own) if own else None
 
@@ -152,9 +157,19 @@ class SweepSetup:
     @property
     def fixed(self) -> dict[str, float]:
         """What every map says of the drive and the striker, where it is not swept, by dotted name."""
-        swept = set(self.points.axes) | set(getattr(self.points, "columns", ()))
         parameters = self.system.parameters
-        return {name: parameters[name] for name in _ALWAYS if name in parameters and name not in swept}
+        return {
+            name: parameters[name] for name in _ALWAYS if name in parameters and name not in self.points.names
+        }
+
+    @property
+    def structural(self) -> list[str]:
+        """What differs among the points and changes the frequencies, the length scale or the steps."""
+        return [
+            name
+            for name in self.points.names
+            if name.startswith(("beam.", "model.", "run.step", "run.accuracy"))
+        ]
 
     def identity(self) -> dict[str, Any]:
         """Everything that the numbers depend on, plain: what two sweeps must share to be one."""
@@ -171,7 +186,7 @@ class SweepSetup:
     def attributes(self, title: str = TITLE, more: dict[str, Any] | None = None) -> dict[str, Any]:
         """The attributes of a file: a title, every parameter, and what made it."""
         own: dict[str, Any] = {
-            "cycles": self.integration.cycles_or_default,
+            "cycles": self._cycles(),
             "engine": self.integration.engine,
             "early_decision": int(self.integration.early_decision),
         }
@@ -180,18 +195,31 @@ class SweepSetup:
         own |= {lookup(name).short: value for name, value in self.fixed.items()}
         more = own | (more or {})
         attrs = attributes_of(title, self.system, self.integration, self.plan, more, self.points.describe())
-        varied = [lookup(name).short for name in self.points.axes]
-        if any(not lookup(name).is_run for name in self.points.axes):
-            varied += [
+        varied = {lookup(name).short for name in self.points.names}
+        if self.structural:
+            varied |= {
                 "reference_freq",
                 "step",
                 "longest_contact_step",
                 "shortest_contact_step",
                 "length_scale",
-            ]
+            }
+        beam = self.system.model.beam
+        if beam is not None and any(name.startswith("beam.") for name in self.points.names):
+            # the one of the two that follows from the other follows anew at every point
+            pair = {"beam.buckling_level", "beam.axial_load"}
+            given = pair & set(self.points.names) or {f"beam.{beam.given}"}
+            varied |= {lookup(name).short for name in pair - given}
         for name in varied:
             attrs.pop(name, None)
         return attrs
+
+    def _cycles(self) -> float:
+        """Cycles of each run; those of the record, if it is marched to its end."""
+        drive = None if self.system.striker is None else self.system.striker.drive
+        if isinstance(drive, Recorded) and self.integration.cycles is None:
+            return round(drive.duration * drive.frequency, 9)
+        return self.integration.cycles_or_default
 
     def coordinates(self) -> dict[str, Any]:
         """Coordinates of a dataset: dimensions, what holds throughout, and what goes with the structure."""
@@ -199,28 +227,39 @@ class SweepSetup:
         for name, value in self.fixed.items():
             row = lookup(name)
             coords[row.short] = ((), value, {"units": row.quantity.unit, "long_name": row.quantity.words})
-        structural = [name for name in self.points.axes if not lookup(name).is_run]
-        if structural:
-            coords |= self._of_structure(structural)
+        if self.structural:
+            coords |= self._of_structure()
         return coords
 
-    def _of_structure(self, structural: list[str]) -> dict[str, Any]:
-        """Frequency that normalises, and step, over the axes that change them."""
-        axes = [self.points.axes[name] for name in structural]
-        shape = tuple(values.size for values in axes)
-        frequencies, steps = np.empty(shape), np.empty(shape)
+    def _of_structure(self) -> dict[str, Any]:
+        """Frequency and length that normalise, and step, over what changes them."""
+        names = self.structural
+        if isinstance(self.points, Grid):
+            axes = [self.points.axes[name] for name in names]
+            dims, shape = tuple(lookup(name).short for name in names), tuple(values.size for values in axes)
+            columns = dict(zip(names, np.meshgrid(*axes, indexing="ij"), strict=True))
+        else:
+            dims, shape = self.points.dims, self.points.shape
+            columns = {name: self.points.columns[name] for name in names}
+        table = np.empty((3, *shape))
+        made: dict[tuple[Any, ...], tuple[float, float, float]] = {}
         for at in np.ndindex(shape):
-            changes = {name: values[i].item() for name, values, i in zip(structural, axes, at, strict=True)}
-            system, integration = self.neighbour(changes)
-            frequencies[at] = system.model.reference_freq
-            steps[at] = plans_of(system, integration, run_columns(system, {}))[0].step
-        dims = tuple(lookup(name).short for name in structural)
-        words = "frequency that Omega and V are normalised by"
-        found = {
-            "reference_freq": (dims, frequencies, {"units": "Hz", "long_name": words}),
-            "step": (dims, steps, {"units": "s", "long_name": "step in free flight"}),
+            key = tuple(columns[name][at].item() for name in names)
+            if key not in made:
+                system, integration = self.neighbour(dict(zip(names, key, strict=True)))
+                plan = plans_of(system, integration, run_columns(system, {}))[0]
+                made[key] = system.model.reference_freq, plan.step, system.scale.length
+            table[(slice(None), *at)] = made[key]
+        labels = {
+            "reference_freq": ("Hz", "frequency that Omega and V are normalised by"),
+            "step": ("s", "step in free flight"),
+            "length_scale": ("m", "length that displacements are normalised by"),
         }
-        return {name: coordinate for name, coordinate in found.items() if name not in dims}
+        return {
+            name: (dims, values, {"units": unit, "long_name": words})
+            for (name, (unit, words)), values in zip(labels.items(), table, strict=True)
+            if name not in dims and name not in self.points.coordinates()
+        }
 
     def dataset(self, statistics: dict[str, NDArray[Any]]) -> xr.Dataset:
         """The statistics of every point as a labelled map."""
@@ -244,8 +283,8 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
             f"tolerance = {integration.tolerance:g}: is for one run; give a sweep a step, or accuracy = 'reference'"
         )
     points = axes if isinstance(axes, Points) else points_of(axes)
-    _require_parameters(system, points)
-    tell(_findings(system, points))
+    require_parameters(system, points)
+    tell(findings_of(system, points))
     law = type(system.contact) if system.contact is not None else None
     resolved = resolve(
         integration.engine,
@@ -256,48 +295,20 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         **({} if system.striker is None else {"drive": type(system.striker.drive)}),
     )[0]
     setup = SweepSetup(system, integration.replace(engine=resolved), points)
-    if integration.step is not None or "run.step" in points.take(np.zeros(1, dtype=np.int64)):
-        _require_resolved(setup)
+    require_every_structure(setup)
     return setup
 
 
-def _require_resolved(setup: SweepSetup) -> None:
-    """Refuse steps that were asked for and do not resolve some run, before any run."""
-    columns = setup.points.take(np.arange(setup.points.size))
-    for system, integration, _, points in setup.groups(columns):
-        own = {name: values for name, values in points.items() if not name.startswith("start.")}
-        require_resolved(system, integration, cycles_of(system, run_columns(system, own)))
+def _alike(system: System, state: State | None, runs: int) -> list[NDArray[np.int64]]:
+    """The runs that are marched together: of free beams, those that begin on the same side of the centre.
 
-
-def _require_parameters(system: System, points: Points) -> None:
-    """Refuse axes over what the system does not have."""
-    first = {name: values[0] for name, values in points.take(np.zeros(1, dtype=np.int64)).items()}
-    for name, value in first.items():
-        plain = value.item() if isinstance(value, np.generic) else value
-        if name.startswith("run."):
-            continue
-        if not name.startswith("start.") and lookup(name).is_run and name not in system.parameters:
-            if name == "striker.gap" and system.striker is not None:
-                continue
-            raise InputError(f"{name}: no parameter of this system; it has {', '.join(system.parameters)}")
-        system.replace(**{name: plain})
-    if (
-        system.striker is None
-        and system.start is None
-        and not any(name.startswith("start.") for name in first)
-    ):
-        raise InputError("striker = None: a beam that nothing strikes needs a start to move from")
-
-
-def _findings(system: System, points: Points) -> Iterator[Finding]:
-    """What is doubtful about the system, or at the ends of what is swept."""
-    yield from system.findings()
-    columns = points.axes if points.axes else points.take(np.arange(points.size))
-    for name, values in columns.items():
-        if values.dtype.kind != "f" or name.startswith(("run.", "start.")):
-            continue
-        for end in (values.min(), values.max()):
-            yield from system.replace(**{name: float(end)}).findings()
+    A free beam is seen from the well that it begins in, a struck one from its striker.
+    """
+    every = np.arange(runs)
+    if system.striker is not None or state is None or not state.batch:
+        return [every]
+    upper = state.amplitude @ system.model.center_shape > 0.0
+    return [part for part in (every[~upper], every[upper]) if part.size]
 
 
 def variable_attributes(name: str) -> dict[str, Any]:
