@@ -212,7 +212,7 @@ class LongReport:
 
 
 @contextmanager
-def report(total: int, log: Path | None) -> Iterator[LongReport]:
+def report(total: int, log: Path | None, store: Path | None) -> Iterator[LongReport]:
     """Give a report of a map of *total* points; refuse, before any work, a log that cannot be written."""
     from snapbeam.core.files import check_writable
 
@@ -224,7 +224,11 @@ def report(total: int, log: Path | None) -> Iterator[LongReport]:
         try:
             yield said
         except KeyboardInterrupt:
-            said.note("stopped; what the store holds is kept, and the same command goes on from there")
+            said.note(
+                "stopped; nothing is kept: with --store FOLDER it could go on from here another time"
+                if store is None
+                else "stopped; what the store holds is kept, and the same command goes on from there"
+            )
             raise
 
 

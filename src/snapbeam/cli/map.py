@@ -78,7 +78,7 @@ def compute_map(
     total = setup.points.size
     start = time.monotonic()
     tally = Tally()
-    with long.report(total, keeping["log"]) as say:
+    with long.report(total, keeping["log"], keeping["store"]) as say:
         kept = Keeping(
             keeping["store"], keeping["verify"], keeping["chunk"], long.kept_config(settings, keeping),
             say.note, tally,

@@ -24,8 +24,6 @@ _FREE_SHARE = 1.0 / 16.0
 # it the shortest step is, by order.
 _CONTACT_SHARE = 1.0 / 6.0
 _CONTACT_SPEED = 0.2
-_PLACES = np.linspace(0.02, 0.5, 25).tolist()
-"""Where the mass met by an impulse is looked at; the other half of the beam is its mirror image."""
 _HALVINGS = {4: 2, 6: 6}
 # Level "reference": how many times shorter, and how far the fastest mode may turn in a flight step, rad.
 _SHORTER = 6.0
@@ -88,7 +86,7 @@ def plan_steps(
     impact = flight
     duration = 0.0
     if contact is not None and not contact.impulsive:
-        mass = min(model.contact_mass(location) for location in _PLACES)
+        mass = model.lightest_contact_mass
         speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_freq
         duration = contact.impact_duration(mass, speed)
     if duration > 0.0:

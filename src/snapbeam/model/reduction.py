@@ -41,7 +41,7 @@ MODEL_QUANTITIES: dict[str, tuple[Quantity, Any]] = {
 """What a reduction takes beside the beam, and its default."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class ReducedModel:
     """N modal amplitudes alpha with a mass, a stiffness and one tension term: the left side of Eq. (11),
 
@@ -90,6 +90,11 @@ class ReducedModel:
         for value in vars(self).values():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
+
+    def __repr__(self) -> str:
+        wells = "two wells" if self.is_bistable else "one equilibrium"
+        of = "given by matrices" if self.beam is None else f"of {self.beam!r}"
+        return f"<ReducedModel: {self.modes} modes, {wells}, first at {self.natural_freq[0]:.4g} Hz, {of}>"
 
     @classmethod
     def from_beam(
@@ -227,6 +232,14 @@ class ReducedModel:
             assert self.contact_shape is not None
             return self.contact_shape
         return BucklingModes(self.beam.length, self.modes).shape(location * self.beam.length)
+
+    @cached_property
+    def lightest_contact_mass(self) -> float:
+        """Least :meth:`contact_mass` between 2 % and half of the span, kg, looked for at 25 places.
+
+        The other half of a beam is the mirror image of the first.
+        """
+        return min(self.contact_mass(location) for location in np.linspace(0.02, 0.5, 25).tolist())
 
     def contact_mass(self, location: float) -> float:
         """Mass met by an impulse at *location*, kg: 1/(phi . m^-1 phi).

@@ -32,7 +32,7 @@ class ModalState(NamedTuple):
     """Hash of the structure that the coordinates belong to."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class State:
     """A state of the beam and its striker, or a batch of them along leading dimensions.
 
@@ -94,6 +94,10 @@ class State:
         for name, array in found.items():
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+
+    def __repr__(self) -> str:
+        count = f"{' x '.join(map(str, self.batch))} states" if self.batch else "one state"
+        return f"<State: {count} of {self.modes} modes>"
 
     @property
     def batch(self) -> tuple[int, ...]:
