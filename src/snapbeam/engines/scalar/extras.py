@@ -9,6 +9,7 @@ from numba.extending import overload
 
 from snapbeam.engines.outcomes import Passed, Statistic, updated
 from snapbeam.engines.scalar.compile import INLINE, inlined
+from snapbeam.model.numbers import own_name
 
 __all__ = ["Extras", "extras_of_table", "observe"]
 
@@ -29,7 +30,7 @@ def extras_of_table() -> Any:
     if rows not in _made:
         owner: Any = type("OwnExtras", (Extras,), {"rows": rows}) if rows else Extras
         made: Any = _named_tuple("Numbers", ())
-        made.owner = owner
+        made.__name__, made.owner = own_name(owner), owner
         if not rows:
             made.__module__, made.__qualname__ = __name__, "Extras.Numbers"
             owner.Numbers = made

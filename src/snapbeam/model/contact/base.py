@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-from collections import namedtuple
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from snapbeam.model.numbers import numbers_type
 from snapbeam.model.quantity import check_fields
 
 __all__ = ["LAWS", "ContactLaw", "Keeps"]
@@ -59,13 +59,8 @@ class ContactLaw:
     @classmethod
     def numbers_type(cls) -> Any:
         """The named tuple of the law's numbers, as kernels see them; an attribute of the class, ``Numbers``."""
-        if "Numbers" not in vars(cls):
-            fields = [item.name for item in dataclasses.fields(cls)]  # type: ignore[arg-type]
-            numbers = namedtuple("Numbers", fields)  # type: ignore[misc]
-            numbers.__module__, numbers.__qualname__ = cls.__module__, f"{cls.__qualname__}.Numbers"
-            numbers.owner = cls  # type: ignore[attr-defined]
-            cls.Numbers = numbers  # type: ignore[attr-defined]
-        return cls.Numbers  # type: ignore[attr-defined]
+        fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+        return numbers_type(cls, (item.name for item in fields))
 
     def impact_duration(self, mass: float, velocity: float) -> float:
         """Duration, s, of the impact of a free *mass* (kg) that arrives with *velocity* (m/s); 0 if none is known.

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections import namedtuple
 from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.model.numbers import numbers_type
 from snapbeam.model.quantity import check_fields
 
 __all__ = ["DRIVES", "Drive", "Scale"]
@@ -55,12 +55,7 @@ class Drive:
     @classmethod
     def numbers_type(cls) -> Any:
         """The named tuple of the drive's numbers, as kernels see them; an attribute of the class, ``Numbers``."""
-        if "Numbers" not in vars(cls):
-            numbers = namedtuple("Numbers", cls.number_names)  # type: ignore[misc]
-            numbers.__module__, numbers.__qualname__ = cls.__module__, f"{cls.__qualname__}.Numbers"
-            numbers.owner = cls  # type: ignore[attr-defined]
-            cls.Numbers = numbers  # type: ignore[attr-defined]
-        return cls.Numbers  # type: ignore[attr-defined]
+        return numbers_type(cls, cls.number_names)
 
     def values(self) -> dict[str, float]:
         """The fields that are plain numbers, by name."""
