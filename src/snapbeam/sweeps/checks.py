@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from snapbeam.core.validate import InputError
 from snapbeam.engines.assemble import cycles_of, run_columns
 from snapbeam.engines.clock import require_resolved
 from snapbeam.model.system import System
-from snapbeam.sweeps.points import Points
+from snapbeam.sweeps.points import Grid, Points
 
 if TYPE_CHECKING:
     from snapbeam.sweeps.setup import SweepSetup
@@ -22,34 +22,47 @@ __all__ = ["findings_of", "require_every_structure", "require_parameters"]
 
 
 def require_parameters(system: System, points: Points) -> None:
-    """Refuse axes over what the system does not have."""
+    """Refuse axes over what the system does not have, by its first point."""
     first = {name: values[0] for name, values in points.take(np.zeros(1, dtype=np.int64)).items()}
-    for name, value in first.items():
-        plain = value.item() if isinstance(value, np.generic) else value
-        if name.startswith("run."):
+    for name in first:
+        if name.startswith(("run.", "start.")) or not lookup(name).is_run or name in system.parameters:
             continue
-        if not name.startswith("start.") and lookup(name).is_run and name not in system.parameters:
-            if name == "striker.gap" and system.striker is not None:
-                continue
+        if name != "striker.gap" or system.striker is None:
             raise InputError(f"{name}: no parameter of this system; it has {', '.join(system.parameters)}")
-        system.replace(**{name: plain})
     if (
         system.striker is None
         and system.start is None
         and not any(name.startswith("start.") for name in first)
     ):
         raise InputError("striker = None: a beam that nothing strikes needs a start to move from")
+    _at(system, first)
+
+
+def _at(system: System, point: dict[str, Any]) -> System:
+    """The system at a point."""
+    plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in point.items()}
+    return system.replace(**{name: value for name, value in plain.items() if not name.startswith("run.")})
 
 
 def findings_of(system: System, points: Points) -> Iterator[Finding]:
     """What is doubtful about the system, or at the ends of what is swept."""
     yield from system.findings()
-    columns = points.axes if points.axes else points.take(np.arange(points.size))
-    for name, values in columns.items():
-        if values.dtype.kind != "f" or name.startswith(("run.", "start.")):
-            continue
-        for end in (values.min(), values.max()):
-            yield from system.replace(**{name: float(end)}).findings()
+    for number in _ends(points):
+        point = {name: values[0] for name, values in points.take(np.array([number])).items()}
+        yield from _at(system, point).findings()
+
+
+def _ends(points: Points) -> list[int]:
+    """Points at which some number is least or greatest."""
+    if isinstance(points, Grid):
+        corners = [(0,) * len(points.shape)]
+        corners += [
+            tuple(size - 1 if i == at else 0 for i in range(len(points.shape)))
+            for at, size in enumerate(points.shape)
+        ]
+        return [int(np.ravel_multi_index(corner, points.shape)) for corner in corners]
+    numbers = [values for values in points.columns.values() if values.dtype.kind in "if"]
+    return sorted({int(at) for values in numbers for at in (values.argmin(), values.argmax())})
 
 
 def require_every_structure(setup: SweepSetup) -> None:

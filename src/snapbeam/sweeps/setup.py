@@ -284,7 +284,6 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         )
     points = axes if isinstance(axes, Points) else points_of(axes)
     require_parameters(system, points)
-    tell(findings_of(system, points))
     law = type(system.contact) if system.contact is not None else None
     resolved = resolve(
         integration.engine,
@@ -296,6 +295,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
     )[0]
     setup = SweepSetup(system, integration.replace(engine=resolved), points)
     require_every_structure(setup)
+    tell(findings_of(system, points))
     return setup
 
 
