@@ -144,7 +144,7 @@ def test_drawn_with_right_labels(system, tmp_path) -> None:
     cases = {
         "level": (
             {"beam.buckling_level": levels, "velocity_amplitude": np.linspace(0.05, 0.5, 6)},
-            "Height of the buckled beam at its centre $b$ (m)", "Velocity amplitude $V$",
+            "Height of the buckled beam at its centre $b$\n(mm)", "Velocity amplitude $V$",
         ),
         "modes": (
             {"modes": [1, 2, 4], "frequency_ratio": np.linspace(0.5, 2.0, 6)},
@@ -152,7 +152,7 @@ def test_drawn_with_right_labels(system, tmp_path) -> None:
         ),
         "contact": (
             {"contact.stiffness": np.geomspace(1e7, 1e9, 4), "striker.side": ["below", "above"]},
-            "Contact stiffness $k_c$ (N/m^1.5)", "Side that the striker pushes from",
+            "Contact stiffness $k_c$ (N/m$^{1.5}$)", "Side that the striker pushes from",
         ),
     }  # fmt: skip
     for name, (axes, across, upward) in cases.items():

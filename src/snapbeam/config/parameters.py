@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import math
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -26,6 +27,7 @@ from snapbeam.model.striker import Striker
 __all__ = ["Parameter", "lookup", "parameters", "short_names"]
 
 _NONE = dataclasses.MISSING
+_POWER = re.compile(r"\^([\d.]+)")
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,8 @@ class Parameter:
         """Words, symbol and unit, for an axis of a picture."""
         words = self.quantity.words[:1].upper() + self.quantity.words[1:]
         symbol = f" ${self.quantity.symbol}$" if self.quantity.symbol else ""
-        unit = "" if self.quantity.unit == "1" else f" ({self.quantity.unit})"
+        raised = _POWER.sub(r"$^{\1}$", self.quantity.unit)
+        unit = "" if raised == "1" else f" ({raised})"
         return f"{words}{symbol}{unit}"
 
     @property
@@ -143,7 +146,8 @@ def lookup(name: str) -> Parameter:
     found = START_NAME.fullmatch(name.removeprefix("start."))
     if found is not None:
         of, mode = found[1], found[2]
-        words = f"{of} of buckling mode {mode} at the start, over that of the well"
+        over = "that of the well" if of == "amplitude" else "omega_1 times the amplitude of the well"
+        words = f"{of} of buckling mode {mode} at the start, over {over}"
         return Parameter(f"start.{of}[{mode}]", f"start_{of}_{mode}", Quantity("1", words, scope=RUN))
     if name in ("start.striker_position", "start_striker_position"):
         words = "mid-position of the striker's tip in space"

@@ -11,11 +11,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from snapbeam.config import Parameter, lookup
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
 from snapbeam.figures.agreement import draw_agreement
-from snapbeam.figures.panels import cell_edges, class_cells
+from snapbeam.figures.axes import dress, edges_of, symbol_of
+from snapbeam.figures.panels import class_cells
 from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_figure
 from snapbeam.lab.compare.dots import Dots
 from snapbeam.model.quasi_static import quasi_static_threshold
@@ -23,20 +23,13 @@ from snapbeam.model.quasi_static import quasi_static_threshold
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["axis_label", "class_handles", "plot_response_map", "symbol_of"]
+__all__ = ["class_handles", "plot_response_map"]
 
 _Array = NDArray[np.float64]
 
 UPWARD = ("velocity_amplitude", "location")
 """Axes that are drawn upward rather than across, the first of them first."""
 
-AXIS_LABELS = {
-    "frequency_ratio": r"Excitation frequency $\Omega$",
-    "location": r"Striker location $x_\mathrm{s}$",
-    "velocity_amplitude": r"Velocity amplitude $V$",
-    "modes": r"Number of modes $N$",
-}
-"""Labels of the paper's own axes; those of the others are in the table of parameters."""
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 
 
@@ -78,8 +71,7 @@ def plot_response_map(
         If the dataset is no map of two axes.
     """
     across, upward, kinds = _two_axes(dataset)
-    (x, x_words), (y, y_words) = (_positions(dataset, name) for name in (across, upward))
-    edges = tuple(_edges(points, name) for points, name in ((x, across), (y, upward)))
+    edges = tuple(edges_of(dataset, name) for name in (across, upward))
     fixed = {
         name: _scalar(dataset, name)
         for name in ("frequency_ratio", "location", "velocity_amplitude")
@@ -91,12 +83,9 @@ def plot_response_map(
             ax = own.add_subplot()
         assert ax is not None
         class_cells(ax, edges[0], edges[1], kinds)
-        ax.set(xlabel=axis_label(dataset, across), ylabel=axis_label(dataset, upward))
         fix_ticks(ax)
-        if x_words is not None:
-            ax.set_xticks(x, x_words)
-        if y_words is not None:
-            ax.set_yticks(y, y_words)
+        dress(ax.xaxis, dataset, across)
+        dress(ax.yaxis, dataset, upward)
         ax.set_title(_subtitle(dataset, fixed), loc="left")
         handles = class_handles(kinds)
         if "class_share" in dataset:
@@ -111,48 +100,6 @@ def plot_response_map(
         elif legend:
             ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2)
     return ax
-
-
-def axis_label(dataset: xr.Dataset, name: str) -> str:
-    """What stands along an axis of a picture: words, symbol and unit of the parameter."""
-    if name in AXIS_LABELS:
-        return AXIS_LABELS[name]
-    row = _parameter(dataset, name)
-    if row is not None:
-        return row.label
-    labels = dataset[name].attrs if name in dataset.coords else {}
-    unit = labels.get("units", "1")
-    return f"{labels.get('long_name', name)}{'' if unit == '1' else f' ({unit})'}"
-
-
-def symbol_of(dataset: xr.Dataset, name: str) -> str:
-    """The symbol of an axis, or its name."""
-    row = _parameter(dataset, name)
-    return name if row is None or not row.quantity.symbol else f"${row.quantity.symbol}$"
-
-
-def _parameter(dataset: xr.Dataset, name: str) -> Parameter | None:
-    """The row of the table for an axis: as its coordinate says, or by its name, as in files of version 0.1."""
-    full = dataset[name].attrs.get("parameter", name) if name in dataset.coords else name
-    try:
-        return lookup(str(full))
-    except InputError:
-        return None
-
-
-def _positions(dataset: xr.Dataset, name: str) -> tuple[_Array, list[str] | None]:
-    """Where the points of an axis are drawn; words and whole numbers stand side by side, with their names."""
-    values = np.asarray(dataset[name].values)
-    if values.dtype.kind in "fc":
-        return values.astype(np.float64), None
-    return np.arange(values.size, dtype=np.float64), [str(value) for value in values]
-
-
-def _edges(points: _Array, name: str) -> _Array:
-    low = 0.0 if points[0] >= 0.0 and name != "start" else -np.inf
-    if np.array_equal(points, np.arange(points.size)):
-        low = -np.inf
-    return cell_edges(points, low, 1.0 if name == "location" else np.inf)
 
 
 def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:

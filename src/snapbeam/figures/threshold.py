@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from snapbeam.core.validate import InputError
-from snapbeam.figures.response_map import axis_label, symbol_of
+from snapbeam.figures.axes import dress, positions, symbol_of
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
 from snapbeam.model.quasi_static import quasi_static_threshold
 
@@ -55,7 +55,7 @@ def plot_threshold(
     along = dims[-1] if len(dims) == 1 or dims[-1] != "modes" else dims[0]
     others = [name for name in dims if name != along]
     raised = str(dataset.attrs.get("along", "velocity_amplitude"))
-    x = np.asarray(dataset[along].values)
+    x, _ = positions(dataset, along)
     curves = (
         [dataset.isel({others[0]: at}) for at in range(dataset.sizes[others[0]])] if others else [dataset]
     )
@@ -79,9 +79,11 @@ def plot_threshold(
         amplitude = dataset[raised].values
         found = float(dataset["always_interwell"].max())
         top = min(amplitude[-1], 1.4 * found) if np.isfinite(found) else amplitude[-1]
-        ax.set(xlim=x[[0, -1]], ylim=(0.0, top), xlabel=axis_label(dataset, along))
-        ax.set_ylabel(axis_label(dataset, raised))
         fix_ticks(ax)
+        dress(ax.xaxis, dataset, along)
+        dress(ax.yaxis, dataset, raised)
+        low = amplitude[0] if ax.get_yscale() == "log" else min(0.0, amplitude[0])
+        ax.set(xlim=x[[0, -1]], ylim=(low, top))
         if "cycles" in dataset.attrs:
             step = float(np.max(np.diff(amplitude)))
             ax.set_title(
