@@ -15,6 +15,7 @@ from typing import Any
 from numba import njit, typeof
 from numba.core import event
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.registry import CPUDispatcher
 
 from snapbeam.engines.scalar.fingerprint import fingerprint
 from snapbeam.engines.scalar.parts import pipeline
@@ -30,18 +31,33 @@ INLINE_HERE: dict[str, Any] = {**INLINE, **_PART}
 """The same, for what only the processor's engine calls."""
 
 
-def compiled(function: Callable[..., Any]) -> Any:
+class _Part(CPUDispatcher):
+    """A part of a kernel; Python can call it too, through a kernel that does nothing else."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        return _by_itself(self)(*arguments)
+
+
+@cache
+def _by_itself(part: Any) -> Any:
+    return njit(**_OPTIONS)(lambda *arguments: part(*arguments))
+
+
+def compiled(function: Callable[..., Any], **options: Any) -> Any:
     """Compile a function that kernels call: no Python objects, no global lock, division as the processor does it.
 
     Nor reference counts, which cost an atomic operation whenever an array is passed on: a kernel allocates nothing,
     and its arrays belong to its caller.
     """
-    return njit(**_PART, **_OPTIONS)(function)
+    part = njit(**options, **_PART, **_OPTIONS)(function)
+    if type(part) is CPUDispatcher:  # under NUMBA_DISABLE_JIT it is the function itself
+        part.__class__ = _Part
+    return part
 
 
 def inlined(function: Callable[..., Any]) -> Any:
     """As :func:`compiled`, and always written into its callers."""
-    return njit(forceinline=True, **_PART, **_OPTIONS)(function)
+    return compiled(function, forceinline=True)
 
 
 @cache
