@@ -5,29 +5,28 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from snapbeam.core.validate import choice, positive
+from snapbeam.engines.measure import flight_step
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.integration import ACCURACIES
 from snapbeam.model.reduction import ReducedModel
 
 __all__ = ["Plan", "plan_steps"]
 
-# Free flight.  A step is short enough either for the fastest mode (radians per step) or, since the linear
-# flow is exact, for the rate at which the tension detunes the modes (radians per step).
-_FASTEST = 0.2
-_DETUNING = 0.0248
-_FREE_SHARE = 1.0 / 16.0
-"""Of the reference period, for a structure without stiffness."""
+# Free flight: the error allowed a step, as it is measured on the structure, by level of accuracy.
+_LIMIT = {"map": 2.5e-7, "reference": 2e-11}
+_LIMIT_OF_HITS = {"map": 1e-9, "reference": 1e-13}
+"""Where impacts last no time: no contact steps share the error, and there is one mode only."""
+_ORDER = {"map": 4, "reference": 6}
+_FREE_TURN = 4.0
+"""Of the fastest mode in a flight step of level "reference", rad."""
+_MOST_DECAY = 1.8
+"""Of the mode that decays fastest, in a flight step."""
 # Contact: longest step over the duration of an impact at the speed 0.2 b omega_1, and how many halvings below
 # it the shortest step is, by order.
-_CONTACT_SHARE = 1.0 / 6.0
+_CONTACT_SHARE = 1.0 / 8.0
 _CONTACT_SPEED = 0.2
-_HALVINGS = {4: 2, 6: 6}
-# Level "reference": how many times shorter, and how far the fastest mode may turn in a flight step, rad.
-_SHORTER = 6.0
-_FREE_TURN = 4.0
+_HALVINGS = {4: 4, 6: 10}
 _MOST_HALVINGS = 5
 _CONTACT_TURN = math.pi
 """Of the fastest mode in the longest contact step, rad: the contact moves every mode, and beyond half a turn
@@ -46,16 +45,6 @@ class Plan(NamedTuple):
     """Halvings of the flight step that make the shortest contact step."""
 
 
-def _detuning_rate(model: ReducedModel) -> float:
-    """Greatest rate, rad/s, at which a change of tension as large as the well's own detunes a mode."""
-    stretch = float(model.equilibrium @ model.equilibrium)
-    moving = model.omega > 0.0
-    if stretch == 0.0 or not moving.any():
-        return 0.0
-    per_mode = np.diag(model.tension_matrix)[moving] / model.omega[moving]
-    return float(model.tension_stiffness * stretch * per_mode.max())
-
-
 def plan_steps(
     model: ReducedModel,
     contact: ContactLaw | None,
@@ -63,7 +52,7 @@ def plan_steps(
     step: float | None = None,
     accuracy: str = "map",
 ) -> Plan:
-    """The steps of a run: short enough for the modes or their detuning, and for an impact.
+    """The steps of a run: short enough in flight, as measured on the model itself, and for an impact.
 
     Parameters
     ----------
@@ -73,16 +62,19 @@ def plan_steps(
     step : float, optional
         Flight step in seconds, instead of the default; contact steps scale with it.
     accuracy : {"map", "reference"}
-        ``"map"``: order 4.  ``"reference"``: order 6, and steps six times shorter or, with many modes, shorter
-        still in flight, to check others with.
+        ``"map"``: order 4, and errors of about a thousandth of the buckling level where a run is well conditioned.
+        ``"reference"``: order 6, and errors a hundred thousand times smaller.
     """
     choice("accuracy", accuracy, ACCURACIES)
-    fastest, detuning = float(model.omega.max()), _detuning_rate(model)
-    limits = [_FASTEST / fastest if fastest > 0.0 else math.inf]
-    limits.append(_DETUNING / detuning if detuning > 0.0 else 0.0 if fastest > 0.0 else math.inf)
-    flight = max(limits)
-    if math.isinf(flight):
-        flight = _FREE_SHARE / model.reference_freq
+    order = _ORDER[accuracy]
+    fastest = float(model.omega.max())
+    limits = _LIMIT_OF_HITS if contact is not None and contact.impulsive else _LIMIT
+    flight = flight_step(model, order, limits[accuracy])
+    if accuracy == "reference" and fastest * flight > _FREE_TURN:
+        flight = _FREE_TURN / fastest
+    decay = float((model.damping_ratio * model.omega).max())
+    if decay * flight > _MOST_DECAY:
+        flight = _MOST_DECAY / decay
     impact = flight
     duration = 0.0
     if contact is not None and not contact.impulsive:
@@ -95,11 +87,6 @@ def plan_steps(
         if fastest > 0.0:
             impact = min(impact, _CONTACT_TURN / fastest)
     coarsest = max(0, math.ceil(math.log2(flight / impact)))
-    order = 4 if accuracy == "map" else 6
-    if accuracy == "reference":
-        flight /= _SHORTER
-        while fastest * flight > _FREE_TURN:
-            flight, coarsest = 0.5 * flight, max(0, coarsest - 1)
     if step is not None:
         flight = positive("step", step, "s")
     return Plan(order, flight, coarsest, coarsest + _HALVINGS[order])

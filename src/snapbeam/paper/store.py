@@ -10,6 +10,7 @@ import numpy as np
 
 from snapbeam.core.files import atomic_path, check_writable
 from snapbeam.core.validate import InputError
+from snapbeam.engines.mark import engine_mark
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,7 +21,8 @@ __all__ = ["load_results", "save_results"]
 def save_results(results: Mapping[str, xr.Dataset], path: Path, size: str) -> Path:
     """Write datasets, by name, with 32-bit floats; coordinates keep their 64 bits.
 
-    Every dataset keeps the attributes that say what it was computed from and by what.
+    Every dataset keeps the attributes that say what it was computed from and by what; the file says which engine it was,
+    by its fingerprint.
     """
     import xarray as xr
 
@@ -38,6 +40,7 @@ def save_results(results: Mapping[str, xr.Dataset], path: Path, size: str) -> Pa
         groups[f"/{name}"], encoding[f"/{name}"] = compact, packed
     tree = xr.DataTree.from_dict(groups)
     tree.attrs["paper_size"] = size
+    tree.attrs["engine_fingerprint"] = engine_mark()
     with atomic_path(target) as temporary:
         tree.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
     return target
