@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import logging
 import os
+import sys
 from pathlib import Path
 from typing import Any
+
+from sphinx.ext.napoleon.docstring import GoogleDocstring
 
 from snapbeam.core.provenance import __version__
 
 # Figures of the paper are drawn from full-size data that were computed once.
 DATA = Path(__file__).parent / "data"
+os.environ["SNAPBEAM_PAPER_DATA"] = str(DATA)  # read by the examples
+sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 os.environ.setdefault("MPLBACKEND", "Agg")
 logging.getLogger("fontTools").setLevel(logging.WARNING)
 
@@ -21,13 +26,15 @@ version = release = __version__
 
 extensions = [
     "myst_parser",
+    "reference",
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "data", "gallery/**/*.ipynb", "gallery/**/*.py", "gallery/**/*.json"]
+exclude_patterns = ["_build", "_ext", "_generated", "data"]
+exclude_patterns += [f"gallery/**/*.{kind}" for kind in ("ipynb", "py", "json")]
 templates_path: list[str] = []
 
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
@@ -36,6 +43,7 @@ myst_heading_anchors = 3
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 napoleon_google_docstring = False
+napoleon_use_param = False  # types are words: "array of shape (N,)" names no class
 napoleon_use_rtype = False
 
 html_theme = "furo"
@@ -49,6 +57,14 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "min_reported_time": 60,
 }
+
+
+def keep_whole(self: Any) -> tuple[str, list[str]]:
+    """The docstring of an attribute as it stands: Napoleon would take what is before a colon for its type."""
+    return "", self._dedent(list(self._consume_to_end()))
+
+
+GoogleDocstring._consume_inline_attribute = keep_whole
 
 
 def draw_paper(app: Any) -> None:

@@ -73,12 +73,17 @@ def _entries(sections: Mapping[str, Any], lines: list[str]) -> list[tuple[str, s
 
 
 def _place(section: str, name: str, value: Any) -> tuple[str, str]:
-    """Where something belongs; version 0.1 had the striker and its drive in one section, and axes by short names."""
+    """Where something belongs.
+
+    Version 0.1 had the striker and its drive in one section, axes by short names, and the reference frequency in [run].
+    """
     if section == "shaker":
         return ("drive" if name in ("frequency_ratio", "velocity_amplitude") else "striker"), name
     if section == "map":
         single = isinstance(value, (int, float)) and not isinstance(value, bool)
         return (_OF_MAP[name], name) if single else ("axes", f"{_OF_MAP[name]}.{name}")
+    if section == "run" and name == "reference_freq":
+        return "model", name
     return section, name
 
 
