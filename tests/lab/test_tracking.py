@@ -21,6 +21,7 @@ PLAIN_TIP = {"shaker_width": 1.0e-3, "tip_radius": 0.6e-3, "marker_thickness": 0
 
 
 def rendered(motion=None, *, snr=30.0, stage=STICKER, shape=(160, 64), seed=0, light=(0.15, 0.1), **options):
+    options.setdefault("rest_frames", 20)
     time, beam, shaker, *_ = impacts(5) if motion is None else motion
     camera = SyntheticCamera(frame_rate=FRAME_RATE, pixel_size=PIXEL, shape=shape, snr_db=snr, light=light)
     return render_recording(

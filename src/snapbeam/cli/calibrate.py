@@ -61,7 +61,7 @@ def calibrate(
         ),
     ] = None,
     plot: opt.Plot = None,
-    report: lab.Report = None,
+    report: lab.JsonFile = None,
 ) -> None:  # fmt: skip
     """Fit thickness and buckling level to measured natural frequencies, and say what the data leave open.
 
@@ -135,5 +135,5 @@ def calibrate(
         save_figure(plot_calibration(result), plot)
         console.print(f"Written: {file_line(plot)}")
     if report is not None:
-        lab.write_report(report, result.summary())
+        lab.write_json(report, result.summary())
         console.print(f"Written: {file_line(report)}")

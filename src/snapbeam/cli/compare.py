@@ -40,7 +40,7 @@ def compare(
     ] = 200,
     window: opt.Window = None,
     plot: opt.Plot = None,
-    report: lab.Report = None,
+    report: lab.JsonFile = None,
 ) -> None:
     """Compare measured responses with a simulated map, or a measured waveform with a simulated one.
 
@@ -74,7 +74,7 @@ def compare(
         save_figure(figure, plot)
         console.print(f"Written: {file_line(plot)}")
     if report is not None:
-        lab.write_report(report, summary)
+        lab.write_json(report, summary)
         console.print(f"Written: {file_line(report)}")
 
 

@@ -45,7 +45,7 @@ def identify(
     sensitivity: lab.Sensitivity = None,
     sampling_freq: lab.SamplingFreq = None,
     plot: opt.Plot = None,
-    report: lab.Report = None,
+    report: lab.JsonFile = None,
 ) -> None:
     """Identify natural frequency, damping ratio and softening from a free decay, with standard errors.
 
@@ -102,5 +102,5 @@ def identify(
         save_figure(plot_decay(data, first), plot)
         console.print(f"Written: {file_line(plot)}")
     if report is not None:
-        lab.write_report(report, {name: fit.summary() for name, fit in fits.items()})
+        lab.write_json(report, {name: fit.summary() for name, fit in fits.items()})
         console.print(f"Written: {file_line(report)}")

@@ -48,7 +48,7 @@ def vibrometer(
         float | None, opt.number_option("Samples per second of --drive-output, Hz (100000).", "Output")
     ] = None,
     plot: opt.Plot = None,
-    report: lab.Report = None,
+    report: lab.JsonFile = None,
 ) -> None:  # fmt: skip
     """Measure the shaker's motion in a vibrometer record and say whether the test is acceptable.
 
@@ -112,7 +112,7 @@ def vibrometer(
         save_figure(plot_drive(data, drive), plot)
         console.print(f"Written: {file_line(plot)}")
     if report is not None:
-        lab.write_report(report, summary)
+        lab.write_json(report, summary)
         console.print(f"Written: {file_line(report)}")
 
 

@@ -95,10 +95,11 @@ def _label(units: str, long_name: str) -> dict[str, str]:
 
 
 def _noise(dataset: xr.Dataset) -> float:
-    """Standard deviation of the penetration [mm] from the standard errors of both edges."""
+    """Standard deviation of the penetration [mm] from the noise of both edges."""
+    scale = float(dataset.attrs.get("pixel_size", 0.0)) * 1e3
     errors = [
-        float(np.nanmedian(dataset[name].values))
-        for name in ("displacement_stderr_mm", "shaker_stderr_mm")
+        scale * float(np.nanmedian(dataset[name].values))
+        for name in ("beam_row_stderr", "tip_row_stderr")
         if name in dataset and np.isfinite(dataset[name].values).any()
     ]
     return float(np.hypot(errors[0], errors[1])) if len(errors) == 2 else 0.0
