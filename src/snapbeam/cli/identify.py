@@ -44,6 +44,7 @@ def identify(
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
     sampling_freq: lab.SamplingFreq = None,
+    columns: lab.Columns = None,
     plot: opt.Plot = None,
     report: lab.JsonFile = None,
 ) -> None:
@@ -65,7 +66,7 @@ def identify(
     if report is not None:
         check_writable(report, "json", (".json",))
     choice("method", method, (*METHODS, "all"))
-    data = lab.open_signal(signal, channel, units, sensitivity, sampling_freq)
+    data = lab.open_signal(signal, channel, units, sensitivity, sampling_freq, columns)
     rough = lab.numbers("frequencies", frequencies) or None
     fits = {
         name: identify_decay(

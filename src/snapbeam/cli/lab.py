@@ -29,7 +29,10 @@ _OUTPUT = "Output"
 
 SignalFile = Annotated[
     Path,
-    typer.Argument(help="CSV, WAV, UFF-58, TDMS, HDF5 or NumPy file of a time series.", metavar="SIGNAL"),
+    typer.Argument(
+        help="Text table, WAV, UFF-58, TDMS, LVM, MATLAB, HDF5 or NumPy file of a time series.",
+        metavar="SIGNAL",
+    ),
 ]
 Channel = Annotated[
     str | None,
@@ -44,7 +47,7 @@ Units = Annotated[
 Sensitivity = Annotated[
     str | None,
     typer.Option(
-        help="What a volt, or full scale (FS) of a sound file, stands for: '125 mm/s/V', '0.5 m/s/FS'.",
+        help="What a volt, or full scale (FS) of a sound file, stands for: '125 mm/s/V', '100 mV/g', '0.5 m/s/FS'.",
         rich_help_panel=_SIGNAL,
     ),
 ]
@@ -77,16 +80,23 @@ JsonFile = Annotated[
 
 
 def open_signal(
-    path: Path, channel: str | None, units: str | None, sensitivity: str | None, sampling_freq: float | None
+    path: Path,
+    channel: str | None,
+    units: str | None,
+    sensitivity: str | None,
+    sampling_freq: float | None,
+    columns: str | None = None,
 ) -> xr.DataArray:
     """Read a signal; a channel given as a whole number is counted, unless one has that name."""
     from snapbeam.lab.signals.files import read_channels, read_signal
 
     chosen: str | int | None = channel
     if channel is not None and channel.isdigit():
-        names = [entry["name"] for entry in read_channels(path, sampling_freq)]
+        names = [entry["name"] for entry in read_channels(path, sampling_freq, columns)]
         chosen = channel if channel in names else int(channel)
-    return read_signal(path, chosen, units=units, sensitivity=sensitivity, sampling_freq=sampling_freq)
+    return read_signal(
+        path, chosen, units=units, sensitivity=sensitivity, sampling_freq=sampling_freq, columns=columns
+    )
 
 
 def tell_findings(console: Console, findings: Iterable[Finding]) -> None:

@@ -30,6 +30,7 @@ def vibrometer(
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
     sampling_freq: lab.SamplingFreq = None,
+    columns: lab.Columns = None,
     camera: Annotated[
         Path | None,
         typer.Option(
@@ -69,7 +70,7 @@ def vibrometer(
     ):
         if path is not None:
             check_writable(path, name, suffixes)
-    data = lab.open_signal(signal, channel, units, sensitivity, sampling_freq)
+    data = lab.open_signal(signal, channel, units, sensitivity, sampling_freq, columns)
     limit = SNR_LIMIT if snr_limit is None else snr_limit
     drive = measure_drive(data, frequency, snr_limit=limit)
     fit, summary = drive.steady, drive.summary()

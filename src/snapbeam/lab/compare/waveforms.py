@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.validate import InputError, positive
-from snapbeam.lab.signals.signal import Samples
+from snapbeam.lab.signals.signal import SignalSamples
 from snapbeam.lab.signals.sine_fit import SineFit, fit_sine
 from snapbeam.runs.schema import check_trajectory
 
@@ -165,7 +165,9 @@ def _shaker_sine(run: xr.Dataset, clock: _Array) -> SineFit:
     begin = clock[good][0] + span / 3.0 if span > 6.0 else clock[good][0]
     count = int(min((clock[good][-1] - begin) * 64, 20_000))
     even = begin + (clock[good][-1] - begin) * np.arange(count) / count
-    samples = Samples(np.interp(even, clock[good], values[good]), even, count / (clock[good][-1] - begin))
+    samples = SignalSamples(
+        np.interp(even, clock[good], values[good]), even, count / (clock[good][-1] - begin)
+    )
     return fit_sine(samples, 1.0, 1, fixed=True)
 
 

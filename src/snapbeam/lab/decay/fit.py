@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError
 from snapbeam.lab.decay.model import ModeEstimate, law_priors
-from snapbeam.lab.signals.signal import Samples
+from snapbeam.lab.signals.signal import SignalSamples
 from snapbeam.lab.signals.sine_fit import white_variance
 
 __all__ = ["FitResult", "explain", "fit_decay"]
@@ -34,7 +34,7 @@ class FitResult(NamedTuple):
 
 
 def fit_decay(
-    samples: Samples,
+    samples: SignalSamples,
     guesses: list[ModeEstimate],
     units: str,
     *,
@@ -45,7 +45,7 @@ def fit_decay(
 
     Parameters
     ----------
-    samples : Samples
+    samples : SignalSamples
     guesses : list of ModeEstimate
     units : str
         Unit of the signal; tells displacement from velocity.
@@ -130,7 +130,7 @@ def fit_decay(
     return FitResult(modes, rest, near[0], rms)
 
 
-def explain(samples: Samples, modes: list[ModeEstimate], units: str, soften: bool) -> FitResult:
+def explain(samples: SignalSamples, modes: list[ModeEstimate], units: str, soften: bool) -> FitResult:
     """What given modes leave of a signal, their amplitudes and phases fitted, all else kept."""
     t = samples.time - samples.time[0]
     first = modes[0].amplitude ** 2

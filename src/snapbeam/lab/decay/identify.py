@@ -25,7 +25,7 @@ from snapbeam.lab.decay.cycles import (
 )
 from snapbeam.lab.decay.fit import explain, fit_decay
 from snapbeam.lab.decay.model import DecayFit, ModeEstimate
-from snapbeam.lab.signals.signal import Samples, check_signal
+from snapbeam.lab.signals.signal import SignalSamples, check_signal
 from snapbeam.lab.signals.sine_fit import spectral_peak, white_variance
 
 if TYPE_CHECKING:
@@ -122,14 +122,14 @@ def identify_decay(
             result = explain(samples, found, units, soften)
             heard = first._replace(noise=first.noise * result.noise_near / sigma) if sigma > 0.0 else first
             found[-1] = regress(heard, float(samples.time[0]), units, method, soften and len(found) == 1)
-        rest = Samples(result.residual, samples.time, samples.sampling_freq)
+        rest = SignalSamples(result.residual, samples.time, samples.sampling_freq)
     final = found
     assert cycles is not None
     notes = _notes(samples, final, result.noise_near, soften)
     free = [mode.natural_freq for mode in final]
     lines = [0.0, *free, *(2.0 * f for f in free)]
     near = white_variance(result.residual, samples.sampling_freq, free[0], lines, 3 * len(free))
-    top = noise_level(Samples(result.residual, samples.time, samples.sampling_freq))
+    top = noise_level(SignalSamples(result.residual, samples.time, samples.sampling_freq))
     amplitude, freq, freq_se = backbone(cycles)
     power = final[0].amplitude ** 2 / 2.0
     return DecayFit(
@@ -149,7 +149,7 @@ def identify_decay(
     )
 
 
-def _cut(samples: Samples, start: float | None, stop: float | None) -> Samples:
+def _cut(samples: SignalSamples, start: float | None, stop: float | None) -> SignalSamples:
     low = samples.time[0] if start is None else finite("start", start)
     high = samples.time[-1] if stop is None else finite("stop", stop)
     inside = (samples.time >= low) & (samples.time <= high)
@@ -158,10 +158,10 @@ def _cut(samples: Samples, start: float | None, stop: float | None) -> Samples:
             f"start = {low:g}, stop = {high:g}: hold {inside.sum()} samples of the signal, which runs from "
             f"{samples.time[0]:g} to {samples.time[-1]:g} s: must hold at least 64"
         )
-    return Samples(samples.values[inside], samples.time[inside], samples.sampling_freq)
+    return SignalSamples(samples.values[inside], samples.time[inside], samples.sampling_freq)
 
 
-def _center(rest: Samples, band: float | None, found: list[ModeEstimate], sigma: float) -> float:
+def _center(rest: SignalSamples, band: float | None, found: list[ModeEstimate], sigma: float) -> float:
     span = rest.values.size / rest.sampling_freq
     if band is None:
         center = spectral_peak(rest, low=4.0 / span)
@@ -180,7 +180,7 @@ def _center(rest: Samples, band: float | None, found: list[ModeEstimate], sigma:
 
 
 def _known_softening(
-    level: float | None, units: str, samples: Samples, band: float | None
+    level: float | None, units: str, samples: SignalSamples, band: float | None
 ) -> tuple[float, float] | None:
     if level is None:
         return None
@@ -195,7 +195,7 @@ def _known_softening(
     return kappa, _SOFTENING_DOUBT * kappa
 
 
-def _notes(samples: Samples, modes: list[ModeEstimate], noise: float, soften: bool) -> list[str]:
+def _notes(samples: SignalSamples, modes: list[ModeEstimate], noise: float, soften: bool) -> list[str]:
     notes = []
     span = samples.values.size / samples.sampling_freq
     first = modes[0]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError, finite
 from snapbeam.lab.drive.vibrometer import DriveMeasurement, displacement_from_velocity, measure_drive
-from snapbeam.lab.signals.signal import Samples, check_signal
+from snapbeam.lab.signals.signal import SignalSamples, check_signal
 from snapbeam.lab.signals.sine_fit import SineFit, fit_sine
 
 if TYPE_CHECKING:
@@ -144,10 +144,10 @@ def align(
     )
 
 
-def _window(signal: xr.DataArray, start: float, stop: float) -> Samples:
+def _window(signal: xr.DataArray, start: float, stop: float) -> SignalSamples:
     samples = check_signal(signal)
     inside = (samples.time >= start) & (samples.time < stop)
-    return Samples(samples.values[inside], samples.time[inside], samples.sampling_freq)
+    return SignalSamples(samples.values[inside], samples.time[inside], samples.sampling_freq)
 
 
 def _candidates(

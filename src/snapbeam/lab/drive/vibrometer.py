@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError, finite, within
-from snapbeam.lab.signals.signal import Samples, check_signal, make_signal
+from snapbeam.lab.signals.signal import SignalSamples, check_signal, make_signal
 from snapbeam.lab.signals.sine_fit import SineFit, fit_sine, spectral_peak
 
 if TYPE_CHECKING:
@@ -255,18 +255,18 @@ def displacement_from_velocity(
     )
 
 
-def _slice(samples: Samples, first: int, last: int | None) -> Samples:
-    return Samples(samples.values[first:last], samples.time[first:last], samples.sampling_freq)
+def _slice(samples: SignalSamples, first: int, last: int | None) -> SignalSamples:
+    return SignalSamples(samples.values[first:last], samples.time[first:last], samples.sampling_freq)
 
 
-def _between(samples: Samples, start: float, stop: float) -> Samples:
+def _between(samples: SignalSamples, start: float, stop: float) -> SignalSamples:
     inside = np.flatnonzero((samples.time >= start) & (samples.time < stop))
     if inside.size == 0:
         return _slice(samples, 0, 0)
     return _slice(samples, int(inside[0]), int(inside[-1]) + 1)
 
 
-def _moving_part(samples: Samples, frequency: float) -> tuple[int, int]:
+def _moving_part(samples: SignalSamples, frequency: float) -> tuple[int, int]:
     """First and last (exclusive) sample of the longest stretch that oscillates at *frequency*."""
     n = samples.values.size
     width = max(3, round(samples.sampling_freq / frequency))
@@ -282,7 +282,7 @@ def _moving_part(samples: Samples, frequency: float) -> tuple[int, int]:
     return int(longest[0]), min(int(longest[1]) + width - 1, n)
 
 
-def _onset(samples: Samples, first: int, rough: SineFit) -> tuple[float | None, float]:
+def _onset(samples: SignalSamples, first: int, rough: SineFit) -> tuple[float | None, float]:
     """Time the motion starts, the likeliest change of variance; None where the record begins in motion."""
     width = round(samples.sampling_freq / rough.frequency)
     quiet = samples.values[:first]
@@ -303,7 +303,7 @@ def _onset(samples: Samples, first: int, rough: SineFit) -> tuple[float | None, 
     return float(samples.time[min(at, samples.time.size - 1)]), uncertainty
 
 
-def _cycle_phasors(samples: Samples, fit: SineFit, start: float, stop: float) -> tuple[_Array, Any]:
+def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: float) -> tuple[_Array, Any]:
     """Middle [s] and complex amplitude, turning with the fitted sine, of each whole cycle."""
     period = 1.0 / fit.frequency
     count = int((stop - start) * fit.frequency + 1e-6)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.validate import InputError, integer, positive
-from snapbeam.lab.signals.signal import Samples
+from snapbeam.lab.signals.signal import SignalSamples
 
 __all__ = ["SineFit", "fit_sine", "spectral_peak", "white_variance"]
 
@@ -91,7 +91,7 @@ def _decibel(power: float, other: float) -> float:
     return 10.0 * math.log10(power / other) if other > 0.0 else math.inf
 
 
-def spectral_peak(samples: Samples, low: float = 0.0, high: float | None = None) -> float:
+def spectral_peak(samples: SignalSamples, low: float = 0.0, high: float | None = None) -> float:
     """Frequency [Hz] of the highest peak of the spectrum (Hann window, parabola through its logarithm).
 
     Raises
@@ -140,13 +140,13 @@ def white_variance(
 
 
 def fit_sine(
-    samples: Samples, frequency: float | None = None, harmonics: int = 10, *, fixed: bool = False
+    samples: SignalSamples, frequency: float | None = None, harmonics: int = 10, *, fixed: bool = False
 ) -> SineFit:
     """Fit a sine, its harmonics and an offset to evenly sampled numbers.
 
     Parameters
     ----------
-    samples : Samples
+    samples : SignalSamples
         From :func:`~snapbeam.lab.signals.signal.check_signal`.
     frequency : float, optional
         A guess [Hz]; the highest peak of the spectrum if left out.
