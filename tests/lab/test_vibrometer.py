@@ -7,8 +7,9 @@ import pytest
 
 from snapbeam.core.validate import InputError
 from snapbeam.lab.drive.align import align
+from snapbeam.lab.drive.displacement import displacement_from_velocity
 from snapbeam.lab.drive.record import recorded_drive
-from snapbeam.lab.drive.vibrometer import displacement_from_velocity, measure_drive
+from snapbeam.lab.drive.vibrometer import measure_drive
 from snapbeam.lab.signals.signal import SignalSamples, make_signal
 from snapbeam.lab.signals.sine_fit import fit_sine, spectral_peak
 

@@ -54,7 +54,7 @@ _HOMES = {
     "render_vibrometer": "synthetic.run",
     "track": "tracking.track",
     "DriveMeasurement": "drive.vibrometer",
-    "displacement_from_velocity": "drive.vibrometer",
+    "displacement_from_velocity": "drive.displacement",
     "measure_drive": "drive.vibrometer",
 }
 
