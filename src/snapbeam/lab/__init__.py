@@ -21,7 +21,7 @@ _HOMES = {
     "compare_waveforms": "compare.waveforms",
     "write_photron": "camera.write",
     "write_video": "camera.write",
-    "compare_wells": "decay.identify",
+    "compare_wells": "decay.wells",
     "identify_decay": "decay.identify",
     "MeasuredResponse": "compare.response",
     "measure_response": "compare.response",

@@ -25,9 +25,9 @@ class Kind:
     says: str
     options: tuple[str, ...] = ()
 
-    def found(self, severity: Severity | None = None, **numbers: float) -> Finding:
-        """The finding with its numbers, in words."""
-        words = self.says.format(**numbers)
+    def found(self, severity: Severity | None = None, told: str = "", **numbers: float) -> Finding:
+        """The finding with its numbers, in words; *told* stands for ``{told}`` in them."""
+        words = self.says.format(told=told, **numbers)
         return Finding(self.code, severity or self.severity, words, numbers)
 
 

@@ -136,7 +136,8 @@ def white_variance(
         near &= np.abs(line - other) > 2.0
     if near.sum() < 16:
         return float(residual @ residual / max(n - free, 1))
-    return float(power[near].mean())
+    mean, robust = float(power[near].mean()), float(np.median(power[near])) / math.log(2.0)
+    return robust if mean > 3.0 * robust else mean  # a line beside is no noise
 
 
 def fit_sine(
