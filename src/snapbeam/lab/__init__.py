@@ -23,6 +23,7 @@ _HOMES = {
     "write_video": "camera.write",
     "compare_wells": "decay.wells",
     "identify_decay": "decay.identify",
+    "mode_shapes": "decay.shapes",
     "MeasuredResponse": "compare.response",
     "measure_response": "compare.response",
     "Finding": "plausibility.finding",

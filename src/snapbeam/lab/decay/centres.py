@@ -6,6 +6,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 
 from snapbeam.core.validate import InputError
 from snapbeam.lab.decay.cycles import noise_level
@@ -15,7 +17,7 @@ from snapbeam.lab.plausibility.decay import KINDS
 from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.lab.signals.signal import SignalSamples
 
-__all__ = ["CLOSE", "ENERGY", "Centres", "find_centres"]
+__all__ = ["CLOSE", "ENERGY", "Centres", "find_centres", "unexplained"]
 
 ENERGY = 40.0  # of a pole over the noise, from which it is a mode
 CLOSE = 0.25  # share within which modes are fitted together
@@ -80,6 +82,19 @@ def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres
     near = [pole for pole in close if pole.energy > 0.003 * max(one.energy for one in own or close)]
     far = [pole for pole in others if pole not in close]
     return Centres(wanted, own, near, far, diagram, told)
+
+
+def unexplained(residual: NDArray[np.float64], sampling_freq: float) -> bool:
+    """Whether what a fit leaves still holds an oscillation that noise would not make."""
+    n = residual.size
+    window = np.cos(0.5 * math.pi * np.arange(n) / n) ** 2
+    power = np.abs(np.fft.rfft(residual * window)) ** 2
+    freq = np.fft.rfftfreq(n, 1.0 / sampling_freq)
+    power[freq * n < 6.0 * sampling_freq] = 0.0
+    # noise may be of any colour: each line against its surroundings
+    width = max(min(power.size // 8, 101), 9) | 1
+    around = median_filter(power, width, mode="nearest") / math.log(2.0)
+    return bool((power > 25.0 * np.maximum(around, 1e-300)).any())
 
 
 def _is_mode(pole: Pole, span: float) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.validate import InputError, choice, integer, positive
-from snapbeam.lab.decay.centres import find_centres
+from snapbeam.lab.decay.centres import find_centres, unexplained
 from snapbeam.lab.decay.cycles import Cycles, backbone, noise_level, regress
 from snapbeam.lab.decay.fit import FitResult, explain
 from snapbeam.lab.decay.judge import findings_about, judged, misfit_of
@@ -102,6 +102,10 @@ def identify_decay(
     if method == "fit":
         samples, result, cycles, more, diagram = fit_modes(decay, centres, units, soften, known)
         told += more
+        if diagram is None and unexplained(result.residual, samples.sampling_freq):
+            # other modes are in the record: once more with them known
+            centres = find_centres(decay, 1, [result.modes[0].natural_freq])
+            samples, result, cycles, told, diagram = fit_modes(decay, centres, units, soften, known)
     else:
         samples = without_poles(decay.samples, centres.far, centres.own)
         result, cycles = _by_cycles(samples, centres.wanted, units, soften, method)

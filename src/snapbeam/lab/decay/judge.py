@@ -20,7 +20,7 @@ from snapbeam.lab.signals.signal import SignalSamples
 __all__ = ["Misfit", "findings_about", "judged", "misfit_of"]
 
 _Array = NDArray[np.float64]
-_RATIO = 2.0  # of what is left to what the noise explains, from which the fit is in doubt
+_RATIO = 1.6  # of what is left to what the noise explains, from which the fit is in doubt
 _MATTERS = 0.003  # of the amplitude; what is left below that is of no matter
 _APART = 6.0  # standard errors by which two halves of a decay may differ
 

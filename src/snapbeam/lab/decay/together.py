@@ -60,7 +60,7 @@ def fit_modes(
         away = [pole for pole in centres.near if pole not in beside]
         part = without_poles(clean, [*others, *away] if len(groups) > 1 else away, [*mine, *beside])
         part = _thinned(part, max([*group, *(pole.frequency for pole in beside)]))
-        result, cycles, more, diagram = _group_fit(part, group, beside, units, soften, known, diagram)
+        result, cycles, more, diagram = _group_fit(part, group, mine, beside, units, soften, known, diagram)
         part, result, cycles, again = _lines_again(decay, part, result, cycles, units, soften, known)
         told += [one for one in more if not again or one.code != KINDS["misfit"].code]
         found |= dict(zip(group, result.modes, strict=False))
@@ -118,6 +118,7 @@ def _lines_again(
 def _group_fit(
     samples: SignalSamples,
     centres: list[float],
+    own: list[Pole],
     beside: list[Pole],
     units: str,
     soften: bool,
@@ -126,48 +127,60 @@ def _group_fit(
 ) -> tuple[FitResult, Cycles, list[Finding], Stabilisation | None]:
     """Modes fitted together; where they leave more than noise, a second law of damping or a close mode."""
     start = float(samples.time[0])
-    guesses, cycles = _guesses(samples, centres, units, soften)
+    guesses, cycles = _guesses(samples, centres, own, units, soften)
     told: list[Finding] = []
-    if beside:
-        # two linear modes that beat look like one that softens
-        soften = soften and len(centres) + len(beside) == 1
-        exact = [_of_pole(pole) for pole in beside]
-        result = fit_decay(samples, [*guesses, *exact], units, soften=soften, known=known if soften else None)
-        second = min(result.modes[1:], key=lambda mode: abs(mode.natural_freq - result.modes[0].natural_freq))
-        told.append(
-            KINDS["close_modes"].found(first=result.modes[0].natural_freq, second=second.natural_freq)
-        )
-        return result, _own_cycles(samples, result, cycles), told, diagram
+    apart = [pole for pole in beside if _apart(samples, pole, guesses)]
+    guesses = [*guesses, *(_of_pole(pole) for pole in apart)]
     result = fit_decay(samples, guesses, units, soften=soften, known=known)
-    own = _own_cycles(samples, result, cycles)
-    law = find_law(own, start, 2.0 * math.pi * result.modes[0].natural_freq * result.modes[0].damping_ratio)
+    alone = _own_cycles(samples, result, cycles)
+    law = find_law(alone, start, 2.0 * math.pi * result.modes[0].natural_freq * result.modes[0].damping_ratio)
     left = misfit_of(samples, result.residual, result.modes).ratio
     if law is not None:
-        try:
-            other = fit_decay(samples, result.modes, units, soften=soften, known=known, law=law)
-        except InputError:
-            other = result
-        first = other.modes[0]
-        told_apart = first.law_strength > 3.0 * first.law_strength_se
-        if other.noise_rms < 0.999 * result.noise_rms and told_apart:
-            other_left = misfit_of(samples, other.residual, other.modes).ratio
-            if other_left < max(0.8 * left, _MISFIT):
-                result, left = other, other_left
-                told.append(
-                    KINDS["damping_law"].found(
-                        told=first.law, strength=first.law_strength, error=first.law_strength_se
-                    )
-                )
-    if left > _MISFIT and len(centres) < 8:
-        better, diagram = _with_close_mode(samples, result, units, diagram)
+        result, left, told = _with_law(samples, result, left, units, soften, known, law)
+    if left > _MISFIT and len(guesses) < 8:
+        near = [pole for pole in beside if pole not in apart]
+        better, diagram = _with_close_mode(samples, result, near, units, diagram)
         if better is not None:
             result = better
-            told = [
-                KINDS["close_modes"].found(
-                    first=better.modes[0].natural_freq, second=better.modes[-1].natural_freq
-                )
-            ]
+            first = better.modes[0].natural_freq
+            second = min((mode.natural_freq for mode in better.modes[1:]), key=lambda f: abs(f - first))
+            told = [KINDS["close_modes"].found(first=first, second=second)]
     return result, _own_cycles(samples, result, cycles), told, diagram
+
+
+def _apart(samples: SignalSamples, pole: Pole, modes: list[ModeEstimate]) -> bool:
+    """Whether a pole lies so far from all modes that it is none of the poles into which one that softens splits."""
+    span = samples.values.size / samples.sampling_freq
+    return all(
+        abs(pole.frequency - mode.natural_freq)
+        > max(8.0 / span, 2.0 * mode.damping_ratio * mode.natural_freq, 0.06 * mode.natural_freq)
+        for mode in modes
+    )
+
+
+def _with_law(
+    samples: SignalSamples,
+    result: FitResult,
+    left: float,
+    units: str,
+    soften: bool,
+    known: tuple[float, float] | None,
+    law: DampingLaw,
+) -> tuple[FitResult, float, list[Finding]]:
+    """The fit with a second law of damping where that is told apart and leaves less; else as it was."""
+    try:
+        other = fit_decay(samples, result.modes, units, soften=soften, known=known, law=law)
+    except InputError:
+        return result, left, []
+    first = other.modes[0]
+    rest = misfit_of(samples, other.residual, other.modes).ratio
+    told_apart = first.law_strength > 3.0 * first.law_strength_se
+    if not told_apart or other.noise_rms >= 0.999 * result.noise_rms or rest >= max(0.8 * left, _MISFIT):
+        return result, left, []
+    finding = KINDS["damping_law"].found(
+        told=first.law, strength=first.law_strength, error=first.law_strength_se
+    )
+    return other, rest, [finding]
 
 
 def _of_pole(pole: Pole) -> ModeEstimate:
@@ -178,15 +191,21 @@ def _of_pole(pole: Pole) -> ModeEstimate:
 
 
 def _guesses(
-    samples: SignalSamples, centres: list[float], units: str, soften: bool
+    samples: SignalSamples, centres: list[float], poles: list[Pole], units: str, soften: bool
 ) -> tuple[list[ModeEstimate], Cycles]:
-    """Each mode by its cycles, what the ones before leave; and the cycles of the first."""
+    """Each mode by its cycles, or by its pole where too few stand out; and the cycles of the first."""
     sigma = noise_level(samples)
     rest = samples
     found: list[ModeEstimate] = []
     kept: Cycles | None = None
     for center in centres:
-        estimate, cycles = mode_by_cycles(rest, center, sigma, units, "hilbert", soften and not found)
+        try:
+            estimate, cycles = mode_by_cycles(rest, center, sigma, units, "hilbert", soften and not found)
+        except InputError:
+            pole = next((one for one in poles if one.frequency == center), None)
+            if pole is None or kept is None:
+                raise
+            estimate, cycles = _of_pole(pole), kept
         kept = kept or cycles
         found.append(estimate)
         if len(centres) > 1:
@@ -225,22 +244,30 @@ def _own_cycles(samples: SignalSamples, result: FitResult, otherwise: Cycles) ->
 
 
 def _with_close_mode(
-    samples: SignalSamples, result: FitResult, units: str, diagram: Stabilisation | None
+    samples: SignalSamples,
+    result: FitResult,
+    near: list[Pole],
+    units: str,
+    diagram: Stabilisation | None,
 ) -> tuple[FitResult | None, Stabilisation | None]:
     """The fit with one mode more, close to the first, if the pencil sees one and it explains what is left."""
-    poles, fresh = find_poles(samples, noise_level(samples))
     first = result.modes[0].natural_freq
-    near = [
-        pole
-        for pole in poles
-        if pole.energy > ENERGY and abs(pole.frequency / first - 1.0) < 0.25 and pole.damping_ratio > -1e-3
-    ]
     if len(near) < 2:
-        return None, diagram or fresh
-    others = [mode for mode in result.modes[1:] if abs(mode.natural_freq / first - 1.0) > 0.25]
+        poles, fresh = find_poles(samples, noise_level(samples))
+        diagram = diagram or fresh
+        near = [
+            pole
+            for pole in poles
+            if pole.energy > ENERGY
+            and abs(pole.frequency / first - 1.0) < CLOSE
+            and pole.damping_ratio > -1e-3
+        ]
+    if len(near) < 2:
+        return None, diagram
+    others = [mode for mode in result.modes[1:] if abs(mode.natural_freq / first - 1.0) > CLOSE]
     pair = [_of_pole(pole) for pole in near[:2]]
     try:
         better = fit_decay(samples, [pair[0], *others, pair[1]], units, soften=False)
     except InputError:
-        return None, diagram or fresh
-    return (better if better.noise_rms < 0.9 * result.noise_rms else None), diagram or fresh
+        return None, diagram
+    return (better if better.noise_rms < 0.9 * result.noise_rms else None), diagram
