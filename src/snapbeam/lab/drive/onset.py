@@ -86,13 +86,13 @@ def find_onset(samples: SignalSamples, first: int, rough: SineFit) -> tuple[floa
     quiet = samples.values[: max(early, 8)]
     if early < 8 or float(np.std(quiet)) > 0.35 * rough.amplitude:
         return None, 0.0
-    rest = float(np.median(quiet))
-    noise = max(float(np.std(quiet)), _NOISE_FLOOR * rough.amplitude)
+    rest = _baseline(samples.time[: quiet.size], quiet)
+    noise = max(float(np.std(quiet - rest(samples.time[: quiet.size]))), _NOISE_FLOOR * rough.amplitude)
     begin = max(early - 2 * width, 0)
     end = min(first + 2 * width, samples.values.size)
     every = max(1, (end - begin) // _LONGEST)
     time = samples.time[begin:end:every]
-    values = samples.values[begin:end:every] - rest
+    values = samples.values[begin:end:every] - rest(time)
     if time.size < 16:
         return None, 0.0
     candidates = time[
@@ -109,6 +109,17 @@ def find_onset(samples: SignalSamples, first: int, rough: SineFit) -> tuple[floa
     fine = np.union1d(coarse, candidates[near])
     scans = [_scan(time, values, fine, rough.frequency, degree, noise) for degree in _DEGREES]
     return _weighed(fine, scans, values.size, every / samples.sampling_freq, width / every)
+
+
+def _baseline(time: _Array, quiet: _Array) -> np.polynomial.Polynomial:
+    """The level at rest, or a straight line where it drifts by more than its noise explains."""
+    level = np.polynomial.Polynomial([float(np.median(quiet))])
+    if quiet.size < 32:
+        return level
+    line = np.polynomial.Polynomial.fit(time, quiet, 1)
+    left = float(np.std(quiet - line(time)))
+    drift = abs(float(line(time[-1]) - line(time[0])))
+    return line if drift > 6.0 * left * math.sqrt(12.0 / quiet.size) + 1e-300 else level
 
 
 def _quiet_end(samples: SignalSamples, first: int, rough: SineFit, width: int) -> int:
