@@ -90,7 +90,7 @@ measured = lab.Measurements(
     buckling_level=0.5e-3,
 )
 calibration = lab.calibrate(measured)
-for text in (*calibration.findings, *calibration.warnings):
+for text in (*calibration.remarks, *calibration.warnings):
     print("-", text)
 figure = plot_calibration(calibration)
 

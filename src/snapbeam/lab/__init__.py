@@ -15,6 +15,7 @@ _HOMES = {
     "ContactTest": "calibration.calibrate",
     "Measurements": "calibration.calibrate",
     "calibrate": "calibration.calibrate",
+    "stiffness_from_impacts": "calibration.impacts",
     "load_measurements": "calibration.calibrate",
     "MeasuredDots": "compare.maps",
     "compare_dots": "compare.maps",

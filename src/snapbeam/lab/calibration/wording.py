@@ -1,4 +1,4 @@
-"""What a calibration says in words."""
+"""What a calibration says in words: remarks on what was found, findings on what to beware of."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.lab.plausibility.calibration import KINDS
+from snapbeam.lab.plausibility.finding import Finding
+
 if TYPE_CHECKING:
     from snapbeam.lab.calibration.calibrate import Calibration
     from snapbeam.lab.calibration.measurements import Measurements
 
-__all__ = ["ASSUMED", "findings", "link_warnings", "warnings", "with_error"]
+__all__ = ["ASSUMED", "doubts", "links", "remarks", "with_error"]
 
 ASSUMED = 0.005
 """Standard error of a frequency for which none is given, as a share of it."""
@@ -40,34 +43,39 @@ def with_error(result: Calibration, name: str) -> str:
     return f"{value:.5g} +- {result.standard_errors[name] * scale:.2g} {unit}"
 
 
-def link_warnings(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, ...]) -> list[str]:
+def links(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, ...]) -> list[Finding]:
     """What to say of parameters that the data do not determine, link, or hardly tell."""
     told = []
     if len(hidden) == 1:
-        told.append(f"no measured frequency depends on {hidden[0]}: it keeps its start")
+        words = f"no measured frequency depends on {hidden[0]}: it keeps its start"
+        told.append(KINDS["undetermined"].found(told=words))
     elif hidden:
-        told.append(
+        words = (
             f"the measured frequencies cannot tell {_listed(hidden)} apart: they depend on a combination of "
             "them only; fix one of them by another measurement (the values given keep nearest to the start)"
         )
-    spread = np.sqrt(np.diag(covariance))
+        told.append(KINDS["undetermined"].found(told=words))
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     for i, name in enumerate(names):
         if name in hidden:
             continue
         if spread[i] > _VAGUE:
-            told.append(f"{name} is known to {spread[i]:.0%} only")
+            told.append(
+                KINDS["vague"].found(told=f"{name} is known to {spread[i]:.0%} only", share=spread[i])
+            )
         for j, other in enumerate(names[:i]):
             linked = 0.0 if other in hidden else covariance[i, j] / (spread[i] * spread[j])
             if abs(linked) > _LINKED:
                 sense = "rises" if linked > 0.0 else "falls"
-                told.append(
+                words = (
                     f"{other} and {name} can hardly be told apart (correlation {linked:+.3f}): where one "
                     f"rises the other {sense}"
                 )
+                told.append(KINDS["linked"].found(told=words, correlation=linked))
     return told
 
 
-def findings(result: Calibration, measured: Measurements) -> list[str]:
+def remarks(result: Calibration, measured: Measurements) -> list[str]:
     """What was found: the frequencies about the wells, and the measured geometry beside the model's."""
     told = []
     first = [values[0] for values in (measured.lower_well_freq, measured.upper_well_freq) if values]
@@ -100,7 +108,7 @@ def findings(result: Calibration, measured: Measurements) -> list[str]:
     return told
 
 
-def warnings(result: Calibration, measured: Measurements) -> list[str]:
+def doubts(result: Calibration, measured: Measurements) -> list[Finding]:
     """What to beware of: unequal wells, assumed errors, data the model does not meet."""
     told = []
     pairs = zip(measured.lower_well_freq, measured.upper_well_freq, strict=False)
@@ -114,31 +122,28 @@ def warnings(result: Calibration, measured: Measurements) -> list[str]:
             if i == 0 and len(result.either_well) == 2:
                 levels = " and ".join(f"{level * 1e3:.4g}" for level in result.either_well)
                 text += f"; either alone would ask for a buckling level of {levels} mm"
-            told.append(text)
+            told.append(KINDS["unequal_wells"].found(told=text, first=one, second=two))
     assumed = [
         state
         for state in ("straight_freq", "lower_well_freq", "upper_well_freq")
         if getattr(measured, state) and getattr(measured, f"{state}_se") is None
     ]
     if assumed:
-        told.append(
+        words = (
             f"no standard errors given for {_listed(tuple(assumed))}: {ASSUMED:.1%} assumed, on which the "
             "uncertainties rest"
         )
+        told.append(KINDS["assumed_errors"].found(told=words))
     for item in result.residuals:
         if abs(item.deviation) > 3.0:
             told.append(
-                f"{item.name}: model {item.model:.4g} Hz, measured {item.measured:.4g} Hz, "
-                f"{abs(item.deviation):.1f} standard errors apart"
+                KINDS["outlier"].found(
+                    told=item.name, model=item.model, measured=item.measured, apart=abs(item.deviation)
+                )
             )
     if result.scatter > 1.1:
-        told.append(
-            f"the data scatter {result.scatter:.2f} times as much as their standard errors allow; the "
-            "uncertainties are raised by it"
-        )
+        told.append(KINDS["scatter"].found(scatter=result.scatter))
     ratios = measured.damping_ratio
     if len(ratios) > 1 and max(ratios) > 1.3 * min(ratios):
-        told.append(
-            f"damping ratios from {min(ratios):.4g} to {max(ratios):.4g}: the model takes one for every mode"
-        )
+        told.append(KINDS["damping_differs"].found(low=min(ratios), high=max(ratios)))
     return told
