@@ -14,16 +14,17 @@ KINDS = table(
         "calibration.antisymmetric", DOUBT,
         "parity of the model's modes, where the data tell modes apart by their order only",
         "the first frequency about a well of this beam, {frequency:.1f} Hz, belongs to the antisymmetric mode, which "
-        "does not depend on the buckling level (above b/r = 6.2, b the buckling level, r the radius of gyration): say which "
-        "measured frequencies are symmetric, lower_well_shape (--lower-well 159a,165s), or measure the symmetric one",
+        "does not depend on the buckling level (above b/r = 6.2, b the buckling level, r the radius of gyration): "
+        "say which measured frequencies are symmetric, lower_well_shape (--lower-well 159a,165s), or measure the "
+        "symmetric one",
         ("lower_well_shape", "upper_well_shape"),
     ),
     Kind(
         "calibration.crossing", DOUBT,
         "distance of the model's first symmetric and antisymmetric frequency",
         "the first two frequencies about a well, {symmetric:.1f} Hz symmetric and {antisymmetric:.1f} Hz "
-        "antisymmetric, lie so close that their order may be the other one: say which measured frequencies are symmetric, "
-        "lower_well_shape (--lower-well 159a,165s)",
+        "antisymmetric, lie so close that their order may be the other one: "
+        "say which measured frequencies are symmetric, lower_well_shape (--lower-well 159a,165s)",
         ("lower_well_shape", "upper_well_shape"),
     ),
     Kind(
