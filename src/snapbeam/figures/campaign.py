@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["plot_campaign"]
 
 _ACROSS = 4
+_LINES = 6  # of a reason in a picture; the table has all of it
 _LABELS = {kind.label: kind for kind in ResponseClass}
 
 
@@ -65,12 +66,13 @@ def _thumbnail(ax: Axes, result: TestResult, path: Path) -> None:
         with xr.open_dataset(path, engine="h5netcdf") as run:
             time = run["time"].values
             step = max(1, time.size // 2000)
-            if "shaker_displacement" in run:
-                ax.plot(
-                    time[::step], run["shaker_displacement"].values[::step], color=SHAKER_COLOR, linewidth=0.4
-                )
-            if "displacement" in run:
-                ax.plot(time[::step], run["displacement"].values[::step], color=BEAM_COLOR, linewidth=0.5)
+            faint = 1.0 if result.status == "measured" else 0.25
+            for name, line, width in (
+                ("shaker_displacement", SHAKER_COLOR, 0.4), ("displacement", BEAM_COLOR, 0.5)
+            ):  # fmt: skip
+                if name in run:
+                    shown = run[name].values[::step]
+                    ax.plot(time[::step], shown, color=line, linewidth=width, alpha=faint)
             ax.set_xlim(time[0], time[-1])
         ax.axhline(0.0, color="0.8", linewidth=0.4, zorder=0)
     else:
@@ -81,11 +83,13 @@ def _thumbnail(ax: Axes, result: TestResult, path: Path) -> None:
     if np.isfinite(result.frequency_hz):
         title += f": {result.frequency_hz:.4g} Hz, {1e3 * result.velocity_m_s:.3g} mm/s"
     ax.set_title(title, fontsize=6, loc="left")
-    mark = "" if result.status == "measured" and not result.doubtful else "!"
-    words = result.reason or "; ".join(words for _, severity, words in result.findings if severity != "note")
-    if mark:
-        text = "\n".join(textwrap.wrap(words, 42)[:4])
-        ax.text(
-            0.03, 0.05, text, transform=ax.transAxes, fontsize=4.2, va="bottom", color=SHAKER_COLOR,
-            bbox={"facecolor": "white", "alpha": 0.85, "edgecolor": "none", "pad": 1.0},
-        )  # fmt: skip
+    codes = dict.fromkeys(code for code, severity, _ in result.findings if severity != "note")
+    if result.status != "measured":
+        lines = textwrap.wrap("spoiled: " + result.reason, 44)
+        text = "\n".join(
+            lines if len(lines) <= _LINES else [*lines[: _LINES - 1], lines[_LINES - 1] + " ..."]
+        )
+        ax.text(0.04, 0.93, text, transform=ax.transAxes, fontsize=4.2, va="top", color=SHAKER_COLOR)
+    elif codes:
+        text = "\n".join(textwrap.wrap("! " + " ".join(codes), 44))
+        ax.text(0.04, 0.93, text, transform=ax.transAxes, fontsize=4.2, va="top", color=SHAKER_COLOR)

@@ -46,7 +46,7 @@ def plot_dot_comparison(dataset: xr.Dataset, dots: Dots, result: DotComparison) 
         low, high = result.agreement_interval
         ax.set_title(
             f"{100 * result.agreement:.0f} % of {result.used} agree "
-            f"(95 %: {100 * low:.0f} to {100 * high:.0f} %)"
+            f"(95 %: {100 * low:.0f} to {100 * high:.0f} %), × do not"
             if result.used
             else "no measured point counts",
             loc="left",
@@ -63,6 +63,6 @@ def _mark_disagreeing(ax: Axes, dataset: xr.Dataset, result: DotComparison) -> N
         return
     across, upward = (name for name in _DRAWN if name in dataset["response"].squeeze().dims)
     ax.plot(
-        table[across].values[wrong], table[upward].values[wrong], "x", color="black", markersize=6.5,
-        markeredgewidth=1.0, zorder=5, label="disagrees with the map",
+        table[across].values[wrong], table[upward].values[wrong], "x", color="black", markersize=8.5,
+        markeredgewidth=1.1, zorder=2.9,
     )  # fmt: skip

@@ -59,7 +59,7 @@ def run_campaign(
     InputError
         If there is nothing to measure.  A test that cannot be measured is a row that says why.
     """
-    tests = find_tests(folder, table)
+    tests = find_tests(folder, table, output)
     kept = output / "tests"
     try:
         kept.mkdir(parents=True, exist_ok=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -85,10 +86,14 @@ def kept_result(path: Path, fingerprint: str) -> TestResult | None:
 
 def run_test(test: Test, settings: CampaignSettings, folder: Path, fingerprint: str) -> TestResult:
     """Measure one test and keep its tracked run and its result in *folder*."""
+    findings: list[Finding] = []
     try:
-        result = _measured(test, settings, folder)
+        result = _measured(test, settings, folder, findings)
     except (InputError, OSError) as error:
-        result = _row(test, status="spoiled", reason=_short(str(error), test))
+        if isinstance(error, OSError):
+            fingerprint = ""  # perhaps it can be read the next time
+        reason = _wrong(findings) or _short(str(error), test)
+        result = _row(test, status="spoiled", reason=reason, findings=tuple(_plain(one) for one in findings))
     result = replace(result, fingerprint=fingerprint)
     plain = {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
@@ -109,13 +114,17 @@ def _row(test: Test, **values: Any) -> TestResult:
 
 
 def _short(message: str, test: Test) -> str:
-    for path in (test.recording, test.vibrometer):
-        if path is not None:
-            message = message.replace(str(path), path.name)
-    return message
+    """A message without the folder of the test's files."""
+    return message.replace(f"{test.recording.parent}{os.sep}", "")
 
 
-def _measured(test: Test, settings: CampaignSettings, folder: Path) -> TestResult:
+def _wrong(findings: list[Finding]) -> str:
+    """The first finding that leaves nothing to trust, in words; empty if there is none."""
+    return next((one.words for one in findings if one.severity is Severity.WRONG), "")
+
+
+def _measured(test: Test, settings: CampaignSettings, folder: Path, findings: list[Finding]) -> TestResult:
+    """The row of a test; *findings* is filled as they come, for a test that ends half way."""
     tracking = settings.tracking
     if test.location is not None:
         tracking = tracking.changed(location=test.location)
@@ -123,7 +132,7 @@ def _measured(test: Test, settings: CampaignSettings, folder: Path) -> TestResul
         tracked = track(recording, tracking)
     with atomic_path(folder / f"{test.name}.nc") as temporary:
         tracked.to_netcdf(temporary, engine="h5netcdf")
-    findings = list(findings_of(tracked))
+    findings += findings_of(tracked)
     seen = measure_drive(shaker_signal(tracked), test.frequency)
     drive, alignment = seen, None
     if test.vibrometer is not None:
@@ -136,9 +145,8 @@ def _measured(test: Test, settings: CampaignSettings, folder: Path) -> TestResul
         tracked, drive.steady.frequency, cycles=settings.cycles, start=_start(seen, drive, alignment)
     )
     speed = 1.0 if drive.units == "m/s" else 2.0 * math.pi * drive.steady.frequency
-    wrong = [one for one in findings if one.severity is Severity.WRONG]
-    reason = wrong[0].words if wrong else ""
-    if not wrong and response.response is ResponseClass.UNKNOWN:
+    reason = _wrong(findings)
+    if not reason and response.response is ResponseClass.UNKNOWN:
         reason = "class not told: " + "; ".join(response.reasons)
     valid = tracked["valid"].values.astype(bool)
     return _row(

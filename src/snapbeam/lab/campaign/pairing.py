@@ -17,7 +17,10 @@ __all__ = ["Test", "find_tests"]
 
 _HEADERS = (".cih", ".cihx")
 _SIGNALS = tuple(suffix for suffix in READERS if suffix not in (".h5", ".hdf5", ".npy", ".nc"))
-_WORDS = r"[-_ ]?(vibrometer|vibro|vib|velocity|vel|laser|ldv|drive|shaker|camera|cam|recording|rec|video)"
+_WORDS = (
+    r"[-_ ]?(?<![a-z])(vibrometer|vibro|vib|velocity|vel|laser|ldv|drive|shaker|camera|cam|recording|rec|video)"
+    r"(?![a-z])"
+)
 _COLUMNS = ("test", "recording", "vibrometer", "frequency_hz", "velocity_m_s", "location", "comment")
 
 
@@ -38,7 +41,7 @@ class Test:
     location: float | None = None
 
 
-def find_tests(folder: Path, table: Path | None = None) -> list[Test]:
+def find_tests(folder: Path, table: Path | None = None, besides: Path | None = None) -> list[Test]:
     """The tests of a folder, in the order of their names or of the table.
 
     A recording and a vibrometer file are one test if their names are the same but for the ending and words
@@ -51,6 +54,8 @@ def find_tests(folder: Path, table: Path | None = None) -> list[Test]:
     table
         A text table with the columns test, recording, and, as far as known, vibrometer, frequency_hz,
         velocity_m_s, location and comment.
+    besides
+        A folder that is none of the recordings, such as that of the results.
 
     Raises
     ------
@@ -64,7 +69,7 @@ def find_tests(folder: Path, table: Path | None = None) -> list[Test]:
     recordings: dict[str, Path] = {}
     signals: dict[str, Path] = {}
     for path in sorted(folder.iterdir()):
-        if path.name.startswith("."):
+        if path.name.startswith(".") or (besides is not None and path.resolve() == besides.resolve()):
             continue
         if path.is_dir():
             if any(one.suffix.lower() in IMAGE_SUFFIXES for one in path.iterdir()):

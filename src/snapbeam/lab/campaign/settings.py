@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from snapbeam.core.provenance import __version__
 from snapbeam.core.validate import InputError, integer
 from snapbeam.lab.tracking.settings import TrackingSettings
 
@@ -60,6 +61,7 @@ class CampaignSettings:
             item.name: getattr(self.tracking, item.name) for item in dataclasses.fields(self.tracking)
         }
         parts = [
+            __version__,
             repr(sorted(self.camera.items())),
             repr(sorted(tracking.items())),
             repr(sorted(self.signal.items())),

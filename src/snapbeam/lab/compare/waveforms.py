@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.validate import InputError, positive
+from snapbeam.lab.compare.start import start_of_shaker
 from snapbeam.lab.plausibility.comparison import KINDS
 from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.lab.signals.signal import SignalSamples
@@ -76,7 +77,7 @@ def compare_waveforms(
         Excitation frequency [Hz] of the measured run, where it has no coordinate ``cycle``.
     start : float, optional
         Start of the excitation in the measured run [s]; it says which cycle is the first, the phase of the
-        shaker says the rest.  The first sample if left out.
+        shaker says the rest.  Read from the shaker if left out, and the first sample if it begins in motion.
     cycles : (float, float), optional
         The part to compare, counted from the start; all that both have if left out.
     measured_onsets, simulated_onsets : array_like, optional
@@ -94,6 +95,8 @@ def compare_waveforms(
             check_trajectory(run, require=("displacement", "shaker_displacement"))
         except InputError as error:
             raise InputError(f"{name}: {error}") from error
+    if start is None and frequency is not None:
+        start = start_of_shaker(measured, positive("frequency", frequency, "Hz"))
     clock, rate = _clock(measured, frequency, start)
     if "cycle" not in simulated.coords:
         raise InputError("simulated: must have the coordinate cycle")

@@ -248,7 +248,8 @@ def _refine(
     common = felt.steady.frequency
     if (stop - start) * common < 5.0:
         raise InputError(
-            f"camera and vibrometer share {(stop - start) * common:.1f} steady cycles: must be 5"
+            f"camera and vibrometer share {max((stop - start) * common, 0.0):.1f} steady cycles when their clocks are "
+            f"{delay:.4g} s apart: must be at least 5; record both from before the start, or give near (--near)"
         )
     one = fit_sine(_window(camera, start, stop), common, fixed=True)
     two = fit_sine(_window(moved, start - delay, stop - delay), common, fixed=True)

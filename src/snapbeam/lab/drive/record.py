@@ -42,7 +42,7 @@ def recorded_drive(
     velocity : xarray.DataArray
         Velocity of the shaker [m/s].
     sampling_freq : float
-        SignalSamples per second [Hz] of the result.
+        Samples per second [Hz] of the result.
     bandwidth : float, optional
         Highest frequency kept [Hz]; ten times the excitation frequency if left out, and never more than 0.4
         of the measured sampling rate.

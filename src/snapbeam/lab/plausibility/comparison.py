@@ -20,15 +20,16 @@ KINDS = table(
     ),
     Kind(
         "comparison.shifted", DOUBT,
-        "the phase of both shakers, where the start of the excitation was given",
-        "the shakers are {shift:+.2f} cycles apart though start (--start) was given: it is wrong, or the drive is of "
-        "another test; the measured clock was shifted by as much",
+        "the phase of both shakers, where the start of the excitation is known",
+        "the shakers are {shift:+.2f} cycles apart counted from the start of each: start (--start) is wrong, or the "
+        "drive is of another test; the measured clock was shifted by as much",
         ("start",),
     ),
     Kind(
         "comparison.no_start", NOTE,
-        "whether the start of the excitation was given",
-        "without start (--start) it is not known which cycle is the first: the runs are aligned within a cycle only",
+        "whether the start of the excitation was given, or seen in the shaker",
+        "without start (--start), and with a shaker that moves from the first sample on, it is not known which cycle "
+        "is the first: the runs are aligned within a cycle only",
         ("start",),
     ),
     Kind(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -272,7 +271,7 @@ def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Finding]:
     closest = never_touching(seen.penetration, seen.rows.row)
     if closest > 0.0:
         told.append(KINDS["never_touches"].found(gap_px=closest))
-    if contact_shift(seen.touch, math.hypot(shaker.tip_error, scene.beam.thickness_error)) > 0.0:
+    if contact_shift(seen.touch, scene.placed_error) > 0.0:
         told.append(KINDS["contact_offset"].found(depth_px=seen.touch.penetration, error_px=seen.touch.error))
     with np.errstate(invalid="ignore"):
         deep = seen.penetration - 5.0 * error > 1.0

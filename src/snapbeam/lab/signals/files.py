@@ -39,7 +39,7 @@ def read_channels(
         ``# sampling_freq: 12000 Hz``), ``.wav``, ``.uff``/``.unv`` (dataset 58, ASCII or binary), ``.tdms``,
         ``.h5``/``.hdf5``/``.nc``, ``.npz``/``.npy``.
     sampling_freq : float, optional
-        SignalSamples per second [Hz] where the file does not say.
+        Samples per second [Hz] where the file does not say.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def read_signal(
         What a volt or full scale stands for, such as ``"125 mm/s/V"`` or ``"0.5 m/s/FS"``; needed for
         channels in volts that are to become velocities, and for sound files of integers.
     sampling_freq : float, optional
-        SignalSamples per second [Hz] where the file does not say.
+        Samples per second [Hz] where the file does not say.
 
     Returns
     -------

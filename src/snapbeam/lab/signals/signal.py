@@ -97,7 +97,7 @@ def make_signal(
     units : str
         The unit of *values*, such as ``"mm/s"``; the signal is converted to SI.
     sampling_freq : float, optional
-        SignalSamples per second [Hz]; exactly one of this and *time*.
+        Samples per second [Hz]; exactly one of this and *time*.
     time : array_like, shape (samples,), optional
         Times [s], evenly spaced.
     start : float

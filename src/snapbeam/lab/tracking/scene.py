@@ -5,6 +5,7 @@ A scene is built whole by the survey and never changes.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 from snapbeam.lab.tracking.edges import Floats
 
 __all__ = ["BeamView", "EdgeShape", "Scene", "ShakerView", "Sticker", "TipOutline"]
+
+_OUTLINE = 3.0  # widths of the edge, of its misfit, by which a tip in the beam's light may lie off
 
 
 @dataclass(frozen=True)
@@ -153,3 +156,17 @@ class Scene:
     shaker: ShakerView | None
     shape: EdgeShape
     striker_in_view: bool
+
+    @property
+    def placed_error(self) -> float:
+        """Standard error [px] of where the tip stands against the beam, the same in all frames.
+
+        A tip that is followed by its own outline is seen against the beam through the same lens: what the
+        blurred step leaves of an edge is left there several times over.
+        """
+        if self.shaker is None:
+            return 0.0
+        lens = 0.0
+        if self.shaker.sticker is None and math.isfinite(self.shape.misfit):
+            lens = _OUTLINE * self.shape.misfit * self.beam.edge_width
+        return math.hypot(self.shaker.tip_error, self.beam.thickness_error, lens)

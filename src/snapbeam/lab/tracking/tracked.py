@@ -19,12 +19,15 @@ from snapbeam.lab.tracking.measure.follower import TrackedRows
 from snapbeam.lab.tracking.measure.series import Rest, find_rest, touching
 from snapbeam.lab.tracking.scene import Scene
 from snapbeam.lab.tracking.settings import TrackingSettings
+from snapbeam.lab.tracking.survey.edge_shape import CLIPPED
 from snapbeam.runs.schema import trajectory_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["tracked_dataset"]
+
+_CLIPPED_ERROR = 0.05  # px; an overexposed edge is sharper than pixels can follow
 
 
 def tracked_dataset(
@@ -52,11 +55,14 @@ def tracked_dataset(
     seen = SeenMotion(rows, rest, penetration, touch, scale, drift)
     findings = (*recording.findings, *tracking_findings(scene, seen, settings, scale * offset))
     # a shift of the edges by the camera's curve moves the shaker against the beam, not the beam against itself
-    placed = 0.0 if shaker is None else math.hypot(shaker.tip_error, beam.thickness_error)
+    placed = scene.placed_error
     bent = math.hypot(2.0 * scene.shape.shift, contact_shift(touch, placed), placed)
     bent = math.hypot(bent, never_touching(penetration, rows.row))
     # an edge that is no blurred step is found a little off, by where in its pixel it lies
-    common = math.hypot(offset, recording.edge_error, 0.7 * np.nan_to_num(scene.shape.misfit))
+    misfit = 0.7 * float(np.nan_to_num(scene.shape.misfit))
+    if scene.shape.clipped > CLIPPED:
+        misfit = max(misfit, _CLIPPED_ERROR)
+    common = math.hypot(offset, recording.edge_error, misfit)
     beam_error = np.hypot(rows.error, common)
     shaker_error = np.hypot(rows.shaker_error, math.hypot(common, bent))
     valid = np.isfinite(beam_mm) & (np.isfinite(shaker_mm) if shaker is not None else True)

@@ -17,6 +17,7 @@ _JUMP = 3.0  # px
 _LONGEST = 3  # frames of a jump
 _STEADY = 0.005  # px; noise less than this is not asked of a rest
 _QUIET = 8  # frames that make a rest
+_FEW = 5  # frames that may be nearer than those that count as nearest
 _OFTEN = 3  # stretches as quiet as the start from which the start is nothing special
 
 
@@ -63,9 +64,10 @@ def touching(penetration: Floats, error: Floats, beam: Floats) -> Touch:
         np.ptp(motion[known], axis=1) > max(12.0 * noise, 0.3)
     )
     # two bodies also move together where they are farthest apart; touching, they are at their nearest
-    deepest = float(np.percentile(penetration[np.isfinite(penetration)], 98)) if known.any() else 0.0
+    seen = penetration[np.isfinite(penetration)]
+    deepest = float(np.partition(seen, -_FEW)[-_FEW]) if seen.size > _FEW else 0.0
     means = together.mean(1)
-    still &= np.where(known, means, -np.inf) > deepest - max(8.0 * noise, 0.3)
+    still &= np.where(known, means, -np.inf) > deepest - max(5.0 * noise, 0.1)
     if np.count_nonzero(still) < 3:
         return nothing
     means = np.sort(means[still])

@@ -18,6 +18,8 @@ from snapbeam.lab.tracking.survey.edge_shape import edge_shape
 
 __all__ = ["BeamBands", "beam_view", "find_bands", "placed"]
 
+_STEADY = 1.1  # blur of a frame over the usual one up to which its edges show the camera's own
+
 
 class BeamBands(NamedTuple):
     """The beam as a band in each column (frames, columns): ``alone`` where nothing else merges with it."""
@@ -136,7 +138,13 @@ def beam_view(
         width_table=width_calibration(width, 2 * half + 1),
         hot_share=hot,
     )
-    return view, edge_shape(windows[1], fits[1], usable, width, rough.sign, clipped)
+    blur = masked_median(fits[1].width, usable)
+    steady = usable
+    if np.isfinite(
+        blur
+    ).any():  # an edge that speeds up within the exposure is bent whatever the camera's curve
+        steady = usable & (blur <= _STEADY * np.nanpercentile(blur, 25.0))[:, None]
+    return view, edge_shape(windows[1], fits[1], steady, width, rough.sign, clipped)
 
 
 def _hot(
