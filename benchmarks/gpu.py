@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from snapbeam.runs.response import statistics_of
 
 import snapbeam as sb
 from snapbeam import paper
@@ -34,7 +35,6 @@ from snapbeam.engines.cuda.layout import device_structure
 from snapbeam.engines.ensemble import Ensemble, make_ensemble
 from snapbeam.engines.plan import plan_steps
 from snapbeam.engines.scalar.composition import COMPOSITIONS
-from snapbeam.runs.response import statistics_of
 
 CONTACT = sb.HertzContact(stiffness=4e8)
 LOCATION = 1 / 2.1

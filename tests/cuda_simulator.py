@@ -12,9 +12,8 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.engines.cuda.driver import Options
@@ -33,8 +32,8 @@ class Job(NamedTuple):
 
 def march_in_simulator(
     jobs: list[Job], timeout: float = 300.0
-) -> list[tuple[NDArray[np.int64], NDArray[np.float64], list[tuple[int, int]]]]:
-    """Counts and numbers of every job, and the calls of its progress."""
+) -> list[tuple[NDArray[Any], list[tuple[int, int]]]]:
+    """Books of every job, and the calls of its progress."""
     with tempfile.TemporaryDirectory() as folder:
         asked, answered = Path(folder, "jobs"), Path(folder, "results")
         asked.write_bytes(pickle.dumps([tuple(job) for job in jobs]))
@@ -56,12 +55,12 @@ def _answer(asked: Path, answered: Path) -> None:
         calls: list[tuple[int, int]] = []
         steps = slice_steps or 10**6
         cuda_engine.SLICE_STEPS = (steps, steps)
-        counts, numbers = cuda_engine.run_ensemble(
+        books = cuda_engine.run_ensemble(
             ensemble,
             progress=lambda done, total, calls=calls: calls.append((done, total)),
             options=options._replace(first_budget=steps),
         )
-        results.append((counts, numbers, calls))
+        results.append((books, calls))
     answered.write_bytes(pickle.dumps(results))
 
 

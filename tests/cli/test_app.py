@@ -52,7 +52,7 @@ def test_version_and_help(cli):
 
 REFUSALS = [
     (("map", "--modes", "0"), "modes = 0: must be an integer in [1, 256]"),
-    (("map", "--cycles", "0"), "cycles = 0: must be an integer of at least 1"),
+    (("map", "--cycles", "0"), "[run] cycles = 0: must be an integer in [1, 10000000]"),
     (("map", "--frequency-ratio", "0.1:4"), "or start:stop:count, such as 0.1:4:64"),
     (("map", "--frequency-ratio", "-1:4:8"), "frequency_ratio"),
     (("map", "--location", "1.5"), "location"),
@@ -115,7 +115,7 @@ def test_map_writes_what_it_says(cli, tmp_path):
     assert re.search(rf"intrawell +{counts[0]} ", result.stdout)
     assert f"Written: {tmp_path / 'map.nc'} (" in result.stdout and "Written: map.png" in result.stdout
     assert "snapbeam simulate" in result.stdout
-    assert "12 of 12 runs" in result.stderr
+    assert "12 of 12 points" in result.stderr
 
     told = cli("info", "map.nc").stdout
     assert "frequency_ratio 4, velocity_amplitude 3" in told
@@ -185,9 +185,9 @@ def test_interrupt_leaves_nothing_behind(tmp_path):
     process = subprocess.Popen(
         command, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
-    assert process.stderr.readline() == "400 runs to compute\n"
+    assert process.stderr.readline() == "400 points to compute\n"
     first = process.stderr.readline()
-    assert re.match(r"\d+ of 400 runs, [\d.]+ runs/s, .* left", first), first + process.stderr.read()
+    assert re.match(r"\d+ of 400 points, [\d.]+ points/s, .* left", first), first + process.stderr.read()
     process.send_signal(signal.SIGINT)
     output, messages = process.communicate(timeout=60)
     assert process.returncode == 130

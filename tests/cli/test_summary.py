@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import shlex
 
 import numpy as np
 import pytest
@@ -47,7 +48,12 @@ def test_what_is_said(synthetic_map, tmp_path):
     assert said.startswith("1000 runs of 32 modes over 200 cycles in 50 s (20 runs/s)")
     assert "Deepest notch of the threshold: V = " in said and "mm/s at" in said
     assert "map.nc (0.20 MB)" in said
-    assert "snapbeam map --modes 32 --cycles 200 --frequency-ratio" in said
+    low = deepest_notch(synthetic_map)
+    point = f"frequency_ratio={low['frequency_ratio']!r},velocity_amplitude={low['velocity_amplitude']!r}"
+    file = shlex.quote(str(path))
+    assert f"snapbeam simulate --from {file} --point {point} --plot run.png" in said
+    assert f"snapbeam map --from {file} --point {point} --frequency-ratio " in said
+    assert f"snapbeam plot {file} --threshold-line" in said
     quiet = text(map_summary(xr.zeros_like(synthetic_map).assign_attrs(synthetic_map.attrs), []))
     assert "No run snapped through: raise the velocity amplitude." in quiet
 

@@ -5,20 +5,39 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.config import Config, config_from_mapping, dump_config, load_config, override, parse_axis
+from snapbeam.config import (
+    DEFAULT_AXES,
+    PHYSICAL,
+    Config,
+    config_from_mapping,
+    dump_config,
+    from_physical,
+    load_config,
+    override,
+    parse_axis,
+    to_physical,
+)
 from snapbeam.core.validate import InputError
+from snapbeam.model.integration import Integration
 from snapbeam.model.paper_values import BEAM, CONTACT
 
 
 def test_nothing_given_is_the_paper():
     config = Config()
-    assert config.beam.build() == BEAM
-    assert config.contact.build() == CONTACT
-    assert config.model.modes == 32
-    axes = config.map.axes()
-    assert axes["frequency_ratio"].shape == (64,)
-    assert axes["velocity_amplitude"][[0, -1]] == pytest.approx([0.01, 0.65])
-    assert axes["location"] == pytest.approx(1.0 / 2.1)
+    system = config.system
+    assert system.model.beam == BEAM
+    assert system.contact == CONTACT
+    assert system.model.modes == config.model.modes == 32
+    assert system.model.damping_ratio.tolist() == [0.005] * 32
+    assert system.get("striker.location") == pytest.approx(1.0 / 2.1)
+    assert system.get("striker.side") == "below"
+    axes = config.axes(DEFAULT_AXES)
+    assert list(axes) == ["drive.frequency_ratio", "drive.velocity_amplitude"]
+    assert axes["drive.frequency_ratio"].shape == (64,)
+    assert axes["drive.velocity_amplitude"][[0, -1]] == pytest.approx([0.01, 0.65])
+    assert config.axes() == {}
+    assert config.integration == Integration()
+    assert config.defaulted == ()
 
 
 REFUSALS = [
@@ -50,20 +69,119 @@ REFUSALS = [
     ({"contact": {"radius": 0.0025}}, "belong together; one is missing"),
     ({"contact": {"radius": 0.0025, "stiffness": 4e8}}, "not both"),
     ({"contact": {"radius": 2e-3, "young_modulus": [3.5, 200.0], "poisson_ratio": [0.3, 0.3]}}, "in GPa?"),
-    ({"shaker": {"location": 1.2}}, "[shaker] location = 1.2: must be 0 to 1"),
+    ({"shaker": {"location": 1.2}}, "[shaker] location = 1.2: must be a number in (0, 1)"),
     ({"shaker": {"side": "left"}}, "side = 'left': must be one of 'below', 'above'"),
     ({"map": {"frequency_ratio": "0.1:4"}}, "or start:stop:count, such as 0.1:4:64"),
     ({"map": {"frequency_ratio": "4:0.1:64"}}, "start must be less than stop"),
     ({"map": {"frequency_ratio": "0.1:4:many"}}, "the count 'many' must be a whole number"),
     ({"map": {"frequency_ratio": [1.0, 0.5]}}, "must be strictly increasing"),
-    ({"map": {"frequency_ratio": "0:4:64"}}, "frequency_ratio = 0.0: must be a number in (0, inf)"),
-    ({"map": {"velocity_amplitude": [-0.1, 0.1]}}, "velocity_amplitude = -0.1: must be a number in [0, inf)"),
+    (
+        {"map": {"frequency_ratio": "0:4:64"}},
+        "[map] frequency_ratio = 0.0: must be a finite number greater than 0",
+    ),
+    (
+        {"map": {"velocity_amplitude": [-0.1, 0.1]}},
+        "[map] velocity_amplitude = -0.1: must be a finite number of at least 0",
+    ),
     ({"map": {"location": "0.1:1:5"}}, "[map] location = 1.0: must be a number in (0, 1)"),
     ({"map": {"location": []}}, "location = []: must hold at least one point"),
     ({"map": {"location": True}}, "[map] location = True: must be a number"),
-    ({"run": {"cycles": 0}}, "cycles = 0: must be an integer of at least 1"),
+    ({"run": {"cycles": 0}}, "[run] cycles = 0: must be an integer in [1, 10000000]"),
+    (
+        {"map": {"cycles": 20}},
+        "[map] cycles: unknown key; must be one of frequency_ratio, velocity_amplitude, location",
+    ),
     ({"run": {"step": "fast"}}, "[run] step = 'fast': must be a number in s"),
     ({"run": {"step": 0.0}}, "step = 0.0: must be a finite number greater than 0 s"),
+    ({"run": {"tolerance": 1e-3, "step": 1e-5}}, "[run] tolerance = 0.001 with step = 1e-05"),
+    ({"run": {"engine": "gpu"}}, "[run] engine = 'gpu': must be one of 'auto', 'cpu', 'cuda'"),
+    ({"run": {"early_decision": 1}}, "[run] early_decision = 1: must be True or False"),
+    (
+        {"model": {"damping_ratio": [0.1, 0.2]}},
+        "[model] damping_ratio of shape (2,): must have the shape (32,)",
+    ),
+    (
+        {"beam": {"buckling_level": 0.0}},
+        "[beam] buckling_level = 0.0: must be a finite number greater than 0 m",
+    ),
+    ({"contact": {"law": "spring"}}, "[contact] law = 'spring': must be one of 'hertz', 'restitution'"),
+    ({"contact": {"law": "restitution"}}, "[contact] coefficient: missing for law = 'restitution'"),
+    (
+        {"contact": {"coefficient": 0.5}},
+        "modes = 32: Newton's law needs one mode, since the mass met by an impulse at a point falls to zero",
+    ),
+    (
+        {"contact": {"coefficient": 0.5, "stiffness": 1e8}},
+        "[contact] give stiffness, of Hertz's law, or coefficient, of Newton's, not both",
+    ),
+    ({"drive": {"kind": "triangle"}}, "[drive] kind = 'triangle': must be one of 'recorded', 'sine'"),
+    (
+        {"drive": {"kind": "recorded"}},
+        "[drive] displacement, velocity, sampling_freq, frequency: missing for kind = 'recorded'",
+    ),
+    (
+        {"drive": {"frequency_hz": -100.0}},
+        "[drive] frequency_hz = -100 Hz: is frequency_ratio = -1.2217, which must be a finite number greater than 0",
+    ),
+    ({"drive": {"frequency_hz": "100 Hz"}}, "[drive] frequency_hz = '100 Hz': must be a number in Hz"),
+    (
+        {"drive": {"velocity_m_s": -1.0}},
+        "[drive] velocity_m_s = -1 m/s: is velocity_amplitude = -5.80416, which must",
+    ),
+    (
+        {"drive": {"frequency_hz": 100.0, "frequency_ratio": 1.0}},
+        "[drive] give frequency_ratio or frequency_hz, not both",
+    ),
+    (
+        {"striker": {"location_m": 0.2}},
+        "[striker] location_m = 0.2 m: is location = 1.24224, which must be a number in (0, 1)",
+    ),
+    ({"striker": {"location_m": 0.05, "location": 0.3}}, "[striker] give location or location_m, not both"),
+    ({"striker": {"gap": "1 mm"}}, "[striker] gap = '1 mm': must be a number in m"),
+    (
+        {"shaker": {"frequency_ratio": 1.0}, "drive": {"frequency_ratio": 2.0}},
+        "[drive] frequency_ratio: is given in two sections",
+    ),
+    ({"start": {"amplitude[1]": "much"}}, "[start] amplitude[1] = 'much': must be a number"),
+    (
+        {"start": {"amplitude[0]": 1.0}},
+        "[start] amplitude[0]: unknown key; must be amplitude[i], velocity[i]",
+    ),
+    ({"start": {"amplitude[40]": 1.0}}, "start.amplitude[40]: mode = 40: must be an integer in [1, 32]"),
+    (
+        {"axes": {"beam.thicknes": "1e-4:2e-4:3"}},
+        "[axes] beam.thicknes: no parameter; did you mean 'beam.thickness'",
+    ),
+    (
+        {"axes": {"beam.thickness": "0.4:0.5:3"}},
+        "[axes] thickness = 0.5 m: must be less than length = 0.161 m; is it given in mm?",
+    ),
+    (
+        {"axes": {"beam.density": "7.5:8:3"}},
+        "[axes] density = 7.5: must be 10 to 30000 kg/m^3; is it given in g/cm^3?",
+    ),
+    (
+        {"axes": {"modes": "1,x"}},
+        "[axes] modes = '1,x': must be a whole number, whole numbers separated by commas",
+    ),
+    ({"axes": {"model.modes": "1:32:3"}}, "[axes] modes = 16.5: must be an integer in [1, 256]"),
+    ({"axes": {"striker.side": "below,left"}}, "[axes] side = 'left': must be one of 'below', 'above'"),
+    (
+        {"axes": {"velocity_m_s": "-0.1:0.2:4"}},
+        "[axes] drive.velocity_m_s = -0.1 m/s: is velocity_amplitude = -0.580416, which must",
+    ),
+    (
+        {"axes": {"frequency_ratio": "0.1:2:3", "frequency_hz": "10:200:3"}},
+        "[axes] frequency_hz: the same axis is given as drive.frequency_ratio",
+    ),
+    (
+        {"axes": {"frequency_hz": "10:200:3", "beam.thickness": "3e-4:4e-4:2"}},
+        "drive.frequency_hz: is made into drive.frequency_ratio, whose unit changes along beam.thickness",
+    ),
+    (
+        {"axes": {"model.modes": [1, 8]}, "drive": {"velocity_m_s": 0.03}},
+        "drive.velocity_m_s: is made into drive.velocity_amplitude, whose unit changes along model.modes",
+    ),
 ]
 
 
@@ -106,12 +224,99 @@ def test_override_replaces_what_it_contradicts():
     changed = override(
         config, {"beam": {"buckling_level": 3e-4, "length": None}, "contact": {"stiffness": 1e8}}
     )
-    beam = changed.beam.build()
+    beam = changed.system.model.beam
     assert beam.buckling_level == 3e-4
     assert beam.length == 0.2
-    assert changed.contact.build().stiffness == 1e8
+    assert changed.system.contact.stiffness == 1e8
     with pytest.raises(InputError, match="give exactly one"):
         override(changed, {"beam": {"buckling_level": 3e-4, "axial_load": 30.0}})
+
+
+def test_an_option_takes_a_contradicting_value_or_axis_away():
+    """Given in a file, overridden on a command line: never both, and never the file's in silence."""
+    config = config_from_mapping(
+        {
+            "axes": {"frequency_ratio": "0.1:2:3", "modes": [1, 2]},
+            "drive": {"velocity_m_s": 0.05},
+            "striker": {"location_m": 0.05},
+            "contact": {"stiffness": 1e8},
+            "model": {"reference_freq": 80.0},
+        }
+    )
+
+    def after(sections):
+        return override(config, sections).to_mapping()
+
+    assert after({"drive": {"velocity_amplitude": 0.3}})["drive"] == {"velocity_amplitude": 0.3}
+    assert after({"striker": {"location": 0.3}})["striker"] == {"location": 0.3}
+    assert after({"model": {"modes": 3}})["axes"] == {"drive.frequency_ratio": "0.1:2:3"}
+    for value in ({"frequency_ratio": 1.2}, {"frequency_hz": 99.0}):
+        changed = after({"drive": value})
+        assert changed["axes"] == {"model.modes": [1, 2]}
+        assert value.items() <= changed["drive"].items()
+    assert after({"axes": {"frequency_hz": "50:100:3"}})["axes"] == {
+        "model.modes": [1, 2],
+        "drive.frequency_hz": "50:100:3",
+    }
+    assert after({"contact": {"coefficient": 0.3}, "model": {"modes": 1}})["contact"] == {"coefficient": 0.3}
+
+
+def test_physical_units_are_ratios_of_the_system():
+    """100 Hz and 31 mm/s at 40 mm from the clamp, given as values and as axes."""
+    config = config_from_mapping(
+        {"drive": {"frequency_hz": 100.0, "velocity_m_s": 0.031}, "striker": {"location_m": 0.04}}
+    )
+    system = config.system
+    freq, level = system.model.reference_freq, BEAM.buckling_level
+    assert system.get("drive.frequency_ratio") == pytest.approx(100.0 / freq, rel=1e-14)
+    assert system.get("drive.velocity_amplitude") == pytest.approx(
+        0.031 / (2.0 * np.pi * freq * level), rel=1e-14
+    )
+    assert system.get("striker.location") == pytest.approx(0.04 / 0.161, rel=1e-14)
+    axes = config_from_mapping(
+        {"axes": {"frequency_hz": "50:100:3", "velocity_m_s": [0.01, 0.03], "location_m": "0.02:0.08:4"}}
+    ).axes()
+    assert list(axes) == ["drive.frequency_ratio", "drive.velocity_amplitude", "striker.location"]
+    np.testing.assert_allclose(axes["drive.frequency_ratio"] * freq, [50.0, 75.0, 100.0], rtol=1e-14)
+    np.testing.assert_allclose(axes["striker.location"] * 0.161, [0.02, 0.04, 0.06, 0.08], rtol=1e-14)
+    for name in PHYSICAL:
+        np.testing.assert_allclose(
+            to_physical(system, name, from_physical(system, name, [0.1, 2.0])), [0.1, 2.0], rtol=1e-14
+        )
+    # the frequency that is normalised by is given, so that no number of modes changes it
+    fixed = config_from_mapping(
+        {"axes": {"modes": [1, 8]}, "drive": {"frequency_hz": 100.0}, "model": {"reference_freq": 80.0}}
+    )
+    assert fixed.system.get("drive.frequency_ratio") == 1.25
+
+
+def test_a_file_of_version_0_1_means_what_it_meant():
+    old = config_from_mapping(
+        {
+            "shaker": {"frequency_ratio": 1.1, "velocity_amplitude": 0.2, "location": 0.3, "side": "above"},
+            "map": {"frequency_ratio": "0.5:2:4", "velocity_amplitude": 0.25},
+        }
+    )
+    assert old.system.get("drive.frequency_ratio") == 1.1
+    assert old.system.get("striker.location") == 0.3
+    assert old.system.get("striker.side") == "above"
+    assert old.system.get("drive.velocity_amplitude") == 0.2, "of single runs"
+    assert list(old.axes()) == ["drive.frequency_ratio", "drive.velocity_amplitude"]
+    assert old.axes()["drive.velocity_amplitude"].tolist() == [0.25], "of the map alone"
+    alone = config_from_mapping({"map": {"velocity_amplitude": 0.25, "location": 0.4}})
+    assert alone.axes() == {}
+    assert alone.system.get("striker.location") == 0.4
+
+
+def test_a_start_by_name():
+    config = config_from_mapping(
+        {"model": {"modes": 3}, "start": {"amplitude[1]": -1.0, "velocity[2]": 0.1, "striker_position": 1e-3}}
+    )
+    model, start = config.system.model, config.system.start
+    np.testing.assert_allclose(start.amplitude, model.equilibrium, rtol=1e-15)
+    well = abs(model.equilibrium[0])
+    np.testing.assert_allclose(start.velocity, [0.0, 0.1 * well * model.omega[0], 0.0], rtol=1e-12)
+    assert float(start.striker_position) == 1e-3
 
 
 def test_files_that_cannot_be_read(tmp_path):

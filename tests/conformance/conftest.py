@@ -6,18 +6,19 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+import frozen
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
+import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.validate import InputError
-from snapbeam.engines.ensemble import Ensemble, Start, make_ensemble
-from snapbeam.engines.plan import plan_steps
-from snapbeam.engines.registry import ENGINES, resolve
-from snapbeam.model.contact import HertzContact
-from snapbeam.model.reduction import ReducedModel
-from snapbeam.runs.response import statistics_of
+from snapbeam.engines.answer import statistics_of
+from snapbeam.engines.assemble import make_ensemble
+from snapbeam.engines.ensemble import Ensemble
+from snapbeam.engines.registry import resolve
+from snapbeam.model.integration import ENGINES
 
 
 @dataclass(frozen=True)
@@ -25,54 +26,59 @@ class Marched:
     """What an engine answered."""
 
     ensemble: Ensemble
-    counts: NDArray[np.int64]
-    numbers: NDArray[np.float64]
-    cycles: int
+    books: NDArray[Any]
 
     @property
     def statistics(self) -> dict[str, NDArray[Any]]:
-        return statistics_of(self.ensemble, self.counts, self.numbers, self.cycles)
+        return statistics_of(self.ensemble, self.books)
+
+    def assert_is(self, other: Marched, which: Any = slice(None)) -> None:
+        """Every column is that of the runs *which* of another ensemble, to the last bit."""
+        for name in self.books.dtype.names:
+            np.testing.assert_array_equal(self.books[name], other.books[name][which], err_msg=name)
 
 
 class March:
-    """An engine by name, called with the parameters of its runs, which broadcast."""
+    """An engine by name, called with the parameters of its runs, which broadcast.
+
+    Without a law of contact nothing strikes, and there is one run.
+    """
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.run = resolve(name)[1]
+        self.engine = resolve(name)[1]
 
     def __call__(
         self,
-        model: ReducedModel,
-        contact: HertzContact | None = paper.CONTACT,
+        model: sb.ReducedModel,
+        contact: sb.ContactLaw | None = paper.CONTACT,
         *,
         frequency_ratio: ArrayLike = 1.0,
         velocity_amplitude: ArrayLike = 0.0,
         location: ArrayLike = paper.LOCATION,
         side: str = "below",
-        cycles: int = 1,
-        step: float | None = None,
-        accuracy: str = "map",
-        early_decision: bool = False,
-        start: Start | None = None,
-        max_steps: int = 10**10,
+        drive: sb.Drive | None = None,
+        start: sb.State | None = None,
         threads: int | None = None,
+        **integration: Any,
     ) -> Marched:
-        columns = np.broadcast_arrays(*map(np.atleast_1d, (frequency_ratio, velocity_amplitude, location)))
-        names = ("frequency_ratio", "velocity_amplitude", "location")
-        ensemble = make_ensemble(
-            model,
-            contact,
-            plan_steps(model, contact, step=step, accuracy=accuracy),
-            **{name: np.array(column, dtype=float) for name, column in zip(names, columns, strict=True)},
-            side=side,
-            cycles=cycles,
-            reference_freq=model.reference_freq,
-            early_decision=early_decision,
-            start=start,
-            max_steps=max_steps,
+        asked = sb.Integration(**({"cycles": 1} | integration))
+        if contact is None:
+            ensemble = make_ensemble(sb.System(model, start=start), asked)
+            return Marched(ensemble, self.engine.run_ensemble(ensemble, threads, None))
+        own = {"drive.frequency_ratio": frequency_ratio, "drive.velocity_amplitude": velocity_amplitude}
+        striker = sb.Striker(
+            drive=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.0) if drive is None else drive, side=side
         )
-        return Marched(ensemble, *self.run(ensemble, threads, None), cycles)
+        try:
+            resolve(self.name, law=type(contact), drive=type(striker.drive))
+        except InputError as refusal:
+            pytest.skip(str(refusal))
+        given = (own if drive is None else {}) | {"striker.location": location}
+        columns = np.broadcast_arrays(*map(np.atleast_1d, given.values()))
+        points = {name: np.array(column, dtype=float) for name, column in zip(given, columns, strict=True)}
+        ensemble = make_ensemble(sb.System(model, contact, striker, start), asked, points)
+        return Marched(ensemble, self.engine.run_ensemble(ensemble, threads, None))
 
 
 @pytest.fixture(scope="session", params=[name for name in ENGINES if name != "auto"])
@@ -87,7 +93,57 @@ def march(request: pytest.FixtureRequest) -> March:
 @pytest.fixture(scope="session")
 def model_of():
     """The paper's beam on N modes, by N and damping ratio."""
-    return cache(lambda modes, damping_ratio=0.005: ReducedModel.from_beam(paper.BEAM, modes, damping_ratio))
+    return cache(
+        lambda modes, damping_ratio=0.005: sb.ReducedModel.from_beam(paper.BEAM, modes, damping_ratio)
+    )
+
+
+def start_up(
+    model: sb.ReducedModel, ratio: float = 1.3, velocity: float = 0.3, cycles: int = 8
+) -> sb.Recorded:
+    """A record of a tip that starts up over three cycles, to a sine and its second harmonic."""
+    case = {"frequency_ratio": ratio, "velocity_amplitude": velocity, "cycles": cycles, "location": 0.5}
+    drive = frozen.recorded(case, model).striker().drive
+    assert isinstance(drive, sb.Recorded)
+    return drive
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What may strike, and how: modes, a law of contact, and whether the drive is a record."""
+
+    modes: int
+    contact: sb.ContactLaw
+    recorded: bool = False
+
+    def given(self, model: sb.ReducedModel, columns: dict[str, Any], cycles: int) -> dict[str, Any]:
+        """Arguments of a march: random runs, of a record those of its location."""
+        if not self.recorded:
+            return {"contact": self.contact, "cycles": cycles} | columns
+        own = {"contact": self.contact, "cycles": cycles, "drive": start_up(model, cycles=cycles)}
+        return own | {"location": columns["location"]}
+
+
+KINDS = {
+    "hertz": Kind(8, paper.CONTACT),
+    "restitution": Kind(1, sb.Restitution(0.6)),
+    "plastic": Kind(1, sb.Restitution(0.0)),
+    "recorded": Kind(4, paper.CONTACT, recorded=True),
+    "recorded restitution": Kind(1, sb.Restitution(0.8), recorded=True),
+}
+"""Every law of contact and every drive there is: what is asked of one is asked of all."""
+
+
+SLOW = {"recorded restitution"}
+"""A kernel of its own, half a minute to compile, for what the others test one by one."""
+
+
+@pytest.fixture(
+    scope="session",
+    params=[pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in KINDS],
+)
+def kind(request: pytest.FixtureRequest) -> Kind:
+    return KINDS[request.param]
 
 
 @pytest.fixture(scope="session")

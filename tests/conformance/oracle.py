@@ -122,6 +122,40 @@ class PaperBeam:
         alpha = np.concatenate(states)
         return Solution(np.concatenate(found), alpha @ phi / LEVEL, alpha @ center / LEVEL, np.array(impacts))
 
+    def bounces(
+        self, ratio: float, velocity: float, coefficient: float, location: float, count: int
+    ) -> Array:
+        """The first *count* impacts of one mode under Newton's law, rows of onset (s) and impulse (N s)."""
+        phi, mass = float(self.shape(location * LENGTH)[0]), float(self.mass[0, 0])
+        omega = ratio * self.omega[0]
+        stroke = velocity * LEVEL * self.omega[0] / omega
+        start = phi * self.rest[0]
+
+        def flight(t: float, y: Array) -> Array:
+            force = self.stiffness[0] * y[0] + self.gamma * y[0] ** 3
+            return np.array([y[1], -force / mass - self.damping[0, 0] * y[1]])
+
+        def depth(t: float, y: Array) -> float:
+            return start + stroke * math.sin(omega * t) - phi * y[0]
+
+        depth.terminal, depth.direction = True, 1.0  # type: ignore[attr-defined]
+        scale = abs(self.rest[0]) * np.array([1.0, self.omega[0]])
+        t, y, found = 0.0, np.array([self.rest[0], 0.0]), []
+        while True:
+            closing = stroke * omega * math.cos(omega * t) - phi * y[1]
+            impulse = (1.0 + coefficient) * closing * mass / phi**2
+            found.append((t, impulse))
+            if len(found) == count:
+                return np.array(found)
+            y = y + np.array([0.0, phi * impulse / mass])
+            # off the tip before the event is looked for, lest the impact itself be found again
+            part = solve_ivp(
+                flight, (t, t + 1.0), y, "DOP853", rtol=1e-12, atol=1e-13 * scale, max_step=2e-5, events=depth,
+                first_step=1e-8,
+            )  # fmt: skip
+            assert part.status == 1, part.message
+            t, y = float(part.t[-1]), part.y[:, -1]
+
 
 def _wavenumber(i: int) -> float:
     """k_i L: (i + 1) pi for odd i; for even i the root of tan(k L/2) = k L/2."""

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.columns import Counts, Numbers
-from snapbeam.engines.ensemble import Start
 from snapbeam.model.decision import RESERVE
+from snapbeam.model.state import State
 
 REGULAR = [(1.4, 0.02), (0.1, 0.05)]
 ELSEWHERE = [(1.21, 0.18), (1.625, 0.3), (3.0, 0.5), (0.5, 0.4)]
@@ -22,12 +21,12 @@ def energy_errors(march, model, share: float, cycles: list[int]) -> tuple[list[f
     velocity = model.linear_modes[:, 0] * math.sqrt(2.0 * energy)
     if model.modes > 3:
         velocity = velocity + model.linear_modes[:, 3] * math.sqrt(0.02 * energy)
-    start = Start(model.equilibrium, velocity)
+    start = State(amplitude=model.equilibrium, velocity=velocity)
     first = float(model.kinetic_energy(velocity))
     ends = [march(model, None, cycles=count, start=start) for count in cycles]
-    assert all(end.counts[0, Counts.STATUS] == RunStatus.OK for end in ends)
-    errors = [abs(float(end.numbers[0, Numbers.ENERGY]) / first - 1.0) for end in ends]
-    return errors, [int(end.counts[0, Counts.CROSSINGS]) for end in ends]
+    assert all(end.books["status"][0] == RunStatus.OK for end in ends)
+    errors = [abs(float(end.books["energy"][0]) / first - 1.0) for end in ends]
+    return errors, [int(end.books["crossings"][0]) for end in ends]
 
 
 @pytest.mark.parametrize(
@@ -54,11 +53,11 @@ def test_energy_of_a_random_motion_stays_within_the_reserve_of_decisions(march, 
     velocity *= math.sqrt(barrier / float(model.kinetic_energy(velocity)))
     steps = {}
     for share in (0.1, 0.19, 0.9):
-        start = Start(model.equilibrium, math.sqrt(share) * velocity)
+        start = State(amplitude=model.equilibrium, velocity=math.sqrt(share) * velocity)
         for cycles in (3, 30, 100):
             end = march(model, None, cycles=cycles, start=start)
-            assert abs(float(end.numbers[0, Numbers.ENERGY]) / barrier - share) < 0.5 * RESERVE
-        steps[share] = int(end.counts[0, Counts.STEPS])
+            assert abs(float(end.books["energy"][0]) / barrier - share) < 0.5 * RESERVE
+        steps[share] = int(end.books["steps"][0])
     # below a fifth of the barrier steps are twice as long
     assert steps[0.1] == steps[0.19] == pytest.approx(0.5 * steps[0.9], rel=1e-2)
 
@@ -80,8 +79,8 @@ def test_undamped_beam_gains_the_work_of_the_shaker(march, model_of, modes) -> N
     """
     ratio, velocity = np.array(REGULAR + ELSEWHERE).T
     end = march(model_of(modes, 0.0), frequency_ratio=ratio, velocity_amplitude=velocity, cycles=8)
-    missing = end.numbers[:, Numbers.ENERGY] - end.numbers[:, Numbers.WORK]
-    share = np.abs(missing) / end.numbers[:, Numbers.GROSS_WORK]
-    assert (end.counts[:, Counts.IMPACTS] > 3).all()
+    missing = end.books["energy"] - end.books["work"]
+    share = np.abs(missing) / end.books["gross_work"]
+    assert (end.books["impacts"] > 3).all()
     assert (share[: len(REGULAR)] < (5e-4 if modes == 32 else 1e-4)).all(), share
     assert (share < 1.5e-3).all(), share

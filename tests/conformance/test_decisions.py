@@ -44,6 +44,14 @@ def test_early_decisions(march, model_of, draw, modes, runs, cycles) -> None:
         assert classes == {0, 1, 2, 3}
 
 
+def test_early_decisions_of_every_law_and_drive(march, model_of, draw, kind) -> None:
+    """Newton's impacts decide early too; what a run decides never changes its class."""
+    model, cycles = model_of(kind.modes), 16
+    given = kind.given(model, draw(60, 300), cycles)
+    given.pop("cycles")
+    compare(march, model, given, cycles)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("modes", "runs", "cycles"), [(1, 5000, 100), (8, 800, 60), (32, 300, 60)])
 def test_many_early_decisions(march, model_of, draw, modes, runs, cycles) -> None:

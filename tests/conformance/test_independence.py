@@ -5,29 +5,40 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import snapbeam as sb
+from snapbeam import paper
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.columns import Counts, Numbers, Reals
-from snapbeam.engines.ensemble import Start
 from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.state import State
+
+
+def part_of(given: dict, which: np.ndarray) -> dict:
+    """The arguments of some of the runs."""
+    return {name: value[which] if isinstance(value, np.ndarray) else value for name, value in given.items()}
+
+
+def check_any_order_batch_and_threads(march, model, given: dict, runs: int) -> None:
+    whole = march(model, **given, threads=2)
+    for which, threads in (
+        (np.arange(runs), 1),
+        (np.arange(runs)[::-1], 3),
+        (np.random.default_rng(3).permutation(runs)[: runs // 2], None),
+        (np.array([0]), None),
+        (np.array([runs // 2]), None),
+        (np.array([runs - 1]), None),
+    ):
+        march(model, **part_of(given, which), threads=threads).assert_is(whole, which)
 
 
 @pytest.mark.parametrize(("modes", "runs", "cycles"), [(1, 60, 12), (8, 16, 5), (32, 10, 3), (40, 6, 1)])
 def test_order_batch_and_threads(march, model_of, draw, modes, runs, cycles) -> None:
-    model, given = model_of(modes), draw(runs, 11)
-    whole = march(model, **given, cycles=cycles, threads=2)
+    given = draw(runs, 11) | {"cycles": cycles}
+    check_any_order_batch_and_threads(march, model_of(modes), given, runs)
 
-    def check(which: np.ndarray, threads: int | None = None) -> None:
-        part = march(
-            model, **{name: column[which] for name, column in given.items()}, cycles=cycles, threads=threads
-        )
-        np.testing.assert_array_equal(part.counts, whole.counts[which])
-        np.testing.assert_array_equal(part.numbers, whole.numbers[which])
 
-    check(np.arange(runs), threads=1)
-    check(np.arange(runs)[::-1], threads=3)
-    check(np.random.default_rng(3).permutation(runs)[: runs // 2])
-    for alone in (0, runs // 2, runs - 1):
-        check(np.array([alone]))
+def test_order_batch_and_threads_of_every_law_and_drive(march, model_of, draw, kind) -> None:
+    model = model_of(kind.modes)
+    check_any_order_batch_and_threads(march, model, kind.given(model, draw(12, 12), 5), 12)
 
 
 @pytest.mark.parametrize(("modes", "runs"), [(1, 5), (12, 4), (32, 3)])
@@ -36,15 +47,36 @@ def test_runs_that_end_at_the_same_step(march, model_of, modes, runs) -> None:
     given = {"frequency_ratio": np.full(runs, 1.3), "velocity_amplitude": np.full(runs, 0.25)}
     many = march(model_of(modes), **given, cycles=3, threads=1)
     assert (many.statistics["status"] == RunStatus.OK).all()
-    np.testing.assert_array_equal(many.counts, np.tile(many.counts[:1], (runs, 1)))
-    np.testing.assert_array_equal(many.numbers, np.tile(many.numbers[:1], (runs, 1)))
+    many.assert_is(many, np.zeros(runs, dtype=int))
+
+
+def test_runs_of_different_contact_are_what_they_are_alone(march, model_of) -> None:
+    """A stiffness that differs between the runs of one ensemble: the steps suit each run's own."""
+    from snapbeam.engines.assemble import make_ensemble
+
+    stiffness = np.array([1e7, 4e8, 3e9])
+    shaker = sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.25)
+    asked = sb.Integration(cycles=3)
+    whole = make_ensemble(
+        sb.System(model_of(2), paper.CONTACT, shaker), asked, {"contact.stiffness": stiffness}
+    )
+    books = march.engine.run_ensemble(whole, None, None)
+    assert len(set(books["steps"].tolist())) == 3
+    for i, value in enumerate(stiffness):
+        alone = make_ensemble(sb.System(model_of(2), sb.HertzContact(float(value)), shaker), asked)
+        assert alone.runs["tick"][0] == whole.runs["tick"][i]
+        assert alone.runs["finest"][0] == whole.runs["finest"][i]
+        found = march.engine.run_ensemble(alone, None, None)
+        for name in books.dtype.names:
+            np.testing.assert_array_equal(found[name][0], books[name][i], err_msg=name)
 
 
 def test_cycles_beyond_the_last_do_not_change_the_first(march, model_of) -> None:
     """Statistics that only accumulate are those of the longer run's beginning: time comes from ticks."""
     model = model_of(2)
     short, long = (march(model, frequency_ratio=1.4, velocity_amplitude=0.02, cycles=c) for c in (5, 10))
-    assert (long.counts >= short.counts).all()
+    for name in ("time", "crossings", "impacts", "steps", "contact_time", "total_impulse", "gross_work"):
+        assert (long.books[name] >= short.books[name]).all(), name
     assert long.statistics["peak_force"] >= short.statistics["peak_force"]
     assert long.statistics["min_displacement"] <= short.statistics["min_displacement"]
 
@@ -53,7 +85,8 @@ def test_time_does_not_drift(march) -> None:
     """Time comes from integers: after 10^5 cycles of a linear oscillator the run ends where it should."""
     oscillator = ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], reference_freq=1.0)
     cycles = 100_000
-    end = march(oscillator, None, cycles=cycles, start=Start(np.zeros(1), np.ones(1)), step=0.3)
-    seconds = end.counts[0, Counts.TIME] * end.ensemble.reals[0, Reals.TICK]
+    start = State(amplitude=np.zeros(1), velocity=np.ones(1))
+    end = march(oscillator, None, cycles=cycles, start=start, step=0.25)
+    seconds = end.books["time"][0] * end.ensemble.runs["tick"][0]
     assert seconds == pytest.approx(cycles, rel=1e-15)
-    assert end.numbers[0, Numbers.ENERGY] == pytest.approx(0.5, rel=1e-9)
+    assert end.books["energy"][0] == pytest.approx(0.5, rel=1e-9)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from snapbeam.engines.ensemble import Start
+from snapbeam.model.state import State
 
 MIRRORED = {
     "min_displacement": "max_displacement",
@@ -15,8 +17,7 @@ MIRRORED = {
 
 
 def assert_mirrored(below, above) -> None:
-    np.testing.assert_array_equal(below.counts, above.counts)
-    np.testing.assert_array_equal(below.numbers, above.numbers)
+    above.assert_is(below)
     first, second = below.statistics, above.statistics
     for name, values in first.items():
         other = MIRRORED.get(name) or {v: k for k, v in MIRRORED.items()}.get(name)
@@ -33,6 +34,19 @@ def test_shaker_from_the_other_side(march, model_of, draw, modes, runs, cycles) 
     )
 
 
+def test_every_law_and_drive_from_the_other_side(march, model_of, draw, kind) -> None:
+    """A record is given in the coordinates of space: its mirror image is the negated one."""
+    model = model_of(kind.modes)
+    below = kind.given(model, draw(12, kind.modes), 8)
+    above = below | {"side": "above"}
+    if "drive" in below:
+        drive = below["drive"]
+        above["drive"] = dataclasses.replace(
+            drive, displacement=-drive.displacement, velocity=-drive.velocity
+        )
+    assert_mirrored(march(model, **below), march(model, **above))
+
+
 @pytest.mark.parametrize("modes", [2, 32])
 def test_negated_start(march, model_of, draw, modes) -> None:
     model, given = model_of(modes), draw(6, 7)
@@ -41,6 +55,6 @@ def test_negated_start(march, model_of, draw, modes) -> None:
         1, modes + 1
     )
     velocity = model.linear_modes[:, 0] * np.sqrt(1.5 * (model.barrier_energy - model.well_energy))
-    below = march(model, **given, cycles=4, start=Start(alpha, velocity))
-    above = march(model, **given, cycles=4, start=Start(-alpha, -velocity), side="above")
+    below = march(model, **given, cycles=4, start=State(amplitude=alpha, velocity=velocity))
+    above = march(model, **given, cycles=4, start=State(amplitude=-alpha, velocity=-velocity), side="above")
     assert_mirrored(below, above)

@@ -83,7 +83,7 @@ def test_threshold_line(synthetic_map):
     ax = plot_response_map(across.transpose(), threshold_line=True)
     place, velocity = ax.lines[-1].get_data()
     np.testing.assert_allclose(velocity, 0.625 * np.sin(np.pi * place) ** 2)
-    assert ax.get_xlabel().startswith("Shaker location")
+    assert ax.get_xlabel().startswith("Striker location")
     nameless = synthetic_map.drop_vars("location")
     with pytest.raises(InputError, match="threshold_line: needs the map's location"):
         plot_response_map(nameless, threshold_line=True)

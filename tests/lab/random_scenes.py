@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from snapbeam import InputError
+from snapbeam.core.findings import doubtful
 from snapbeam.lab import (
     Defects,
     SyntheticCamera,
@@ -18,7 +19,6 @@ from snapbeam.lab import (
     render_recording,
     track,
 )
-from snapbeam.lab.plausibility.finding import doubtful
 from snapbeam.lab.synthetic.defects import Fixture
 
 LEVEL = 0.335e-3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import pytest
@@ -80,6 +81,16 @@ def test_replace_keeps_what_was_given() -> None:
     assert loaded.replace(buckling_level=0.335e-3) == BEAM
     with pytest.raises(InputError, match=r"thicknes: no parameter of a beam.*thickness"):
         BEAM.replace(thicknes=1.0)
+
+
+def test_the_replace_of_dataclasses_keeps_what_was_given_too() -> None:
+    """What followed from the other is not taken for given."""
+    assert dataclasses.replace(BEAM, thickness=0.5e-3) == BEAM.replace(thickness=0.5e-3)
+    loaded = BEAM.replace(axial_load=30.0)
+    assert dataclasses.replace(loaded, width=20e-3) == loaded.replace(width=20e-3)
+    # it cannot know that the given one is meant to give way; Beam.replace does
+    with pytest.raises(InputError, match=r"buckling_level = 0\.000335, axial_load = 30\.0: give exactly one"):
+        dataclasses.replace(BEAM, axial_load=30.0)
 
 
 @pytest.mark.parametrize("name", [*STEEL, "buckling_level"])

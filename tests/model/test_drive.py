@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from snapbeam.core.validate import InputError, InputTypeError
-from snapbeam.model.drive import Shaker, quasi_static_threshold
 from snapbeam.model.modes import BucklingModes
 from snapbeam.model.paper_values import BEAM, LOCATION
+from snapbeam.model.quasi_static import quasi_static_threshold
+from snapbeam.model.striker import Shaker
 
 
 def test_shaker() -> None:

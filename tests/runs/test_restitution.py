@@ -70,6 +70,52 @@ def test_mirror_image_is_exact(one_mode):
     assert runs[0].response.crossings == runs[1].response.crossings
 
 
+@pytest.mark.parametrize("coefficient", [0.0, 0.6, 1.0])
+def test_one_mode_has_one_shape(one_mode, coefficient):
+    """Extremes at the striker and at the centre are in the ratio of the shape, exactly: no hit is passed over."""
+    shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3, location=0.3)
+    outcome = sb.simulate(one_mode, shaker, sb.Restitution(coefficient), cycles=30).outcome
+    ratio = float(one_mode.center_shape[0] / one_mode.shape_at(0.3)[0])
+    for name in ("min", "max"):
+        at_striker, at_center = outcome[f"{name}_displacement"], outcome[f"{name}_center_displacement"]
+        assert at_center == pytest.approx(ratio * at_striker, rel=1e-12)
+
+
+def test_no_force_is_told_of_an_impact_that_lasts_no_time(one_mode):
+    """As the table of impacts says of each; where the bodies stay together there is one."""
+    shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
+    run = sb.simulate(one_mode, shaker, sb.Restitution(0.6), cycles=10)
+    assert run.outcome.impacts > 0 and np.isnan(run.outcome.peak_force)
+    assert np.isnan(run.impacts.peak_force.values).all()
+    held = sb.simulate(
+        one_mode, sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05), sb.Restitution(0.0), cycles=2
+    )
+    assert held.outcome.peak_force == pytest.approx(float(np.nanmax(held.impacts.peak_force)), rel=1e-9)
+
+
+@pytest.mark.parametrize("coefficient", [0.3, 0.9])
+def test_early_decision_is_kept_and_told(one_mode, coefficient):
+    """The class is that of the whole run, and the attribute says what was asked."""
+    decided = 0
+    for amplitude in np.linspace(0.2, 0.6, 9):
+        shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=float(amplitude))
+        full, early = (
+            sb.simulate(
+                one_mode,
+                shaker,
+                sb.Restitution(coefficient),
+                cycles=60,
+                early_decision=flag,
+                sample_times=[0.0],
+            )
+            for flag in (False, True)
+        )
+        assert early.outcome.response == full.outcome.response
+        assert early.dataset.attrs["early_decision"] == 1
+        decided += early.outcome.status == sb.RunStatus.DECIDED
+    assert decided > 0
+
+
 def test_a_map_takes_the_law(one_mode):
     ds = sb.response_map(
         one_mode, sb.Restitution(0.6), frequency_ratio=[0.8, 1.2], velocity_amplitude=[0.05, 0.3], cycles=10

@@ -15,7 +15,10 @@ def test_labels():
     run = trajectory_dataset(
         TIME, 3.0 * TIME, displacement=TIME, modal_amplitude=np.zeros((5, 3)), attrs={"modes": 3}
     )
-    assert run["displacement"].attrs == {"units": "b", "long_name": "beam displacement at the shaker"}
+    assert run["displacement"].attrs == {
+        "units": "1",
+        "long_name": "beam displacement at the striker, over b",
+    }
     assert run["time"].attrs["units"] == "s"
     assert run["modal_amplitude"].dims == ("time", "mode")
     assert list(run["mode"].values) == [1, 2, 3]
@@ -63,9 +66,17 @@ def test_check_says_what_is_wrong():
     with pytest.raises(InputError, match="run without contact_force, penetration"):
         check_trajectory(run, require=("contact_force", "penetration"))
     run["displacement"].attrs["units"] = "mm"
-    with pytest.raises(InputError, match="displacement in units 'mm': must be in 'b'"):
+    with pytest.raises(InputError, match="displacement in units 'mm': must be in '1'"):
         check_trajectory(run)
     with pytest.raises(InputError, match=r"must be an xarray\.Dataset, not dict"):
         check_trajectory({})
     with pytest.raises(InputError, match=r"with dimensions \('t',\)"):
         check_trajectory(trajectory_dataset(TIME, displacement=TIME).assign(penetration=("t", TIME)))
+
+
+def test_files_of_version_0_1_are_read():
+    """They gave numbers over b the unit "b", which is none."""
+    run = trajectory_dataset(TIME, displacement=TIME, penetration=TIME)
+    for name in ("displacement", "penetration"):
+        run[name].attrs["units"] = "b"
+    assert check_trajectory(run) is run

@@ -23,11 +23,23 @@ SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
             sb.InputError,
             r"needs a buckled beam: axial_load = 0 N must exceed .* 24.3685 N",
         ),
-        ({"model": paper.BEAM}, sb.InputTypeError, r"model = Beam\(.*: must be a ReducedModel"),
-        ({"shaker": 1.21}, sb.InputTypeError, "shaker = 1.21: must be a Shaker"),
-        ({"shaker": None}, sb.InputError, "shaker = None: .* needs an initial_state"),
-        ({"contact": None}, sb.InputError, "contact = None: a shaker needs a HertzContact"),
-        ({"contact": 4e8}, sb.InputTypeError, "contact = 400000000.0: must be a HertzContact"),
+        ({"model": paper.BEAM}, sb.InputTypeError, r"model = Beam\(.*: must be a System or a ReducedModel"),
+        (
+            {"shaker": 1.21},
+            sb.InputTypeError,
+            "striker = 1.21: must be a Striker, a Shaker or a RecordedDrive",
+        ),
+        ({"shaker": None}, sb.InputError, r"striker = None: .* needs a start to move from \(initial_state\)"),
+        (
+            {"contact": None},
+            sb.InputError,
+            "contact = None: a striker needs a law of contact, such as HertzContact",
+        ),
+        (
+            {"contact": 4e8},
+            sb.InputTypeError,
+            "contact = 400000000.0: must be a law of contact, such as HertzContact",
+        ),
         ({"cycles": 0}, sb.InputError, r"cycles = 0: must be an integer in \[1, 10000000\]"),
         ({"cycles": -3}, sb.InputError, "cycles = -3: must be an integer"),
         ({"cycles": 1.5}, sb.InputError, "cycles = 1.5: must be an integer"),
@@ -71,3 +83,66 @@ def test_refusals(changes: dict[str, Any], error: type[Exception], message: str)
     given: dict[str, Any] = {"model": BUCKLED, "shaker": SHAKER, "contact": paper.CONTACT, "cycles": 1}
     with pytest.raises(error, match=message):
         sb.simulate(**(given | changes))
+
+
+SYSTEM = sb.System(BUCKLED, paper.CONTACT, SHAKER)
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: sb.simulate(SYSTEM, 200), sb.InputTypeError, "integration = 200: must be an Integration"),
+        (
+            lambda: sb.simulate(SYSTEM, cycles=3),
+            sb.InputTypeError,
+            "cycles: with a System, what is left is one Integration",
+        ),
+        (
+            lambda: sb.simulate(SYSTEM, sb.Integration(), sb.Integration()),
+            sb.InputTypeError,
+            "arguments: with a System, what is left is one Integration",
+        ),
+        (
+            lambda: sb.simulate(sb.System(BUCKLED)),
+            sb.InputError,
+            r"striker = None: a beam that nothing strikes needs a start to move from \(initial_state\)",
+        ),
+        (
+            lambda: sb.simulate(BUCKLED, SHAKER, paper.CONTACT, 3, speed=1),
+            sb.InputTypeError,
+            "speed: no parameter of a run",
+        ),
+        (
+            lambda: sb.simulate(SYSTEM, sb.Integration(cycles=10**6)),
+            sb.InputError,
+            r"\d+ samples of 2 modes would take .* GiB, the limit is 4 GiB: give fewer sample_times, or fewer cycles",
+        ),
+        (
+            lambda: sb.simulate(SYSTEM, sb.Integration(cycles=10**7)),
+            sb.InputError,
+            "a run of 2e\\+09 samples is too long to record: give sample_times, or fewer cycles",
+        ),
+    ],
+)
+def test_refusals_of_systems(call, error: type[Exception], message: str) -> None:
+    with pytest.raises(error, match=message):
+        call()
+
+
+@pytest.mark.parametrize("ratio", [0.3, 3.0])
+def test_a_step_that_does_not_resolve_a_period_is_refused(ratio: float) -> None:
+    """A quarter of a cycle and of the first period is the longest: no class is told of a run that saw nothing."""
+    system = SYSTEM.replace(**{"drive.frequency_ratio": ratio})
+    longest = 0.25 / (BUCKLED.reference_freq * max(ratio, 1.0))
+    words = "a cycle of excitation" if ratio > 1.0 else "a period of the first mode"
+    for door in (
+        sb.simulate,
+        lambda system, asked: sb.sweep(system, {"velocity_amplitude": [0.1, 0.2]}, asked),
+    ):
+        with pytest.raises(
+            sb.InputError, match=r"step = 1 s: does not resolve .*must be at most .*a quarter of it"
+        ):
+            door(system, sb.Integration(cycles=5, step=1.0))
+        with pytest.raises(sb.InputError, match=f"does not resolve {words}"):
+            door(system, sb.Integration(cycles=5, step=1.01 * longest))
+        door(system, sb.Integration(cycles=1, step=0.99 * longest))

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.sweeps.compute.task import Recipe
-from snapbeam.sweeps.compute.tasks import MemoryBook, Stage
-from snapbeam.sweeps.sweep import map_setup
+from snapbeam.sweeps.compute.task import PointWork
+from snapbeam.sweeps.compute.tasks import MemoryKeeper, Stage
+from snapbeam.sweeps.doors import map_setup
 
 BEAM = sb.Beam(
     length=0.161, thickness=0.4e-3, width=15e-3, density=7800.0, young_modulus=200e9, buckling_level=0.335e-3
@@ -35,12 +35,12 @@ def small(model):
 
 
 @pytest.fixture(scope="session")
-def recipe(small):
-    return Recipe(map_setup(**small))
+def work(small):
+    return PointWork(map_setup(**small))
 
 
 @pytest.fixture(scope="session")
-def whole(recipe):
+def whole(work):
     """Rows of the small map, computed in one go."""
-    grid = recipe.setup.grid
-    return MemoryBook(recipe, 1).complete(Stage("base", grid, grid.size)).read(0, grid.size)
+    grid = work.setup.points
+    return MemoryKeeper(work, 1).complete(Stage("base", grid, grid.size)).read(0, grid.size)

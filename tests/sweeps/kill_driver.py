@@ -20,11 +20,10 @@ import numpy as np
 import zarr.storage  # noqa: F401  (loaded before the first fork, so that a child starts at once)
 
 import snapbeam as sb
-from snapbeam.sweeps.compute.task import Recipe
-from snapbeam.sweeps.compute.tasks import MemoryBook, Stage
+from snapbeam.sweeps.compute.task import PointWork
+from snapbeam.sweeps.compute.tasks import MemoryKeeper, Stage
+from snapbeam.sweeps.doors import long_map, map_setup
 from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.stored import long_map
-from snapbeam.sweeps.sweep import map_setup
 
 CHUNK = 3
 BEAM = sb.Beam(
@@ -54,19 +53,19 @@ def in_child(work, *arguments):
 
 def compute(store, trace):
     """Compute the map, leaving a byte in *trace* for each task begun."""
-    begin = Recipe.compute
+    begin = PointWork.compute
 
     def counted(self, *arguments):
         os.write(trace, b".")
         return begin(self, *arguments)
 
-    Recipe.compute = counted
+    PointWork.compute = counted
     long_map(**ASKED, store=store, chunk=CHUNK, threads=1)
 
 
-def look(store, recipe, stage, answer):
+def look(store, work, stage, answer):
     """Say which tasks are done, with the hashes of their data as read back, and which are damaged."""
-    with MapStore(store, recipe) as held:
+    with MapStore(store, work) as held:
         held.open_stage(stage)
         pending = set(held.pending(stage))
         done = {
@@ -80,10 +79,10 @@ def look(store, recipe, stage, answer):
 
 def main(folder, kills, seed):
     """Kill *kills* times and print what was seen as JSON."""
-    recipe = Recipe(map_setup(**ASKED))
-    grid = recipe.setup.grid
+    work = PointWork(map_setup(**ASKED))
+    grid = work.setup.points
     stage = Stage("base", grid, CHUNK)
-    whole = MemoryBook(recipe, 1).complete(Stage("base", grid, grid.size))
+    whole = MemoryKeeper(work, 1).complete(Stage("base", grid, grid.size))
     wanted = {task: whole.read(*stage.bounds(task)).content_hash() for task in range(stage.tasks)}
     draw = random.Random(seed)
     seen = {"kills": 0, "maps": 0, "lost": 0, "changed": 0, "wrong": 0, "damaged": 0, "begun": 0, "needed": 0}
@@ -107,7 +106,7 @@ def main(folder, kills, seed):
             if not (store / "map.json").exists():
                 continue
             answer_read, answer = os.pipe()
-            _, status = os.waitpid(in_child(look, store, recipe, stage, answer), 0)
+            _, status = os.waitpid(in_child(look, store, work, stage, answer), 0)
             assert status == 0, "the store could not be opened"
             found = json.loads(os.read(answer_read, 1 << 20))
             for end in (answer_read, answer):

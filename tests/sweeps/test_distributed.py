@@ -15,26 +15,26 @@ import snapbeam as sb
 from snapbeam.core.codes import ResponseClass, RunStatus
 from snapbeam.core.validate import InputError
 from snapbeam.sweeps.compute.cluster import open_client, parse_cluster, slurm_arguments
-from snapbeam.sweeps.compute.task import Recipe
+from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.compute.tasks import Stage
 from snapbeam.sweeps.compute.workers import ATTEMPTS, ClusterWorkers
-from snapbeam.sweeps.keep.durable import StoreError
+from snapbeam.sweeps.doors import long_map, map_setup
+from snapbeam.sweeps.errors import StoreError
 from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.stored import StoreBook, Tally, long_map
-from snapbeam.sweeps.sweep import map_setup
+from snapbeam.sweeps.stored import Keeping, StoreKeeper, Tally
 
 CHUNK = 3  # twenty points: seven tasks
 
 
-class Trouble(Recipe):
-    """A recipe whose tasks do harm in the worker: once each, or always."""
+class Trouble(PointWork):
+    """A work whose tasks do harm in the worker: once each, or always."""
 
     once: ClassVar[dict] = {}
     always: ClassVar[dict] = {}
     marks = ""
 
     def compute(self, points, threads=None, progress=None):
-        first = (float(points["frequency_ratio"][0]), float(points["velocity_amplitude"][0]))
+        first = (float(points["drive.frequency_ratio"][0]), float(points["drive.velocity_amplitude"][0]))
         harm = self.always.get(first)
         mark = os.path.join(self.marks, f"{first[0]:.3f}-{first[1]:.3f}")
         if first in self.once and not os.path.exists(mark):
@@ -63,23 +63,24 @@ def client():
 
 
 def trouble(small, folder, once=None, always=None):
-    recipe = Trouble(map_setup(**small))
-    stage = Stage("base", recipe.setup.grid, CHUNK)
+    work = Trouble(map_setup(**small))
+    stage = Stage("base", work.setup.points, CHUNK)
 
     def first(task):
-        points = stage.points(task)
-        return float(points["frequency_ratio"][0]), float(points["velocity_amplitude"][0])
+        points = stage.columns(task)
+        return float(points["drive.frequency_ratio"][0]), float(points["drive.velocity_amplitude"][0])
 
     for name, harm in (("once", once or {}), ("always", always or {})):
-        object.__setattr__(recipe, name, {first(task): kind for task, kind in harm.items()})
-    object.__setattr__(recipe, "marks", str(folder))
-    return recipe, stage
+        object.__setattr__(work, name, {first(task): kind for task, kind in harm.items()})
+    object.__setattr__(work, "marks", str(folder))
+    return work, stage
 
 
-def computed(path, recipe, stage, client):
+def computed(path, work, stage, client):
     tally, said = Tally(), []
-    with MapStore(path, recipe, CHUNK) as store:
-        results = StoreBook(store, ClusterWorkers(client, said.append), tally, said.append).complete(stage)
+    with MapStore(path, work, CHUNK) as store:
+        keeping = Keeping(path, note=said.append, tally=tally)
+        results = StoreKeeper(store, ClusterWorkers(client, said.append), keeping).complete(stage)
         return results.read(0, stage.size), tally, said, store.made_with()
 
 
@@ -96,36 +97,38 @@ def test_nothing_listens_to_the_network(client):
 
 def test_workers_that_are_killed_in_mid_task(tmp_path, small, whole, client):
     """By SIGKILL and by a segmentation fault: the same numbers, to the last bit."""
-    recipe, stage = trouble(small, tmp_path, once={1: "kill", 4: "segfault"})
-    columns, tally, _, made = computed(tmp_path / "store", recipe, stage, client)
+    work, stage = trouble(small, tmp_path, once={1: "kill", 4: "segfault"})
+    columns, tally, _, made = computed(tmp_path / "store", work, stage, client)
     assert columns.content_hash() == whole.content_hash()
     assert tally.computed == 7 and not tally.failed and "failed_tasks" not in made
     assert sorted(len(file.read_text()) for file in tmp_path.glob("*-*")) == [1, 1, 1, 1, 1, 2, 2]
 
 
 def test_a_poisonous_task_is_set_apart(tmp_path, small, whole, client):
-    recipe, stage = trouble(small, tmp_path, always={2: "kill"}, once={5: "raise"})
-    columns, tally, said, made = computed(tmp_path / "store", recipe, stage, client)
+    work, stage = trouble(small, tmp_path, always={2: "kill"}, once={5: "raise"})
+    columns, tally, said, made = computed(tmp_path / "store", work, stage, client)
     assert tally.failed == [("base", 2, f"killed its worker, {ATTEMPTS} times")]
     assert tally.computed == 6 and any("task 2 was given up" in line for line in said)
     assert "base 2: killed its worker, 3 times" in made["failed_tasks"]
     poisoned = slice(2 * CHUNK, 3 * CHUNK)
-    status = recipe.values("status", columns)
+    status = work.values("status", columns)
     assert (status[poisoned] == RunStatus.NOT_RUN).all() and (
         np.delete(status, np.r_[poisoned]) == RunStatus.OK
     ).all()
-    assert (recipe.values("response", columns)[poisoned] == ResponseClass.UNKNOWN).all()
+    assert (work.values("response", columns)[poisoned] == ResponseClass.UNKNOWN).all()
     assert sorted(len(file.read_text()) for file in tmp_path.glob("*-*")) == [1, 1, 1, 1, 1, 2, 3]
     tally = Tally()
     result = long_map(**small, store=tmp_path / "store", tally=tally)  # here, and without the poison
     assert tally.kept == 6 and tally.computed == 1
-    np.testing.assert_array_equal(result["response"].values.ravel(), Recipe.values(recipe, "response", whole))
+    np.testing.assert_array_equal(
+        result["response"].values.ravel(), PointWork.values(work, "response", whole)
+    )
 
 
 def test_workers_that_cannot_compute_at_all(tmp_path, small, client):
-    recipe, stage = trouble(small, tmp_path, always=dict.fromkeys(range(7), "raise"))
+    work, stage = trouble(small, tmp_path, always=dict.fromkeys(range(7), "raise"))
     with pytest.raises(StoreError, match="cannot compute this map: a task raised RuntimeError: no luck"):
-        computed(tmp_path / "store", recipe, stage, client)
+        computed(tmp_path / "store", work, stage, client)
 
 
 def test_a_scheduler_that_runs_already(tmp_path, small, whole, client):

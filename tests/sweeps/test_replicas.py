@@ -8,9 +8,9 @@ import xarray as xr
 
 import snapbeam as sb
 from snapbeam.core.validate import InputError
-from snapbeam.model.paper_values import BEAM
-from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicas, perturbed_starts
-from snapbeam.sweeps.stored import long_map
+from snapbeam.model.paper_values import BEAM, CONTACT
+from snapbeam.sweeps.doors import long_map
+from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicas, perturbed_start
 
 
 def test_measuring_error_is_that_of_a_pixel():
@@ -21,14 +21,21 @@ def test_measuring_error_is_that_of_a_pixel():
     assert MEASURING_ERROR / BEAM.buckling_level == pytest.approx(0.0103, abs=1e-4)
 
 
+def starts_of(model, replicas, side="below"):
+    system = sb.System(model, CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, side=side))
+    return [perturbed_start(system, replicas, repeat) for repeat in range(replicas.count)]
+
+
 @pytest.mark.parametrize("modes", [1, 4, 32])
 def test_starts_have_the_size_asked_for(modes):
     model = sb.ReducedModel.from_beam(BEAM, modes=modes)
-    starts = perturbed_starts(model, Replicas(2000, size=5e-6), "below")
-    moved = np.array([model.center_shape @ (start.alpha - model.equilibrium) for start in starts])
+    starts = starts_of(model, Replicas(2000, size=5e-6))
+    moved = np.array([model.center_shape @ (start.amplitude - model.equilibrium) for start in starts])
     assert np.sqrt(np.mean(moved**2)) == pytest.approx(5e-6, rel=0.08)
     assert abs(moved.mean()) < 4.0 * 5e-6 / np.sqrt(2000)
-    q = np.array([np.linalg.solve(model.linear_modes, start.alpha - model.equilibrium) for start in starts])
+    q = np.array(
+        [np.linalg.solve(model.linear_modes, start.amplitude - model.equilibrium) for start in starts]
+    )
     p = np.array([np.linalg.solve(model.linear_modes, start.velocity) for start in starts])
     energy = 0.5 * np.array([np.mean((q * model.omega) ** 2, axis=0), np.mean(p**2, axis=0)])
     np.testing.assert_allclose(energy, energy.mean(), rtol=0.25)  # 2000 draws: 3 % a value, 64 of them
@@ -36,15 +43,15 @@ def test_starts_have_the_size_asked_for(modes):
 
 def test_starts_are_reproducible_and_mirror():
     model = sb.ReducedModel.from_beam(BEAM, modes=3)
-    first = perturbed_starts(model, Replicas(3), "below")
-    more = perturbed_starts(model, Replicas(5), "below")
-    other = perturbed_starts(model, Replicas(3, seed=1), "below")
-    mirror = perturbed_starts(model, Replicas(3), "above")
+    first = starts_of(model, Replicas(3), "below")
+    more = starts_of(model, Replicas(5), "below")
+    other = starts_of(model, Replicas(3, seed=1), "below")
+    mirror = starts_of(model, Replicas(3), "above")
     for at, start in enumerate(first):
-        np.testing.assert_array_equal(start.alpha, more[at].alpha)
-        np.testing.assert_array_equal(start.alpha, -mirror[at].alpha)
+        np.testing.assert_array_equal(start.amplitude, more[at].amplitude)
+        np.testing.assert_array_equal(start.amplitude, -mirror[at].amplitude)
         np.testing.assert_array_equal(start.velocity, -mirror[at].velocity)
-        assert (start.alpha != other[at].alpha).all()
+        assert (start.amplitude != other[at].amplitude).all()
 
 
 def test_shares(small):
@@ -66,6 +73,23 @@ def test_shares(small):
     assert float(tiny["class_share"].max("response_class").mean()) > float(
         wild["class_share"].max("response_class").mean()
     )
+
+
+def test_repeats_of_starts_that_are_swept():
+    """A change is added to where each point begins, not to the rest state."""
+    model = sb.ReducedModel.from_beam(BEAM, modes=2)
+    system = sb.System(model, CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02))
+    axes = {"start.velocity[1]": [0.0, 1.0, 2.0], "velocity_amplitude": [0.02, 0.03]}
+    asked = sb.Integration(cycles=3)
+    ds = sb.sweep(system, axes, asked, replicas=Replicas(2, size=1e-15))
+    assert (ds.class_share.max("response_class") == 1.0).all(), "hardly changed, every repeat is the run"
+    assert len(np.unique(ds.response)) > 1, "and the runs differ"
+    replicas = Replicas(1, size=1e-6)
+    batch = sb.State(amplitude=np.array([[1e-3, 0.0], [2e-3, 1e-4]]), phase=[0.0, 0.5])
+    moved = perturbed_start(system, replicas, 0, batch)
+    change = perturbed_start(system, replicas, 0).amplitude - model.equilibrium
+    np.testing.assert_allclose(moved.amplitude - batch.amplitude, [change, change], rtol=1e-9)
+    np.testing.assert_array_equal(moved.phase, batch.phase)
 
 
 def test_what_is_refused(small):

@@ -18,12 +18,12 @@ from typer.testing import CliRunner
 import snapbeam as sb
 from snapbeam.cli import app
 from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION
-from snapbeam.sweeps.compute.task import Recipe
+from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.compute.tasks import Stage, chunk_size
+from snapbeam.sweeps.doors import long_map, map_setup
 from snapbeam.sweeps.keep.store import MapStore
 from snapbeam.sweeps.replicas import Replicas
-from snapbeam.sweeps.stored import Tally, long_map
-from snapbeam.sweeps.sweep import map_setup
+from snapbeam.sweeps.stored import Tally
 
 HERE = Path(__file__).parent
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="kills and forks are POSIX here")
@@ -78,7 +78,7 @@ def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
     log = (tmp_path / "map.log").read_text().splitlines()
     assert log[0].endswith("map of 64 points") and "T" in log[0].split()[0]
     assert any(f"{4 * done} of 64 points are done" in line for line in log)
-    assert any("(100.0 %)" in line and "runs/s" in line for line in log)
+    assert any("(100.0 %)" in line and "points/s" in line for line in log)
     resumed = xr.load_dataset(tmp_path / "map.nc", engine="h5netcdf")
     model = sb.ReducedModel.from_beam(BEAM, modes=1, damping_ratio=DAMPING_RATIO)
     whole = sb.response_map(
@@ -117,15 +117,15 @@ def test_bits_do_not_depend_on_tasks_order_or_threads(tmp_path, small, early):
     """Over location too, where the rows of a task's structure are computed together, and with repeats."""
     asked = dict(small, location=[0.21, 0.3, 0.4762], early_decision=early)
     asked["model"] = sb.ReducedModel.from_beam(asked["model"].beam, modes=4)
-    recipe = Recipe(map_setup(**asked), Replicas(1, halve_step=True))
-    grid = recipe.setup.grid
-    wanted = recipe.compute(grid.take(np.arange(grid.size)), 2).content_hash()
+    work = PointWork(map_setup(**asked), Replicas(1, halve_step=True))
+    grid = work.setup.points
+    wanted = work.compute(grid.take(np.arange(grid.size)), 2).content_hash()
     for chunk, threads, reverse in ((7, 1, True), (1, 2, False), (60, 3, False)):
         stage = Stage("base", grid, chunk)
-        with MapStore(tmp_path / f"{chunk}", recipe, chunk) as store:
+        with MapStore(tmp_path / f"{chunk}", work, chunk) as store:
             store.open_stage(stage)
             for task in sorted(store.pending(stage), reverse=reverse):
-                store.commit(stage, task, recipe.compute(stage.points(task), threads))
+                store.commit(stage, task, work.compute(stage.columns(task), threads))
             assert store.reader(stage).read(0, grid.size).content_hash() == wanted
 
 
@@ -167,7 +167,7 @@ beam = sb.Beam(length=0.161, thickness=0.4e-3, width=15e-3, density=7800.0, youn
                buckling_level=0.335e-3)
 model = sb.ReducedModel.from_beam(beam, modes=1)
 sb.long_map(model, sb.HertzContact(stiffness=4e8), cycles=1, frequency_ratio=np.linspace(2.0, 4.0, side),
-            velocity_amplitude=np.linspace(0.01, 0.6, 1000), step=2e-3, store=folder + "/store",
+            velocity_amplitude=np.linspace(0.01, 0.6, 1000), step=7e-4, store=folder + "/store",
             output=folder + "/map.nc")
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 """
@@ -199,14 +199,14 @@ def test_a_store_costs_little(tmp_path, small):
     asked = dict(small, cycles=200, frequency_ratio=np.linspace(1.0, 3.0, 8))
     asked["velocity_amplitude"] = np.linspace(0.05, 0.6, 16)
     asked["model"] = sb.ReducedModel.from_beam(asked["model"].beam, modes=32)
-    recipe = Recipe(map_setup(**asked))
+    work = PointWork(map_setup(**asked))
     computing = storing = 0.0
-    with MapStore(tmp_path / "store", recipe) as store:
-        stage = Stage("base", recipe.setup.grid, store.chunk)
+    with MapStore(tmp_path / "store", work) as store:
+        stage = Stage("base", work.setup.points, store.chunk)
         store.open_stage(stage)
         for task in range(stage.tasks):
             clock = time.monotonic()
-            columns = recipe.compute(stage.points(task), len(os.sched_getaffinity(0)))
+            columns = work.compute(stage.columns(task), len(os.sched_getaffinity(0)))
             computing += time.monotonic() - clock
             clock = time.monotonic()
             store.commit(stage, task, columns)

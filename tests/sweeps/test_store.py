@@ -19,14 +19,15 @@ from typer.testing import CliRunner
 import snapbeam
 from snapbeam.cli import app
 from snapbeam.core.validate import InputError
-from snapbeam.sweeps.compute.task import Recipe
+from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.compute.tasks import Stage
+from snapbeam.sweeps.doors import long_map, map_setup
+from snapbeam.sweeps.errors import StoreError
 from snapbeam.sweeps.keep import durable, ledger, tables
-from snapbeam.sweeps.keep.durable import StoreError, StoreLock, append_line
+from snapbeam.sweeps.keep.durable import StoreLock, append_line
 from snapbeam.sweeps.keep.ledger import Ledger, Record
 from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.stored import Tally, long_map
-from snapbeam.sweeps.sweep import map_setup
+from snapbeam.sweeps.stored import Tally
 
 CHUNK = 6  # twenty points: four tasks, the last one short
 
@@ -35,15 +36,15 @@ def fill(store, stage):
     store.open_stage(stage)
     todo = store.pending(stage)
     for task in todo:
-        store.commit(stage, task, store.recipe.compute(stage.points(task), 1))
+        store.commit(stage, task, store.work.compute(stage.columns(task), 1))
     return todo
 
 
 @pytest.fixture
-def stored(tmp_path, recipe):
+def stored(tmp_path, work):
     """A finished store, and its only stage."""
-    stage = Stage("base", recipe.setup.grid, CHUNK)
-    with MapStore(tmp_path / "store", recipe, CHUNK) as store:
+    stage = Stage("base", work.setup.points, CHUNK)
+    with MapStore(tmp_path / "store", work, CHUNK) as store:
         assert fill(store, stage) == [0, 1, 2, 3]
     return tmp_path / "store", stage
 
@@ -80,7 +81,7 @@ def swap(file):
 
 
 @pytest.mark.parametrize("damage", [truncate, empty, flip, delete, swap])
-def test_damage_in_any_chunk_is_found_and_repaired(stored, recipe, whole, damage):
+def test_damage_in_any_chunk_is_found_and_repaired(stored, work, whole, damage):
     path, stage = stored
     for file in chunks(path):
         task = int(file.name.split(".")[1])
@@ -88,16 +89,16 @@ def test_damage_in_any_chunk_is_found_and_repaired(stored, recipe, whole, damage
             continue  # the short last chunk holds another number of rows: covered by the others' exchange
         before = {each: each.read_bytes() for each in chunks(path)}
         broken = {task} | (damage(file) or set())
-        with MapStore(path, recipe) as store:
+        with MapStore(path, work) as store:
             store.open_stage(stage)
             assert set(store.damaged_in(stage)) == broken == set(store.pending(stage))
             for again in store.pending(stage):
-                store.commit(stage, again, recipe.compute(stage.points(again), 1))
+                store.commit(stage, again, work.compute(stage.columns(again), 1))
             assert store.reader(stage).read(0, stage.size).content_hash() == whole.content_hash()
         assert {each: each.read_bytes() for each in chunks(path)} == before
 
 
-def test_each_bit_of_a_chunk_counts(stored, recipe):
+def test_each_bit_of_a_chunk_counts(stored, work):
     path, stage = stored
     file = chunks(path)[0]
     sound = file.read_bytes()
@@ -105,30 +106,30 @@ def test_each_bit_of_a_chunk_counts(stored, recipe):
         data = bytearray(sound)
         data[at // 8] ^= 1 << (at % 8)
         file.write_bytes(bytes(data))
-        with MapStore(path, recipe) as store:
+        with MapStore(path, work) as store:
             store.open_stage(stage)
             assert store.damaged_in(stage) == [0], f"bit {at}"
 
 
-def test_damage_after_the_check_is_not_read(stored, recipe):
+def test_damage_after_the_check_is_not_read(stored, work):
     path, stage = stored
-    with MapStore(path, recipe) as store:
+    with MapStore(path, work) as store:
         store.open_stage(stage)
         flip(chunks(path)[-1])
         with pytest.raises(StoreError, match="task 3 of stage base was damaged after"):
             store.reader(stage).read(0, stage.size)
 
 
-def test_descriptions_of_arrays_are_written_again(stored, recipe, whole):
+def test_descriptions_of_arrays_are_written_again(stored, work, whole):
     path, stage = stored
     for file in sorted(path.glob("runs.zarr/**/zarr.json")):
         file.write_text("{}")
-    with MapStore(path, recipe) as store:
+    with MapStore(path, work) as store:
         assert fill(store, stage) == []
         assert store.reader(stage).read(0, 20).content_hash() == whole.content_hash()
 
 
-def test_done_is_what_the_ledger_says(stored, recipe, tmp_path):
+def test_done_is_what_the_ledger_says(stored, work, tmp_path):
     path, stage = stored
     lines = (path / "ledger.jsonl").read_text().splitlines(keepends=True)
     assert len(lines) == 4
@@ -141,17 +142,17 @@ def test_done_is_what_the_ledger_says(stored, recipe, tmp_path):
         ("\x00\xff not a record\n" + "".join(lines), []),
     ):
         (path / "ledger.jsonl").write_text(content)
-        with MapStore(path, recipe) as store:
+        with MapStore(path, work) as store:
             store.open_stage(stage)
             assert store.pending(stage) == pending and store.damaged == []
     (path / "ledger.jsonl").write_text("".join(lines[:3]) + lines[3][:40])
-    with MapStore(path, recipe) as store:
+    with MapStore(path, work) as store:
         assert store.ledger.torn == 1
         assert fill(store, stage) == [3]
     kept = Ledger(path / "ledger.jsonl")
     assert sorted(task for _, task in kept.records) == [0, 1, 2, 3] and kept.torn == 1
     record = kept.records["base", 2]
-    assert record.engine == recipe.setup.engine and record.step == recipe.setup.plan.step
+    assert record.engine == work.setup.integration.engine and record.step == work.setup.plan.step
     assert record.version == snapbeam.__version__ and len(record.content) == len(record.parameters) == 64
 
 
@@ -159,60 +160,60 @@ def test_other_parameters_are_refused_with_the_differences(stored, small):
     path, _ = stored
     other = dict(small, cycles=4, velocity_amplitude=np.linspace(0.05, 0.7, 6), location=0.4)
     with pytest.raises(InputError) as refused:
-        MapStore(path, Recipe(map_setup(**other)))
+        MapStore(path, PointWork(map_setup(**other)))
     text = str(refused.value)
     assert "cycles: 3 in the store, 4 asked for" in text
     assert re.search(r"velocity_amplitude: .* in the store, 6 points from 0\.05 to 0\.7 asked for", text)
     assert "location: 0.476" in text and "0.4 asked for" in text
     assert "damping_ratio" not in text and "frequency_ratio" not in text
-    with pytest.raises(InputError, match="replicas: nothing in the store, 2 asked for"):
+    with pytest.raises(InputError, match=r"replicas\.count: nothing in the store, 2 asked for"):
         long_map(**small, store=path, replicas=2)
 
 
-def test_a_folder_that_is_no_store(tmp_path, recipe):
+def test_a_folder_that_is_no_store(tmp_path, work):
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(InputError, match="is not empty and holds no map"):
-        MapStore(tmp_path, recipe)
+        MapStore(tmp_path, work)
     with pytest.raises(InputError, match="must be a folder, not a file"):
-        MapStore(tmp_path / "notes.txt", recipe)
+        MapStore(tmp_path / "notes.txt", work)
     with pytest.raises(InputError, match="is not an existing folder"):
-        MapStore(tmp_path / "none" / "store", recipe)
+        MapStore(tmp_path / "none" / "store", work)
 
 
-def test_a_damaged_description_is_told(stored, recipe):
+def test_a_damaged_description_is_told(stored, work):
     path, _ = stored
     held = json.loads((path / "map.json").read_text())
     for text in ("", "{", json.dumps(held | {"parameters": held["parameters"] | {"cycles": 4}})):
         (path / "map.json").write_text(text)
         with pytest.raises(StoreError, match=r"map\.json is damaged"):
-            MapStore(path, recipe)
+            MapStore(path, work)
     (path / "map.json").write_text(json.dumps(held | {"format_version": 99}))
     with pytest.raises(InputError, match=r"another format \(99\)"):
-        MapStore(path, recipe)
+        MapStore(path, work)
 
 
 @pytest.mark.parametrize(
     "where", ["map.json", "ledger.jsonl", "runs.zarr/base/numbers/c.1.0", "runs.zarr/base"]
 )
-def test_links_are_refused(stored, recipe, tmp_path, where):
+def test_links_are_refused(stored, work, tmp_path, where):
     path, _ = stored
     moved = tmp_path / "elsewhere"
     (path / where).rename(moved)
     (path / where).symlink_to(moved)
     with pytest.raises(InputError, match="is a link or no plain file"):
-        MapStore(path, recipe)
+        MapStore(path, work)
 
 
 @pytest.mark.parametrize("name", ["../outside", "/etc", "a/b", "..", ".hidden", ""])
-def test_names_that_leave_the_store_are_refused(stored, recipe, name):
+def test_names_that_leave_the_store_are_refused(stored, work, name):
     path, stage = stored
     good = Ledger(path / "ledger.jsonl").records["base", 0]
     append_line(path / "ledger.jsonl", Record(**(vars(good) | {"stage": name})).line())
     with pytest.raises(InputError, match="is no name of a member of a store"):
-        MapStore(path, recipe)
+        MapStore(path, work)
     (path / "ledger.jsonl").unlink()
-    with MapStore(path, recipe) as store, pytest.raises(InputError, match="is no name of a member"):
-        store.open_stage(Stage(name, stage.grid, CHUNK))
+    with MapStore(path, work) as store, pytest.raises(InputError, match="is no name of a member"):
+        store.open_stage(Stage(name, stage.points, CHUNK))
 
 
 HOLDER = """
@@ -225,17 +226,17 @@ with StoreLock(Path(sys.argv[1]) / "lock"):
 """
 
 
-def test_a_second_writer_is_refused_until_the_first_is_gone(stored, recipe):
+def test_a_second_writer_is_refused_until_the_first_is_gone(stored, work):
     path, _ = stored
     process = subprocess.Popen([sys.executable, "-c", HOLDER, str(path)], stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout.readline() == "held\n"
         with pytest.raises(StoreError, match=f"written by another process .process {process.pid}."):
-            MapStore(path, recipe)
+            MapStore(path, work)
         process.send_signal(signal.SIGKILL)
         process.wait()
-        with MapStore(path, recipe), pytest.raises(StoreError, match=f"process {os.getpid()}"):
-            MapStore(path, recipe)
+        with MapStore(path, work), pytest.raises(StoreError, match=f"process {os.getpid()}"):
+            MapStore(path, work)
     finally:
         process.kill()
         process.wait()
@@ -259,18 +260,18 @@ class Full:
 
 @pytest.mark.parametrize("where", ["data", "ledger"])
 @pytest.mark.parametrize("writes", [0, 1, 3])
-def test_a_full_disk_loses_nothing(tmp_path, recipe, whole, monkeypatch, where, writes):
-    stage = Stage("base", recipe.setup.grid, CHUNK)
-    store = MapStore(tmp_path / "store", recipe, CHUNK)
+def test_a_full_disk_loses_nothing(tmp_path, work, whole, monkeypatch, where, writes):
+    stage = Stage("base", work.setup.points, CHUNK)
+    store = MapStore(tmp_path / "store", work, CHUNK)
     store.open_stage(stage)
     place, name = (tables, "durable_write") if where == "data" else (ledger, "append_line")
     with monkeypatch.context() as patch, store:
         patch.setattr(place, name, Full(getattr(durable, name), writes))
         with pytest.raises(StoreError, match="No space left on device; no finished task is lost"):
             for task in range(stage.tasks):
-                store.commit(stage, task, recipe.compute(stage.points(task), 1))
+                store.commit(stage, task, work.compute(stage.columns(task), 1))
     finished = writes // 2 if where == "data" else writes
-    with MapStore(tmp_path / "store", recipe) as store:
+    with MapStore(tmp_path / "store", work) as store:
         store.open_stage(stage)
         assert store.pending(stage) == list(range(finished, 4)) and store.damaged == []
         fill(store, stage)
@@ -325,12 +326,12 @@ def test_a_full_file_system(small_disk, tmp_path, monkeypatch):
     )
 
 
-def test_verify_repairs_and_computes_nothing_else(tmp_path, small, recipe):
-    path, stage = tmp_path / "store", Stage("base", recipe.setup.grid, CHUNK)
-    with MapStore(path, recipe, CHUNK) as store:
+def test_verify_repairs_and_computes_nothing_else(tmp_path, small, work):
+    path, stage = tmp_path / "store", Stage("base", work.setup.points, CHUNK)
+    with MapStore(path, work, CHUNK) as store:
         store.open_stage(stage)
         for task in (0, 2):
-            store.commit(stage, task, recipe.compute(stage.points(task), 1))
+            store.commit(stage, task, work.compute(stage.columns(task), 1))
     flip(path / "runs.zarr/base/integers/c.2.0")
     tally = Tally()
     checked = long_map(**small, store=path, verify=True, tally=tally, threads=1)
@@ -341,7 +342,7 @@ def test_verify_repairs_and_computes_nothing_else(tmp_path, small, recipe):
         long_map(**small, store=tmp_path / "none", verify=True)
 
 
-def test_another_version_is_told(stored, recipe, small):
+def test_another_version_is_told(stored, work, small):
     path, _ = stored
     lines = []
     for record in Ledger(path / "ledger.jsonl").records.values():

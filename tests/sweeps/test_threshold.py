@@ -13,7 +13,7 @@ import snapbeam as sb
 from snapbeam.cli import app
 from snapbeam.core.validate import InputError
 from snapbeam.model.paper_values import BEAM, CONTACT
-from snapbeam.sweeps.search import Samples, search_everything_below, search_fast
+from snapbeam.sweeps.search import Responses, search_everything_below, search_fast
 
 
 def samples_of(classes):
@@ -23,7 +23,7 @@ def samples_of(classes):
         asked.extend(zip(columns.tolist(), rows.tolist(), strict=True))
         return classes[columns, rows]
 
-    samples = Samples(*classes.shape, ask)
+    samples = Responses(*classes.shape, ask)
     return samples, asked
 
 
@@ -192,4 +192,4 @@ def test_command(tmp_path, monkeypatch):
     assert curve["first_interwell"].shape == (2, 5) and curve.attrs["search"] == "fast"
     assert (tmp_path / "t.png").stat().st_size > 10_000
     refused = CliRunner().invoke(app, ["threshold", "--modes", "1,x"])
-    assert refused.exit_code == 2 and "must be whole numbers, such as 1,32" in refused.stderr
+    assert refused.exit_code == 2 and "whole numbers separated by commas, such as 1,32" in refused.stderr

@@ -10,10 +10,11 @@ import typer
 from snapbeam.cli import lab
 from snapbeam.cli import options as opt
 from snapbeam.cli.console import door, file_line, out
+from snapbeam.cli.parameter_options import configured
 
 if TYPE_CHECKING:
+    from snapbeam.core.findings import Finding
     from snapbeam.lab.calibration.measurements import ContactTest
-    from snapbeam.lab.plausibility.finding import Finding
 
 __all__ = ["calibrate"]
 
@@ -27,7 +28,6 @@ def _list_option(about: str) -> Any:
 
 @door
 def calibrate(
-    ctx: typer.Context,
     measurements: Annotated[
         Path | None,
         typer.Argument(help="TOML file with a section named measured.", metavar="[MEASUREMENTS]"),
@@ -59,7 +59,10 @@ def calibrate(
     effective_mass: Annotated[
         float | None, opt.number_option("1/(1/m1 + 1/m2) of the two bodies of --impacts, kg.", _MEASURED)
     ] = None,
-    config: opt.ConfigFile = None,
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", "-c", help="TOML file of parameters of the beam and the model.", metavar="FILE"),
+    ] = None,
     fit: Annotated[
         str | None,
         typer.Option(
@@ -68,7 +71,7 @@ def calibrate(
             metavar="NAME,NAME", rich_help_panel=_FIT,
         ),
     ] = None,
-    modes: opt.Modes = None,
+    modes: Annotated[int | None, opt.count_option("Number N of buckling modes, 1 to 256.", _FIT)] = None,
     output: Annotated[
         Path | None,
         typer.Option(
@@ -92,19 +95,19 @@ def calibrate(
 
     from snapbeam.config import config_from_mapping, override
     from snapbeam.core.files import check_writable
+    from snapbeam.core.findings import refuse
     from snapbeam.core.validate import InputError
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
     from snapbeam.lab.calibration.calibrate import Measurements, load_measurements
     from snapbeam.lab.calibration.calibrate import calibrate as fit_beam
     from snapbeam.lab.calibration.wording import with_error
-    from snapbeam.lab.plausibility.finding import refuse
 
     for name, path, suffixes in (
         ("output", output, (".toml",)), ("plot", plot, FIGURE_SUFFIXES), ("json", report, (".json",)),
     ):  # fmt: skip
         if path is not None:
             check_writable(path, name, suffixes)
-    settings = opt.configured({"config": config, "modes": modes})
+    settings = configured({"config": config, "model.modes": modes})
     given: dict[str, Any] = {}
     if measurements is not None:
         from_file, sections = load_measurements(measurements)
@@ -136,8 +139,10 @@ def calibrate(
         given["contact"] = (*given.get("contact", ()), *tests)
     if not given:
         raise InputError("measurements: give a TOML file, or frequencies as options; see --help")
+    beam = settings.model.beam
+    assert beam is not None
     chosen = tuple(name.strip() for name in fit.split(",")) if fit else None
-    result = fit_beam(Measurements(**given), settings.beam.build(), fit=chosen, modes=settings.model.modes)
+    result = fit_beam(Measurements(**given), beam, fit=chosen, modes=settings.model.modes)
     console = out()
     for name in result.values:
         console.print(f"  {name:<20}{with_error(result, name)}")
@@ -185,7 +190,7 @@ def _shapes(text: str) -> tuple[str, tuple[str, ...]]:
 
 def _contact_tests(path: Path, effective_mass: float) -> tuple[tuple[ContactTest, ...], tuple[Finding, ...]]:
     """The contact stiffness of tracked impacts as one test, and what is to be said of it."""
-    from snapbeam.cli.info import open_result
+    from snapbeam.cli.results import open_result
     from snapbeam.core.validate import InputError
     from snapbeam.lab.calibration.impacts import stiffness_from_impacts
     from snapbeam.lab.calibration.measurements import HERTZ_TIME, ContactTest

@@ -135,7 +135,7 @@ def _tell(done: int, total: int, result: Any) -> None:
 
 def _on_map(target: Path, simulated: Path) -> Path:
     """The responses on a map; the share that agrees is printed."""
-    from snapbeam.cli.info import open_result
+    from snapbeam.cli.results import open_result
     from snapbeam.figures.dot_comparison import plot_dot_comparison
     from snapbeam.figures.style import save_figure
     from snapbeam.lab.compare.dots import read_dots

@@ -10,14 +10,14 @@ import typer
 from snapbeam.cli import lab
 from snapbeam.cli import options as opt
 from snapbeam.cli.console import door, file_line, out
-from snapbeam.cli.info import open_result
+from snapbeam.cli.results import open_result
 from snapbeam.core.codes import ResponseClass
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from snapbeam.lab.plausibility.finding import Finding
+    from snapbeam.core.findings import Finding
 
 __all__ = ["compare"]
 
@@ -61,8 +61,8 @@ def compare(
     Example: snapbeam compare tests.csv map.nc --plot agreement.png
     """
     from snapbeam.core.files import check_writable
+    from snapbeam.core.findings import refuse
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
-    from snapbeam.lab.plausibility.finding import refuse
 
     if plot is not None:
         check_writable(plot, "plot", FIGURE_SUFFIXES)
@@ -146,9 +146,9 @@ def _run(
 ) -> tuple[dict, Figure | None, tuple[Finding, ...]]:
     import numpy as np
 
+    from snapbeam.core.findings import findings_of
     from snapbeam.lab.compare.response import measure_response
     from snapbeam.lab.compare.waveforms import compare_waveforms
-    from snapbeam.lab.plausibility.finding import findings_of
 
     onsets = None
     if "penetration_mm" in run:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import logging
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -29,6 +30,8 @@ __all__ = [
     "FAILED",
     "INTERRUPTED",
     "REFUSED",
+    "compiling_told",
+    "counted",
     "door",
     "duration",
     "errors",
@@ -114,41 +117,90 @@ class _RateColumn(ProgressColumn):
         return Text(pace(int(task.completed), int(task.total), task.elapsed, self.what))
 
 
-def pace(done: int, total: int, elapsed: float, what: str = "runs") -> str:
-    """Return runs, or whatever else is counted, per second and the time left, in words."""
+def pace(done: int, total: int, elapsed: float, what: str = "points") -> str:
+    """Return points, or whatever else is counted, per second and the time left, in words."""
     rate = done / max(elapsed, 1e-9)
     left = f", {duration((total - done) / rate)} left" if 0 < done < total else ""
     return f"{rate:.3g} {what}/s{left}"
 
 
-@contextmanager
-def progress(total: int, task: str = "map", what: str = "runs") -> Iterator[Callable[[int, int], None]]:
-    """Give a function of (runs done, runs in all) that shows how far it is, how fast, and what is left.
+def counted(count: int, what: str = "points") -> str:
+    """A number of things, in words: ``1 point``, ``256 points``."""
+    return f"{count} {what.removesuffix('s') if count == 1 else what}"
 
-    *task* names the work, *what* is counted.  A bar on a terminal; elsewhere a line for each tenth of the work.
+
+@contextmanager
+def progress(
+    total: int | None, task: str = "map", what: str = "points"
+) -> Iterator[Callable[[int, int], None]]:
+    """Give a function of (points done, points in all) that shows how far it is, how fast, and what is left.
+
+    *total* is None where it is not known before, *task* names the work, *what* is counted.  A bar on a terminal;
+    elsewhere a line for each tenth of the work.  The time before the first call, in which an engine may be compiled,
+    is not counted.
     """
     console = errors()
     if console.is_terminal:
         columns = (TextColumn(task), BarColumn(), MofNCompleteColumn(), _RateColumn(what))
-        with Progress(*columns, console=console, transient=True) as bar:
-            shown = bar.add_task(task, total=total)
-            yield lambda done, all_of_them: bar.update(shown, completed=done, total=all_of_them)
+        with Progress(*columns, console=console, transient=True) as bar, compiling_told(bar.console):
+            shown = bar.add_task(task, total=total, start=False)
+
+            def update(done: int, all_of_them: int) -> None:
+                bar.start_task(shown)
+                bar.update(shown, completed=done, total=all_of_them)
+
+            yield update
     else:
-        console.print(f"{total} {what} to compute")
-        yield _Lines(console, what)
+        with compiling_told(console):
+            yield _Lines(console, total, what)
+
+
+@contextmanager
+def compiling_told(console: Console) -> Iterator[None]:
+    """Show what the engines log, which is when they are compiled."""
+    log = logging.getLogger("snapbeam")
+    handler = _Handler(console)
+    before = log.level
+    log.addHandler(handler)
+    log.setLevel(min(before, logging.INFO) if before else logging.INFO)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.setLevel(before)
+
+
+class _Handler(logging.Handler):
+    def __init__(self, console: Console) -> None:
+        super().__init__(logging.INFO)
+        self.console = console
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.console.print(record.getMessage(), markup=False)
 
 
 class _Lines:
-    def __init__(self, console: Console, what: str) -> None:
+    def __init__(self, console: Console, total: int | None, what: str) -> None:
         self.console = console
         self.what = what
-        self.start = time.monotonic()
+        self.total: int | None = None
+        if total is not None:
+            self._begin(total)
+
+    def _begin(self, total: int) -> None:
+        self.total = total
+        self.start: float | None = None
         self.tenths = 0
+        self.console.print(f"{counted(total, self.what)} to compute")
 
     def __call__(self, done: int, total: int) -> None:
+        if total != self.total:
+            self._begin(total)
+        if self.start is None:
+            self.start = time.monotonic()
         tenths = 10 * done // total if total else 10
         if tenths <= self.tenths:
             return
         self.tenths = tenths
         spent = pace(done, total, time.monotonic() - self.start, self.what)
-        self.console.print(f"{done} of {total} {self.what}, {spent}")
+        self.console.print(f"{done} of {counted(total, self.what)}, {spent}")

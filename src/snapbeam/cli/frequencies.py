@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
+from typing import Annotated, Any
 
 from snapbeam.cli import options as opt
 from snapbeam.cli.console import door, out
+from snapbeam.cli.parameter_options import BEAM, MODEL, configured, with_parameters
 
 __all__ = ["frequencies"]
 
 
 @door
+@with_parameters(*BEAM, *MODEL)
 def frequencies(
-    ctx: typer.Context,
-    config: opt.ConfigFile = None,
+    given: Any,
     count: Annotated[int, opt.count_option("How many to print (10).", "Output")] = 10,
-    modes: opt.Modes = None,
-    length: opt.Length = None,
-    thickness: opt.Thickness = None,
-    width: opt.Width = None,
-    density: opt.Density = None,
-    young_modulus: opt.YoungModulus = None,
-    buckling_level: opt.BucklingLevel = None,
-    axial_load: opt.AxialLoad = None,
 ) -> None:
     """Print the natural frequencies about the equilibrium: reduced, exact, and without load.
 
@@ -33,20 +24,20 @@ def frequencies(
     """
     from rich.table import Table
 
-    from snapbeam import ReducedModel, exact_natural_freq
     from snapbeam.core.validate import integer
+    from snapbeam.model.frequencies import exact_natural_freq
 
     count = integer("count", count, 1, 200)
-    settings = opt.configured(ctx.params)
-    beam = settings.beam.build()
-    model = ReducedModel.from_beam(beam, **settings.model.model_dump())
+    model = configured(given).model
+    beam = model.beam
+    assert beam is not None
     reduced = model.natural_freq
     exact = exact_natural_freq(beam, count=count)
     straight = exact_natural_freq(beam.replace(axial_load=0.0), count=count)
     state = f"buckled by b = {1e3 * beam.buckling_level:.4g} mm" if beam.is_buckled else "not buckled"
     console = out()
     load = f"P = {beam.axial_load:.4f} N, P_cr = {beam.critical_load:.4f} N"
-    console.print(f"{load}: {state}; {settings.model.modes} modes")
+    console.print(f"{load}: {state}; {model.modes} modes")
     table = Table(box=None, pad_edge=False)
     for title in ("", "reduced (Hz)", "exact (Hz)", "error (%)", "without load (Hz)"):
         table.add_column(title, justify="right")

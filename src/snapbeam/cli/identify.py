@@ -75,11 +75,11 @@ def identify(
     from rich.table import Table
 
     from snapbeam.core.files import check_writable
+    from snapbeam.core.findings import refuse
     from snapbeam.core.validate import choice
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
     from snapbeam.lab.decay.identify import METHODS, identify_decay
     from snapbeam.lab.decay.shapes import mode_shapes
-    from snapbeam.lab.plausibility.finding import refuse
 
     for name, path in (("plot", plot), ("stabilisation", stabilisation)):
         if path is not None:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from snapbeam.cli.console import door, out
 
-if TYPE_CHECKING:
-    import xarray as xr
-
-__all__ = ["info", "open_result"]
+__all__ = ["info"]
 
 
 @door
@@ -20,6 +17,7 @@ def info(
     file: Annotated[Path, typer.Argument(help="NetCDF file written by snapbeam.", metavar="FILE")],
 ) -> None:
     """Say what a map or a run holds and what made it: parameters, version, command, time."""
+    from snapbeam.cli.results import open_result
     from snapbeam.cli.summary import class_table, parameter_table, status_lines
 
     dataset = open_result(file)
@@ -37,17 +35,3 @@ def info(
     if "response" in dataset:
         console.print(class_table(dataset), *status_lines(dataset), sep="\n")
     console.print(parameter_table(dataset.attrs))
-
-
-def open_result(file: Path) -> xr.Dataset:
-    """Return the dataset in a file, read into memory; refuse what is no NetCDF file of results."""
-    import xarray as xr
-
-    from snapbeam.core.validate import InputError
-
-    if not file.is_file():
-        raise InputError(f"file = {str(file)!r}: no such file")
-    try:
-        return xr.load_dataset(file, engine="h5netcdf")
-    except (OSError, ValueError) as error:
-        raise InputError(f"file = {str(file)!r}: is no NetCDF file of results") from error

@@ -17,7 +17,7 @@ from snapbeam.cli import options as opt
 if TYPE_CHECKING:
     import xarray as xr
 
-    from snapbeam.lab.plausibility.finding import Finding
+    from snapbeam.core.findings import Finding
 
 __all__ = [
     "Channel", "Columns", "JsonFile", "SamplingFreq", "Sensitivity", "SignalFile", "Strict", "Units", "numbers",

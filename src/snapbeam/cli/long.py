@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -18,21 +19,14 @@ if TYPE_CHECKING:
     from snapbeam.sweeps.stored import Tally
 
 __all__ = [
-    "Chunk",
-    "ClusterOption",
-    "HalveStep",
-    "Log",
-    "Refine",
-    "ReplicaSize",
-    "Replicas",
-    "Report",
-    "StoreOption",
-    "Verify",
+    "LongReport",
+    "is_long",
     "kept_config",
-    "long_arguments",
     "report",
     "resumed",
+    "sweep_options",
     "tally_lines",
+    "with_keeping",
 ]
 
 _LONG = "Long maps"
@@ -83,50 +77,101 @@ Log = Annotated[
 ]
 
 _KEPT = {"refine": int, "replicas": int, "replica_size": float, "halve_step": bool}
+_OPTIONS: dict[str, tuple[Any, Any]] = {
+    "store": (None, StoreOption),
+    "verify": (False, Verify),
+    "cluster": (None, ClusterOption),
+    "refine": (None, Refine),
+    "replicas": (None, Replicas),
+    "replica_size": (None, ReplicaSize),
+    "halve_step": (False, HalveStep),
+    "chunk": (None, Chunk),
+    "log": (None, Log),
+}
 
 
-def long_arguments(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the arguments of a long map among the options *given*; empty if it is a map like any other."""
-    names = ("store", "cluster", "replicas", "replica_size", "chunk")
-    arguments = {name: given[name] for name in names if given[name] is not None}
-    if given["refine"] is not None:
-        arguments["refine_levels"] = given["refine"]
-    return arguments | {name: True for name in ("verify", "halve_step") if given[name]}
+def with_keeping(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the options of sweeps that take long; it gets them as a mapping ``keeping``."""
+    own = {
+        name: parameter
+        for name, parameter in inspect.signature(function, eval_str=True).parameters.items()
+        if name != "keeping"
+    }
+
+    def command(**arguments: Any) -> Any:
+        keeping = {name: arguments.pop(name) for name in _OPTIONS}
+        return function(keeping=keeping, **arguments)
+
+    added = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+        for name, (default, kind) in _OPTIONS.items()
+    ]
+    kept = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own.values()]
+    command.__name__, command.__doc__, command.__module__ = (
+        function.__name__,
+        function.__doc__,
+        function.__module__,
+    )
+    command.__signature__ = inspect.Signature(kept + added)  # type: ignore[attr-defined]
+    return command
 
 
-def resumed(given: dict[str, Any], settings: Config) -> Config:
-    """Return the parameters of a store that is named alone, for one can be resumed without repeating them.
+def is_long(keeping: Mapping[str, Any]) -> bool:
+    """Whether anything but a log was asked for."""
+    return any(value not in (None, False) for name, value in keeping.items() if name != "log")
 
-    Options of the map that the store keeps are put into *given* where they were left out.
+
+def sweep_options(keeping: Mapping[str, Any]) -> dict[str, Any]:
+    """What a sweep is asked for beside its store."""
+    from snapbeam.core.validate import integer
+    from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicas
+
+    repeats = None
+    count = 0 if keeping["replicas"] is None else integer("replicas", keeping["replicas"], 0, 10_000)
+    if count or keeping["halve_step"]:
+        size = MEASURING_ERROR if keeping["replica_size"] is None else keeping["replica_size"]
+        repeats = Replicas(count, size, bool(keeping["halve_step"]))
+    return {"cluster": keeping["cluster"], "refine_levels": keeping["refine"] or 0, "replicas": repeats}
+
+
+def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config) -> Config:
+    """The parameters of a store that is named alone, for one can be resumed without repeating them.
+
+    Options that the store keeps are put into *keeping* where they were left out.
     """
     from snapbeam.config import config_from_mapping
     from snapbeam.core.validate import InputError
     from snapbeam.sweeps.keep.store import read_stored_config
 
-    if given["store"] is None or settings.model_dump(exclude_unset=True):
+    if keeping["store"] is None or settings.to_mapping():
         return settings
-    kept = read_stored_config(given["store"])
+    kept = read_stored_config(keeping["store"])
     if kept is None:
         return settings
     options = kept.get("options", {})
     if not isinstance(kept.get("parameters"), dict) or not isinstance(options, dict):
-        raise InputError(f"store = {str(given['store'])!r}: keeps no parameters that can be read")
+        raise InputError(f"store = {str(keeping['store'])!r}: keeps no parameters that can be read")
     for name, kind in _KEPT.items():
-        if not given[name] and isinstance(options.get(name), kind):
-            given[name] = options[name]
-    return config_from_mapping(kept["parameters"], source=f"{given['store'].name}/map.json")
+        if not keeping[name] and isinstance(options.get(name), kind):
+            keeping[name] = options[name]
+    return config_from_mapping(kept["parameters"], source=f"{keeping['store'].name}/map.json")
 
 
-def kept_config(settings: Config, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a store keeps so that it can be resumed by its name alone."""
-    options = {name: given[name] for name in _KEPT if given[name]}
-    return {
-        "parameters": settings.model_dump(mode="json", exclude_unset=True, exclude_none=True),
-        "options": options,
+def kept_config(settings: Config, keeping: Mapping[str, Any]) -> dict[str, Any]:
+    """What a store keeps so that it can be resumed by its name alone."""
+    import numpy as np
+
+    options = {name: keeping[name] for name in _KEPT if keeping[name]}
+    plain = {
+        section: {
+            name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()
+        }
+        for section, values in settings.to_mapping().items()
     }
+    return {"parameters": plain, "options": options}
 
 
-class Report:
+class LongReport:
     """Progress for a person: a bar on a terminal, lines elsewhere, and lines with the time in a log file."""
 
     _INTERVAL = 30.0
@@ -135,7 +180,7 @@ class Report:
         self._bar = bar
         self._log = log
         self._start = self._last = time.monotonic()
-        self._before = 0
+        self._before: int | None = None
         self._quiet = True
 
     def note(self, text: str) -> None:
@@ -146,7 +191,7 @@ class Report:
     def progress(self, done: int, total: int) -> None:
         """Say how far the present stage is."""
         now = time.monotonic()
-        if done < self._before:
+        if self._before is None or done < self._before:
             self._start = now
         finished = done >= total and done != self._before
         self._before = done
@@ -167,19 +212,23 @@ class Report:
 
 
 @contextmanager
-def report(total: int, log: Path | None) -> Iterator[Report]:
+def report(total: int, log: Path | None, store: Path | None) -> Iterator[LongReport]:
     """Give a report of a map of *total* points; refuse, before any work, a log that cannot be written."""
     from snapbeam.core.files import check_writable
 
     if log is not None:
         check_writable(log, "log")
     with progress(total) as bar:
-        said = Report(bar, log)
+        said = LongReport(bar, log)
         said.log(f"map of {total} points")
         try:
             yield said
         except KeyboardInterrupt:
-            said.note("stopped; what the store holds is kept, and the same command goes on from there")
+            said.note(
+                "stopped; nothing is kept: with --store FOLDER it could go on from here another time"
+                if store is None
+                else "stopped; what the store holds is kept, and the same command goes on from there"
+            )
             raise
 
 

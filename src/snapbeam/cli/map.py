@@ -1,46 +1,41 @@
-"""``snapbeam map``: the response class over frequency, amplitude and location."""
+"""``snapbeam map``: the response class over frequency, amplitude, location, or any parameters."""
 
 from __future__ import annotations
 
-import math
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from snapbeam.cli import long
 from snapbeam.cli import options as opt
-from snapbeam.cli.console import FAILED, door, out, progress
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from snapbeam.config import Axis
+from snapbeam.cli.console import FAILED, door, out
+from snapbeam.cli.parameter_options import (
+    BEAM,
+    CONTACT,
+    DRIVE,
+    MODEL,
+    RUN,
+    STRIKER,
+    configured,
+    with_parameters,
+)
 
 __all__ = ["compute_map"]
 
-_AXES = "Axes: a number, numbers a,b,c, or start:stop:count"
+_AXES = (
+    "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
+    "striker.location", "striker.location_m",
+)  # fmt: skip
 
 
 @door
+@with_parameters(*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN, axes=_AXES)
+@long.with_keeping
 def compute_map(
-    ctx: typer.Context,
-    config: opt.ConfigFile = None,
-    frequency_ratio: Annotated[
-        str | None,
-        typer.Option(
-            help="Omega, excitation over first natural frequency (0.1:4:64).", rich_help_panel=_AXES
-        ),
-    ] = None,
-    velocity_amplitude: Annotated[
-        str | None,
-        typer.Option(help="V, velocity amplitude over b omega_1 (0.01:0.65:40).", rich_help_panel=_AXES),
-    ] = None,
-    location: Annotated[
-        str | None,
-        typer.Option(help="x_s, shaker position over length, in (0, 1) (1/2.1).", rich_help_panel=_AXES),
-    ] = None,
+    given: Any,
+    keeping: Any,
     output: Annotated[
         Path,
         typer.Option(
@@ -50,32 +45,7 @@ def compute_map(
     plot: opt.Plot = None,
     dots: opt.Dots = None,
     threshold_line: opt.ThresholdLine = False,
-    modes: opt.Modes = None,
-    damping_ratio: opt.DampingRatio = None,
-    contact_stiffness: opt.ContactStiffness = None,
-    cycles: opt.Cycles = None,
-    reference_freq: opt.ReferenceFreq = None,
-    step: opt.Step = None,
-    accuracy: opt.Accuracy = None,
-    engine: opt.Engine = None,
-    early_decision: opt.EarlyDecision = None,
     threads: opt.Threads = None,
-    store: long.StoreOption = None,
-    verify: long.Verify = False,
-    cluster: long.ClusterOption = None,
-    refine: long.Refine = None,
-    replicas: long.Replicas = None,
-    replica_size: long.ReplicaSize = None,
-    halve_step: long.HalveStep = False,
-    chunk: long.Chunk = None,
-    log: long.Log = None,
-    length: opt.Length = None,
-    thickness: opt.Thickness = None,
-    width: opt.Width = None,
-    density: opt.Density = None,
-    young_modulus: opt.YoungModulus = None,
-    buckling_level: opt.BucklingLevel = None,
-    axial_load: opt.AxialLoad = None,
 ) -> None:
     """Compute the map of response types and say what it shows.
 
@@ -85,100 +55,98 @@ def compute_map(
     Example: snapbeam map --modes 32 --cycles 200 --frequency-ratio 0.1:4:64 --velocity-amplitude
     0.01:0.65:40 --location 1/2.1 -o map.nc --plot map.png
     """
+    from snapbeam.cli.results import check_pictures, draw_map, read_overlay
     from snapbeam.cli.summary import map_summary
     from snapbeam.core.files import check_writable
 
-    axes = {
-        "frequency_ratio": frequency_ratio,
-        "velocity_amplitude": velocity_amplitude,
-        "location": location,
-    }
-    given = dict(ctx.params)
-    settings = long.resumed(given, opt.configured(given, map=axes))
-    points = settings.map.axes()
+    settings = long.resumed(given, keeping, configured(given))
+    axes = _axes_of(settings, given)
     check_writable(output, "output", (".nc",))
+    check_pictures(("plot", plot))
     if plot is not None:
-        _check_plot(plot, points)
+        _check_two_axes(plot, axes)
+    system = settings.system
+    system.model.require_bistable("a map")
+    beam = system.model.beam
+    overlay = read_overlay(dots, system.model.reference_freq, None if beam is None else beam.buckling_level)
 
-    from snapbeam import ReducedModel, long_map, response_map
+    from snapbeam.sweeps.setup import sweep_setup
+    from snapbeam.sweeps.stored import Keeping, Tally, compute_sweep
 
-    beam = settings.beam.build()
-    model = ReducedModel.from_beam(beam, **settings.model.model_dump())
-    model.require_bistable("a map")
-    overlay = read_overlay(dots, settings.run.reference_freq or model.natural_freq[0], beam.buckling_level)
-    arguments: dict[str, Any] = points | opt.run_arguments(settings)
-    total = math.prod(1 if isinstance(values, float) else len(values) for values in points.values())
+    setup = sweep_setup(system, axes, settings.integration.replace(threads=threads))
+    asked = long.sweep_options(keeping)
+    total = setup.points.size
     start = time.monotonic()
-    further = long.long_arguments(given)
-    contact = settings.contact.build()
-    if not further and log is None:
-        with progress(total) as say:
-            dataset = response_map(model, contact, **arguments, threads=threads, progress=say)
-        write_map(dataset, output)
-        lines: list[str] = []
-    else:
-        from snapbeam.sweeps.stored import Tally
-
-        tally = Tally()
-        further |= {} if verify else {"output": output}
-        further |= {"config": long.kept_config(settings, given), "tally": tally, "threads": threads}
-        with long.report(total, log) as say:
-            dataset = long_map(model, contact, **arguments, **further, progress=say.progress, note=say.note)
-            lines = long.tally_lines(tally, store, time.monotonic() - start)
-            for line in lines:
-                say.log(line)
-        if verify:
-            out().print(*lines, sep="\n", markup=False)
-            raise typer.Exit(FAILED if tally.failed else 0)
+    tally = Tally()
+    with long.report(total, keeping["log"], keeping["store"]) as say:
+        kept = Keeping(
+            keeping["store"], keeping["verify"], keeping["chunk"], long.kept_config(settings, keeping),
+            say.note, tally,
+        )  # fmt: skip
+        dataset = compute_sweep(
+            setup, kept, output=output if long.is_long(keeping) and not kept.verify else None,
+            progress=say.progress, **asked,
+        )  # fmt: skip
+        lines = long.tally_lines(tally, keeping["store"], time.monotonic() - start)
+        for line in lines:
+            say.log(line)
+    if keeping["verify"]:
+        out().print(*lines, sep="\n", markup=False)
+        raise typer.Exit(FAILED if tally.failed else 0)
     elapsed = time.monotonic() - start
+    if not long.is_long(keeping):
+        from snapbeam.cli.results import write_map
+
+        write_map(dataset, output)
     files = [output]
     if plot is not None:
         files.append(draw_map(dataset, plot, overlay, threshold_line))
-    out().print(map_summary(dataset, files, None if further else elapsed))
+    out().print(map_summary(dataset, files, None if long.is_long(keeping) else elapsed))
     out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")
-    if further and tally.failed:
+    if tally.failed:
         raise typer.Exit(FAILED)
 
 
-def _check_plot(path: Path, points: dict[str, Axis]) -> None:
-    from snapbeam.core.files import check_writable
+def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
+    """The axes that were named; of frequency ratio and velocity amplitude, where neither is, the default ones."""
+    from snapbeam.config import DEFAULT_AXES, PHYSICAL
+
+    named = settings.axes()
+    if any(text for text in given.get("axis") or ()) or any(
+        name not in ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
+        for name in named
+    ):
+        return named
+    drive = settings.section("drive")
+    axes = dict(named)
+    for name, text in DEFAULT_AXES.items():
+        field = name.partition(".")[2]
+        physical = {row.parameter: full.partition(".")[2] for full, row in PHYSICAL.items()}[name]
+        if name not in named and field not in drive and physical not in drive:
+            axes |= settings.axes({name: text}) if not named else _default(name, text)
+    order = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
+    axes = {name: axes[name] for name in sorted(axes, key=lambda each: order.index(each))}
+    if not axes:
+        import numpy as np
+
+        striker = settings.system.striker
+        return {"striker.location": np.array([striker.location])}
+    return axes
+
+
+def _default(name: str, text: str) -> dict[str, Any]:
+    from snapbeam.config import parse_axis
+
+    return {name: parse_axis(name, text)}
+
+
+def _check_two_axes(path: Path, axes: dict[str, Any]) -> None:
+    from snapbeam.config import lookup
     from snapbeam.core.validate import InputError
-    from snapbeam.figures.style import FIGURE_SUFFIXES
 
-    check_writable(path, "plot", FIGURE_SUFFIXES)
-    axes = [name for name, values in points.items() if not isinstance(values, float) and len(values) > 1]
-    if len(axes) != 2:
+    many = [lookup(name).short for name, values in axes.items() if len(values) > 1]
+    if len(many) != 2:
         raise InputError(
-            f"plot = {str(path)!r}: a map is drawn over two axes, not {len(axes)} ({', '.join(axes)}); "
-            "leave --plot out, and draw one point of an axis with snapbeam plot map.nc --location 0.3"
+            f"plot = {str(path)!r}: a map is drawn over two axes, not {len(many)} ({', '.join(many)}); "
+            "leave --plot out, and draw one point of an axis with snapbeam plot map.nc --at location=0.3"
         )
-
-
-def read_overlay(dots: Path | None, reference_freq: float | None, buckling_level: float | None) -> Any:
-    """Return the measured points of a CSV file, normalised, or None."""
-    if dots is None:
-        return None
-    from snapbeam.lab.compare.dots import read_dots
-
-    return read_dots(dots, reference_freq=reference_freq, buckling_level=buckling_level)
-
-
-def write_map(dataset: xr.Dataset, path: Path) -> Path:
-    """Write a map to a NetCDF file, whole or not at all."""
-    from snapbeam.core.files import atomic_path
-
-    with atomic_path(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
-    return path
-
-
-def draw_map(dataset: xr.Dataset, path: Path, overlay: Any, threshold_line: bool) -> Path:
-    """Draw a map to a picture file."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from snapbeam.figures import plot_response_map, save_figure
-
-    figure = plot_response_map(dataset, dots=overlay, threshold_line=threshold_line).get_figure(root=True)
-    assert figure is not None
-    return save_figure(figure, path)

@@ -19,8 +19,9 @@ def paper(
     figure: Annotated[
         str,
         typer.Argument(
-            help="fig2 to fig8, figA9, figB10, si5 (an animation), low_frequency, sensitivity, claims (the "
-            "table of what the paper says and what is measured), or all.",
+            help="fig2 to fig8, figA9, figB10, si5 (an animation); low_frequency, resonance, waveforms, "
+            "transients, windows, disturbances, sensitivity (studies beside them); claims (the table of what the "
+            "paper says and what is measured); or all.",
             metavar="FIGURE",
         ),
     ],
@@ -64,7 +65,7 @@ def paper(
     matplotlib.use("Agg")
     from snapbeam.core.validate import InputError, choice
     from snapbeam.paper import FIGURES, Results
-    from snapbeam.paper.claims import write_claims
+    from snapbeam.paper.claims import summary, write_claims
 
     choice("figure", figure, (*FIGURES, "claims", "all"))
     try:
@@ -93,9 +94,7 @@ def paper(
             rows, files = write_claims(output, kept, Results("quick", progress=_Tell()))
         else:
             rows, files = write_claims(output, results)
-        verdicts = [row.verdict for row in rows]
-        counts = ", ".join(f"{verdicts.count(kind)} {kind}" for kind in dict.fromkeys(verdicts))
-        out().print(f"claims ({'stored' if stored else size}): {counts}")
+        out().print(f"claims ({'stored' if stored else size}): {summary(rows)}")
         for file in files:
             out().print(f"  {file_line(file)}")
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from snapbeam.cli import options as opt
 from snapbeam.cli.console import door, file_line, out
-from snapbeam.cli.info import open_result
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["plot"]
 
@@ -25,35 +27,62 @@ def plot(
     frequency_ratio: Annotated[float | None, opt.number_option("Omega.", _SLICE)] = None,
     velocity_amplitude: Annotated[float | None, opt.number_option("V.", _SLICE)] = None,
     location: Annotated[float | None, opt.number_option("x_s.", _SLICE)] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="One point of any axis, such as beam.thickness=4e-4; again for another axis.",
+            rich_help_panel=_SLICE,
+            metavar="NAME=VALUE",
+        ),
+    ] = None,
     dots: opt.Dots = None,
     threshold_line: opt.ThresholdLine = False,
     window: opt.Window = None,
 ) -> None:
     """Draw a map or a run again: other format, measured dots, one slice of a map of three axes."""
-    from snapbeam.cli.map import draw_map, read_overlay
-    from snapbeam.cli.simulate import draw_run
-    from snapbeam.core.files import check_writable
-    from snapbeam.core.validate import InputError
-    from snapbeam.figures.style import FIGURE_SUFFIXES
+    from snapbeam.cli.results import (
+        check_pictures,
+        draw_map,
+        draw_run,
+        draw_threshold,
+        open_result,
+        read_overlay,
+    )
 
-    check_writable(output, "output", FIGURE_SUFFIXES)
+    check_pictures(("output", output))
     dataset = open_result(file)
     if "time" in dataset.dims:
         draw_run(dataset, output, opt.parse_window(window))
+    elif "first_interwell" in dataset:
+        draw_threshold(dataset, output)
     else:
         wanted = {
             "frequency_ratio": frequency_ratio,
             "velocity_amplitude": velocity_amplitude,
             "location": location,
         }
-        chosen = {name: value for name, value in wanted.items() if value is not None}
-        for name in chosen:
-            if name not in dataset.dims:
-                raise InputError(
-                    f"{name}: is no axis of this map, whose axes are {', '.join(map(str, dataset.dims))}"
-                )
-        dataset = dataset.sel(chosen, method="nearest") if chosen else dataset
+        dataset = _sliced(dataset, wanted, at or [])
         attrs = dataset.attrs
         overlay = read_overlay(dots, attrs.get("reference_freq"), attrs.get("beam_buckling_level"))
         draw_map(dataset, output, overlay, threshold_line)
     out().print(f"Written: {file_line(output)}")
+
+
+def _sliced(dataset: xr.Dataset, wanted: dict[str, float | None], at: list[str]) -> xr.Dataset:
+    """The map at the points that were named, the nearest there are."""
+    from snapbeam.cli.parameter_options import parse_number
+    from snapbeam.config import lookup
+    from snapbeam.core.validate import InputError
+
+    chosen = {name: value for name, value in wanted.items() if value is not None}
+    for text in at:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise InputError(f"at = {text!r}: must be name=value")
+        chosen[lookup(name).short] = parse_number(value)
+    for name in chosen:
+        if name not in dataset.dims:
+            raise InputError(
+                f"{name}: is no axis of this map, whose axes are {', '.join(map(str, dataset.dims))}"
+            )
+    return dataset.sel(chosen, method="nearest") if chosen else dataset

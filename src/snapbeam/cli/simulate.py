@@ -9,40 +9,34 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from snapbeam.cli import options as opt
-from snapbeam.cli.console import door, duration, file_line, out
+from snapbeam.cli.console import FAILED, compiling_told, door, duration, errors, file_line, out
+from snapbeam.cli.parameter_options import (
+    BEAM,
+    CONTACT,
+    DRIVE,
+    MODEL,
+    RUN,
+    STRIKER,
+    configured,
+    with_parameters,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["draw_run", "simulate"]
-
-_SHAKER = "Shaker"
+__all__ = ["simulate"]
 
 
 @door
+@with_parameters(*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN, "run.tolerance")
 def simulate(
-    ctx: typer.Context,
-    config: opt.ConfigFile = None,
-    frequency_ratio: Annotated[
-        float | None,
-        opt.number_option("Omega, excitation over first natural frequency (1.21).", _SHAKER),
-    ] = None,
-    velocity_amplitude: Annotated[
-        float | None,
-        opt.number_option("V, velocity amplitude over b omega_1 (0.18).", _SHAKER),
-    ] = None,
-    location: Annotated[
-        float | None, opt.number_option("x_s, position over length, in (0, 1) (1/2.1).", _SHAKER)
-    ] = None,
-    side: Annotated[
-        str | None, typer.Option(help="Side it pushes from: below or above.", rich_help_panel=_SHAKER)
-    ] = None,
+    given: Any,
     drive: Annotated[
         Path | None,
         typer.Option(
             help="Recorded drive in place of the sinusoidal one: the file that snapbeam vibrometer "
             "--drive-output wrote.",
-            rich_help_panel=_SHAKER,
+            rich_help_panel="Striker and drive",
             metavar="FILE",
         ),
     ] = None,
@@ -63,43 +57,19 @@ def simulate(
         ),
     ] = None,
     window: opt.Window = None,
-    modes: opt.Modes = None,
-    damping_ratio: opt.DampingRatio = None,
-    contact_stiffness: opt.ContactStiffness = None,
-    cycles: opt.Cycles = None,
-    reference_freq: opt.ReferenceFreq = None,
-    step: opt.Step = None,
-    accuracy: opt.Accuracy = None,
-    engine: opt.Engine = None,
-    early_decision: opt.EarlyDecision = None,
-    length: opt.Length = None,
-    thickness: opt.Thickness = None,
-    width: opt.Width = None,
-    density: opt.Density = None,
-    young_modulus: opt.YoungModulus = None,
-    buckling_level: opt.BucklingLevel = None,
-    axial_load: opt.AxialLoad = None,
 ) -> None:
     """Compute one run and say how the beam responds.
 
     Example: snapbeam simulate --frequency-ratio 1.21 --velocity-amplitude 0.18 -o run.nc --plot run.png
     --window 0:20
     """
+    from snapbeam.cli.results import check_pictures, draw_run
     from snapbeam.core.files import check_writable
 
-    sine = {
-        "frequency_ratio": frequency_ratio,
-        "velocity_amplitude": velocity_amplitude,
-        "location": location,
-        "side": side,
-    }
-    settings = opt.configured(ctx.params, shaker=sine)
+    settings = configured(given)
     if output is not None:
         check_writable(output, "output", (".nc",))
-    if plot is not None:
-        from snapbeam.figures.style import FIGURE_SUFFIXES
-
-        check_writable(plot, "plot", FIGURE_SUFFIXES)
+    check_pictures(("plot", plot))
     if animate is not None:
         from snapbeam.figures.animation import ANIMATION_SUFFIXES
 
@@ -108,39 +78,60 @@ def simulate(
 
     import snapbeam as sb
 
-    model = sb.ReducedModel.from_beam(settings.beam.build(), **settings.model.model_dump())
-    start = time.monotonic()
-    arguments = opt.run_arguments(settings)
-    shaker: sb.Shaker | sb.RecordedDrive = settings.shaker.build()
+    system, integration = settings.system, settings.integration
     if drive is not None:
-        if frequency_ratio is not None or velocity_amplitude is not None:
-            raise sb.InputError("frequency_ratio, velocity_amplitude: must be left out with a recorded drive")
-        shaker = sb.RecordedDrive.from_dataset(
-            _recorded(drive), location=settings.shaker.location, side=settings.shaker.side
+        named = [
+            name for name in ("frequency_ratio", "velocity_amplitude") if given[f"drive.{name}"] is not None
+        ]
+        if named:
+            raise sb.InputError(f"{', '.join(named)}: must be left out with a recorded drive")
+        assert system.striker is not None
+        recorded = sb.RecordedDrive.from_dataset(
+            _recorded(drive), location=system.striker.location, side=system.striker.side
         )
-        arguments["cycles"] = cycles
-    run = sb.simulate(model, shaker, settings.contact.build(), **arguments)
-    elapsed = time.monotonic() - start
+        system = system.replace(striker=recorded)
+    start = time.monotonic()
+    with compiling_told(errors()), _share_done() as progress:
+        run = sb.simulate(system, integration, progress=progress)
     console = out()
-    console.print(_told(run, elapsed))
+    console.print(_told(run, time.monotonic() - start))
     if output is not None:
-        from snapbeam.cli.map import write_map
-
-        console.print(f"Written: {file_line(write_map(run.dataset, output))}")
+        run.save(output)
+        console.print(f"Written: {file_line(output)}")
     if plot is not None:
         console.print(f"Written: {file_line(draw_run(run.dataset, plot, part))}")
     if animate is not None:
         console.print(f"Written: {file_line(_animated(run.dataset, animate, part))}")
+    if run.outcome.status not in (sb.RunStatus.OK, sb.RunStatus.DECIDED):
+        raise typer.Exit(FAILED)
 
 
-def draw_run(dataset: xr.Dataset, path: Path, window: tuple[float, float] | None) -> Path:
-    """Draw a run to a picture file."""
-    import matplotlib
+class _share_done:
+    """Shows how much of a run is done, once it takes longer than a moment; a bar on a terminal alone."""
 
-    matplotlib.use("Agg")
-    from snapbeam.figures import plot_run, save_figure
+    _MOMENT = 1.0
 
-    return save_figure(plot_run(dataset, window), path)
+    def __init__(self) -> None:
+        self._start = time.monotonic()
+        self._bar: Any = None
+
+    def __enter__(self) -> Any:
+        return self._report
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+    def _report(self, share: float) -> None:
+        if time.monotonic() - self._start < self._MOMENT or not errors().is_terminal:
+            return
+        if self._bar is None:
+            from rich.progress import Progress
+
+            self._bar = Progress(console=errors(), transient=True)
+            self._task = self._bar.add_task("run", total=1.0)
+            self._bar.start()
+        self._bar.update(self._task, completed=share)
 
 
 def _recorded(path: Path) -> xr.Dataset:
@@ -166,23 +157,27 @@ def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | Non
 
 
 def _told(run: Any, elapsed: float) -> str:
-    from snapbeam.core.codes import ResponseClass, RunStatus
+    from snapbeam.core.codes import RunStatus
 
-    answer = run.response
-    kind, status = ResponseClass(int(answer.response)), RunStatus(int(answer.status))
+    answer = run.outcome
+    kind, status = answer.response, answer.status
+    if status not in (RunStatus.OK, RunStatus.DECIDED):
+        return f"[bold red]failed[/] ({status.name}): {status.advice}"
     well = "upper" if answer.final_well > 0 else "lower"
-    final = "below the barrier: it stays there" if answer.end_is_final else "above the barrier: not settled"
+    final = ", and stays there for certain" if answer.end_is_final else ""
     crossings = f"{answer.crossings}, {answer.crossings_last_quarter} of them in the last quarter"
     contact = f"{answer.impacts}, in contact {100.0 * answer.contact_share:.3g} % of the time"
     center = f"{answer.min_center_displacement:.4g} to {answer.max_center_displacement:.4g} b"
+    force = "no finite force" if answer.peak_force != answer.peak_force else f"{answer.peak_force:.4g} N"
     lines = [
         f"[bold]{kind.label}[/] (in {duration(elapsed)}; {status.advice})",
         f"  zero crossings        {crossings}",
-        f"  at the end            in the {well} well, {final}",
+        f"  at the end            in the {well} well{final}",
         f"  centre displacement   {center}",
-        f"  at the shaker         {answer.min_displacement:.4g} to {answer.max_displacement:.4g} b",
+        f"  at the striker        {answer.min_displacement:.4g} to {answer.max_displacement:.4g} b",
         f"  impacts               {contact}",
-        f"  peak contact force    {answer.peak_force:.4g} N",
+        f"  peak contact force    {force}",
+        f"  striker's work        {answer.shaker_work:.4g} J, {answer.dissipated_energy:.4g} J dissipated",
     ]
     if answer.crossings:
         lines.insert(2, f"  last crossing         at {answer.last_crossing:.5g} s")

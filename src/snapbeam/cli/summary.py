@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from snapbeam.cli.console import duration, file_line
+from snapbeam.cli.source import point_text
 from snapbeam.core.codes import ResponseClass, RunStatus
 
 if TYPE_CHECKING:
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "class_table",
+    "coordinate_text",
     "deepest_notch",
     "lowest_interwell",
     "map_summary",
@@ -26,7 +29,8 @@ __all__ = [
     "status_lines",
 ]
 
-_AXES = ("frequency_ratio", "velocity_amplitude", "location")
+_SYMBOLS = {"frequency_ratio": "Omega", "velocity_amplitude": "V", "location": "x_s", "modes": "N"}
+_PAPER = ("frequency_ratio", "velocity_amplitude", "location")
 
 
 def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | None = None) -> RenderableType:
@@ -34,8 +38,7 @@ def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | Non
     attrs = dataset.attrs
     runs = dataset["response"].size
     noun = "point" if "computed" in dataset or "class_share" in dataset else "run"
-    modes, cycles = _count(attrs["modes"], "mode"), _count(attrs["cycles"], "cycle")
-    head = f"{_count(runs, noun)} of {modes} over {cycles}"
+    head = f"{_count(runs, noun)} of {_modes(dataset)} over {_count(attrs.get('cycles', 0), 'cycle')}"
     if elapsed is not None:
         head += f" in {duration(elapsed)} ({runs / max(elapsed, 1e-9):.3g} runs/s)"
     lines = [head]
@@ -43,15 +46,34 @@ def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | Non
     if low is None:
         lines_after = ["No run snapped through: raise the velocity amplitude."]
     else:
-        lines_after = [f"Lowest interwell velocity amplitude: {_where(low, attrs)}"]
+        raised = _raised(dataset)
+        lines_after = [f"Lowest interwell {raised.replace('_', ' ')}: {_where(low, raised, attrs)}"]
         notch = deepest_notch(dataset)
         if notch is not None:
-            lines_after.append(f"Deepest notch of the threshold: {_where(notch, attrs)}")
+            lines_after.append(f"Deepest notch of the threshold: {_where(notch, raised, attrs)}")
             low = notch
     lines_after += status_lines(dataset)
     lines_after += [f"Written: {file_line(path)}" for path in files]
     lines_after += ["Next:", *(f"  {line}" for line in _suggestions(dataset, files, low))]
     return Group(*lines, class_table(dataset), *lines_after)
+
+
+def _modes(dataset: xr.Dataset) -> str:
+    if "modes" in dataset.coords:
+        return f"{', '.join(str(number) for number in np.atleast_1d(dataset['modes'].values))} modes"
+    return _count(int(dataset.attrs["modes"]), "mode") if "modes" in dataset.attrs else "its modes"
+
+
+def _raised(dataset: xr.Dataset) -> str:
+    """The axis whose least interwell value is of interest: the velocity amplitude, or the last one of numbers."""
+    if "velocity_amplitude" in dataset.dims or not dataset["response"].dims:
+        return "velocity_amplitude"
+    numbers = [
+        str(name)
+        for name in dataset["response"].dims
+        if name in dataset.coords and dataset[name].dtype.kind == "f"
+    ]
+    return numbers[-1] if numbers else "velocity_amplitude"
 
 
 def _count(number: int, noun: str) -> str:
@@ -72,17 +94,23 @@ def class_table(dataset: xr.Dataset) -> Table:
     return table
 
 
-def lowest_interwell(dataset: xr.Dataset) -> dict[str, float] | None:
-    """Return the coordinates of the interwell run of least velocity amplitude, or None."""
-    response = dataset["response"]
-    coordinates = np.broadcast_arrays(
-        *(dataset[name].broadcast_like(response).transpose(*response.dims).values for name in _AXES)
-    )
+def lowest_interwell(dataset: xr.Dataset) -> dict[str, Any] | None:
+    """Return the coordinates of the interwell run of least velocity amplitude, or None.
+
+    Of a map without that axis it is the least value of its last axis of numbers.
+    """
+    response, raised = dataset["response"], _raised(dataset)
     interwell = response.values >= ResponseClass.TRANSIENT_1
     if not interwell.any():
         return None
-    at = np.unravel_index(np.argmin(np.where(interwell, coordinates[1], np.inf)), response.shape)
-    return {name: float(values[at]) for name, values in zip(_AXES, coordinates, strict=True)}
+    names = [str(name) for name in dataset.coords if name in response.dims or name in _PAPER]
+    if raised in dataset.coords:
+        amounts = dataset[raised].broadcast_like(response).transpose(*response.dims).values
+        at = np.unravel_index(np.argmin(np.where(interwell, amounts, np.inf)), response.shape)
+    else:
+        at = np.unravel_index(int(np.argmax(interwell)), response.shape)
+    point = response.isel(dict(zip(response.dims, at, strict=True)))
+    return {name: point[name].item() for name in names if name in point.coords}
 
 
 def deepest_notch(dataset: xr.Dataset) -> dict[str, float] | None:
@@ -109,11 +137,23 @@ def deepest_notch(dataset: xr.Dataset) -> dict[str, float] | None:
     return place | {"location": float(dataset["location"].squeeze())}
 
 
-def _where(point: dict[str, float], attrs: dict[str, Any]) -> str:
-    omega, velocity, location = (point[name] for name in _AXES)
-    text = f"V = {velocity:.4g} at Omega = {omega:.4g}, x_s = {location:.4g}"
+def coordinate_text(name: str, value: Any) -> str:
+    """A coordinate in words, by the paper's symbol where it has one: ``V = 0.18``, ``side = below``."""
+    shown = f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{_SYMBOLS.get(name, name)} = {shown}"
+
+
+def _where(point: dict[str, Any], raised: str, attrs: dict[str, Any]) -> str:
+    """Coordinates of a point in words, in physical units beside where they are known."""
+    others = [coordinate_text(name, point[name]) for name in point if name != raised]
+    text = (
+        f"{coordinate_text(raised, point[raised])} at {', '.join(others)}"
+        if raised in point
+        else ", ".join(others)
+    )
     freq, level = attrs.get("reference_freq"), attrs.get("beam_buckling_level")
-    if freq and level:
+    if freq and level and {"frequency_ratio", "velocity_amplitude"} <= point.keys():
+        velocity, omega = point["velocity_amplitude"], point["frequency_ratio"]
         text += f" ({2e3 * np.pi * freq * level * velocity:.3g} mm/s at {omega * freq:.4g} Hz)"
     return text
 
@@ -140,28 +180,33 @@ def status_lines(dataset: xr.Dataset) -> list[str]:
     return lines
 
 
-def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, float] | None) -> list[str]:
-    common = f"--modes {dataset.attrs['modes']} --cycles {dataset.attrs['cycles']}"
+def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, Any] | None) -> list[str]:
+    """Commands that go on from a map, each of the very system that it is of."""
     lines = []
-    if low is not None:
-        omega, velocity, location = (low[name] for name in _AXES)
-        lines.append(
-            f"see that run      snapbeam simulate {common} --frequency-ratio {omega:.4g} "
-            f"--velocity-amplitude {velocity:.4g} --location {location:.5g} --plot run.png"
-        )
-        if dataset.sizes.get("frequency_ratio", 1) > 1 and dataset.sizes.get("velocity_amplitude", 1) > 1:
+    file = shlex.quote(str(files[0])) if files else None
+    axes = [str(name) for name in dataset["response"].dims if name in dataset.coords]
+    if low is not None and file is not None and "point" not in dataset.dims:
+        point = point_text({name: low[name] for name in axes})
+        at = f" --point {shlex.quote(point)}" if point else ""
+        lines.append(f"see that run      snapbeam simulate --from {file}{at} --plot run.png")
+        if {"frequency_ratio", "velocity_amplitude"} <= set(axes) and min(
+            dataset.sizes[name] for name in axes
+        ) > 1:
+            omega, velocity = low["frequency_ratio"], low["velocity_amplitude"]
             lines.append(
-                f"look closer       snapbeam map {common} "
+                f"look closer       snapbeam map --from {file}{at} "
                 f"--frequency-ratio {0.8 * omega:.3g}:{1.2 * omega:.3g}:40 "
                 f"--velocity-amplitude {0.5 * velocity:.3g}:{2.0 * velocity:.3g}:40 "
-                f"--location {location:.5g} -o closer.nc --plot closer.png"
+                "-o closer.nc --plot closer.png"
             )
-    if files:
-        lines.append(f"draw it again     snapbeam plot {escape(str(files[0]))} --threshold-line -o map.pdf")
+    if file is not None:
+        line = " --threshold-line" if set(axes) <= set(_PAPER) else ""
+        if sum(dataset.sizes[name] > 1 for name in axes) == 2:
+            lines.append(f"draw it again     snapbeam plot {file}{line} -o map.pdf")
         lines.append(
             f'open it           python -c "import xarray; print(xarray.open_dataset({str(files[0])!r}))"'
         )
-    return lines
+    return [escape(line) for line in lines]
 
 
 def parameter_table(attrs: dict[str, Any]) -> Table:

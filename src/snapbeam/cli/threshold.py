@@ -1,4 +1,4 @@
-"""``snapbeam threshold``: the smallest velocity amplitude that makes the beam snap through."""
+"""``snapbeam threshold``: the smallest velocity amplitude, or whatever else, that makes the beam snap through."""
 
 from __future__ import annotations
 
@@ -11,31 +11,38 @@ import typer
 
 from snapbeam.cli import options as opt
 from snapbeam.cli.console import door, duration, file_line, out, progress
+from snapbeam.cli.parameter_options import (
+    BEAM,
+    CONTACT,
+    DRIVE,
+    MODEL,
+    RUN,
+    STRIKER,
+    configured,
+    with_parameters,
+)
+from snapbeam.cli.summary import coordinate_text
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["threshold"]
 
-_AXES = "Axes: a number, numbers a,b,c, or start:stop:count"
+_AXES = (
+    "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
+    "striker.location", "striker.location_m", "model.modes",
+)  # fmt: skip
 _SEARCH = "Search"
+_VALUES = "0.005:0.64:128"
 
 
 @door
+@with_parameters(*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN, axes=_AXES)
 def threshold(
-    ctx: typer.Context,
-    config: opt.ConfigFile = None,
-    frequency_ratio: Annotated[
-        str | None, typer.Option(help="Omega (0.1:4:64).", rich_help_panel=_AXES)
-    ] = None,
-    location: Annotated[
-        str | None,
-        typer.Option(help="x_s (1/2.1); an axis if --frequency-ratio is a number.", rich_help_panel=_AXES),
-    ] = None,
-    velocity_amplitude: Annotated[
-        str | None,
-        typer.Option(help="V to choose from: range and resolution (0.005:0.64:128).", rich_help_panel=_AXES),
-    ] = None,
+    given: Any,
+    along: Annotated[
+        str, typer.Option(help="Parameter to raise (velocity_amplitude).", rich_help_panel=_SEARCH)
+    ] = "velocity_amplitude",
     search: Annotated[
         str,
         typer.Option(
@@ -55,29 +62,9 @@ def threshold(
         ),
     ] = Path("threshold.nc"),
     plot: opt.Plot = None,
-    modes: Annotated[
-        str | None,
-        typer.Option(
-            help="Numbers N of buckling modes, such as 1,32.", rich_help_panel="Reduced model and contact"
-        ),
-    ] = None,
-    damping_ratio: opt.DampingRatio = None,
-    contact_stiffness: opt.ContactStiffness = None,
-    cycles: opt.Cycles = None,
-    reference_freq: opt.ReferenceFreq = None,
-    step: opt.Step = None,
-    accuracy: opt.Accuracy = None,
-    engine: opt.Engine = None,
     threads: opt.Threads = None,
-    length: opt.Length = None,
-    thickness: opt.Thickness = None,
-    width: opt.Width = None,
-    density: opt.Density = None,
-    young_modulus: opt.YoungModulus = None,
-    buckling_level: opt.BucklingLevel = None,
-    axial_load: opt.AxialLoad = None,
 ) -> None:
-    """Find the threshold of the interwell response along frequency ratio or location, as a band.
+    """Find the threshold of the interwell response over frequency ratio, location or any parameters, as a band.
 
     The boundary is fractal in places, so two curves are written: the lowest amplitude that snaps the beam
     through, and the one above which every run does.
@@ -85,87 +72,72 @@ def threshold(
     Example: snapbeam threshold --modes 1,32 --frequency-ratio 0.1:4:64 --velocity-amplitude 0.005:0.64:128
     -o threshold.nc --plot threshold.png
     """
+    from snapbeam.cli.results import check_pictures, draw_threshold, write_map
+    from snapbeam.config import lookup, parse_axis
     from snapbeam.core.files import check_writable
+    from snapbeam.core.validate import InputError
 
-    axes = {
-        "frequency_ratio": frequency_ratio,
-        "velocity_amplitude": velocity_amplitude or "0.005:0.64:128",
-        "location": location,
-    }
-    given = {name: value for name, value in ctx.params.items() if name != "modes"}
-    settings = opt.configured(given, map=axes)
-    counts = [settings.model.modes] if modes is None else _counts(modes)
+    settings = configured(given)
     check_writable(output, "output", (".nc",))
-    if plot is not None:
-        from snapbeam.figures.style import FIGURE_SUFFIXES
+    check_pictures(("plot", plot))
+    name = lookup(along).name
+    axes = settings.axes()
+    values = axes.pop(name, None)
+    if values is None:
+        if name != "drive.velocity_amplitude":
+            raise InputError(f"{along}: give the values to choose from, as --axis {along}=start:stop:count")
+        values = np.atleast_1d(parse_axis("velocity_amplitude", _VALUES))
+    if not [each for each in axes if each != "model.modes"]:
+        axes["drive.frequency_ratio"] = np.atleast_1d(parse_axis("frequency_ratio", "0.1:4:64"))
+    axes = dict(sorted(axes.items(), key=lambda item: lookup(item[0]).is_run))
 
-        check_writable(plot, "plot", FIGURE_SUFFIXES)
+    from snapbeam.sweeps.threshold import threshold as find
 
-    from snapbeam import ReducedModel, threshold_curve
-    from snapbeam.cli.map import write_map
-
-    beam = settings.beam.build()
-    models = [
-        ReducedModel.from_beam(beam, modes=n, damping_ratio=settings.model.damping_ratio) for n in counts
-    ]
-    for model in models:
-        model.require_bistable("a threshold")
-    arguments: dict[str, Any] = settings.map.axes() | opt.run_arguments(settings)
-    arguments.pop("early_decision", None)
+    system = settings.system
+    system.model.require_bistable("a threshold")
     start = time.monotonic()
-    with progress(1) as report:
-        dataset = threshold_curve(
-            models[0] if len(models) == 1 else models, settings.contact.build(), **arguments,
-            search=search, share=0.1 if share is None else share, threads=threads, progress=report,
+    with progress(None, "threshold", "runs") as report:
+        dataset = find(
+            system, name, values, axes, settings.integration.replace(threads=threads), search=search,
+            share=0.1 if share is None else share, progress=report,
         )  # fmt: skip
     elapsed = time.monotonic() - start
     files = [write_map(dataset, output)]
     if plot is not None:
-        files.append(_draw(dataset, plot))
+        files.append(draw_threshold(dataset, plot))
     out().print(*_summary(dataset, elapsed), *(f"Written: {file_line(path)}" for path in files), sep="\n")
-
-
-def _counts(text: str) -> list[int]:
-    from snapbeam.core.validate import InputError, integer
-
-    try:
-        return [integer("modes", int(part), 1, 256) for part in text.split(",")]
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"modes = {text!r}: must be whole numbers, such as 1,32") from None
-
-
-def _draw(dataset: xr.Dataset, path: Path) -> Path:
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from snapbeam.figures import plot_threshold, save_figure
-
-    figure = plot_threshold(dataset).get_figure(root=True)
-    assert figure is not None
-    return save_figure(figure, path)
 
 
 def _summary(dataset: xr.Dataset, elapsed: float) -> list[str]:
     runs, full = dataset.attrs["runs"], dataset.attrs["runs_of_full_map"]
     lines = [f"{runs} runs in {duration(elapsed)}, {100.0 * runs / full:.1f} % of a full map's {full}"]
-    curves = [dataset.isel(modes=at) for at in range(dataset.sizes.get("modes", 0))] or [dataset]
-    for curve in curves:
-        modes = curve["modes"].item() if "modes" in curve.coords else dataset.attrs["modes"]
-        first = curve["first_interwell"]
-        if bool(first.isnull().all()):
-            lines.append(f"N = {modes}: no interwell response; raise the velocity amplitude")
-            continue
-        at = first.isel({first.dims[0]: int(np.nanargmin(first.values))})
-        width = float((curve["always_interwell"] - first).mean())
-        along = str(first.dims[0])
-        lines.append(
-            f"N = {modes}: lowest threshold V = {float(at):.4g} at {along} = {float(at[along]):.4g}; "
-            f"band {width:.2g} wide on average"
-        )
-        none = int(first.isnull().sum())
-        if none:
-            lines.append(f"  no interwell response in range at {none} of {first.size} points")
+    along = dataset.attrs["along"]
+    first = dataset["first_interwell"]
+    across = str(first.dims[-1])
+    for at in np.ndindex(first.shape[:-1]):
+        chosen = dict(zip(map(str, first.dims[:-1]), at, strict=True))
+        curve = dataset.isel(chosen)
+        lines += _curve(curve, along, across, chosen)
     lines.append(f"It may miss {dataset.attrs['may_miss']}.")
+    return lines
+
+
+def _curve(curve: xr.Dataset, along: str, across: str, chosen: dict[str, int]) -> list[str]:
+    """What one curve shows."""
+    first = curve["first_interwell"]
+    named = [coordinate_text(name, curve[name].item()) for name in chosen]
+    if "modes" in curve.attrs and "modes" not in chosen:
+        named.append(coordinate_text("modes", int(curve.attrs["modes"])))
+    head = f"{', '.join(named)}: " if named else ""
+    if bool(first.isnull().all()):
+        return [f"{head}no interwell response; raise {along}"]
+    at = first.isel({across: int(np.nanargmin(first.values))})
+    width = float((curve["always_interwell"] - first).mean())
+    lines = [
+        f"{head}lowest threshold {coordinate_text(along, float(at))} at {coordinate_text(across, at[across].item())}; "
+        f"band {width:.2g} wide on average"
+    ]
+    none = int(first.isnull().sum())
+    if none:
+        lines.append(f"  no interwell response in range at {none} of {first.size} points")
     return lines

@@ -189,7 +189,7 @@ def track(
         check_writable(video, "video", (".mp4", ".mov", ".avi"))
     integer("frame", frame, 0)
     integer("video_every", video_every, 1)
-    from snapbeam.lab.plausibility.finding import findings_of, refuse
+    from snapbeam.core.findings import findings_of, refuse
     from snapbeam.lab.tracking.quality import tracking_report
     from snapbeam.lab.tracking.settings import TrackingSettings
     from snapbeam.lab.tracking.track import track as track_recording

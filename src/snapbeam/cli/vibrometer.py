@@ -75,9 +75,9 @@ def vibrometer(
     Example: snapbeam vibrometer velocity.csv --frequency 100 --plot drive.png --json drive.json
     """
     from snapbeam.core.files import atomic_path, check_writable
+    from snapbeam.core.findings import doubtful, refuse
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
     from snapbeam.lab.drive.vibrometer import SNR_LIMIT, measure_drive
-    from snapbeam.lab.plausibility.finding import doubtful, refuse
 
     for name, path, suffixes in (
         ("plot", plot, FIGURE_SUFFIXES),
@@ -106,7 +106,7 @@ def vibrometer(
     findings = drive.findings
     alignment = None
     if camera is not None:
-        from snapbeam.cli.info import open_result
+        from snapbeam.cli.results import open_result
         from snapbeam.lab.drive.align import align
         from snapbeam.lab.drive.seen import shaker_signal
 

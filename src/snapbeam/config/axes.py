@@ -17,7 +17,10 @@ Axis = float | NDArray[np.float64]
 _FORMS = "a number, numbers separated by commas, or start:stop:count, such as 0.1:4:64"
 
 
-def parse_axis(name: str, value: float | str | Sequence[float]) -> Axis:
+_WHOLE = "a whole number, whole numbers separated by commas, such as 1,32, or start:stop:count"
+
+
+def parse_axis(name: str, value: float | str | Sequence[float], *, whole: bool = False) -> Axis:
     """Return *value* as one number, or as a strictly increasing axis.
 
     Parameters
@@ -27,6 +30,8 @@ def parse_axis(name: str, value: float | str | Sequence[float]) -> Axis:
     value : float, str or sequence of float
         ``0.18``, ``"0.18"``, ``"1/2.1"``, ``"0.1,0.2,0.5"``, or ``"0.1:4:64"`` for 64 points from 0.1 to 4,
         both included.
+    whole : bool
+        Whether the numbers are to be whole, as a refusal then says.
 
     Returns
     -------
@@ -38,7 +43,7 @@ def parse_axis(name: str, value: float | str | Sequence[float]) -> Axis:
         If it cannot be read so, is not finite, or does not increase.
     """
     if isinstance(value, str):
-        return _parse_text(name, value)
+        return _parse_text(name, value, _WHOLE if whole else _FORMS)
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return _finite(name, str(value), float(value))
     if isinstance(value, bool) or not isinstance(value, (Sequence, np.ndarray)):
@@ -46,10 +51,10 @@ def parse_axis(name: str, value: float | str | Sequence[float]) -> Axis:
     return axis(name, value, -math.inf, math.inf)
 
 
-def _parse_text(name: str, text: str) -> Axis:
+def _parse_text(name: str, text: str, forms: str) -> Axis:
     parts = text.split(":")
     if len(parts) == 3:
-        start, stop = (_number(name, text, part) for part in parts[:2])
+        start, stop = (_number(name, text, part, forms) for part in parts[:2])
         try:
             count = int(parts[2])
         except ValueError:
@@ -58,17 +63,17 @@ def _parse_text(name: str, text: str) -> Axis:
             raise InputError(f"{name} = {text!r}: start must be less than stop and count at least 2")
         return np.linspace(start, stop, count)
     if len(parts) != 1:
-        raise InputError(f"{name} = {text!r}: must be {_FORMS}")
-    numbers = [_number(name, text, part) for part in text.split(",")]
+        raise InputError(f"{name} = {text!r}: must be {forms}")
+    numbers = [_number(name, text, part, forms) for part in text.split(",")]
     return numbers[0] if len(numbers) == 1 else axis(name, numbers, -math.inf, math.inf)
 
 
-def _number(name: str, text: str, part: str) -> float:
+def _number(name: str, text: str, part: str, forms: str) -> float:
     numerator, slash, denominator = part.partition("/")
     try:
         value = float(numerator) / float(denominator) if slash else float(part)
     except (ValueError, ZeroDivisionError):
-        raise InputError(f"{name} = {text!r}: must be {_FORMS}") from None
+        raise InputError(f"{name} = {text!r}: must be {forms}") from None
     return _finite(name, text, value)
 
 

@@ -23,12 +23,14 @@ from snapbeam.core.validate import InputError, InputTypeError
 
 __all__ = [
     "__version__",
+    "array_hash",
     "canonical_json",
     "command_line",
     "created_now",
     "made_by",
     "parameter_hash",
     "platform_name",
+    "processor_name",
 ]
 
 __version__ = "0.1.0"
@@ -37,6 +39,13 @@ __version__ = "0.1.0"
 def platform_name() -> str:
     """Return the system, the processor family and the Python version: ``"Linux x86_64, Python 3.11.2"``."""
     return f"{platform.system()} {platform.machine()}, Python {platform.python_version()}"
+
+
+def processor_name() -> str:
+    """Return the type of the processor that code is compiled for; results are bit-identical on one type."""
+    from llvmlite import binding
+
+    return str(binding.get_host_cpu_name())
 
 
 def created_now() -> str:
@@ -112,6 +121,15 @@ def _plain(value: Any, name: str) -> Any:
 def parameter_hash(parameters: Any) -> str:
     """Return the SHA-256 of :func:`canonical_json`, in 64 hexadecimal digits: equal for equal parameters."""
     return hashlib.sha256(canonical_json(parameters).encode()).hexdigest()
+
+
+def array_hash(values: Any) -> str:
+    """Return the SHA-256 of an array's shape, kind and contents."""
+    array = np.ascontiguousarray(values)
+    digest = hashlib.sha256(f"{array.shape} {array.dtype.kind}".encode())
+    plain = "".join(map(str, array.tolist())).encode() if array.dtype.kind in "OUS" else array.tobytes()
+    digest.update(plain)
+    return digest.hexdigest()
 
 
 def made_by(parameters: Any = None, *, command: str | None = None) -> dict[str, str]:

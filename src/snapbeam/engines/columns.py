@@ -1,73 +1,39 @@
-"""Which column of the kernels' arrays holds what."""
+"""What describes one run of an ensemble to an engine: a record by name, SI units, seen from the striker's side."""
 
 from __future__ import annotations
 
-from enum import IntEnum
+from typing import Any
 
-__all__ = ["Counts", "Numbers", "Reals", "Ticks"]
+import numpy as np
 
+__all__ = ["RUN"]
 
-class Counts(IntEnum):
-    """Integers that a run keeps."""
+_REALS = (
+    "offset",  # penetration of the tip at mid-stroke into the beam at rest
+    "tip_speed",  # greatest speed of the tip, ever
+    "phase",  # argument of the drive at the start, rad
+    "rest_contact",  # displacement of the contact point and of the centre in the well that q is counted from
+    "rest_center",
+    "tick",  # s
+    "decide_energy",  # energy above the well below which a beam in the far well stays there; -inf: never decide
+    "decide_reach",  # highest future position of the tip, or 0 if that is higher
+    "contact_time",  # s since the present contact began; negative: apart; NaN: the penetration decides
+    "lowest",  # height of a flight that is too low to be seen, m
+    "home",  # +1 if q and p are counted from the first well, -1 from the other
+)
+_INTEGERS = (
+    "step",  # ticks of a flight step
+    "period",  # ticks in which the drive's argument makes one turn
+    "landing",  # ticks from one state that is handed out to the next; the whole run if none is
+    "end",
+    "last_quarter",
+    "decide_crossings",  # crossings in the last quarter beyond which it is continuous; -1: never decide
+    "coarsest",  # halvings of the flight step that make the longest contact step
+    "finest",  # and the shortest
+    "contact_row",
+    "start_row",
+)
 
-    STATUS = 0
-    TIME = 1
-    """Ticks marched."""
-    TOUCHING = 2
-    ONSET = 3
-    """Tick at which the present contact began."""
-    SIDE = 4
-    """Sign of the centre displacement, -1 in the well the run began in."""
-    CROSSINGS = 5
-    CROSSINGS_LAST_QUARTER = 6
-    IMPACTS = 7
-    STEPS = 8
-    SAMPLES = 9
-
-
-class Numbers(IntEnum):
-    """Floats that a run keeps, in SI units, seen from the shaker's side."""
-
-    LAST_CROSSING = 0
-    MIN_DISPLACEMENT = 1
-    MAX_DISPLACEMENT = 2
-    MIN_CENTER = 3
-    MAX_CENTER = 4
-    PEAK_FORCE = 5
-    CONTACT_TIME = 6
-    WORK = 7
-    GROSS_WORK = 8
-    DISSIPATED = 9
-    ENERGY = 10
-    DEEPEST = 11
-    """Greatest penetration of the present contact."""
-    IMPULSE = 12
-    """Impulse of the present contact."""
-    DECIDED_AT = 13
-
-
-class Reals(IntEnum):
-    """Floats that describe a run, in SI units, seen from the shaker's side."""
-
-    OFFSET = 0
-    """Penetration of the shaker at mid-stroke into a beam at rest."""
-    AMPLITUDE = 1
-    OMEGA = 2
-    STIFFNESS = 3
-    REST_CONTACT = 4
-    REST_CENTER = 5
-    TICK = 6
-    DECIDE_ENERGY = 7
-    DECIDE_REACH = 8
-
-
-class Ticks(IntEnum):
-    """Integers that describe a run."""
-
-    STEP = 0
-    PERIOD = 1
-    END = 2
-    LAST_QUARTER = 3
-    DECIDE_CROSSINGS = 4
-    CONTACT_ROW = 5
-    START_ROW = 6
+RUN: np.dtype[Any] = np.dtype(
+    [(name, np.float64) for name in _REALS] + [(name, np.int64) for name in _INTEGERS], align=True
+)

@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from snapbeam.core.validate import choice, positive
-from snapbeam.model.contact import HertzContact, Restitution
+from snapbeam.model.contact import ContactLaw
+from snapbeam.model.integration import ACCURACIES
 from snapbeam.model.reduction import ReducedModel
 
-__all__ = ["ACCURACIES", "Plan", "plan_steps"]
+__all__ = ["Plan", "plan_steps"]
 
 # Free flight.  A step is short enough either for the fastest mode (radians per step) or, since the linear
 # flow is exact, for the rate at which the tension detunes the modes (radians per step).
@@ -23,8 +24,6 @@ _FREE_SHARE = 1.0 / 16.0
 # it the shortest step is, by order.
 _CONTACT_SHARE = 1.0 / 6.0
 _CONTACT_SPEED = 0.2
-_PLACES = np.linspace(0.02, 0.5, 25).tolist()
-"""Where the mass met by an impulse is looked at; the other half of the beam is its mirror image."""
 _HALVINGS = {4: 2, 6: 6}
 # Level "reference": how many times shorter, and how far the fastest mode may turn in a flight step, rad.
 _SHORTER = 6.0
@@ -33,8 +32,6 @@ _MOST_HALVINGS = 5
 _CONTACT_TURN = math.pi
 """Of the fastest mode in the longest contact step, rad: the contact moves every mode, and beyond half a turn
 its kicks come in step with the fastest ones."""
-
-ACCURACIES = ("map", "reference")
 
 
 class Plan(NamedTuple):
@@ -61,7 +58,7 @@ def _detuning_rate(model: ReducedModel) -> float:
 
 def plan_steps(
     model: ReducedModel,
-    contact: HertzContact | Restitution | None,
+    contact: ContactLaw | None,
     *,
     step: float | None = None,
     accuracy: str = "map",
@@ -87,10 +84,13 @@ def plan_steps(
     if math.isinf(flight):
         flight = _FREE_SHARE / model.reference_freq
     impact = flight
-    if isinstance(contact, HertzContact):
-        mass = min(model.contact_mass(location) for location in _PLACES)
+    duration = 0.0
+    if contact is not None and not contact.impulsive:
+        mass = model.lightest_contact_mass
         speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_freq
-        impact = _CONTACT_SHARE * contact.impact_duration(mass, speed)
+        duration = contact.impact_duration(mass, speed)
+    if duration > 0.0:
+        impact = _CONTACT_SHARE * duration
         flight = min(flight, impact * 2**_MOST_HALVINGS)
         if fastest > 0.0:
             impact = min(impact, _CONTACT_TURN / fastest)

@@ -2,55 +2,92 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError, choice
-from snapbeam.engines.cpu import driver as cpu_engine
+from snapbeam.engines.cpu import driver as cpu
 from snapbeam.engines.ensemble import Ensemble
+from snapbeam.engines.outputs import Landings, Recorded
+from snapbeam.model.contact import ContactLaw
+from snapbeam.model.drive import Drive, Sine
+from snapbeam.model.integration import ENGINES
 
-__all__ = ["ENGINES", "Engine", "resolve"]
-
-ENGINES = ("auto", "cpu", "cuda")
+__all__ = ["Engine", "resolve"]
 
 _FEWEST_RUNS = 2000
 """A device marches one run slower than a core does, but over a thousand at a time: fewer do not fill it."""
 _FEWEST_CYCLES = 2_000_000
 """Cycles of all runs, more than a minute of a core's work: with fewer, compiling the kernel costs more."""
 
+Progress = Callable[[int, int], object]
+
 
 class Engine(Protocol):
-    """An engine marches every run of an ensemble and returns its counts and numbers, a row a run."""
+    """What every engine can do, or refuses by name."""
 
-    def __call__(
+    def run_ensemble(
+        self, ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
+    ) -> NDArray[Any]:
+        """March every run of an ensemble; a book a run."""
+        ...
+
+    def march_landing(
+        self, ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
+    ) -> Landings:
+        """As :meth:`run_ensemble`, and the states at every landing."""
+        ...
+
+    def march_tangents(
         self,
         ensemble: Ensemble,
+        tangents: NDArray[np.float64],
         threads: int | None = None,
-        progress: Callable[[int, int], object] | None = None,
-    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
+        progress: Progress | None = None,
+    ) -> tuple[Landings, NDArray[np.float64]]:
+        """As :meth:`march_landing`, with small changes of the states carried along."""
+        ...
+
+    def record(
+        self,
+        ensemble: Ensemble,
+        times: NDArray[np.float64],
+        in_contact: bool,
+        progress: Callable[[float], object] | None = None,
+    ) -> Iterator[Recorded]:
+        """March one run and give what it wrote down, in pieces."""
+        ...
 
 
 def resolve(
-    name: str, *, runs: int = 1, cycles: int = 1, modes: int = 1, restitution: bool = False
+    name: str,
+    *,
+    runs: int = 1,
+    cycles: float = 1,
+    modes: int = 1,
+    law: type[ContactLaw] | None = None,
+    drive: type[Drive] = Sine,
 ) -> tuple[str, Engine]:
     """The engine that *name* stands for, and its own name.
 
-    ``"auto"`` is the CUDA engine where a device can be used and the work pays for it, else the CPU's: at
-    least 2000 runs and two million cycles in all, at most 128 modes, no law of restitution.
+    ``"auto"`` is the CUDA engine where a device can be used, what is studied is something for it and the work pays
+    for it, else the CPU's: at least 2000 runs and two million cycles in all, at most 128 modes.
 
     Parameters
     ----------
     name : {"auto", "cpu", "cuda"}
-    runs, cycles : int
-        How many runs there are to march, and the cycles of each.
+    runs : int
+        How many there are to march.
+    cycles : float
+        Of each.
     modes : int
         Modes of the model.
-    restitution : bool
-        Whether impacts follow Newton's law of restitution.
+    law, drive : type
+        Of contact, and of the striker.
 
     Raises
     ------
@@ -58,17 +95,13 @@ def resolve(
         For another name, or for ``"cuda"`` without a device: the message says what is missing.
     """
     choice("engine", name, ENGINES)
-    if name == "cuda" or (
-        name == "auto"
-        and runs >= _FEWEST_RUNS
-        and runs * cycles >= _FEWEST_CYCLES
-        and find_spec("numba_cuda")
-    ):
-        from snapbeam.engines.cuda import driver as cuda_engine
+    pays = runs >= _FEWEST_RUNS and runs * cycles >= _FEWEST_CYCLES
+    if name == "cuda" or (name == "auto" and pays and find_spec("numba_cuda")):
+        from snapbeam.engines.cuda import driver as cuda
 
-        reason = cuda_engine.refusal(modes, restitution)
-        if reason is None and (name == "cuda" or not cuda_engine.simulated()):
-            return "cuda", cuda_engine.run_ensemble
+        reason = cuda.refusal(modes, law, drive)
+        if reason is None and (name == "cuda" or not cuda.simulated()):
+            return "cuda", cuda
         if name == "cuda":
             raise InputError(f"engine = 'cuda': {reason}; use engine='cpu' or 'auto'")
-    return "cpu", cpu_engine.run_ensemble
+    return "cpu", cpu

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from snapbeam.core.files import atomic_path, check_writable
 from snapbeam.core.validate import InputError, integer, nonnegative, positive
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
+from snapbeam.model.bent import displacement_along
 from snapbeam.runs.schema import check_trajectory
 
 if TYPE_CHECKING:
@@ -279,19 +280,14 @@ class _Scene:
 
 
 class _BeamShape:
-    """The deflection along the beam, in units of b, from its modal amplitudes."""
+    """The deflection along the beam, over b, at any instant between two samples."""
 
     def __init__(self, dataset: xr.Dataset) -> None:
-        from snapbeam.model.modes import BucklingModes
-
-        attrs = dataset.attrs
         for name in ("beam_length", "length_scale"):
-            if name not in attrs:
+            if name not in dataset.attrs:
                 raise InputError(f"run without the attribute {name}: its modal amplitudes have no shape")
-        length = float(attrs["beam_length"])
-        modes = BucklingModes(length, dataset.sizes["mode"])
         self.position = np.linspace(0.0, 1.0, _POSITIONS)
-        self.shapes = modes.shape(self.position * length) / float(attrs["length_scale"])
+        self.length, self.scale = (float(dataset.attrs[name]) for name in ("beam_length", "length_scale"))
         self.time = dataset["time"].values
         self.alpha = dataset["modal_amplitude"].values
 
@@ -299,4 +295,4 @@ class _BeamShape:
         after = int(np.clip(np.searchsorted(self.time, time), 1, self.time.size - 1))
         share = (time - self.time[after - 1]) / (self.time[after] - self.time[after - 1])
         alpha = (1.0 - share) * self.alpha[after - 1] + share * self.alpha[after]
-        return np.asarray(alpha @ self.shapes)
+        return displacement_along(self.length, alpha, self.position) / self.scale

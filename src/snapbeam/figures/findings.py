@@ -7,8 +7,8 @@ from collections.abc import Iterable
 
 from matplotlib.figure import Figure
 
+from snapbeam.core.findings import Finding, Severity
 from snapbeam.figures.style import SHAKER_COLOR
-from snapbeam.lab.plausibility.finding import Finding, Severity
 
 __all__ = ["draw_findings", "findings_height"]
 

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
 from snapbeam.figures.agreement import draw_agreement
-from snapbeam.figures.panels import cell_edges, class_cells
+from snapbeam.figures.axes import dress, edges_of, symbol_of
+from snapbeam.figures.panels import class_cells
 from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_figure
 from snapbeam.lab.compare.dots import Dots
-from snapbeam.model.drive import quasi_static_threshold
+from snapbeam.model.quasi_static import quasi_static_threshold
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,15 +27,9 @@ __all__ = ["class_handles", "plot_response_map"]
 
 _Array = NDArray[np.float64]
 
-AXES = ("frequency_ratio", "location", "velocity_amplitude")
-"""Coordinates of a map; the one that comes first here is drawn across, the other upward."""
+UPWARD = ("velocity_amplitude", "location")
+"""Axes that are drawn upward rather than across, the first of them first."""
 
-AXIS_LABELS = {
-    "frequency_ratio": r"Excitation frequency $\Omega$",
-    "location": r"Shaker location $x_\mathrm{s}$",
-    "velocity_amplitude": r"Velocity amplitude $V$",
-}
-_SYMBOLS = {"frequency_ratio": r"$\Omega$", "location": r"$x_\mathrm{s}$", "velocity_amplitude": "$V$"}
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 
 
@@ -55,8 +50,7 @@ def plot_response_map(
     Parameters
     ----------
     dataset : xarray.Dataset
-        A map with two axes of more than one point among ``frequency_ratio``, ``location`` and
-        ``velocity_amplitude``, and the variable ``response``.
+        A map with the variable ``response`` over two axes of more than one point.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
     dots : Dots, optional
@@ -77,20 +71,21 @@ def plot_response_map(
         If the dataset is no map of two axes.
     """
     across, upward, kinds = _two_axes(dataset)
-    x, y = (np.asarray(dataset[name].values, dtype=np.float64) for name in (across, upward))
-    edges = tuple(
-        cell_edges(points, 0.0, 1.0 if name == "location" else np.inf)
-        for points, name in ((x, across), (y, upward))
-    )
-    fixed = {name: _scalar(dataset, name) for name in AXES if name not in (across, upward)}
+    edges = tuple(edges_of(dataset, name) for name in (across, upward))
+    fixed = {
+        name: _scalar(dataset, name)
+        for name in ("frequency_ratio", "location", "velocity_amplitude")
+        if name not in (across, upward)
+    }
     with house_style():
         own = new_figure("single", 92.0 if legend else 70.0) if ax is None else None
         if own is not None:
             ax = own.add_subplot()
         assert ax is not None
         class_cells(ax, edges[0], edges[1], kinds)
-        ax.set(xlabel=AXIS_LABELS[across], ylabel=AXIS_LABELS[upward])
         fix_ticks(ax)
+        dress(ax.xaxis, dataset, across)
+        dress(ax.yaxis, dataset, upward)
         ax.set_title(_subtitle(dataset, fixed), loc="left")
         handles = class_handles(kinds)
         if "class_share" in dataset:
@@ -111,18 +106,20 @@ def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
     if "response" not in dataset:
         raise InputError(f"no map: it has no variable 'response' among {list(map(str, dataset.variables))}")
     response = dataset["response"].squeeze()
-    named = [name for name in AXES if name in response.dims]
-    if len(named) != 2 or response.ndim != 2:
+    named = [str(name) for name in response.dims]
+    if len(named) != 2 or "point" in named:
         sizes = ", ".join(f"{name} {size}" for name, size in response.sizes.items()) or "none"
         raise InputError(
-            f"a map is drawn over two axes of more than one point among {', '.join(AXES)}; "
-            f"this one has {sizes}: select one point of the others, as with dataset.isel(location=0)"
+            f"a map is drawn over two axes of more than one point; this one has {sizes}: select one point of the "
+            "others, as with dataset.isel(location=0)"
         )
-    return named[0], named[1], response.transpose(named[1], named[0]).values
+    upward = next((name for name in UPWARD if name in named), named[1])
+    across = named[0] if named[1] == upward else named[1]
+    return across, upward, response.transpose(upward, across).values
 
 
 def _scalar(dataset: xr.Dataset, name: str) -> float | None:
-    return float(dataset[name].squeeze()) if name in dataset.coords else None
+    return float(dataset[name].squeeze()) if name in dataset.coords and dataset[name].size == 1 else None
 
 
 def _subtitle(dataset: xr.Dataset, fixed: dict[str, float | None]) -> str:
@@ -131,7 +128,9 @@ def _subtitle(dataset: xr.Dataset, fixed: dict[str, float | None]) -> str:
         parts.append(f"$N$ = {int(dataset.attrs['modes'])}")
     if "cycles" in dataset.attrs:
         parts.append(f"{int(dataset.attrs['cycles'])} cycles")
-    parts += [f"{_SYMBOLS[name]} = {value:.4g}" for name, value in fixed.items() if value is not None]
+    parts += [
+        f"{symbol_of(dataset, name)} = {value:.4g}" for name, value in fixed.items() if value is not None
+    ]
     return ", ".join(parts)
 
 
@@ -159,6 +158,10 @@ def _percent(count: int, total: int) -> str:
 
 def _draw_threshold(ax: Axes, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
     x = np.linspace(*ax.get_xlim(), 402)[1:-1]
+    if {across, upward} - {"frequency_ratio", "location", "velocity_amplitude"}:
+        raise InputError(
+            f"threshold_line: is drawn over frequency ratio, location and velocity amplitude, not {across}, {upward}"
+        )
     if (across, upward) == ("frequency_ratio", "location"):
         height = np.linspace(*ax.get_ylim(), 402)[1:-1]
         line = _given(fixed, "velocity_amplitude") / quasi_static_threshold(height, 1.0), height

@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import doubtful, findings_of
 from snapbeam.core.validate import InputError, integer
 from snapbeam.figures.findings import draw_findings, findings_height
 from snapbeam.figures.style import BEAM_COLOR, COLUMN_WIDTHS, SHAKER_COLOR, house_style, new_figure
-from snapbeam.lab.plausibility.finding import doubtful, findings_of
 from snapbeam.lab.tracking.flags import FrameFlag
 from snapbeam.lab.tracking.geometry import Orientation
 from snapbeam.lab.tracking.quality import check_tracked, tracking_quality

@@ -5,14 +5,21 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
-from snapbeam.core.validate import InputError, finite, positive
+from snapbeam.core.validate import InputError, finite
 from snapbeam.model.modes import wavenumbers
+from snapbeam.model.quantity import quantities, quantity
 
 __all__ = ["Beam"]
 
-_NOT_GIVEN: Any = None
+
+class _Derived(float):
+    """A number that followed from another one, and so was not given."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _Derived, (float(self),)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,45 +58,81 @@ class Beam:
         ``buckling_level`` and ``axial_load`` are given.
     """
 
-    length: float
-    thickness: float
-    width: float
-    density: float
-    young_modulus: float
-    buckling_level: float = _NOT_GIVEN
-    axial_load: float = _NOT_GIVEN
+    length: float = quantity(
+        "m",
+        "distance between the clamps",
+        low=0.0,
+        symbol="L",
+        short="beam_length",
+        plausible=(1e-6, 100.0, "mm"),
+    )
+    thickness: float = quantity(
+        "m", "thickness in the direction of bending", low=0.0, symbol="h", short="beam_thickness",
+        plausible=(1e-9, 1.0, "mm"),
+    )  # fmt: skip
+    width: float = quantity(
+        "m", "width of the section", low=0.0, short="beam_width", plausible=(1e-9, 10.0, "mm")
+    )
+    density: float = quantity(
+        "kg/m^3",
+        "mass density",
+        low=0.0,
+        symbol=r"\rho",
+        short="beam_density",
+        plausible=(10.0, 3e4, "g/cm^3"),
+    )
+    young_modulus: float = quantity(
+        "Pa", "Young's modulus", low=0.0, symbol="E", short="beam_young_modulus", plausible=(1e3, 2e12, "GPa")
+    )
+    buckling_level: float = quantity(
+        "m", "height of the buckled beam at its centre", default=None, low=0.0, symbol="b", optional=True,
+        short="beam_buckling_level", plausible=(1e-12, 10.0, "mm"),
+    )  # fmt: skip
+    axial_load: float = quantity(
+        "N",
+        "axial load, compression positive",
+        default=None,
+        symbol="P",
+        optional=True,
+        short="beam_axial_load",
+    )
     _given: str = dataclasses.field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        units = {
-            "length": "m",
-            "thickness": "m",
-            "width": "m",
-            "density": "kg/m^3",
-            "young_modulus": "Pa",
-        }
-        for name, unit in units.items():
-            self._set(name, positive(name, getattr(self, name), unit))
-        if (self.buckling_level is None) == (self.axial_load is None):
+        level: float | None = self.buckling_level
+        load: float | None = self.axial_load
+        # what followed from the other in the beam that dataclasses.replace starts from is not given
+        if isinstance(level, _Derived) and load is not None:
+            level = None
+        if isinstance(load, _Derived) and level is not None:
+            load = None
+        if (level is None) == (load is None):
             raise InputError(
-                f"buckling_level = {self.buckling_level!r}, axial_load = {self.axial_load!r}: "
+                f"buckling_level = {level!r}, axial_load = {load!r}: "
                 "give exactly one of the two, the other follows from it"
             )
+        for name in ("length", "thickness", "width", "density", "young_modulus"):
+            self._set(name, _beam_quantities()[name].check(name, getattr(self, name)))
         # tension per square of the buckling level: P - P_cr = stretch b^2
         stretch = math.pi**2 * self.young_modulus * self.area / (4.0 * self.length**2)
-        if self.axial_load is None:
-            level = positive("buckling_level", self.buckling_level, "m")
+        if load is None:
+            level = _beam_quantities()["buckling_level"].check("buckling_level", level)
             self._set("_given", "buckling_level")
-            self._set("axial_load", self.critical_load + stretch * level**2)
+            load = _Derived(self.critical_load + stretch * level**2)
         else:
-            load = finite("axial_load", self.axial_load, "a finite number of N, compression positive")
-            level = math.sqrt(max(load - self.critical_load, 0.0) / stretch)
+            load = finite("axial_load", load, "a finite number of N, compression positive")
+            level = _Derived(math.sqrt(max(load - self.critical_load, 0.0) / stretch))
             self._set("_given", "axial_load")
-            self._set("axial_load", load)
+        self._set("axial_load", load)
         self._set("buckling_level", level)
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
+
+    @property
+    def given(self) -> str:
+        """Which of ``buckling_level`` and ``axial_load`` the beam was made with."""
+        return self._given
 
     def replace(self, **changes: float) -> Beam:
         """Return a beam with some parameters changed.
@@ -155,3 +198,8 @@ class Beam:
     def is_buckled(self) -> bool:
         """Whether the axial load exceeds the critical load, so that the beam is bistable."""
         return self.buckling_level > 0.0
+
+
+@cache
+def _beam_quantities() -> dict[str, Any]:
+    return quantities(Beam)

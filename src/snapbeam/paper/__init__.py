@@ -34,6 +34,7 @@ __all__ = [
     "STRAIGHT_BEAM",
     "Recipe",
     "Results",
+    "disturbances",
     "fig2",
     "fig3",
     "fig4",
@@ -44,9 +45,13 @@ __all__ = [
     "figA9",
     "figB10",
     "low_frequency",
+    "resonance",
     "sensitivity",
     "shared_results",
     "si5",
+    "transients",
+    "waveforms",
+    "windows",
 ]
 
 fig2 = Recipe("fig2", "the beam and the shaker, with their symbols")
@@ -59,13 +64,24 @@ fig8 = Recipe("fig8", "response over location and amplitude, 1 and 32 modes")
 figA9 = Recipe("figA9", "error of the natural frequencies over the number of modes")
 figB10 = Recipe("figB10", "greatest displacement over frequency at two drives, 1 and 32 modes")
 si5 = Recipe("si5", "response over location and amplitude as modes are added (animation)")
-low_frequency = Recipe("low_frequency", "threshold over the quasi-static one at low frequency")
-sensitivity = Recipe("sensitivity", "how the map changes with what the paper leaves open")
+
+low_frequency = Recipe("low_frequency", "threshold over the quasi-static one at low frequency", "studies")
+resonance = Recipe("resonance", "the resonance of the intrawell response and the notch of fig6", "studies")
+waveforms = Recipe(
+    "waveforms", "snap-throughs, impacts and modes of runs at random points of fig6", "studies"
+)
+transients = Recipe("transients", "what still changes after the cycles of fig7", "studies")
+windows = Recipe("windows", "amplitudes of transient responses near a clamp and near the centre", "studies")
+disturbances = Recipe(
+    "disturbances", "start-up transients, starts off the well, impacts without higher modes", "studies"
+)
+sensitivity = Recipe("sensitivity", "how the map changes with what the paper leaves open", "studies")
 
 FIGURES: dict[str, Recipe] = {
     recipe.name: recipe
     for recipe in (
-        fig2, fig3, fig4, fig5, fig6, fig7, fig8, figA9, figB10, si5, low_frequency, sensitivity,
+        fig2, fig3, fig4, fig5, fig6, fig7, fig8, figA9, figB10, si5,
+        low_frequency, resonance, waveforms, transients, windows, disturbances, sensitivity,
     )
 }  # fmt: skip
-"""Every recipe by name: the figures of the paper, its fifth video, and two more that its claims need."""
+"""Every recipe by name: the figures of the paper, its fifth video, and those that its claims need beside."""

@@ -123,7 +123,7 @@ def shared_results() -> Results:
 
 @dataclass(frozen=True)
 class Recipe:
-    """One figure of the paper: how its data are computed and how they are drawn.
+    """One figure of the paper, or a study beside them: how its data are computed and how they are drawn.
 
     ``recipe()`` draws it, ``recipe.compute()`` gives the data, ``recipe.write(folder)`` writes the figure as
     PDF and PNG (and the video, for ``si5``) with the data.
@@ -131,6 +131,8 @@ class Recipe:
 
     name: str
     about: str
+    folder: str = "recipes"
+    """Where its module stands: ``recipes`` for a figure of the paper, ``studies`` for what claims need beside."""
 
     def __call__(
         self,
@@ -204,4 +206,4 @@ def _module(name: str) -> Any:
     from snapbeam.paper import FIGURES
 
     choice("figure", name, tuple(FIGURES))
-    return import_module(f"snapbeam.paper.recipes.{name}")
+    return import_module(f"snapbeam.paper.{FIGURES[name].folder}.{name}")

@@ -16,10 +16,21 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["KEPT", "class_map", "legend_handles", "paper_model", "paper_run", "relative_map", "shapes_along"]
+__all__ = [
+    "KEPT",
+    "TOLERANCE",
+    "class_map",
+    "legend_handles",
+    "paper_model",
+    "paper_run",
+    "relative_map",
+    "shapes_along",
+]
 
 _Array = NDArray[np.float64]
 
+TOLERANCE = 1e-5
+"""What a run that is shown may be wrong by, in b: far below the width of a line."""
 KEPT = ("response", "status", "crossings", "end_is_final", "decided_at")
 """What is kept of a map that is run for its classes."""
 
@@ -32,7 +43,7 @@ def paper_model(modes: int, damping_ratio: ArrayLike = DAMPING_RATIO) -> sb.Redu
 def paper_run(
     modes: int, frequency_ratio: float, velocity_amplitude: float, cycles: int, **more: Any
 ) -> sb.Run:
-    """One run of the paper's beam and shaker."""
+    """One run of the paper's beam and shaker; *more* is for :func:`snapbeam.simulate`, and the location."""
     location = more.pop("location", LOCATION)
     shaker = sb.Shaker(
         frequency_ratio=frequency_ratio, velocity_amplitude=velocity_amplitude, location=location

@@ -1,144 +1,90 @@
-"""What is asked of one run, checked, and made into an ensemble of one for an engine."""
+"""What is asked of a run, in the words of a system and an integration, or of version 0.1."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from snapbeam.core.validate import InputError, InputTypeError, finite_array, flag, integer, positive
-from snapbeam.engines.ensemble import Ensemble, Start, make_ensemble, with_recorded_drive
-from snapbeam.engines.plan import Plan, plan_steps
-from snapbeam.model.contact import HertzContact, Restitution
-from snapbeam.model.drive import RecordedDrive, Shaker
+from snapbeam.core.validate import InputError, InputTypeError, finite_array, positive
+from snapbeam.model.contact import ContactLaw
+from snapbeam.model.drive import Sine
+from snapbeam.model.integration import Integration
 from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.state import State
+from snapbeam.model.striker import RecordedDrive, Shaker, Striker
+from snapbeam.model.system import System
 
-__all__ = ["OneRun", "check_system", "one_run"]
+__all__ = ["asked", "cycle_of", "require_motion", "system_of"]
 
-_CYCLES = 200
-
-
-@dataclass(frozen=True)
-class OneRun:
-    """A run that makes sense; how finely it is stepped is left open."""
-
-    model: ReducedModel
-    shaker: Shaker | RecordedDrive | None
-    contact: HertzContact | Restitution | None
-    """None without a shaker."""
-    cycles: int | None
-    start: Start | None
-    early_decision: bool
-    reference_freq: float
-    """Hz."""
-
-    @property
-    def period(self) -> float:
-        """Seconds of one cycle."""
-        if isinstance(self.shaker, RecordedDrive):
-            return 1.0 / self.shaker.frequency
-        ratio = 1.0 if self.shaker is None else self.shaker.frequency_ratio
-        return 1.0 / (self.reference_freq * ratio)
-
-    @property
-    def _drive(self) -> Shaker:
-        if isinstance(self.shaker, Shaker):
-            return self.shaker
-        if self.shaker is None:
-            # seen from the well the beam starts in, so that mirror images are mirrored to the bit
-            assert self.start is not None
-            side = "above" if float(self.start.alpha @ self.model.center_shape) > 0.0 else "below"
-            return Shaker(frequency_ratio=1.0, velocity_amplitude=0.0, side=side)
-        return Shaker(
-            frequency_ratio=self.shaker.frequency / self.reference_freq,
-            velocity_amplitude=0.0,
-            location=self.shaker.location,
-            side=self.shaker.side,
-        )
-
-    def plan(self, step: float | None = None, accuracy: str = "map") -> Plan:
-        """The steps of a named level, or of a flight step in seconds."""
-        return plan_steps(self.model, self.contact, step=step, accuracy=accuracy)
-
-    def ensemble(self, plan: Plan) -> Ensemble:
-        """This run, with these steps, for an engine."""
-        drive = self._drive
-        ensemble = make_ensemble(
-            self.model,
-            self.contact,
-            plan,
-            frequency_ratio=np.array([drive.frequency_ratio]),
-            velocity_amplitude=np.array([drive.velocity_amplitude]),
-            location=np.array([drive.location]),
-            side=drive.side,
-            cycles=self.cycles or _CYCLES,
-            reference_freq=self.reference_freq,
-            early_decision=self.early_decision,
-            start=self.start,
-        )
-        if isinstance(self.shaker, RecordedDrive):
-            return with_recorded_drive(ensemble, self.shaker, _recorded_duration(self.shaker, self.cycles))
-        return ensemble
+_OPTIONS = ("step", "tolerance", "accuracy", "engine", "early_decision", "threads", "max_steps")
 
 
-def one_run(
-    model: ReducedModel,
-    shaker: Shaker | RecordedDrive | None,
-    contact: HertzContact | Restitution | None,
-    cycles: int | None,
-    initial_state: tuple[ArrayLike, ArrayLike] | None,
-    early_decision: bool,
-    reference_freq: float | None,
-) -> OneRun:
-    """Check what is asked of a run.
+def asked(model: Any, parts: tuple[Any, ...], options: dict[str, Any]) -> tuple[System, Integration]:
+    """A system and an integration, however they were given.
 
     Raises
     ------
     InputError
-        For bad input.
+        For bad input, and for a system in which nothing could move.
     """
-    check_system(model, contact, shaker)
-    if cycles is not None:
-        cycles = integer("cycles", cycles, 1, 10**7)
-    start = None if initial_state is None else _checked_start(model, initial_state)
-    if shaker is None and start is None:
-        raise InputError("shaker = None: a beam that nothing strikes needs an initial_state to move")
-    reference = model.reference_freq if reference_freq is None else positive("reference_freq", reference_freq)
-    struck = contact if shaker is not None else None
-    return OneRun(model, shaker, struck, cycles, start, flag("early_decision", early_decision), reference)
+    if isinstance(model, System):
+        system, integration = model, integration_of(parts, options)
+    else:
+        system, integration = system_of(model, *parts, **options)
+    require_motion(system)
+    return system, integration
 
 
-def _recorded_duration(drive: RecordedDrive, cycles: int | None) -> float:
-    if cycles is None:
-        return drive.duration
-    if cycles / drive.frequency > drive.duration * (1.0 + 1e-9):
-        held = drive.duration * drive.frequency
-        raise InputError(f"cycles = {cycles}: must be at most the {held:.1f} cycles of the recorded drive")
-    return min(cycles / drive.frequency, drive.duration)
-
-
-def check_system(model: Any, contact: Any, shaker: Any = None) -> None:
-    """Refuse what is no model, contact or shaker, and a model that cannot be struck."""
-    if not isinstance(model, ReducedModel):
-        raise InputTypeError(f"model = {model!r}: must be a ReducedModel")
-    if shaker is not None and not isinstance(shaker, (Shaker, RecordedDrive)):
-        raise InputTypeError(f"shaker = {shaker!r}: must be a Shaker or a RecordedDrive")
-    if contact is not None and not isinstance(contact, (HertzContact, Restitution)):
-        raise InputTypeError(f"contact = {contact!r}: must be a HertzContact or a Restitution")
-    if isinstance(contact, Restitution) and model.modes != 1:
+def require_motion(system: System) -> None:
+    """Refuse a system in which nothing could move."""
+    if system.striker is None and system.start is None:
         raise InputError(
-            f"contact = {contact!r} with modes = {model.modes}: Newton's law needs one mode, since the "
-            "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
+            "striker = None: a beam that nothing strikes needs a start to move from (initial_state)"
         )
-    if shaker is not None and contact is None:
-        raise InputError("contact = None: a shaker needs a HertzContact")
-    if model.length_scale is None:
-        model.require_bistable("a run")
 
 
-def _checked_start(model: ReducedModel, initial_state: tuple[ArrayLike, ArrayLike]) -> Start:
+def system_of(
+    model: ReducedModel,
+    shaker: Striker | Shaker | RecordedDrive | None = None,
+    contact: ContactLaw | None = None,
+    cycles: int | None = None,
+    *,
+    initial_state: tuple[ArrayLike, ArrayLike] | None = None,
+    reference_freq: float | None = None,
+    **options: Any,
+) -> tuple[System, Integration]:
+    """What version 0.1 took as parts and options, as a system and an integration."""
+    if not isinstance(model, ReducedModel):
+        raise InputTypeError(f"model = {model!r}: must be a System or a ReducedModel")
+    for name in options:
+        if name not in _OPTIONS:
+            raise InputTypeError(f"{name}: no parameter of a run; must be one of {', '.join(_OPTIONS)}")
+    if reference_freq is not None:
+        model = replace(model, given_reference_freq=positive("reference_freq", reference_freq, "Hz"))
+    start = None if initial_state is None else _start_of(model, initial_state)
+    system = System(model, contact if shaker is not None else None, shaker, start)  # type: ignore[arg-type]
+    if shaker is None and contact is not None:
+        System(model, contact)  # refuses a law that does not suit the model
+    return system, Integration(cycles=cycles, **options)
+
+
+def integration_of(parts: tuple[Any, ...], options: dict[str, Any]) -> Integration:
+    given = [*parts, *(options.pop(name) for name in ("integration",) if name in options)]
+    if options or len(given) > 1:
+        raise InputTypeError(
+            f"{', '.join(options) or 'arguments'}: with a System, what is left is one Integration, sample_times and "
+            "progress"
+        )
+    integration = given[0] if given and given[0] is not None else Integration()
+    if not isinstance(integration, Integration):
+        raise InputTypeError(f"integration = {integration!r}: must be an Integration")
+    return integration
+
+
+def _start_of(model: ReducedModel, initial_state: tuple[ArrayLike, ArrayLike]) -> State:
     try:
         alpha, velocity = initial_state
     except (TypeError, ValueError):
@@ -149,4 +95,16 @@ def _checked_start(model: ReducedModel, initial_state: tuple[ArrayLike, ArrayLik
         if array.size != model.modes:
             raise InputError(f"initial_state {name} of shape {array.shape}: must have shape ({model.modes},)")
         parts.append(array)
-    return Start(*parts)
+    return State(amplitude=parts[0], velocity=parts[1])
+
+
+def cycle_of(system: System) -> float:
+    """Seconds of one cycle of excitation, or of the first mode where nothing strikes."""
+    freq = system.model.reference_freq
+    if system.striker is None:
+        return 1.0 / freq
+    drive = system.striker.drive
+    if isinstance(drive, Sine):
+        return 1.0 / (freq * drive.frequency_ratio)
+    columns = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
+    return float(drive.cycle(columns, system.scale)[0])

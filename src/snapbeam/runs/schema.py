@@ -1,8 +1,8 @@
 """The labelled dataset of one run, simulated or measured: its names, dimensions and units.
 
-Displacements are normalised by the buckling level b, times are in seconds, ``cycle`` counts periods of the
-excitation (the paper's tau).  A measured run has no modal amplitudes, force or energies, and may have
-dropouts: samples at which something was not found have ``valid`` = 0, and only there may a number be NaN.
+Displacements are normalised by the buckling level b and velocities by b omega_1, times are in seconds, ``cycle``
+counts periods of the excitation (the paper's tau).  A measured run has no modal amplitudes, force or energies, and
+may have dropouts: samples at which something was not found have ``valid`` = 0, and only there may a number be NaN.
 """
 
 from __future__ import annotations
@@ -33,20 +33,26 @@ SCHEMA: dict[str, Quantity] = {
     "time": Quantity(("time",), "s", "time"),
     "cycle": Quantity(("time",), "1", "cycles of excitation"),
     "mode": Quantity(("mode",), "1", "buckling mode"),
-    "displacement": Quantity(("time",), "b", "beam displacement at the shaker"),
-    "center_displacement": Quantity(("time",), "b", "beam displacement at the centre"),
-    "shaker_displacement": Quantity(("time",), "b", "shaker displacement"),
-    "penetration": Quantity(("time",), "b", "penetration"),
+    "displacement": Quantity(("time",), "1", "beam displacement at the striker, over b"),
+    "center_displacement": Quantity(("time",), "1", "beam displacement at the centre, over b"),
+    "velocity": Quantity(("time",), "1", "beam velocity at the striker, over b omega_1"),
+    "center_velocity": Quantity(("time",), "1", "beam velocity at the centre, over b omega_1"),
+    "shaker_displacement": Quantity(("time",), "1", "striker displacement, over b"),
+    "penetration": Quantity(("time",), "1", "penetration, over b"),
     "contact_force": Quantity(("time",), "N", "contact force"),
     "modal_amplitude": Quantity(("time", "mode"), "m^0.5", "modal amplitude"),
-    "energy_beam": Quantity(("time",), "J", "kinetic and potential energy of the beam"),
+    "modal_velocity": Quantity(("time", "mode"), "m^0.5/s", "modal velocity"),
+    "energy_beam": Quantity(("time",), "J", "kinetic and potential energy of the beam, above its well"),
     "energy_contact": Quantity(("time",), "J", "energy stored in the contact"),
-    "work_shaker": Quantity(("time",), "J", "work done by the shaker"),
+    "work_shaker": Quantity(("time",), "J", "work done by the striker"),
     "energy_dissipated": Quantity(("time",), "J", "energy dissipated by damping"),
     "valid": Quantity(("time",), "1", "whether the sample was measured"),
 }
 """Every variable a run may have, by name; ``time``, ``cycle`` and ``mode`` are coordinates."""
 
+_MODAL = ("modal_amplitude", "modal_velocity")
+_FORMER_UNITS = {"b": "1"}
+"""Units that files of version 0.1 give to numbers over b."""
 _COORDINATES = ("time", "cycle", "mode")
 
 
@@ -69,7 +75,7 @@ def trajectory_dataset(
         What the run came from: parameters and provenance.
     **variables : array_like
         The variables of :data:`SCHEMA` by name, of shape (samples,), or (samples, modes) for
-        ``modal_amplitude``.
+        ``modal_amplitude`` and ``modal_velocity``.
 
     Returns
     -------
@@ -96,7 +102,7 @@ def trajectory_dataset(
         if array.dtype.kind not in "biuf":
             raise InputTypeError(f"{name}: must be an array of numbers, not of {array.dtype}")
         data[name] = _labelled(name, array)
-        if name == "modal_amplitude" and array.ndim == 2:
+        if name in _MODAL and array.ndim == 2:
             coords["mode"] = _labelled("mode", np.arange(1, array.shape[1] + 1))
     length = len(coords["time"][1])
     for name, (dims, values, _) in (*coords.items(), *data.items()):
@@ -147,7 +153,7 @@ def check_trajectory(dataset: xr.Dataset, require: Iterable[str] = ("displacemen
         if variable.dims != quantity.dims:
             raise InputError(f"{name} with dimensions {variable.dims}: must have dimensions {quantity.dims}")
         units = variable.attrs.get("units")
-        if units != quantity.units:
+        if _FORMER_UNITS.get(str(units), units) != quantity.units:
             raise InputError(f"{name} in units {units!r}: must be in {quantity.units!r}")
         good = np.isfinite(variable.values)
         if valid is not None and name not in _COORDINATES:

@@ -11,21 +11,21 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from snapbeam.core.provenance import made_by
-from snapbeam.core.validate import choice, positive, within
-from snapbeam.engines.columns import Reals, Ticks
-from snapbeam.engines.cpu import driver as cpu_engine
+from snapbeam.core.validate import choice, positive
+from snapbeam.engines.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.plan import Plan
-from snapbeam.model.contact import HertzContact, Restitution
-from snapbeam.model.drive import RecordedDrive, Shaker
-from snapbeam.model.reduction import ReducedModel
-from snapbeam.runs.request import OneRun, one_run
+from snapbeam.engines.registry import resolve
+from snapbeam.model.integration import ACCURACIES, Integration
+from snapbeam.model.system import System
+from snapbeam.runs.request import asked, cycle_of
+from snapbeam.runs.samples import joined
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,7 +36,6 @@ _Array = NDArray[np.float64]
 
 PERTURBATION = 1e-13
 """Relative change of the drive whose response is called the conditioning."""
-_TOLERANCES = (1e-10, 0.1)
 _SHARE = 0.1
 """Of the tolerance: what the response to the perturbation may take before nothing more is promised."""
 _SAMPLES_PER_CYCLE = 40
@@ -78,32 +77,32 @@ class Accuracy:
 
 
 def conditioning(
-    model: ReducedModel,
-    shaker: Shaker | RecordedDrive | None = None,
-    contact: HertzContact | Restitution | None = None,
-    cycles: int | None = None,
-    *,
+    model: System | Any,
+    *parts: Any,
     accuracy: str = "reference",
-    initial_state: tuple[ArrayLike, ArrayLike] | None = None,
-    reference_freq: float | None = None,
     perturbation: float = PERTURBATION,
+    **options: Any,
 ) -> xr.Dataset:
     """How far a tiny change of the drive moves a run: what no integrator can promise to undercut.
 
+    Called as ``conditioning(system, cycles)``, or, as in version 0.1, with the parts:
+    ``conditioning(model, shaker, contact, cycles, initial_state=..., reference_freq=...)``.
+
     Parameters
     ----------
-    model, shaker, contact, cycles, initial_state, reference_freq
-        As for :func:`~snapbeam.simulate`.
-    accuracy : {"reference", "map"}
+    system : System
+    cycles : int, optional
+        As for an :class:`~snapbeam.Integration`.
+    accuracy : {"map", "reference"}
         Steps of the two runs compared.
     perturbation : float
-        Relative change of the shaker's amplitude, or of the initial state if there is no shaker.
+        Relative change of the striker's amplitude, or of the start if there is no striker.
 
     Returns
     -------
     xarray.Dataset
         Over ``time`` (s) and ``cycle``: ``separation``, the greatest change up to that time of the displacement
-        at the contact point and at the centre, in b.
+        at the contact point and at the centre, over b.
 
     Raises
     ------
@@ -113,52 +112,52 @@ def conditioning(
     import xarray as xr
 
     size = positive("perturbation", perturbation)
-    asked = one_run(model, shaker, contact, cycles, initial_state, False, reference_freq)
-    plan = asked.plan(accuracy=choice("accuracy", accuracy, ("map", "reference")))
-    ensemble = asked.ensemble(plan)
-    times = _instants(asked, ensemble)
-    separation = _apart(_watch(ensemble, times), _watch(_perturbed(ensemble, size), times))
+    level = choice("accuracy", accuracy, ACCURACIES)
+    if isinstance(model, System) and len(parts) == 1 and not isinstance(parts[0], Integration):
+        parts = (Integration(cycles=parts[0]),)
+    system, integration = asked(model, parts, options)
+    integration = integration.replace(accuracy=level, tolerance=None, early_decision=False)
+    plan = plans_of(system, integration, run_columns(system, {}))[0]
+    ensemble = make_ensemble(system, integration, plan=plan)
+    times = _instants(system, ensemble)
+    separation = _apart(_watch(system, ensemble, times), _watch(system, _perturbed(ensemble, size), times))
     attrs = {"title": "conditioning of a run", "perturbation": size, "step": plan.step, "order": plan.order}
     return xr.Dataset(
         {
             "separation": (
                 "time",
                 separation,
-                {"units": "b", "long_name": "greatest change of the displacement so far"},
+                {"units": "1", "long_name": "greatest change of the displacement so far, over b"},
             )
         },
         {
             "time": ("time", times, {"units": "s", "long_name": "time"}),
-            "cycle": ("time", times / asked.period, {"units": "1", "long_name": "cycles of excitation"}),
+            "cycle": ("time", times / cycle_of(system), {"units": "1", "long_name": "cycles of excitation"}),
         },
         attrs | made_by(attrs),
     )
 
 
-def steps_for(tolerance: float, asked: OneRun) -> tuple[Plan, Accuracy]:
-    """Steps with which a run meets *tolerance*, and what they gave.
+def steps_for(system: System, integration: Integration) -> tuple[Plan, Accuracy]:
+    """Steps with which a run meets the tolerance of *integration*, and what they gave.
 
     Runs of ever finer steps are compared with the one before, at the contact point and at the centre, 40 times
     a cycle, until they differ by less than the tolerance up to the horizon; the finer one is taken, so the
     difference bounds its error from above wherever refinement converges.
-
-    Raises
-    ------
-    InputError
-        For a tolerance out of range.
     """
-    limit = within("tolerance", tolerance, *_TOLERANCES, closed="both", unit="b")
-    whole = replace(asked, early_decision=False)
-    base = whole.plan()
+    limit = integration.tolerance
+    assert limit is not None
+    whole = integration.replace(tolerance=None, early_decision=False)
+    base = plans_of(system, whole, run_columns(system, {}))[0]
     levels = [_level(base, order, divisor) for order, divisor in _LADDER]
     if limit < _CHEAP:
         levels = levels[2:]
-    times = _instants(whole, whole.ensemble(base))
-    coarse = _watch(whole.ensemble(levels[0]), times)
+    times = _instants(system, make_ensemble(system, whole, plan=base))
+    coarse = _watch(system, make_ensemble(system, whole, plan=levels[0]), times)
     for plan in levels[1:]:
-        ensemble = whole.ensemble(plan)
-        fine = _watch(ensemble, times)
-        response = _apart(fine, _watch(_perturbed(ensemble, PERTURBATION), times))
+        ensemble = make_ensemble(system, whole, plan=plan)
+        fine = _watch(system, ensemble, times)
+        response = _apart(fine, _watch(system, _perturbed(ensemble, PERTURBATION), times))
         difference = _apart(coarse, fine)
         last = _last_within(response, _SHARE * limit)
         reached = bool(difference[last] <= limit)
@@ -188,31 +187,30 @@ def _level(base: Plan, order: int, divisor: int) -> Plan:
     return Plan(order, base.step / divisor, base.coarsest, base.coarsest + _HALVINGS[order])
 
 
-def _instants(asked: OneRun, ensemble: Ensemble) -> _Array:
-    end = float(ensemble.reals[0, Reals.TICK] * ensemble.ticks[0, Ticks.END])
-    fastest = min(asked.period, 1.0 / asked.reference_freq)
+def _instants(system: System, ensemble: Ensemble) -> _Array:
+    end = float(ensemble.runs["tick"][0] * ensemble.runs["end"][0])
+    fastest = min(cycle_of(system), 1.0 / system.model.reference_freq)
     count = math.ceil(end / fastest * _SAMPLES_PER_CYCLE)
     return np.linspace(0.0, end, min(count, _MOST_SAMPLES) + 1)
 
 
 def _perturbed(ensemble: Ensemble, size: float) -> Ensemble:
-    """The same run with its drive, or its initial state if nothing drives it, changed by a relative *size*."""
-    reals, factor = ensemble.reals.copy(), 1.0 + size
-    driven = bool((reals[:, Reals.AMPLITUDE] != 0.0).any())
-    reals[:, Reals.AMPLITUDE] *= factor
+    """The same run with its drive, or its start if nothing drives it, changed by a relative *size*."""
+    factor, numbers = 1.0 + size, ensemble.drive_numbers.copy()
+    driven = bool((ensemble.runs["tip_speed"] != 0.0).any())
+    if "amplitude" in ensemble.drive.number_names:
+        numbers[:, ensemble.drive.number_names.index("amplitude")] *= factor
     starts = ensemble.starts if driven else ensemble.starts * factor
-    return replace(ensemble, reals=reals, starts=starts, drive_table=ensemble.drive_table * factor)
+    return replace(ensemble, drive_numbers=numbers, starts=starts, samples=ensemble.samples * factor)
 
 
-def _watch(ensemble: Ensemble, times: _Array) -> _Array:
-    """Displacements of the contact point and of the centre, b, shape (times, 2)."""
-    packed, layout = ensemble.packed, ensemble.packed.layout
-    scale = packed.model.length_scale
-    assert scale is not None
-    _, _, outputs = cpu_engine.record(ensemble, 0, times, 0, False)
-    center = packed.memory[layout.center : layout.center + layout.size]
-    read_out = np.column_stack((ensemble.contact_rows[0], center))
-    return np.asarray(outputs.rows @ read_out / scale)
+def _watch(system: System, ensemble: Ensemble, times: _Array) -> _Array:
+    """Displacements of the contact point and of the centre, over b, shape (times, 2)."""
+    recorded = joined(list(resolve("cpu")[1].record(ensemble, times, False)))
+    read_out = np.column_stack((ensemble.contact_rows[0], ensemble.structure.center))
+    found = np.full((times.size, 2), np.nan)
+    found[: recorded.times.size] = recorded.q @ read_out / system.scale.length
+    return found
 
 
 def _apart(a: _Array, b: _Array) -> _Array:

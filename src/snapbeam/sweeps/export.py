@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from snapbeam.core.codes import ResponseClass
 from snapbeam.core.files import atomic_path
-from snapbeam.sweeps.compute.task import CLASSES, Recipe
-from snapbeam.sweeps.compute.tasks import Results
-from snapbeam.sweeps.sweep import Grid, response_flags
+from snapbeam.runs.save import code_flags
+from snapbeam.sweeps.compute.task import CLASSES, PointWork
+from snapbeam.sweeps.compute.tasks import Rows
+from snapbeam.sweeps.points import PointList, Points
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,67 +28,94 @@ _BLOCK = 65536
 def class_coordinate() -> tuple[tuple[str], Any, dict[str, Any]]:
     """The coordinate of the shares of the classes."""
     values = np.array([int(kind) for kind in CLASSES], dtype=np.int8)
-    return (_CLASS_DIM,), values, {"units": "1", "long_name": "response class"} | response_flags()
+    return (_CLASS_DIM,), values, {"units": "1", "long_name": "response class"} | code_flags(ResponseClass)
 
 
-def to_dataset(recipe: Recipe, grid: Grid, results: Results, attrs: dict[str, Any]) -> xr.Dataset:
+def to_dataset(work: PointWork, points: Points, rows: Rows, attrs: dict[str, Any]) -> xr.Dataset:
     """The map in memory."""
     import xarray as xr
 
-    columns = results.read(0, grid.size)
-    coords = grid.coordinates()
-    if recipe.replicas is not None:
-        coords[_CLASS_DIM] = class_coordinate()
-    dataset = xr.Dataset(coords=coords, attrs=attrs)
-    for name, (_, by_class, labels) in recipe.variables().items():
-        dims = (*grid.axes, _CLASS_DIM) if by_class else tuple(grid.axes)
-        shape = (*grid.shape, len(CLASSES)) if by_class else grid.shape
-        dataset[name] = (dims, recipe.values(name, columns).reshape(shape), labels)
+    table = rows.read(0, points.size)
+    dataset = xr.Dataset(coords=_coordinates(work, points), attrs=attrs)
+    for name, (_, by_class, labels) in work.variables().items():
+        dims = (*points.dims, _CLASS_DIM) if by_class else points.dims
+        dataset[name] = (dims, points.arranged(work.values(name, table)), labels)
     return dataset
 
 
-def to_netcdf(recipe: Recipe, grid: Grid, results: Results, attrs: dict[str, Any], path: Path) -> None:
+def _coordinates(work: PointWork, points: Points) -> dict[str, Any]:
+    coords = work.setup.with_points(points).coordinates()
+    if work.replicas is not None:
+        coords[_CLASS_DIM] = class_coordinate()
+    return coords
+
+
+def to_netcdf(work: PointWork, points: Points, rows: Rows, attrs: dict[str, Any], path: Path) -> None:
     """Write the map to a NetCDF file, whole or not at all, holding only a block of it in memory.
 
     The file is the one that :func:`to_dataset` and xarray would write.
     """
     import h5netcdf
+    import h5py
 
     with atomic_path(path) as temporary, h5netcdf.File(temporary, "w") as file:
-        file.attrs.update(attrs)
-        coords = grid.coordinates()
-        if recipe.replicas is not None:
-            coords[_CLASS_DIM] = class_coordinate()
-        scalars = " ".join(name for name, (dims, _, _) in coords.items() if not dims)
-        file.dimensions = {dims[0]: len(values) for dims, values, _ in coords.values() if dims}
+        file.attrs.update({name: value for name, value in attrs.items() if value is not None})
+        coords = _coordinates(work, points)
+        scalars = " ".join(name for name, (dims, _, _) in coords.items() if name not in dims)
+        file.dimensions = {
+            dims[0]: len(values) for name, (dims, values, _) in coords.items() if dims == (name,)
+        }
+        if isinstance(points, PointList):
+            file.dimensions[points.dims[0]] = points.size
         for name, (dims, values, labels) in coords.items():
             data = np.asarray(values)
-            fill = np.nan if data.dtype.kind == "f" else None
-            variable = file.create_variable(name, dims, data.dtype, data=data, fillvalue=fill)
+            if data.dtype.kind in "OU":
+                data = data.astype(object)
+                variable = file.create_variable(name, dims, h5py.string_dtype(), data=data)
+            else:
+                fill = np.nan if data.dtype.kind == "f" else None
+                variable = file.create_variable(name, dims, data.dtype, data=data, fillvalue=fill)
             variable.attrs.update(labels)
         written = {}
-        for name, (kind, by_class, labels) in recipe.variables().items():
-            dims = (*grid.axes, _CLASS_DIM) if by_class else tuple(grid.axes)
+        for name, (kind, by_class, labels) in work.variables().items():
+            dims = (*points.dims, _CLASS_DIM) if by_class else points.dims
             stored = "int8" if kind == "bool" else kind
             fill = np.nan if kind == "float64" else None
-            written[name] = file.create_variable(name, dims, np.dtype(stored), fillvalue=fill)
+            written[name] = file.create_variable(
+                name,
+                dims,
+                np.dtype(stored),
+                fillvalue=fill,
+                chunks=None if not dims else True,
+                **_COMPRESSION,
+            )
             written[name].attrs.update(labels | ({"dtype": "bool"} if kind == "bool" else {}))
             if scalars:
                 written[name].attrs["coordinates"] = scalars
-        for place, start, stop in _blocks(grid):
-            columns = results.read(start, stop)
+        for place, start, stop in _blocks(points):
+            table = rows.read(start, stop)
             for name, variable in written.items():
-                values = recipe.values(name, columns)
-                shape = tuple(s.stop - s.start for s in place) + grid.shape[len(place) :] + values.shape[1:]
-                variable[(*place, ...)] = values.reshape(shape).astype(variable.dtype)
+                values = work.values(name, table)
+                shape = tuple(s.stop - s.start for s in place) + points.shape[len(place) :] + values.shape[1:]
+                _put(variable, points, place, values.reshape(shape).astype(variable.dtype))
 
 
-def _blocks(grid: Grid) -> Iterator[tuple[tuple[slice, ...], int, int]]:
-    """Ranges of the first dimension and the points they hold."""
-    if not grid.axes:
-        yield (), 0, 1
+_COMPRESSION: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "shuffle": True}
+
+
+def _put(variable: Any, points: Points, place: tuple[slice, ...], block: np.ndarray) -> None:
+    """Write a block, which is in the order of counting, where it belongs among the dimensions."""
+    if isinstance(points, PointList):
+        variable[(*place, ...)] = block
         return
-    rows, row = grid.shape[0], grid.size // grid.shape[0]
+    inside = [points.order.index(name) for name in points.axes]
+    where = [place[at] if at < len(place) else slice(None) for at in inside]
+    variable[(*where, ...)] = block.transpose(*inside, *range(len(inside), block.ndim))
+
+
+def _blocks(points: Points) -> Iterator[tuple[tuple[slice, ...], int, int]]:
+    """Ranges of the first axis in the order of counting, and the points they hold."""
+    rows, row = points.shape[0], points.size // points.shape[0]
     step = max(1, _BLOCK // row)
     for first in range(0, rows, step):
         last = min(first + step, rows)

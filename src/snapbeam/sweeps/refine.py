@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass, RunStatus
-from snapbeam.sweeps.compute.task import Columns
-from snapbeam.sweeps.compute.tasks import Book, Results, Stage
-from snapbeam.sweeps.sweep import Grid, Progress
+from snapbeam.core.validate import InputError
+from snapbeam.sweeps.compute.task import ResultTable
+from snapbeam.sweeps.compute.tasks import Keeper, Rows, Stage
+from snapbeam.sweeps.points import Grid
+from snapbeam.sweeps.setup import Progress
 
-__all__ = ["MAX_LEVELS", "RefinedResults", "refine", "refined_grid"]
+__all__ = ["MAX_LEVELS", "RefinedRows", "refine", "refined_grid"]
 
 MAX_LEVELS = 10
 _BLOCK = 65536
@@ -25,152 +27,175 @@ _BLOCK = 65536
 _Classes = NDArray[np.int8]
 _Mask = NDArray[np.bool_]
 _Index = NDArray[np.int64]
+_Split = tuple[bool, ...]
 
 
-class RefinedResults:
+class RefinedRows:
     """Rows of a refined map: those that were computed, and those that were inferred."""
 
-    def __init__(self, columns: Columns, computed: _Mask) -> None:
+    def __init__(self, columns: ResultTable, computed: _Mask) -> None:
         self.columns = columns
         self.computed = computed
         """Whether each point was run, shape of the grid."""
 
-    def read(self, start: int, stop: int) -> Columns:
+    def read(self, start: int, stop: int) -> ResultTable:
         """Rows *start* to *stop*."""
-        return Columns(self.columns.integers[start:stop], self.columns.numbers[start:stop])
+        return ResultTable(self.columns.integers[start:stop], self.columns.numbers[start:stop])
 
 
 def refined_grid(grid: Grid) -> Grid:
-    """The grid with a point more between each two neighbours of an axis."""
+    """The grid with a point more between each two neighbours of an axis of numbers.
+
+    Whole numbers and words have nothing between them.
+    """
     axes = {}
     for name, values in grid.axes.items():
+        if values.dtype.kind != "f":
+            axes[name] = values
+            continue
         axes[name] = np.empty(2 * values.size - 1)
         axes[name][::2] = values
         axes[name][1::2] = 0.5 * (values[1:] + values[:-1])
-    return Grid(axes, grid.scalars)
+    return Grid(axes)
 
 
-def refine(book: Book, levels: int, progress: Progress | None = None) -> tuple[Grid, RefinedResults]:
+def refine(keeper: Keeper, levels: int, progress: Progress | None = None) -> tuple[Grid, RefinedRows]:
     """Compute a map and refine it *levels* times where neighbours differ in class.
 
     Returns
     -------
     grid : Grid
         The grid at full resolution, (n - 1) 2^levels + 1 points along an axis of n.
-    results : RefinedResults
+    results : RefinedRows
         The rows of all of its points.
     """
-    recipe = book.recipe
-    grid = recipe.setup.grid
-    base = Stage("base", grid, book.chunk)
-    parts: list[tuple[_Index, Results]] = [(np.arange(grid.size), book.complete(base, progress))]
-    classes = _classes(book, parts[0][1], grid.size).reshape(grid.shape)
+    work = keeper.work
+    grid = work.setup.points
+    if not isinstance(grid, Grid):
+        raise InputError("refine_levels: a list of points cannot be refined; give axes")
+    split = _split(grid)
+    if not any(split):
+        raise InputError("refine_levels: needs an axis of at least two numbers that are not whole by nature")
+    base = Stage("base", grid, keeper.chunk)
+    parts: list[tuple[_Index, Rows]] = [(np.arange(grid.size), keeper.complete(base, progress))]
+    classes = _classes(keeper, parts[0][1], grid.size).reshape(grid.shape)
     computed = np.ones(grid.shape, dtype=bool)
     for level in range(1, levels + 1):
         finer = refined_grid(grid)
         parts = [(_finer_index(index, grid, finer), results) for index, results in parts]
         corners = classes
-        classes = _spread(corners, finer.shape, ResponseClass.UNKNOWN)
-        computed = _spread(computed, finer.shape, False)
-        active = _differ(corners)
+        classes = _spread(corners, finer.shape, split, ResponseClass.UNKNOWN)
+        computed = _spread(computed, finer.shape, split, False)
+        active = _differ(corners, split)
         part = 0
         while True:
-            missing = np.flatnonzero(_points_of(active, finer.shape) & ~computed)
+            missing = np.flatnonzero(_points_of(active, finer.shape, split) & ~computed)
             if missing.size:
                 part += 1
-                stage = Stage(f"level-{level}-{part}", finer, book.chunk, missing)
-                results = book.complete(stage, progress)
+                stage = Stage(f"level-{level}-{part}", finer, keeper.chunk, missing)
+                results = keeper.complete(stage, progress)
                 parts.append((missing, results))
-                classes.flat[missing] = _classes(book, results, missing.size)
+                classes.flat[missing] = _classes(keeper, results, missing.size)
                 computed.flat[missing] = True
-            surprised = _surprised(corners, classes, computed) & ~active
+            surprised = _surprised(corners, classes, computed, split) & ~active
             if not surprised.any():
                 break
             active |= surprised
-        _infer(corners, classes, computed, active)
+        _infer(corners, classes, computed, active, split)
         grid = finer
-    return grid, _assemble(book, grid, parts, classes, computed)
+    return grid, _assemble(keeper, grid, parts, classes, computed)
 
 
-def _classes(book: Book, results: Results, size: int) -> _Classes:
+def _classes(keeper: Keeper, results: Rows, size: int) -> _Classes:
     blocks = [
-        book.recipe.values("response", results.read(start, min(start + _BLOCK, size)))
+        keeper.work.values("response", results.read(start, min(start + _BLOCK, size)))
         for start in range(0, size, _BLOCK)
     ]
     return np.concatenate(blocks).astype(np.int8)
 
 
+def _split(grid: Grid) -> _Split:
+    """Which axes are halved, in the order of counting."""
+    return tuple(grid.axes[name].dtype.kind == "f" and grid.axes[name].size > 1 for name in grid.order)
+
+
 def _finer_index(index: _Index, grid: Grid, finer: Grid) -> _Index:
-    if not grid.axes:
-        return index
-    places = tuple(2 * at for at in np.unravel_index(index, grid.shape))
-    return np.ravel_multi_index(places, finer.shape).astype(np.int64)
+    places = np.unravel_index(index, grid.shape)
+    doubled = tuple(2 * at if halved else at for at, halved in zip(places, _split(grid), strict=True))
+    return np.ravel_multi_index(doubled, finer.shape).astype(np.int64)
 
 
-def _spread(coarse: NDArray, shape: tuple[int, ...], fill: int) -> NDArray:
+def _every(split: _Split) -> tuple[slice, ...]:
+    """Where the points of a coarse grid lie in the fine one."""
+    return tuple(slice(None, None, 2) if halved else slice(None) for halved in split)
+
+
+def _spread(coarse: NDArray, shape: tuple[int, ...], split: _Split, fill: int) -> NDArray:
     fine = np.full(shape, fill, dtype=coarse.dtype)
-    fine[tuple(slice(None, None, 2) for _ in shape)] = coarse
+    fine[_every(split)] = coarse
     return fine
 
 
-def _cells(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Cells between the points of a grid; an axis of one point has one flat cell."""
-    return tuple(max(count - 1, 1) for count in shape)
-
-
-def _corner_views(coarse: _Classes) -> list[_Classes]:
-    cells = _cells(coarse.shape)
-    offsets = product(*((0, 1) if count > 1 else (0,) for count in coarse.shape))
+def _corner_views(coarse: _Classes, split: _Split) -> list[_Classes]:
+    """The corners of all cells, corner by corner; an axis that is not halved has flat cells, one a point."""
+    cells = tuple(count - 1 if halved else count for count, halved in zip(coarse.shape, split, strict=True))
+    offsets = product(*((0, 1) if halved else (0,) for halved in split))
     return [coarse[tuple(slice(o, o + c) for o, c in zip(at, cells, strict=True))] for at in offsets]
 
 
-def _fine_slices(shape: tuple[int, ...]) -> list[tuple[slice, ...]]:
+def _fine_slices(shape: tuple[int, ...], split: _Split) -> list[tuple[slice, ...]]:
     """For each of the 3^d points of a refined cell, where it lies in the fine grid, all cells at once."""
-    offsets = product(*((0, 1, 2) if count > 1 else (0,) for count in shape))
-    cells = tuple((count - 1) // 2 if count > 1 else 1 for count in shape)
-    return [tuple(slice(o, o + 2 * c - 1, 2) for o, c in zip(at, cells, strict=True)) for at in offsets]
+    offsets = product(*((0, 1, 2) if halved else (0,) for halved in split))
+    cells = tuple((count - 1) // 2 if halved else count for count, halved in zip(shape, split, strict=True))
+    return [
+        tuple(
+            slice(o, o + 2 * c - 1, 2) if halved else slice(0, c)
+            for o, c, halved in zip(at, cells, split, strict=True)
+        )
+        for at in offsets
+    ]
 
 
-def _differ(coarse: _Classes) -> _Mask:
+def _differ(coarse: _Classes, split: _Split) -> _Mask:
     """Cells whose corners are not all of one class."""
-    first, *others = _corner_views(coarse)
+    first, *others = _corner_views(coarse, split)
     different = np.zeros(first.shape, dtype=bool)
     for other in others:
         different |= other != first
     return different
 
 
-def _points_of(active: _Mask, shape: tuple[int, ...]) -> _Mask:
+def _points_of(active: _Mask, shape: tuple[int, ...], split: _Split) -> _Mask:
     inside = np.zeros(shape, dtype=bool)
-    for at in _fine_slices(shape):
+    for at in _fine_slices(shape, split):
         inside[at] |= active
     return inside
 
 
-def _surprised(corners: _Classes, fine: _Classes, computed: _Mask) -> _Mask:
+def _surprised(corners: _Classes, fine: _Classes, computed: _Mask, split: _Split) -> _Mask:
     """Cells with a computed point that is not of the class of the first corner."""
-    expected = _corner_views(corners)[0]
+    expected = _corner_views(corners, split)[0]
     found = np.zeros(expected.shape, dtype=bool)
-    for at in _fine_slices(fine.shape):
+    for at in _fine_slices(fine.shape, split):
         found |= computed[at] & (fine[at] != expected)
     return found
 
 
-def _infer(corners: _Classes, fine: _Classes, computed: _Mask, active: _Mask) -> None:
-    expected = _corner_views(corners)[0]
-    for at in _fine_slices(fine.shape):
+def _infer(corners: _Classes, fine: _Classes, computed: _Mask, active: _Mask, split: _Split) -> None:
+    expected = _corner_views(corners, split)[0]
+    for at in _fine_slices(fine.shape, split):
         fine[at] = np.where(computed[at] | active, fine[at], expected)
 
 
 def _assemble(
-    book: Book, grid: Grid, parts: list[tuple[_Index, Results]], classes: _Classes, computed: _Mask
-) -> RefinedResults:
-    recipe = book.recipe
-    columns = recipe.unfinished(grid.size, RunStatus.INFERRED)
-    columns.integers[:, recipe.integers.index("response")] = classes.ravel()
+    keeper: Keeper, grid: Grid, parts: list[tuple[_Index, Rows]], classes: _Classes, computed: _Mask
+) -> RefinedRows:
+    work = keeper.work
+    columns = work.unfinished(grid.size, RunStatus.INFERRED)
+    columns.integers[:, work.integers.index("response")] = classes.ravel()
     for index, results in parts:
         for start in range(0, index.size, _BLOCK):
             rows = index[start : start + _BLOCK]
             block = results.read(start, start + rows.size)
             columns.integers[rows], columns.numbers[rows] = block
-    return RefinedResults(columns, computed)
+    return RefinedRows(columns, computed)

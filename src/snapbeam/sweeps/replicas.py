@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from snapbeam.core.validate import InputError, integer, positive
-from snapbeam.engines.ensemble import Start
-from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.start import rest_state
+from snapbeam.model.state import State
+from snapbeam.model.system import System
 
-__all__ = ["MEASURING_ERROR", "Replicas", "perturbed_starts"]
+__all__ = ["MEASURING_ERROR", "Replicas", "perturbed_start"]
 
 MEASURING_ERROR = 12e-6 / 12.0**0.5
 """Error of a position read to one pixel of the paper's camera, 12 um: the rms of rounding to a pixel, m."""
@@ -54,24 +55,31 @@ class Replicas:
         return 1 + self.count + int(self.halve_step)
 
 
-def perturbed_starts(model: ReducedModel, replicas: Replicas, side: str) -> list[Start]:
-    """Starts of a beam that still rings faintly in all its modes, the same for every point of a map.
+def perturbed_start(system: System, replicas: Replicas, repeat: int, state: State | None = None) -> State:
+    """The start of one repeat: a beam that still rings faintly in all its modes, the same for every point of a map.
+
+    It is added to *state*, or a batch of states, or else to the system's own start.
 
     Each linear mode gets a normally distributed displacement and velocity of equal mean energy,
     q_j ~ N(0, s/omega_j) and q_j' ~ N(0, s), with s such that the displacement of the centre has the
     root mean square asked for.
     """
-    sign = 1.0 if side == "below" else -1.0
+    model = system.model
+    rest = state if state is not None else system.start
+    if rest is None:
+        rest = rest_state(model, system.striker)
+    sign = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
     moving = model.omega > 0.0
     per_unit = np.where(moving, 1.0 / np.where(moving, model.omega, 1.0), 0.0)
     reach = float(np.sqrt(np.sum(((model.center_shape @ model.linear_modes) * per_unit) ** 2)))
     if reach == 0.0:
         raise InputError("replicas: no mode moves the centre, so its start cannot be changed")
     speed = replicas.size / reach
-    starts = []
-    for repeat in range(replicas.count):
-        generator = np.random.Generator(np.random.Philox(key=[replicas.seed, repeat]))
-        q, velocity = generator.standard_normal((2, model.modes)) * speed
-        alpha = model.equilibrium + model.linear_modes @ (q * per_unit)
-        starts.append(Start(sign * alpha, sign * (model.linear_modes @ velocity)))
-    return starts
+    generator = np.random.Generator(np.random.Philox(key=[replicas.seed, repeat]))
+    q, velocity = generator.standard_normal((2, model.modes)) * speed
+    return State(
+        amplitude=rest.amplitude + sign * (model.linear_modes @ (q * per_unit)),
+        velocity=rest.velocity + sign * (model.linear_modes @ velocity),
+        phase=rest.phase,
+        striker_position=rest.striker_position,
+    )

@@ -12,7 +12,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Samples", "search_everything_below", "search_fast"]
+__all__ = ["Responses", "search_everything_below", "search_fast"]
 
 _Index = NDArray[np.int64]
 Ask = Callable[[_Index, _Index], NDArray[np.int8]]
@@ -34,7 +34,7 @@ class _Spent(Exception):
     """The next responses would cost more than is left."""
 
 
-class Samples:
+class Responses:
     """Responses found so far: classes of shape (columns, rows), and which of them are known."""
 
     def __init__(self, columns: int, rows: int, ask: Ask) -> None:
@@ -79,37 +79,37 @@ class Samples:
         return np.where(above.any(axis=1), above.argmax(axis=1), rows.size)
 
 
-def search_fast(samples: Samples, budget: int) -> None:
+def search_fast(found: Responses, budget: int) -> None:
     """Bracket the boundary of each column, its neighbours a guide, then spend what is left looking below it.
 
     Every fourth column is bracketed over its whole range and cut down to neighbouring rows; the others start
     from what those found.  Then rows below the lowest interwell one are tried, the columns that stand out
     above their neighbours first, until *budget* responses are known or nothing is left.
     """
-    samples.budget = budget
+    found.budget = budget
     with suppress(_Spent):
-        _bracket_all(samples)
-    while (left := budget - samples.runs) > 0:
-        column, row = _next_below(samples)
+        _bracket_all(found)
+    while (left := budget - found.runs) > 0:
+        column, row = _next_below(found)
         if column.size == 0:
             return
-        count = min(left, max(1, -(-samples.classes.shape[0] // 4)))
-        samples.need(column[:count], row[:count])
+        count = min(left, max(1, -(-found.classes.shape[0] // 4)))
+        found.need(column[:count], row[:count])
 
 
-def _bracket_all(samples: Samples) -> None:
-    columns, rows = samples.classes.shape
+def _bracket_all(found: Responses) -> None:
+    columns, rows = found.classes.shape
     seeds = np.unique(np.append(np.arange(0, columns, _SEED_EVERY), columns - 1))
     low, high = np.full(columns, -1), np.full(columns, rows)
-    _bisect(samples, seeds, low, high)
+    _bisect(found, seeds, low, high)
     others = np.setdiff1d(np.arange(columns), seeds)
     if others.size:
         guess = np.rint(np.interp(others, seeds, high[seeds])).astype(np.int64)
-        _bracket(samples, others, guess, low, high)
-        _bisect(samples, others, low, high)
+        _bracket(found, others, guess, low, high)
+        _bisect(found, others, low, high)
 
 
-def _bisect(samples: Samples, columns: _Index, low: _Index, high: _Index) -> None:
+def _bisect(found: Responses, columns: _Index, low: _Index, high: _Index) -> None:
     """Narrow the brackets to neighbouring rows, low not interwell and high interwell."""
     while True:
         open_ = columns[high[columns] - low[columns] > 1]
@@ -117,14 +117,14 @@ def _bisect(samples: Samples, columns: _Index, low: _Index, high: _Index) -> Non
             return
         width = high[open_] - low[open_]
         middle = low[open_] + np.clip(np.rint(_LOW_BIAS * width).astype(np.int64), 1, width - 1)
-        found = samples.need(open_, middle)
-        high[open_] = np.where(found, middle, high[open_])
-        low[open_] = np.where(found, low[open_], middle)
+        snaps = found.need(open_, middle)
+        high[open_] = np.where(snaps, middle, high[open_])
+        low[open_] = np.where(snaps, low[open_], middle)
 
 
-def _bracket(samples: Samples, columns: _Index, guess: _Index, low: _Index, high: _Index) -> None:
+def _bracket(found: Responses, columns: _Index, guess: _Index, low: _Index, high: _Index) -> None:
     """Step away from the guesses, in doubling steps, until a row is below the boundary and one above it."""
-    rows = samples.classes.shape[1]
+    rows = found.classes.shape[1]
     step = _FIRST_STEP
     below, above = guess - step, guess + step
     while True:
@@ -136,19 +136,19 @@ def _bracket(samples: Samples, columns: _Index, guess: _Index, low: _Index, high
         which = np.concatenate((down, up))
         row = np.clip(np.concatenate((below[down], above[up])), 0, rows - 1)
         column = columns[which]
-        found = samples.need(column, row)
-        high[column] = np.where(found, np.minimum(high[column], row), high[column])
-        low[column] = np.where(found, low[column], np.maximum(low[column], row))
+        snaps = found.need(column, row)
+        high[column] = np.where(snaps, np.minimum(high[column], row), high[column])
+        low[column] = np.where(snaps, low[column], np.maximum(low[column], row))
         step *= 2
         below[down] -= step
         above[up] += step
 
 
-def _next_below(samples: Samples) -> tuple[_Index, _Index]:
+def _next_below(found: Responses) -> tuple[_Index, _Index]:
     """The next unknown row below the first interwell one of each column, the most promising column first."""
-    first = samples.first()
-    rows = np.arange(samples.classes.shape[1])
-    candidates = ~samples.known & (rows < first[:, None])
+    first = found.first()
+    rows = np.arange(found.classes.shape[1])
+    candidates = ~found.known & (rows < first[:, None])
     columns = np.flatnonzero(candidates.any(axis=1))
     row = rows.size - 1 - candidates[columns, ::-1].argmax(axis=1)
     lowest = np.array([first[max(0, c - _REACH) : c + _REACH + 1].min() for c in columns], dtype=np.int64)
@@ -157,18 +157,18 @@ def _next_below(samples: Samples) -> tuple[_Index, _Index]:
     return columns[order], row[order]
 
 
-def search_everything_below(samples: Samples, block: int, confirm: int) -> None:
+def search_everything_below(found: Responses, block: int, confirm: int) -> None:
     """Go up every column, *block* rows at a time, until *confirm* interwell rows follow each other.
 
     Nothing below is left out, so the first interwell row found is the first of the grid.
     """
-    columns, rows = samples.classes.shape
+    columns, rows = found.classes.shape
     going = np.arange(columns)
     for start in range(0, rows, block):
         stop = min(start + block, rows)
         pairs = np.meshgrid(going, np.arange(start, stop), indexing="ij")
-        samples.need(pairs[0].ravel(), pairs[1].ravel())
-        tail = samples.interwell[going, max(0, stop - confirm) : stop]
+        found.need(pairs[0].ravel(), pairs[1].ravel())
+        tail = found.interwell[going, max(0, stop - confirm) : stop]
         going = going[~(tail.all(axis=1) & (stop >= confirm))]
         if going.size == 0:
             return

@@ -1,4 +1,4 @@
-"""Maps that take long: kept in a store, resumed, spread over a cluster, refined, repeated."""
+"""Sweeps that take long: kept in a store, resumed, spread over a cluster, refined, repeated."""
 
 from __future__ import annotations
 
@@ -10,28 +10,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from snapbeam.core.files import check_writable
-from snapbeam.core.validate import InputError, integer
-from snapbeam.model.contact import HertzContact
-from snapbeam.model.reduction import ReducedModel
+from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.validate import InputError, InputTypeError, flag, integer
 from snapbeam.sweeps.compute.cluster import Cluster, open_client, parse_cluster
-from snapbeam.sweeps.compute.task import Recipe
-from snapbeam.sweeps.compute.tasks import Book, MemoryBook, Results, Stage
+from snapbeam.sweeps.compute.task import PointWork
+from snapbeam.sweeps.compute.tasks import Keeper, MemoryKeeper, Rows, Stage
 from snapbeam.sweeps.compute.workers import ClusterWorkers, Failure, HereWorkers, Workers
 from snapbeam.sweeps.export import to_dataset, to_netcdf
 from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.refine import MAX_LEVELS, RefinedResults, refine
-from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicas
-from snapbeam.sweeps.sweep import Grid, Progress, map_setup
+from snapbeam.sweeps.points import Points
+from snapbeam.sweeps.refine import MAX_LEVELS, RefinedRows, refine
+from snapbeam.sweeps.replicas import Replicas
+from snapbeam.sweeps.setup import Progress, SweepSetup
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Tally", "long_map"]
+__all__ = ["Keeping", "Tally", "compute_sweep"]
 
-_TITLE = "map of the response of a struck bistable beam"
 Note = Callable[[str], object]
 
 
@@ -41,7 +38,7 @@ class _Incomplete(Exception):
 
 @dataclass
 class Tally:
-    """What happened while a map was computed."""
+    """What happened while a sweep was computed."""
 
     tasks: int = 0
     """Tasks of the stages so far."""
@@ -58,26 +55,62 @@ class Tally:
     """Tasks that are not done, when a store is only verified."""
 
 
-def _spread(task: int) -> float:
+@dataclass(frozen=True, eq=False)
+class Keeping:
+    """Where a sweep is kept while it is computed, and how.
+
+    Parameters
+    ----------
+    path : path, optional
+        Folder of the store; in memory if none is given.
+    verify : bool
+        Check every finished task of the store and compute again only those that are damaged; points that
+        were never computed stay unknown.
+    chunk : int, optional
+        Points of a task of a new store.
+    config : dict, optional
+        Parameters to keep in the store as a parameter file would hold them.
+    note : callable, optional
+        Called as ``note(text)`` with what there is to say.
+    tally : Tally, optional
+        Filled with what was computed, kept, damaged and given up.
+    """
+
+    path: str | os.PathLike[str] | None = None
+    verify: bool = False
+    chunk: int | None = None
+    config: dict[str, Any] | None = None
+    note: Note | None = None
+    tally: Tally | None = None
+
+    def __post_init__(self) -> None:
+        if self.path is not None and not isinstance(self.path, (str, os.PathLike)):
+            raise InputTypeError(f"store = {self.path!r}: must be a folder")
+        flag("verify", self.verify)
+        if self.path is None and self.verify:
+            raise InputError("verify: needs a store")
+        if self.path is not None and self.verify and not (Path(self.path) / "map.json").is_file():
+            raise InputError(f"store = {str(self.path)!r}: there is no map to verify")
+
+
+def _scattered(task: int) -> float:
     """Order in which any few tasks lie all over the map, so that the time left is told well from the start."""
     return task * 0.6180339887498949 % 1.0
 
 
-class StoreBook:
-    """A map kept in a store: finished tasks are read, damaged and missing ones are computed."""
+class StoreKeeper:
+    """A sweep kept in a store: finished tasks are read, damaged and missing ones are computed."""
 
-    def __init__(
-        self, store: MapStore, workers: Workers, tally: Tally, note: Note, only_damaged: bool = False
-    ) -> None:
+    def __init__(self, store: MapStore, workers: Workers, keeping: Keeping) -> None:
         self.store = store
-        self.recipe = store.recipe
+        self.work = store.work
         self.chunk = store.chunk
         self.workers = workers
-        self.tally = tally
-        self.note = note
-        self.only_damaged = only_damaged
+        self.tally = Tally() if keeping.tally is None else keeping.tally
+        self.note: Note = keeping.note if keeping.note is not None else (lambda _: None)
+        self.only_damaged = keeping.verify
 
-    def complete(self, stage: Stage, progress: Progress | None = None) -> Results:
+    def complete(self, stage: Stage, progress: Progress | None = None) -> Rows:
         """Compute the tasks of a stage that are not done, committing each."""
         store, tally = self.store, self.tally
         store.open_stage(stage)
@@ -89,7 +122,7 @@ class StoreBook:
             self.note(
                 f"{stage.name}: {len(damaged)} of {stage.tasks} tasks were damaged and are computed again"
             )
-        todo = sorted(damaged if self.only_damaged else pending, key=_spread)
+        todo = sorted(damaged if self.only_damaged else pending, key=_scattered)
         sizes = {task: int(np.diff(stage.bounds(task))[0]) for task in todo}
         total, done = sum(sizes.values()), 0
         if total < stage.size and not self.only_damaged:
@@ -99,15 +132,15 @@ class StoreBook:
             if progress is not None:
                 progress(done + inside, total)
 
-        for task, outcome in self.workers.run(self.recipe, stage, todo, report):
-            if isinstance(outcome, Failure):
-                store.fail(stage, task, outcome.reason)
-                tally.failed.append((stage.name, task, outcome.reason))
-                self.note(f"{stage.name}: task {task} was given up: it {outcome.reason}")
+        for task, result in self.workers.run(self.work, stage, todo, report):
+            if isinstance(result, Failure):
+                store.fail(stage, task, result.reason)
+                tally.failed.append((stage.name, task, result.reason))
+                self.note(f"{stage.name}: task {task} was given up: it {result.reason}")
             else:
-                store.commit(stage, task, outcome.columns, outcome.processor)
+                store.commit(stage, task, result.columns, result.processor)
                 tally.computed += 1
-                tally.runs += sizes[task] * self.recipe.runs_per_point
+                tally.runs += sizes[task] * self.work.runs_per_point
             done += sizes[task]
             report(0)
         if self.only_damaged and (missing := len(store.pending(stage))):
@@ -116,185 +149,84 @@ class StoreBook:
         return store.reader(stage)
 
 
-def long_map(
-    model: ReducedModel,
-    contact: HertzContact,
+def compute_sweep(
+    setup: SweepSetup,
+    keeping: Keeping,
     *,
-    frequency_ratio: ArrayLike,
-    velocity_amplitude: ArrayLike,
-    location: ArrayLike = 1.0 / 2.1,
-    cycles: int = 200,
-    side: str = "below",
-    reference_freq: float | None = None,
-    step: float | None = None,
-    accuracy: str = "map",
-    engine: str = "auto",
-    early_decision: bool = False,
-    store: str | os.PathLike[str] | None = None,
-    verify: bool = False,
     cluster: str | None = None,
     refine_levels: int = 0,
-    replicas: int = 0,
-    replica_size: float = MEASURING_ERROR,
-    replica_seed: int = 0,
-    halve_step: bool = False,
-    chunk: int | None = None,
-    threads: int | None = None,
+    replicas: Replicas | None = None,
     output: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
-    note: Note | None = None,
-    tally: Tally | None = None,
-    config: dict[str, Any] | None = None,
 ) -> xr.Dataset:
-    """A response map that survives interruption, refines itself and can leave this machine.
-
-    The parameters up to *early_decision* are those of :func:`snapbeam.response_map`, and so are the numbers:
-    bit for bit, whatever the tasks, their order, the threads, the workers and the interruptions.
-
-    Parameters
-    ----------
-    store : path, optional
-        Folder that keeps the map while it is computed.  One that exists is resumed: what is finished and
-        undamaged is not computed again.
-    verify : bool
-        Check every finished task of the store and compute again only those that are damaged; points that
-        were never computed stay unknown.
-    cluster : str, optional
-        Who computes: ``"local:4"``, ``"tcp://host:8786"`` or a TOML file with a section ``[slurm]``; this
-        process by default.  Needs a store.
-    refine_levels : int
-        Times the spacing is halved where neighbours differ in class.
-    replicas : int
-        Repeats of each run with a changed start; adds ``class_share`` to the map.
-    replica_size : float
-        Root mean square of the change of the centre displacement, m; by default the error of a position
-        read to one pixel of the paper's camera.
-    replica_seed : int
-        Chooses the changes.
-    halve_step : bool
-        One repeat more with every step halved; adds ``response_half_step``.
-    chunk : int, optional
-        Points of a task.
-    threads : int, optional
-        Threads of this process; all usable cores by default.  Workers of a cluster use those they have.
-    output : path, optional
-        NetCDF file to write, a block at a time, so that memory does not grow with the map.
-    progress, note : callable, optional
-        Called as ``progress(done, total)`` with points of the present stage, and ``note(text)``.
-    tally : Tally, optional
-        Filled with what was computed, kept, damaged and given up.
-    config : dict, optional
-        Parameters to keep in the store as a parameter file would hold them.
-
-    Returns
-    -------
-    xarray.Dataset
-        The map of :func:`snapbeam.response_map`; of a refined map at full resolution, with ``computed``
-        that says which points were run.  With *output*, opened from that file.
-
-    Raises
-    ------
-    InputError
-        For bad input, and for a store that holds another map.
-    StoreError
-        If the store is in use, cannot be written or is damaged beyond repair.
-    """
-    setup = map_setup(
-        model,
-        contact,
-        frequency_ratio=frequency_ratio,
-        velocity_amplitude=velocity_amplitude,
-        location=location,
-        cycles=cycles,
-        side=side,
-        reference_freq=reference_freq,
-        step=step,
-        accuracy=accuracy,
-        engine=engine,
-        early_decision=early_decision,
-    )
+    """Compute a sweep that was checked; see :func:`snapbeam.sweep`."""
     levels = integer("refine_levels", refine_levels, 0, MAX_LEVELS)
-    if threads is not None:
-        threads = integer("threads", threads, 1, 4096)
-    repeats = None
-    if halve_step or integer("replicas", replicas, 0, 10_000):
-        repeats = Replicas(replicas, replica_size, bool(halve_step), replica_seed)
+    if replicas is not None and not isinstance(replicas, Replicas):
+        raise InputTypeError(f"replicas = {replicas!r}: must be a number of repeats, or Replicas")
+    if progress is not None and not callable(progress):
+        raise InputTypeError(f"progress = {progress!r}: must be callable, as progress(done, total)")
     target = None if output is None else check_writable(output, "output", (".nc",))
     asked = None if cluster is None else parse_cluster(cluster)
-    if store is None and (verify or asked is not None):
-        raise InputError(f"{'verify' if verify else 'cluster'}: needs a store")
-    if store is not None and verify and not (Path(store) / "map.json").is_file():
-        raise InputError(f"store = {str(store)!r}: there is no map to verify")
-    recipe = Recipe(setup, repeats)
-    tally = Tally() if tally is None else tally
-    note = note if note is not None else (lambda _: None)
-    with _book(recipe, store, asked, threads, chunk, tally, note, verify, config) as book:
-        grid, results = _computed(book, levels, progress)
-        more = {} if not isinstance(book, StoreBook) else book.store.made_with()
-        return _result(recipe, grid, results, more, target)
+    if keeping.path is None and asked is not None:
+        raise InputError("cluster: needs a store")
+    work = PointWork(setup, replicas)
+    with _keeper(work, keeping, asked) as keeper:
+        points, rows = _computed(keeper, levels, progress)
+        more = {} if not isinstance(keeper, StoreKeeper) else keeper.store.made_with()
+        return _result(work, points, rows, more, target)
 
 
-def _computed(book: Book, levels: int, progress: Progress | None) -> tuple[Grid, Results]:
-    grid = book.recipe.setup.grid
-    base = Stage("base", grid, book.chunk)
+def _computed(keeper: Keeper, levels: int, progress: Progress | None) -> tuple[Points, Rows]:
+    points = keeper.work.setup.points
+    base = Stage("base", points, keeper.chunk)
     try:
-        return refine(book, levels, progress) if levels else (grid, book.complete(base, progress))
+        return refine(keeper, levels, progress) if levels else (points, keeper.complete(base, progress))
     except _Incomplete:
-        assert isinstance(book, StoreBook)
-        return grid, book.store.reader(base)
+        assert isinstance(keeper, StoreKeeper)
+        return points, keeper.store.reader(base)
 
 
 @contextmanager
-def _book(
-    recipe: Recipe,
-    store: str | os.PathLike[str] | None,
-    cluster: Cluster | None,
-    threads: int | None,
-    chunk: int | None,
-    tally: Tally,
-    note: Note,
-    verify: bool,
-    config: dict[str, Any] | None,
-) -> Iterator[Book]:
-    if store is None:
-        yield MemoryBook(recipe, threads)
+def _keeper(work: PointWork, keeping: Keeping, cluster: Cluster | None) -> Iterator[Keeper]:
+    threads = work.setup.integration.threads
+    if keeping.path is None:
+        yield MemoryKeeper(work, threads)
         return
-    with MapStore(Path(store), recipe, chunk, config) as kept:
+    with MapStore(Path(keeping.path), work, keeping.chunk, keeping.config) as kept:
         if cluster is None:
-            yield StoreBook(kept, HereWorkers(threads), tally, note, verify)
+            yield StoreKeeper(kept, HereWorkers(threads), keeping)
             return
         with open_client(cluster) as client:
-            yield StoreBook(kept, ClusterWorkers(client, note), tally, note, verify)
+            note = keeping.note if keeping.note is not None else (lambda _: None)
+            yield StoreKeeper(kept, ClusterWorkers(client, note), keeping)
 
 
 def _result(
-    recipe: Recipe, grid: Grid, results: Results, more: dict[str, Any], target: Path | None
+    work: PointWork, points: Points, rows: Rows, more: dict[str, Any], target: Path | None
 ) -> xr.Dataset:
     import xarray as xr
 
-    if recipe.replicas is not None:
-        repeats = recipe.replicas
+    if work.replicas is not None:
+        repeats = work.replicas
         more |= {
             "replicas": repeats.count,
             "replica_size": repeats.size,
             "replica_seed": repeats.seed,
             "halve_step": int(repeats.halve_step),
         }
-    attrs = recipe.setup.attributes(_TITLE, more)
-    if isinstance(results, RefinedResults):
-        attrs["points_computed"] = int(results.computed.sum())
-        attrs["points_inferred"] = int(grid.size - results.computed.sum())
-        dataset = to_dataset(recipe, grid, results, attrs)
+    attrs = work.setup.attributes(more=more)
+    if isinstance(rows, RefinedRows):
+        attrs["points_computed"] = int(rows.computed.sum())
+        attrs["points_inferred"] = int(points.size - rows.computed.sum())
+        dataset = to_dataset(work, points, rows, attrs)
         labels = {"units": "1", "long_name": "whether the point was run; if not, its class was inferred"}
-        dataset["computed"] = (tuple(grid.axes), results.computed, labels)
+        dataset["computed"] = (points.dims, points.arranged(rows.computed.ravel()), labels)
         if target is None:
             return dataset
-        from snapbeam.core.files import atomic_path
-
         with atomic_path(target) as temporary:
             dataset.to_netcdf(temporary, engine="h5netcdf")
     elif target is None:
-        return to_dataset(recipe, grid, results, attrs)
+        return to_dataset(work, points, rows, attrs)
     else:
-        to_netcdf(recipe, grid, results, attrs, target)
+        to_netcdf(work, points, rows, attrs, target)
     return xr.open_dataset(target, engine="h5netcdf")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from snapbeam import InputError
+from snapbeam.core.findings import Finding
 from snapbeam.lab.plausibility import (
     alignment,
     calibration,
@@ -19,7 +20,6 @@ from snapbeam.lab.plausibility import (
     tracking,
     vibrometer,
 )
-from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.lab.plausibility.kinds import Kind
 
 KINDS: Mapping[str, Kind] = {

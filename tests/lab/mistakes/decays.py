@@ -40,7 +40,8 @@ def outcome(signal, freq, zeta, **options):
     fit = identify_decay(signal, **options)
     mode = fit.modes[0]
     ratio = max(
-        off(mode.natural_freq, freq, mode.natural_freq_se), off(mode.damping_ratio, zeta, mode.damping_ratio_se)
+        off(mode.natural_freq, freq, mode.natural_freq_se),
+        off(mode.damping_ratio, zeta, mode.damping_ratio_se),
     )
     return Outcome(fit.findings, "", ratio)
 

@@ -90,7 +90,7 @@ Shutter Type2(nsec) : 65060
 Scale Pixel Size : 47.1930
 Scale Distance : 1000.0000
 Scale 2Points Distance : 21.1896
-"""
+"""  # noqa: W291
     + _DETAILS
     + _VIEWER,
     # pyMRAW, stikalo60k_16bit.cih
@@ -139,7 +139,7 @@ Comment Text :
 EffectiveBit Side : Lower
 Date : 2020/11/10
 Camera Type : FASTCAM SA-Z type 2100K-M-64GB
-""",
+""",  # noqa: W291
     # pyidi, data/data_synthetic.cih
     "generated.cih": """#Camera Information Header
 Record Rate(fps) : 1

@@ -1,34 +1,46 @@
-"""The CPU engine's driver: threads that take runs from a queue."""
+"""The CPU engine's driver: threads that take runs from a queue, and one run in slices."""
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.columns import Counts, Numbers, Reals
-from snapbeam.engines.cpu.march import march_many
-from snapbeam.engines.cpu.rows import Layout
+from snapbeam.engines.cpu.march import Kept, march_many
+from snapbeam.engines.cpu.march_one import march_one
+from snapbeam.engines.cpu.memory import Memory, Packed, lay_out, pack
+from snapbeam.engines.cpu.recording import MARKS, REALS, VALUES, Outputs
+from snapbeam.engines.cpu.state import Asked, Room
+from snapbeam.engines.cpu.tangent import TANGENT_ROWS, march_tangent
 from snapbeam.engines.ensemble import Ensemble
-from snapbeam.engines.scalar.composition import Stages, in_memory, slot_length
-from snapbeam.engines.scalar.decisions import PIECES, Outputs
+from snapbeam.engines.outcomes import empty_books
+from snapbeam.engines.outputs import Landings, Last, Recorded
+from snapbeam.engines.scalar.compile import kernel, ready
+from snapbeam.engines.scalar.decisions import PIECES
+from snapbeam.engines.scalar.extras import extras_of_table
 from snapbeam.engines.scalar.lanes import WIDTH
 
-__all__ = ["record", "run_ensemble", "usable_cores"]
+__all__ = ["march_landing", "march_tangents", "record", "run_ensemble", "usable_cores"]
 
 _Array = NDArray[np.float64]
+_Integers = NDArray[np.int64]
 _CHUNK_STEPS = 3_000_000
-"""Flight steps per task at most: a second or so, so that progress is smooth and Ctrl-C prompt."""
+"""Flight steps per task at most: a second or so, so that progress is smooth."""
 _CHUNKS = 4
 """Tasks per thread at least, of _FEW runs each at least, so that the threads end together."""
 _FEW = 4
-_ALIGNMENT = 64
+_POLL = 0.2
+"""Seconds after which an interrupt is heard."""
+_SLICE_STEPS = 200_000
+"""Steps of a recorded run between two looks at what else is wanted: some 0.1 s."""
+_SLICE_BYTES = 32 * 2**20
+"""Size of a slice's buffers, at most."""
 
 
 def usable_cores() -> int:
@@ -39,79 +51,34 @@ def usable_cores() -> int:
         return os.cpu_count() or 1
 
 
-def _memory(ensemble: Ensemble) -> tuple[_Array, tuple[Layout, Layout], Stages]:
-    """A copy of the structure's rows with room for two runs, aligned to whole registers, and where is what."""
-    packed, plan, drive = ensemble.packed, ensemble.plan, ensemble.drive_table
-    size, first = packed.layout.size, packed.layout
-    work = 10 * size + (plan.finest + 3) * slot_length(plan.order, size) + 8 * size
-    second = first._replace(
-        g=first.work + work, contact=first.work + work + size, work=first.work + work + 2 * size
-    )
-    stages, weights = in_memory(plan.order, second.work + work)
-    first_drive = stages.flow + weights.size
-    raw = np.zeros(first_drive + drive.size + _ALIGNMENT // 8)
-    skipped = (-raw.ctypes.data % _ALIGNMENT) // 8
-    memory: _Array = raw[skipped : skipped + first_drive + drive.size]
-    memory[: first.work] = packed.memory
-    memory[second.g : second.g + size] = memory[first.g : first.g + size]
-    memory[stages.flow : first_drive] = weights
-    memory[first_drive:] = drive
-    samples, interval = drive.size // 2, ensemble.drive_interval
-    first = first._replace(drive=first_drive, drive_samples=samples, drive_interval=interval)
-    second = second._replace(drive=first_drive, drive_samples=samples, drive_interval=interval)
-    return memory, (first, second), stages
-
-
-def _nothing(size: int) -> Outputs:
-    return Outputs(np.empty(0), np.empty((0, size)), np.empty((0, 6)), np.empty((0, 4)), False)
-
-
-def _empty(runs: int) -> tuple[NDArray[np.int64], _Array]:
-    counts = np.zeros((runs, len(Counts)), dtype=np.int64)
-    counts[:, Counts.STATUS] = RunStatus.NOT_RUN
-    numbers = np.zeros((runs, len(Numbers)))
-    numbers[:, Numbers.LAST_CROSSING] = np.nan
-    numbers[:, Numbers.DECIDED_AT] = np.nan
-    return counts, numbers
-
-
-def _march(
-    ensemble: Ensemble,
-    counts: NDArray[np.int64],
-    numbers: _Array,
-    which: NDArray[np.int64],
-    outputs: Outputs,
-) -> None:
-    """March the runs *which* in this thread by the law of impact that the ensemble has."""
-    march: Any = march_many
-    if ensemble.restitution:
-        from snapbeam.engines.cpu.restitution import march_restitution_many as march
-    packed, plan = ensemble.packed, ensemble.plan
-    memory, layouts, stages = _memory(ensemble)
-    fastest = max(float(packed.model.omega.max()), float(ensemble.reals[:, Reals.OMEGA].max()))
-    pieces = 2 * max(8, math.ceil(PIECES * fastest * plan.step / (2.0 * math.pi)) + 1)
-    march(
-        memory,
-        packed.blocks,
-        layouts,
-        stages,
-        ensemble.contact_rows,
-        ensemble.starts,
-        ensemble.reals,
-        ensemble.ticks,
-        plan.coarsest,
-        plan.finest,
-        ensemble.max_steps,
-        counts,
-        numbers,
-        which,
-        np.empty((pieces + 1, 4)),
-        np.empty(pieces * 4 * WIDTH),
-        outputs,
+def _asked(ensemble: Ensemble, packed: Packed, memory: Memory) -> Asked:
+    """The ensemble in this engine's layout."""
+    law, drive = ensemble.law.numbers_type(), ensemble.drive.numbers_type()
+    return Asked(
+        runs=ensemble.runs,
+        law_numbers=ensemble.law_numbers,
+        drive_numbers=memory.drive_numbers,
+        contact_rows=packed.spread(ensemble.contact_rows),
+        starts=packed.spread(ensemble.starts),
+        law=law(*[0.0] * len(law._fields)),
+        drive=drive(*[0.0] * len(drive._fields)),
+        extras=extras_of_table(),
+        max_steps=ensemble.max_steps,
+        high=bool((ensemble.structure.omega > ensemble.high_omega).any()),
     )
 
 
-def _chunks(work: _Array, threads: int) -> list[NDArray[np.int64]]:
+def _room(ensemble: Ensemble) -> Room:
+    longest = float(ensemble.step_times.max())
+    pieces = 2 * max(8, math.ceil(PIECES * ensemble.fastest * longest / (2.0 * math.pi)) + 1)
+    return Room(np.empty((pieces + 1, 4)), np.empty(pieces * 4 * WIDTH))
+
+
+def _kernel(march: Callable[..., Any], ensemble: Ensemble) -> Any:
+    return kernel(march.py_func, (ensemble.law, ensemble.drive, type(extras_of_table()).owner))  # type: ignore[attr-defined]
+
+
+def _chunks(work: _Array, threads: int) -> list[_Integers]:
     """The runs of each task, longest first: tasks of so little *work* that every thread gets several."""
     order = np.argsort(-work, kind="stable")
     share = work.sum() / max(1.0, min(threads * _CHUNKS, work.size / _FEW))
@@ -122,23 +89,110 @@ def _chunks(work: _Array, threads: int) -> list[NDArray[np.int64]]:
 
 def run_ensemble(
     ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
-) -> tuple[NDArray[np.int64], _Array]:
-    """March every run of an ensemble.
+) -> NDArray[Any]:
+    """March every run of an ensemble; returns a book a run.
 
     Runs are handed out longest first, a chunk at a time; what a run gives does not depend on which thread
     marched it or on what it was marched with.
+    """
+    return _march(ensemble, threads, progress, landings=0).books
+
+
+def march_landing(
+    ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
+) -> Landings:
+    """As :func:`run_ensemble`, and the states at every landing."""
+    landings = int(-(-ensemble.runs["end"][0] // ensemble.runs["landing"][0]))
+    return _march(ensemble, threads, progress, landings)
+
+
+def march_tangents(
+    ensemble: Ensemble,
+    tangents: _Array,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> tuple[Landings, _Array]:
+    """As :func:`march_landing`, with tangents carried along to the end.
+
+    Parameters
+    ----------
+    tangents : array of shape (runs, k, 2, N)
+        Small changes of q and p of each run.
 
     Returns
     -------
-    counts : int64 array of shape (runs, len(Counts))
-    numbers : float64 array of shape (runs, len(Numbers))
+    landings : Landings
+    tangents : array of shape (runs, k, 2, N)
     """
-    packed = ensemble.packed
-    counts, numbers = _empty(ensemble.size)
-    threads = threads or usable_cores()
+    landings = int(-(-ensemble.runs["end"][0] // ensemble.runs["landing"][0]))
+    packed = pack(ensemble.structure, ensemble.high_omega)
+    size = packed.layout.size
+    spread = packed.spread(tangents).reshape(*tangents.shape[:2], 2 * size)
+    march = _kernel(march_tangent, ensemble)
+    rows = TANGENT_ROWS + 2 * tangents.shape[1]
 
-    def march_chunk(which: NDArray[np.int64]) -> int:
-        _march(ensemble, counts, numbers, which, _nothing(packed.layout.size))
+    def arguments(which: _Integers, kept: Kept) -> tuple[Any, ...]:
+        memory = lay_out(ensemble, packed, rows)
+        first = memory.layouts[1].g - rows * size + TANGENT_ROWS * size
+        asked, room = _asked(ensemble, packed, memory), _room(ensemble)
+        return (
+            memory.memory,
+            memory.blocks,
+            memory.layouts[0],
+            memory.stages,
+            asked,
+            which,
+            room,
+            kept,
+            spread,
+            first,
+        )
+
+    found = _spread_over(ensemble, packed, march, arguments, threads, progress, landings)
+    return found, spread.reshape(*tangents.shape[:2], 2, size)[..., packed.rows]
+
+
+def _march(
+    ensemble: Ensemble,
+    threads: int | None,
+    progress: Callable[[int, int], object] | None,
+    landings: int,
+) -> Landings:
+    packed = pack(ensemble.structure, ensemble.high_omega)
+    march = _kernel(march_many, ensemble)
+
+    def arguments(which: _Integers, kept: Kept) -> tuple[Any, ...]:
+        memory = lay_out(ensemble, packed)
+        asked, room = _asked(ensemble, packed, memory), _room(ensemble)
+        return memory.memory, memory.blocks, memory.layouts, memory.stages, asked, which, room, kept
+
+    return _spread_over(ensemble, packed, march, arguments, threads, progress, landings)
+
+
+def _spread_over(
+    ensemble: Ensemble,
+    packed: Packed,
+    march: Callable[..., None],
+    arguments: Callable[[_Integers, Kept], tuple[Any, ...]],
+    threads: int | None,
+    progress: Callable[[int, int], object] | None,
+    landings: int,
+) -> Landings:
+    """Hand the runs to threads, in chunks; *arguments* are those of *march*, whose memory is a thread's own."""
+    size = packed.layout.size
+    kept = Kept(
+        empty_books(ensemble.size),
+        np.empty((ensemble.size, landings, 2 * size)),
+        np.empty((ensemble.size, landings, 2), dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
+    )
+    threads = threads or usable_cores()
+    ready(march, *arguments(np.zeros(1, dtype=np.int64), kept))
+    if progress is not None:
+        progress(0, ensemble.size)
+
+    def march_chunk(which: _Integers) -> int:
+        march(*arguments(which, kept))
         return which.size
 
     done = 0
@@ -148,28 +202,93 @@ def run_ensemble(
         }
         try:
             while pending:
-                finished, pending = wait(pending, return_when=FIRST_COMPLETED)
+                finished, pending = wait(pending, timeout=_POLL, return_when=FIRST_COMPLETED)
                 done += sum(future.result() for future in finished)
-                if progress is not None:
+                if progress is not None and finished:
                     progress(done, ensemble.size)
         except BaseException:
+            kept.pulse[0] = 1
             pool.shutdown(wait=True, cancel_futures=True)
             raise
-    return counts, numbers
+    q, p = kept.states[..., packed.rows], kept.states[..., size + packed.rows]
+    return Landings(kept.books, q, p, kept.homes[..., 0], kept.homes[..., 1])
+
+
+def _last(memory: _Array, packed: Packed, aside: tuple[_Integers, _Array], books: NDArray[Any]) -> Last:
+    """Where a run that was laid aside stands."""
+    marks, reals = aside
+    q, p = memory[marks[4] : marks[4] + packed.layout.size], memory[marks[5] : marks[5] + packed.layout.size]
+    since = int(marks[0] - books["onset"][0]) if marks[10] else -1
+    return Last(q[packed.rows], p[packed.rows], int(reals[0]), since)
+
+
+class _Buffers(NamedTuple):
+    """How much a slice of a recorded run holds."""
+
+    samples: int
+    impacts: int
+    most: int
+
+
+def _buffers(ensemble: Ensemble, times: _Array, size: int) -> _Buffers:
+    """Room for a slice: at least for what a single step may hold."""
+    span = 2.0 * float(ensemble.step_times[0]) * (1.0 + 1e-9)
+    most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
+    row = 8 * (2 * size + VALUES + 1)
+    samples = max(2 * most + 4, min(times.size + 4096, _SLICE_BYTES // row))
+    return _Buffers(samples, 4096, most + 1)
 
 
 def record(
-    ensemble: Ensemble, run: int, times: _Array, impacts: int, ledger: bool
-) -> tuple[NDArray[np.int64], _Array, Outputs]:
-    """March one run and write down what happens at *times* and in its first *impacts* impacts."""
-    size = ensemble.packed.layout.size
+    ensemble: Ensemble,
+    times: _Array,
+    in_contact: bool,
+    progress: Callable[[float], object] | None = None,
+) -> Iterator[Recorded]:
+    """March the one run of an ensemble once, and give what it wrote down in pieces, in order.
+
+    Parameters
+    ----------
+    times : array of shape (instants,)
+        Instants to record, s, ascending.
+    in_contact : bool
+        Whether to record the ends of the steps in contact too.
+    progress : callable, optional
+        Called with the share of the run that is done, several times a second.
+    """
+    packed = pack(ensemble.structure, ensemble.high_omega)
+    size, march = packed.layout.size, _kernel(march_one, ensemble)
+    memory, books = lay_out(ensemble, packed), empty_books(1)
+    asked, room = _asked(ensemble, packed, memory), _room(ensemble)
+    buffers = _buffers(ensemble, times, size)
+    aside = np.zeros(MARKS, dtype=np.int64), np.zeros(REALS)
+    aside[0][0] = -1
+    marks = np.zeros(3, dtype=np.int64)
+    book, end = books[0], float(ensemble.runs["end"][0])
     outputs = Outputs(
-        times,
-        np.full((times.size, size), np.nan),
-        np.full((times.size, 6), np.nan),
-        np.full((impacts, 4), np.nan),
-        ledger,
-    )
-    all_counts, all_numbers = _empty(ensemble.size)
-    _march(ensemble, all_counts, all_numbers, np.array([run]), outputs)
-    return all_counts[run], all_numbers[run], outputs
+        times, np.empty(buffers.samples), np.empty((buffers.samples, 2 * size)),
+        np.empty((buffers.samples, VALUES)), np.empty((buffers.impacts, 4)), marks, buffers.most, in_contact,
+    )  # fmt: skip
+    arguments = (
+        memory.memory, memory.blocks, memory.layouts[0], memory.stages, asked, room, book, outputs, aside, _SLICE_STEPS,
+    )  # fmt: skip
+    ready(march, *arguments)
+    while True:
+        march(*arguments)
+        running = books["status"][0] == RunStatus.RUNNING
+        full = books["samples"][0] + buffers.most + 3 > buffers.samples
+        held = int(books["impacts"][0] - marks[1])
+        if not running or full or held >= buffers.impacts:
+            count = int(books["samples"][0])
+            rows = outputs.rows[:count]
+            yield Recorded(
+                outputs.at[:count].copy(), rows[:, packed.rows], rows[:, size + packed.rows],
+                outputs.values[:count].copy(), outputs.impacts[:held].copy(), books.copy(),
+                _last(memory.memory, packed, aside, books),
+            )  # fmt: skip
+            if not running:
+                return
+            marks[1] += held
+            aside[0][1] = 0
+        if progress is not None:
+            progress(float(books["time"][0]) / end)

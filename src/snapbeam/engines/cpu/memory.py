@@ -1,8 +1,8 @@
-"""From a ReducedModel to the padded rows that the kernels march."""
+"""The CPU engine's layout: a structure in padded rows, eight modes a register, and room to march in."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,67 +10,51 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from snapbeam.engines.cpu.rows import Layout
+from snapbeam.engines.ensemble import Ensemble
+from snapbeam.engines.scalar.composition import Stages, in_memory, slot_length
 from snapbeam.engines.scalar.lanes import WIDTH
-from snapbeam.model.reduction import ReducedModel
+from snapbeam.engines.structure import Structure
 
-__all__ = ["Packed", "pack"]
+__all__ = ["Memory", "Packed", "lay_out", "pack"]
 
 _Array = NDArray[np.float64]
 
 _LONGEST_DECAY = 4.0
-"""zeta omega t up to which :func:`~snapbeam.engines.scalar.physics.decay` is accurate."""
+"""zeta omega t up to which :func:`~snapbeam.engines.scalar.physics.decay_less_one` is accurate."""
 _SLOWEST = 1e-12
 """Stands for no damping, 1/s."""
+_ALIGNMENT = 64
+WORK_ROWS = 10
+"""Rows that a march works in: q, p, k at both ends of a step and of a look ahead, and G q."""
 
 
 class Packed(NamedTuple):
-    """A structure in rows, and the way there and back."""
+    """A structure in rows."""
 
     memory: _Array
-    """What the kernel reads."""
     blocks: NDArray[np.int64]
+    """First row, row after the last, and columns of each block of coupled modes."""
     layout: Layout
     rows: NDArray[np.int64]
     """Row of each linear mode, shape (N,)."""
-    equilibrium: _Array
-    """alpha at the well the run starts in, shape (N,)."""
-    model: ReducedModel
-    sign: float
-    """+1 for a shaker below, -1 for one above."""
 
-    def row(self, shape: _Array) -> _Array:
-        """V^T shape as a padded row, with the sign of the shaker's side."""
-        padded = np.zeros(self.layout.size)
-        padded[self.rows] = self.sign * (self.model.linear_modes.T @ shape)
-        return padded
-
-    def modal(self, alpha: _Array, velocity: _Array) -> tuple[_Array, _Array]:
-        """Amplitudes and their velocities as padded rows q and p."""
-        back = self.model.linear_modes.T @ self.model.mass
-        q, p = np.zeros(self.layout.size), np.zeros(self.layout.size)
-        q[self.rows] = back @ (alpha - self.equilibrium)
-        p[self.rows] = back @ velocity
-        return q, p
-
-    def amplitudes(self, q: _Array) -> _Array:
-        """alpha of padded rows q of shape (..., rows)."""
-        alpha: _Array = self.equilibrium + q[..., self.rows] @ self.model.linear_modes.T
-        return alpha
+    def spread(self, values: _Array) -> _Array:
+        """Numbers of modes, shape (..., N), as padded rows, shape (..., rows)."""
+        out = np.zeros((*values.shape[:-1], self.layout.size))
+        out[..., self.rows] = values
+        return out
 
 
-def pack(model: ReducedModel, side: str) -> Packed:
-    """Arrange *model* in rows about the well that a run from *side* starts in.
+def pack(structure: Structure, high_omega: float = np.inf) -> Packed:
+    """Arrange a structure in rows.
 
     Linear modes that the tension does not couple (the symmetric and the antisymmetric ones) become
     separate blocks, each padded to a multiple of eight rows.
     """
-    sign = 1.0 if side == "below" else -1.0
-    equilibrium = sign * model.equilibrium
-    coupling = model.tension_matrix
-    _, label = connected_components(csr_array(coupling != 0.0), directed=False)
-    omega, zeta = model.omega, model.damping_ratio
+    _, label = connected_components(csr_array(structure.coupling != 0.0), directed=False)
+    omega, zeta = structure.omega, structure.damping_ratio
     blocks: list[int] = []
-    rows = np.empty(model.modes, dtype=np.int64)
+    rows = np.empty(omega.size, dtype=np.int64)
     size = 0
     for b in range(label.max() + 1):
         members = np.flatnonzero(label == b)
@@ -86,7 +70,7 @@ def pack(model: ReducedModel, side: str) -> Packed:
         return out
 
     full = np.zeros((size, size))
-    full[np.ix_(rows, rows)] = coupling
+    full[np.ix_(rows, rows)] = structure.coupling
     strips = []
     for start, stop, columns in zip(blocks[::3], blocks[1::3], blocks[2::3], strict=True):
         at = start
@@ -94,31 +78,67 @@ def pack(model: ReducedModel, side: str) -> Packed:
             height = 2 * WIDTH if at + 2 * WIDTH <= stop else WIDTH
             strips.append(full[at : at + height, start : start + columns].T.ravel())
             at += height
-    packed = Packed(
-        memory=np.empty(0),
-        blocks=np.array(blocks, dtype=np.int64),
-        layout=Layout(*range(len(Layout._fields))),
-        rows=rows,
-        equilibrium=equilibrium,
-        model=model,
-        sign=sign,
-    )
-    pieces = [
-        padded(omega),
-        padded(omega * omega),
-        padded(omega * np.sqrt(1.0 - zeta * zeta), 1.0),
-        padded(zeta * omega),
-        padded(model.linear_modes.T @ equilibrium),
-        np.zeros(size),
-        packed._replace(layout=packed.layout._replace(size=size)).row(model.center_shape),
-        padded(-2.0 * (model.linear_modes.T @ model.mass @ equilibrium)),
-        np.concatenate(strips),
-    ]
-    starts = np.concatenate(([0], np.cumsum([piece.size for piece in pieces])))
-    stretch = float(equilibrium @ equilibrium)
+    pieces = {
+        "omega": padded(omega),
+        "omega_squared": padded(omega * omega),
+        "omega_damped": padded(omega * np.sqrt(1.0 - zeta * zeta), 1.0),
+        "damping": padded(zeta * omega),
+        "g": padded(structure.well),
+        "contact": np.zeros(size),
+        "center": padded(structure.center),
+        "shift": padded(structure.shift),
+        "high": padded((omega > high_omega).astype(np.float64)),
+        "tension": np.concatenate(strips),
+    }
+    starts = np.concatenate(([0], np.cumsum([piece.size for piece in pieces.values()])))
     moving = bool(np.all(omega * np.sqrt(1.0 - zeta * zeta) > 0.0))
     gentle = _LONGEST_DECAY / max(float((zeta * omega).max()), _SLOWEST) if moving else 0.0
-    layout = Layout._make(
-        (size, *map(int, starts), float(model.tension_stiffness), stretch, gentle, 0, 0, 1.0)
+    layout = Layout(
+        size=size,
+        **dict(zip(pieces, map(int, starts), strict=False)),
+        work=int(starts[-1]),
+        gamma=structure.tension_stiffness,
+        stretch=structure.stretch,
+        gentle=gentle,
     )
-    return packed._replace(memory=np.concatenate(pieces), layout=layout)
+    return Packed(np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows)
+
+
+class Memory(NamedTuple):
+    """Everything that one thread needs to march runs of an ensemble, in one flat array."""
+
+    memory: _Array
+    blocks: NDArray[np.int64]
+    layouts: tuple[Layout, Layout]
+    """Two places that share the rows of the structure."""
+    stages: Stages
+    drive_numbers: _Array
+    """With the place of the drive's samples in memory."""
+
+
+def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
+    """A copy of a structure's rows with room for two runs, aligned to whole registers.
+
+    *extra_rows* are added to the work rows of the first place.
+    """
+    size, first = packed.layout.size, packed.layout
+    slots = (ensemble.finest + 3) * slot_length(ensemble.order, size) + 8 * size
+    work = (WORK_ROWS + extra_rows) * size + slots
+    second = first._replace(
+        g=first.work + work, contact=first.work + work + size, work=first.work + work + 2 * size
+    )
+    stages, weights = in_memory(ensemble.order, second.work + WORK_ROWS * size + slots)
+    table = stages.flow + weights.size
+    length = table + ensemble.samples.size
+    raw = np.zeros(length + _ALIGNMENT // 8)
+    skipped = (-raw.ctypes.data % _ALIGNMENT) // 8
+    memory: _Array = raw[skipped : skipped + length]
+    memory[: first.work] = packed.memory
+    memory[second.g : second.g + size] = memory[first.g : first.g + size]
+    memory[stages.flow : table] = weights
+    memory[table:] = ensemble.samples
+    numbers: Any = ensemble.drive_numbers
+    if "table" in ensemble.drive.number_names:
+        numbers = numbers.copy()
+        numbers[:, ensemble.drive.number_names.index("table")] += table
+    return Memory(memory, packed.blocks, (first, second), stages, numbers)

@@ -40,6 +40,7 @@ __all__ = [
     "glide",
     "kick_and_flow",
     "kick_rows",
+    "modal_energies",
     "modal_energy",
     "signals",
     "speed_bound",
@@ -66,6 +67,8 @@ class Layout(NamedTuple):
     """V^T phi(1/2), with the sign of the shaker's side."""
     shift: int
     """From the well the run begins in to the other, as q."""
+    high: int
+    """1 for a mode above the frequency from which energy counts as high, 0 for the others."""
     tension: int
     """G, packed in strips."""
     work: int
@@ -76,12 +79,6 @@ class Layout(NamedTuple):
     """Squared slopes of the beam in a well, alpha_eq . alpha_eq; 0 if there is one well only."""
     gentle: float
     """Longest flow, s, that polynomials serve; 0 if there is an overdamped or a still mode."""
-    drive: int
-    """Where a recorded drive begins: displacement and velocity of each sample in turn."""
-    drive_samples: int
-    """Samples of the recorded drive; 0: the drive is sinusoidal."""
-    drive_interval: float
-    """Seconds between samples."""
 
 
 @inlined
@@ -266,6 +263,18 @@ def modal_energy(memory, layout, q, p):
         omega = load(memory, layout.omega + row)
         total = total + mode_energy(omega, load(memory, q + row), load(memory, p + row))
     return lanes_sum(total)
+
+
+@inlined
+def modal_energies(memory, layout, q, p):
+    """As :func:`modal_energy`, and the part of it in the modes above a frequency."""
+    total, high = splat(0.0), splat(0.0)
+    for row in range(0, layout.size, WIDTH):
+        omega = load(memory, layout.omega + row)
+        energy = mode_energy(omega, load(memory, q + row), load(memory, p + row))
+        total = total + energy
+        high = fma(load(memory, layout.high + row), energy, high)
+    return lanes_sum(total), lanes_sum(high)
 
 
 @inlined

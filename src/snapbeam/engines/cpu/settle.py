@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.columns import Counts, Numbers
-from snapbeam.engines.cpu.rows import dot, flow_coefficients, modal_energy, speed_bound
-from snapbeam.engines.cpu.state import Now, cut_slot, look_slot
-from snapbeam.engines.cpu.step import Step, look_inside, observe, prepare, take_step
-from snapbeam.engines.scalar.compile import compiled, inlined
+from snapbeam.engines.cpu.look import look_inside
+from snapbeam.engines.cpu.recording import record_aside, record_contact, record_instants
+from snapbeam.engines.cpu.rows import dot, flow_coefficients, modal_energies, modal_energy, speed_bound
+from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot, look_slot
+from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
+from snapbeam.engines.scalar.compile import inlined
 from snapbeam.engines.scalar.decisions import (
+    Seen,
     count_in_step,
     finish_impact,
     first_entry,
     is_quiet,
     safe_for,
-    seen_from,
-    track_extremes,
+    track,
+    track_energy,
 )
-from snapbeam.engines.scalar.physics import contact_energy, contact_force, tension_energy
+from snapbeam.engines.scalar.extras import observe as observe_extras
+from snapbeam.engines.scalar.physics import tension_energy
 from snapbeam.engines.scalar.signals import first_fall, turning_point, widened
+from snapbeam.engines.scalar.tip import seen_from
 
 __all__ = ["settle"]
 
@@ -28,8 +33,22 @@ _OK, _DECIDED, _RUNNING = int(RunStatus.OK), int(RunStatus.DECIDED), int(RunStat
 _NOT_FINITE, _STEP_LIMIT = int(RunStatus.NOT_FINITE), int(RunStatus.STEP_LIMIT)
 
 
+class Met(NamedTuple):
+    """What a step met: whether it enters or leaves the contact, where it is cut, and how it was looked into."""
+
+    event: bool
+    cut: int
+    """Ticks; 0: the contact begins with the step."""
+    entry: float
+    """Seconds into the step at which the gap closes; negative: it does not."""
+    safe_gap: int
+    safe_center: int
+    pieces: int
+    piece: float
+
+
 @inlined
-def _cut(step, run, ticks, length):
+def cut_to(step, run, ticks, length):
     """*step*, of another length and prepared in the slot for those."""
     return Step(
         ticks, cut_slot(run), length, step.phase, step.touching, step.q, step.p, step.k,
@@ -38,7 +57,7 @@ def _cut(step, run, ticks, length):
 
 
 @inlined
-def _aside(step, run, length, size):
+def aside(step, run, length, size):
     """*step*, cut to *length* and written to the spare rows: a look ahead."""
     return Step(
         0, cut_slot(run), length, step.phase, step.touching, step.q, step.p, step.k,
@@ -46,152 +65,178 @@ def _aside(step, run, length, size):
     )  # fmt: skip
 
 
-@compiled
-def _record(memory, blocks, layout, stages, run, impactor, now, step, numbers, outputs):
-    """Write down what happens at the instants inside a step; returns how many are recorded then."""
-    clock, sample, size = run.clock, now.sample, layout.size
-    times, q2, p2 = outputs.times, run.spare, run.spare + size
-    while sample < times.size:
-        if times[sample] > (now.t + step.ticks) * clock.tick and now.t + step.ticks < clock.end:
-            break
-        part = min(max(0.0, times[sample] - now.t * clock.tick), step.length)
-        prepare(memory, layout, stages, impactor, part, cut_slot(run))
-        here = take_step(
-            memory, blocks, layout, stages, impactor, _aside(step, run, part, size), outputs.ledger
-        )
-        depth = observe(memory, layout, impactor, step.phase + impactor.omega * part, q2, p2)[2]
-        energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, here.gq, here.qr)
-        for row in range(size):
-            outputs.rows[sample, row] = memory[q2 + row]
-            if now.home < 0.0:
-                outputs.rows[sample, row] += memory[layout.shift + row]
-        outputs.values[sample, 0] = depth
-        outputs.values[sample, 1] = contact_force(impactor.stiffness, depth)
-        outputs.values[sample, 2] = energy
-        outputs.values[sample, 3] = contact_energy(impactor.stiffness, depth)
-        outputs.values[sample, 4] = numbers[Numbers.WORK] + here.work
-        outputs.values[sample, 5] = numbers[Numbers.DISSIPATED] + here.dissipated
-        sample += 1
-    return sample
+@inlined
+def meets(memory, layout, run, now, tip, step, seen1, room):
+    """Whether and where a step enters or leaves the contact."""
+    seen, clock, tick = now.seen, run.clock, run.clock.tick
+    safe_gap, safe_center = now.watch.safe_gap, now.watch.safe_center
+    event, cut, entry, pieces, piece = False, step.ticks, -1.0, 0, 0.0
+    after = now.t + step.ticks
+    if step.touching:
+        if seen1.d <= 0.0:
+            event = True
+            if seen.d > 0.0:
+                fall = first_fall(seen.d, seen.dv, seen1.d, seen1.dv, step.length)
+                cut = max(1, int(fall * step.ticks))
+        return Met(event, cut, entry, safe_gap, safe_center, pieces, piece)
+    size = layout.size
+    if after > safe_gap:
+        bound = speed_bound(memory, layout, layout.contact, step.q, step.p)
+        push = dot(memory, size, layout.contact, step.k)
+        safe_gap = now.t + int(safe_for(-seen.d, bound, run.tip_speed, push, run.step_time) / tick)
+    if after > safe_center:
+        bound = speed_bound(memory, layout, layout.center, step.q, step.p)
+        push = dot(memory, size, layout.center, step.k)
+        safe_center = now.t + int(safe_for(abs(seen.c), bound, 0.0, push, run.step_time) / tick)
+    if after > min(safe_gap, safe_center):
+        look, pieces = look_slot(run), run.step_pieces
+        if step.ticks == 2 * clock.step:
+            pieces *= 2
+        elif step.ticks != clock.step:
+            look += 4 * size
+            pieces = max(2, math.ceil(step.length / run.finest_look))
+            flow_coefficients(memory, layout, step.length / pieces, look)
+        piece = step.length / pieces
+        look_inside(memory, layout, tip, look, pieces, piece, step, after > safe_center, room)
+        if after > safe_gap:
+            entry = first_entry(room.looked, pieces, piece)
+            if entry >= 0.0:
+                event, cut = True, min(step.ticks, int(entry / tick))
+    return Met(event, cut, entry, safe_gap, safe_center, pieces, piece)
 
 
 @inlined
-def settle(memory, blocks, layout, stages, run, now, step, done, room, counts, numbers, outputs):
-    """Where a run stands after a step, cut at the contact's edge if it met one, with its statistics kept."""
-    clock, t, size = run.clock, now.t, layout.size
-    tick, end = clock.tick, clock.end
-    seen, parts = room
-    q, p, k, q1, p1, k1 = now.q, now.p, now.k, now.q1, now.p1, now.k1
-    w, wv, d, dv, c, cv = now.w, now.wv, now.d, now.dv, now.c, now.cv
-    touching, safe_gap, safe_center = now.touching, now.safe_gap, now.safe_center
-    impactor = seen_from(run.struck, now.home, run.rest_contact)
-    rest_contact, rest_center = now.home * run.rest_contact, now.home * run.rest_center
-    ticks, length, phase = step.ticks, step.length, step.phase
-    w1, wv1, d1, dv1, c1, cv1 = observe(memory, layout, impactor, phase + impactor.omega * length, q1, p1)
-    if not math.isfinite(d1 + dv1):
-        return Now(
-            t, q, p, k, q1, p1, k1, now.home, now.stretch, now.quiet, w, wv, d, dv, c, cv, touching, safe_gap,
-            safe_center, now.sample, _NOT_FINITE
-        )  # fmt: skip
+def _deepest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, book, outputs):
+    """The greatest penetration of a contact so far, its turning point within the step included.
 
-    # where the step meets or leaves the contact, if it does
-    event, cut = False, ticks
-    pieces, piece = 0, 0.0
-    if touching:
-        if d1 <= 0.0:
-            event = True
-            if d > 0.0:
-                cut = max(1, int(first_fall(d, dv, d1, dv1, length) * ticks))
-    else:
-        if t + ticks > safe_gap:
-            bound = speed_bound(memory, layout, layout.contact, q, p)
-            push = dot(memory, size, layout.contact, k)
-            speed = run.struck.amplitude * run.struck.omega
-            safe_gap = t + int(safe_for(-d, bound, speed, push, run.step_time) / tick)
-        if t + ticks > safe_center:
-            bound = speed_bound(memory, layout, layout.center, q, p)
-            push = dot(memory, size, layout.center, k)
-            safe_center = t + int(safe_for(abs(c), bound, 0.0, push, run.step_time) / tick)
-        if t + ticks > min(safe_gap, safe_center):
-            look, pieces = look_slot(run), run.step_pieces
-            if ticks == 2 * clock.step:
-                pieces *= 2
-            elif ticks != clock.step:
-                look += 4 * size
-                pieces = max(2, math.ceil(length / run.finest_look))
-                flow_coefficients(memory, layout, length / pieces, look)
-            piece = length / pieces
-            near_center = t + ticks > safe_center
-            look_inside(
-                memory, layout, impactor, look, pieces, piece, phase, q, p, k, k1, parts, near_center, seen
-            )
-            if t + ticks > safe_gap:
-                entry = first_entry(seen, pieces, piece)
-                if entry >= 0.0:
-                    event, cut = True, min(ticks, int(entry / tick))
-                    if cut < 1:
-                        counts[Counts.TOUCHING], counts[Counts.ONSET] = 1, t
-                        status = _STEP_LIMIT if counts[Counts.STEPS] >= clock.max_steps else _RUNNING
-                        return Now(
-                            t, q, p, k, q1, p1, k1, now.home, now.stretch, now.quiet, w, wv, d, dv, c, cv, True,
-                            safe_gap, safe_center, now.sample, status
-                        )  # fmt: skip
-    if cut < ticks:
-        ticks, length = cut, cut * tick
-        step = _cut(step, run, ticks, length)
-        prepare(memory, layout, stages, impactor, length, step.at)
-        done = take_step(memory, blocks, layout, stages, impactor, step, outputs.ledger)
-        w1, wv1, d1, dv1, c1, cv1 = observe(memory, layout, impactor, phase + impactor.omega * length, q1, p1)
-    w1 += rest_contact
-    c1 += rest_center
+    Returns that and how many samples there are: the turning point is one where the run is recorded.
+    """
+    seen, deepest = now.seen, max(book.deepest, seen1.d)
+    turn = turning_point(seen.d, seen.dv, seen1.d, seen1.dv, step.length) if seen.dv > 0.0 else -1.0
+    if turn > 0.0 and widened(seen.d, deepest, seen.d, seen.dv, seen1.d, seen1.dv, step.length)[1] > deepest:
+        part, size = turn * step.length, layout.size
+        prepare(memory, layout, stages, run.struck.drive, part, cut_slot(run))
+        ledger = None if outputs is None else True
+        short = aside(step, run, part, size)
+        here = take_step(memory, blocks, layout, stages, tip, short, ledger)
+        there = step.phase + tip.drive.omega * part
+        depth = observe(memory, layout, tip, there, run.spare, run.spare + size).d
+        if outputs is not None:
+            when = now.t * run.clock.tick + part
+            sample = record_aside(memory, layout, tip, now, short, here, when, depth, sample, book, outputs)
+        deepest = max(deepest, depth)
+    return deepest, sample
+
+
+@inlined
+def swapped(rows):
+    """The end of a step becomes the beginning of the next."""
+    return Rows(rows.q1, rows.p1, rows.k1, rows.q, rows.p, rows.k)
+
+
+@inlined
+def weighed(memory, layout, run, now, t, state, seen1, watch, event, status, book, asked):
+    """After some steps, or a release, the energy is looked at: is the beam quiet, is its future certain?
+
+    *state* is where q and p stand, and g.q and q.Gq.  Returns what is kept in mind, and the status.
+    """
+    clock, beat, quiet, last = run.clock, watch.beat, watch.quiet, watch.weighed
+    released = event and not watch.touching
+    if released or (beat & 7) == 0:
+        q, p, gq, qr = state
+        high = 0.0
+        if asked.high:
+            linear, high = modal_energies(memory, layout, q, p)
+        else:
+            linear = modal_energy(memory, layout, q, p)
+        track_energy(book, linear, high, (t - last) * clock.tick)
+        last = t
+        if not watch.touching:
+            energy = linear + tension_energy(layout.gamma, gq, qr)
+            quiet = is_quiet(energy, layout.gamma, layout.stretch)
+            if not event and now.home < 0.0 and (beat & 15) == 0 and seen1.w > clock.decide_reach:
+                if seen1.c > 0.0 and energy < clock.decide_energy:
+                    status = _DECIDED
+    if clock.decide_crossings >= 0 and book.crossings_last_quarter > clock.decide_crossings:
+        status = _DECIDED
+    if status == _RUNNING and book.steps >= clock.max_steps:
+        status = _STEP_LIMIT
+    return Watch(watch.touching, quiet, watch.safe_gap, watch.safe_center, last, beat), status
+
+
+@inlined
+def settle(memory, blocks, place, run, now, step, done, room, book, asked, outputs):
+    """Where a run stands after a step, cut at the contact's edge if it met one, with its statistics kept.
+
+    Returns that and the step that was taken.  *outputs* are what is recorded, or None.
+    """
+    layout, stages, clock, tick = place.layout, place.stages, run.clock, run.clock.tick
+    ledger = None if outputs is None else True
+    tip = seen_from(run.struck, now.home, run.rest_contact)
+    rest_contact, rest_center = now.home * run.rest_contact, now.home * run.rest_center
+    t, seen, touching = now.t, now.seen, now.watch.touching
+    omega = tip.drive.omega
+    about = observe(memory, layout, tip, step.phase + omega * step.length, step.q1, step.p1)
+    if not math.isfinite(about.d + about.dv):
+        return (
+            Now(t, now.home, now.stretch, now.rows, seen, now.watch, now.sample, now.landed, _NOT_FINITE),
+            step,
+        )
+    met = meets(memory, layout, run, now, tip, step, about, room)
+    if met.cut < 1:
+        book.touching, book.onset = 1, t
+        status = _STEP_LIMIT if book.steps >= clock.max_steps else _RUNNING
+        watch = Watch(True, now.watch.quiet, met.safe_gap, met.safe_center, now.watch.weighed, now.watch.beat)
+        return Now(t, now.home, now.stretch, now.rows, seen, watch, now.sample, now.landed, status), step
+    if met.cut < step.ticks:
+        step = cut_to(step, run, met.cut, met.cut * tick)
+        prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
+        done = take_step(memory, blocks, layout, stages, tip, step, ledger)
+        about = observe(memory, layout, tip, step.phase + omega * step.length, step.q1, step.p1)
+    seen1 = Seen(about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv)
     sample = now.sample
-    if sample < outputs.times.size:
-        sample = _record(memory, blocks, layout, stages, run, impactor, now, step, numbers, outputs)
+    if outputs is not None:
+        sample = record_instants(memory, blocks, layout, stages, run, tip, now, step, book, outputs)
 
     # statistics of the step
     if touching:
-        numbers[Numbers.IMPULSE] += done.impulse
-        numbers[Numbers.WORK] += done.work
-        numbers[Numbers.GROSS_WORK] += done.gross
-        deepest = max(numbers[Numbers.DEEPEST], d1)
-        turn = turning_point(d, dv, d1, dv1, length) if dv > 0.0 else -1.0
-        if turn > 0.0 and widened(d, deepest, d, dv, d1, dv1, length)[1] > deepest:
-            part = turn * length
-            prepare(memory, layout, stages, impactor, part, cut_slot(run))
-            take_step(memory, blocks, layout, stages, impactor, _aside(step, run, part, size), False)
-            there = phase + impactor.omega * part
-            depth = observe(memory, layout, impactor, there, run.spare, run.spare + size)[2]
-            deepest = max(deepest, depth)
-        numbers[Numbers.DEEPEST] = deepest
-    numbers[Numbers.DISSIPATED] += done.dissipated
-    track_extremes(numbers, w, wv, w1, wv1, c, cv, c1, cv1, length)
-    if touching or t + ticks > safe_center:
-        count_in_step(counts, numbers, clock, t, length, c, cv, c1, cv1, seen, rest_center, pieces, piece)
+        book.deepest, sample = _deepest_point(
+            memory, blocks, layout, stages, run, tip, now, step, seen1, sample, book, outputs
+        )
+        book.impulse += done.impulse
+        book.work += done.work
+        book.gross_work += done.gross
+    if outputs is not None:
+        book.dissipated += done.dissipated
+    track(book, seen, seen1, step.length)
+    if touching or t + step.ticks > met.safe_center:
+        count_in_step(
+            book, clock, t, step.length, seen, seen1, room.looked, rest_center, met.pieces, met.piece
+        )
+    observe_extras(asked.extras, book, t * tick, step.length, seen, seen1, touching)
 
     # accept
-    t += ticks
-    status = _RUNNING if t < end else _OK
-    quiet, released = now.quiet, event and touching
-    if event:
+    t += step.ticks
+    status = _RUNNING if t < clock.end else _OK
+    quiet, safe_gap, safe_center = now.watch.quiet, met.safe_gap, met.safe_center
+    if met.event:
         safe_gap, safe_center = t, t
         if touching:
-            finish_impact(counts, numbers, outputs, impactor.stiffness, t, tick)
-            touching = False
-            d1 = min(d1, 0.0)
+            if outputs is None:
+                finish_impact(book, None, 0, tip.law, t, tick)
+            else:
+                finish_impact(book, outputs.impacts, outputs.marks[1], tip.law, t, tick)
+            seen1 = Seen(seen1.w, seen1.wv, min(seen1.d, 0.0), seen1.dv, seen1.c, seen1.cv)
         else:
-            touching = True
-            counts[Counts.TOUCHING], counts[Counts.ONSET] = 1, t
-    if released or (not touching and (counts[Counts.STEPS] & 7) == 0):
-        energy = modal_energy(memory, layout, q1, p1) + tension_energy(layout.gamma, done.gq, done.qr)
-        quiet = is_quiet(energy, layout.gamma, layout.stretch)
-        if not event and now.home < 0.0 and (counts[Counts.STEPS] & 15) == 0 and w1 > clock.decide_reach:
-            if c1 > 0.0 and energy < clock.decide_energy:
-                status = _DECIDED
-    if clock.decide_crossings >= 0 and counts[Counts.CROSSINGS_LAST_QUARTER] > clock.decide_crossings:
-        status = _DECIDED
-    if status == _RUNNING and counts[Counts.STEPS] >= clock.max_steps:
-        status = _STEP_LIMIT
-    return Now(
-        t, q1, p1, k1, q, p, k, now.home, 2.0 * done.gq + done.qr, quiet, w1, wv1, d1, dv1, c1, cv1, touching, safe_gap,
-        safe_center, sample, status
-    )  # fmt: skip
+            book.touching, book.onset = 1, t
+    touching = touching != met.event
+    watch = Watch(touching, quiet, safe_gap, safe_center, now.watch.weighed, now.watch.beat)
+    state = step.q1, step.p1, done.gq, done.qr
+    watch, status = weighed(memory, layout, run, now, t, state, seen1, watch, met.event, status, book, asked)
+    if outputs is not None:
+        sample = record_contact(memory, layout, run, tip, now, step, done, seen1, sample, book, outputs)
+    stretch = 2.0 * done.gq + done.qr
+    return (
+        Now(t, now.home, stretch, swapped(now.rows), seen1, watch, sample, now.landed, status),
+        step,
+    )

@@ -1,35 +1,112 @@
-"""A run of the CPU engine: what stays the same in it, where it stands, how it begins and ends."""
+"""A run of the CPU engine: what stays the same in it, where it stands, how it begins, lands and ends."""
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.columns import Counts, Numbers, Ticks
-from snapbeam.engines.cpu.rows import acceleration_rows, flow_coefficients, modal_energy, tension_rows
-from snapbeam.engines.cpu.step import Impactor, observe, prepare
+from snapbeam.engines.cpu.rows import (
+    Layout,
+    acceleration_rows,
+    flow_coefficients,
+    modal_energy,
+    tension_rows,
+)
+from snapbeam.engines.cpu.step import observe, prepare
 from snapbeam.engines.scalar.compile import compiled, inlined
-from snapbeam.engines.scalar.composition import TURNS
-from snapbeam.engines.scalar.decisions import PIECES, Clock, change_well, finish_impact, is_quiet, set_up
-from snapbeam.engines.scalar.physics import contact_energy, tension_energy, tension_factors
-from snapbeam.engines.scalar.signals import sign_of
+from snapbeam.engines.scalar.composition import TURNS, Stages
+from snapbeam.engines.scalar.contact import contact_energy, is_impulsive
+from snapbeam.engines.scalar.decisions import (
+    PIECES,
+    Clock,
+    Seen,
+    clock_of,
+    finish_impact,
+    is_quiet,
+    leave_contact_open,
+    open_book,
+)
+from snapbeam.engines.scalar.physics import tension_energy, tension_factors
+from snapbeam.engines.scalar.tip import Tip, numbers_of, seen_from
 
-__all__ = ["Now", "Run", "begin", "cut_slot", "finish", "look_slot"]
+__all__ = ["Asked", "Now", "Place", "Room", "Rows", "Run", "Watch", "begin", "change_well", "finish", "land"]
 
 _OK, _DECIDED, _RUNNING = int(RunStatus.OK), int(RunStatus.DECIDED), int(RunStatus.RUNNING)
 _TWO_PI = 2.0 * math.pi
 
 
+class Asked(NamedTuple):
+    """What is asked of the runs of an ensemble."""
+
+    runs: Any
+    law_numbers: Any
+    drive_numbers: Any
+    contact_rows: Any
+    starts: Any
+    law: Any
+    """Any numbers of the law, for their type; so is the drive's."""
+    drive: Any
+    extras: Any
+    """Statistics that were registered, by type."""
+    max_steps: int
+    high: bool
+    """Whether some modes count as high."""
+
+
+class Place(NamedTuple):
+    """Where in memory a run is marched."""
+
+    layout: Layout
+    stages: Stages
+
+
+class Room(NamedTuple):
+    """What a thread works in beside memory: what a look inside a step saw, and partial sums."""
+
+    looked: Any
+    parts: Any
+
+
+class Rows(NamedTuple):
+    """Where the state stands, q, p and the tension's acceleration k, and where a step puts the next."""
+
+    q: int
+    p: int
+    k: int
+    q1: int
+    p1: int
+    k1: int
+
+
+class Watch(NamedTuple):
+    """What a march keeps in mind from step to step."""
+
+    touching: bool
+    quiet: bool
+    """Whether the energy is so low that longer steps serve."""
+    safe_gap: int
+    """Until this tick the gap cannot close."""
+    safe_center: int
+    """Until this tick the centre cannot cross."""
+    weighed: int
+    """Tick at which the energy was last looked at."""
+    beat: int
+    """Steps since the run began or landed."""
+
+
 class Run(NamedTuple):
     """What stays the same in a run."""
 
-    struck: Impactor
-    """The shaker as seen from the well the run begins in."""
+    struck: Tip
+    """The tip as seen from the well that the run's rests are measured in."""
     clock: Clock
+    phase: float
+    """Argument of the drive at the start."""
     rest_contact: float
-    """Displacement of the contact point in that well, seen from the shaker's side."""
+    """Displacement of the contact point in that well, seen from the striker's side."""
     rest_center: float
+    tip_speed: float
     finest_look: float
     """Longest piece that a step is looked into by, s."""
     step_pieces: int
@@ -42,6 +119,8 @@ class Run(NamedTuple):
     """Length of one."""
     spare: int
     """Rows for a look ahead: q, p, k."""
+    lowest: float
+    """Height of a flight that is too low to be seen, m: under Newton's law, where chatter ends."""
 
 
 class Now(NamedTuple):
@@ -49,33 +128,17 @@ class Now(NamedTuple):
 
     t: int
     """Ticks."""
-    q: int
-    p: int
-    k: int
-    q1: int
-    p1: int
-    k1: int
     home: float
-    """+1 in the well the run began in, -1 in the other: the origin of q."""
+    """+1 in the first well, -1 in the other: the origin of q."""
     stretch: float
-    quiet: bool
-    """Whether its energy is so low that longer steps serve."""
-    w: float
-    """Displacement of the contact point, and its rate."""
-    wv: float
-    d: float
-    """Penetration, and its rate."""
-    dv: float
-    c: float
-    """Displacement of the centre, and its rate."""
-    cv: float
-    touching: bool
-    safe_gap: int
-    """Until then the gap cannot close."""
-    safe_center: int
-    """Until then the centre cannot cross."""
+    """Squared slopes beyond those of the well."""
+    rows: Rows
+    seen: Seen
+    watch: Watch
     sample: int
     """Instants recorded so far."""
+    landed: int
+    """States handed out so far."""
     status: int
 
 
@@ -91,22 +154,29 @@ def look_slot(run):
     return cut_slot(run) + run.slot
 
 
-@compiled
-def begin(memory, blocks, layout, stages, asked, i, limits, counts, numbers):
-    """Put run *i* into its place in memory; returns what stays and where it stands."""
-    contact_rows, starts, reals, ticks = asked
-    contact_row, start = contact_rows[ticks[i, Ticks.CONTACT_ROW]], starts[ticks[i, Ticks.START_ROW]]
-    struck, clock, (rest_contact, rest_center) = set_up(
-        memory, layout, contact_row, start, reals[i], ticks[i], *limits
+@inlined
+def phase_at(run, t):
+    """Argument of the drive at a tick: from the whole number alone, never by addition."""
+    return run.phase + _TWO_PI * ((t % run.clock.period) / run.clock.period)
+
+
+@inlined
+def run_of(memory, layout, stages, asked, i):
+    """What stays the same in run *i*; its prepared steps go into memory."""
+    record = asked.runs[i]
+    size, work = layout.size, layout.work
+    struck = Tip(
+        record.offset,
+        numbers_of(asked.law, asked.law_numbers, i),
+        numbers_of(asked.drive, asked.drive_numbers, i),
     )
-    size = layout.size
-    slot = (stages.flows + 1) // 2 * 4 * size + 2 * TURNS
-    q, p, k = layout.work, layout.work + size, layout.work + 2 * size
-    r, coefficients = layout.work + 9 * size, layout.work + 10 * size
+    clock = clock_of(record, asked.max_steps)
+    coefficients, slot = work + 10 * size, (stages.flows + 1) // 2 * 4 * size + 2 * TURNS
     step_time = clock.step * clock.tick
     for level in range(clock.finest + 2):
-        prepare(memory, layout, stages, struck, 2.0 * step_time / (1 << level), coefficients + level * slot)
-    fastest = struck.omega
+        length, at = 2.0 * step_time / (1 << level), coefficients + level * slot
+        prepare(memory, layout, stages, struck.drive, length, at)
+    fastest = struck.drive.omega
     for row in range(size):
         fastest = max(fastest, memory[layout.omega + row])
     finest_look = _TWO_PI / (PIECES * fastest)
@@ -114,57 +184,105 @@ def begin(memory, blocks, layout, stages, asked, i, limits, counts, numbers):
     run = Run(
         struck,
         clock,
-        rest_contact,
-        rest_center,
+        record.phase,
+        record.rest_contact,
+        record.rest_center,
+        record.tip_speed,
         finest_look,
         step_pieces,
         step_time,
         coefficients,
         slot,
-        q + 6 * size,
+        work + 6 * size,
+        record.lowest,
     )
     flow_coefficients(memory, layout, step_time / step_pieces, look_slot(run))
+    return run
 
-    t = counts[Counts.TIME]
-    phase = _TWO_PI * ((t % clock.period) / clock.period)
+
+@inlined
+def land(memory, blocks, layout, run, t, home, rows, touching, landed, sample):
+    """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from a landing."""
+    q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
     acceleration_rows(memory, layout, along_g, along_r, r, k)
-    w, wv, d, dv, c, cv = observe(memory, layout, struck, phase, q, p)
-    w += rest_contact
-    c += rest_center
-    touching = d > 0.0 or (d == 0.0 and dv > 0.0)
-    counts[Counts.TOUCHING], counts[Counts.ONSET] = touching, t
-    counts[Counts.SIDE] = sign_of(c, 0)
-    numbers[Numbers.MIN_DISPLACEMENT] = numbers[Numbers.MAX_DISPLACEMENT] = w
-    numbers[Numbers.MIN_CENTER] = numbers[Numbers.MAX_CENTER] = c
-    numbers[Numbers.DEEPEST] = max(d, 0.0)
-    status = _RUNNING if t < clock.end else _OK
-    q1, p1, k1, stretch = q + 3 * size, p + 3 * size, k + 3 * size, 2.0 * gq + qr
+    tip = seen_from(run.struck, home, run.rest_contact)
+    about = observe(memory, layout, tip, phase_at(run, t), q, p)
+    rest_contact, rest_center = home * run.rest_contact, home * run.rest_center
+    seen = Seen(about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv)
     energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
     quiet = is_quiet(energy, layout.gamma, layout.stretch)
-    now = Now(t, q, p, k, q1, p1, k1, 1.0, stretch, quiet, w, wv, d, dv, c, cv, touching, t, t, 0, status)
-    return run, now
+    status = _RUNNING if t < run.clock.end else _OK
+    watch = Watch(touching, quiet, t, t, t, 0)
+    return Now(t, home, 2.0 * gq + qr, rows, seen, watch, sample, landed, status), energy
 
 
 @compiled
-def finish(memory, blocks, layout, run, now, counts, numbers, outputs):
-    """Close a run's book; the state, about the well it began in, goes to its first two work rows."""
-    q, p, size, tick = now.q, now.p, layout.size, run.clock.tick
-    r = layout.work + 9 * size
-    if now.touching:
-        finish_impact(counts, numbers, outputs, run.struck.stiffness, now.t, tick)
-    if now.status == _DECIDED:
-        numbers[Numbers.DECIDED_AT] = now.t * tick
+def begin(memory, blocks, place, asked, i, book):
+    """Put run *i* into its place in memory; returns what stays and where it stands."""
+    layout, record = place.layout, asked.runs[i]
+    size, work = layout.size, layout.work
+    for row in range(size):
+        memory[layout.contact + row] = asked.contact_rows[record.contact_row, row]
+        memory[work + row] = asked.starts[record.start_row, 0, row]
+        memory[work + size + row] = asked.starts[record.start_row, 1, row]
+    run = run_of(memory, layout, place.stages, asked, i)
+    rows = Rows(work, work + size, work + 2 * size, work + 3 * size, work + 4 * size, work + 5 * size)
+    if record.home < 0.0:
+        for row in range(size):
+            memory[layout.g + row] = -memory[layout.g + row]
+    now, energy = land(memory, blocks, layout, run, 0, record.home, rows, False, 0, 0)
+    seen, since = now.seen, record.contact_time
+    touching = since >= 0.0
+    if not math.isfinite(since):
+        # under a law whose impacts last no time, what is in touch and closing is about to hit
+        pressed = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
+        touching = pressed and not is_impulsive(run.struck.law)
+    book.touching, book.onset = int(touching), 0
+    if math.isfinite(since) and since > 0.0:
+        book.onset = -int(since / run.clock.tick + 0.5)
+    open_book(book, seen, energy + contact_energy(run.struck.law, seen.d))
+    watch = Watch(touching, now.watch.quiet, 0, 0, 0, 0)
+    return run, Now(0, now.home, now.stretch, rows, seen, watch, 0, 0, now.status)
+
+
+@compiled
+def change_well(memory, blocks, layout, home, q, k, r):
+    """Take the other well as the origin: exact, since the structure is the same about both.
+
+    About the well that the beam is in, the linear flow holds most of the motion of every mode; about
+    the far one, modes faster than the step would be held in place by kicks alone.
+    """
+    for row in range(layout.size):
+        memory[q + row] -= home * memory[layout.shift + row]
+        memory[layout.g + row] = -memory[layout.g + row]
     gq, qr = tension_rows(memory, blocks, layout, q, r)
-    numbers[Numbers.ENERGY] = (
+    along_g, along_r = tension_factors(layout.gamma, gq, qr)
+    acceleration_rows(memory, layout, along_g, along_r, r, k)
+    return 2.0 * gq + qr
+
+
+@compiled
+def finish(memory, blocks, layout, run, now, book, impacts, before, goes_on):
+    """Close a run's book; its last contact too, unless the run is to go on from here."""
+    q, p, tick = now.rows.q, now.rows.p, run.clock.tick
+    if now.watch.touching:
+        if goes_on:
+            leave_contact_open(book, run.struck.law, now.t, tick)
+        else:
+            finish_impact(book, impacts, before, run.struck.law, now.t, tick)
+    if now.status == _DECIDED:
+        book.decided_at = now.t * tick
+    gq, qr = tension_rows(memory, blocks, layout, q, layout.work + 9 * layout.size)
+    book.energy = (
         modal_energy(memory, layout, q, p)
         + tension_energy(layout.gamma, gq, qr)
-        + contact_energy(run.struck.stiffness, now.d)
+        + contact_energy(run.struck.law, now.seen.d)
     )
+    book.displacement, book.center = now.seen.w, now.seen.c
     if now.home < 0.0:
-        change_well(memory, blocks, layout, now.home, q, now.k, r)
-    for row in range(size):
-        q_end, p_end = memory[q + row], memory[p + row]
-        memory[layout.work + row], memory[layout.work + size + row] = q_end, p_end
-    counts[Counts.TIME], counts[Counts.STATUS], counts[Counts.SAMPLES] = now.t, now.status, now.sample
+        # the place in memory is left as it was found
+        for row in range(layout.size):
+            memory[layout.g + row] = -memory[layout.g + row]
+    book.time, book.status, book.samples = now.t, now.status, now.sample

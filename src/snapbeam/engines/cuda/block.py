@@ -5,12 +5,10 @@ A sum has one order, fixed by the number of threads, and every thread reads the 
 
 from __future__ import annotations
 
-import operator
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from numba import config, cuda, types
-from numba.extending import overload
+from numba import config, cuda
 
 from snapbeam.engines.cuda.layout import WARP
 
@@ -34,25 +32,6 @@ def shared(function: Any) -> Any:
     The simulator's arrays are none that compiled code takes: there the function runs as plain Python.
     """
     return function.py_func if SIMULATED else function
-
-
-if not SIMULATED:
-    # Numba indexes arrays by members of an IntEnum on the CPU but not, so far, on CUDA devices.
-    @overload(operator.getitem, target="cuda")
-    def _read(array, column):
-        if isinstance(column, types.IntEnumMember):
-            return lambda array, column: array[column.value]
-        return None
-
-    @overload(operator.setitem, target="cuda")
-    def _write(array, column, value):
-        if isinstance(column, types.IntEnumMember):
-
-            def write(array, column, value):
-                array[column.value] = value
-
-            return write
-        return None
 
 
 def stride_of(threads: int) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from typing import Any, NamedTuple
 
@@ -13,22 +13,24 @@ import numpy as np
 from numba import NumbaPerformanceWarning
 from numpy.typing import NDArray
 
-from snapbeam.core.codes import RunStatus
 from snapbeam.core.validate import InputError
-from snapbeam.engines.columns import Counts, Numbers, Reals, Ticks
 from snapbeam.engines.cuda.layout import (
     FEWEST_THREADS,
     KEPT,
     MARKS,
     MOST_MODES,
     RESIDENT_WARPS,
-    DeviceStructure,
     device_structure,
 )
 from snapbeam.engines.ensemble import Ensemble
+from snapbeam.engines.outcomes import empty_books, updated
+from snapbeam.engines.outputs import Landings, Recorded
 from snapbeam.engines.scalar.composition import COMPOSITIONS, TURNS
+from snapbeam.engines.scalar.decisions import PIECES
+from snapbeam.model.contact import ContactLaw
+from snapbeam.model.drive import Drive, Sine
 
-__all__ = ["Options", "refusal", "run_ensemble", "simulated"]
+__all__ = ["Options", "march_landing", "march_tangents", "record", "refusal", "run_ensemble", "simulated"]
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
@@ -62,22 +64,25 @@ def simulated() -> bool:
     return bool(config.ENABLE_CUDASIM)
 
 
-def refusal(modes: int, restitution: bool) -> str | None:
+def refusal(modes: int, law: type[ContactLaw] | None = None, drive: type[Drive] = Sine) -> str | None:
     """Why such runs cannot be marched on a device here, or None if they can."""
-    if restitution:
-        return "Newton's law of restitution is marched by the CPU engine alone"
+    if law is not None and law.impulsive:
+        return (
+            f"the law of contact {law.name!r}, whose impacts last no time, is marched by the CPU engine alone"
+        )
+    if not drive.harmonic:
+        return f"the drive {drive.name!r} is marched by the CPU engine alone"
     if modes > MOST_MODES:
         return f"a model of {modes} modes has more than its {MOST_MODES}"
+    if updated():
+        return "statistics that were registered are kept by the CPU engine alone"
     return _unusable()
 
 
-def _most_pieces(ensemble: Ensemble, structure: DeviceStructure) -> int:
+def _most_pieces(ensemble: Ensemble) -> int:
     """Room for what is seen inside a step of any run."""
-    from snapbeam.engines.scalar.decisions import PIECES
-
-    step_time = float((ensemble.reals[:, Reals.TICK] * ensemble.ticks[:, Ticks.STEP]).max())
-    fastest = max(float(structure.values[0].max()), float(ensemble.reals[:, Reals.OMEGA].max()))
-    return 2 * (max(4, math.ceil(step_time * PIECES * fastest / (2.0 * math.pi))) + 2)
+    step_time = float(ensemble.step_times.max())
+    return 2 * (max(4, math.ceil(step_time * PIECES * ensemble.fastest / (2.0 * math.pi))) + 2)
 
 
 class Options(NamedTuple):
@@ -101,94 +106,100 @@ class _Launch:
 
         from snapbeam.engines.cuda.march import march_kernel
 
-        plan = ensemble.plan
         self.ensemble = ensemble
+        self.finest = ensemble.finest
         self.structure = device_structure(
             ensemble, options.fewest_threads or (1 if simulated() else FEWEST_THREADS)
         )
         self.kernel = march_kernel(
-            plan.order, self.structure.threads, self.structure.columns, options.warps or RESIDENT_WARPS
-        )
-        row = self.structure.across
-        size = ensemble.packed.layout.size
-        starts = row(ensemble.starts.reshape(-1, 2, size))
+            ensemble.order, self.structure.threads, self.structure.columns, self.finest,
+            options.warps or RESIDENT_WARPS,
+        )  # fmt: skip
         self.fixed = (
             cuda.to_device(self.structure.values),
             cuda.to_device(self.structure.places),
             cuda.to_device(self.structure.coupling),
-            float(ensemble.packed.layout.gamma),
-            float(ensemble.packed.layout.stretch),
-            cuda.to_device(row(ensemble.contact_rows)),
-            cuda.to_device(starts),
         )
-        self.pieces = _most_pieces(ensemble, self.structure)
+        self.contact_rows = cuda.to_device(self.structure.across(ensemble.contact_rows))
+        self.starts = cuda.to_device(self.structure.across(ensemble.starts))
+        self.pieces = _most_pieces(ensemble)
         self.blocks = 1
-        self.room = self._room()
-        one_run = (np.empty((1, len(Counts)), dtype=np.int64), np.empty((1, len(Numbers))))
+        self.kept, self.work = self._room()
         # a march of no steps: the kernel is compiled, and the driver knows how many blocks fit
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NumbaPerformanceWarning)
-            self._call(self._runs(np.zeros(1, dtype=np.int64), *one_run), 0)
+            self._call(self._runs(np.zeros(1, dtype=np.int64), empty_books(1)), 0)
         fitting = [
             one.max_cooperative_grid_blocks(self.structure.threads) for one in self.kernel.overloads.values()
         ]
         self.blocks = max(
             1, min(max(fitting, default=1), options.most_blocks or ensemble.size, ensemble.size)
         )
-        self.room = self._room()
+        self.kept, self.work = self._room()
 
-    def _room(self) -> tuple[Any, ...]:
+    def _room(self) -> tuple[Any, Any]:
         """What blocks keep of their own: marks and state of the run laid down, and work arrays."""
         from numba import cuda
 
-        plan, threads, blocks = self.ensemble.plan, self.structure.threads, self.blocks
-        distinct = (COMPOSITIONS[plan.order].flow.size + 1) // 2
-        flows = (plan.finest + 3) * distinct + 2
-        return (
+        from snapbeam.engines.cuda.march import DeviceKept, DeviceRoom
+
+        threads, blocks = self.structure.threads, self.blocks
+        distinct = (COMPOSITIONS[self.ensemble.order].flow.size + 1) // 2
+        flows = (self.finest + 3) * distinct + 2
+        kept = DeviceKept(
             cuda.to_device(np.full(blocks, -1, dtype=np.int64)),
             cuda.to_device(np.zeros((blocks, MARKS), dtype=np.int64)),
             cuda.to_device(np.zeros((blocks, KEPT))),
             cuda.device_array((blocks, 3, threads), dtype=np.float64),
+        )
+        work = DeviceRoom(
             cuda.device_array((blocks, flows, 4, threads), dtype=np.float64),
-            cuda.device_array((blocks, plan.finest + 3, 2, TURNS), dtype=np.float64),
+            cuda.device_array((blocks, self.finest + 3, 2, TURNS), dtype=np.float64),
             cuda.device_array((blocks, self.pieces + 1, 4), dtype=np.float64),
         )
+        return kept, work
 
-    def _runs(self, which: _Integers, counts: _Integers, numbers: _Array) -> tuple[Any, ...]:
+    def _runs(self, which: _Integers, books: NDArray[Any]) -> tuple[Any, ...]:
         """The columns of the runs *which*, their queue, and where their results go."""
         from numba import cuda
 
+        from snapbeam.engines.cuda.march import DeviceAsked
+
+        ensemble = self.ensemble
+        law, drive = ensemble.law.numbers_type(), ensemble.drive.numbers_type()
+        asked = DeviceAsked(
+            runs=cuda.to_device(np.ascontiguousarray(ensemble.runs[which]).view(np.recarray)),
+            law_numbers=cuda.to_device(np.ascontiguousarray(ensemble.law_numbers[which])),
+            drive_numbers=cuda.to_device(np.ascontiguousarray(ensemble.drive_numbers[which])),
+            contact_rows=self.contact_rows,
+            starts=self.starts,
+            law=law(*[0.0] * len(law._fields)),
+            drive=drive(*[0.0] * len(drive._fields)),
+            gamma=float(ensemble.structure.tension_stiffness),
+            stretch=float(ensemble.structure.stretch),
+            max_steps=ensemble.max_steps,
+        )
         return (
-            cuda.to_device(np.ascontiguousarray(self.ensemble.reals[which])),
-            cuda.to_device(np.ascontiguousarray(self.ensemble.ticks[which])),
+            asked,
             cuda.to_device(np.arange(which.size, dtype=np.int64)),
             cuda.to_device(np.zeros(2, dtype=np.int64)),
-            cuda.to_device(counts),
-            cuda.to_device(numbers),
+            cuda.to_device(books.view(np.recarray)),
         )
 
     def _call(self, runs: tuple[Any, ...], budget: int) -> _Integers:
         """March every block for *budget* steps; returns how many runs were drawn and how many ended."""
-        reals, ticks, order, queue, counts, numbers = runs
-        plan = self.ensemble.plan
+        asked, order, queue, books = runs
         self.kernel[self.blocks, self.structure.threads](
-            *self.fixed, reals, ticks, order, queue, *self.room, counts, numbers,
-            plan.coarsest, plan.finest, self.ensemble.max_steps, budget,
-        )  # fmt: skip
+            *self.fixed, asked, order, queue, self.kept, self.work, books, budget
+        )
         state: _Integers = queue.copy_to_host()
         return state
 
     def march(
-        self,
-        which: _Integers,
-        counts: _Integers,
-        numbers: _Array,
-        ended: Callable[[int], object],
-        budget: int,
+        self, which: _Integers, books: NDArray[Any], ended: Callable[[int], object], budget: int
     ) -> int:
-        """March the runs *which*, in this order, into *counts* and *numbers*; returns the last budget."""
-        own_counts, own_numbers = counts[which], numbers[which]
-        runs = self._runs(which, own_counts, own_numbers)
+        """March the runs *which*, in this order, into *books*; returns the last budget."""
+        runs = self._runs(which, books[which])
         done = 0
         while done < which.size:
             began = time.perf_counter()
@@ -198,7 +209,7 @@ class _Launch:
             if now > done:
                 ended(now - done)
             done = now
-        counts[which], numbers[which] = runs[4].copy_to_host(), runs[5].copy_to_host()
+        books[which] = runs[3].copy_to_host()
         return budget
 
 
@@ -207,7 +218,7 @@ def run_ensemble(
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
     options: Options | None = None,
-) -> tuple[_Integers, _Array]:
+) -> NDArray[Any]:
     """March every run of an ensemble on the CUDA device.
 
     Runs go to the device longest first, a bounded number at a time; what a run gives does not depend on
@@ -224,24 +235,17 @@ def run_ensemble(
 
     Returns
     -------
-    counts : int64 array of shape (runs, len(Counts))
-    numbers : float64 array of shape (runs, len(Numbers))
+    array of books, shape (runs,)
 
     Raises
     ------
     InputError
         No device can be used, or the ensemble is none for it.
     """
-    reason = refusal(ensemble.packed.model.modes, ensemble.restitution)
-    if reason is None and ensemble.drive_table.size > 0:
-        reason = "a recorded drive is marched by the CPU engine alone"
+    reason = refusal(ensemble.structure.omega.size, ensemble.law, ensemble.drive)
     if reason is not None:
         raise InputError(f"engine = 'cuda': {reason}; use engine='cpu'")
-    counts = np.zeros((ensemble.size, len(Counts)), dtype=np.int64)
-    counts[:, Counts.STATUS] = RunStatus.NOT_RUN
-    numbers = np.zeros((ensemble.size, len(Numbers)))
-    numbers[:, Numbers.LAST_CROSSING] = np.nan
-    numbers[:, Numbers.DECIDED_AT] = np.nan
+    books = empty_books(ensemble.size)
     done = 0
 
     def ended(more: int) -> None:
@@ -255,5 +259,26 @@ def run_ensemble(
     order = np.argsort(-ensemble.work, kind="stable")
     budget = options.first_budget
     for first in range(0, order.size, _CHUNK):
-        budget = launch.march(order[first : first + _CHUNK], counts, numbers, ended, budget)
-    return counts, numbers
+        budget = launch.march(order[first : first + _CHUNK], books, ended, budget)
+    return books
+
+
+def _cpu_only(what: str) -> InputError:
+    return InputError(f"engine = 'cuda': {what} by the CPU engine alone; use engine='cpu'")
+
+
+def march_landing(ensemble: Ensemble, threads: int | None = None, progress: Any = None) -> Landings:
+    """Refused: states are handed out by the CPU engine."""
+    raise _cpu_only("states are handed out")
+
+
+def march_tangents(
+    ensemble: Ensemble, tangents: _Array, threads: int | None = None, progress: Any = None
+) -> tuple[Landings, _Array]:
+    """Refused: tangents are carried by the CPU engine."""
+    raise _cpu_only("tangents are carried")
+
+
+def record(ensemble: Ensemble, times: _Array, in_contact: bool, progress: Any = None) -> Iterator[Recorded]:
+    """Refused: runs are recorded by the CPU engine."""
+    raise _cpu_only("runs are recorded")

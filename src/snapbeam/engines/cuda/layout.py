@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import float64, int64
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from snapbeam.engines.ensemble import Ensemble
 
@@ -21,7 +22,6 @@ __all__ = [
     "DeviceStructure",
     "device_structure",
     "launch_bounds",
-    "signature",
 ]
 
 _Array = NDArray[np.float64]
@@ -32,29 +32,18 @@ MOST_MODES = 128
 WARP = 32
 FEWEST_THREADS = 16
 """Of a block on a device, where fewer would leave lanes of the warp idle all the same."""
-STRUCTURE = ("omega", "omega_squared", "omega_damped", "damping", "g", "center", "shift")
-"""Rows of the structure, by their names in :class:`snapbeam.engines.cpu.rows.Layout`."""
-MARKS = 4
+STRUCTURE = ("omega", "omega_squared", "omega_damped", "damping", "g", "center", "shift", "high")
+"""Rows of the structure."""
+MARKS = 6
 """Integers, and"""
-KEPT = 8
-"""floats that a run laid down keeps beside its counts and numbers."""
+KEPT = 9
+"""floats that a run laid down keeps beside its book."""
 
 RESIDENT_WARPS = 12
 """Warps of a multiprocessor that the kernel's use of registers leaves room for: 168 registers a thread, with
 which nothing is spilled in the innermost loop."""
 # Beyond so many coupled modes, a mode's column of G takes what registers there are.
 _REGISTER_COLUMNS = 16
-
-
-def signature() -> tuple[Any, ...]:
-    """Numba's types of the kernel's arguments."""
-    row, table = int64[::1], int64[:, ::1]
-    reals2, reals3, reals4 = float64[:, ::1], float64[:, :, ::1], float64[:, :, :, ::1]
-    return (
-        reals2, table, reals2, float64, float64, reals2, reals3, reals2, table, row, row,
-        row, table, reals2, reals3, reals4, reals4, reals3, table, reals2,
-        int64, int64, int64, int64,
-    )  # fmt: skip
 
 
 def launch_bounds(threads: int, columns: int, warps: int = RESIDENT_WARPS) -> tuple[int, int]:
@@ -71,19 +60,25 @@ class DeviceStructure(NamedTuple):
     """Threads of a block: a power of two, on a device 16 at least."""
     columns: int
     """Modes that one mode is coupled to, at most, a power of two."""
-    rows: _Integers
-    """Row of :class:`snapbeam.engines.cpu.memory.Packed` that each thread takes, shape (modes,)."""
+    order: _Integers
+    """Mode that each thread takes, shape (modes,): coupled modes stand together."""
     values: _Array
-    """The rows named in :data:`snapbeam.engines.cuda.march.STRUCTURE`, shape (7, threads)."""
+    """The rows named in :data:`STRUCTURE`, shape (8, threads)."""
     coupling: _Array
     """Column j: G's entries between mode j and the modes coupled to it, shape (columns, threads)."""
     places: _Integers
     """Where each mode stands in shared memory, and the first that it is coupled to, shape (2, threads)."""
 
-    def across(self, rows: _Array) -> _Array:
-        """Padded rows of shape (..., rows) as threads hold them, shape (..., threads)."""
-        out = np.zeros((*rows.shape[:-1], self.threads))
-        out[..., : self.rows.size] = rows[..., self.rows]
+    def across(self, values: _Array) -> _Array:
+        """Numbers of modes, shape (..., N), as threads hold them, shape (..., threads)."""
+        out = np.zeros((*values.shape[:-1], self.threads))
+        out[..., : self.order.size] = values[..., self.order]
+        return out
+
+    def back(self, values: _Array) -> _Array:
+        """What threads hold, shape (..., threads), as numbers of modes, shape (..., N)."""
+        out = np.empty((*values.shape[:-1], self.order.size))
+        out[..., self.order] = values[..., : self.order.size]
         return out
 
 
@@ -96,25 +91,35 @@ def device_structure(ensemble: Ensemble, fewest_threads: int = FEWEST_THREADS) -
 
     Coupled modes stand together; sets of them begin in different banks of the shared memory.
     """
-    packed = ensemble.packed
-    order = np.argsort(packed.rows)
-    rows = packed.rows[order]
-    block = np.searchsorted(packed.blocks[::3], rows, side="right") - 1
+    structure = ensemble.structure
+    _, label = connected_components(csr_array(structure.coupling != 0.0), directed=False)
+    order = np.argsort(label, kind="stable")
+    block = label[order]
     begins, count = np.unique(block, return_index=True, return_counts=True)[1:]
     first, size = begins[block], count[block]
-    threads = max(fewest_threads, _power_of_two(rows.size))
+    modes = order.size
+    threads = max(fewest_threads, _power_of_two(modes))
     columns = max(4, _power_of_two(int(count.max())))
     coupling = np.zeros((columns, threads))
-    full = packed.model.tension_matrix[np.ix_(order, order)]
-    for j in range(rows.size):
+    full = structure.coupling[np.ix_(order, order)]
+    for j in range(modes):
         coupling[: size[j], j] = full[first[j] : first[j] + size[j], j]
     places = np.zeros((2, threads), dtype=np.int64)
     places[0] = np.arange(threads) + block[-1]
-    places[0, : rows.size] = np.arange(rows.size) + block
-    places[1, : rows.size] = first + block
-    structure = DeviceStructure(threads, columns, rows, np.empty(0), coupling, places)
-    layout, memory = packed.layout, packed.memory
-    starts = [getattr(layout, name) for name in STRUCTURE]
-    values = structure.across(np.array([memory[at : at + layout.size] for at in starts]))
-    values[STRUCTURE.index("omega_damped"), rows.size :] = 1.0
-    return structure._replace(values=values)
+    places[0, :modes] = np.arange(modes) + block
+    places[1, :modes] = first + block
+    arranged = DeviceStructure(threads, columns, order, np.empty(0), coupling, places)
+    omega, zeta = structure.omega, structure.damping_ratio
+    rows = {
+        "omega": omega,
+        "omega_squared": omega * omega,
+        "omega_damped": omega * np.sqrt(1.0 - zeta * zeta),
+        "damping": zeta * omega,
+        "g": structure.well,
+        "center": structure.center,
+        "shift": structure.shift,
+        "high": (omega > ensemble.high_omega).astype(np.float64),
+    }
+    values = arranged.across(np.array([rows[name] for name in STRUCTURE]))
+    values[STRUCTURE.index("omega_damped"), modes:] = 1.0
+    return arranged._replace(values=values)

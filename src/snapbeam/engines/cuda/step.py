@@ -16,10 +16,11 @@ from numba import cuda
 
 from snapbeam.engines.cuda.block import device, sums, synchroniser
 from snapbeam.engines.scalar.composition import COMPOSITIONS
+from snapbeam.engines.scalar.contact import contact_force
+from snapbeam.engines.scalar.decisions import Seen
 from snapbeam.engines.scalar.lanes import fma
 from snapbeam.engines.scalar.physics import (
     circle,
-    contact_force,
     decay_less_one,
     rotation,
     shaker_motion,
@@ -41,6 +42,7 @@ class Mode(NamedTuple):
     damping: float
     center: float
     contact: float
+    high: float
 
 
 class Functions(NamedTuple):
@@ -121,24 +123,24 @@ def functions(order: int, threads: int, columns: int) -> Functions:
         return (a + b) + (c + d)
 
     @device
-    def observe(block, mode, impactor, phase, q, p):
+    def observe(block, mode, tip, phase, q, p):
         sine, cosine = sincos(phase)
-        motion, velocity = shaker_motion(impactor.amplitude, impactor.omega, sine, cosine)
+        motion, velocity = shaker_motion(tip.drive.amplitude, tip.drive.omega, sine, cosine)
         w, rate, c, c_rate = sum_four(
             block, mode.contact * q, mode.contact * p, mode.center * q, mode.center * p
         )
-        return w, rate, impactor.offset + motion - w, velocity - rate, c, c_rate
+        return Seen(w, rate, tip.offset + motion - w, velocity - rate, c, c_rate)
 
     @device
-    def press(block, impactor, slot, stage, sine0, cosine0, cq):
+    def press(block, tip, slot, stage, sine0, cosine0, cq):
         """Contact force at a kick, and the velocity of the tip."""
         sine, cosine = block.turns[slot, 0, stage], block.turns[slot, 1, stage]
         sine, cosine = sine0 * cosine + cosine0 * sine, cosine0 * cosine - sine0 * sine
-        motion, velocity = shaker_motion(impactor.amplitude, impactor.omega, sine, cosine)
-        return contact_force(impactor.stiffness, impactor.offset + motion - cq), velocity
+        motion, velocity = shaker_motion(tip.drive.amplitude, tip.drive.omega, sine, cosine)
+        return contact_force(tip.law, tip.offset + motion - cq), velocity
 
     @device
-    def take_step(block, mode, g, gamma, impactor, slot, length, phase, touching, q, p, k):
+    def take_step(block, mode, g, gamma, tip, slot, length, phase, touching, q, p, k):
         """As :func:`snapbeam.engines.cpu.step.take_step`, of this thread's mode.
 
         Returns q, p and k at the end, g.q and q.Gq there, and the step's impulse, work and gross work.
@@ -151,7 +153,7 @@ def functions(order: int, threads: int, columns: int) -> Functions:
         if touching:
             sine0, cosine0 = sincos(phase)
             cq = sum_one(block, mode.contact * q)
-            force, velocity = press(block, impactor, slot, 0, sine0, cosine0, cq)
+            force, velocity = press(block, tip, slot, 0, sine0, cosine0, cq)
             impulse = weight * force
             work = weight * force * velocity
             gross = weight * abs(force * velocity)
@@ -166,7 +168,7 @@ def functions(order: int, threads: int, columns: int) -> Functions:
             weight = kick[stage] * length
             if touching:
                 gq, qr, cq = sum_three(block, g * q, r * q, mode.contact * q)
-                force, velocity = press(block, impactor, slot, stage, sine0, cosine0, cq)
+                force, velocity = press(block, tip, slot, stage, sine0, cosine0, cq)
                 impulse += weight * force
                 work += weight * force * velocity
                 gross += weight * abs(force * velocity)
@@ -178,12 +180,12 @@ def functions(order: int, threads: int, columns: int) -> Functions:
         return q, p, k, gq, qr, impulse, work, gross
 
     @device
-    def look_inside(block, mode, impactor, at, pieces, piece, phase, q, p, k, k1):
+    def look_inside(block, mode, tip, at, pieces, piece, phase, q, p, k, k1):
         """As :func:`snapbeam.engines.cpu.step.look_inside`; *at* is the flow over one piece."""
         contact0, contact1, center0, center1 = sum_four(
             block, mode.contact * k, mode.contact * k1, mode.center * k, mode.center * k1
         )
-        turn_sine, turn_cosine = sincos(impactor.omega * piece)
+        turn_sine, turn_cosine = sincos(tip.drive.omega * piece)
         sine, cosine = sincos(phase)
         flow, half = block.flows[at], 0.5 * piece
         for i in range(pieces + 1):
@@ -193,8 +195,8 @@ def functions(order: int, threads: int, columns: int) -> Functions:
             done = i / pieces
             if block.lane == 0:
                 owed = half if i > 0 else 0.0
-                motion, velocity = shaker_motion(impactor.amplitude, impactor.omega, sine, cosine)
-                block.seen[i, 0] = impactor.offset + motion - w
+                motion, velocity = shaker_motion(tip.drive.amplitude, tip.drive.omega, sine, cosine)
+                block.seen[i, 0] = tip.offset + motion - w
                 block.seen[i, 1] = velocity - rate - owed * ((1.0 - done) * contact0 + done * contact1)
                 block.seen[i, 2] = c
                 block.seen[i, 3] = c_rate + owed * ((1.0 - done) * center0 + done * center1)

@@ -1,60 +1,105 @@
 """How kernels are compiled, and how the compiled code is kept between runs.
 
-Numba keeps compiled functions on disk and compiles them again when the file they stand in changes.  The
-kernels are compiled into each other across files, so here the name under which they are kept holds a
-fingerprint of all of them: a change anywhere, or another version of the package, never meets old code.
+Functions are compiled into the kernel that calls them, across files and with the law of contact and the drive that
+it marches; a kernel is what is kept on disk.  Numba alone would keep it until the file that it stands in changes.
+Here it is kept under a fingerprint of everything that it bakes in (:mod:`~snapbeam.engines.scalar.fingerprint`).
 """
 
 from __future__ import annotations
 
-import hashlib
+import logging
 from collections.abc import Callable
-from pathlib import Path
+from functools import cache
 from typing import Any
 
-from numba import njit
-from numba.core.caching import IndexDataCacheFile
+from numba import njit, typeof
+from numba.core import event
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.registry import CPUDispatcher
 
-__all__ = ["compiled", "inlined"]
+from snapbeam.engines.scalar.fingerprint import fingerprint
+from snapbeam.engines.scalar.parts import pipeline
 
+__all__ = ["INLINE", "INLINE_HERE", "compiled", "inlined", "kernel", "ready"]
 
-def _fingerprint() -> str:
-    """Of the source of every kernel that is kept on disk, in 16 hexadecimal digits."""
-    digest = hashlib.sha256()
-    package = Path(__file__).parents[2]
-    for folder in ("core/codes.py", "engines/*.py", "engines/scalar/*.py", "engines/cpu/*.py"):
-        for path in sorted(package.glob(folder)):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-_FINGERPRINT = _fingerprint()
-
-
-def _compile(function: Callable[..., Any], **options: Any) -> Any:
-    options |= {"error_model": "numpy", "nogil": True, "_nrt": False}
-    dispatcher = njit(cache=True, **options)(function)
-    cache = dispatcher._cache
-    try:
-        cache._cache_file = IndexDataCacheFile(
-            cache_path=cache._cache_path,
-            filename_base=f"{cache._impl.filename_base}-{_FINGERPRINT}",
-            source_stamp=cache._impl.locator.get_source_stamp(),
-        )
-    except AttributeError:  # no place to keep compiled code, or a Numba that keeps it otherwise
-        return njit(**options)(function)
-    return dispatcher
+_LOG = logging.getLogger("snapbeam")
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
+_PART: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, **pipeline()}
+INLINE: dict[str, Any] = {"error_model": "numpy", "forceinline": True}
+"""Options of an overload that is to be written into its callers, on every engine."""
+INLINE_HERE: dict[str, Any] = {**INLINE, **_PART}
+"""The same, for what only the processor's engine calls."""
 
 
-def compiled(function: Callable[..., Any]) -> Any:
-    """Compile a kernel: no Python objects, no global lock, division as the processor does it.
+class _Part(CPUDispatcher):
+    """A part of a kernel; Python can call it too, through a kernel that does nothing else."""
+
+    def __call__(self, *arguments: Any) -> Any:
+        return _by_itself(self)(*arguments)
+
+
+@cache
+def _by_itself(part: Any) -> Any:
+    return njit(**_OPTIONS)(lambda *arguments: part(*arguments))
+
+
+def compiled(function: Callable[..., Any], **options: Any) -> Any:
+    """Compile a function that kernels call: no Python objects, no global lock, division as the processor does it.
 
     Nor reference counts, which cost an atomic operation whenever an array is passed on: a kernel allocates nothing,
     and its arrays belong to its caller.
     """
-    return _compile(function)
+    part = njit(**options, **_PART, **_OPTIONS)(function)
+    if type(part) is CPUDispatcher:  # under NUMBA_DISABLE_JIT it is the function itself
+        part.__class__ = _Part
+    return part
 
 
 def inlined(function: Callable[..., Any]) -> Any:
     """As :func:`compiled`, and always written into its callers."""
-    return _compile(function, forceinline=True)
+    return compiled(function, forceinline=True)
+
+
+@cache
+def kernel(function: Callable[..., Any], kinds: tuple[type, ...]) -> Any:
+    """A kernel for some laws of contact and drives, kept on disk under the fingerprint of what it bakes in."""
+    dispatcher = njit(**_OPTIONS)(function)
+    mark = fingerprint(kinds)
+    if mark is None:
+        return dispatcher
+    try:
+        dispatcher.enable_caching()
+        cache_of: FunctionCache = dispatcher._cache
+        cache_of._cache_file = IndexDataCacheFile(
+            cache_path=cache_of._cache_path,
+            filename_base=f"{cache_of._impl.filename_base}-{mark}",
+            source_stamp=cache_of._impl.locator.get_source_stamp(),
+        )
+    except (
+        AttributeError,
+        RuntimeError,
+    ):  # no place to keep compiled code, or a Numba that keeps it otherwise
+        return njit(**_OPTIONS)(function)
+    return dispatcher
+
+
+class _Telling(event.Listener):
+    """Says once that a kernel is being compiled."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.told = False
+
+    def on_start(self, event: Any) -> None:
+        if not self.told:
+            self.told = True
+            _LOG.info("compiling %s, once on this machine: some 15 s", self.name)
+
+    def on_end(self, event: Any) -> None:
+        """Nothing to say."""
+
+
+def ready(march: Any, *arguments: Any) -> None:
+    """Compile a kernel for such arguments, or fetch it from the disk, before anything is timed; says so in the log."""
+    with event.install_listener("numba:compile", _Telling(march.py_func.__name__)):
+        march.compile(tuple(typeof(value) for value in arguments))

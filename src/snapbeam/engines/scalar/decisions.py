@@ -1,35 +1,30 @@
-"""Parts of a march: its clock, what it writes, and the decisions and bookkeeping between steps."""
+"""What is decided between steps, and kept of them: scalar functions that every engine's march is made of."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from snapbeam.engines.columns import Counts, Numbers, Reals, Ticks
-from snapbeam.engines.cpu.rows import acceleration_rows, tension_rows
-from snapbeam.engines.cpu.step import Impactor
-from snapbeam.engines.scalar.compile import compiled
-from snapbeam.engines.scalar.physics import contact_force, tension_factors
-from snapbeam.engines.scalar.signals import count_crossings, first_rise, widened
+from snapbeam.engines.scalar.compile import compiled, inlined
+from snapbeam.engines.scalar.contact import peak_force
+from snapbeam.engines.scalar.signals import count_crossings, first_rise, sign_of, widened
 
 __all__ = [
     "PIECES",
     "Clock",
-    "Outputs",
-    "change_well",
+    "Seen",
+    "clock_of",
     "contact_level",
     "count_in_step",
     "finish_impact",
     "first_entry",
     "flight_level",
     "is_quiet",
+    "leave_contact_open",
+    "open_book",
     "safe_for",
-    "seen_from",
-    "set_up",
     "ticks_of",
-    "track_extremes",
+    "track",
+    "track_energy",
 ]
 
 
@@ -41,7 +36,9 @@ class Clock(NamedTuple):
     step: int
     """Flight step."""
     period: int
-    """Of the drive."""
+    """Of the drive's argument."""
+    landing: int
+    """From one state that is handed out to the next."""
     end: int
     last_quarter: int
     coarsest: int
@@ -52,24 +49,23 @@ class Clock(NamedTuple):
     decide_energy: float
     """Energy above the well below which a beam in the far well stays there; -inf: never decide."""
     decide_reach: float
-    """Highest future position of the shaker, or 0 if that is higher."""
+    """Highest future position of the tip, or 0 if that is higher."""
     decide_crossings: int
     """Crossings in the last quarter beyond which the response is continuous; -1: never decide."""
 
 
-class Outputs(NamedTuple):
-    """Where a march writes what is asked of it; arrays of length 0 ask for nothing."""
+class Seen(NamedTuple):
+    """What is seen of a run at an instant, from the striker's side."""
 
-    times: NDArray[np.float64]
-    """Instants to record, s, ascending."""
-    rows: NDArray[np.float64]
-    """q at those instants, shape (instants, rows)."""
-    values: NDArray[np.float64]
-    """Penetration, contact force, beam energy, contact energy, work and dissipation, shape (instants, 6)."""
-    impacts: NDArray[np.float64]
-    """Onset, duration, greatest penetration and impulse of each impact, shape (impacts, 4)."""
-    ledger: bool
-    """Whether to integrate the dissipation."""
+    w: float
+    """Displacement of the contact point, m, and its rate."""
+    wv: float
+    d: float
+    """Penetration, and its rate."""
+    dv: float
+    c: float
+    """Displacement of the centre, and its rate."""
+    cv: float
 
 
 # How contact steps are graded: a step is at most this share of the time since the onset, and of the time to
@@ -89,58 +85,75 @@ _QUIET = 0.2
 PIECES = 5.0
 
 
-@compiled
-def set_up(memory, layout, contact_row, start, reals, ticks, coarsest, finest, max_steps):
-    """Put one run's contact row and start into memory; returns its shaker, clock and rests."""
-    for row in range(layout.size):
-        memory[layout.contact + row] = contact_row[row]
-    for row in range(2 * layout.size):
-        memory[layout.work + row] = start[row]
-    impactor = Impactor(
-        reals[Reals.OFFSET], reals[Reals.AMPLITUDE], reals[Reals.OMEGA], reals[Reals.STIFFNESS]
-    )
-    clock = Clock(
-        reals[Reals.TICK],
-        ticks[Ticks.STEP],
-        ticks[Ticks.PERIOD],
-        ticks[Ticks.END],
-        ticks[Ticks.LAST_QUARTER],
-        coarsest,
-        finest,
+@inlined
+def clock_of(run, max_steps):
+    """The clock of a run, from its record."""
+    return Clock(
+        run.tick,
+        run.step,
+        run.period,
+        run.landing,
+        run.end,
+        run.last_quarter,
+        run.coarsest,
+        run.finest,
         max_steps,
-        reals[Reals.DECIDE_ENERGY],
-        reals[Reals.DECIDE_REACH],
-        ticks[Ticks.DECIDE_CROSSINGS],
+        run.decide_energy,
+        run.decide_reach,
+        run.decide_crossings,
     )
-    return impactor, clock, (reals[Reals.REST_CONTACT], reals[Reals.REST_CENTER])
 
 
 @compiled
-def finish_impact(counts, numbers, outputs, stiffness, end, tick):
-    """Enter the contact that ends at tick *end* in the statistics, unless nothing was pressed."""
-    deepest = numbers[Numbers.DEEPEST]
+def open_book(book, seen, energy):
+    """Begin a run's statistics with what is seen of it at the start."""
+    book.side = sign_of(seen.c, 0)
+    book.min_displacement, book.max_displacement = seen.w, seen.w
+    book.min_center, book.max_center = seen.c, seen.c
+    book.deepest = max(seen.d, 0.0)
+    book.first_energy = energy
+
+
+@compiled
+def finish_impact(book, impacts, before, law, end, tick):
+    """Enter the contact that ends at tick *end* in the statistics, unless nothing was pressed.
+
+    *impacts* is a table that begins after *before* impacts, or None.
+    """
+    deepest = book.deepest
     if deepest > 0.0:
-        duration = (end - counts[Counts.ONSET]) * tick
-        force = contact_force(stiffness, deepest)
-        at = counts[Counts.IMPACTS]
-        if at < outputs.impacts.shape[0]:
-            outputs.impacts[at, 0] = counts[Counts.ONSET] * tick
-            outputs.impacts[at, 1] = duration
-            outputs.impacts[at, 2] = force
-            outputs.impacts[at, 3] = numbers[Numbers.IMPULSE]
-        counts[Counts.IMPACTS] += 1
-        numbers[Numbers.CONTACT_TIME] += duration
-        numbers[Numbers.PEAK_FORCE] = max(numbers[Numbers.PEAK_FORCE], force)
-    counts[Counts.TOUCHING] = 0
-    numbers[Numbers.DEEPEST] = 0.0
-    numbers[Numbers.IMPULSE] = 0.0
+        duration = (end - book.onset) * tick
+        force = peak_force(law, deepest)
+        if impacts is not None:
+            at = book.impacts - before
+            if at < impacts.shape[0]:
+                impacts[at, 0] = book.onset * tick
+                impacts[at, 1] = duration
+                impacts[at, 2] = force
+                impacts[at, 3] = book.impulse
+        book.impacts += 1
+        # of a contact that began before the run, what falls into it
+        book.contact_time += duration if book.onset >= 0 else end * tick
+        book.peak_force = max(book.peak_force, force)
+    book.total_impulse += book.impulse
+    book.touching = 0
+    book.deepest = 0.0
+    book.impulse = 0.0
 
 
 @compiled
-def safe_for(distance, bound, shaker_speed, acceleration, step):
+def leave_contact_open(book, law, end, tick):
+    """Enter what a contact gave so far, of a run that is to go on from tick *end*."""
+    book.contact_time += (end - max(book.onset, 0)) * tick
+    book.total_impulse += book.impulse
+    book.peak_force = max(book.peak_force, peak_force(law, book.deepest))
+
+
+@compiled
+def safe_for(distance, bound, tip_speed, acceleration, step):
     """For how long a signal at *distance* from zero cannot reach it, at most a few steps."""
     horizon = _TRUST * step
-    speed = _MARGIN * bound + shaker_speed + abs(acceleration) * horizon
+    speed = _MARGIN * bound + tip_speed + abs(acceleration) * horizon
     if speed * horizon <= distance:
         return horizon
     return distance / speed
@@ -187,35 +200,33 @@ def flight_level(clock, quiet, stretch, stretch_at_rest):
 
 
 @compiled
-def first_entry(seen, pieces, piece):
+def first_entry(looked, pieces, piece):
     """When the penetration first becomes positive inside a step that was looked into; -1 if it does not."""
     for i in range(pieces):
-        rise = first_rise(seen[i, 0], seen[i, 1], seen[i + 1, 0], seen[i + 1, 1], piece)
+        rise = first_rise(looked[i, 0], looked[i, 1], looked[i + 1, 0], looked[i + 1, 1], piece)
         if rise >= 0.0:
             return (i + rise) * piece
     return -1.0
 
 
 @compiled
-def count_in_step(counts, numbers, clock, start, length, c, cv, c1, cv1, seen, rest, pieces, piece):
-    """Count zero crossings of the centre in a step, through what was seen inside it."""
-    left, left_rate, begun = c, cv, 0.0
+def count_in_step(book, clock, start, length, seen, seen1, looked, rest, pieces, piece):
+    """Count zero crossings of the centre in a step, through what was seen when it was looked into."""
+    left, left_rate, begun = seen.c, seen.cv, 0.0
     i = 1
     while True:
         if i < pieces and i * piece < length:
-            right, right_rate, ended = rest + seen[i, 2], seen[i, 3], i * piece
+            right, right_rate, ended = rest + looked[i, 2], looked[i, 3], i * piece
         else:
-            right, right_rate, ended = c1, cv1, length
-        found, last, side = count_crossings(
-            counts[Counts.SIDE], left, left_rate, right, right_rate, ended - begun
-        )
-        counts[Counts.SIDE] = side
+            right, right_rate, ended = seen1.c, seen1.cv, length
+        found, last, side = count_crossings(book.side, left, left_rate, right, right_rate, ended - begun)
+        book.side = side
         if found > 0:
             when = start * clock.tick + begun + last * (ended - begun)
-            counts[Counts.CROSSINGS] += found
-            numbers[Numbers.LAST_CROSSING] = when
+            book.crossings += found
+            book.last_crossing = when
             if when > clock.last_quarter * clock.tick:
-                counts[Counts.CROSSINGS_LAST_QUARTER] += found
+                book.crossings_last_quarter += found
         if ended >= length:
             return
         left, left_rate, begun = right, right_rate, ended
@@ -223,35 +234,25 @@ def count_in_step(counts, numbers, clock, start, length, c, cv, c1, cv1, seen, r
 
 
 @compiled
-def track_extremes(numbers, w, wv, w1, wv1, c, cv, c1, cv1, length):
-    """Widen the extremes of the contact point (w) and of the centre (c) by a step."""
-    numbers[Numbers.MIN_DISPLACEMENT], numbers[Numbers.MAX_DISPLACEMENT] = widened(
-        numbers[Numbers.MIN_DISPLACEMENT], numbers[Numbers.MAX_DISPLACEMENT], w, wv, w1, wv1, length
+def track(book, seen, seen1, length):
+    """Widen the extremes of the contact point and of the centre by a step, and add to their mean squares."""
+    book.min_displacement, book.max_displacement = widened(
+        book.min_displacement, book.max_displacement, seen.w, seen.wv, seen1.w, seen1.wv, length
     )
-    numbers[Numbers.MIN_CENTER], numbers[Numbers.MAX_CENTER] = widened(
-        numbers[Numbers.MIN_CENTER], numbers[Numbers.MAX_CENTER], c, cv, c1, cv1, length
+    book.min_center, book.max_center = widened(
+        book.min_center, book.max_center, seen.c, seen.cv, seen1.c, seen1.cv, length
     )
+    book.peak_velocity = max(book.peak_velocity, abs(seen1.wv))
+    book.peak_center_velocity = max(book.peak_center_velocity, abs(seen1.cv))
+    half = 0.5 * length
+    book.square_displacement += half * (seen.w * seen.w + seen1.w * seen1.w)
+    book.square_center += half * (seen.c * seen.c + seen1.c * seen1.c)
+    book.square_velocity += half * (seen.wv * seen.wv + seen1.wv * seen1.wv)
+    book.square_center_velocity += half * (seen.cv * seen.cv + seen1.cv * seen1.cv)
 
 
 @compiled
-def change_well(memory, blocks, layout, home, q, k, r):
-    """Take the other well as the origin: exact, since the structure is the same about both.
-
-    About the well that the beam is in, the linear flow holds most of the motion of every mode; about
-    the far one, modes faster than the step would be held in place by kicks alone.
-    """
-    for row in range(layout.size):
-        memory[q + row] -= home * memory[layout.shift + row]
-        memory[layout.g + row] = -memory[layout.g + row]
-    gq, qr = tension_rows(memory, blocks, layout, q, r)
-    along_g, along_r = tension_factors(layout.gamma, gq, qr)
-    acceleration_rows(memory, layout, along_g, along_r, r, k)
-    return 2.0 * gq + qr
-
-
-@compiled
-def seen_from(impactor, home, rest):
-    """The shaker as seen from the well *home*: +1 the one the run began in, -1 the other."""
-    return Impactor(
-        impactor.offset + (1.0 - home) * rest, impactor.amplitude, impactor.omega, impactor.stiffness
-    )
+def track_energy(book, whole, high, span):
+    """Add to the energy of the modes over time, all of them and those above a frequency."""
+    book.energy_time += whole * span
+    book.high_energy_time += high * span

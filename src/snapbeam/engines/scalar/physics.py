@@ -11,18 +11,13 @@ which is Eq. (11) of Rouleau et al. (2024) without approximation, both wells inc
 
 from __future__ import annotations
 
-import math
-
 from snapbeam.engines.scalar.compile import inlined
 from snapbeam.engines.scalar.lanes import fma, select_less, vfloor
 
 __all__ = [
     "circle",
-    "contact_energy",
-    "contact_force",
     "decay_less_one",
     "mode_energy",
-    "recorded_motion",
     "rotation",
     "shaker_motion",
     "sincos",
@@ -36,22 +31,6 @@ __all__ = [
 _HALF_PI_1 = 1.5707963267341256
 _HALF_PI_2 = 6.077100506303966e-11
 _HALF_PI_3 = 2.0222662487959506e-21
-
-
-@inlined
-def contact_force(stiffness, penetration):
-    """Hertz's force f = kc d^(3/2), none when apart (Eq. 17)."""
-    if penetration > 0.0:
-        return stiffness * penetration * math.sqrt(penetration)
-    return 0.0
-
-
-@inlined
-def contact_energy(stiffness, penetration):
-    """Energy stored in the contact, (2/5) kc d^(5/2): the integral of Eq. (17)."""
-    if penetration > 0.0:
-        return 0.4 * stiffness * penetration * penetration * math.sqrt(penetration)
-    return 0.0
 
 
 @inlined
@@ -184,16 +163,3 @@ def shaker_motion(amplitude, omega, sine, cosine):
     w_s(t) - w_s(0) = A sin(omega t) with A = V b omega_1 / omega.
     """
     return amplitude * sine, amplitude * omega * cosine
-
-
-@inlined
-def recorded_motion(s, interval, w0, v0, w1, v1):
-    """Displacement and velocity of a recorded drive between two samples, at the share *s* of the interval.
-
-    The cubic that matches both displacements and both velocities, and its own derivative.
-    """
-    a, b = v0 * interval, v1 * interval
-    rise = w1 - w0
-    c2, c3 = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
-    displacement = w0 + s * (a + s * (c2 + s * c3))
-    return displacement, (a + s * (2.0 * c2 + s * 3.0 * c3)) / interval

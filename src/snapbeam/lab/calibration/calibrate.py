@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.config import config_from_mapping, dump_config
+from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError, InputTypeError, choice, integer
 from snapbeam.lab.calibration import wording as words
 from snapbeam.lab.calibration.fit import directions, search, sensitivity
 from snapbeam.lab.calibration.measurements import ContactTest, Measurements, load_measurements
 from snapbeam.lab.plausibility.calibration import KINDS
-from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.model.beam import Beam
 from snapbeam.model.paper_values import BEAM, MODES
 from snapbeam.model.reduction import ReducedModel

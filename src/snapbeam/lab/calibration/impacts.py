@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError, InputTypeError, positive
 from snapbeam.lab.calibration.measurements import HERTZ_TIME
 from snapbeam.lab.plausibility.calibration import KINDS
-from snapbeam.lab.plausibility.finding import Finding
 
 if TYPE_CHECKING:
     import xarray as xr

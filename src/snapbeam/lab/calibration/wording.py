@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import Finding
 from snapbeam.lab.plausibility.calibration import KINDS
-from snapbeam.lab.plausibility.finding import Finding
 
 if TYPE_CHECKING:
     from snapbeam.lab.calibration.calibrate import Calibration

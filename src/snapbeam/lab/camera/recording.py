@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError, integer, positive
 from snapbeam.lab.camera.sources.base import FrameSource
 from snapbeam.lab.camera.sources.opening import open_source
-from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.lab.plausibility.recording import KINDS
 
 __all__ = ["Recording", "open_recording"]

@@ -13,6 +13,7 @@ import numpy as np
 
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.files import atomic_path
+from snapbeam.core.findings import Finding, Severity, findings_of
 from snapbeam.core.validate import InputError
 from snapbeam.lab.camera.recording import open_recording
 from snapbeam.lab.campaign.pairing import Test
@@ -21,7 +22,6 @@ from snapbeam.lab.compare.response import measure_response
 from snapbeam.lab.drive.align import Alignment, align
 from snapbeam.lab.drive.seen import shaker_signal
 from snapbeam.lab.drive.vibrometer import DriveMeasurement, measure_drive
-from snapbeam.lab.plausibility.finding import Finding, Severity, findings_of
 from snapbeam.lab.signals.files import read_signal
 from snapbeam.lab.tracking.track import track
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError, positive
 from snapbeam.lab.compare.start import start_of_shaker
 from snapbeam.lab.plausibility.comparison import KINDS
-from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.lab.signals.signal import SignalSamples
 from snapbeam.lab.signals.sine_fit import SineFit, fit_sine
 from snapbeam.runs.schema import check_trajectory
@@ -122,7 +122,7 @@ def compare_waveforms(
         "simulated_shaker": _on(grid, model_clock, simulated["shaker_displacement"].values),
     }
     waveforms = xr.Dataset(
-        {name: ("cycle", value, {"units": "b"}) for name, value in columns.items()},
+        {name: ("cycle", value, {"units": "1"}) for name, value in columns.items()},
         {"cycle": ("cycle", grid, {"long_name": "cycles of excitation", "units": "1"})},
     )
     one, two = columns["measured_displacement"], columns["simulated_displacement"]
@@ -252,7 +252,7 @@ def _spectra(grid: _Array, step: float, columns: dict[str, _Array]) -> xr.Datase
         good = np.isfinite(values)
         filled = np.where(good, values, np.interp(grid, grid[good], values[good]))
         amplitude = 2.0 * np.abs(np.fft.rfft((filled - filled.mean()) * window)) / window.sum()
-        data[name] = ("frequency_ratio", amplitude, {"units": "b"})
+        data[name] = ("frequency_ratio", amplitude, {"units": "1"})
     ratio = np.fft.rfftfreq(grid.size, step)
     return xr.Dataset(data, {"frequency_ratio": ("frequency_ratio", ratio, {"units": "1"})})
 

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
+from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError
 from snapbeam.lab.decay.cycles import noise_level
 from snapbeam.lab.decay.poles import Pole, Stabilisation, find_poles
 from snapbeam.lab.decay.window import Decay, dominant
 from snapbeam.lab.plausibility.decay import KINDS
-from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.lab.signals.signal import SignalSamples
 
 __all__ = ["CLOSE", "ENERGY", "Centres", "find_centres", "unexplained"]

@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import Finding
 from snapbeam.lab.decay.cycles import Cycles
 from snapbeam.lab.decay.fit import FitResult
 from snapbeam.lab.decay.laws import envelope
 from snapbeam.lab.decay.model import ModeEstimate
 from snapbeam.lab.plausibility.decay import KINDS
-from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.lab.signals.signal import SignalSamples
 
 __all__ = ["Misfit", "findings_about", "judged", "misfit_of"]

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import Finding, doubtful
 from snapbeam.lab.decay.drift import Line
 from snapbeam.lab.decay.poles import Stabilisation
-from snapbeam.lab.plausibility.finding import Finding, doubtful
 
 __all__ = ["DecayFit", "ModeEstimate", "law_priors"]
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError
 from snapbeam.lab.decay.centres import CLOSE, ENERGY, Centres
 from snapbeam.lab.decay.cycles import Cycles, hilbert_cycles, noise_level, peak_cycles, regress
@@ -16,7 +17,6 @@ from snapbeam.lab.decay.model import ModeEstimate
 from snapbeam.lab.decay.poles import Pole, Stabilisation, find_poles, thinned, without_poles
 from snapbeam.lab.decay.window import Decay
 from snapbeam.lab.plausibility.decay import KINDS
-from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.lab.signals.signal import SignalSamples
 from snapbeam.lab.signals.sine_fit import fit_sine
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError, finite
 from snapbeam.lab.decay.cycles import hilbert_cycles, noise_level, regress
 from snapbeam.lab.decay.drift import Line, find_drift, find_lines, without_lines
 from snapbeam.lab.decay.release import find_ceiling, find_jump, find_release
 from snapbeam.lab.plausibility.decay import KINDS
-from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.lab.signals.signal import SignalSamples
 
 __all__ = ["Decay", "dominant", "prepared"]

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError, finite
 from snapbeam.lab.drive.displacement import displacement_from_velocity
 from snapbeam.lab.drive.vibrometer import DriveMeasurement, measure_drive
 from snapbeam.lab.plausibility.alignment import KINDS
-from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.lab.signals.signal import SignalSamples, check_signal
 from snapbeam.lab.signals.sine_fit import SineFit, fit_sine
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from snapbeam.core.findings import to_json
 from snapbeam.core.validate import InputError, choice, positive
 from snapbeam.lab.drive.align import Alignment
 from snapbeam.lab.drive.displacement import displacement_from_velocity
 from snapbeam.lab.drive.vibrometer import DriveMeasurement, measure_drive
-from snapbeam.lab.plausibility.finding import to_json
 from snapbeam.lab.plausibility.vibrometer import KINDS as VIBROMETER
 from snapbeam.lab.signals.signal import check_signal
 

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import Finding, doubtful
 from snapbeam.core.validate import InputError, finite, positive, within
 from snapbeam.lab.drive.onset import find_onset, moves_outside, moving_part
-from snapbeam.lab.plausibility.finding import Finding, doubtful
 from snapbeam.lab.plausibility.vibrometer import KINDS
 from snapbeam.lab.signals.flaws import Clipping, Flaw, find_clipping, find_flaws, sound_samples, stuck_runs
 from snapbeam.lab.signals.signal import SignalSamples, check_signal

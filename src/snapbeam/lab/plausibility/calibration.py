@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from snapbeam.lab.plausibility.finding import Severity
+from snapbeam.core.findings import Severity
 from snapbeam.lab.plausibility.kinds import Kind, table
 
 __all__ = ["KINDS"]

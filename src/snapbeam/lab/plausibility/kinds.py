@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from snapbeam.lab.plausibility.finding import Finding, Severity
+from snapbeam.core.findings import Finding, Severity
 
 __all__ = ["Kind", "table"]
 
@@ -28,7 +28,7 @@ class Kind:
     def found(self, severity: Severity | None = None, told: str = "", **numbers: float) -> Finding:
         """The finding with its numbers, in words; *told* stands for ``{told}`` in them."""
         words = self.says.format(told=told, **numbers)
-        return Finding(self.code, severity or self.severity, words, numbers)
+        return Finding(self.code, words, numbers, severity or self.severity)
 
 
 def table(*kinds: Kind) -> Mapping[str, Kind]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from snapbeam.lab.plausibility.finding import Finding, Severity
+from snapbeam.core.findings import Finding, Severity
 from snapbeam.lab.plausibility.kinds import Kind, table
 from snapbeam.lab.tracking.flags import FrameFlag
 from snapbeam.lab.tracking.measure.follower import TrackedRows

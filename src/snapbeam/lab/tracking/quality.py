@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from snapbeam.core.findings import findings_of
 from snapbeam.core.validate import InputError, InputTypeError
-from snapbeam.lab.plausibility.finding import findings_of
 from snapbeam.lab.tracking.flags import FrameFlag
 
 if TYPE_CHECKING:

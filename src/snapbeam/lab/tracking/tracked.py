@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import Finding, to_json
 from snapbeam.core.validate import InputError
 from snapbeam.lab.camera.recording import Recording
-from snapbeam.lab.plausibility.finding import Finding, to_json
 from snapbeam.lab.plausibility.tracking import SeenMotion, contact_shift, never_touching, tracking_findings
 from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.flags import FrameFlag

@@ -1,20 +1,50 @@
-"""What the paper says, measured: each claim a function with a rule, all of them a table."""
+"""What the paper says, measured: each claim a function with a rule and a few words, all of them a table.
+
+``topics`` holds the claims: a module of functions that return numbers, and a file of words beside it.
+"""
 
 from __future__ import annotations
 
 import os
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from snapbeam.core.validate import InputError
-from snapbeam.paper.claims.table import VERDICTS, Claim, write_table
+from snapbeam.paper.claims.finding import VERDICTS, Finding
+from snapbeam.paper.claims.prose import fill, read_topic
+from snapbeam.paper.claims.table import Claim, summary, write_table
 from snapbeam.paper.recipe import MissingResults
 
 if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
-__all__ = ["VERDICTS", "Claim", "measure_claims", "write_claims"]
+__all__ = ["TOPICS", "VERDICTS", "Claim", "measure_claims", "measurements", "summary", "write_claims"]
+
+TOPICS = (
+    "beam",
+    "basis",
+    "contact",
+    "waveforms",
+    "ripples",
+    "thresholds",
+    "resonances",
+    "classes",
+    "transients",
+    "disturbances",
+    "locations",
+    "added_modes",
+    "efficiency",
+    "questions",
+)
+"""The topics in the order of the table."""
+
+
+def measurements(topic: str) -> Mapping[str, Callable[[Results], Finding]]:
+    """The functions of a topic by the numbers of its rows."""
+    rows: Mapping[str, Callable[[Results], Finding]] = import_module(f"{__name__}.topics.{topic}").ROWS
+    return rows
 
 
 def measure_claims(results: Results, sketch: Results | None = None) -> list[Claim]:
@@ -28,43 +58,37 @@ def measure_claims(results: Results, sketch: Results | None = None) -> list[Clai
     sketch : Results, optional
         What to measure a claim on if *results* lack its data and do not compute them; each row says its size.
     """
-    from snapbeam.paper.claims import contact, frequencies, locations, maps, unsaid, waveforms
-
-    functions = (
-        frequencies.natural_frequencies,
-        frequencies.misprint,
-        maps.notches,
-        maps.thresholds,
-        maps.long_runs,
-        maps.low_frequency,
-        locations.one_mode,
-        locations.many_modes,
-        locations.added_modes,
-        waveforms.resonances,
-        waveforms.snap_through,
-        frequencies.convergence,
-        contact.restitution,
-        frequencies.dynamic_basis,
-        waveforms.central_shaker,
-        locations.transient_window,
-        contact.stiffness,
-        unsaid.reference_frequency,
-        unsaid.contact_stiffness,
-        unsaid.damping,
-        unsaid.end_rule,
-        unsaid.tolerance,
-    )
     rows: list[Claim] = []
-    for function in functions:
-        used = results
-        try:
-            found = function(results)
-        except MissingResults:
-            if sketch is None:
-                raise
-            used = sketch
-            found = function(sketch)
-        rows += [replace(claim, size=used.size) for claim in found]
+    for name in TOPICS:
+        topic, functions = read_topic(name), measurements(name)
+        for number, entry in topic.entries.items():
+            used = results
+            try:
+                finding = functions[number](results)
+            except MissingResults:
+                if sketch is None:
+                    raise
+                used = sketch
+                finding = functions[number](sketch)
+            filled = {
+                part: fill(getattr(entry, part), finding)
+                for part in ("measured", "uncertainty", "rule", "fails", "note")
+            }
+            rows.append(
+                Claim(
+                    number=number,
+                    topic=topic.title,
+                    says=entry.says,
+                    paper=entry.paper,
+                    source=entry.source,
+                    figure=entry.figure,
+                    verdict=finding.verdict,
+                    close=finding.close,
+                    quantities=finding.quantities,
+                    size=used.size,
+                    **filled,
+                )
+            )
     return rows
 
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import groupby
 from pathlib import Path
 
 from snapbeam.core.files import atomic_path, check_writable
 from snapbeam.core.provenance import made_by
 from snapbeam.core.validate import choice
+from snapbeam.paper.claims.finding import VERDICTS, Quantity
 
-__all__ = ["VERDICTS", "Claim", "write_table"]
-
-VERDICTS = ("holds", "in part", "fails", "open")
+__all__ = ["Claim", "summary", "write_table"]
 
 
 @dataclass(frozen=True)
@@ -23,31 +25,52 @@ class Claim:
     """What the paper says, what was measured by which rule, and whether they agree.
 
     ``verdict``: ``holds``, ``in part``, ``fails``, or ``open`` for what the paper does not say and whose
-    influence is measured instead.  ``size``: whether it was measured at the size of the paper or on a sketch.
+    influence is measured instead.  ``close``: whether it would be another within the uncertainty.  ``size``:
+    whether it was measured at the size of the paper or on a sketch.
     """
 
     number: str
-    statement: str
+    topic: str
+    says: str
     paper: str
+    source: str
     measured: str
     uncertainty: str
     verdict: str
+    close: bool
     rule: str
-    remark: str = ""
+    fails: str
+    note: str = ""
+    figure: str = ""
     size: str = "full"
+    quantities: Mapping[str, Quantity] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         choice("verdict", self.verdict, VERDICTS)
 
 
+def summary(claims: Sequence[Claim]) -> str:
+    """How many statements hold, hold in part and fail, how many of these are close, how many questions are open."""
+    counts = Counter(claim.verdict for claim in claims)
+    close = sum(claim.close for claim in claims if claim.verdict != "open")
+    total = len(claims) - counts["open"]
+    sketched = sum(claim.size != "full" for claim in claims)
+    return (
+        f"Of {total} statements {counts['holds']} hold, {counts['in part']} hold in part and {counts['fails']} fail; "
+        f"{close} of these verdicts (†) would be another within the uncertainty. {counts['open']} questions that "
+        "the paper leaves open are measured apart."
+        + (f" {sketched} rows (*) are measured on sketches." if sketched else "")
+    )
+
+
 def write_table(claims: Sequence[Claim], folder: Path, size: str) -> list[Path]:
     """Write ``claims.md``, ``claims.csv`` and ``claims.json`` to a folder."""
     stamp = made_by({"size": size, "claims": [claim.number for claim in claims]})
-    record = {"size": size, **stamp, "claims": [asdict(claim) for claim in claims]}
+    record = {"size": size, **stamp, "summary": summary(claims), "claims": [_record(row) for row in claims]}
     texts = {
         "claims.md": _markdown(claims),
         "claims.csv": _csv(claims),
-        "claims.json": json.dumps(record, indent=1, ensure_ascii=False) + "\n",
+        "claims.json": json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False) + "\n",
     }
     files = []
     for name, text in texts.items():
@@ -58,29 +81,68 @@ def write_table(claims: Sequence[Claim], folder: Path, size: str) -> list[Path]:
     return files
 
 
+def _record(claim: Claim) -> dict[str, object]:
+    """A row for JSON, which has no number for what was not found."""
+    quantities = {
+        name: {part: value if math.isfinite(value) else None for part, value in quantity._asdict().items()}
+        for name, quantity in claim.quantities.items()
+    }
+    return {**asdict(claim), "quantities": quantities}
+
+
 def _markdown(claims: Sequence[Claim]) -> str:
-    lines = [
-        "| # | the paper says | paper | measured | uncertainty | verdict | size |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    for claim in claims:
-        cells = (claim.number, claim.statement, claim.paper, claim.measured, claim.uncertainty)
-        lines.append("| " + " | ".join(map(_cell, cells)) + f" | **{claim.verdict}** | {claim.size} |")
-    lines += ["", "**How each was measured, and what to make of it**", ""]
-    for claim in claims:
-        remark = f" {claim.remark}" if claim.remark else ""
-        lines += [f"{claim.number}", f": *{claim.rule}*{remark}", ""]
-    return "\n".join(lines)
+    lines = [f"**{summary(claims)}**", ""]
+    # questions last, whatever their place in the list
+    ordered = sorted(claims, key=lambda claim: claim.verdict == "open")
+    for topic, group in groupby(ordered, key=lambda claim: claim.topic):
+        rows = list(group)
+        is_open = rows[0].verdict == "open"
+        lines += [f"### {topic}", "", *_table(rows, is_open), "", *_details(rows), ""]
+    return "\n".join(lines).rstrip() + "\n"
 
 
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|").replace("\n", " ")
+def _table(rows: Iterable[Claim], is_open: bool) -> list[str]:
+    if is_open:
+        lines = ["| # | question | measured | for comparison | shown in |", "|---|---|---|---|---|"]
+    else:
+        lines = [
+            "| # | the paper says | number in the paper | measured | uncertainty | verdict | shown in |",
+            "|---|---|---|---|---|---|---|",
+        ]
+    for row in rows:
+        verdict = f"**{row.verdict}**" + (" †" if row.close else "") + (" *" if row.size != "full" else "")
+        cells = [row.says, row.measured, row.uncertainty, _link(row.figure)]
+        if not is_open:
+            cells = [row.says, row.paper, row.measured, row.uncertainty, verdict, _link(row.figure)]
+        lines.append("| " + " | ".join([row.number, *(cell.replace("|", "\\|") for cell in cells)]) + " |")
+    return lines
+
+
+def _link(figures: str) -> str:
+    """Links to headings, given one after another with commas, of the page that holds the table."""
+    names = [name.strip() for name in figures.split(",") if name.strip()]
+    return ", ".join(f"[{name}](#{name.lower().replace(' ', '-').replace('.', '')})" for name in names)
+
+
+def _details(rows: Iterable[Claim]) -> list[str]:
+    lines = []
+    for row in rows:
+        verb = "Matters with" if row.verdict == "open" else "Fails with"
+        parts = [f"*{row.source}.*", f"Rule: {row.rule}", f"{verb}: {row.fails}", row.note]
+        lines += [row.number, ": " + " ".join(part for part in parts if part), ""]
+    return lines
 
 
 def _csv(claims: Sequence[Claim]) -> str:
     stream = io.StringIO()
-    names = [field.name for field in fields(Claim)]
-    writer = csv.DictWriter(stream, names, lineterminator="\n")
+    rows = []
+    for claim in claims:
+        row = {key: value for key, value in asdict(claim).items() if key != "quantities"}
+        name, quantity = next(iter(claim.quantities.items()))
+        rows.append(
+            row | {"quantity": name, "value": quantity.value, "value_uncertainty": quantity.uncertainty}
+        )
+    writer = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
     writer.writeheader()
-    writer.writerows(asdict(claim) for claim in claims)
+    writer.writerows(rows)
     return stream.getvalue()

@@ -11,7 +11,7 @@ from snapbeam.core.validate import InputError
 from snapbeam.figures.panels import panel_letters
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
 from snapbeam.model.paper_values import MODES
-from snapbeam.paper.system import paper_model, paper_run, shapes_along
+from snapbeam.paper.system import TOLERANCE, paper_model, paper_run, shapes_along
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,7 +39,9 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     model = paper_model(modes)
     period = 1.0 / (FREQUENCY_RATIO * model.reference_freq)
     times = np.linspace(0.0, _CYCLES * period, _CYCLES * _SAMPLES + 1)
-    run = paper_run(modes, FREQUENCY_RATIO, VELOCITY_AMPLITUDE, _CYCLES, sample_times=times)
+    run = paper_run(
+        modes, FREQUENCY_RATIO, VELOCITY_AMPLITUDE, _CYCLES, sample_times=times, tolerance=TOLERANCE
+    )
     names = ["displacement", "center_displacement", "shaker_displacement", "contact_force", "modal_amplitude"]
     x, shapes = shapes_along(model, 161)
     along = xr.Dataset(

@@ -1,4 +1,4 @@
-"""What one task computes: the runs of some points, as two plain tables."""
+"""What is computed at each point of a sweep: its runs, as rows of two plain tables."""
 
 from __future__ import annotations
 
@@ -12,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass, RunStatus
-from snapbeam.core.provenance import canonical_json, parameter_hash
-from snapbeam.runs.response import STATISTICS
-from snapbeam.sweeps.replicas import Replicas, perturbed_starts
-from snapbeam.sweeps.sweep import MapSetup, Points, Progress, response_flags, variable_attributes
+from snapbeam.core.provenance import array_hash, canonical_json, parameter_hash
+from snapbeam.engines.outcomes import STATISTICS
+from snapbeam.model.state import State
+from snapbeam.model.system import System
+from snapbeam.runs.save import code_flags
+from snapbeam.sweeps.points import Columns
+from snapbeam.sweeps.replicas import Replicas, perturbed_start
+from snapbeam.sweeps.setup import Progress, SweepSetup, variable_attributes
 
-__all__ = ["CLASSES", "Columns", "Recipe"]
+__all__ = ["CLASSES", "PointWork", "ResultTable"]
 
 CLASSES = tuple(ResponseClass)
 """Classes in the order in which repeats are counted."""
@@ -25,7 +29,7 @@ _COUNTS = tuple(f"runs_{kind.name.lower()}" for kind in CLASSES)
 _HALVED = "response_half_step"
 
 
-class Columns(NamedTuple):
+class ResultTable(NamedTuple):
     """Results of runs: whole numbers and real numbers, a row a run."""
 
     integers: NDArray[np.int32]
@@ -42,16 +46,16 @@ class Columns(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Recipe:
-    """How the points of a map become rows of results, repeats included."""
+class PointWork:
+    """How the points of a sweep become rows of results, repeats included."""
 
-    setup: MapSetup
+    setup: SweepSetup
     replicas: Replicas | None = None
 
     @cached_property
     def integers(self) -> tuple[str, ...]:
         """Names of the columns of whole numbers."""
-        names = [name for name, (kind, _, _) in STATISTICS.items() if kind != "float64"]
+        names = [name for name, row in STATISTICS.items() if row.dtype != "float64"]
         if self.replicas is not None:
             names += [*_COUNTS, _HALVED] if self.replicas.halve_step else _COUNTS
         return tuple(names)
@@ -59,7 +63,7 @@ class Recipe:
     @cached_property
     def numbers(self) -> tuple[str, ...]:
         """Names of the columns of real numbers."""
-        return tuple(name for name, (kind, _, _) in STATISTICS.items() if kind == "float64")
+        return tuple(name for name, row in STATISTICS.items() if row.dtype == "float64")
 
     @property
     def runs_per_point(self) -> int:
@@ -69,39 +73,37 @@ class Recipe:
     @cached_property
     def parameters(self) -> dict[str, Any]:
         """Everything the numbers depend on, plain: what two maps must share to be one."""
-        setup = self.setup
-        parameters = setup.description() | {name: values.tolist() for name, values in setup.grid.axes.items()}
-        parameters |= setup.grid.scalars
-        if setup.model.beam is None:
-            parameters["natural_freq"] = [float(f"{value:.9g}") for value in setup.model.natural_freq]
+        found = self.setup.identity() | {"statistics": list(STATISTICS)}
         if self.replicas is not None:
-            parameters["replicas"] = self.replicas.count
-            parameters["replica_size"] = self.replicas.size
-            parameters["replica_seed"] = self.replicas.seed
-            parameters["halve_step"] = self.replicas.halve_step
-        return parameters
+            found["replicas"] = {
+                "count": self.replicas.count,
+                "size": self.replicas.size,
+                "seed": self.replicas.seed,
+                "halve_step": self.replicas.halve_step,
+            }
+        return found
 
     @cached_property
     def parameter_hash(self) -> str:
         """SHA-256 of :attr:`parameters`."""
         return parameter_hash(self.parameters)
 
-    def task_hash(self, points: Points) -> str:
+    def task_hash(self, points: Columns) -> str:
         """SHA-256 of the parameters and of the points of one task."""
-        places = {name: values.tolist() for name, values in points.items()}
+        places = {name: array_hash(values) for name, values in points.items()}
         return hashlib.sha256((self.parameter_hash + canonical_json(places)).encode()).hexdigest()
 
     def model_hash(self) -> str:
         """SHA-256 of the model's numbers, which may differ in their last digits between processors."""
-        model = self.setup.model
+        model = self.setup.system.model
         digest = hashlib.sha256()
         for values in (model.mass, model.stiffness, model.omega, model.linear_modes, model.equilibrium):
             digest.update(np.ascontiguousarray(values).tobytes())
         return digest.hexdigest()
 
     def compute(
-        self, points: Points, threads: int | None = None, progress: Progress | None = None
-    ) -> Columns:
+        self, points: Columns, threads: int | None = None, progress: Progress | None = None
+    ) -> ResultTable:
         """Integrate every run of *points*, repeats included."""
         setup, size = self.setup, next(iter(points.values())).size
         total = size * self.runs_per_point
@@ -113,45 +115,48 @@ class Recipe:
 
         results = setup.march(points, threads, report)
         if self.replicas is not None:
-            repeats = [results["response"]]
-            for start in perturbed_starts(setup.model, self.replicas, setup.side):
+            repeats, replicas = [results["response"]], self.replicas
+            for repeat in range(replicas.count):
                 before += size
+
+                def start(system: System, state: State | None, number: int = repeat) -> State:
+                    return perturbed_start(system, replicas, number, state)
+
                 repeats.append(setup.march(points, threads, report, start=start)["response"])
-            if self.replicas.halve_step:
+            if replicas.halve_step:
                 before = total - size
-                finer = setup.plan._replace(step=0.5 * setup.plan.step)
-                repeats.append(setup.march(points, threads, report, plan=finer)["response"])
+                repeats.append(setup.march(points, threads, report, step_factor=0.5)["response"])
                 results[_HALVED] = repeats[-1]
             kinds = np.array(repeats)
             results |= {
                 name: (kinds == kind).sum(axis=0) for name, kind in zip(_COUNTS, CLASSES, strict=True)
             }
-        return Columns(
+        return ResultTable(
             np.stack([results[name] for name in self.integers], axis=1).astype(np.int32),
             np.stack([results[name] for name in self.numbers], axis=1).astype(np.float64),
         )
 
-    def unfinished(self, size: int, status: RunStatus = RunStatus.NOT_RUN) -> Columns:
+    def unfinished(self, size: int, status: RunStatus = RunStatus.NOT_RUN) -> ResultTable:
         """Rows of points that were not computed: class unknown, and the status that says why."""
         integers = np.zeros((size, len(self.integers)), dtype=np.int32)
         integers[:, self.integers.index("response")] = ResponseClass.UNKNOWN
         integers[:, self.integers.index("status")] = status
         if _HALVED in self.integers:
             integers[:, self.integers.index(_HALVED)] = ResponseClass.UNKNOWN
-        return Columns(integers, np.full((size, len(self.numbers)), np.nan))
+        return ResultTable(integers, np.full((size, len(self.numbers)), np.nan))
 
     def variables(self) -> dict[str, tuple[str, bool, dict[str, Any]]]:
         """Kind, whether there is one value a class, and attributes of each variable of the map."""
-        variables = {name: (STATISTICS[name][0], False, variable_attributes(name)) for name in STATISTICS}
+        variables = {name: (row.dtype, False, variable_attributes(name)) for name, row in STATISTICS.items()}
         if self.replicas is not None:
             labels = {"units": "1", "long_name": "share of the runs of a point, by response class"}
             variables["class_share"] = ("float64", True, labels)
             if self.replicas.halve_step:
                 labels = {"units": "1", "long_name": "response class with the step halved"}
-                variables[_HALVED] = ("int8", False, labels | response_flags())
+                variables[_HALVED] = ("int8", False, labels | code_flags(ResponseClass))
         return variables
 
-    def values(self, name: str, columns: Columns) -> NDArray[Any]:
+    def values(self, name: str, columns: ResultTable) -> NDArray[Any]:
         """One variable of the map from rows of results, shape (runs,) or (runs, classes)."""
         if name == "class_share":
             first = self.integers.index(_COUNTS[0])
@@ -163,10 +168,10 @@ class Recipe:
             return columns.numbers[:, self.numbers.index(name)].astype(kind)
         return columns.integers[:, self.integers.index(name)].astype(kind)
 
-    def join(self, parts: Iterable[Columns]) -> Columns:
+    def join(self, parts: Iterable[ResultTable]) -> ResultTable:
         """Rows of several parts as one."""
         whole = [self.unfinished(0), *parts]
-        return Columns(
+        return ResultTable(
             np.concatenate([part.integers for part in whole]),
             np.concatenate([part.numbers for part in whole]),
         )

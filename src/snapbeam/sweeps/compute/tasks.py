@@ -8,25 +8,26 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.sweeps.compute.task import Columns, Recipe
-from snapbeam.sweeps.sweep import Grid, Points, Progress
+from snapbeam.sweeps.compute.task import PointWork, ResultTable
+from snapbeam.sweeps.points import Columns, Points
+from snapbeam.sweeps.setup import Progress
 
-__all__ = ["Book", "MemoryBook", "Results", "Stage", "chunk_size"]
+__all__ = ["Keeper", "MemoryKeeper", "Rows", "Stage", "chunk_size"]
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """Points computed together: all of a grid, or the listed ones, cut into tasks of *chunk* points."""
+    """Points computed together: all of a sweep, or the listed ones, cut into tasks of *chunk* points."""
 
     name: str
-    grid: Grid
+    points: Points
     chunk: int
     which: NDArray[np.int64] | None = None
 
     @property
     def size(self) -> int:
         """Number of points."""
-        return self.grid.size if self.which is None else self.which.size
+        return self.points.size if self.which is None else self.which.size
 
     @property
     def tasks(self) -> int:
@@ -37,25 +38,25 @@ class Stage:
         """First point of a task and the one after its last."""
         return task * self.chunk, min((task + 1) * self.chunk, self.size)
 
-    def points(self, task: int) -> Points:
+    def columns(self, task: int) -> Columns:
         """The points of a task."""
         start, stop = self.bounds(task)
-        return self.grid.take(np.arange(start, stop) if self.which is None else self.which[start:stop])
+        return self.points.take(np.arange(start, stop) if self.which is None else self.which[start:stop])
 
 
-class Results(Protocol):
+class Rows(Protocol):
     """Rows of results of a stage, in the order of its points."""
 
-    def read(self, start: int, stop: int) -> Columns: ...
+    def read(self, start: int, stop: int) -> ResultTable: ...
 
 
-class Book(Protocol):
+class Keeper(Protocol):
     """Where the stages of a map are computed and kept."""
 
-    recipe: Recipe
+    work: PointWork
     chunk: int
 
-    def complete(self, stage: Stage, progress: Progress | None = None) -> Results:
+    def complete(self, stage: Stage, progress: Progress | None = None) -> Rows:
         """Compute what is missing of a stage and return its results."""
         ...
 
@@ -70,22 +71,22 @@ def chunk_size(points: int, engine: str) -> int:
 
 
 class _Rows:
-    def __init__(self, columns: Columns) -> None:
+    def __init__(self, columns: ResultTable) -> None:
         self.columns = columns
 
-    def read(self, start: int, stop: int) -> Columns:
-        return Columns(self.columns.integers[start:stop], self.columns.numbers[start:stop])
+    def read(self, start: int, stop: int) -> ResultTable:
+        return ResultTable(self.columns.integers[start:stop], self.columns.numbers[start:stop])
 
 
-class MemoryBook:
+class MemoryKeeper:
     """A map that lives in memory and is gone with the process."""
 
-    def __init__(self, recipe: Recipe, threads: int | None = None) -> None:
-        self.recipe = recipe
+    def __init__(self, work: PointWork, threads: int | None = None) -> None:
+        self.work = work
         self.threads = threads
-        self.chunk = max(recipe.setup.grid.size, 1)
+        self.chunk = max(work.setup.points.size, 1)
 
-    def complete(self, stage: Stage, progress: Progress | None = None) -> Results:
+    def complete(self, stage: Stage, progress: Progress | None = None) -> Rows:
         """Compute the stage in one go."""
-        points = stage.grid.take(np.arange(stage.size) if stage.which is None else stage.which)
-        return _Rows(self.recipe.compute(points, self.threads, progress))
+        points = stage.points.take(np.arange(stage.size) if stage.which is None else stage.which)
+        return _Rows(self.work.compute(points, self.threads, progress))

@@ -9,27 +9,26 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from snapbeam.core.provenance import __version__
-from snapbeam.sweeps.compute.task import Columns, Recipe
+from snapbeam.core.provenance import __version__, processor_name
+from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Stage
-from snapbeam.sweeps.keep.durable import StoreError
-from snapbeam.sweeps.keep.store import processor_name
-from snapbeam.sweeps.sweep import Points
+from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.points import Columns
 
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-__all__ = ["ATTEMPTS", "ClusterWorkers", "Failure", "HereWorkers", "Outcome", "Workers"]
+__all__ = ["ATTEMPTS", "ClusterWorkers", "Failure", "HereWorkers", "TaskResult", "Workers"]
 
 ATTEMPTS = 3
 """Times that a task may kill its worker, or raise in it, before it is given up."""
 _POLL = 0.5
 
 
-class Outcome(NamedTuple):
+class TaskResult(NamedTuple):
     """Results of a task, and the type of the processor they come from."""
 
-    columns: Columns
+    columns: ResultTable
     processor: str
 
 
@@ -43,8 +42,8 @@ class Workers(Protocol):
     """Computes tasks of a stage and gives each with what came of it, in any order."""
 
     def run(
-        self, recipe: Recipe, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
-    ) -> Iterator[tuple[int, Outcome | Failure]]: ...
+        self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
+    ) -> Iterator[tuple[int, TaskResult | Failure]]: ...
 
 
 @dataclass(frozen=True)
@@ -54,17 +53,17 @@ class HereWorkers:
     threads: int | None = None
 
     def run(
-        self, recipe: Recipe, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
-    ) -> Iterator[tuple[int, Outcome | Failure]]:
+        self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
+    ) -> Iterator[tuple[int, TaskResult | Failure]]:
         """Compute the tasks in order; *progress* gets the points done of the present one."""
         for task in tasks:
-            columns = recipe.compute(stage.points(task), self.threads, lambda done, _: progress(done))
-            yield task, Outcome(columns, processor_name())
+            columns = work.compute(stage.columns(task), self.threads, lambda done, _: progress(done))
+            yield task, TaskResult(columns, processor_name())
 
 
-def work(recipe: Recipe, points: Points, threads: int) -> tuple[Any, Any, str, str]:
+def compute_task(work: PointWork, points: Columns, threads: int) -> tuple[Any, Any, str, str]:
     """What a worker of a cluster does: one task, with all its threads."""
-    columns = recipe.compute(points, threads)
+    columns = work.compute(points, threads)
     return columns.integers, columns.numbers, processor_name(), __version__
 
 
@@ -81,8 +80,8 @@ class ClusterWorkers:
     note: Callable[[str], object] = print
 
     def run(
-        self, recipe: Recipe, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
-    ) -> Iterator[tuple[int, Outcome | Failure]]:
+        self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
+    ) -> Iterator[tuple[int, TaskResult | Failure]]:
         """Compute the tasks as workers come and go."""
         queue = deque(tasks)
         flying: dict[Future, tuple[int, str]] = {}
@@ -98,7 +97,7 @@ class ClusterWorkers:
                 for address in sorted(idle)[: len(queue)]:
                     task = queue.popleft()
                     future = self.client.submit(
-                        work, recipe, stage.points(task), there[address],
+                        compute_task, work, stage.columns(task), there[address],
                         workers=[address], allow_other_workers=False, pure=False, retries=0,
                     )  # fmt: skip
                     flying[future] = task, address
@@ -106,7 +105,7 @@ class ClusterWorkers:
                     del flying[future]
                     outcome = self._outcome(future, address in there)
                     future.release()
-                    if isinstance(outcome, Outcome):
+                    if isinstance(outcome, TaskResult):
                         succeeded = True
                         yield task, outcome
                         continue
@@ -138,7 +137,7 @@ class ClusterWorkers:
             wait(list(flying), timeout=_POLL, return_when="FIRST_COMPLETED")
         return [(f, task, at) for f, (task, at) in flying.items() if f.done() or at not in there]
 
-    def _outcome(self, future: Future, alive: bool) -> Outcome | Failure:
+    def _outcome(self, future: Future, alive: bool) -> TaskResult | Failure:
         from distributed import KilledWorker
 
         if not future.done():
@@ -148,7 +147,7 @@ class ClusterWorkers:
             integers, numbers, processor, version = future.result()
             if version != __version__:
                 raise StoreError(f"a worker runs snapbeam {version}, this is {__version__}: install the same")
-            return Outcome(Columns(integers, numbers), processor)
+            return TaskResult(ResultTable(integers, numbers), processor)
         if future.status == "cancelled":
             return Failure("was cancelled") if alive else Failure("killed its worker")
         error = future.exception()

@@ -11,16 +11,13 @@ from types import TracebackType
 from typing import Self
 
 from snapbeam.core.validate import InputError
+from snapbeam.sweeps.errors import StoreError
 
-__all__ = ["PARTIAL", "StoreError", "StoreLock", "append_line", "durable_write", "member", "refuse_links"]
+__all__ = ["PARTIAL", "StoreLock", "append_line", "durable_write", "member", "refuse_links"]
 
 PARTIAL = ".partial"
 """Suffix of a file that is being written."""
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
-
-
-class StoreError(OSError):
-    """A store that cannot be written, read or trusted; the message says what to do."""
 
 
 def durable_write(path: Path, data: bytes | memoryview) -> None:

@@ -21,26 +21,20 @@ from typing import Any, Self
 
 import numpy as np
 
-from snapbeam.core.provenance import __version__, canonical_json, parameter_hash
+from snapbeam.core.provenance import __version__, canonical_json, parameter_hash, processor_name
 from snapbeam.core.validate import InputError, integer
-from snapbeam.sweeps.compute.task import Columns, Recipe
+from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Stage, chunk_size
-from snapbeam.sweeps.keep.durable import StoreError, StoreLock, durable_write, member, refuse_links
+from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.keep.durable import StoreLock, durable_write, member, refuse_links
 from snapbeam.sweeps.keep.ledger import Ledger, Record
 
-__all__ = ["MapStore", "processor_name", "read_stored_config"]
+__all__ = ["MapStore", "StoredRows", "read_stored_config"]
 
-_FORMAT = {"format": "snapbeam map", "format_version": 1}
+_FORMAT = {"format": "snapbeam map", "format_version": 2}
 _DATA = "runs.zarr"
 _TABLES = ("integers", "numbers")
 _KNOWN = {"map.json", "ledger.jsonl", "lock", _DATA}
-
-
-def processor_name() -> str:
-    """The type of the processor that compiled code is made for; results are bit-identical on one type."""
-    from llvmlite import binding
-
-    return str(binding.get_host_cpu_name())
 
 
 class MapStore:
@@ -50,7 +44,7 @@ class MapStore:
     ----------
     path : path
         Folder of the store; made if it is not there, in a folder that is.
-    recipe : Recipe
+    work : PointWork
         What is computed.
     chunk : int, optional
         Points of a task of a new store.
@@ -69,12 +63,12 @@ class MapStore:
     def __init__(
         self,
         path: str | Path,
-        recipe: Recipe,
+        work: PointWork,
         chunk: int | None = None,
         config: dict[str, Any] | None = None,
     ) -> None:
         self.path = _store_folder(path)
-        self.recipe = recipe
+        self.work = work
         if chunk is not None:
             chunk = integer("chunk", chunk, 1, 10**7)
         self.path.mkdir(exist_ok=True)
@@ -90,7 +84,7 @@ class MapStore:
         """Tasks whose data did not match the ledger when this store was opened."""
         self._arrays: dict[str, Any] = {}
         self._processor = processor_name()
-        self._model = recipe.model_hash()
+        self._model = work.model_hash()
         self._warn_of_mixture()
 
     def __enter__(self) -> Self:
@@ -107,15 +101,15 @@ class MapStore:
 
     def _describe(self, chunk: int | None, config: dict[str, Any] | None) -> int:
         file = self.path / "map.json"
-        wanted = json.loads(canonical_json(self.recipe.parameters))
+        wanted = json.loads(canonical_json(self.work.parameters))
         if file.exists():
             held = _read_description(file)
             _refuse_other(self.path, held["parameters"], wanted)
             return int(held["chunk"])
         if any(entry.name not in _KNOWN for entry in self.path.iterdir()):
             raise InputError(f"store = {str(self.path)!r}: is not empty and holds no map")
-        setup = self.recipe.setup
-        chunk = chunk_size(setup.grid.size, setup.engine) if chunk is None else chunk
+        setup = self.work.setup
+        chunk = chunk_size(setup.points.size, setup.integration.engine) if chunk is None else chunk
         held = _FORMAT | {"parameters": wanted, "parameter_hash": parameter_hash(wanted), "chunk": chunk}
         if config is not None:
             held["config"] = config
@@ -142,13 +136,13 @@ class MapStore:
         from snapbeam.sweeps.keep.tables import open_tables
 
         member(stage.name)
-        self._arrays[stage.name] = open_tables(self.path / _DATA, stage, self.recipe)
+        self._arrays[stage.name] = open_tables(self.path / _DATA, stage, self.work)
         for task in range(stage.tasks):
             record = self.ledger.records.get((stage.name, task))
             if record is None or record.state != "done":
                 continue
             if (
-                record.parameters != self.recipe.task_hash(stage.points(task))
+                record.parameters != self.work.task_hash(stage.columns(task))
                 or self._load(stage, task) is None
             ):
                 del self.ledger.records[stage.name, task]
@@ -167,7 +161,7 @@ class MapStore:
         """Tasks of a stage that were found damaged when it was opened."""
         return [task for name, task in self.damaged if name == stage.name]
 
-    def commit(self, stage: Stage, task: int, columns: Columns, processor: str = "") -> None:
+    def commit(self, stage: Stage, task: int, columns: ResultTable, processor: str = "") -> None:
         """Write the results of a task, have them on the disk, and then say in the ledger that it is done."""
         start, stop = stage.bounds(task)
         if any(len(table) != stop - start for table in columns):
@@ -189,15 +183,15 @@ class MapStore:
             raise self._cannot_write(error) from error
 
     def _record(self, stage: Stage, task: int, state: str, content: str, processor: str) -> None:
-        setup = self.recipe.setup
+        setup = self.work.setup
         self.ledger.write(
             Record(
                 stage=stage.name,
                 task=task,
                 state=state,
-                parameters=self.recipe.task_hash(stage.points(task)),
+                parameters=self.work.task_hash(stage.columns(task)),
                 content=content,
-                engine=setup.engine,
+                engine=setup.integration.engine,
                 version=__version__,
                 step=setup.plan.step,
                 processor=processor or self._processor,
@@ -211,18 +205,20 @@ class MapStore:
             "lost: make room and give the same command again"
         )
 
-    def _load(self, stage: Stage, task: int) -> Columns | None:
+    def _load(self, stage: Stage, task: int) -> ResultTable | None:
         """The results of a finished task, or None if they are not what the ledger says."""
         start, stop = stage.bounds(task)
         try:
-            columns = Columns(*(np.asarray(self._arrays[stage.name][name][start:stop]) for name in _TABLES))
+            columns = ResultTable(
+                *(np.asarray(self._arrays[stage.name][name][start:stop]) for name in _TABLES)
+            )
         except Exception:  # whatever a codec makes of damaged bytes
             return None
         return columns if columns.content_hash() == self.ledger.records[stage.name, task].content else None
 
-    def reader(self, stage: Stage) -> StoredResults:
+    def reader(self, stage: Stage) -> StoredRows:
         """The results of a stage, read as they are asked for."""
-        return StoredResults(self, stage)
+        return StoredRows(self, stage)
 
     def made_with(self) -> dict[str, str]:
         """Attributes that say what computed the finished tasks, and how far their numbers can be trusted."""
@@ -244,14 +240,14 @@ class MapStore:
         return attrs
 
 
-class StoredResults:
+class StoredRows:
     """Rows of a stage, read from its store; what is not done is unknown, with the status NOT_RUN."""
 
     def __init__(self, store: MapStore, stage: Stage) -> None:
         self.store = store
         self.stage = stage
 
-    def read(self, start: int, stop: int) -> Columns:
+    def read(self, start: int, stop: int) -> ResultTable:
         """Rows *start* to *stop*, each task checked against the ledger again."""
         store, stage, parts = self.store, self.stage, []
         for task in range(start // stage.chunk, -(-stop // stage.chunk)):
@@ -265,10 +261,10 @@ class StoredResults:
                         "it was checked; give the same command again to repair it"
                     )
             else:
-                columns = store.recipe.unfinished(last - first)
+                columns = store.work.unfinished(last - first)
             cut = slice(max(start - first, 0), min(stop, last) - first)
-            parts.append(Columns(columns.integers[cut], columns.numbers[cut]))
-        return store.recipe.join(parts)
+            parts.append(ResultTable(columns.integers[cut], columns.numbers[cut]))
+        return store.work.join(parts)
 
 
 def _store_folder(path: str | Path) -> Path:
@@ -318,16 +314,28 @@ def read_stored_config(path: str | Path) -> dict[str, Any] | None:
 
 
 def _refuse_other(path: Path, held: dict[str, Any], wanted: dict[str, Any]) -> None:
+    there, here = _flat(held), _flat(wanted)
     lines = [
-        f"  {name}: {_brief(held.get(name))} in the store, {_brief(wanted.get(name))} asked for"
-        for name in sorted(held.keys() | wanted.keys())
-        if held.get(name) != wanted.get(name)
+        f"  {name}: {_brief(there.get(name))} in the store, {_brief(here.get(name))} asked for"
+        for name in sorted(there.keys() | here.keys())
+        if there.get(name) != here.get(name)
     ]
     if lines:
         raise InputError(f"store = {str(path)!r}: holds a map of other parameters\n" + "\n".join(lines))
 
 
+def _flat(values: dict[str, Any], before: str = "") -> dict[str, Any]:
+    """Nested parameters by dotted name."""
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        full = f"{before}{name}"
+        found |= _flat(value, f"{full}.") if isinstance(value, dict) else {full: value}
+    return found
+
+
 def _brief(value: Any) -> str:
-    if isinstance(value, list) and len(value) > 4:
+    if isinstance(value, list) and len(value) > 4 and isinstance(value[0], (int, float)):
         return f"{len(value)} points from {value[0]:g} to {value[-1]:g}"
+    if isinstance(value, list) and len(value) > 4:
+        return f"an array of {len(value)} rows"
     return "nothing" if value is None else f"{value!r}"

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snapbeam.core.validate import InputError
-from snapbeam.sweeps.compute.task import Recipe
+from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.compute.tasks import Stage
 from snapbeam.sweeps.keep.durable import durable_write
 
@@ -19,7 +19,7 @@ __all__ = ["open_tables"]
 _MISSING = "zarr is needed for --store: install snapbeam[cluster]"
 
 
-def open_tables(folder: Path, stage: Stage, recipe: Recipe) -> dict[str, Any]:
+def open_tables(folder: Path, stage: Stage, work: PointWork) -> dict[str, Any]:
     """The arrays of a stage, made if they are not there; damaged descriptions are written again."""
     try:
         import zarr
@@ -29,7 +29,7 @@ def open_tables(folder: Path, stage: Stage, recipe: Recipe) -> dict[str, Any]:
 
     held: dict[str, Buffer] = {}
     fresh = MemoryStore(held)
-    _create(fresh, stage, recipe)
+    _create(fresh, stage, work)
     folder.mkdir(exist_ok=True)
     for key, value in held.items():
         path, data = folder / key, value.to_bytes()
@@ -39,24 +39,24 @@ def open_tables(folder: Path, stage: Stage, recipe: Recipe) -> dict[str, Any]:
     store = _durable_store(folder)
     return {
         name: zarr.open_array(store, path=f"{stage.name}/{name}", mode="r+", config=_CONFIG)
-        for name in _tables(recipe)
+        for name in _tables(work)
     }
 
 
 _CONFIG: Any = {"write_empty_chunks": True}
 
 
-def _tables(recipe: Recipe) -> dict[str, tuple[str, tuple[str, ...]]]:
-    return {"integers": ("int32", recipe.integers), "numbers": ("float64", recipe.numbers)}
+def _tables(work: PointWork) -> dict[str, tuple[str, tuple[str, ...]]]:
+    return {"integers": ("int32", work.integers), "numbers": ("float64", work.numbers)}
 
 
-def _create(store: Any, stage: Stage, recipe: Recipe) -> None:
+def _create(store: Any, stage: Stage, work: PointWork) -> None:
     import zarr
     from zarr.codecs import Crc32cCodec, ZstdCodec
 
     zarr.create_group(store)
-    zarr.create_group(store, path=stage.name, attributes=recipe.setup.description())
-    for name, (kind, columns) in _tables(recipe).items():
+    zarr.create_group(store, path=stage.name, attributes={"parameter_hash": work.parameter_hash})
+    for name, (kind, columns) in _tables(work).items():
         zarr.create_array(
             store,
             name=f"{stage.name}/{name}",

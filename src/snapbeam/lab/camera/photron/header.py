@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError
 from snapbeam.lab.camera.photron.fields import Fields, read_fields
 from snapbeam.lab.camera.photron.timing import Timing, read_timing
-from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.lab.plausibility.recording import KINDS
 
 __all__ = ["CameraHeader", "check_pixels", "read_header"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from snapbeam.core.findings import Finding
 from snapbeam.lab.camera.photron.fields import Fields
-from snapbeam.lab.plausibility.finding import Finding
 from snapbeam.lab.plausibility.recording import KINDS
 
 __all__ = ["Timing", "read_timing"]

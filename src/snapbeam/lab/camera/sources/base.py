@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.lab.plausibility.finding import Finding
+from snapbeam.core.findings import Finding
 
 __all__ = ["FrameSource", "grey_of", "scaled_floats"]
 

@@ -1,0 +1,257 @@
+"""What was given in a parameter file or on a command line: checked, completed from the paper, made into values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.config.check import MATERIALS, checked_sections, contradictions, parsed_axis, with_section
+from snapbeam.config.parameters import lookup
+from snapbeam.config.physical import PHYSICAL, checked_physical, physical_name, unit_of
+from snapbeam.core.validate import InputError
+from snapbeam.model.contact import HertzContact
+from snapbeam.model.integration import Integration
+from snapbeam.model.mapping import parts_from_mapping
+from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
+from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.system import System
+
+__all__ = ["DEFAULT_AXES", "DEFAULT_DRIVE", "Config", "config_from_mapping", "override", "same_axis"]
+
+_Array = NDArray[np.float64]
+Sections = Mapping[str, Mapping[str, Any]]
+
+DEFAULT_DRIVE = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18}
+DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude": "0.01:0.65:40"}
+"""Of a map for which no axis is named."""
+# What stands for the same thing in a section: giving one set takes the other away.
+_RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
+    "beam": [({"buckling_level"}, {"axial_load"})],
+    "contact": [({"stiffness"}, set(MATERIALS)), ({"coefficient"}, {"stiffness", *MATERIALS})],
+    "drive": [({"frequency_ratio"}, {"frequency_hz"}), ({"velocity_amplitude"}, {"velocity_m_s"})],
+    "striker": [({"location"}, {"location_m"})],
+}
+
+
+@dataclass(frozen=True)
+class Config:
+    """Parameters that were given, by section; the paper's stand where nothing is given.
+
+    Attributes
+    ----------
+    given : mapping of str to mapping
+        Checked values by section and name.
+    """
+
+    given: Sections = field(default_factory=dict)
+
+    def section(self, name: str) -> dict[str, Any]:
+        """What was given of a section."""
+        return dict(self.given.get(name, {}))
+
+    @cached_property
+    def defaulted(self) -> tuple[str, ...]:
+        """Names of what was not given and takes the paper's value, although something beside it was given."""
+        names = []
+        for section, values in self._defaults().items():
+            own = self.section(section)
+            if own:
+                names += [f"{section}.{name}" for name in values if name not in own]
+        return tuple(names)
+
+    def _defaults(self) -> dict[str, dict[str, Any]]:
+        beam = {
+            name: getattr(BEAM, name) for name in ("length", "thickness", "width", "density", "young_modulus")
+        }
+        own = self.section("beam")
+        if not {"buckling_level", "axial_load"} & own.keys():
+            beam["buckling_level"] = BEAM.buckling_level
+        contact: dict[str, Any] = {}
+        if not self.section("contact"):
+            contact = {"stiffness": CONTACT.stiffness}
+        drive = dict(DEFAULT_DRIVE)
+        given = self.section("drive")
+        if given.get("kind", "sine") != "sine":
+            drive = {}
+        for physical, name in (("frequency_hz", "frequency_ratio"), ("velocity_m_s", "velocity_amplitude")):
+            if physical in given:
+                drive.pop(name, None)
+        return {
+            "beam": beam,
+            "model": {"modes": MODES, "damping_ratio": DAMPING_RATIO},
+            "contact": contact,
+            "striker": {} if "location_m" in self.section("striker") else {"location": LOCATION},
+            "drive": drive,
+        }
+
+    @cached_property
+    def system(self) -> System:
+        """The system; what is not given is the paper's.
+
+        Raises
+        ------
+        InputError
+            For values that do not go together.
+        """
+        sections: dict[str, Any] = {
+            name: values | self.section(name) for name, values in self._defaults().items()
+        }
+        sections["contact"] = self._contact(sections["contact"])
+        sections["drive"].setdefault("kind", "sine")
+        later = {
+            f"{section}.{name}": sections[section].pop(name)
+            for section in ("drive", "striker")
+            for name in [key for key in sections[section] if f"{section}.{key}" in PHYSICAL]
+        }
+        for physical, value in later.items():
+            own = PHYSICAL[physical].parameter.partition(".")[2]
+            sections[physical.partition(".")[0]].setdefault(own, _stand_in(own, value))
+        system = System.from_mapping(sections)
+        if later:
+            system = system.replace(**{
+                PHYSICAL[name].parameter: checked_physical(system, name, value, name.partition(".")[2])
+                for name, value in later.items()
+            })  # fmt: skip
+        start = self.section("start")
+        return (
+            system.replace(**{f"start.{name}": value for name, value in start.items()}) if start else system
+        )
+
+    @property
+    def model(self) -> ReducedModel:
+        """The reduced model alone, of a beam that need not be buckled."""
+        sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
+        found: ReducedModel = parts_from_mapping(sections)["model"]
+        return found
+
+    @staticmethod
+    def _contact(values: dict[str, Any]) -> dict[str, Any]:
+        materials = {name: values.pop(name) for name in MATERIALS if name in values}
+        if materials:
+            moduli, ratios = tuple(materials["young_modulus"]), tuple(materials["poisson_ratio"])
+            values["stiffness"] = HertzContact.from_materials(materials["radius"], moduli, ratios).stiffness
+        if "law" not in values:
+            values["law"] = "restitution" if "coefficient" in values else "hertz"
+        return values
+
+    @cached_property
+    def integration(self) -> Integration:
+        """How runs are integrated."""
+        return Integration(**self.section("run"))
+
+    def axes(self, default: Mapping[str, str] | None = None) -> dict[str, _Array]:
+        """The axes, by dotted name, those in physical units made into ratios; *default* if none is named.
+
+        A single value makes an axis of one point.
+
+        Raises
+        ------
+        InputError
+            For values in physical units that are out of range.
+        """
+        given = self.section("axes") or dict(default or {})
+        found: dict[str, Any] = {}
+        for name, value in given.items():
+            parsed = parsed_axis(name, value)
+            if name in PHYSICAL:
+                ratios = [checked_physical(self.system, name, each, name) for each in parsed.tolist()]
+                found[PHYSICAL[name].parameter] = np.array(ratios)
+            else:
+                found[lookup(name).name] = parsed
+        self._require_fixed_units(found)
+        return found
+
+    def _require_fixed_units(self, axes: Mapping[str, Any]) -> None:
+        """Refuse numbers in Hz, m/s or m beside an axis that changes what they are a multiple of."""
+        own = [name for name in PHYSICAL if name.partition(".")[2] in self.section(name.partition(".")[0])]
+        for name in [*own, *(name for name in self.section("axes") if name in PHYSICAL)]:
+            for axis, values in axes.items():
+                if axis.partition(".")[0] not in ("beam", "model"):
+                    continue
+                there = [self.system.replace(**{axis: values[at].item()}) for at in (0, -1)]
+                if any(abs(unit_of(each, name) / unit_of(self.system, name) - 1.0) > 1e-9 for each in there):
+                    ratio = PHYSICAL[name].parameter
+                    raise InputError(
+                        f"{name}: is made into {ratio}, whose unit changes along {axis}; give {ratio}"
+                    )
+
+    def to_mapping(self) -> dict[str, dict[str, Any]]:
+        """What was given, plain, as a file would hold it."""
+        return {section: dict(values) for section, values in self.given.items() if values}
+
+
+def _stand_in(name: str, value: Any) -> float:
+    """A value that lets the system be made before the physical one is known."""
+    return 1.0 if name == "frequency_ratio" else 0.0 if name == "velocity_amplitude" else 0.5
+
+
+def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config:
+    """Check nested parameters, as a TOML file holds them.
+
+    Parameters
+    ----------
+    sections : mapping of mapping
+        Values by section and name.  Sections ``shaker`` and ``map``, as version 0.1 had them, are read too.
+    source : str
+        Where they come from, to stand before each refusal.
+
+    Raises
+    ------
+    InputError
+        One line for each thing that is wrong: unknown names, wrong kinds, wrong units.
+    """
+    found, lines = checked_sections(sections)
+    config = Config(found)
+    lines = lines or contradictions(found)
+    if not lines:
+        try:
+            config.model  # noqa: B018
+            if config.model.length_scale is not None:
+                config.system  # noqa: B018
+                config.axes()
+            config.integration  # noqa: B018
+        except InputError as error:
+            lines = [with_section(str(error), found)]
+    if lines:
+        raise InputError("\n".join(f"{source}: {line}" if source else line for line in lines))
+    return config
+
+
+def override(config: Config, sections: Mapping[str, Mapping[str, Any]]) -> Config:
+    """The parameters with others laid over them; what they contradict is taken away, None is left alone.
+
+    A value takes an axis over the same parameter away.
+    """
+    merged: dict[str, dict[str, Any]] = {name: dict(values) for name, values in config.given.items()}
+    for section, values in sections.items():
+        own = {name: value for name, value in values.items() if value is not None}
+        target = merged.setdefault(section, {})
+        if section == "axes":
+            for name in own:
+                for same in same_axis(name):
+                    target.pop(same, None)
+        for one, other in [pair for both in _RIVALS.get(section, []) for pair in (both, both[::-1])]:
+            if one & own.keys() and not other & own.keys():
+                for name in other:
+                    target.pop(name, None)
+        target |= own
+        if section != "axes":
+            for name in own:
+                for same in same_axis(f"{section}.{name}"):
+                    merged.get("axes", {}).pop(same, None)
+    return config_from_mapping(merged)
+
+
+def same_axis(name: str) -> set[str]:
+    """The dotted names, that in a physical unit among them, of what *name* stands for; none if it is unknown."""
+    try:
+        physical = physical_name(name)
+        full = lookup(name).name if physical is None else PHYSICAL[physical].parameter
+    except InputError:
+        return set()
+    return {full, *(key for key, row in PHYSICAL.items() if row.parameter == full)}

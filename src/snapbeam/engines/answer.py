@@ -1,0 +1,107 @@
+"""What engines answer: the books of many runs, read as statistics in the units and signs of a map."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.core.codes import RunStatus
+from snapbeam.engines.ensemble import Ensemble
+from snapbeam.engines.outcomes import STATISTICS
+from snapbeam.model.decision import decidable_energy
+
+__all__ = ["Reading", "statistics_of"]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The books of an ensemble, and what it takes to read them."""
+
+    ensemble: Ensemble
+    book: NDArray[Any]
+    cycles: float
+
+    @property
+    def sign(self) -> float:
+        """+1 for a striker below, -1 for one above."""
+        return self.ensemble.structure.sign
+
+    @property
+    def length(self) -> float:
+        """What displacements are normalised by, m."""
+        return self.ensemble.scale.length
+
+    @property
+    def speed(self) -> float:
+        """What velocities are normalised by, m/s."""
+        return self.ensemble.scale.length * self.ensemble.scale.omega
+
+    @property
+    def first_side(self) -> NDArray[np.int64]:
+        """Side of the centre that each run begins on."""
+        return self.ensemble.first_side
+
+    @cached_property
+    def good(self) -> NDArray[np.bool_]:
+        """Runs whose class is known."""
+        status = self.book["status"]
+        return np.asarray((status == RunStatus.OK) | (status == RunStatus.DECIDED))
+
+    @cached_property
+    def duration(self) -> NDArray[np.float64]:
+        """Time marched, s."""
+        return np.asarray(self.book["time"] * self.ensemble.runs["tick"])
+
+    def seen(self, column: str) -> NDArray[np.float64]:
+        """A column, NaN where the run failed."""
+        return np.where(self.good, self.book[column], np.nan)
+
+    @property
+    def peak_force(self) -> NDArray[np.float64]:
+        """Of the law's force; NaN where an impact lasts no time."""
+        force = self.seen("peak_force")
+        if self.ensemble.law.impulsive:
+            return np.where((force == 0.0) & (self.book["impacts"] > 0), np.nan, force)
+        return force
+
+    @cached_property
+    def final(self) -> NDArray[np.bool_]:
+        """Runs that will provably stay in the well they ended in.
+
+        Untouched, the beam only loses energy: with less than it takes to come back to the highest position the tip
+        will ever have, or to pass the saddle, it never does.  Nothing is said of a well that the tip is in.
+        """
+        book, ensemble = self.book, self.ensemble
+        model = ensemble.structure.model
+        found = np.zeros(book.size, dtype=bool)
+        if not model.is_bistable:
+            return found
+        settled = self.good & (book["energy"] < model.barrier_energy - model.well_energy)
+        if not np.isfinite(ensemble.highest).any():
+            return np.asarray(settled)
+        away = settled & (book["side"] > 0) & (book["displacement"] > np.maximum(ensemble.highest, 0.0))
+        away &= book["center"] > 0.0
+        which = np.flatnonzero(away)
+        if which.size:
+            bound = decidable_energy(model, ensemble.location[which], ensemble.highest[which])
+            found[which] = book["energy"][which] < bound
+        return found
+
+
+def statistics_of(
+    ensemble: Ensemble, books: NDArray[Any], cycles: float | None = None
+) -> dict[str, NDArray[Any]]:
+    """What an engine found, in the units and signs of a map; arrays of shape (runs,) by name.
+
+    *cycles* is how long the runs lasted, if not as the ensemble says.
+    """
+    reading = Reading(ensemble, books, ensemble.cycles if cycles is None else cycles)
+    found = {}
+    for name, row in STATISTICS.items():
+        values = row.value(reading) if row.update is None else row.value(reading, books[f"own_{name}"])
+        found[name] = np.asarray(values).astype(row.dtype)
+    return found

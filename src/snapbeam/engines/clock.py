@@ -1,0 +1,127 @@
+"""The clock of a run: time in ticks, so that halved steps and located events are whole numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.core.validate import InputError
+from snapbeam.engines.plan import Plan
+from snapbeam.model.drive import Recorded
+from snapbeam.model.integration import Integration
+from snapbeam.model.system import System
+
+__all__ = ["SUBDIVISION", "Clocked", "clocked", "require_resolved"]
+
+_Array = NDArray[np.float64]
+
+SUBDIVISION = 1 << 20
+"""Ticks of a flight step."""
+_MOST_TICKS = 2.0**61
+_FEWEST = 4.0
+"""Flight steps, at least, in a cycle of excitation and in a period of the first mode, of a step that was asked for."""
+
+
+class Clocked(NamedTuple):
+    """How long runs last."""
+
+    cycles: float
+
+
+def clocked(
+    table: NDArray[Any],
+    system: System,
+    integration: Integration,
+    cycle: _Array,
+    plans: list[Plan],
+    periods: float | None,
+) -> Clocked:
+    """Enter the ticks of every run in the table of runs.
+
+    *cycle* holds the seconds of one cycle of excitation of each run.
+
+    Raises
+    ------
+    InputError
+        If a run has more steps than can be counted in ticks, or a record ends before it.
+    """
+    require_resolved(system, integration, cycle)
+    lengths = np.array([plan.step for plan in plans])
+    drive = system.striker.drive if system.striker is not None else None
+    table["step"] = SUBDIVISION
+    table["coarsest"] = [plan.coarsest for plan in plans]
+    table["finest"] = [plan.finest for plan in plans]
+    if isinstance(drive, Recorded):
+        turn = np.full(table.size, drive.duration)
+        left = 1.0 - table["phase"] / (2.0 * math.pi)
+        asked = _asked_cycles(drive, integration, periods, float(left.min()))
+        steps = _whole_steps(turn, lengths, 1.0)
+        table["period"] = steps * SUBDIVISION
+        table["tick"] = turn / table["period"]
+        held = drive.duration * drive.frequency
+        table["landing"] = np.rint(table["period"] / held)
+        share = asked / drive.frequency / drive.duration
+        table["end"] = np.rint(share * table["period"] if periods is None else asked * table["landing"])
+        table["end"] = np.minimum(table["end"], np.rint(left * table["period"]))
+        cycles = float(table["end"][0] * table["tick"][0] * drive.frequency)
+    else:
+        cycles = float(integration.cycles_or_default if periods is None else periods)
+        steps = _whole_steps(cycle, lengths, cycles)
+        table["period"] = steps * SUBDIVISION
+        table["tick"] = cycle / table["period"]
+        table["end"] = table["period"] * int(cycles)
+        if not cycles.is_integer():
+            table["end"] = np.rint(table["period"] * cycles).astype(np.int64)
+    if periods is None:
+        table["landing"] = table["end"]
+    elif not isinstance(drive, Recorded):
+        table["landing"] = table["period"]
+    table["last_quarter"] = table["end"] // 4 * 3
+    return Clocked(cycles)
+
+
+def _asked_cycles(drive: Recorded, integration: Integration, periods: float | None, left: float) -> float:
+    """Cycles to march, of a record of which a share *left* is still to come."""
+    held = drive.duration * drive.frequency * left
+    asked = integration.cycles if periods is None else periods
+    if asked is None and held > 0.0:
+        return held
+    if asked is None or asked > held * (1.0 + 1e-9) + 1e-9:
+        of = "of" if left == 1.0 else "that are left of"
+        raise InputError(
+            f"cycles = {asked}: must be at most the {max(held, 0.0):.1f} cycles {of} the recorded drive"
+        )
+    return min(float(asked), held)
+
+
+def require_resolved(system: System, integration: Integration, cycle: _Array) -> None:
+    """Refuse a step that was asked for and does not resolve a *cycle* (s) of excitation or the first mode's period.
+
+    Raises
+    ------
+    InputError
+    """
+    if integration.step is None:
+        return
+    shortest, first = float(cycle.min()), 1.0 / system.model.reference_freq
+    for length, words in ((shortest, "a cycle of excitation"), (first, "a period of the first mode")):
+        if integration.step * _FEWEST > length * (1.0 + 1e-12):
+            raise InputError(
+                f"step = {integration.step:g} s: does not resolve {words} of {length:.4g} s; must be at most "
+                f"{length / _FEWEST:.4g} s, a quarter of it"
+            )
+
+
+def _whole_steps(period: _Array, step: _Array, cycles: float) -> NDArray[np.int64]:
+    """Flight steps in each period, the step made a little shorter to fit."""
+    steps = np.ceil(period / step * (1.0 - 1e-12))
+    most = float(steps.max()) * max(cycles, 1.0)
+    if not most <= _MOST_TICKS / SUBDIVISION:
+        raise InputError(
+            f"step = {float(step.min()):g} s with cycles = {cycles:g} of up to {float(period.max()):g} s: makes "
+            f"{most:.2g} steps, must be at most {_MOST_TICKS / SUBDIVISION:.2g}"
+        )
+    return np.asarray(steps.astype(np.int64))

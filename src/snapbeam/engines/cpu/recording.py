@@ -1,0 +1,189 @@
+"""What a recorded run writes down, and how it is laid aside and taken up again when its buffers are full."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from snapbeam.engines.cpu.hold import held_for, hold
+from snapbeam.engines.cpu.rows import modal_energy
+from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot
+from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
+from snapbeam.engines.scalar.compile import compiled, inlined
+from snapbeam.engines.scalar.contact import contact_energy, contact_force
+from snapbeam.engines.scalar.decisions import Seen
+from snapbeam.engines.scalar.physics import tension_energy
+
+__all__ = [
+    "MARKS",
+    "REALS",
+    "VALUES",
+    "Outputs",
+    "has_room",
+    "lay_aside",
+    "record_aside",
+    "record_contact",
+    "record_held",
+    "record_instants",
+    "take_up",
+]
+
+VALUES = 6
+"""Penetration, contact force, beam energy, contact energy, work and dissipation of a sample."""
+MARKS, REALS = 24, 10
+"""Integers and floats of a run that was laid aside."""
+_MOST_IN_CONTACT = 96
+"""Steps of one contact whose ends are recorded."""
+
+
+class Outputs(NamedTuple):
+    """Where a march writes what is asked of it, until it is full."""
+
+    times: Any
+    """Instants to record, s, ascending."""
+    at: Any
+    """When each sample was taken, s; those of one step in any order."""
+    rows: Any
+    """q about the first well, then p, shape (samples, 2 rows)."""
+    values: Any
+    """Shape (samples, VALUES)."""
+    impacts: Any
+    """Onset, duration, peak force and impulse of each impact, shape (impacts, 4)."""
+    marks: Any
+    """Instants recorded so far; impacts handed on before; samples of the present contact."""
+    most: int
+    """Instants that one step may hold."""
+    in_contact: bool
+    """Whether the ends of steps in contact are recorded too."""
+
+
+@inlined
+def has_room(now, book, outputs):
+    """Whether another step's samples and impact fit."""
+    rows = now.sample + outputs.most + 3 <= outputs.at.size
+    return rows and book.impacts - outputs.marks[1] < outputs.impacts.shape[0]
+
+
+@inlined
+def _write(memory, layout, home, q, p, outputs, sample, when, tip, depth, energy, work, dissipated):
+    """One sample, about the first well."""
+    size = layout.size
+    for row in range(size):
+        outputs.rows[sample, row] = memory[q + row]
+        if home < 0.0:
+            outputs.rows[sample, row] += memory[layout.shift + row]
+        outputs.rows[sample, size + row] = memory[p + row]
+    outputs.at[sample] = when
+    outputs.values[sample, 0] = depth
+    outputs.values[sample, 1] = contact_force(tip.law, depth)
+    outputs.values[sample, 2] = energy
+    outputs.values[sample, 3] = contact_energy(tip.law, depth)
+    outputs.values[sample, 4] = work
+    outputs.values[sample, 5] = dissipated
+
+
+@compiled
+def record_instants(memory, blocks, layout, stages, run, tip, now, step, book, outputs):
+    """Write down what happens at the instants inside a step; returns how many samples there are then."""
+    clock, sample, size = run.clock, now.sample, layout.size
+    times, done = outputs.times, outputs.marks[0]
+    q2, p2 = run.spare, run.spare + size
+    while done < times.size:
+        if times[done] > (now.t + step.ticks) * clock.tick and now.t + step.ticks < clock.end:
+            break
+        part = min(max(0.0, times[done] - now.t * clock.tick), step.length)
+        prepare(memory, layout, stages, run.struck.drive, part, cut_slot(run))
+        short = Step(
+            0, cut_slot(run), part, step.phase, step.touching, step.q, step.p, step.k,
+            q2, p2, run.spare + 2 * size, step.r
+        )  # fmt: skip
+        here = take_step(memory, blocks, layout, stages, tip, short, True)
+        depth = observe(memory, layout, tip, step.phase + tip.drive.omega * part, q2, p2).d
+        energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, here.gq, here.qr)
+        _write(
+            memory, layout, now.home, q2, p2, outputs, sample, times[done], tip, depth, energy,
+            book.work + here.work, book.dissipated + here.dissipated,
+        )  # fmt: skip
+        sample, done = sample + 1, done + 1
+    outputs.marks[0] = done
+    # the slot for steps of any length holds the present step again, should it be a cut one
+    if step.at == cut_slot(run):
+        prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
+    return sample
+
+
+@inlined
+def record_held(memory, blocks, layout, run, tip, now, step, book, outputs):
+    """As :func:`record_instants`, of a step in which the tip carries a single mode."""
+    clock, sample, size, done = run.clock, now.sample, layout.size, outputs.marks[0]
+    times, q2, p2 = outputs.times, run.spare, run.spare + size
+    while done < times.size:
+        if times[done] > (now.t + step.ticks) * clock.tick and now.t + step.ticks < clock.end:
+            break
+        part = min(max(0.0, times[done] - now.t * clock.tick), step.length)
+        phase = step.phase + tip.drive.omega * part
+        _, work, _, dissipated, _ = held_for(memory, blocks, layout, run, tip, step.phase, part)
+        force, gq, qr = hold(memory, blocks, layout, tip, phase, q2, p2, run.spare + 2 * size)
+        energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, gq, qr)
+        _write(
+            memory, layout, now.home, q2, p2, outputs, sample, times[done], tip, 0.0, energy,
+            book.work + work, book.dissipated + dissipated,
+        )  # fmt: skip
+        outputs.values[sample, 1] = force
+        sample, done = sample + 1, done + 1
+    outputs.marks[0] = done
+    return sample
+
+
+@inlined
+def record_aside(memory, layout, tip, now, short, here, when, depth, sample, book, outputs):
+    """Write down the end of a look ahead in contact; returns how many samples there are."""
+    if not outputs.in_contact:
+        return sample
+    energy = modal_energy(memory, layout, short.q1, short.p1) + tension_energy(layout.gamma, here.gq, here.qr)
+    _write(
+        memory, layout, now.home, short.q1, short.p1, outputs, sample, when, tip, depth, energy,
+        book.work + here.work, book.dissipated + here.dissipated,
+    )  # fmt: skip
+    return sample + 1
+
+
+@inlined
+def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, book, outputs):
+    """Write down the end of a step in contact, of the first ones of each; returns how many samples there are."""
+    if not outputs.in_contact or not (step.touching or book.touching != 0):
+        return sample
+    if not step.touching:
+        outputs.marks[2] = 0
+    when = (now.t + step.ticks) * run.clock.tick
+    if outputs.marks[2] >= _MOST_IN_CONTACT and book.touching != 0:
+        return sample
+    outputs.marks[2] += 1
+    energy = modal_energy(memory, layout, step.q1, step.p1) + tension_energy(layout.gamma, done.gq, done.qr)
+    _write(
+        memory, layout, now.home, step.q1, step.p1, outputs, sample, when, tip, seen1.d, energy, book.work,
+        book.dissipated,
+    )  # fmt: skip
+    return sample + 1
+
+
+@compiled
+def lay_aside(now, marks, reals):
+    """Where a run stands, written down."""
+    rows, seen, watch = now.rows, now.seen, now.watch
+    marks[0], marks[1], marks[2], marks[3] = now.t, now.sample, now.landed, now.status
+    marks[4], marks[5], marks[6] = rows.q, rows.p, rows.k
+    marks[7], marks[8], marks[9] = rows.q1, rows.p1, rows.k1
+    marks[10], marks[11] = int(watch.touching), int(watch.quiet)
+    marks[12], marks[13], marks[14], marks[15] = watch.safe_gap, watch.safe_center, watch.weighed, watch.beat
+    reals[0], reals[1] = now.home, now.stretch
+    reals[2], reals[3], reals[4] = seen.w, seen.wv, seen.d
+    reals[5], reals[6], reals[7] = seen.dv, seen.c, seen.cv
+
+
+@compiled
+def take_up(marks, reals):
+    """Where a run stood when it was laid aside."""
+    rows = Rows(marks[4], marks[5], marks[6], marks[7], marks[8], marks[9])
+    seen = Seen(reals[2], reals[3], reals[4], reals[5], reals[6], reals[7])
+    watch = Watch(marks[10] != 0, marks[11] != 0, marks[12], marks[13], marks[14], marks[15])
+    return Now(marks[0], reals[0], reals[1], rows, seen, watch, marks[1], marks[2], marks[3])

@@ -1,0 +1,112 @@
+"""The tangent flow: small changes of the state, carried along by the very steps that a run takes.
+
+A step is a composition of kicks and exact linear flows; its derivative, at the lengths of step that were taken, is the
+composition of theirs.  A kick by the tension's acceleration k(q) and the contact's force f(d) changes by
+
+    delta k = -2 gamma (r.dq) g - 2 gamma (g.dq + r.dq) r - gamma (2 g.q + q.r) G dq,    r = G q,
+    delta f = -f'(d) c.dq,
+
+so each kick is a shear and each flow contracts by what damping takes: the sum of all exponents is exact.  The laws of
+contact that are let in here have a force without a jump, so that nothing else happens where contact begins and ends.
+"""
+
+from __future__ import annotations
+
+from snapbeam.core.codes import RunStatus
+from snapbeam.engines.cpu.after import after_step
+from snapbeam.engines.cpu.march import choose, hand_out
+from snapbeam.engines.cpu.rows import acceleration_rows, dot, flow_rows, kick_rows, tension_rows
+from snapbeam.engines.cpu.state import Place, begin, cut_slot, finish
+from snapbeam.engines.cpu.step import prepare, take_step
+from snapbeam.engines.scalar.compile import compiled
+from snapbeam.engines.scalar.contact import contact_force, contact_slope
+from snapbeam.engines.scalar.lanes import WIDTH, fma, load, store
+from snapbeam.engines.scalar.physics import tension_factors
+from snapbeam.engines.scalar.tip import seen_from, tip_motion
+
+__all__ = ["TANGENT_ROWS", "march_tangent"]
+
+_RUNNING = int(RunStatus.RUNNING)
+TANGENT_ROWS = 8
+"""Rows beside the tangents themselves: the state of the step that is gone through again, and room."""
+
+
+@compiled
+def _kick_tangent(memory, layout, weight, along_r, slope, r, dq, dp, dr, gdq, rdq):
+    """Change a tangent's velocity by a kick."""
+    gamma, size = layout.gamma, layout.size
+    push = -slope * dot(memory, size, layout.contact, dq)
+    of_g, of_r = -2.0 * gamma * rdq, -2.0 * gamma * (gdq + rdq)
+    for row in range(0, size, WIDTH):
+        change = fma(of_g, load(memory, layout.g + row), of_r * load(memory, r + row))
+        change = fma(along_r, load(memory, dr + row), change)
+        change = fma(push, load(memory, layout.contact + row), change)
+        store(memory, dp + row, fma(weight, change, load(memory, dp + row)))
+
+
+@compiled
+def carry_tangents(memory, blocks, place, run, tip, step, first, count):
+    """Go through a step again, with the *count* tangents that stand from row *first* on."""
+    layout, stages, size = place.layout, place.stages, place.layout.size
+    if step.at == cut_slot(run):
+        prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
+    q, p, k, r = first - 4 * size, first - 3 * size, first - 2 * size, first - size
+    dr = first - 5 * size
+    for row in range(size):
+        memory[q + row], memory[p + row] = memory[step.q + row], memory[step.p + row]
+    for stage in range(stages.flows + 1):
+        weight = memory[stages.kick + stage] * step.length
+        gq, qr = tension_rows(memory, blocks, layout, q, r)
+        along_g, along_r = tension_factors(layout.gamma, gq, qr)
+        force, slope = 0.0, 0.0
+        if step.touching:
+            now = step.phase + memory[stages.elapsed + stage] * step.length * tip.drive.omega
+            motion, _ = tip_motion(tip.drive, memory, now)
+            penetration = tip.offset + motion - dot(memory, size, layout.contact, q)
+            force, slope = contact_force(tip.law, penetration), contact_slope(tip.law, penetration)
+        for i in range(count):
+            dq, dp = first + 2 * i * size, first + (2 * i + 1) * size
+            gdq, _ = tension_rows(memory, blocks, layout, dq, dr)
+            rdq = dot(memory, size, r, dq)
+            _kick_tangent(memory, layout, weight, along_r, slope, r, dq, dp, dr, gdq, rdq)
+        acceleration_rows(memory, layout, along_g, along_r, r, k)
+        kick_rows(memory, layout, weight, k, force, p, p)
+        if stage == stages.flows:
+            break
+        flow = step.at + min(stage, stages.flows - 1 - stage) * 4 * size
+        flow_rows(memory, size, flow, q, p, q, p)
+        for i in range(count):
+            dq, dp = first + 2 * i * size, first + (2 * i + 1) * size
+            flow_rows(memory, size, flow, dq, dp, dq, dp)
+
+
+@compiled
+def march_tangent(memory, blocks, layout, stages, asked, which, room, kept, tangents, first):
+    """March the runs *which* one after the other, with their tangents, shape (runs, k, 2 rows), from row *first* on.
+
+    Tangents are handed out as they are at the end of a run.
+    """
+    place, size, count = Place(layout, stages), layout.size, tangents.shape[1]
+    for i in which:
+        book = kept.books[i]
+        run, now = begin(memory, blocks, place, asked, i, book)
+        for j in range(count):
+            for row in range(2 * size):
+                memory[first + 2 * j * size + row] = tangents[i, j, row]
+        while now.status == _RUNNING:
+            if kept.pulse[0] != 0:
+                book.time, book.status = now.t, _RUNNING
+                return
+            before = now.t
+            now, step = choose(memory, blocks, place, run, now, book)
+            home = now.home
+            tip = seen_from(run.struck, home, run.rest_contact)
+            done = take_step(memory, blocks, layout, stages, tip, step, None)
+            now, step = after_step(memory, blocks, place, run, now, step, done, room, book, asked, None)
+            if now.t > before:
+                carry_tangents(memory, blocks, place, run, tip, step, first, count)
+            now = hand_out(memory, blocks, layout, run, now, book, i, kept)
+        finish(memory, blocks, layout, run, now, book, None, 0, True)
+        for j in range(count):
+            for row in range(2 * size):
+                tangents[i, j, row] = memory[first + 2 * j * size + row]

@@ -1,0 +1,291 @@
+"""One step of a run on the device, and what follows it: the decisions of the CPU engine, a thread a mode."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from snapbeam.core.codes import RunStatus
+from snapbeam.engines.cuda.block import device, shared
+from snapbeam.engines.cuda.run import Held, Standing
+from snapbeam.engines.cuda.step import Functions
+from snapbeam.engines.scalar.decisions import (
+    Seen,
+    contact_level,
+    count_in_step,
+    finish_impact,
+    first_entry,
+    flight_level,
+    is_quiet,
+    safe_for,
+    ticks_of,
+    track,
+    track_energy,
+)
+from snapbeam.engines.scalar.physics import mode_energy, tension_acceleration, tension_energy, tension_factors
+from snapbeam.engines.scalar.signals import first_fall, turning_point, widened
+from snapbeam.engines.scalar.tip import seen_from
+
+__all__ = ["step_function"]
+
+_OK, _DECIDED, _RUNNING = int(RunStatus.OK), int(RunStatus.DECIDED), int(RunStatus.RUNNING)
+_NOT_FINITE, _STEP_LIMIT = int(RunStatus.NOT_FINITE), int(RunStatus.STEP_LIMIT)
+_TWO_PI = 2.0 * math.pi
+# What a pass through a step is for.
+_WHOLE, _CUT, _DEEPEST = 0, 1, 2
+
+_first_entry, _count_in_step = shared(first_entry), shared(count_in_step)
+_finish_impact, _track, _track_energy = shared(finish_impact), shared(track), shared(track_energy)
+_safe_for, _is_quiet, _ticks_of = shared(safe_for), shared(is_quiet), shared(ticks_of)
+_flight_level, _contact_level, _seen_from = shared(flight_level), shared(contact_level), shared(seen_from)
+_first_fall, _turning_point, _widened = shared(first_fall), shared(turning_point), shared(widened)
+
+
+class Taken(NamedTuple):
+    """A step that was taken: what it gave, where it was cut and how it was looked into."""
+
+    own: Standing
+    seen: Seen
+    span: int
+    length: float
+    event: bool
+    entered: bool
+    failed: bool
+    deepest: float
+    safe_gap: int
+    safe_center: int
+    pieces: int
+    piece: float
+    impulse: float
+    work: float
+    gross: float
+
+
+def step_function(functions: Functions) -> Any:
+    """The device function that takes a run one step further."""
+    sum_four, tension = functions.sum_four, functions.tension
+    observe, take_step, prepare = functions.observe, functions.take_step, functions.prepare
+    look_inside, flow_into, synchronise = functions.look_inside, functions.flow_into, functions.synchronise
+
+    @device
+    def home_again(block, fixed, held):
+        """The other well becomes the origin, if the centre has crossed over; see change_well."""
+        own, home = held.own, held.home
+        if not (fixed.rest_stretch > 0.0 and held.seen.c * (home * fixed.rest_center) < 0.0):
+            return own, home
+        q, home = own.q - home * fixed.shift, -home
+        g, r = home * fixed.g, tension(block, q)
+        gq, qr, _, _ = sum_four(block, g * q, r * q, 0.0, 0.0)
+        along_g, along_r = tension_factors(fixed.gamma, gq, qr)
+        return Standing(q, own.p, tension_acceleration(along_g, along_r, g, r), gq, qr), home
+
+    @device
+    def safe_until(block, fixed, held, own, after):
+        """Until when the gap cannot close and the centre cannot cross, looked at again where it is needed."""
+        safe_gap, safe_center = held.safe_gap, held.safe_center
+        if after > min(safe_gap, safe_center):
+            mode, clock = fixed.mode, fixed.clock
+            oq = abs(mode.omega * own.q) + abs(own.p)
+            gap_bound, gap_push, center_bound, center_push = sum_four(
+                block,
+                abs(mode.contact) * oq,
+                mode.contact * own.k,
+                abs(mode.center) * oq,
+                mode.center * own.k,
+            )
+            if after > safe_gap:
+                safe = _safe_for(-held.seen.d, gap_bound, fixed.tip_speed, gap_push, fixed.step_time)
+                safe_gap = held.t + int(safe / clock.tick)
+            if after > safe_center:
+                safe = _safe_for(abs(held.seen.c), center_bound, 0.0, center_push, fixed.step_time)
+                safe_center = held.t + int(safe / clock.tick)
+        return safe_gap, safe_center
+
+    @device
+    def looked(block, fixed, tip, own, k1, phase, span, length):
+        """Look inside a free step; in how many pieces of which length."""
+        look, pieces, step = fixed.whole_look, fixed.step_pieces, fixed.clock.step
+        if span == 2 * step:
+            pieces *= 2
+        elif span != step:
+            look += 1
+            pieces = max(2, math.ceil(length / fixed.finest_look))
+            flow_into(block, fixed.mode, length / pieces, look)
+        piece = length / pieces
+        look_inside(block, fixed.mode, tip, look, pieces, piece, phase, own.q, own.p, own.k, k1)
+        return pieces, piece
+
+    @device
+    def taken(block, fixed, held, own, home, span, slot, phase):
+        """Take a step, cut it short at an event, and look for the deepest point: one text for all three."""
+        clock, seen, touching = fixed.clock, held.seen, held.touching
+        tip = _seen_from(fixed.struck, home, fixed.rest_contact)
+        g, tick = home * fixed.g, clock.tick
+        length = span * tick
+        here, purpose = length, _WHOLE
+        event, entered, failed, deepest = False, False, False, held.deepest
+        pieces, piece = 0, 0.0
+        safe_gap, safe_center = held.safe_gap, held.safe_center
+        own1, seen1, impulse, work, gross = own, seen, 0.0, 0.0, 0.0
+        while True:
+            if slot == fixed.cut_slot:
+                prepare(block, fixed.mode, fixed.struck.drive.omega, here, slot)
+            q2, p2, k2, gq2, qr2, impulse2, work2, gross2 = take_step(
+                block, fixed.mode, g, fixed.gamma, tip, slot, here, phase, touching, own.q, own.p, own.k
+            )
+            about = observe(block, fixed.mode, tip, phase + tip.drive.omega * here, q2, p2)
+            if purpose == _DEEPEST:
+                deepest = max(deepest, about.d)
+                break
+            own1 = Standing(q2, p2, k2, gq2, qr2)
+            seen1 = Seen(
+                about.w + home * fixed.rest_contact, about.wv, about.d, about.dv,
+                about.c + home * fixed.rest_center, about.cv,
+            )  # fmt: skip
+            impulse, work, gross = impulse2, work2, gross2
+            if purpose == _WHOLE:
+                if not math.isfinite(seen1.d + seen1.dv):
+                    failed = True
+                    break
+                cut = span
+                if touching:
+                    if seen1.d <= 0.0:
+                        event = True
+                        if seen.d > 0.0:
+                            cut = max(1, int(_first_fall(seen.d, seen.dv, seen1.d, seen1.dv, length) * span))
+                else:
+                    after = held.t + span
+                    safe_gap, safe_center = safe_until(block, fixed, held, own, after)
+                    if after > min(safe_gap, safe_center):
+                        pieces, piece = looked(block, fixed, tip, own, k2, phase, span, length)
+                        if after > safe_gap:
+                            entry = _first_entry(block.seen, pieces, piece)
+                            if entry >= 0.0:
+                                event, cut = True, min(span, int(entry / tick))
+                                entered = cut < 1
+                if entered:
+                    break
+                if cut < span:
+                    span, length = cut, cut * tick
+                    here, slot, purpose = length, fixed.cut_slot, _CUT
+                    continue
+            if touching:
+                deepest = max(deepest, seen1.d)
+                turn = _turning_point(seen.d, seen.dv, seen1.d, seen1.dv, length) if seen.dv > 0.0 else -1.0
+                if turn > 0.0 and (
+                    _widened(seen.d, deepest, seen.d, seen.dv, seen1.d, seen1.dv, length)[1] > deepest
+                ):
+                    here, slot, purpose = turn * length, fixed.cut_slot, _DEEPEST
+                    continue
+            break
+        return Taken(
+            own1, seen1, span, length, event, entered, failed, deepest, safe_gap, safe_center, pieces, piece,
+            impulse, work, gross,
+        )  # fmt: skip
+
+    @device
+    def keep(block, fixed, held, home, step, counted, book):
+        """Enter a step in the statistics; the first thread keeps the book."""
+        if block.lane == 0:
+            if held.touching:
+                book.impulse += step.impulse
+                book.work += step.work
+                book.gross_work += step.gross
+                book.deepest = step.deepest
+            _track(book, held.seen, step.seen, step.length)
+            if counted:
+                _count_in_step(
+                    book, fixed.clock, held.t, step.length, held.seen, step.seen, block.seen,
+                    home * fixed.rest_center, step.pieces, step.piece,
+                )  # fmt: skip
+
+    @device
+    def weigh(block, fixed, held, step, t, home, touching, released, status, book):
+        """After some steps, or a release, the energy is looked at."""
+        quiet, weighed, own = held.quiet, held.weighed, step.own
+        if released or (held.steps & 7) == 0:
+            energy = mode_energy(fixed.mode.omega, own.q, own.p)
+            linear, high, _, _ = sum_four(block, energy, fixed.mode.high * energy, 0.0, 0.0)
+            if block.lane == 0:
+                _track_energy(book, linear, high, (t - weighed) * fixed.clock.tick)
+            weighed = t
+            if not touching:
+                energy = linear + tension_energy(fixed.gamma, own.gq, own.qr)
+                quiet = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
+                far = home < 0.0 and step.seen.w > fixed.clock.decide_reach and step.seen.c > 0.0
+                if not step.event and far and (held.steps & 15) == 0 and energy < fixed.clock.decide_energy:
+                    status = _DECIDED
+        return quiet, weighed, status
+
+    @device
+    def further(block, fixed, held, book):
+        """The run after one more step."""
+        clock = fixed.clock
+        own, home = home_again(block, fixed, held)
+        steps = held.steps + 1
+        level = _flight_level(clock, held.quiet, 2.0 * own.gq + own.qr, fixed.rest_stretch)
+        if held.touching:
+            elapsed = (held.t - held.onset) * clock.tick
+            level = max(level, _contact_level(clock, elapsed, held.seen.d, held.seen.dv))
+        span, slot = _ticks_of(clock, level), level + 1
+        if held.t + span > clock.end:
+            span, slot = clock.end - held.t, fixed.cut_slot
+        phase = fixed.phase + _TWO_PI * ((held.t % clock.period) / clock.period)
+        step = taken(block, fixed, held, own, home, span, slot, phase)
+        if step.failed or step.entered:
+            status = _NOT_FINITE if step.failed else _STEP_LIMIT if steps >= clock.max_steps else _RUNNING
+            onset = held.t if step.entered else held.onset
+            if block.lane == 0 and step.entered:
+                book.touching, book.onset = 1, held.t
+            return Held(
+                held.t, home, own, held.seen, held.touching or step.entered, held.quiet, step.safe_gap,
+                step.safe_center, onset, held.deepest, held.weighed, steps, status,
+            )  # fmt: skip
+        counted = held.touching or held.t + step.span > step.safe_center
+        keep(block, fixed, held, home, step, counted, book)
+        t, seen = held.t + step.span, step.seen
+        status = _RUNNING if t < clock.end else _OK
+        touching, onset, deepest = held.touching != step.event, held.onset, step.deepest
+        safe_gap, safe_center = step.safe_gap, step.safe_center
+        released = step.event and held.touching
+        if step.event:
+            safe_gap, safe_center = t, t
+            if held.touching:
+                if block.lane == 0:
+                    _finish_impact(book, None, 0, fixed.struck.law, t, clock.tick)
+                deepest = 0.0
+                seen = Seen(seen.w, seen.wv, min(seen.d, 0.0), seen.dv, seen.c, seen.cv)
+            else:
+                onset = t
+                if block.lane == 0:
+                    book.touching, book.onset = 1, t
+        counting = Held(
+            held.t, held.home, held.own, held.seen, held.touching, held.quiet, held.safe_gap, held.safe_center,
+            held.onset, held.deepest, held.weighed, steps, held.status,
+        )  # fmt: skip
+        quiet, weighed, status = weigh(
+            block, fixed, counting, step, t, home, touching, released, status, book
+        )
+        if counted and clock.decide_crossings >= 0:
+            synchronise()
+            if book.crossings_last_quarter > clock.decide_crossings:
+                status = _DECIDED
+        if status == _RUNNING and steps >= clock.max_steps:
+            status = _STEP_LIMIT
+        return Held(
+            t,
+            home,
+            step.own,
+            seen,
+            touching,
+            quiet,
+            safe_gap,
+            safe_center,
+            onset,
+            deepest,
+            weighed,
+            steps,
+            status,
+        )
+
+    return further

@@ -1,0 +1,215 @@
+"""A run of the CUDA engine: what stays the same in it, where it stands, how it begins, is laid down and ends."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from snapbeam.core.codes import RunStatus
+from snapbeam.engines.cuda.block import device, shared
+from snapbeam.engines.cuda.step import Functions, Mode
+from snapbeam.engines.scalar.contact import contact_energy
+from snapbeam.engines.scalar.decisions import (
+    PIECES,
+    Clock,
+    Seen,
+    clock_of,
+    finish_impact,
+    is_quiet,
+    open_book,
+)
+from snapbeam.engines.scalar.physics import mode_energy, tension_acceleration, tension_energy, tension_factors
+from snapbeam.engines.scalar.tip import Tip, numbers_of, seen_from
+
+__all__ = ["Fixed", "Held", "Standing", "run_functions"]
+
+_OK, _DECIDED, _RUNNING = int(RunStatus.OK), int(RunStatus.DECIDED), int(RunStatus.RUNNING)
+_TWO_PI = 2.0 * math.pi
+
+_finish_impact, _open_book = shared(finish_impact), shared(open_book)
+_clock_of, _seen_from, _is_quiet = shared(clock_of), shared(seen_from), shared(is_quiet)
+
+
+class Fixed(NamedTuple):
+    """What stays the same in a run."""
+
+    struck: Tip
+    clock: Clock
+    phase: float
+    rest_contact: float
+    rest_center: float
+    tip_speed: float
+    finest_look: float
+    step_pieces: int
+    step_time: float
+    mode: Mode
+    g: float
+    """Of this thread's mode, in the first well."""
+    shift: float
+    gamma: float
+    rest_stretch: float
+    cut_slot: int
+    whole_look: int
+
+
+class Standing(NamedTuple):
+    """What belongs to a thread's mode, and the tension's sums."""
+
+    q: float
+    p: float
+    k: float
+    gq: float
+    qr: float
+
+
+class Held(NamedTuple):
+    """Where a run stands."""
+
+    t: int
+    home: float
+    own: Standing
+    seen: Seen
+    touching: bool
+    quiet: bool
+    safe_gap: int
+    safe_center: int
+    onset: int
+    deepest: float
+    weighed: int
+    steps: int
+    status: int
+
+
+def run_functions(functions: Functions, threads: int, finest: int) -> tuple[Any, Any, Any, Any, Any]:
+    """Device functions: fixed_of, begin, take_up, lay_down, finish."""
+    sum_one, sum_four, tension = functions.sum_one, functions.sum_four, functions.tension
+    observe, prepare, flow_into = functions.observe, functions.prepare, functions.flow_into
+    distinct = functions.distinct
+
+    @device
+    def fixed_of(block, structure, asked, i, fresh):
+        """What stays the same in run *i*; its prepared steps, if it is *fresh*."""
+        lane, record = block.lane, asked.runs[i]
+        mode = Mode(
+            structure[0, lane], structure[1, lane], structure[2, lane], structure[3, lane],
+            structure[5, lane], asked.contact_rows[record.contact_row, lane], structure[7, lane],
+        )  # fmt: skip
+        struck = Tip(
+            record.offset,
+            numbers_of(asked.law, asked.law_numbers, i),
+            numbers_of(asked.drive, asked.drive_numbers, i),
+        )
+        clock = _clock_of(record, asked.max_steps)
+        step_time = clock.step * clock.tick
+        fastest = struck.drive.omega
+        for j in range(threads):
+            fastest = max(fastest, structure[0, j])
+        finest_look = _TWO_PI / (PIECES * fastest)
+        step_pieces = max(4, math.ceil(step_time / finest_look))
+        whole_look = (finest + 3) * distinct
+        if fresh:
+            for level in range(clock.finest + 2):
+                prepare(block, mode, struck.drive.omega, 2.0 * step_time / (1 << level), level)
+            flow_into(block, mode, step_time / step_pieces, whole_look)
+        return Fixed(
+            struck, clock, record.phase, record.rest_contact, record.rest_center, record.tip_speed,
+            finest_look, step_pieces, step_time, mode, structure[4, lane], structure[6, lane],
+            asked.gamma, asked.stretch, finest + 2, whole_look,
+        )  # fmt: skip
+
+    @device
+    def tensioned(block, fixed, home, q, p):
+        """This thread's part of a state, with the tension's sums."""
+        g = home * fixed.g
+        r = tension(block, q)
+        gq, qr, _, _ = sum_four(block, g * q, r * q, 0.0, 0.0)
+        along_g, along_r = tension_factors(fixed.gamma, gq, qr)
+        return Standing(q, p, tension_acceleration(along_g, along_r, g, r), gq, qr)
+
+    @device
+    def begin(block, fixed, asked, i, book):
+        lane, record = block.lane, asked.runs[i]
+        q, p = asked.starts[record.start_row, 0, lane], asked.starts[record.start_row, 1, lane]
+        home = record.home
+        own = tensioned(block, fixed, home, q, p)
+        tip = _seen_from(fixed.struck, home, fixed.rest_contact)
+        about = observe(block, fixed.mode, tip, fixed.phase, q, p)
+        seen = Seen(
+            about.w + home * fixed.rest_contact, about.wv, about.d, about.dv,
+            about.c + home * fixed.rest_center, about.cv,
+        )  # fmt: skip
+        energy = sum_one(block, mode_energy(fixed.mode.omega, q, p)) + tension_energy(
+            fixed.gamma, own.gq, own.qr
+        )
+        quiet = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
+        touching = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
+        if lane == 0:
+            book.status, book.touching, book.onset = _RUNNING, int(touching), 0
+            _open_book(book, seen, energy + contact_energy(fixed.struck.law, seen.d))
+        return Held(0, home, own, seen, touching, quiet, 0, 0, 0, max(seen.d, 0.0), 0, 0, _RUNNING)
+
+    @device
+    def take_up(block, index, kept, book):
+        """Where a run stood when it was laid down."""
+        lane, marks, reals, modes = block.lane, kept.marks, kept.reals, kept.modes
+        own = Standing(
+            modes[index, 0, lane],
+            modes[index, 1, lane],
+            modes[index, 2, lane],
+            reals[index, 6],
+            reals[index, 7],
+        )
+        seen = Seen(
+            reals[index, 0],
+            reals[index, 1],
+            reals[index, 2],
+            reals[index, 3],
+            reals[index, 4],
+            reals[index, 5],
+        )
+        return Held(
+            book.time, float(marks[index, 2]), own, seen, book.touching != 0, marks[index, 3] != 0,
+            marks[index, 0], marks[index, 1], book.onset, reals[index, 8], marks[index, 4], book.steps, _RUNNING,
+        )  # fmt: skip
+
+    @device
+    def lay_down(block, index, kept, book, held):
+        lane = block.lane
+        own, seen = held.own, held.seen
+        kept.modes[index, 0, lane], kept.modes[index, 1, lane], kept.modes[index, 2, lane] = (
+            own.q,
+            own.p,
+            own.k,
+        )
+        if lane == 0:
+            marks, reals = kept.marks, kept.reals
+            marks[index, 0], marks[index, 1], marks[index, 2] = (
+                held.safe_gap,
+                held.safe_center,
+                int(held.home),
+            )
+            marks[index, 3], marks[index, 4] = int(held.quiet), held.weighed
+            reals[index, 0], reals[index, 1], reals[index, 2] = seen.w, seen.wv, seen.d
+            reals[index, 3], reals[index, 4], reals[index, 5] = seen.dv, seen.c, seen.cv
+            reals[index, 6], reals[index, 7], reals[index, 8] = own.gq, own.qr, held.deepest
+            book.time, book.status, book.steps = held.t, held.status, held.steps
+            book.touching, book.onset = int(held.touching), held.onset
+
+    @device
+    def finish(block, fixed, held, book):
+        linear = sum_one(block, mode_energy(fixed.mode.omega, held.own.q, held.own.p))
+        if block.lane == 0:
+            clock, law = fixed.clock, fixed.struck.law
+            if held.touching:
+                _finish_impact(book, None, 0, law, held.t, clock.tick)
+            if held.status == _DECIDED:
+                book.decided_at = held.t * clock.tick
+            book.energy = (
+                linear
+                + tension_energy(fixed.gamma, held.own.gq, held.own.qr)
+                + contact_energy(law, held.seen.d)
+            )
+            book.displacement, book.center = held.seen.w, held.seen.c
+            book.time, book.status, book.steps = held.t, held.status, held.steps
+
+    return fixed_of, begin, take_up, lay_down, finish

@@ -1,0 +1,321 @@
+"""The table of outcomes: what kernels keep of a run, and what follows from it.
+
+Kernels write :data:`BOOK`, one record a run; maps, runs and :class:`~snapbeam.Outcome` hold :data:`STATISTICS`.
+A new statistic is a row: either a formula of what is kept already, or, with ``update``, a scalar function
+that kernels call after every step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.core.codes import ResponseClass, RunStatus, classify
+from snapbeam.core.validate import InputError
+
+if TYPE_CHECKING:
+    from snapbeam.engines.answer import Reading
+
+__all__ = [
+    "BOOK",
+    "STATISTICS",
+    "Passed",
+    "Statistic",
+    "book_dtype",
+    "empty_books",
+    "register",
+    "updated",
+    "withdraw",
+]
+
+Values = NDArray[Any]
+
+
+class Passed(NamedTuple):
+    """A step that was taken, as statistics see it; SI units, seen from the striker's side."""
+
+    time: float
+    """At its beginning, s."""
+    length: float
+    displacement: tuple[float, float]
+    """Of the contact point, at its two ends."""
+    velocity: tuple[float, float]
+    center_displacement: tuple[float, float]
+    center_velocity: tuple[float, float]
+    penetration: tuple[float, float]
+    touching: bool
+
+
+# What every kernel keeps: name, kind, value at the start.
+_KEPT: tuple[tuple[str, type, float], ...] = (
+    ("status", np.int64, int(RunStatus.NOT_RUN)),
+    ("time", np.int64, 0),  # ticks marched
+    ("touching", np.int64, 0),
+    ("onset", np.int64, 0),  # tick at which the present contact began
+    ("side", np.int64, 0),  # sign of the centre displacement, -1 in the well the run began in
+    ("crossings", np.int64, 0),
+    ("crossings_last_quarter", np.int64, 0),
+    ("impacts", np.int64, 0),
+    ("steps", np.int64, 0),
+    ("samples", np.int64, 0),
+    ("last_crossing", np.float64, math.nan),
+    ("min_displacement", np.float64, 0.0),
+    ("max_displacement", np.float64, 0.0),
+    ("min_center", np.float64, 0.0),
+    ("max_center", np.float64, 0.0),
+    ("peak_velocity", np.float64, 0.0),
+    ("peak_center_velocity", np.float64, 0.0),
+    ("square_displacement", np.float64, 0.0),  # integrals over time
+    ("square_center", np.float64, 0.0),
+    ("square_velocity", np.float64, 0.0),
+    ("square_center_velocity", np.float64, 0.0),
+    ("energy_time", np.float64, 0.0),  # integral of the modal energy, sampled
+    ("high_energy_time", np.float64, 0.0),  # of the modes above a frequency
+    ("peak_force", np.float64, 0.0),
+    ("contact_time", np.float64, 0.0),
+    ("total_impulse", np.float64, 0.0),
+    ("work", np.float64, 0.0),
+    ("gross_work", np.float64, 0.0),
+    ("dissipated", np.float64, 0.0),  # integrated, where a ledger is kept
+    ("first_energy", np.float64, 0.0),
+    ("energy", np.float64, 0.0),  # at the end, contact included
+    ("displacement", np.float64, 0.0),  # of contact point and centre, at the end
+    ("center", np.float64, 0.0),
+    ("deepest", np.float64, 0.0),  # greatest penetration of the present contact
+    ("impulse", np.float64, 0.0),  # of the present contact
+    ("decided_at", np.float64, math.nan),
+)
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """One row of the table.
+
+    Attributes
+    ----------
+    name : str
+        Variable of a map, and attribute of an :class:`~snapbeam.Outcome`.
+    dtype : str
+    unit : str
+        As UDUNITS knows it; ``"1"`` for displacements over b and velocities over b omega_1.
+    words : str
+    value : callable
+        From a :class:`~snapbeam.engines.answer.Reading` of many runs to an array of shape (runs,).  With *update*:
+        from the reading and the array of what *update* left.
+    update : callable, optional
+        ``update(held, step) -> held``, a scalar function of numbers that kernels compile; *step* is a
+        :class:`Passed`.
+    start : float
+        What *update* begins with.
+    """
+
+    name: str
+    dtype: str
+    unit: str
+    words: str
+    value: Callable[..., Values]
+    update: Callable[[float, Any], float] | None = None
+    start: float = 0.0
+
+
+def _plain(column: str) -> Callable[[Reading], Values]:
+    return lambda reading: reading.book[column]
+
+
+def _seen(column: str, factor: Callable[[Reading], float] = lambda _: 1.0) -> Callable[[Reading], Values]:
+    return lambda reading: reading.seen(column) * factor(reading)
+
+
+def _low_high(low: str, high: str, greatest: bool) -> Callable[[Reading], Values]:
+    """Least or greatest displacement over b, in the signs of space."""
+
+    def value(reading: Reading) -> Values:
+        upward = reading.sign > 0.0
+        column = high if greatest == upward else low
+        return reading.sign * reading.seen(column) / reading.length + 0.0
+
+    return value
+
+
+def _peak(low: str, high: str) -> Callable[[Reading], Values]:
+    return lambda reading: np.maximum(np.abs(reading.seen(low)), np.abs(reading.seen(high))) / reading.length
+
+
+def _rms(column: str, per_speed: bool) -> Callable[[Reading], Values]:
+    def value(reading: Reading) -> Values:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            mean = np.where(reading.duration > 0.0, reading.seen(column) / reading.duration, np.nan)
+        return np.asarray(np.sqrt(mean) / (reading.speed if per_speed else reading.length))
+
+    return value
+
+
+def _response(reading: Reading) -> Values:
+    book = reading.book
+    kinds = classify(
+        book["crossings"], book["crossings_last_quarter"], reading.cycles, -reading.first_side * book["side"]
+    )
+    return np.where(reading.good, kinds, ResponseClass.UNKNOWN)
+
+
+def _contact_share(reading: Reading) -> Values:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(reading.duration > 0.0, reading.book["contact_time"] / reading.duration, np.nan)
+    return np.where(reading.good, share, np.nan)
+
+
+def _high_share(reading: Reading) -> Values:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = reading.seen("high_energy_time") / reading.seen("energy_time")
+    return np.where(reading.seen("energy_time") > 0.0, share, np.where(reading.good, 0.0, np.nan))
+
+
+def _dissipated(reading: Reading) -> Values:
+    return reading.seen("work") - (reading.seen("energy") - reading.seen("first_energy"))
+
+
+def _mean_power(reading: Reading) -> Values:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(reading.duration > 0.0, reading.seen("work") / reading.duration, np.nan)
+
+
+_ROWS = (
+    Statistic("response", "int8", "1", "response class", _response),
+    Statistic("status", "int8", "1", "status of the run", _plain("status")),
+    Statistic("crossings", "int32", "1", "zero crossings of the centre displacement", _plain("crossings")),
+    Statistic(
+        "crossings_last_quarter", "int32", "1", "zero crossings in the last quarter", _plain("crossings_last_quarter")
+    ),
+    Statistic("last_crossing", "float64", "s", "time of the last zero crossing", _plain("last_crossing")),
+    Statistic(
+        "final_well", "int8", "1", "sign of the centre displacement at the end",
+        lambda reading: reading.sign * reading.book["side"],
+    ),
+    Statistic("end_is_final", "bool", "1", "whether the run provably ends in its last well", lambda r: r.final),
+    Statistic(
+        "min_displacement", "float64", "1", "least beam displacement at the striker, over b",
+        _low_high("min_displacement", "max_displacement", greatest=False),
+    ),
+    Statistic(
+        "max_displacement", "float64", "1", "greatest beam displacement at the striker, over b",
+        _low_high("min_displacement", "max_displacement", greatest=True),
+    ),
+    Statistic(
+        "min_center_displacement", "float64", "1", "least centre displacement, over b",
+        _low_high("min_center", "max_center", greatest=False),
+    ),
+    Statistic(
+        "max_center_displacement", "float64", "1", "greatest centre displacement, over b",
+        _low_high("min_center", "max_center", greatest=True),
+    ),
+    Statistic("peak_force", "float64", "N", "peak contact force", lambda reading: reading.peak_force),
+    Statistic("impacts", "int32", "1", "impacts", _plain("impacts")),
+    Statistic("contact_share", "float64", "1", "share of time in contact", _contact_share),
+    Statistic("decided_at", "float64", "s", "time at which the class became certain", _plain("decided_at")),
+    Statistic(
+        "peak_displacement", "float64", "1", "greatest distance of the contact point from the straight beam, over b",
+        _peak("min_displacement", "max_displacement"),
+    ),
+    Statistic(
+        "peak_center_displacement", "float64", "1", "greatest distance of the centre from the straight beam, over b",
+        _peak("min_center", "max_center"),
+    ),
+    Statistic(
+        "peak_velocity", "float64", "1", "greatest speed of the contact point at the end of a step, over b omega_1",
+        _seen("peak_velocity", lambda reading: 1.0 / reading.speed),
+    ),
+    Statistic(
+        "peak_center_velocity", "float64", "1", "greatest speed of the centre at the end of a step, over b omega_1",
+        _seen("peak_center_velocity", lambda reading: 1.0 / reading.speed),
+    ),
+    Statistic(
+        "rms_displacement", "float64", "1", "root mean square displacement of the contact point, over b",
+        _rms("square_displacement", per_speed=False),
+    ),
+    Statistic(
+        "rms_center_displacement", "float64", "1", "root mean square displacement of the centre, over b",
+        _rms("square_center", per_speed=False),
+    ),
+    Statistic(
+        "rms_velocity", "float64", "1", "root mean square velocity of the contact point, over b omega_1",
+        _rms("square_velocity", per_speed=True),
+    ),
+    Statistic(
+        "rms_center_velocity", "float64", "1", "root mean square velocity of the centre, over b omega_1",
+        _rms("square_center_velocity", per_speed=True),
+    ),
+    Statistic("impulse", "float64", "N s", "impulse on the beam, all impacts", _seen("total_impulse")),
+    Statistic("shaker_work", "float64", "J", "work done by the striker", _seen("work")),
+    Statistic("gross_work", "float64", "J", "work done by the striker, taken as positive", _seen("gross_work")),
+    Statistic("mean_power", "float64", "W", "work done by the striker over the time of the run", _mean_power),
+    Statistic(
+        "dissipated_energy", "float64", "J", "energy dissipated: the striker's work less what the beam gained",
+        _dissipated,
+    ),
+    Statistic(
+        "high_frequency_share", "float64", "1", "share of the modal energy above a multiple of omega_1, over time",
+        _high_share,
+    ),
+)  # fmt: skip
+
+STATISTICS: dict[str, Statistic] = {row.name: row for row in _ROWS}
+"""Variables of a map and attributes of an outcome, by name."""
+
+
+def updated() -> tuple[Statistic, ...]:
+    """The statistics that kernels update after every step."""
+    return tuple(row for row in STATISTICS.values() if row.update is not None)
+
+
+def register(statistic: Statistic) -> None:
+    """Add a statistic to the table; every run and map from now on has it.
+
+    Raises
+    ------
+    InputError
+        If the name is taken or cannot name a variable.
+    """
+    if not statistic.name.isidentifier():
+        raise InputError(f"statistic {statistic.name!r}: must be a name, such as 'rms_force'")
+    if statistic.name in STATISTICS:
+        raise InputError(f"statistic {statistic.name!r}: there is one of that name")
+    STATISTICS[statistic.name] = statistic
+
+
+def withdraw(name: str) -> None:
+    """Take a registered statistic out of the table again.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name, or it is one of the package's own.
+    """
+    if name not in STATISTICS or STATISTICS[name] in _ROWS:
+        raise InputError(f"statistic {name!r}: was not registered")
+    del STATISTICS[name]
+
+
+def book_dtype() -> np.dtype[Any]:
+    """One record of what kernels keep of a run."""
+    fields = [(name, kind) for name, kind, _ in _KEPT]
+    fields += [(f"own_{row.name}", np.float64) for row in updated()]
+    return np.dtype(fields, align=True)
+
+
+BOOK = book_dtype()
+"""Of the package's own statistics."""
+
+
+def empty_books(runs: int) -> Any:
+    """Books of runs that have not begun."""
+    books = np.zeros(runs, dtype=book_dtype())
+    for name, _, start in _KEPT:
+        books[name] = start
+    for row in updated():
+        books[f"own_{row.name}"] = row.start
+    return books

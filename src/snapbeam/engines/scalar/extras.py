@@ -1,0 +1,89 @@
+"""Statistics that were registered: scalar functions called after every step, one after the other."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from typing import Any
+
+from numba.extending import overload
+
+from snapbeam.engines.outcomes import Passed, Statistic, updated
+from snapbeam.engines.scalar.compile import INLINE, inlined
+from snapbeam.model.numbers import own_name
+
+__all__ = ["Extras", "extras_of_table", "observe"]
+
+
+class Extras:
+    """What a kernel updates beside its own columns; subclasses stand for lists of statistics."""
+
+    rows: tuple[Statistic, ...] = ()
+
+
+_named_tuple: Any = namedtuple
+_made: dict[tuple[Statistic, ...], Any] = {}
+
+
+def extras_of_table() -> Any:
+    """A value whose type tells a kernel which statistics the table has beside the package's own."""
+    rows = updated()
+    if rows not in _made:
+        owner: Any = type("OwnExtras", (Extras,), {"rows": rows}) if rows else Extras
+        made: Any = _named_tuple("Numbers", ())
+        made.__name__, made.owner = own_name(owner), owner
+        if not rows:
+            made.__module__, made.__qualname__ = __name__, "Extras.Numbers"
+            owner.Numbers = made
+        _made[rows] = made()
+    return _made[rows]
+
+
+def observe(
+    extras: Any, book: Any, time: float, length: float, seen: Any, seen1: Any, touching: bool
+) -> None:
+    """Update every registered statistic by a step."""
+    rows = type(extras).owner.rows
+    for row in rows:
+        name = f"own_{row.name}"
+        book[name] = row.update(book[name], _passed.py_func(time, length, seen, seen1, touching))
+
+
+@inlined
+def _passed(time, length, seen, seen1, touching):
+    return Passed(
+        time, length, (seen.w, seen1.w), (seen.wv, seen1.wv), (seen.c, seen1.c), (seen.cv, seen1.cv),
+        (seen.d, seen1.d), touching,
+    )  # fmt: skip
+
+
+def _chain(rows: tuple[Statistic, ...]) -> Any:
+    """The update functions of *rows*, compiled into one."""
+    if not rows:
+
+        @inlined
+        def nothing(book, passed):
+            return
+
+        return nothing
+    assert rows[0].update is not None
+    name, update, rest = f"own_{rows[0].name}", inlined(rows[0].update), _chain(rows[1:])
+
+    @inlined
+    def one_and_rest(book, passed):
+        book[name] = update(book[name], passed)
+        rest(book, passed)
+
+    return one_and_rest
+
+
+@overload(observe, jit_options=INLINE)
+def _observe(extras, book, time, length, seen, seen1, touching):
+    rows = extras.instance_class.owner.rows
+    if not rows:
+        return lambda extras, book, time, length, seen, seen1, touching: None
+    apply = _chain(rows)
+
+    def implementation(extras, book, time, length, seen, seen1, touching):
+        apply(book, _passed(time, length, seen, seen1, touching))
+
+    return implementation

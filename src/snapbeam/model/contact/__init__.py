@@ -1,0 +1,7 @@
+"""Laws of contact, one a file: what happens where the striker touches the beam."""
+
+from snapbeam.model.contact.base import LAWS, ContactLaw, Keeps
+from snapbeam.model.contact.hertz import HertzContact
+from snapbeam.model.contact.restitution import Restitution
+
+__all__ = ["LAWS", "ContactLaw", "HertzContact", "Keeps", "Restitution"]

@@ -1,0 +1,70 @@
+"""What every law of contact says of itself, and the laws by name."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from snapbeam.model.numbers import numbers_type
+from snapbeam.model.quantity import check_fields
+
+__all__ = ["LAWS", "ContactLaw", "Keeps"]
+
+LAWS: dict[str, type[ContactLaw]] = {}
+"""Every law by the name it has in parameter files."""
+
+
+@dataclass(frozen=True)
+class Keeps:
+    """What a law of contact leaves intact; what it does not is refused, or switched off, where it is needed."""
+
+    mirror: bool = True
+    """The mirror image of a run is a run."""
+    energy_bound: bool = True
+    """Untouched, the beam's energy only falls: what early decision rests on."""
+    smooth: bool = True
+    """The force is continuous where contact begins and ends, so that the tangent flow is plain."""
+
+
+class ContactLaw:
+    """A law of contact between the striker's tip and the beam: a frozen dataclass in a file of its own.
+
+    Its fields are quantities of scope *run*, each a positive number or zero.  Its physics are scalar functions of
+    numbers that every engine compiles for itself; ``law`` stands for the numbers, by the names of the fields:
+
+    - ``force(law, penetration)``: force on both, N, for a penetration > 0 (m);
+    - ``energy(law, penetration)``: energy stored in the contact, J, whose derivative is the force;
+    - ``slope(law, penetration)``: derivative of the force, N/m, for the tangent flow.
+
+    They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone, and never allocate.
+    """
+
+    name: ClassVar[str] = ""
+    """In parameter files and attributes."""
+    keeps: ClassVar[Keeps] = Keeps()
+    impulsive: ClassVar[bool] = False
+    """Whether an impact lasts no time: a jump of the velocity instead of a force."""
+    most_modes: ClassVar[int | None] = None
+    """Modes of a model that may be struck under this law."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if cls.name:
+            LAWS[cls.name] = cls
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @classmethod
+    def numbers_type(cls) -> Any:
+        """The named tuple of the law's numbers, as kernels see them; an attribute of the class, ``Numbers``."""
+        fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+        return numbers_type(cls, (item.name for item in fields))
+
+    def impact_duration(self, mass: float, velocity: float) -> float:
+        """Duration, s, of the impact of a free *mass* (kg) that arrives with *velocity* (m/s); 0 if none is known.
+
+        The steps in contact are planned by it.
+        """
+        return 0.0

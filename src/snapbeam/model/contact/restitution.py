@@ -1,0 +1,50 @@
+"""Newton's law of impact."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from snapbeam.model.contact.base import ContactLaw, Keeps
+from snapbeam.model.quantity import RUN, quantity
+
+__all__ = ["Restitution"]
+
+
+@dataclass(frozen=True)
+class Restitution(ContactLaw):
+    """Newton's law of impact for a single mode: the velocity of separation is e times that of approach.
+
+    The contact lasts no time, so nothing but one mode can use the law (the mass met by a point falls
+    to zero as modes are added).
+
+    Parameters
+    ----------
+    coefficient : float
+        Coefficient of restitution e, in [0, 1].
+    """
+
+    coefficient: float = quantity(
+        "1", "coefficient of restitution", low=0.0, high=1.0, closed="both", scope=RUN, symbol="e",
+        short="restitution_coefficient",
+    )  # fmt: skip
+
+    name = "restitution"
+    keeps = Keeps(smooth=False)
+    impulsive = True
+    most_modes = 1
+
+    @staticmethod
+    def force(law: Any, penetration: float) -> float:
+        """None: an impact is a jump."""
+        return 0.0
+
+    @staticmethod
+    def energy(law: Any, penetration: float) -> float:
+        """None is stored."""
+        return 0.0
+
+    @staticmethod
+    def slope(law: Any, penetration: float) -> float:
+        """None."""
+        return 0.0

@@ -1,0 +1,84 @@
+"""What every drive says of itself, and the drives by name."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.numbers import numbers_type
+from snapbeam.model.quantity import check_fields
+
+__all__ = ["DRIVES", "Drive", "Scale"]
+
+_Array = NDArray[np.float64]
+
+DRIVES: dict[str, type[Drive]] = {}
+"""Every drive by the name it has in parameter files."""
+
+
+class Scale(NamedTuple):
+    """What normalised quantities of a drive are multiplied by."""
+
+    length: float
+    """Length that normalises displacements, m: the buckling level b."""
+    omega: float
+    """Angular frequency that Omega and V are normalised by, rad/s."""
+
+
+class Drive:
+    """A prescribed motion of the striker's tip about its mid-position: a frozen dataclass in a file of its own.
+
+    Kernels see its motion as a function of one argument that grows by ``omega`` radians a second.  A drive
+    that is not a sine brings ``motion(drive, memory, argument)``, a scalar function of numbers that every engine
+    compiles for itself and that returns displacement (m) and velocity (m/s), and ``acceleration`` likewise (m/s^2);
+    ``drive`` stands for its numbers and ``memory[drive.table:]`` for its samples.
+    """
+
+    name: ClassVar[str] = ""
+    """In parameter files and attributes."""
+    harmonic: ClassVar[bool] = False
+    """Whether it is the sine that engines know by themselves."""
+    number_names: ClassVar[tuple[str, ...]] = ("omega",)
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if cls.name:
+            DRIVES[cls.name] = cls
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @classmethod
+    def numbers_type(cls) -> Any:
+        """The named tuple of the drive's numbers, as kernels see them; an attribute of the class, ``Numbers``."""
+        return numbers_type(cls, cls.number_names)
+
+    def values(self) -> dict[str, float]:
+        """The fields that are plain numbers, by name."""
+        fields = dataclasses.fields(self)  # type: ignore[arg-type]
+        found = {item.name: getattr(self, item.name) for item in fields}
+        return {name: value for name, value in found.items() if isinstance(value, float)}
+
+    def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """The numbers of many runs, arrays of shape (runs,), from its fields as such arrays."""
+        raise NotImplementedError
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """Seconds of one cycle of excitation, shape (runs,)."""
+        raise NotImplementedError
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """Highest displacement (m) from the mid-position and greatest speed (m/s) ever, shape (runs,)."""
+        raise NotImplementedError
+
+    def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """As the first of :meth:`bounds`, of the mirror image of the motion; the same unless it is lopsided."""
+        return self.bounds(columns, scale)[0]
+
+    def samples(self) -> _Array:
+        """What kernels look up, as one row; empty for a formula."""
+        return np.empty(0)

@@ -1,0 +1,93 @@
+"""How a system is integrated: for how long, how finely, by which engine."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+from snapbeam.core.validate import InputError
+from snapbeam.model.quantity import check_fields, quantities, quantity
+
+__all__ = ["ACCURACIES", "CYCLES", "ENGINES", "Integration"]
+
+ACCURACIES = ("map", "reference")
+ENGINES = ("auto", "cpu", "cuda")
+CYCLES = 200
+"""Cycles of a run unless others are asked for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Integration:
+    """How runs are integrated; what is studied is a :class:`~snapbeam.System`.
+
+    Parameters
+    ----------
+    cycles : int, optional
+        Cycles of excitation, at least 1; 200 by default, and with a recorded drive as many as it holds.
+    step : float, optional
+        Step in free flight, s; steps in contact scale with it.  The default follows from the model and
+        the contact; its error is on the docs' page on accuracy.
+    accuracy : {"map", "reference"}
+        ``"map"``: order 4.  ``"reference"``: order 6 and much shorter steps, to check others with.
+    tolerance : float, optional
+        Greatest error allowed in the displacement of the contact point and of the centre of one run, in b, from
+        1e-10 to 0.1, as far as the problem's conditioning lets any integrator promise it; in place of *step*
+        and *accuracy*.
+    engine : {"auto", "cpu", "cuda"}
+        What integrates; ``"auto"`` takes the fastest that serves.
+    early_decision : bool
+        End a run once its response class is certain: the class is the same, statistics other than it stop there.
+    threads : int, optional
+        Threads of the CPU engine; all usable cores by default.  No number depends on it.
+    high_frequency_ratio : float
+        Multiple of omega_1 above which the energy of a mode counts as high, for ``high_frequency_share``.
+    max_steps : int
+        Steps that one run may take before it ends with the status STEP_LIMIT.
+
+    Raises
+    ------
+    InputError
+        For values out of range, or a tolerance beside a step or an accuracy.
+    """
+
+    cycles: int | None = quantity(
+        "1", "cycles of excitation", default=None, kind=int, low=1, high=10**7, optional=True
+    )
+    step: float | None = quantity("s", "step in free flight", default=None, low=0.0, optional=True)
+    accuracy: str = quantity("1", "accuracy level", default="map", kind=str, choices=ACCURACIES)
+    tolerance: float | None = quantity(
+        "1", "greatest error of the displacement, over b", default=None, low=1e-10, high=0.1, closed="both",
+        optional=True,
+    )  # fmt: skip
+    engine: str = quantity("1", "what integrates", default="auto", kind=str, choices=ENGINES)
+    early_decision: bool = quantity(
+        "1", "whether a run ends once its response class is certain", default=False, kind=bool
+    )
+    threads: int | None = quantity(
+        "1", "threads of the CPU engine", default=None, kind=int, low=1, high=4096, optional=True
+    )
+    high_frequency_ratio: float = quantity(
+        "1", "multiple of omega_1 above which the energy of a mode counts as high", default=5.0, low=0.0
+    )
+    max_steps: int = quantity("1", "steps that a run may take", default=10**10, kind=int, low=1, high=10**15)
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.tolerance is not None and (self.step is not None or self.accuracy != "map"):
+            raise InputError(
+                f"tolerance = {self.tolerance!r} with step = {self.step!r}, accuracy = {self.accuracy!r}: give one"
+            )
+
+    def replace(self, **changes: Any) -> Integration:
+        """An integration with some values changed; unknown names are refused."""
+        known = quantities(Integration)
+        for name in changes:
+            if name not in known:
+                raise InputError(f"{name}: no parameter of an integration; must be one of {', '.join(known)}")
+        return dataclasses.replace(self, **changes)
+
+    @property
+    def cycles_or_default(self) -> int:
+        """The cycles asked for, or 200."""
+        return CYCLES if self.cycles is None else self.cycles

@@ -1,0 +1,134 @@
+"""Parts of a system to and from sections of plain values, as parameter files hold them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from snapbeam.core.validate import InputError
+from snapbeam.model.beam import Beam
+from snapbeam.model.contact import LAWS, ContactLaw
+from snapbeam.model.drive import DRIVES, Drive
+from snapbeam.model.quantity import quantities
+from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.state import State
+from snapbeam.model.striker import Striker
+
+__all__ = ["SECTIONS", "parts_from_mapping", "parts_to_mapping"]
+
+SECTIONS = ("beam", "model", "contact", "striker", "drive", "start")
+"""Sections of a system, in their order."""
+
+_MATRICES = (
+    "mass", "stiffness", "contact_shape", "center_shape", "tension_stiffness", "equilibrium", "length_scale",
+)  # fmt: skip
+_START = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
+
+
+def parts_to_mapping(
+    model: ReducedModel, contact: ContactLaw | None, striker: Striker | None, start: State | None
+) -> dict[str, dict[str, Any]]:
+    """The parts as sections; what is None is left out."""
+    sections: dict[str, dict[str, Any]] = {}
+    section: dict[str, Any] = {}
+    damping = model.damping_ratio
+    uniform = bool(np.all(damping == damping[0]))
+    if model.beam is not None:
+        beam = model.beam
+        names = ("length", "thickness", "width", "density", "young_modulus", beam.given)
+        sections["beam"] = {name: float(getattr(beam, name)) for name in names}
+        section["modes"] = model.modes
+    else:
+        section |= {name: getattr(model, name) for name in _MATRICES}
+    section["damping_ratio"] = float(damping[0]) if uniform else np.array(damping)
+    if model.given_reference_freq is not None:
+        section["reference_freq"] = model.given_reference_freq
+    sections["model"] = section
+    if contact is not None:
+        sections["contact"] = {"law": contact.name} | _fields(contact)
+    if striker is not None:
+        own = {name: getattr(striker, name) for name in quantities(Striker)}
+        sections["striker"] = {name: value for name, value in own.items() if value is not None}
+        sections["drive"] = {"kind": striker.drive.name} | _fields(striker.drive)
+    if start is not None:
+        values = {name: getattr(start, name) for name in _START}
+        sections["start"] = {
+            name: value if np.ndim(value) else float(value)
+            for name, value in values.items()
+            if not np.isnan(value).all()
+        }
+    return sections
+
+
+def _fields(part: Any) -> dict[str, Any]:
+    found = {item.name: getattr(part, item.name) for item in dataclasses.fields(part)}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """The parts that sections describe."""
+    for name, values in sections.items():
+        if name not in SECTIONS:
+            raise InputError(f"[{name}]: unknown section; must be one of {', '.join(SECTIONS)}")
+        if not isinstance(values, Mapping):
+            raise InputError(f"{name} = {values!r}: must be a section [{name}]")
+    parts: dict[str, Any] = {"model": _model(sections)}
+    if "contact" in sections:
+        parts["contact"] = _chosen(sections["contact"], "contact", "law", LAWS)
+    if "striker" in sections or "drive" in sections:
+        drive: Drive = _chosen(sections.get("drive", {}), "drive", "kind", DRIVES)
+        own = dict(sections.get("striker", {}))
+        _only(own, "striker", list(quantities(Striker)))
+        parts["striker"] = Striker(drive=drive, **own)
+    if "start" in sections:
+        values = dict(sections["start"])
+        _only(values, "start", list(_START))
+        _needed(values, "start", State)
+        parts["start"] = State(**values)
+    return parts
+
+
+def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
+    own = dict(sections.get("model", {}))
+    if "beam" in sections:
+        values = dict(sections["beam"])
+        _only(values, "beam", [item.name for item in dataclasses.fields(Beam) if item.init])
+        _only(own, "model", ["modes", "damping_ratio", "reference_freq"])
+        _needed(values, "beam", Beam)
+        return ReducedModel.from_beam(Beam(**values), **own)
+    _only(own, "model", [*_MATRICES, "damping_ratio", "reference_freq"])
+    for name in ("mass", "stiffness", "contact_shape"):
+        if name not in own:
+            raise InputError(f"[model] {name} is missing: give it, or a section [beam]")
+    return ReducedModel.from_matrices(**own)
+
+
+def _chosen(values: Mapping[str, Any], section: str, key: str, known: Mapping[str, Any]) -> Any:
+    own = dict(values)
+    name = own.pop(key, None)
+    if name not in known:
+        raise InputError(f"[{section}] {key} = {name!r}: must be one of {', '.join(map(repr, known))}")
+    kind = known[name]
+    _only(own, section, [item.name for item in dataclasses.fields(kind)])
+    _needed(own, section, kind, f" for {key} = {name!r}")
+    return kind(**own)
+
+
+def _needed(values: Mapping[str, Any], section: str, kind: Any, why: str = "") -> None:
+    """Refuse values that leave out what has no default."""
+    missing = [
+        item.name
+        for item in dataclasses.fields(kind)
+        if item.init and item.default is dataclasses.MISSING and item.name not in values
+    ]
+    if missing:
+        raise InputError(f"[{section}] {', '.join(missing)}: missing{why}")
+
+
+def _only(values: Mapping[str, Any], section: str, known: list[str]) -> None:
+    for name in values:
+        if name not in known:
+            raise InputError(f"[{section}] {name}: unknown key; must be one of {', '.join(known)}")

@@ -1,0 +1,38 @@
+"""The threshold of a slow striker in closed form (Eq. 21)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.core.validate import InputError, finite_array
+
+__all__ = ["quasi_static_threshold"]
+
+
+def quasi_static_threshold(location: ArrayLike, frequency_ratio: ArrayLike) -> NDArray[np.float64]:
+    """Velocity amplitude V_QS1 at which a slow shaker carries one mode over the unstable equilibrium.
+
+    Eq. (21), V_QS1 = Omega phi_1(x_s)/phi_1(1/2) = Omega (1 - cos 2 pi x_s)/2: the shaker's highest
+    position reaches the straight beam.
+
+    Parameters
+    ----------
+    location : array_like
+        x_s, each in (0, 1).
+    frequency_ratio : array_like
+        Omega, each greater than 0.  The two broadcast against each other.
+
+    Returns
+    -------
+    array of the broadcast shape
+    """
+    x = finite_array("location", location)
+    ratio = finite_array("frequency_ratio", frequency_ratio)
+    if ((x <= 0.0) | (x >= 1.0)).any():
+        bad = x[(x <= 0.0) | (x >= 1.0)].flat[0]
+        raise InputError(f"location = {bad:g}: must lie in (0, 1)")
+    if (ratio <= 0.0).any():
+        raise InputError(f"frequency_ratio = {ratio[ratio <= 0.0].flat[0]:g}: must be greater than 0")
+    threshold: NDArray[np.float64] = np.asarray(ratio * np.sin(np.pi * x) ** 2)
+    return threshold

@@ -1,0 +1,107 @@
+"""A system's neighbours: parts made anew with parameters changed by dotted name."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from snapbeam.core.validate import InputError
+from snapbeam.model.mapping import SECTIONS
+from snapbeam.model.quantity import quantities
+from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.start import started
+from snapbeam.model.state import State
+
+__all__ = ["replaced"]
+
+_OF_MODEL = ("modes", "damping_ratio", "reference_freq")
+
+
+def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """The parts of a system (model, contact, striker, start) with *changes*, by dotted name or whole part."""
+    whole: dict[str, Any] = {}
+    inside: dict[str, dict[str, Any]] = {}
+    for name, value in changes.items():
+        section, dot, field = name.partition(".")
+        if section not in SECTIONS:
+            raise InputError(f"{name}: no parameter of a system; its sections are {', '.join(SECTIONS)}")
+        if dot:
+            inside.setdefault(section, {})[field] = value
+        else:
+            whole[section] = value
+    found = dict(parts)
+    for name in ("model", "contact", "striker", "start"):
+        if name in whole:
+            found[name] = whole[name]
+    found["model"] = _model(
+        found["model"], whole.get("beam"), inside.get("beam", {}), inside.get("model", {})
+    )
+    if "contact" in inside:
+        found["contact"] = _changed(found["contact"], "contact", inside["contact"])
+    if "drive" in whole:
+        found["striker"] = dataclasses.replace(_there(found["striker"], "striker"), drive=whole["drive"])
+    if "drive" in inside:
+        striker = _there(found["striker"], "drive")
+        drive = _changed(striker.drive, "drive", inside["drive"])
+        found["striker"] = dataclasses.replace(striker, drive=drive)
+    if "striker" in inside:
+        found["striker"] = _changed(found["striker"], "striker", inside["striker"])
+    start, model = found["start"], found["model"]
+    if isinstance(start, State) and "start" not in whole and start.modes != model.modes:
+        found["start"] = start.with_modes(model.modes)
+    if "start" in inside:
+        found["start"] = started(found["model"], found["striker"], found["start"], inside["start"])
+    return found
+
+
+def _there(part: Any, section: str) -> Any:
+    if part is None:
+        raise InputError(f"{section}: this system has none")
+    return part
+
+
+def _changed(part: Any, section: str, values: Mapping[str, Any]) -> Any:
+    """A frozen part with some of its quantities changed."""
+    known = quantities(type(_there(part, section)))
+    for name in values:
+        if name not in known:
+            raise InputError(
+                f"{section}.{name}: no parameter of this system; must be one of {', '.join(known)}"
+            )
+    return dataclasses.replace(part, **values)
+
+
+def _model(
+    model: ReducedModel, beam: Any, of_beam: Mapping[str, Any], of_model: Mapping[str, Any]
+) -> ReducedModel:
+    if beam is None and not of_beam and not of_model:
+        return model
+    for name in of_model:
+        if name not in _OF_MODEL or (name == "modes" and model.beam is None):
+            raise InputError(f"model.{name}: cannot be changed; must be one of {', '.join(_OF_MODEL)}")
+    if model.beam is None:
+        if beam is not None or of_beam:
+            raise InputError("beam: this model was given by matrices, it has no beam")
+        given = {
+            "damping_ratio": of_model.get("damping_ratio", model.damping_ratio),
+            "reference_freq": of_model.get("reference_freq", model.given_reference_freq),
+        }
+        names = ("mass", "stiffness", "contact_shape", "center_shape", "tension_stiffness", "equilibrium")
+        rest = {name: getattr(model, name) for name in names}
+        return ReducedModel.from_matrices(**rest, length_scale=model.length_scale or 1.0, **given)
+    known = [item.name for item in dataclasses.fields(model.beam) if item.init]
+    for name in of_beam:
+        if name not in known:
+            raise InputError(f"beam.{name}: no parameter of a beam; must be one of {', '.join(known)}")
+    damping: Any = model.damping_ratio
+    if np.all(damping == damping[0]):
+        damping = float(damping[0])
+    changed = {
+        "modes": model.modes,
+        "damping_ratio": damping,
+        "reference_freq": model.given_reference_freq,
+    } | dict(of_model)
+    return ReducedModel.from_beam((model.beam if beam is None else beam).replace(**of_beam), **changed)

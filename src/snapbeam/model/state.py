@@ -1,0 +1,201 @@
+"""Where a run stands: everything that its future depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.core.codes import RunStatus
+from snapbeam.core.validate import InputError, finite_array
+
+__all__ = ["ModalState", "State"]
+
+_Array = NDArray[np.float64]
+_REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
+
+
+class ModalState(NamedTuple):
+    """A state in the coordinates of an engine, so that going on loses no bit."""
+
+    q: _Array
+    """Linear modes about the well, shape (..., N)."""
+    p: _Array
+    home: _Array
+    """+1 about the well that the striker pushes away from, -1 about the other, shape (...)."""
+    offset: _Array
+    """Penetration of the tip at mid-stroke into the beam at rest in the first well, m."""
+    structure: str
+    """Hash of the structure that the coordinates belong to."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class State:
+    """A state of the beam and its striker, or a batch of them along leading dimensions.
+
+    Parameters
+    ----------
+    amplitude : array_like of shape (..., N)
+        Amplitudes alpha of the buckling modes, m^0.5.
+    velocity : array_like of shape (..., N), optional
+        Their velocities, m^0.5/s; zeros by default.
+    phase : array_like of shape (...), optional
+        Phase of the drive, rad; NaN, or nothing given: the one that the drive has at the start.
+    striker_position : array_like of shape (...), optional
+        Where the mid-position of the tip is in space, m; NaN, or nothing given: the tip touches the beam.
+    contact_time : array_like of shape (...)
+        Seconds since the present contact began; negative where tip and beam are apart, NaN where the
+        penetration decides.
+    tangent : array_like of shape (..., k, 2, N), optional
+        Small changes of amplitude and velocity that were carried along, k of them.
+    passed : mapping, optional
+        What happened on the way here: crossings, impacts, peak_force, ... by name.  A state that was not reached,
+        as its ``passed["status"]`` says, is NaN.
+    modal : ModalState, optional
+        The same in an engine's coordinates.
+
+    Raises
+    ------
+    InputError
+        For shapes that do not fit each other, or numbers that are not finite.
+    """
+
+    amplitude: _Array
+    velocity: _Array = None  # type: ignore[assignment]
+    phase: _Array = np.nan  # type: ignore[assignment]
+    striker_position: _Array = None  # type: ignore[assignment]
+    contact_time: _Array = np.nan  # type: ignore[assignment]
+    tangent: _Array | None = None
+    passed: Mapping[str, _Array] | None = field(default=None, repr=False)
+    modal: ModalState | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        amplitude = _finite_where_known("state amplitude", self.amplitude, self.passed)
+        if amplitude.ndim == 0:
+            raise InputError(
+                f"state amplitude = {float(amplitude):g}: must be an array of shape (..., modes)"
+            )
+        batch = amplitude.shape[:-1]
+        velocity = np.zeros_like(amplitude)
+        if self.velocity is not None:
+            velocity = _finite_where_known("state velocity", self.velocity, self.passed)
+            if velocity.shape != amplitude.shape:
+                raise InputError(
+                    f"state velocity of shape {velocity.shape}: must have shape {amplitude.shape}"
+                )
+        found = {"amplitude": amplitude, "velocity": velocity}
+        found["phase"] = _maybe("state phase", self.phase, batch)
+        position = np.nan if self.striker_position is None else self.striker_position
+        found["striker_position"] = _maybe("state striker_position", position, batch)
+        found["contact_time"] = _maybe("state contact_time", self.contact_time, batch)
+        for name, array in found.items():
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    def __repr__(self) -> str:
+        count = f"{' x '.join(map(str, self.batch))} states" if self.batch else "one state"
+        return f"<State: {count} of {self.modes} modes>"
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """Shape of the batch; () for one state."""
+        return self.amplitude.shape[:-1]
+
+    @property
+    def modes(self) -> int:
+        """Number of modes N."""
+        return self.amplitude.shape[-1]
+
+    def __getitem__(self, index: Any) -> State:
+        """States of a batch, with what is known of each of them and not of their way as a whole."""
+        if not self.batch:
+            raise InputError(f"state[{index!r}]: this is one state, not a batch")
+        passed, tangent = self.passed, self.tangent
+        if passed is not None:
+            passed = {
+                name: values[index] for name, values in passed.items() if np.shape(values) == self.batch
+            }
+        if tangent is not None:
+            tangent = tangent[index] if tangent.shape[:-3] == self.batch else None
+        modal = self.modal
+        if modal is not None:
+            parts = (modal.q[index], modal.p[index], modal.home[index], modal.offset[index])
+            modal = ModalState(*parts, modal.structure)
+        return State(
+            amplitude=self.amplitude[index],
+            velocity=self.velocity[index],
+            phase=self.phase[index],
+            striker_position=self.striker_position[index],
+            contact_time=self.contact_time[index],
+            tangent=tangent,
+            passed=passed,
+            modal=modal,
+        )
+
+    def flat(self) -> State:
+        """The batch as one dimension; a single state as a batch of one."""
+        count = int(np.prod(self.batch, dtype=np.int64))
+        modal = self.modal
+        if modal is not None:
+            q, p, home, offset, structure = modal
+            shape = (count, q.shape[-1])
+            modal = ModalState(q.reshape(shape), p.reshape(shape), home.ravel(), offset.ravel(), structure)
+        return State(
+            amplitude=self.amplitude.reshape(count, self.modes),
+            velocity=self.velocity.reshape(count, self.modes),
+            phase=self.phase.ravel(),
+            striker_position=self.striker_position.ravel(),
+            contact_time=self.contact_time.ravel(),
+            modal=modal,
+        )
+
+    def with_modes(self, modes: int) -> State:
+        """The same shape on another number of modes: more of them are still at zero.
+
+        Raises
+        ------
+        InputError
+            If modes that move would be left out.
+        """
+        if modes == self.modes:
+            return self
+        if modes < self.modes and (self.amplitude[..., modes:].any() or self.velocity[..., modes:].any()):
+            raise InputError(
+                f"modes = {modes}: a state of {self.modes} modes cannot be cut to fewer without loss"
+            )
+        kept = min(modes, self.modes)
+        amplitude, velocity = np.zeros((*self.batch, modes)), np.zeros((*self.batch, modes))
+        amplitude[..., :kept], velocity[..., :kept] = self.amplitude[..., :kept], self.velocity[..., :kept]
+        return State(
+            amplitude=amplitude, velocity=velocity, phase=self.phase, striker_position=self.striker_position,
+            contact_time=self.contact_time,
+        )  # fmt: skip
+
+
+def _finite_where_known(name: str, value: ArrayLike, passed: Mapping[str, _Array] | None) -> _Array:
+    """Numbers that are finite, but for states that were not reached, as their status says."""
+    status = None if passed is None else passed.get("status")
+    if status is None:
+        return finite_array(name, value)
+    array = np.array(value, dtype=np.float64)
+    lost = np.isnan(array).all(axis=-1) & ~np.isin(status, _REACHED)
+    finite_array(name, np.where(lost[..., None], 0.0, array))
+    return array
+
+
+def _spread(name: str, array: _Array, batch: tuple[int, ...]) -> _Array:
+    try:
+        return np.array(np.broadcast_to(array, batch), dtype=np.float64)
+    except ValueError:
+        raise InputError(f"{name} of shape {array.shape}: must have the shape {batch} of the batch") from None
+
+
+def _maybe(name: str, value: ArrayLike, batch: tuple[int, ...]) -> _Array:
+    """Numbers of which NaN means that none is given."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf" or np.isinf(array).any():
+        raise InputError(f"{name} = {value!r}: must be finite numbers, or NaN for none")
+    return _spread(name, array.astype(np.float64), batch)

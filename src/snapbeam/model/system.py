@@ -1,0 +1,253 @@
+"""A system: everything that is studied, as one value."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.findings import Finding
+from snapbeam.core.provenance import canonical_json
+from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.model.contact import ContactLaw
+from snapbeam.model.doubts import doubts_of
+from snapbeam.model.drive import Scale
+from snapbeam.model.mapping import parts_from_mapping, parts_to_mapping
+from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.replacing import replaced
+from snapbeam.model.state import State
+from snapbeam.model.striker import RecordedDrive, Shaker, Striker
+
+__all__ = ["System"]
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """A structure, what strikes it and how they touch: what is studied, frozen, described, hashed and saved.
+
+    Parameters
+    ----------
+    model : ReducedModel
+    contact : ContactLaw, optional
+        Needed with a striker.
+    striker : Striker, Shaker or RecordedDrive, optional
+        Without one the structure vibrates freely from *start*.
+    start : State, optional
+        Where runs begin, one state; by default at rest in the well that the striker pushes away from, touched by it.
+
+    Raises
+    ------
+    InputError
+        For parts that are none, or that do not go together.
+
+    Examples
+    --------
+    >>> import snapbeam as sb
+    >>> from snapbeam import paper
+    >>> system = sb.System(
+    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=8),
+    ...     contact=paper.CONTACT,
+    ...     striker=sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
+    ... )
+    >>> thicker = system.replace(**{"beam.thickness": 5e-4, "striker.location": 0.3})
+    """
+
+    model: ReducedModel
+    contact: ContactLaw | None = None
+    striker: Striker | None = None
+    start: State | None = None
+
+    def __post_init__(self) -> None:
+        model, contact, striker, start = self.model, self.contact, self.striker, self.start
+        if not isinstance(model, ReducedModel):
+            raise InputTypeError(f"model = {model!r}: must be a ReducedModel")
+        if isinstance(striker, (Shaker, RecordedDrive)):
+            striker = striker.striker()
+            object.__setattr__(self, "striker", striker)
+        if striker is not None and not isinstance(striker, Striker):
+            raise InputTypeError(f"striker = {striker!r}: must be a Striker, a Shaker or a RecordedDrive")
+        if contact is not None and not isinstance(contact, ContactLaw):
+            raise InputTypeError(
+                f"contact = {contact!r}: must be a law of contact, such as HertzContact(stiffness)"
+            )
+        if contact is not None and contact.most_modes is not None and model.modes > contact.most_modes:
+            raise InputError(
+                f"contact = {contact!r} with modes = {model.modes}: Newton's law needs one mode, since the "
+                "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
+            )
+        if striker is not None and contact is None:
+            raise InputError(
+                "contact = None: a striker needs a law of contact, such as HertzContact(stiffness)"
+            )
+        if model.length_scale is None:
+            model.require_bistable("a run")
+        if start is not None:
+            if not isinstance(start, State):
+                raise InputTypeError(f"start = {start!r}: must be a State")
+            if start.batch:
+                raise InputError(f"start: a batch of shape {start.batch}: must be one state")
+            if start.modes != model.modes:
+                raise InputError(
+                    f"start of {start.modes} modes: must have the {model.modes} modes of the model"
+                )
+            # what a system is made of is what it is hashed and saved by: a state's way here is no part of it
+            object.__setattr__(
+                self, "start", dataclasses.replace(start, tangent=None, passed=None, modal=None)
+            )
+
+    # ------------------------------------------------------------------ by dotted name
+
+    def replace(self, **changes: Any) -> System:
+        """A neighbour: the same system with parameters changed by dotted name.
+
+        Names are those of the table of parameters (:data:`snapbeam.config.PARAMETERS`), such as
+        ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``striker.location`` and
+        ``drive.frequency_ratio``, or whole parts: ``beam``, ``model``, ``contact``, ``striker``, ``drive``, ``start``.
+
+        Raises
+        ------
+        InputError
+            For a name that the system does not have, and for values as the parts refuse them.
+        """
+        parts = {item.name: getattr(self, item.name) for item in fields(self)}
+        return System(**replaced(parts, changes))
+
+    def get(self, name: str) -> Any:
+        """The value of a parameter by its dotted name.
+
+        Raises
+        ------
+        InputError
+            For a name that the system does not have.
+        """
+        found = self.parameters
+        if name not in found:
+            raise InputError(f"{name}: no parameter of this system; it has {', '.join(found)}")
+        return found[name]
+
+    @cached_property
+    def parameters(self) -> dict[str, Any]:
+        """Every parameter by dotted name, plain numbers, words and arrays."""
+        return {
+            f"{section}.{name}": value
+            for section, values in self.to_mapping().items()
+            for name, value in values.items()
+        }
+
+    @property
+    def scale(self) -> Scale:
+        """Length and angular frequency that displacements and drives are normalised by."""
+        assert self.model.length_scale is not None
+        return Scale(self.model.length_scale, 2.0 * np.pi * self.model.reference_freq)
+
+    def findings(self) -> tuple[Finding, ...]:
+        """What is doubtful about it: sizes that look like another unit, assumptions of the model left behind."""
+        return doubts_of(self.model, self.striker)
+
+    # ------------------------------------------------------------------ identity and files
+
+    def to_mapping(self) -> dict[str, dict[str, Any]]:
+        """The system as sections of plain values, as a parameter file holds them."""
+        return parts_to_mapping(self.model, self.contact, self.striker, self.start)
+
+    @classmethod
+    def from_mapping(cls, sections: Mapping[str, Mapping[str, Any]]) -> System:
+        """The system that such sections describe.
+
+        Raises
+        ------
+        InputError
+            For sections, names or values that are none of a system.
+        """
+        return cls(**parts_from_mapping(sections))
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of everything the numbers depend on, every sample of a recorded drive included."""
+        text = canonical_json(_hashable(self.to_mapping()))
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def __eq__(self, other: object) -> bool:
+        return self.hash == other.hash if isinstance(other, System) else NotImplemented
+
+    def __hash__(self) -> int:
+        return int(self.hash[:15], 16)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the system to a TOML file, whole or not at all; :meth:`load` reads it back equal."""
+        import tomli_w
+
+        target = check_writable(path, "path", (".toml",))
+        with atomic_path(target) as temporary:
+            temporary.write_text(tomli_w.dumps(_without_none(self.to_mapping())), encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> System:
+        """Read a system that :meth:`save` wrote.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read, is no TOML or describes no system.
+        """
+        import tomllib
+
+        try:
+            with open(path, "rb") as stream:
+                sections = tomllib.load(stream)
+        except OSError as error:
+            raise InputError(f"path = {str(path)!r}: cannot be read, {error.strerror or error}") from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+            raise InputError(f"path = {str(path)!r}: is no TOML, {error}") from None
+        return cls.from_mapping(sections)
+
+    def describe(self) -> str:
+        """The system in a few lines, for a person to read."""
+        lines = []
+        for section, values in self.to_mapping().items():
+            words = ", ".join(
+                f"{name} = {_brief(value)}" for name, value in values.items() if value is not None
+            )
+            lines.append(f"{section:8s}  {words}")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        parts = [f"modes={self.model.modes}", f"contact={self.contact!r}"]
+        if self.striker is not None:
+            parts.append(f"striker={self.striker!r}" if self.striker.drive.harmonic else "striker=recorded")
+        return f"<System {', '.join(parts)}, hash {self.hash[:12]}>"
+
+
+def _hashable(value: Any) -> Any:
+    """*value* with long arrays replaced by the hash of their bytes."""
+    if isinstance(value, np.ndarray) and value.size > 256:
+        data = np.ascontiguousarray(value, dtype="<f8")
+        return {"shape": list(value.shape), "sha256": hashlib.sha256(data.tobytes()).hexdigest()}
+    if isinstance(value, Mapping):
+        return {key: _hashable(item) for key, item in value.items()}
+    return value
+
+
+def _without_none(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    return {
+        section: {
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in values.items()
+            if value is not None
+        }
+        for section, values in sections.items()
+    }
+
+
+def _brief(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"array of shape {value.shape}" if value.size > 4 else json.dumps(value.tolist())
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,113 @@
+"""What a claim's measurement returns: numbers with their uncertainty, and a verdict that a rule computes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+__all__ = [
+    "FAIL",
+    "VERDICTS",
+    "Check",
+    "Finding",
+    "Number",
+    "Quantity",
+    "above",
+    "below",
+    "found",
+    "measured",
+    "near",
+]
+
+VERDICTS = ("holds", "in part", "fails", "open")
+
+Number = float | int | tuple[float, ...] | tuple[tuple[float, ...], ...]
+"""What stands in the text beside quantities: settings, cuts, lists of numbers or of rows of them."""
+
+
+class Quantity(NamedTuple):
+    """A measured value and its uncertainty, a half width of the same quantity in the same unit."""
+
+    value: float
+    uncertainty: float
+
+
+class Check(NamedTuple):
+    """Whether a condition is met: by every value within the uncertainty, by the measured one, by any."""
+
+    must: bool
+    does: bool
+    could: bool
+
+    def __and__(self, other: Check) -> Check:
+        return Check(self.must and other.must, self.does and other.does, self.could and other.could)
+
+    def __or__(self, other: Check) -> Check:
+        return Check(self.must or other.must, self.does or other.does, self.could or other.could)
+
+
+FAIL = Check(False, False, False)
+"""The condition that nothing meets."""
+
+
+def above(value: Quantity | float, limit: float) -> Check:
+    """Whether a value is above a limit; a number that is not finite is above none."""
+    middle, spread = value if isinstance(value, Quantity) else (value, 0.0)
+    return Check(middle - spread > limit, middle > limit, middle + spread > limit)
+
+
+def below(value: Quantity | float, limit: float) -> Check:
+    """Whether a value is below a limit, or on it."""
+    middle, spread = value if isinstance(value, Quantity) else (value, 0.0)
+    return Check(middle + spread <= limit, middle <= limit, middle - spread <= limit)
+
+
+def near(value: Quantity | float, target: float, allowed: float) -> Check:
+    """Whether a value is within *allowed* of a target."""
+    middle, spread = value if isinstance(value, Quantity) else (value, 0.0)
+    # a slack of rounding, so that "within a step of the grid" holds a step of the grid
+    off, allowed = abs(middle - target), allowed * (1.0 + 1e-9)
+    return Check(off + spread <= allowed, off <= allowed, off - spread <= allowed)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was measured of one claim.
+
+    ``close``: whether the verdict would be another somewhere within the uncertainties.  The first of the
+    ``quantities`` is the one the claim is about.
+    """
+
+    verdict: str
+    close: bool
+    quantities: Mapping[str, Quantity]
+    numbers: Mapping[str, Number] = field(default_factory=dict)
+
+
+def found(holds: Check, in_part: Check = FAIL, /, **named: Quantity | Number) -> Finding:
+    """The finding on a claim that *holds* by one condition and, where it does not, *in part* by another."""
+
+    def verdict(reading: int) -> str:
+        return "holds" if holds[reading] else "in part" if in_part[reading] else "fails"
+
+    worst, now, best = (verdict(reading) for reading in range(3))
+    return _finding(now, worst != best, named)
+
+
+def measured(matters: Check, /, **named: Quantity | Number) -> Finding:
+    """The finding on an open question, whose influence is measured.
+
+    ``matters`` is 1 where it shows, beyond the uncertainty.
+    """
+    return _finding("open", matters.must != matters.does, {**named, "matters": int(matters.must)})
+
+
+def _finding(verdict: str, close: bool, named: Mapping[str, Quantity | Number]) -> Finding:
+    quantities = {name: value for name, value in named.items() if isinstance(value, Quantity)}
+    for name, quantity in quantities.items():
+        if not (quantity.uncertainty >= 0.0 or math.isnan(quantity.value)):
+            raise ValueError(f"{name} = {quantity}: must have an uncertainty of at least 0")
+    numbers = {name: value for name, value in named.items() if not isinstance(value, Quantity)}
+    return Finding(verdict, close, quantities, numbers)

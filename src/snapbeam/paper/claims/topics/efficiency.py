@@ -1,0 +1,143 @@
+"""Section 4.3: where to strike, for the least velocity and for a transient response."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.paper.claims.finding import Finding, Quantity, above, below, found
+from snapbeam.paper.claims.spread import combined, mean_of, part
+from snapbeam.paper.claims.topics.classes import transient
+from snapbeam.paper.claims.topics.locations import along
+from snapbeam.paper.studies.windows import CENTRE, END, longest_window
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from snapbeam.paper.recipe import Results
+
+__all__ = ["ROWS"]
+
+_Array = NDArray[np.float64]
+_END, _CENTRE = 0.1, 0.48
+
+
+def _relative(results: Results, ratio: float) -> tuple[Quantity, Quantity]:
+    """Threshold near a clamp and at the centre, over the highest."""
+    x, curve, step = along(results, ratio, 1)
+    top = float(curve.max())
+    end, centre = (mean_of(inside / top, step / top) for inside in (curve[x <= _END], curve[x >= _CENTRE]))
+    return end, centre
+
+
+def _efficient(results: Results, ratio: float) -> Finding:
+    end, centre = _relative(results, ratio)
+    return found(
+        below(end, 0.6) & below(centre, 0.6), below(end, 0.9) & below(centre, 0.9), end=end, centre=centre
+    )
+
+
+def efficient_middle(results: Results) -> Finding:
+    """33a: near a clamp and at the centre little velocity is needed, Omega = 0.625."""
+    return _efficient(results, 0.625)
+
+
+def efficient_fast(results: Results) -> Finding:
+    """33b: and Omega = 1.625."""
+    return _efficient(results, 1.625)
+
+
+def more_so_when_fast(results: Results) -> Finding:
+    """33c: particularly at high frequency."""
+    slow, fast = (_relative(results, ratio) for ratio in (0.625, 1.625))
+    gains = [
+        Quantity(s.value - f.value, combined(s.uncertainty, f.uncertainty))
+        for s, f in zip(slow, fast, strict=True)
+    ]
+    end, centre = gains
+    return found(
+        above(end, 0.0) & above(centre, 0.0), above(end, 0.0) | above(centre, 0.0), end=end, centre=centre
+    )
+
+
+def _window(results: Results, ratio: float) -> xr.Dataset:
+    return part(results, "windows", f"omega_{ratio:g}")
+
+
+def _ratio(centre: Quantity, end: Quantity, least: float) -> Quantity:
+    """Of two numbers of which neither is told from one smaller than *least*."""
+    above_it, below_it = max(centre.value, least), max(end.value, least)
+    value = above_it / below_it
+    return Quantity(value, value * combined(centre.uncertainty / above_it, end.uncertainty / below_it))
+
+
+def _means(x: _Array, values: _Array, error: float) -> tuple[Quantity, Quantity]:
+    """Of the locations near a clamp and near the centre."""
+    return mean_of(values[x <= END], error), mean_of(values[x >= CENTRE], error)
+
+
+def _wide(results: Results, ratio: float) -> Finding:
+    ds = _window(results, ratio)
+    drives, x = ds.velocity_amplitude.values, ds.location.values
+    step = float(drives[1] - drives[0])
+    inside = transient(ds.transpose("location", "velocity_amplitude"))
+    width = inside.sum(axis=1) * step
+    end, centre = _means(x, width, 0.5 * step)
+    times = _ratio(centre, end, 0.5 * step)
+    return found(
+        above(times, 2.0), above(times, 1.0), times=times, end=end, centre=centre, top=float(drives[-1]),
+        cut=int(inside[:, -1].sum()),
+    )  # fmt: skip
+
+
+def wide_middle(results: Results) -> Finding:
+    """15a: amplitudes that give a transient response, near a clamp and near the centre, Omega = 0.625."""
+    return _wide(results, 0.625)
+
+
+def wide_fast(results: Results) -> Finding:
+    """15b: and Omega = 1.625."""
+    return _wide(results, 1.625)
+
+
+def _fine(results: Results, ratio: float) -> Finding:
+    ds = _window(results, ratio)
+    step = float(ds.velocity_amplitude[1] - ds.velocity_amplitude[0])
+    low, high = longest_window(ds)
+    # half of the window over its middle: how far the amplitude may be off, as a share of it; 0 without a window
+    room = np.where(np.isfinite(low), (high - low + step) / (high + low), 0.0)
+    middle = np.nan_to_num(0.5 * (low + high), nan=np.inf)
+    error = float(np.median(0.5 * step / middle)) or 0.5 * step
+    end, centre = _means(ds.location.values, room, error)
+    times = _ratio(centre, end, error)
+    return found(
+        above(times, 2.0),
+        above(times, 1.0),
+        times=times,
+        end=end,
+        centre=centre,
+        without=int(np.isnan(low).sum()),
+    )
+
+
+def fine_middle(results: Results) -> Finding:
+    """15c: how finely the amplitude has to be set, as a share of itself, Omega = 0.625."""
+    return _fine(results, 0.625)
+
+
+def fine_fast(results: Results) -> Finding:
+    """15d: and Omega = 1.625."""
+    return _fine(results, 1.625)
+
+
+ROWS = {
+    "15a": wide_middle,
+    "15b": wide_fast,
+    "15c": fine_middle,
+    "15d": fine_fast,
+    "33a": efficient_middle,
+    "33b": efficient_fast,
+    "33c": more_so_when_fast,
+}

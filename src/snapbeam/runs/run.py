@@ -1,0 +1,72 @@
+"""A run: what it did, sample by sample, impact by impact and in a few numbers."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from snapbeam.model.integration import Integration
+from snapbeam.model.state import State
+from snapbeam.model.system import System
+from snapbeam.runs.outcome import Outcome
+from snapbeam.runs.tolerance import Accuracy
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Run"]
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A recorded run.
+
+    Attributes
+    ----------
+    dataset : xarray.Dataset
+        Time series: the variables of :data:`snapbeam.runs.schema.SCHEMA`.
+    outcome : Outcome
+        The class and the statistics.
+    impacts : xarray.Dataset
+        Onset, duration, peak force and impulse of each impact.
+    system : System
+        What was run, and
+    integration : Integration
+        how.
+    accuracy : Accuracy or None
+        What an asked tolerance gave.
+    end : State or None
+        Where the run stands at its end; None if it failed.
+    """
+
+    dataset: xr.Dataset
+    outcome: Outcome
+    impacts: xr.Dataset
+    system: System
+    integration: Integration
+    accuracy: Accuracy | None = None
+    end: State | None = None
+
+    @property
+    def response(self) -> Outcome:
+        """The outcome, by the name it had in version 0.1."""
+        return self.outcome
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the run to a NetCDF file, whole or not at all; :func:`snapbeam.load_run` reads it back.
+
+        Raises
+        ------
+        InputError
+            If *path* cannot be written or does not end in ``.nc``.
+        """
+        from snapbeam.runs.save import save_run
+
+        save_run(self, path)
+
+    def __repr__(self) -> str:
+        samples = self.dataset.sizes["time"]
+        return (
+            f"<Run {self.outcome.response.label}, {samples} samples, {self.impacts.sizes['impact']} impacts>"
+        )

@@ -1,0 +1,106 @@
+"""From the pieces that an engine wrote down to the datasets of a run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.engines.ensemble import Ensemble
+from snapbeam.engines.outputs import Recorded
+from snapbeam.model.system import System
+from snapbeam.runs.schema import trajectory_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["impact_table", "joined", "run_dataset"]
+
+_Array = NDArray[np.float64]
+
+IMPACT_COLUMNS = (
+    ("onset", "s", "onset of the impact"),
+    ("duration", "s", "duration of the impact"),
+    ("peak_force", "N", "peak contact force"),
+    ("impulse", "N s", "impulse on the beam"),
+)
+
+
+def joined(pieces: list[Recorded]) -> Recorded:
+    """Pieces of a run as one, its samples in the order of time."""
+    times, q, p, values, impacts = (
+        np.concatenate(parts) for parts in zip(*(piece[:5] for piece in pieces), strict=True)
+    )
+    order = np.argsort(times, kind="stable")
+    order = order[np.append(True, np.diff(times[order]) > 0.0)] if order.size else order
+    return Recorded(
+        times[order], q[order], p[order], values[order], impacts, pieces[-1].books, pieces[-1].last
+    )
+
+
+def run_dataset(
+    ensemble: Ensemble,
+    system: System,
+    recorded: Recorded,
+    times: _Array | None,
+    period: float,
+    attrs: dict[str, Any],
+) -> xr.Dataset:
+    """The time series of a run.
+
+    *times* are the instants that were asked for; those that the run did not reach are NaN, with ``valid`` = 0.
+    """
+    structure, model = ensemble.structure, system.model
+    scale, speed = system.scale.length, system.scale.length * system.scale.omega
+    alpha, rate = structure.amplitudes(recorded.q), structure.velocities(recorded.p)
+    values = recorded.values
+    location = 0.5 if system.striker is None else system.striker.location
+    shape = model.shape_at(location)
+    displacement = alpha @ shape / scale
+    variables: dict[str, _Array] = {
+        "displacement": displacement,
+        "center_displacement": alpha @ model.center_shape / scale,
+        "velocity": rate @ shape / speed,
+        "center_velocity": rate @ model.center_shape / speed,
+    }
+    struck = system.striker is not None
+    if struck:
+        penetration = values[:, 0] / scale
+        variables |= {
+            "shaker_displacement": displacement + structure.sign * penetration,
+            "penetration": penetration,
+            "contact_force": values[:, 1],
+        }
+    variables |= {"modal_amplitude": alpha, "modal_velocity": rate, "energy_beam": values[:, 2]}
+    if struck:
+        variables |= {"energy_contact": values[:, 3], "work_shaker": values[:, 4]}
+    variables["energy_dissipated"] = values[:, 5]
+    at = recorded.times
+    valid = np.asarray(np.isfinite(values[:, 2:]).all(axis=1) & np.isfinite(alpha).all(axis=1))
+    if times is not None and at.size < times.size:
+        missing = times.size - at.size
+        at, valid = times, np.concatenate((valid, np.zeros(missing, dtype=bool)))
+        variables = {
+            name: np.concatenate((array, np.full((missing, *array.shape[1:]), np.nan)))
+            for name, array in variables.items()
+        }
+    if not valid.all():
+        variables = {
+            name: np.where(valid if array.ndim == 1 else valid[:, None], array, np.nan)
+            for name, array in variables.items()
+        }
+        variables["valid"] = np.asarray(valid, dtype=np.int8)
+    return trajectory_dataset(at, at / period, attrs=attrs, **variables)
+
+
+def impact_table(table: _Array, attrs: dict[str, Any]) -> xr.Dataset:
+    """The impacts of a run, one after the other."""
+    import xarray as xr
+
+    data = {
+        name: ("impact", table[:, i], {"units": units, "long_name": words})
+        for i, (name, units, words) in enumerate(IMPACT_COLUMNS)
+    }
+    number = ("impact", np.arange(1, len(table) + 1), {"units": "1", "long_name": "number of the impact"})
+    return xr.Dataset(data, {"impact": number}, attrs)

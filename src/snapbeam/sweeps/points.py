@@ -1,0 +1,277 @@
+"""Points of a sweep: values of any parameters, a grid of them or a list."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.config.parameters import Parameter, lookup, parameters, short_names
+from snapbeam.config.physical import PHYSICAL, physical_name
+from snapbeam.core.provenance import array_hash
+from snapbeam.core.validate import InputError, InputTypeError, axis, finite_array
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Columns", "Grid", "PointList", "Points", "points_of"]
+
+Columns = dict[str, NDArray[Any]]
+"""Values of some points by dotted name, arrays of shape (points,)."""
+POINT = "point"
+"""Dimension of a list of points."""
+_NOT_SWEPT = ("run.engine", "run.threads", "run.tolerance", "drive.displacement", "drive.velocity")
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Every combination of the values of some axes.
+
+    Points are counted with the axes that need another structure outermost, so that those of one structure follow
+    each other; the dimensions of the dataset keep the order in which the axes were given.
+    """
+
+    axes: dict[str, NDArray[Any]]
+    """Values by dotted name, in the order of the dimensions."""
+
+    @cached_property
+    def order(self) -> tuple[str, ...]:
+        """The axes in the order in which points are counted."""
+        structural = [name for name in self.axes if not lookup(name).is_run]
+        return (*structural, *(name for name in self.axes if name not in structural))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What differs among the points."""
+        return tuple(self.axes)
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Dimensions of the dataset."""
+        return tuple(lookup(name).short for name in self.axes)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Points along each axis, in the order of counting."""
+        return tuple(self.axes[name].size for name in self.order)
+
+    @property
+    def size(self) -> int:
+        """Points in all."""
+        return int(np.prod(self.shape, dtype=np.int64))
+
+    def take(self, which: NDArray[np.int64]) -> Columns:
+        """The values of the points of the given numbers."""
+        at = np.unravel_index(which, self.shape) if self.axes else ()
+        return {name: self.axes[name][i] for name, i in zip(self.order, at, strict=True)}
+
+    def arranged(self, values: NDArray[Any]) -> NDArray[Any]:
+        """An array over all points, in the order of counting, with the dimensions of the dataset first."""
+        inside = values.reshape(*self.shape, *values.shape[1:])
+        moved = [self.order.index(name) for name in self.axes]
+        return inside.transpose(*moved, *range(len(moved), inside.ndim))
+
+    def coordinates(self) -> dict[str, Any]:
+        """Dimensions, values and labels of the axes, by name."""
+        return {lookup(name).short: _coordinate(lookup(name), values) for name, values in self.axes.items()}
+
+    def describe(self) -> dict[str, Any]:
+        """What tells this grid from another one."""
+        return {name: values.tolist() for name, values in self.axes.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class PointList:
+    """Points one after the other."""
+
+    columns: Columns
+    labels: dict[str, NDArray[Any]] = field(default_factory=dict)
+    """Whatever else stands beside the points in the table that they came from."""
+
+    @property
+    def axes(self) -> dict[str, NDArray[Any]]:
+        """None of its own."""
+        return {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What differs among the points."""
+        return tuple(self.columns)
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """One, called ``point``."""
+        return (POINT,)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Points."""
+        return (self.size,)
+
+    @property
+    def size(self) -> int:
+        """Points in all."""
+        return int(next(iter(self.columns.values())).size)
+
+    def take(self, which: NDArray[np.int64]) -> Columns:
+        """The values of the points of the given numbers."""
+        return {name: values[which] for name, values in self.columns.items()}
+
+    def arranged(self, values: NDArray[Any]) -> NDArray[Any]:
+        """As it is."""
+        return values
+
+    def coordinates(self) -> dict[str, Any]:
+        """The values of each parameter along the points, by name."""
+        found: dict[str, Any] = {
+            lookup(name).short: ((POINT,), values, _labels(lookup(name)))
+            for name, values in self.columns.items()
+        }
+        return found | {name: ((POINT,), values, {}) for name, values in self.labels.items()}
+
+    def describe(self) -> dict[str, Any]:
+        """What tells this list from another one."""
+        return {
+            name: {"points": values.size, "sha256": array_hash(values)}
+            for name, values in self.columns.items()
+        }
+
+
+Points = Grid | PointList
+
+
+def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
+    """The points that were asked for.
+
+    Parameters
+    ----------
+    given : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
+        A mapping makes a grid: parameters by dotted name, or by the name that datasets use, with strictly increasing
+        numbers, or different words.  A dataset with one-dimensional variables along one dimension, or a data frame,
+        makes a list; its columns that are no parameters are kept as labels, unless their names are almost those of
+        parameters.
+
+    Raises
+    ------
+    InputError
+        For unknown names, parameters that cannot be swept, and values out of range.
+    """
+    import xarray as xr
+
+    if isinstance(given, xr.Dataset):
+        return _list_of({str(name): np.asarray(given[name].values) for name in given.variables})
+    if hasattr(given, "columns") and hasattr(given, "to_dict"):
+        return _list_of({str(name): np.asarray(given[name]) for name in given.columns})
+    if not isinstance(given, Mapping):
+        raise InputTypeError(
+            f"axes = {given!r}: must be a mapping of parameters to values, an xarray.Dataset or a table of points"
+        )
+    if not given:
+        raise InputError("axes: must name at least one parameter to sweep")
+    axes: dict[str, NDArray[Any]] = {}
+    for name, values in given.items():
+        row = _swept(str(name))
+        if row.name in axes:
+            raise InputError(f"{name}: stands twice among the axes")
+        axes[row.name] = _axis(row, str(name), values)
+    return Grid(axes)
+
+
+def _swept(name: str) -> Parameter:
+    row = lookup(name)
+    if row.name in _NOT_SWEPT:
+        raise InputError(f"{name}: cannot be swept")
+    return row
+
+
+def _axis(row: Parameter, name: str, values: Any) -> NDArray[Any]:
+    """The values of one axis, checked: numbers that increase, or different words."""
+    item = row.quantity
+    if item.kind in (str, bool):
+        words = [item.check(name, value) for value in np.atleast_1d(np.asarray(values)).tolist()]
+        if len(set(words)) < len(words):
+            raise InputError(f"{name} = {words}: must differ from each other")
+        return np.array(words)
+    if np.ndim(values) == 0:
+        raise InputError(f"{name} = {values!r}: must be an array; put a single value into the system")
+    closed = item.closed if item.kind is float else "both"
+    array = axis(name, values, item.low, item.high, closed=closed)
+    if item.kind is int:
+        return np.array([item.check(name, value) for value in array.tolist()], dtype=np.int64)
+    return array
+
+
+def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
+    known: Columns = {}
+    labels: dict[str, NDArray[Any]] = {}
+    for name, values in columns.items():
+        if values.ndim != 1:
+            if values.ndim == 0:
+                values = np.full(_length(columns), values)
+            else:
+                raise InputError(f"{name} of shape {values.shape}: a list of points must have one dimension")
+        if _is_label(name):
+            labels[name] = values
+            continue
+        row = _swept(name)
+        if row.name in known:
+            raise InputError(f"{name}: stands twice among the points, as {row.name} too")
+        item = row.quantity
+        if item.kind in (str, bool):
+            known[row.name] = np.array([item.check(name, value) for value in values.tolist()])
+        else:
+            numbers = finite_array(name, values, 1)
+            known[row.name] = np.array(
+                [item.check(f"{name}[{i}]", value) for i, value in enumerate(numbers.tolist())]
+            )
+    if not known:
+        raise InputError(f"points with {', '.join(columns)}: none of these is a parameter")
+    lengths = {name: values.size for name, values in (known | labels).items()}
+    if len(set(lengths.values())) > 1 or min(lengths.values()) == 0:
+        raise InputError(f"points of lengths {lengths}: must be equal, and at least one")
+    return PointList(known, labels)
+
+
+def _is_label(name: str) -> bool:
+    """Whether a column of a table of points is no parameter; refused if it looks as if it were meant to be one.
+
+    Raises
+    ------
+    InputError
+        For a parameter in a physical unit, and for a name that differs from a parameter's by a slip.
+    """
+    physical = physical_name(name)
+    if physical is not None:
+        ratio = lookup(PHYSICAL[physical].parameter).short
+        raise InputError(f"{name}: give {ratio}, which snapbeam.config.from_physical makes of it")
+    table = parameters()
+    known = [*table, *short_names(), *(full.partition(".")[2] for full in table)]
+    if name in known:
+        return False
+    try:
+        lookup(name)
+    except InputError:
+        close = difflib.get_close_matches(name, known, 1, 0.85)
+        if close:
+            raise InputError(
+                f"{name}: no parameter; did you mean {close[0]!r}?  Give a column that is only a label another name"
+            ) from None
+        return True
+    return False
+
+
+def _length(columns: Mapping[str, NDArray[Any]]) -> int:
+    return max((values.size for values in columns.values() if values.ndim == 1), default=1)
+
+
+def _labels(row: Parameter) -> dict[str, Any]:
+    return {"units": row.quantity.unit, "long_name": row.quantity.words, "parameter": row.name}
+
+
+def _coordinate(row: Parameter, values: NDArray[Any]) -> tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]:
+    return (row.short,), values, _labels(row)

@@ -1,0 +1,322 @@
+"""A sweep before it is computed: the system, its points and how each run is integrated, checked once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.config.parameters import lookup
+from snapbeam.core.codes import ResponseClass, RunStatus
+from snapbeam.core.findings import tell
+from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.engines.answer import statistics_of
+from snapbeam.engines.assemble import make_ensemble, plans_of, run_columns
+from snapbeam.engines.outcomes import STATISTICS
+from snapbeam.engines.plan import Plan
+from snapbeam.engines.registry import resolve
+from snapbeam.model.drive import Recorded
+from snapbeam.model.integration import Integration
+from snapbeam.model.quantity import quantities
+from snapbeam.model.start import started
+from snapbeam.model.state import State
+from snapbeam.model.system import System
+from snapbeam.runs.describe import attributes_of
+from snapbeam.runs.save import code_flags
+from snapbeam.sweeps.checks import findings_of, require_every_structure, require_parameters
+from snapbeam.sweeps.points import Columns, Grid, Points, points_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Progress", "SweepSetup", "sweep_setup", "variable_attributes"]
+
+Progress = Callable[[int, int], object]
+
+TITLE = "map of the response of a struck bistable beam"
+_ALWAYS = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
+"""Parameters that every map says, swept or not."""
+
+
+@dataclass(frozen=True, eq=False)
+class SweepSetup:
+    """A sweep that makes sense."""
+
+    system: System
+    integration: Integration
+    """With the engine resolved."""
+    points: Points
+
+    def with_points(self, points: Points) -> SweepSetup:
+        """The same sweep over other points."""
+        return SweepSetup(self.system, self.integration, points)
+
+    def march(
+        self,
+        columns: Columns,
+        threads: int | None = None,
+        progress: Progress | None = None,
+        *,
+        start: Callable[[System, State | None], State] | None = None,
+        step_factor: float = 1.0,
+    ) -> dict[str, NDArray[Any]]:
+        """Integrate runs and return their statistics, arrays of shape (runs,) by name.
+
+        What a run gives depends on its own point alone, not on what it is marched with.
+
+        Parameters
+        ----------
+        columns : dict of str to array of shape (runs,)
+            The points.
+        threads, progress
+            As for an engine.
+        start : callable, optional
+            ``start(system, state) -> State``: where the runs of a system begin instead; *state* is where the
+            points say, None if they say nothing of it.
+        step_factor : float
+            Times the length of every step.
+        """
+        total = next(iter(columns.values())).size
+        found: dict[str, NDArray[Any]] = {}
+        done = 0
+        for system, integration, which, points in self.groups(columns):
+            state = self.start_of(system, points)
+            if start is not None:
+                state = start(system, state)
+            own = {name: values for name, values in points.items() if not name.startswith("start.")}
+            for part in _alike(system, state, which.size):
+                columns_of_part = {name: values[part] for name, values in own.items()}
+                begun = state[part] if state is not None and state.batch else state
+                ensemble = make_ensemble(
+                    system, integration, columns_of_part, start=begun, step_factor=step_factor
+                )
+
+                def report(inside: int, _: int, before: int = done) -> None:
+                    if progress is not None:
+                        progress(before + inside, total)
+
+                engine = resolve(
+                    integration.engine,
+                    modes=system.model.modes,
+                    law=ensemble.law,
+                    drive=ensemble.drive,
+                )[1]
+                books = engine.run_ensemble(ensemble, threads, report)
+                for name, values in statistics_of(ensemble, books).items():
+                    found.setdefault(name, np.zeros(total, dtype=values.dtype))[which[part]] = values
+                done += part.size
+        return found
+
+    def groups(
+        self, columns: Columns
+    ) -> Iterator[tuple[System, Integration, NDArray[np.int64], dict[str, NDArray[np.float64]]]]:
+        """The points by structure: a system, an integration, which points, and what differs among them."""
+        structural = [name for name in columns if not lookup(name).is_run]
+        own = [name for name in columns if name not in structural]
+        total = next(iter(columns.values())).size
+        if not structural:
+            points = {name: np.asarray(columns[name], dtype=np.float64) for name in own}
+            yield self.system, self.integration, np.arange(total), points
+            return
+        keys: dict[tuple[Any, ...], list[int]] = {}
+        for i, key in enumerate(zip(*(columns[name].tolist() for name in structural), strict=True)):
+            keys.setdefault(key, []).append(i)
+        for key, members in keys.items():
+            which = np.array(members)
+            changes = dict(zip(structural, key, strict=True))
+            try:
+                system, integration = self.neighbour(changes)
+            except InputError as error:
+                where = ", ".join(f"{name} = {value}" for name, value in changes.items())
+                raise InputError(f"at {where}: {error}") from None
+            points = {name: np.asarray(columns[name][which], dtype=np.float64) for name in own}
+            yield system, integration, which, points
+
+    def neighbour(self, changes: dict[str, Any]) -> tuple[System, Integration]:
+        """The system and the integration with some parameters of their structure changed."""
+        of_run = {name[4:]: value for name, value in changes.items() if name.startswith("run.")}
+        of_system = {name: value for name, value in changes.items() if not name.startswith("run.")}
+        system = self.system.replace(**of_system) if of_system else self.system
+        return system, self.integration.replace(**of_run) if of_run else self.integration
+
+    @staticmethod
+    def start_of(system: System, points: dict[str, NDArray[np.float64]]) -> State | None:
+        """Where runs of a system begin, if the points say something of it."""
+        own = {name[6:]: values for name, values in points.items() if name.startswith("start.")}
+        return started(system.model, system.striker, system.start, own) if own else None
+
+    @cached_property
+    def plan(self) -> Plan:
+        """Steps of the system as it stands."""
+        return plans_of(self.system, self.integration, run_columns(self.system, {}))[0]
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """What every map says of the drive and the striker, where it is not swept, by dotted name."""
+        parameters = self.system.parameters
+        return {
+            name: parameters[name] for name in _ALWAYS if name in parameters and name not in self.points.names
+        }
+
+    @property
+    def structural(self) -> list[str]:
+        """What differs among the points and changes the frequencies, the length scale or the steps."""
+        return [
+            name
+            for name in self.points.names
+            if name.startswith(("beam.", "model.", "run.step", "run.accuracy"))
+        ]
+
+    def identity(self) -> dict[str, Any]:
+        """Everything that the numbers depend on, plain: what two sweeps must share to be one."""
+        integration = {
+            name: getattr(self.integration, name) for name in quantities(Integration) if name != "threads"
+        }
+        return {
+            "system": self.system.to_mapping(),
+            "integration": integration,
+            "points": self.points.describe(),
+            "step": self.plan.step,
+        }
+
+    def attributes(self, title: str = TITLE, more: dict[str, Any] | None = None) -> dict[str, Any]:
+        """The attributes of a file: a title, every parameter, and what made it."""
+        own: dict[str, Any] = {
+            "cycles": self._cycles(),
+            "engine": self.integration.engine,
+            "early_decision": int(self.integration.early_decision),
+        }
+        if self.system.striker is not None:
+            own["side"] = self.system.striker.side
+        own |= {lookup(name).short: value for name, value in self.fixed.items()}
+        more = own | (more or {})
+        attrs = attributes_of(title, self.system, self.integration, self.plan, more, self.points.describe())
+        varied = {lookup(name).short for name in self.points.names}
+        if self.structural:
+            varied |= {
+                "reference_freq",
+                "step",
+                "longest_contact_step",
+                "shortest_contact_step",
+                "length_scale",
+            }
+        beam = self.system.model.beam
+        if beam is not None and any(name.startswith("beam.") for name in self.points.names):
+            # the one of the two that follows from the other follows anew at every point
+            pair = {"beam.buckling_level", "beam.axial_load"}
+            given = pair & set(self.points.names) or {f"beam.{beam.given}"}
+            varied |= {lookup(name).short for name in pair - given}
+        for name in varied:
+            attrs.pop(name, None)
+        return attrs
+
+    def _cycles(self) -> float:
+        """Cycles of each run; those of the record, if it is marched to its end."""
+        drive = None if self.system.striker is None else self.system.striker.drive
+        if isinstance(drive, Recorded) and self.integration.cycles is None:
+            return round(drive.duration * drive.frequency, 9)
+        return self.integration.cycles_or_default
+
+    def coordinates(self) -> dict[str, Any]:
+        """Coordinates of a dataset: dimensions, what holds throughout, and what goes with the structure."""
+        coords = self.points.coordinates()
+        for name, value in self.fixed.items():
+            row = lookup(name)
+            coords[row.short] = ((), value, {"units": row.quantity.unit, "long_name": row.quantity.words})
+        if self.structural:
+            coords |= self._of_structure()
+        return coords
+
+    def _of_structure(self) -> dict[str, Any]:
+        """Frequency and length that normalise, and step, over what changes them."""
+        names = self.structural
+        if isinstance(self.points, Grid):
+            axes = [self.points.axes[name] for name in names]
+            dims, shape = tuple(lookup(name).short for name in names), tuple(values.size for values in axes)
+            columns = dict(zip(names, np.meshgrid(*axes, indexing="ij"), strict=True))
+        else:
+            dims, shape = self.points.dims, self.points.shape
+            columns = {name: self.points.columns[name] for name in names}
+        table = np.empty((3, *shape))
+        made: dict[tuple[Any, ...], tuple[float, float, float]] = {}
+        for at in np.ndindex(shape):
+            key = tuple(columns[name][at].item() for name in names)
+            if key not in made:
+                system, integration = self.neighbour(dict(zip(names, key, strict=True)))
+                plan = plans_of(system, integration, run_columns(system, {}))[0]
+                made[key] = system.model.reference_freq, plan.step, system.scale.length
+            table[(slice(None), *at)] = made[key]
+        labels = {
+            "reference_freq": ("Hz", "frequency that Omega and V are normalised by"),
+            "step": ("s", "step in free flight"),
+            "length_scale": ("m", "length that displacements are normalised by"),
+        }
+        return {
+            name: (dims, values, {"units": unit, "long_name": words})
+            for (name, (unit, words)), values in zip(labels.items(), table, strict=True)
+            if name not in dims and name not in self.points.coordinates()
+        }
+
+    def dataset(self, statistics: dict[str, NDArray[Any]]) -> xr.Dataset:
+        """The statistics of every point as a labelled map."""
+        import xarray as xr
+
+        dataset = xr.Dataset(coords=self.coordinates(), attrs=self.attributes())
+        for name, values in statistics.items():
+            dataset[name] = (self.points.dims, self.points.arranged(values), variable_attributes(name))
+        return dataset
+
+
+def sweep_setup(system: System, axes: Any, integration: Integration | None = None) -> SweepSetup:
+    """Check what is asked of a sweep; the parameters are those of :func:`snapbeam.sweep`."""
+    if not isinstance(system, System):
+        raise InputTypeError(f"system = {system!r}: must be a System")
+    integration = Integration() if integration is None else integration
+    if not isinstance(integration, Integration):
+        raise InputTypeError(f"integration = {integration!r}: must be an Integration")
+    if integration.tolerance is not None:
+        raise InputError(
+            f"tolerance = {integration.tolerance:g}: is for one run; give a sweep a step, or accuracy = 'reference'"
+        )
+    points = axes if isinstance(axes, Points) else points_of(axes)
+    require_parameters(system, points)
+    law = type(system.contact) if system.contact is not None else None
+    resolved = resolve(
+        integration.engine,
+        runs=points.size,
+        cycles=integration.cycles_or_default,
+        modes=system.model.modes,
+        law=law,
+        **({} if system.striker is None else {"drive": type(system.striker.drive)}),
+    )[0]
+    setup = SweepSetup(system, integration.replace(engine=resolved), points)
+    require_every_structure(setup)
+    tell(findings_of(system, points))
+    return setup
+
+
+def _alike(system: System, state: State | None, runs: int) -> list[NDArray[np.int64]]:
+    """The runs that are marched together: of free beams, those that begin on the same side of the centre.
+
+    A free beam is seen from the well that it begins in, a struck one from its striker.
+    """
+    every = np.arange(runs)
+    if system.striker is not None or state is None or not state.batch:
+        return [every]
+    upper = state.amplitude @ system.model.center_shape > 0.0
+    return [part for part in (every[~upper], every[upper]) if part.size]
+
+
+def variable_attributes(name: str) -> dict[str, Any]:
+    """Unit and name in words of one variable of a map; for codes, what they mean."""
+    row = STATISTICS[name]
+    labels: dict[str, Any] = {"units": row.unit, "long_name": row.words}
+    if name == "response":
+        labels |= code_flags(ResponseClass)
+    elif name == "status":
+        labels |= code_flags(RunStatus)
+    return labels

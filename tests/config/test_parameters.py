@@ -1,0 +1,178 @@
+"""The one table of parameters: everything that can be set is in it once, with its unit, its limits and its words."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.config import lookup, parameters
+from snapbeam.config.parameters import Parameter, short_names
+from snapbeam.core.validate import InputError
+from snapbeam.model.contact import LAWS
+from snapbeam.model.drive import DRIVES
+from snapbeam.model.quantity import RUN, STRUCTURE, quantities
+from snapbeam.model.reduction import MODEL_QUANTITIES
+
+TABLE = parameters()
+CLASSES = {
+    "beam": [sb.Beam],
+    "striker": [sb.Striker],
+    "run": [sb.Integration],
+    "contact": list(LAWS.values()),
+    "drive": list(DRIVES.values()),
+}
+
+
+@pytest.mark.parametrize("section", CLASSES)
+def test_every_quantity_of_every_class_is_in_it(section: str) -> None:
+    found = {name for name in TABLE if name.startswith(f"{section}.")}
+    assert found == {f"{section}.{name}" for kind in CLASSES[section] for name in quantities(kind)}
+    for kind in CLASSES[section]:
+        for name, item in quantities(kind).items():
+            assert TABLE[f"{section}.{name}"].quantity == item
+            if section in ("contact", "drive"):
+                assert kind.name in TABLE[f"{section}.{name}"].kinds
+
+
+@pytest.mark.parametrize("section", CLASSES)
+def test_every_field_of_every_class_is_a_quantity(section: str) -> None:
+    """What a person can give to a class is in the table; but for the one of two that the other follows from."""
+    for kind in CLASSES[section]:
+        fields = {item.name for item in dataclasses.fields(kind) if item.init}
+        parts = {"drive"} if kind is sb.Striker else set()
+        assert fields - parts == set(quantities(kind)), kind
+
+
+def test_every_argument_of_a_model_of_a_beam_is_in_it() -> None:
+    asked = set(inspect.signature(sb.ReducedModel.from_beam).parameters) - {"beam"}
+    assert {f"model.{name}" for name in asked} == {name for name in TABLE if name.startswith("model.")}
+    assert {f"model.{name}" for name in MODEL_QUANTITIES} == {f"model.{name}" for name in asked}
+
+
+def test_a_system_has_no_parameter_beside_it() -> None:
+    system = sb.System(
+        sb.ReducedModel.from_beam(paper.BEAM, modes=2),
+        paper.CONTACT,
+        sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-4),
+    )
+    words = {"contact.law", "drive.kind"}
+    assert set(system.parameters) - words <= set(TABLE)
+
+
+def test_names_are_unique() -> None:
+    shorts = [row.short for row in TABLE.values()]
+    assert len(set(shorts)) == len(shorts) == len(TABLE)
+    assert short_names() == {row.short: name for name, row in TABLE.items()}
+    for name, row in TABLE.items():
+        assert row.name == name
+        assert row.short.isidentifier()
+        assert row.section == name.split(".")[0]
+
+
+def test_every_row_is_said_in_words() -> None:
+    for name, row in TABLE.items():
+        assert len(row.quantity.words) > 5, name
+        assert row.quantity.words[0].islower() or row.quantity.words.startswith("Young"), name
+        assert not row.quantity.words.endswith("."), name
+        assert row.quantity.unit, name
+        assert row.label.startswith(row.quantity.words[0].upper()), name
+        assert row.quantity.scope in (RUN, STRUCTURE)
+        assert row.limits or row.quantity.kind is object, name
+        if row.default is not None:
+            assert row.quantity.check(name, row.default) == row.default, name
+
+
+@pytest.mark.parametrize(
+    ("name", "label", "limits"),
+    [
+        ("beam.thickness", "Thickness in the direction of bending $h$ (m)", "(0, inf)"),
+        ("drive.velocity_amplitude", r"Velocity amplitude over b omega_1 $V$", "[0, inf)"),
+        ("striker.location", r"Location of the striker over the length $x_\mathrm{s}$", "(0, 1)"),
+        ("striker.side", "Side that the striker pushes from", "below or above"),
+        ("model.modes", "Number of buckling modes $N$", "[1, 256]"),
+        ("model.damping_ratio", r"Damping ratio of every linear mode $\zeta$", "[0, 1)"),
+        ("contact.stiffness", "Contact stiffness $k_c$ (N/m$^{1.5}$)", "(0, inf)"),
+        ("beam.density", r"Mass density $\rho$ (kg/m$^{3}$)", "(0, inf)"),
+        ("contact.coefficient", "Coefficient of restitution $e$", "[0, 1]"),
+        ("run.early_decision", "Whether a run ends once its response class is certain", "true or false"),
+    ],
+)
+def test_label_and_limits(name: str, label: str, limits: str) -> None:
+    assert (TABLE[name].label, TABLE[name].limits) == (label, limits)
+
+
+@pytest.mark.parametrize(
+    ("asked", "name"),
+    [
+        ("beam.thickness", "beam.thickness"),
+        ("beam_thickness", "beam.thickness"),
+        ("thickness", "beam.thickness"),
+        ("frequency_ratio", "drive.frequency_ratio"),
+        ("modes", "model.modes"),
+        ("contact_stiffness", "contact.stiffness"),
+        ("stiffness", "contact.stiffness"),
+        ("restitution_coefficient", "contact.coefficient"),
+        ("location", "striker.location"),
+        ("step", "run.step"),
+        ("frequency", "drive.frequency"),
+        ("start.amplitude[3]", "start.amplitude[3]"),
+        ("start.velocity[1]", "start.velocity[1]"),
+        ("start_striker_position", "start.striker_position"),
+    ],
+)
+def test_looked_up_by_any_of_its_names(asked: str, name: str) -> None:
+    assert lookup(asked).name == name
+
+
+@pytest.mark.parametrize("name", [name for name in TABLE if name != "drive.displacement"])
+def test_looked_up_by_its_own_and_its_short_name(name: str) -> None:
+    assert lookup(name) == TABLE[name]
+    assert lookup(TABLE[name].short) == TABLE[name]
+
+
+def test_starts_are_parameters_of_runs() -> None:
+    row = lookup("start.amplitude[2]")
+    assert isinstance(row, Parameter)
+    assert row.is_run
+    assert row.short == "start_amplitude_2"
+    assert "mode 2" in row.label
+    assert lookup("start.striker_position").quantity.unit == "m"
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("beam.thicknes", "did you mean 'beam.thickness'"),
+        ("start.amplitude[0]", "no parameter"),
+        ("", "no parameter"),
+        (3, "must be a name, such as 'drive.frequency_ratio'"),
+    ],
+)
+def test_unknown_names(name, message) -> None:
+    with pytest.raises(InputError, match=message):
+        lookup(name)
+
+
+def test_scopes_are_what_an_ensemble_shares() -> None:
+    """Whatever is of scope run may differ inside one ensemble; the engines take it as a column."""
+    from snapbeam.engines.assemble import run_columns
+
+    laws = {"stiffness": paper.CONTACT, "coefficient": sb.Restitution(0.5)}
+    for name, row in TABLE.items():
+        if not row.is_run:
+            continue
+        law = laws.get(name.partition(".")[2], paper.CONTACT)
+        system = sb.System(
+            sb.ReducedModel.from_beam(paper.BEAM, modes=1),
+            law,
+            sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1),
+        )
+        columns = run_columns(system, {name: np.array([0.1, 0.2, 0.3])})
+        assert columns[name].tolist() == [0.1, 0.2, 0.3]
+    with pytest.raises(InputError, match=r"beam\.thickness: no parameter that may differ between the runs"):
+        run_columns(system, {"beam.thickness": np.array([1e-4, 2e-4])})

@@ -1,0 +1,160 @@
+"""Compiled code is kept under a fingerprint of everything that it bakes in."""
+
+from __future__ import annotations
+
+import importlib
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import snapbeam
+from snapbeam.engines.scalar import fingerprint as marking
+from snapbeam.engines.scalar.fingerprint import fingerprint
+from snapbeam.model.contact import HertzContact, Restitution
+from snapbeam.model.drive import Recorded, Sine
+
+PACKAGE = Path(snapbeam.__file__).parent
+
+
+@pytest.fixture
+def copy(tmp_path, monkeypatch) -> Path:
+    """A copy of the package whose fingerprint is taken; caches of this process are left as they were."""
+    there = tmp_path / "snapbeam"
+    shutil.copytree(PACKAGE, there, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(marking, "_PACKAGE", there)
+    yield there
+    monkeypatch.undo()
+    marking._package_mark.cache_clear()
+    fingerprint.cache_clear()
+
+
+def mark(kinds: tuple[type, ...] = (HertzContact, Sine)) -> str | None:
+    marking._package_mark.cache_clear()
+    fingerprint.cache_clear()
+    return fingerprint(kinds)
+
+
+def changed(path: Path) -> str | None:
+    """The fingerprint with a file changed, which then is as it was."""
+    before = path.read_bytes()
+    path.write_bytes(before + b"\n# a change\n")
+    found = mark()
+    path.write_bytes(before)
+    return found
+
+
+def test_every_file_of_the_engines_and_the_codes_is_in_it(copy) -> None:
+    """A status that is renumbered, a step that is rewritten, in whichever subfolder: another fingerprint."""
+    first = mark()
+    files = [copy / "core" / "codes.py", *sorted((copy / "engines").rglob("*.py"))]
+    assert len(files) > 35
+    assert {path.parent.name for path in files} == {"core", "engines", "cpu", "cuda", "scalar"}
+    marks = {changed(path) for path in files}
+    assert first not in marks
+    assert len(marks) == len(files)
+    assert mark() == first
+
+
+def test_a_file_more_is_another_fingerprint(copy) -> None:
+    first = mark()
+    (copy / "engines" / "cpu" / "more.py").write_text("")
+    assert mark() != first
+
+
+def test_what_no_kernel_bakes_in_is_not_in_it(copy) -> None:
+    """A change of a label costs nobody a compilation."""
+    first = mark()
+    for name in ("core/findings.py", "model/system.py", "runs/simulate.py", "cli/app.py", "figures/style.py"):
+        assert changed(copy / name) == first
+
+
+def test_laws_and_drives_have_their_own(copy) -> None:
+    marks = [
+        mark(kinds)
+        for kinds in (
+            (HertzContact, Sine),
+            (Restitution, Sine),
+            (HertzContact, Recorded),
+            (Restitution, Recorded),
+        )
+    ]
+    assert None not in marks
+    assert len(set(marks)) == 4
+
+
+LAW = """
+from dataclasses import dataclass
+from snapbeam.model.contact import ContactLaw
+from snapbeam.model.quantity import RUN, quantity
+
+@dataclass(frozen=True)
+class Spring(ContactLaw):
+    stiffness: float = quantity("N/m", "stiffness", low=0.0, scope=RUN)
+    {more}
+
+    @staticmethod
+    def force(law, penetration):
+        return {factor} * law.stiffness * penetration
+"""
+
+
+def law_of(folder: Path, text: str) -> type:
+    """The law in a file of somebody's, read anew."""
+    (folder / "somebodys_law.py").write_text(text)
+    sys.modules.pop("somebodys_law", None)
+    importlib.invalidate_caches()
+    shutil.rmtree(folder / "__pycache__", ignore_errors=True)
+    return importlib.import_module("somebodys_law").Spring
+
+
+def test_a_law_of_somebody_is_marked_by_what_it_computes(tmp_path, monkeypatch) -> None:
+    """Its force, a constant and a function that the force reads; not a comment beside them."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    plain = LAW.format(factor="1.0", more="")
+    first = fingerprint((law_of(tmp_path, plain), Sine))
+    assert first is not None
+    assert fingerprint((law_of(tmp_path, plain + "\n# a comment\n"), Sine)) == first
+    assert fingerprint((law_of(tmp_path, LAW.format(factor="2.0", more="")), Sine)) != first
+    marks = [
+        fingerprint((law_of(tmp_path, f"FACTOR = {value}\n" + LAW.format(factor="FACTOR", more="")), Sine))
+        for value in (1.0, 2.0)
+    ]
+    called = [
+        fingerprint(
+            (
+                law_of(
+                    tmp_path, f"def twice():\n    return {value}\n" + LAW.format(factor="twice()", more="")
+                ),
+                Sine,
+            )
+        )
+        for value in (1.0, 2.0)
+    ]
+    found = [first, *marks, *called]
+    assert None not in found and len(set(found)) == 5
+
+
+def test_a_statistic_of_somebody_is_never_kept() -> None:
+    """It stands for functions from anywhere; two of them must not share a kernel."""
+    from snapbeam.engines.outcomes import Statistic, register, withdraw
+    from snapbeam.engines.scalar.extras import extras_of_table
+
+    assert fingerprint((HertzContact, Sine, type(extras_of_table()).owner)) is not None
+    register(Statistic("own", "float64", "s", "time marched", lambda r, h: h, update=lambda held, step: held))
+    try:
+        assert fingerprint((HertzContact, Sine, type(extras_of_table()).owner)) is None
+    finally:
+        withdraw("own")
+
+
+def test_a_law_typed_at_a_prompt_is_never_kept() -> None:
+    """Its source cannot be read, so nothing tells two of them apart."""
+    code = LAW.format(factor="1.0", more="") + (
+        "\nfrom snapbeam.engines.scalar.fingerprint import fingerprint\n"
+        "from snapbeam.model.drive import Sine\nprint(fingerprint((Spring, Sine)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "None\n"

@@ -1,0 +1,66 @@
+"""Kernels that are loaded from disk side by side do not run each other's code."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+from snapbeam.engines.outcomes import Statistic, register, withdraw
+from snapbeam.engines.scalar.extras import extras_of_table
+from snapbeam.model.contact import LAWS, ContactLaw
+from snapbeam.model.drive import DRIVES
+
+PROGRAM = """
+import json, sys
+import snapbeam as sb
+from snapbeam import paper
+
+model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.001)
+shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3)
+laws = {"hertz": paper.CONTACT, "plastic": sb.Restitution(0.0), "elastic": sb.Restitution(0.9)}
+found = {}
+for name in sys.argv[1:]:
+    system, asked = sb.System(model, laws[name], shaker), sb.Integration(cycles=3)
+    run = sb.simulate(system, asked, sample_times=[0.0])
+    ds = sb.sweep(system, {"velocity_amplitude": [0.3]}, asked)
+    found[name] = [repr(dict(run.outcome)), repr({str(k): v.item() for k, v in ds.data_vars.items()})]
+print(json.dumps(found))
+"""
+
+
+def told(*laws: str) -> dict[str, list[str]]:
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *laws], capture_output=True, text=True, check=True, timeout=500
+    )
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_a_law_gives_what_it_gives_alone() -> None:
+    """Each law in a process of its own, then together, their code loaded from disk."""
+    alone = told("hertz") | told("plastic", "elastic")
+    together = told("hertz", "plastic", "elastic")
+    for name, said in alone.items():
+        assert together[name] == said, name
+
+
+def test_types_of_numbers_are_named_apart() -> None:
+    """Compiled code is linked by names: those of every law and drive differ, and of a law that was read anew."""
+    kinds = [kind.numbers_type() for kind in (*LAWS.values(), *DRIVES.values())]
+    before = type(extras_of_table())
+    register(Statistic("own", "float64", "s", "time marched", lambda r, h: h, update=lambda held, step: held))
+    try:
+        kinds += [before, type(extras_of_table())]
+    finally:
+        withdraw("own")
+
+    def law() -> type[ContactLaw]:
+        class Somebodys(ContactLaw):
+            pass
+
+        return Somebodys
+
+    from snapbeam.model.numbers import numbers_type
+
+    kinds += [numbers_type(law(), ("stiffness",)) for _ in range(2)]
+    assert len({kind.__name__ for kind in kinds}) == len(kinds)

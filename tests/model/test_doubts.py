@@ -1,0 +1,115 @@
+"""What is doubtful about a system: found once, said once, with the figures."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.core import findings
+
+SHAKER = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1)
+
+
+@pytest.fixture(autouse=True)
+def nothing_told(monkeypatch):
+    monkeypatch.setattr(findings, "_told", set())
+
+
+def system(beam: sb.Beam = paper.BEAM, modes: int = 1, **drive) -> sb.System:
+    model = sb.ReducedModel.from_beam(beam, modes)
+    given = {"frequency_ratio": 1.2, "velocity_amplitude": 0.1} | drive
+    return sb.System(model, paper.CONTACT, sb.Shaker(**given))
+
+
+def codes(of: sb.System) -> list[str]:
+    return [finding.code for finding in of.findings()]
+
+
+def deep(level: float) -> sb.Beam:
+    """Buckled by *level* radii of gyration."""
+    return paper.BEAM.replace(buckling_level=level * paper.BEAM.radius_of_gyration)
+
+
+def test_the_papers_own_system_is_beyond_doubt() -> None:
+    for modes in (1, 32):
+        assert codes(system(modes=modes)) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "words"),
+    [
+        ({"density": 7.8}, "implausible-size", r"beam\.density = 7\.8 kg/m\^3.*is it given in g/cm\^3\?"),
+        ({"length": 161.0}, "implausible-size", r"beam\.length = 161 m.*is it given in mm\?"),
+        ({"young_modulus": 200.0}, "implausible-size", r"young_modulus = 200 Pa.*is it given in GPa\?"),
+        ({"width": 0.2}, "implausible-size", r"width = 0\.2 m is not less than beam\.length = 0\.161 m"),
+        ({"buckling_level": 0.03}, "not-shallow", "slope of 0.59: the model takes the displacement as small"),
+        ({"thickness": 0.03, "buckling_level": 1e-3}, "not-slender", "thickness is 0.19 of the length"),
+    ],
+)
+def test_beams(changes, code: str, words: str) -> None:
+    import re
+
+    found = {finding.code: finding for finding in system(paper.BEAM.replace(**changes)).findings()}
+    assert re.search(words, found[code].words), found[code].words
+
+
+def test_a_first_mode_that_a_striker_at_the_centre_cannot_excite() -> None:
+    """Above b/r = 6.21 the lowest mode about a well is antisymmetric."""
+    assert "first-mode-antisymmetric" not in codes(system(deep(6.20), modes=32))
+    assert "first-mode-antisymmetric" in codes(system(deep(6.22), modes=32))
+    (found,) = [f for f in system(deep(6.3), modes=4).findings() if f.code == "first-mode-antisymmetric"]
+    model = sb.ReducedModel.from_beam(deep(6.3), 4)
+    assert found.numbers["symmetric_freq"] == pytest.approx(float(model.natural_freq[model.parity > 0][0]))
+    assert found.numbers["symmetric_freq"] > model.reference_freq
+    assert "set model.reference_freq" in found.words
+    # what it advises settles it
+    advised = system(deep(6.3), modes=4).replace(**{"model.reference_freq": found.numbers["symmetric_freq"]})
+    assert codes(advised) == []
+    # one mode is the symmetric one
+    assert codes(system(deep(6.3), modes=1)) == []
+
+
+def test_drives_that_look_like_another_unit() -> None:
+    assert codes(system(frequency_ratio=100.0)) == ["ratio-like-hertz"]
+    assert "is it given in Hz?" in system(frequency_ratio=100.0).findings()[0].words
+    assert codes(system(velocity_amplitude=31.0)) == ["amplitude-like-speed"]
+    assert codes(system(frequency_ratio=19.9, velocity_amplitude=19.9)) == []
+
+
+def told(call) -> list[str]:
+    with warnings.catch_warnings(record=True) as seen:
+        warnings.simplefilter("always")
+        call()
+    return [str(each.message) for each in seen if issubclass(each.category, sb.PlausibilityWarning)]
+
+
+def test_told_once_and_where_the_caller_stands() -> None:
+    odd = system(paper.BEAM.replace(density=7.8))
+    asked = sb.Integration(cycles=1)
+
+    def run() -> None:
+        sb.simulate(odd, asked, sample_times=[0.0])
+
+    with pytest.warns(sb.PlausibilityWarning, match=r"beam\.density = 7\.8") as seen:
+        run()
+    assert [str(each.message) for each in seen] == [odd.findings()[0].words]
+    assert seen[0].filename == __file__
+    assert told(run) == []
+    assert told(lambda: sb.sweep(odd, {"frequency_ratio": [1.0, 1.1]}, asked)) == []
+    other = odd.replace(**{"beam.density": 7.7})
+    assert len(told(lambda: sb.sweep(other, {"frequency_ratio": [1.0, 1.1]}, asked))) == 1
+    assert told(lambda: sb.simulate(other, asked, sample_times=[0.0])) == []
+
+
+def test_axes_are_doubted_too() -> None:
+    """A sweep of frequencies given in Hz, and of a level at whose end the first mode is antisymmetric."""
+    asked = sb.Integration(cycles=1)
+    said = told(lambda: sb.sweep(system(), {"frequency_ratio": [50.0, 100.0]}, asked))
+    assert len(said) == 2 and all("is it given in Hz?" in each for each in said)
+    levels = paper.BEAM.radius_of_gyration * np.array([3.0, 6.3])
+    said = told(lambda: sb.sweep(system(modes=2), {"beam.buckling_level": levels}, asked))
+    assert len(said) == 1 and "antisymmetric" in said[0]

@@ -1,0 +1,133 @@
+"""States, and starts named in numbers that people use."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.model.start import amplitude_scale, rest_state, started
+
+MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+BELOW, ABOVE = (
+    sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1, side=side).striker() for side in ("below", "above")
+)
+
+
+def test_what_is_not_given() -> None:
+    state = sb.State(amplitude=[1.0, 2.0])
+    assert (state.modes, state.batch) == (2, ())
+    np.testing.assert_array_equal(state.velocity, [0.0, 0.0])
+    assert math.isnan(state.phase) and math.isnan(state.striker_position) and math.isnan(state.contact_time)
+    with pytest.raises(ValueError):
+        state.amplitude[0] = 3.0
+
+
+def test_a_batch_and_its_states() -> None:
+    amplitude = np.arange(24.0).reshape(2, 4, 3)
+    batch = sb.State(amplitude=amplitude, phase=[0.0, 1.0, 2.0, 3.0], striker_position=1e-4)
+    assert (batch.batch, batch.modes) == ((2, 4), 3)
+    one = batch[1, 2]
+    assert one.batch == ()
+    np.testing.assert_array_equal(one.amplitude, amplitude[1, 2])
+    assert (float(one.phase), float(one.striker_position)) == (2.0, 1e-4)
+    assert batch[0].batch == (4,)
+    flat = batch.flat()
+    assert flat.batch == (8,)
+    np.testing.assert_array_equal(flat.amplitude, amplitude.reshape(8, 3))
+    np.testing.assert_array_equal(flat.phase, [0.0, 1.0, 2.0, 3.0] * 2)
+    assert one.flat().batch == (1,)
+    with pytest.raises(InputError, match=r"state\[0\]: this is one state, not a batch"):
+        one[0]
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "message"),
+    [
+        ({"amplitude": 1.0}, InputError, r"state amplitude = 1: must be an array of shape \(\.\.\., modes\)"),
+        ({"amplitude": [1.0, np.nan]}, InputError, r"state amplitude\[1\] = .*nan.*: must be finite"),
+        ({"amplitude": ["a"]}, InputTypeError, "state amplitude = .*must be an array of numbers"),
+        (
+            {"amplitude": [1.0, 2.0], "velocity": [1.0]},
+            InputError,
+            r"state velocity of shape \(1,\): must have shape \(2,\)",
+        ),
+        (
+            {"amplitude": [1.0], "phase": np.inf},
+            InputError,
+            "state phase = inf: must be finite numbers, or NaN",
+        ),
+        ({"amplitude": [1.0], "phase": "late"}, InputError, "state phase = 'late': must be finite numbers"),
+        (
+            {"amplitude": np.zeros((4, 1)), "phase": [0.0, 1.0]},
+            InputError,
+            r"state phase of shape \(2,\): must have the shape \(4,\) of the batch",
+        ),
+    ],
+)
+def test_refusals(given, error, message) -> None:
+    with pytest.raises(error, match=message):
+        sb.State(**given)
+
+
+def test_more_modes_are_still_and_none_that_moves_is_lost() -> None:
+    state = sb.State(
+        amplitude=[[1.0, 0.5, 0.0]], velocity=[[0.0, 0.0, 0.0]], phase=0.3, striker_position=1e-4
+    )
+    more = state.with_modes(5)
+    np.testing.assert_array_equal(more.amplitude, [[1.0, 0.5, 0.0, 0.0, 0.0]])
+    assert float(more.phase[0]) == 0.3 and float(more.striker_position[0]) == 1e-4
+    np.testing.assert_array_equal(more.with_modes(2).amplitude, [[1.0, 0.5]])
+    with pytest.raises(InputError, match="modes = 1: a state of 5 modes cannot be cut to fewer without loss"):
+        more.with_modes(1)
+
+
+# ---------------------------------------------------------------------- starts
+
+
+def test_rest_is_in_the_well_that_the_striker_pushes_away_from() -> None:
+    np.testing.assert_array_equal(rest_state(MODEL, BELOW).amplitude, MODEL.equilibrium)
+    np.testing.assert_array_equal(rest_state(MODEL, ABOVE).amplitude, -MODEL.equilibrium)
+    np.testing.assert_array_equal(rest_state(MODEL).amplitude, MODEL.equilibrium)
+
+
+def test_amplitudes_are_counted_in_that_of_the_well() -> None:
+    scale = amplitude_scale(MODEL)
+    assert scale == pytest.approx(abs(MODEL.equilibrium[0]), rel=1e-14)
+    state = started(MODEL, BELOW, None, {"amplitude[1]": 0.5, "velocity[2]": 0.1, "striker_position": 2e-4})
+    np.testing.assert_allclose(state.amplitude, [0.5 * scale, 0.0, 0.0], rtol=1e-14)
+    np.testing.assert_allclose(state.velocity, [0.0, 0.1 * scale * MODEL.omega[0], 0.0], rtol=1e-12)
+    assert float(state.striker_position) == 2e-4
+    # the centre of the upper well: amplitude[1] = 1 is b up
+    up = started(MODEL, BELOW, None, {"amplitude[1]": 1.0})
+    assert float(MODEL.center_shape @ up.amplitude) == pytest.approx(paper.BEAM.buckling_level, rel=1e-12)
+    # of a structure with one well: what moves the centre by the length scale
+    spring = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[2.0], length_scale=3.0)
+    assert amplitude_scale(spring) == 1.5
+
+
+def test_a_start_changes_only_what_is_named() -> None:
+    given = sb.State(amplitude=[1e-3, 2e-3, 3e-3], velocity=[0.1, 0.2, 0.3], phase=0.4)
+    state = started(MODEL, BELOW, given, {"velocity[3]": [0.0, 1.0]})
+    assert state.batch == (2,)
+    np.testing.assert_array_equal(state.amplitude, [[1e-3, 2e-3, 3e-3]] * 2)
+    np.testing.assert_array_equal(state.velocity[:, :2], [[0.1, 0.2]] * 2)
+    assert state.velocity[0, 2] == 0.0 and state.velocity[1, 2] > 0.0
+    np.testing.assert_array_equal(state.phase, [0.4, 0.4])
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("amplitude[4]", r"start\.amplitude\[4\]: mode = 4: must be an integer in \[1, 3\]"),
+        ("amplitude[0]", r"start\.amplitude\[0\]: no parameter of a start; must be amplitude\[i\]"),
+        ("position", r"start\.position: no parameter of a start"),
+    ],
+)
+def test_starts_that_are_none(name: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        started(MODEL, BELOW, None, {name: 1.0})

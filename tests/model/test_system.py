@@ -1,0 +1,322 @@
+"""A system: one value that describes itself, hashes, saves and reads back equal, and changes by dotted name."""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.core.validate import InputError, InputTypeError
+
+MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
+PLAIN = sb.System(MODEL, paper.CONTACT, SHAKER)
+
+
+def record(samples: int = 400, last: float = 0.0) -> sb.RecordedDrive:
+    """A sine of 600 rad/s, its last sample shifted a little."""
+    t = np.arange(samples) / 20_000.0
+    displacement = 1e-4 * np.sin(600.0 * t)
+    displacement[-1] += last
+    return sb.RecordedDrive(
+        displacement=displacement, velocity=0.06 * np.cos(600.0 * t), sampling_freq=20_000.0, frequency=95.0
+    )
+
+
+def start(**changes) -> sb.State:
+    given = {"amplitude": 0.9 * MODEL.equilibrium, "velocity": np.array([1e-3, 0.0, 0.1])}
+    return sb.State(**(given | changes))
+
+
+BY_MATRICES = sb.ReducedModel.from_matrices(
+    [[1.0, 0.1], [0.1, 2.0]],
+    [-4.0, 3.0],
+    contact_shape=[1.0, 1.0],
+    tension_stiffness=4.0,
+    equilibrium=[-1.0, 0.0],
+    damping_ratio=[0.01, 0.02],
+)
+SYSTEMS = {
+    "plain": PLAIN,
+    "recorded": PLAIN.replace(striker=record()),
+    "start": PLAIN.replace(start=start(striker_position=1e-4, phase=0.3, contact_time=-1.0)),
+    "free": sb.System(MODEL, start=start()),
+    "matrices": sb.System(
+        BY_MATRICES,
+        sb.HertzContact(1e3),
+        sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, side="above"),
+    ),
+    "gap": PLAIN.replace(**{"striker.gap": -1e-4, "drive.phase": 1.0}),
+    "load": PLAIN.replace(**{"beam.axial_load": 36.0}),
+    "damping by mode": sb.System(
+        sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=[0.01, 0.02], reference_freq=80.0),
+        paper.CONTACT,
+        SHAKER,
+    ),
+    "restitution": sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=1), sb.Restitution(0.6), SHAKER),
+}
+
+
+# ---------------------------------------------------------------------- files
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_saved_and_read_back_equal(name: str, tmp_path) -> None:
+    system = SYSTEMS[name]
+    system.save(tmp_path / "system.toml")
+    assert [file.name for file in tmp_path.iterdir()] == ["system.toml"]
+    again = sb.System.load(tmp_path / "system.toml")
+    assert again == system
+    assert again.hash == system.hash
+    assert hash(again) == hash(system)
+    np.testing.assert_equal(again.to_mapping(), system.to_mapping())
+    np.testing.assert_array_equal(again.model.linear_modes, system.model.linear_modes)
+    assert sb.System.from_mapping(system.to_mapping()) == system
+    assert pickle.loads(pickle.dumps(system)) == system
+
+
+def test_what_is_read_back_runs_alike(tmp_path) -> None:
+    for name in ("start", "recorded", "restitution"):
+        SYSTEMS[name].save(tmp_path / "system.toml")
+        runs = [
+            sb.simulate(system, sb.Integration(cycles=1), sample_times=[0.0])
+            for system in (SYSTEMS[name], sb.System.load(tmp_path / "system.toml"))
+        ]
+        np.testing.assert_equal(dict(runs[0].outcome), dict(runs[1].outcome))
+        np.testing.assert_array_equal(runs[0].end.amplitude, runs[1].end.amplitude)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[bam]\n", r"\[bam\]: unknown section; must be one of beam, model"),
+        ("beam = 3\n", r"beam = 3: must be a section \[beam\]"),
+        ("[beam]\n", r"\[beam\] length, thickness, width, density, young_modulus: missing"),
+        ("[model]\nmodes = 3\n", r"\[model\] modes: unknown key; must be one of mass"),
+        ("[model]\nmass = [[1.0]]\n", r"\[model\] stiffness is missing: give it, or a section \[beam\]"),
+        ("[start]\nphase = 1.0\n", r"\[model\] mass is missing"),
+        ("[model\n", "is no TOML"),
+    ],
+)
+def test_files_that_are_no_system(tmp_path, text: str, message: str) -> None:
+    path = tmp_path / "system.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        sb.System.load(path)
+
+
+def test_files_that_cannot_be_used(tmp_path) -> None:
+    with pytest.raises(InputError, match="cannot be read, No such file"):
+        sb.System.load(tmp_path / "none.toml")
+    with pytest.raises(InputError, match=r"must end in \.toml"):
+        PLAIN.save(tmp_path / "system.json")
+    sections = PLAIN.to_mapping() | {"start": {"phase": 1.0}}
+    with pytest.raises(InputError, match=r"\[start\] amplitude: missing"):
+        sb.System.from_mapping(sections)
+    with pytest.raises(InputError, match=r"\[drive\] kind = None: must be one of 'recorded', 'sine'"):
+        sb.System.from_mapping({name: part for name, part in PLAIN.to_mapping().items() if name != "drive"})
+
+
+# ---------------------------------------------------------------------- identity
+
+
+CHANGES = {
+    "beam.length": 0.17,
+    "beam.thickness": 5e-4,
+    "beam.width": 0.02,
+    "beam.density": 7700.0,
+    "beam.young_modulus": 1.9e11,
+    "beam.buckling_level": 3e-4,
+    "beam.axial_load": 36.0,
+    "model.modes": 5,
+    "model.damping_ratio": 0.01,
+    "model.reference_freq": 80.0,
+    "contact.stiffness": 2e8,
+    "striker.location": 0.3,
+    "striker.side": "above",
+    "striker.gap": 1e-5,
+    "drive.frequency_ratio": 1.3,
+    "drive.velocity_amplitude": 0.2,
+    "drive.phase": 0.5,
+    "start.amplitude[1]": -0.9,
+    "start.velocity[2]": 0.1,
+    "start.striker_position": 1e-4,
+    "start.phase": 0.1,
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_any_change_is_another_system(name: str) -> None:
+    changed = PLAIN.replace(**{name: CHANGES[name]})
+    assert changed != PLAIN
+    assert changed.hash != PLAIN.hash
+    if not name.startswith("start."):
+        assert changed.get(name) == CHANGES[name]
+    assert len({PLAIN, changed, PLAIN.replace()}) == 2
+
+
+def test_every_parameter_of_scope_run_can_be_changed() -> None:
+    from snapbeam.config import parameters
+
+    names = {name for name, row in parameters().items() if row.section not in ("run",)}
+    others = {
+        "drive.displacement",
+        "drive.velocity",
+        "drive.sampling_freq",
+        "drive.frequency",
+        "contact.coefficient",
+    }
+    assert names - set(CHANGES) == others
+
+
+def test_every_sample_and_the_start_are_hashed() -> None:
+    """Two runs with different records or starts do not carry the same parameter hash."""
+    one, other = (PLAIN.replace(striker=record(last=shift)) for shift in (0.0, 1e-12))
+    assert one.hash != other.hash
+    begun, elsewhere = (PLAIN.replace(start=start(velocity=[0.0, 0.0, v])) for v in (0.1, 0.1 + 1e-15))
+    assert begun.hash != elsewhere.hash
+    asked = sb.Integration(cycles=1)
+    attrs = [
+        sb.simulate(system, asked, sample_times=[0.0]).dataset.attrs
+        for system in (one, other, begun, elsewhere)
+    ]
+    assert len({each["parameter_hash"] for each in attrs}) == 4
+    assert [each["system_hash"] for each in attrs] == [s.hash for s in (one, other, begun, elsewhere)]
+
+
+def test_what_a_state_met_on_its_way_is_no_part_of_a_system(tmp_path) -> None:
+    """A system that begins in a state from a run is the one that is read back from its file."""
+    state = sb.advance(PLAIN, periods=1, tangent=np.zeros((1, 2, 3)))
+    system = PLAIN.replace(start=state)
+    assert system.start.modal is None and system.start.passed is None and system.start.tangent is None
+    system.save(tmp_path / "system.toml")
+    again = sb.System.load(tmp_path / "system.toml")
+    asked = sb.Integration(cycles=3)
+    runs = [sb.simulate(each, asked, sample_times=[0.0]) for each in (system, again)]
+    np.testing.assert_equal(dict(runs[0].outcome), dict(runs[1].outcome))
+
+
+def test_hash_is_the_same_tomorrow() -> None:
+    """Over versions, else no result can be traced to its parameters."""
+    assert PLAIN.hash == "371d285f5199" + PLAIN.hash[12:]
+
+
+# ---------------------------------------------------------------------- neighbours
+
+
+def test_replace_keeps_everything_else() -> None:
+    changed = PLAIN.replace(**{"beam.thickness": 5e-4, "striker.location": 0.3})
+    assert changed.model.beam == dataclasses.replace(paper.BEAM, thickness=5e-4)
+    assert changed.model.beam.buckling_level == paper.BEAM.buckling_level
+    assert changed.model.beam.axial_load > paper.BEAM.axial_load
+    assert changed.striker == dataclasses.replace(PLAIN.striker, location=0.3)
+    assert changed.contact is PLAIN.contact
+    assert changed.model.modes == 3
+    assert PLAIN.get("striker.location") == pytest.approx(1.0 / 2.1), "the first one is as it was"
+    assert PLAIN.replace() == PLAIN
+
+
+def test_whole_parts() -> None:
+    assert PLAIN.replace(beam=paper.BEAM.replace(width=0.02)).get("beam.width") == 0.02
+    assert (
+        PLAIN.replace(drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.1)).get("drive.frequency_ratio")
+        == 2.0
+    )
+    assert PLAIN.replace(striker=None, contact=None, start=start()).striker is None
+    shaken = PLAIN.replace(striker=sb.Shaker(frequency_ratio=3.0, velocity_amplitude=0.1, location=0.2))
+    assert (shaken.get("drive.frequency_ratio"), shaken.get("striker.location")) == (3.0, 0.2)
+    both = PLAIN.replace(model=sb.ReducedModel.from_beam(paper.BEAM, 2), **{"beam.width": 0.02})
+    assert (both.model.modes, both.get("beam.width")) == (2, 0.02)
+
+
+def test_damping_and_reference_of_a_structure_given_by_matrices() -> None:
+    system = SYSTEMS["matrices"].replace(**{"model.damping_ratio": 0.05, "model.reference_freq": 1.0})
+    assert system.model.damping_ratio.tolist() == [0.05, 0.05]
+    assert system.model.reference_freq == 1.0
+    np.testing.assert_array_equal(system.model.mass, BY_MATRICES.mass)
+    np.testing.assert_allclose(system.model.natural_freq, BY_MATRICES.natural_freq, rtol=1e-15)
+
+
+def test_another_number_of_modes_keeps_the_start() -> None:
+    system = PLAIN.replace(start=start())
+    more = system.replace(**{"model.modes": 5})
+    np.testing.assert_array_equal(more.start.amplitude, [*system.start.amplitude, 0.0, 0.0])
+    np.testing.assert_array_equal(more.start.velocity, [1e-3, 0.0, 0.1, 0.0, 0.0])
+    with pytest.raises(
+        InputError, match=r"modes = 2: a state of 3 modes cannot be cut to fewer without loss"
+    ):
+        system.replace(**{"model.modes": 2})
+    assert system.replace(**{"model.modes": 5}).replace(**{"model.modes": 3}) == system
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"beam.thicknes": 1.0}, r"beam\.thicknes: no parameter of a beam; must be one of length, thickness"),
+        ({"nothing.x": 1.0}, r"nothing\.x: no parameter of a system; its sections are beam, model, contact"),
+        ({"modes": 3}, "modes: no parameter of a system"),
+        (
+            {"contact.coefficient": 0.5},
+            r"contact\.coefficient: no parameter of this system; must be one of stiffness",
+        ),
+        (
+            {"model.mass": 1.0},
+            r"model\.mass: cannot be changed; must be one of modes, damping_ratio, reference_freq",
+        ),
+        ({"striker.frequency_ratio": 1.0}, "must be one of location, side, gap"),
+        ({"drive.displacement": [1.0]}, "must be one of frequency_ratio, velocity_amplitude, phase"),
+        ({"start.amplitude": 1.0}, r"must be amplitude\[i\], velocity\[i\], phase or striker_position"),
+        ({"start.amplitude[9]": 1.0}, r"start\.amplitude\[9\]: mode = 9: must be an integer in \[1, 3\]"),
+        ({"beam": paper.STRAIGHT_BEAM}, "a run needs a buckled beam: axial_load = 0 N must exceed"),
+        ({"beam.buckling_level": 1e-3, "beam.axial_load": 30.0}, "give exactly one of the two"),
+        ({"model.modes": 0}, r"modes = 0: must be an integer in \[1, 256\]"),
+        ({"striker.location": 1.0}, r"location = 1.0: must be a number in \(0, 1\)"),
+        ({"contact": None}, "contact = None: a striker needs a law of contact"),
+        ({"contact": 3.0}, r"contact = 3.0: must be a law of contact, such as HertzContact\(stiffness\)"),
+        ({"contact": sb.Restitution(0.5)}, "with modes = 3: Newton's law needs one mode"),
+        ({"model": 3}, "model = 3: must be a ReducedModel"),
+        ({"drive": 3}, "drive = 3: must be a drive"),
+        ({"striker": 3}, "striker = 3: must be a Striker, a Shaker or a RecordedDrive"),
+        ({"start": 3}, "start = 3: must be a State"),
+        ({"start": sb.State(amplitude=np.zeros(2))}, "start of 2 modes: must have the 3 modes of the model"),
+        (
+            {"start": sb.State(amplitude=np.zeros((4, 3)))},
+            r"start: a batch of shape \(4,\): must be one state",
+        ),
+    ],
+)
+def test_refusals(changes, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        PLAIN.replace(**changes)
+
+
+def test_refusals_name_what_is_not_there() -> None:
+    with pytest.raises(InputError, match=r"beam\.thicknes: no parameter of this system; it has beam\.length"):
+        PLAIN.get("beam.thicknes")
+    with pytest.raises(InputError, match="drive: this system has none"):
+        SYSTEMS["free"].replace(**{"drive.frequency_ratio": 1.0})
+    with pytest.raises(InputError, match="beam: this model was given by matrices, it has no beam"):
+        SYSTEMS["matrices"].replace(**{"beam.length": 0.2})
+    with pytest.raises(InputTypeError):
+        sb.System(MODEL, paper.CONTACT, "shaker")  # type: ignore[arg-type]
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        PLAIN.contact = sb.HertzContact(1.0)  # type: ignore[misc]
+
+
+def test_described() -> None:
+    text = PLAIN.describe()
+    assert "contact   law = hertz, stiffness = 4e+08" in text
+    assert "drive     kind = sine, frequency_ratio = 1.21, velocity_amplitude = 0.18" in text
+    assert "array of shape (400,)" in SYSTEMS["recorded"].describe()
+    assert repr(PLAIN).startswith("<System modes=3, contact=HertzContact(stiffness=400000000.0)")
+    assert PLAIN.hash[:12] in repr(PLAIN)
+    assert len(repr(SYSTEMS["recorded"])) < 200
+
+
+def test_scale() -> None:
+    assert PLAIN.scale.length == paper.BEAM.buckling_level
+    assert PLAIN.scale.omega == pytest.approx(2.0 * np.pi * MODEL.reference_freq)

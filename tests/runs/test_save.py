@@ -1,0 +1,127 @@
+"""Runs survive the disk: what is read back is what was written, and says what it is to anybody."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.core.validate import InputError
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "conformance"))
+import frozen
+
+MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+SYSTEM = sb.System(MODEL, paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))
+RECORD = {"frequency_ratio": 1.3, "velocity_amplitude": 0.3, "cycles": 4, "location": 0.45}
+CASES = {
+    "plain": (SYSTEM, sb.Integration(cycles=5)),
+    "tolerance": (SYSTEM, sb.Integration(cycles=2, tolerance=1e-4)),
+    "recorded": (sb.System(MODEL, paper.CONTACT, frozen.recorded(RECORD, MODEL)), sb.Integration()),
+    "restitution": (
+        sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=1), sb.Restitution(0.6), SYSTEM.striker),
+        sb.Integration(cycles=4),
+    ),
+    "free": (sb.System(MODEL, start=sb.State(amplitude=0.9 * MODEL.equilibrium)), sb.Integration(cycles=3)),
+    "decided": (
+        SYSTEM.replace(**{"drive.velocity_amplitude": 0.36, "model.modes": 1}),
+        sb.Integration(cycles=60, early_decision=True),
+    ),
+    "failed": (sb.System(MODEL, start=sb.State(amplitude=[1e200, 0.0, 0.0])), sb.Integration(cycles=3)),
+    "no impact ends": (SYSTEM.replace(**{"drive.velocity_amplitude": 0.0}), sb.Integration(cycles=1)),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_round_trip(name: str, tmp_path) -> None:
+    system, integration = CASES[name]
+    run = sb.simulate(system, integration)
+    run.save(tmp_path / "run.nc")
+    assert [file.name for file in tmp_path.iterdir()] == ["run.nc"]
+    again = sb.load_run(tmp_path / "run.nc")
+    xr.testing.assert_identical(again.dataset, run.dataset)
+    xr.testing.assert_identical(again.impacts, run.impacts)
+    np.testing.assert_equal(dict(again.outcome), dict(run.outcome))
+    assert [type(value) for value in again.outcome.values()] == [
+        type(value) for value in run.outcome.values()
+    ]
+    assert again.system == run.system and again.integration == run.integration
+    assert again.accuracy == run.accuracy
+    assert (again.end is None) == (run.end is None) == (name == "failed")
+    if run.end is not None:
+        for part in ("amplitude", "velocity", "phase", "striker_position", "contact_time"):
+            np.testing.assert_array_equal(getattr(again.end, part), getattr(run.end, part), err_msg=part)
+    # saved again, it is the same
+    again.save(tmp_path / "again.nc")
+    xr.testing.assert_identical(sb.load_run(tmp_path / "again.nc").dataset, run.dataset)
+
+
+def test_what_was_read_goes_on(tmp_path) -> None:
+    run = sb.simulate(SYSTEM, sb.Integration(cycles=3))
+    run.save(tmp_path / "run.nc")
+    again = sb.load_run(tmp_path / "run.nc")
+    same = sb.simulate(again.system, again.integration)
+    xr.testing.assert_equal(same.dataset, run.dataset)
+    on, of_file = (sb.advance(SYSTEM, state, 2) for state in (run.end, again.end))
+    np.testing.assert_allclose(of_file.amplitude, on.amplitude, rtol=0.0, atol=1e-12)
+
+
+def test_the_file_says_what_it_is(tmp_path) -> None:
+    """Any program that reads NetCDF finds units, names and what codes mean."""
+    run = sb.simulate(SYSTEM, sb.Integration(cycles=3))
+    run.save(tmp_path / "run.nc")
+    root = xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf")
+    assert root.attrs["Conventions"] == "CF-1.11"
+    assert root.attrs["system_hash"] == SYSTEM.hash
+    for name, variable in root.variables.items():
+        assert {"units", "long_name"} <= variable.attrs.keys(), name
+    outcome = xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="outcome")
+    flags = outcome.response.attrs
+    assert flags["flag_meanings"].split()[list(flags["flag_values"]).index(int(run.outcome.response))] == (
+        run.outcome.response.label.replace(" ", "_")
+    )
+    assert len(outcome.status.attrs["flag_meanings"].split()) == len(outcome.status.attrs["flag_values"])
+    impacts = xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="impacts")
+    assert impacts.peak_force.attrs["units"] == "N"
+    assert root.displacement.encoding["zlib"] or root.displacement.encoding.get("compression") == "gzip"
+    text = str(root.attrs)
+    assert str(tmp_path) not in text
+
+
+def test_a_long_run_is_compressed(tmp_path) -> None:
+    run = sb.simulate(SYSTEM.replace(**{"drive.velocity_amplitude": 0.01}), sb.Integration(cycles=60))
+    run.save(tmp_path / "run.nc")
+    assert (tmp_path / "run.nc").stat().st_size < run.dataset.nbytes
+
+
+def test_refusals(tmp_path) -> None:
+    run = sb.simulate(SYSTEM, sb.Integration(cycles=1))
+    with pytest.raises(InputError, match=r"must end in \.nc"):
+        run.save(tmp_path / "run.txt")
+    with pytest.raises(InputError, match="is not an existing folder"):
+        run.save(tmp_path / "none" / "run.nc")
+    with pytest.raises(InputError, match=r"none\.nc.*is no file of a run that Run\.save wrote"):
+        sb.load_run(tmp_path / "none.nc")
+    (tmp_path / "text.nc").write_text("no netcdf")
+    with pytest.raises(InputError, match=r"is no file of a run that Run\.save wrote"):
+        sb.load_run(tmp_path / "text.nc")
+    run.dataset.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
+    with pytest.raises(InputError, match=r"is no file of a run that Run\.save wrote"):
+        sb.load_run(tmp_path / "dataset.nc")
+    run.save(tmp_path / "run.nc")
+    import h5netcdf
+
+    for name, text in (("snapbeam_system", "{"), ("snapbeam_format", "snapbeam run 99")):
+        with h5netcdf.File(tmp_path / "run.nc", "a") as file:
+            before, file.attrs[name] = file.attrs[name], text
+        with pytest.raises(InputError, match=r"is damaged|is no file of a run"):
+            sb.load_run(tmp_path / "run.nc")
+        with h5netcdf.File(tmp_path / "run.nc", "a") as file:
+            file.attrs[name] = before
+    assert sb.load_run(tmp_path / "run.nc").system == SYSTEM
+    assert "<Run intrawell" in repr(run) and "samples" in repr(run)

@@ -1,0 +1,191 @@
+"""Points: grids over any mixture of parameters, lists from tables, how they are counted, and what is refused."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+
+from snapbeam.core.validate import InputError
+from snapbeam.sweeps.points import Grid, PointList, points_of
+
+MIXED = {
+    "frequency_ratio": [0.8, 1.2, 1.6],
+    "beam.thickness": [3e-4, 4e-4],
+    "drive.velocity_amplitude": np.linspace(0.1, 0.4, 4),
+    "modes": [1, 3],
+    "striker.side": ["below", "above"],
+    "early_decision": [False, True],
+}
+
+
+def test_a_mapping_makes_a_grid() -> None:
+    grid = points_of(MIXED)
+    assert isinstance(grid, Grid)
+    assert list(grid.axes) == [
+        "drive.frequency_ratio", "beam.thickness", "drive.velocity_amplitude", "model.modes", "striker.side",
+        "run.early_decision",
+    ]  # fmt: skip
+    assert grid.dims == (
+        "frequency_ratio", "beam_thickness", "velocity_amplitude", "modes", "side", "early_decision",
+    )  # fmt: skip
+    assert grid.size == 3 * 2 * 4 * 2 * 2 * 2
+    assert [values.dtype.kind for values in grid.axes.values()] == ["f", "f", "f", "i", "U", "b"]
+
+
+def test_counting_keeps_the_runs_of_a_structure_together() -> None:
+    """Axes of the structure outermost, each group in the order it was given; every combination once."""
+    grid = points_of(MIXED)
+    assert grid.order == (
+        "beam.thickness", "model.modes", "striker.side", "run.early_decision", "drive.frequency_ratio",
+        "drive.velocity_amplitude",
+    )  # fmt: skip
+    assert grid.shape == (2, 2, 2, 2, 3, 4)
+    points = grid.take(np.arange(grid.size))
+    rows = list(zip(*(points[name].tolist() for name in grid.order), strict=True))
+    assert rows == list(itertools.product(*(grid.axes[name].tolist() for name in grid.order)))
+    some = grid.take(np.array([7, 190, 0]))
+    for name in grid.order:
+        np.testing.assert_array_equal(some[name], points[name][[7, 190, 0]])
+
+
+def test_arrays_come_back_with_the_dimensions_as_they_were_given() -> None:
+    grid = points_of(MIXED)
+    points = grid.take(np.arange(grid.size))
+    assert grid.arranged(np.arange(grid.size)).shape == (3, 2, 4, 2, 2, 2)
+    for at, name in enumerate(grid.axes):
+        values = grid.arranged(points[name])
+        expected = grid.axes[name].reshape([-1 if i == at else 1 for i in range(6)])
+        np.testing.assert_array_equal(values, np.broadcast_to(expected, values.shape))
+    vectors = grid.arranged(np.stack((np.arange(grid.size), -np.arange(grid.size)), axis=1))
+    assert vectors.shape == (3, 2, 4, 2, 2, 2, 2)
+    np.testing.assert_array_equal(vectors[..., 0], -vectors[..., 1])
+
+
+def test_coordinates_say_what_they_are() -> None:
+    coords = points_of(MIXED).coordinates()
+    dims, values, labels = coords["beam_thickness"]
+    assert dims == ("beam_thickness",)
+    assert values.tolist() == [3e-4, 4e-4]
+    assert labels == {
+        "units": "m", "long_name": "thickness in the direction of bending", "parameter": "beam.thickness",
+    }  # fmt: skip
+    assert coords["frequency_ratio"][2]["units"] == "1"
+
+
+COLUMNS = {"frequency_ratio": [0.8, 1.2, 1.6], "modes": [3, 1, 3], "who": ["a", "b", "c"]}
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        pd.DataFrame(COLUMNS),
+        xr.Dataset({name: ("test", values) for name, values in COLUMNS.items()}),
+        xr.Dataset({"frequency_ratio": ("point", COLUMNS["frequency_ratio"]), "modes": ("point", COLUMNS["modes"])},
+                   coords={"who": ("point", COLUMNS["who"])}),
+    ],
+    ids=["data frame", "dataset", "coordinates"],
+)  # fmt: skip
+def test_a_table_makes_a_list(table) -> None:
+    points = points_of(table)
+    assert isinstance(points, PointList)
+    assert points.dims == ("point",) and points.shape == (3,) and points.size == 3
+    assert points.names == ("drive.frequency_ratio", "model.modes")
+    assert points.columns["model.modes"].tolist() == [3, 1, 3]
+    assert points.labels["who"].tolist() == ["a", "b", "c"]
+    taken = points.take(np.array([2, 0]))
+    assert {name: values.tolist() for name, values in taken.items()} == {
+        "drive.frequency_ratio": [1.6, 0.8], "model.modes": [3, 3],
+    }  # fmt: skip
+    coords = points.coordinates()
+    assert coords["modes"][0] == ("point",) and coords["modes"][2]["parameter"] == "model.modes"
+    assert coords["who"][1].tolist() == ["a", "b", "c"]
+
+
+def test_a_list_needs_no_order_and_may_repeat() -> None:
+    points = points_of(pd.DataFrame({"velocity_amplitude": [0.3, 0.1, 0.3]}))
+    assert points.columns["drive.velocity_amplitude"].tolist() == [0.3, 0.1, 0.3]
+
+
+def test_one_value_of_a_dataset_holds_for_all() -> None:
+    points = points_of(xr.Dataset({"frequency_ratio": ("p", [1.0, 2.0]), "location": 0.3}))
+    assert points.columns["striker.location"].tolist() == [0.3, 0.3]
+
+
+def test_lists_are_told_apart() -> None:
+    def described(values):
+        return points_of(pd.DataFrame({"velocity_amplitude": values})).describe()
+
+    assert described([0.1, 0.2]) == described(np.array([0.1, 0.2]))
+    assert described([0.1, 0.2]) != described([0.2, 0.1])
+    assert described([0.1, 0.2])["drive.velocity_amplitude"]["points"] == 2
+
+
+def frame(**columns) -> pd.DataFrame:
+    return pd.DataFrame(columns)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "axes: must name at least one parameter to sweep"),
+        (
+            [1.0, 2.0],
+            r"axes = \[1.0, 2.0\]: must be a mapping of parameters to values, an xarray.Dataset or a table",
+        ),
+        ({"modes": 3}, "modes = 3: must be an array; put a single value into the system"),
+        ({"modes": [1, 2], "model.modes": [1, 2]}, r"model\.modes: stands twice among the axes"),
+        ({"beam.thicknes": [1e-4, 2e-4]}, r"beam\.thicknes: no parameter; did you mean 'beam\.thickness'"),
+        ({3: [1, 2]}, "3: no parameter"),
+        ({"run.engine": ["cpu", "cuda"]}, r"run\.engine: cannot be swept"),
+        ({"threads": [1, 2]}, "threads: cannot be swept"),
+        ({"run.tolerance": [1e-3, 1e-2]}, r"run\.tolerance: cannot be swept"),
+        ({"drive.displacement": [1.0, 2.0]}, r"drive\.displacement: cannot be swept"),
+        ({"location": [0.5, 0.4]}, r"location\[0\] = 0.5, location\[1\] = 0.4: must be strictly increasing"),
+        ({"location": [0.5, 1.0]}, r"location = 1.0: must be a number in \(0, 1\)"),
+        ({"velocity_amplitude": [-0.1, 0.1]}, r"velocity_amplitude = -0.1: must be .* \[0, inf\)"),
+        ({"location": [0.5, np.nan]}, r"location\[1\] = .*nan.*: must be finite"),
+        ({"location": []}, r"location = \[\]: must hold at least one point"),
+        (
+            {"location": [[0.1, 0.2]]},
+            r"location of shape \(1, 2\): must be a number or a one-dimensional array",
+        ),
+        ({"modes": [1.5, 2.0]}, r"modes = 1.5: must be an integer in \[1, 256\]"),
+        ({"striker.side": ["below", "left"]}, "side = 'left': must be one of 'below', 'above'"),
+        ({"striker.side": ["below", "below"]}, "must differ from each other"),
+        ({"frequency_ratio": ["a", "b"]}, "frequency_ratio = .*must be an array of numbers"),
+        (
+            frame(frequency_ratio=[1.0, -1.0]),
+            r"frequency_ratio\[1\] = -1.0: must be a finite number greater than 0",
+        ),
+        (frame(modes=[1.5, 2.0]), r"modes\[0\] = 1.5: must be an integer"),
+        (frame(who=["a", "b"]), "points with who: none of these is a parameter"),
+        (frame(frequency_ratio=[]), r"points of lengths .*: must be equal, and at least one"),
+        (
+            frame(velocity_amplitud=[0.1], location=[0.3]),
+            "velocity_amplitud: no parameter; did you mean 'velocity_ampl",
+        ),
+        (
+            frame(frequency_hz=[100.0], location=[0.3]),
+            "frequency_hz: give frequency_ratio, which .*from_physical",
+        ),
+        (
+            pd.DataFrame({"frequency_ratio": [1.0], "drive.frequency_ratio": [2.0]}),
+            r"drive\.frequency_ratio: stands twice among the points",
+        ),
+        (
+            xr.Dataset({"location": (("x", "y"), np.full((2, 2), 0.3))}),
+            r"location of shape \(2, 2\): a list of points",
+        ),
+        (
+            xr.Dataset({"location": ("x", [0.3, 0.4]), "modes": ("y", [1, 2, 3])}),
+            r"points of lengths .*: must be equal",
+        ),
+    ],
+)
+def test_refusals(given, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        points_of(given)
