@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
+from snapbeam.core.findings import Finding, ImplausibleError, Severity, findings_of
+
 _HOMES = {
     "Alignment": "drive.align",
     "align": "drive.align",
@@ -27,10 +29,6 @@ _HOMES = {
     "mode_shapes": "decay.shapes",
     "MeasuredResponse": "compare.response",
     "measure_response": "compare.response",
-    "Finding": "plausibility.finding",
-    "ImplausibleError": "plausibility.finding",
-    "Severity": "plausibility.finding",
-    "findings_of": "plausibility.finding",
     "FrameFlag": "tracking.flags",
     "TrackingSettings": "tracking.settings",
     "pixel_size_from_marks": "camera.marks",
@@ -60,7 +58,7 @@ _HOMES = {
     "measure_drive": "drive.vibrometer",
 }
 
-__all__ = sorted(_HOMES)
+__all__ = ["Finding", "ImplausibleError", "Severity", "findings_of", *sorted(_HOMES)]
 
 
 def __getattr__(name: str) -> Any:
