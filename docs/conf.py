@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
+from sphinx.domains.python._object import PyXrefMixin
 from sphinx.ext.napoleon.docstring import GoogleDocstring
 
 from snapbeam.core.provenance import __version__
@@ -65,6 +67,18 @@ def keep_whole(self: Any) -> tuple[str, list[str]]:
 
 
 GoogleDocstring._consume_inline_attribute = keep_whole
+
+_link = PyXrefMixin.make_xrefs
+
+
+def link_errors_only(self: Any, rolename: str, domain: str, target: str, *more: Any, **options: Any) -> Any:
+    """Types are words, such as "array of shape (N,)": they name no class and no attribute ``shape``."""
+    if rolename == "exc":
+        return _link(self, rolename, domain, target, *more, **options)
+    return [options.get("contnode") or nodes.emphasis(target, target)]
+
+
+PyXrefMixin.make_xrefs = link_errors_only
 
 
 def draw_paper(app: Any) -> None:

@@ -121,7 +121,7 @@ def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any
 def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
     item = row.quantity
     unit = "" if item.unit == "1" else f" in {item.unit}"
-    if item.kind is float and not (name == "damping_ratio" and isinstance(value, list)):
+    if item.kind is float and not (name == "damping_ratio" and isinstance(value, (list, np.ndarray))):
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return f"{name} = {value!r}: must be a number{unit}", None
         if not math.isfinite(value):
@@ -134,7 +134,7 @@ def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
         return f"{name} = {value!r}: must be a whole number{unit}", None
     elif item.kind is str and not isinstance(value, str):
         return f"{name} = {value!r}: must be text", None
-    elif item.kind is object or isinstance(value, list):
+    elif item.kind is object or isinstance(value, (list, np.ndarray)):
         return _array(name, value)
     try:
         return "", item.check(name, value)
