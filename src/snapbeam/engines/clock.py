@@ -89,7 +89,7 @@ def _asked_cycles(drive: Recorded, integration: Integration, periods: float | No
     asked = integration.cycles if periods is None else periods
     if asked is None and held > 0.0:
         return held
-    if asked is None or asked > held * (1.0 + 1e-9) + 1e-9:
+    if asked is None or asked > held + 1e-6:  # states stand on ticks
         of = "of" if left == 1.0 else "that are left of"
         raise InputError(
             f"cycles = {asked}: must be at most the {max(held, 0.0):.1f} cycles {of} the recorded drive"
