@@ -15,6 +15,7 @@ from snapbeam.engines.scalar.compile import inlined
 from snapbeam.engines.scalar.decisions import (
     Seen,
     count_in_step,
+    entry_again,
     finish_impact,
     first_entry,
     is_quiet,
@@ -188,11 +189,14 @@ def settle(memory, blocks, place, run, now, step, done, room, book, asked, outpu
         status = _STEP_LIMIT if book.steps >= clock.max_steps else _RUNNING
         watch = Watch(True, now.watch.quiet, met.safe_gap, met.safe_center, now.watch.weighed, now.watch.beat)
         return Now(t, now.home, now.stretch, now.rows, seen, watch, now.sample, now.landed, status), step
-    if met.cut < step.ticks:
-        step = cut_to(step, run, met.cut, met.cut * tick)
+    whole, cut, found = step.ticks, met.cut, touching or not met.event
+    while cut != step.ticks:
+        step = cut_to(step, run, cut, cut * tick)
         prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
         done = take_step(memory, blocks, layout, stages, tip, step, ledger)
         about = observe(memory, layout, tip, step.phase + omega * step.length, step.q1, step.p1)
+        if not found:
+            cut, found = entry_again(clock, cut, whole, about), True
     seen1 = Seen(about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv)
     sample = now.sample
     if outputs is not None:

@@ -13,6 +13,7 @@ from snapbeam.engines.scalar.decisions import (
     Seen,
     contact_level,
     count_in_step,
+    entry_again,
     finish_impact,
     first_entry,
     flight_level,
@@ -34,7 +35,7 @@ _TWO_PI = 2.0 * math.pi
 # What a pass through a step is for.
 _WHOLE, _CUT, _DEEPEST = 0, 1, 2
 
-_first_entry, _count_in_step = shared(first_entry), shared(count_in_step)
+_first_entry, _count_in_step, _entry_again = shared(first_entry), shared(count_in_step), shared(entry_again)
 _finish_impact, _track, _track_energy = shared(finish_impact), shared(track), shared(track_energy)
 _safe_for, _is_quiet, _ticks_of = shared(safe_for), shared(is_quiet), shared(ticks_of)
 _flight_level, _contact_level, _seen_from = shared(flight_level), shared(contact_level), shared(seen_from)
@@ -125,6 +126,7 @@ def step_function(functions: Functions) -> Any:
         here, purpose = length, _WHOLE
         event, entered, failed, deepest = False, False, False, held.deepest
         pieces, piece = 0, 0.0
+        whole, found = span, touching
         safe_gap, safe_center = held.safe_gap, held.safe_center
         own1, seen1, impulse, work, gross = own, seen, 0.0, 0.0, 0.0
         while True:
@@ -166,6 +168,12 @@ def step_function(functions: Functions) -> Any:
                 if entered:
                     break
                 if cut < span:
+                    span, length = cut, cut * tick
+                    here, slot, purpose = length, fixed.cut_slot, _CUT
+                    continue
+            if event and not found:
+                cut, found = _entry_again(clock, span, whole, seen1), True
+                if cut != span:
                     span, length = cut, cut * tick
                     here, slot, purpose = length, fixed.cut_slot, _CUT
                     continue

@@ -15,6 +15,7 @@ __all__ = [
     "clock_of",
     "contact_level",
     "count_in_step",
+    "entry_again",
     "finish_impact",
     "first_entry",
     "flight_level",
@@ -207,6 +208,20 @@ def first_entry(looked, pieces, piece):
         if rise >= 0.0:
             return (i + rise) * piece
     return -1.0
+
+
+@compiled
+def entry_again(clock, cut, whole, seen):
+    """Where a step of *whole* ticks is to be cut that was cut at *cut*, where the gap has not just closed.
+
+    What was seen inside the step was seen by linear modes under a tension that changes evenly; a step that ends there
+    knows better.  The finest contact step is as near as counts.
+    """
+    if seen.dv > 0.0:
+        late = seen.d / seen.dv
+        if abs(late) > (clock.step >> clock.finest) * clock.tick:
+            return min(max(1, cut - int(late / clock.tick)), whole)
+    return cut
 
 
 @compiled

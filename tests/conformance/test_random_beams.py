@@ -1,0 +1,96 @@
+"""Beams and points drawn anew from a seed, against an independent solution of each.
+
+``pytest tests/conformance/test_random_beams.py -m slow --seed 7 --draws 200`` draws others.  What is said of the accuracy
+in the documentation is what this prints: the shares of well-conditioned runs within the levels' errors.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from any_beam import AnyBeam, drawn
+
+import snapbeam as sb
+
+WELL = 1e-10
+"""Response to a relative change of the drive by 1e-13, of the buckling level, up to which a run is well-conditioned."""
+LIMIT = {"map": 1e-3, "reference": 1e-8}
+CARRIED = 1e-9
+"""What the reference and the independent solution are allowed, as a relative change of the drive, each."""
+
+
+class Drawn(NamedTuple):
+    """What came of one draw."""
+
+    frequencies: float
+    """Greatest relative difference of a natural frequency."""
+    separation: float
+    error: dict[str, float]
+    words: str
+
+
+def solved(rng: np.random.Generator) -> Drawn:
+    """One beam, by both."""
+    given = drawn(rng)
+    own = AnyBeam(given)
+    beam = sb.Beam(
+        length=given.length,
+        thickness=given.thickness,
+        width=given.width,
+        density=given.density,
+        young_modulus=given.young,
+        buckling_level=given.level,
+    )
+    model = sb.ReducedModel.from_beam(beam, modes=given.modes, damping_ratio=given.damping_ratio)
+    system = sb.System(
+        model,
+        contact=sb.HertzContact(stiffness=given.contact_stiffness),
+        striker=sb.Shaker(
+            frequency_ratio=given.frequency_ratio,
+            velocity_amplitude=given.velocity_amplitude,
+            location=given.location,
+        ),
+    )
+    cycles = max(1, round(3.0 * given.frequency_ratio))
+    end = 2.0 * math.pi * cycles / (given.frequency_ratio * float(own.omega[0]))
+    times = np.linspace(0.0, end, 121)[1:] * (1.0 - 1e-12)
+    truth = own.displacement(times)
+    error = {}
+    for accuracy in LIMIT:
+        run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
+        found = np.stack((run.dataset.displacement.values, run.dataset.center_displacement.values), axis=1)
+        error[accuracy] = float(np.abs(found - truth).max())
+    return Drawn(
+        float(np.abs(model.omega / own.omega - 1.0).max()),
+        float(sb.conditioning(system, cycles).separation[-1]),
+        error,
+        str(given),
+    )
+
+
+def judge(draws: list[Drawn]) -> None:
+    """Every well-conditioned run within the limits of both levels; the figures are printed."""
+    well = [draw for draw in draws if draw.separation <= WELL]
+    print(f"{len(well)} of {len(draws)} runs are well-conditioned")
+    for accuracy, limit in LIMIT.items():
+        worst = max(well, key=lambda draw: draw.error[accuracy])
+        median = float(np.median([draw.error[accuracy] for draw in well]))
+        print(f"{accuracy}: median error {median:.1e}, worst {worst.error[accuracy]:.1e} at {worst.words}")
+        for draw in well:
+            allowed = max(limit, CARRIED / 1e-13 * draw.separation)
+            assert draw.error[accuracy] <= allowed, (accuracy, draw)
+    assert max(draw.frequencies for draw in draws) < 1e-11
+
+
+def test_some_beams() -> None:
+    rng = np.random.default_rng(2026)
+    judge([solved(rng) for _ in range(6)])
+
+
+@pytest.mark.slow
+def test_many_beams(request: pytest.FixtureRequest) -> None:
+    rng = np.random.default_rng(int(request.config.getoption("--seed")))
+    judge([solved(rng) for _ in range(int(request.config.getoption("--draws")))])
