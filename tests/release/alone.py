@@ -1,4 +1,4 @@
-"""Install each archive of a folder alone in a fresh environment and run it: ``python tests/release/alone.py dist [extra ...]``."""
+"""Install each archive of a folder alone in a fresh environment and run it: ``python alone.py dist [extra ...]``."""
 
 from __future__ import annotations
 
