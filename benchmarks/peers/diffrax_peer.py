@@ -129,11 +129,11 @@ def _prepare_many(kind: Any, weight: float, cases: list[Case], tolerance: float)
 
 METHODS = (
     Method(
-        "diffrax Tsit5", (1e-4, 1e-6, 1e-8), partial(_prepare, diffrax.Tsit5, 10.0), "vmap over the points",
+        "diffrax Tsit5", (1e-4, 1e-5, 1e-6, 1e-7, 1e-8), partial(_prepare, diffrax.Tsit5, 10.0), "vmap over the points",
         partial(_prepare_many, diffrax.Tsit5, 10.0),
     ),
     Method(
-        "diffrax Dopri8", (1e-4, 1e-6, 1e-8, 1e-10), partial(_prepare, diffrax.Dopri8, 10.0), "vmap over the points",
+        "diffrax Dopri8", (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10), partial(_prepare, diffrax.Dopri8, 10.0), "vmap over the points",
         partial(_prepare_many, diffrax.Dopri8, 10.0),
     ),
 )  # fmt: skip

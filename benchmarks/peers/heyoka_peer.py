@@ -130,7 +130,7 @@ def _prepare_many(cases: list[Case], tolerance: float) -> Solver:
 
     integrator = hy.taylor_adaptive_batch(
         equations, np.zeros((2 * count, lanes)), tol=tolerance, compact_mode=True, pars=np.zeros((3, lanes)),
-        t_events=[hy.t_event_batch(depth, callback=switch)],
+        t_events=[hy.t_event_batch(1e6 * depth, callback=switch, cooldown=1e-9)],
     )  # fmt: skip
     groups = [np.minimum(np.arange(at, at + lanes), len(cases) - 1) for at in range(0, len(cases), lanes)]
 
@@ -162,7 +162,7 @@ def _prepare_many(cases: list[Case], tolerance: float) -> Solver:
 
 METHODS = (
     Method(
-        "heyoka Taylor", (1e-5, 1e-8, 1e-11, 1e-14), _prepare, f"batch of {hy.recommended_simd_size()}, compact mode",
+        "heyoka Taylor", (1e-5, 1e-6, 1e-7, 1e-8, 1e-11, 1e-14), _prepare, f"batch of {hy.recommended_simd_size()}, compact mode",
         _prepare_many,
     ),
 )  # fmt: skip

@@ -135,6 +135,12 @@ def write_pages(folder: Path) -> None:
     """Write the generated parts into a folder; a file that has not changed is left alone."""
     folder.mkdir(parents=True, exist_ok=True)
     pages = {"parameters": parameter_tables, "variables": variable_tables, "command_line": command_line}
+    bench = folder.parent / "images" / "rivals.inc"
+    pages["rivals"] = lambda: (
+        bench.read_text(encoding="utf-8")
+        if bench.exists()
+        else "The comparison has not been run for this version: `python -m benchmarks rivals -o docs/images`.\n"
+    )
     for name, make in pages.items():
         target, text = folder / f"{name}.md", make()
         if not target.exists() or target.read_text(encoding="utf-8") != text:
