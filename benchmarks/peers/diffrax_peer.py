@@ -133,7 +133,7 @@ METHODS = (
         partial(_prepare_many, diffrax.Tsit5, 10.0),
     ),
     Method(
-        "diffrax Dopri8", (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10), partial(_prepare, diffrax.Dopri8, 10.0), "vmap over the points",
-        partial(_prepare_many, diffrax.Dopri8, 10.0),
+        "diffrax Dopri8", (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10), partial(_prepare, diffrax.Dopri8, 10.0),
+        "vmap over the points", partial(_prepare_many, diffrax.Dopri8, 10.0),
     ),
 )  # fmt: skip

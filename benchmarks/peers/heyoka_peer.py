@@ -162,7 +162,7 @@ def _prepare_many(cases: list[Case], tolerance: float) -> Solver:
 
 METHODS = (
     Method(
-        "heyoka Taylor", (1e-5, 1e-6, 1e-7, 1e-8, 1e-11, 1e-14), _prepare, f"batch of {hy.recommended_simd_size()}, compact mode",
-        _prepare_many,
+        "heyoka Taylor", (1e-5, 1e-6, 1e-7, 1e-8, 1e-11, 1e-14), _prepare,
+        f"batch of {hy.recommended_simd_size()}, compact mode", _prepare_many,
     ),
 )  # fmt: skip
