@@ -7,6 +7,7 @@ is classed, and sweeps show where it snaps.
 from snapbeam.core.codes import ResponseClass, RunStatus, classify
 from snapbeam.core.findings import Finding, PlausibilityWarning
 from snapbeam.core.provenance import __version__
+from snapbeam.core.showing import register_accessor
 from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.engines.outcomes import STATISTICS, Statistic
 from snapbeam.model.beam import Beam
@@ -33,6 +34,8 @@ from snapbeam.sweeps.sweep import sweep
 from snapbeam.sweeps.threshold import threshold
 
 Response = Outcome
+register_accessor()
+del register_accessor
 
 __all__ = [
     "STATISTICS",

@@ -219,6 +219,12 @@ class System:
             lines.append(f"{section:8s}  {words}")
         return "\n".join(lines)
 
+    def _repr_html_(self) -> str:
+        from snapbeam.core.showing import html_table
+
+        rows = [(section, text.strip()) for section, _, text in map(_parted, self.describe().splitlines())]
+        return html_table(f"System, hash {self.hash[:12]}", rows)
+
     def __repr__(self) -> str:
         parts = [f"modes={self.model.modes}", f"contact={self.contact!r}"]
         if self.striker is not None:
@@ -251,3 +257,7 @@ def _brief(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return f"array of shape {value.shape}" if value.size > 4 else json.dumps(value.tolist())
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _parted(line: str) -> tuple[str, str, str]:
+    return line.partition("  ")

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
+from snapbeam.core.reporting import counting
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, flag, positive
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble
@@ -43,7 +44,7 @@ def advance(
     *,
     integration: Integration | None = None,
     every: bool = False,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> State:
     """Where a system stands some periods of the excitation after it stood in a state.
 
@@ -67,7 +68,7 @@ def advance(
         Whether to give the states after each period, along a new first dimension, instead of the last one; their
         ``passed`` is of the whole way, but for the status, which is of each state.
     progress : callable, optional
-        Called as ``progress(done, total)`` with states.
+        Called as ``progress(done, total)`` with states; True writes a line to standard error.
 
     Returns
     -------
@@ -88,6 +89,7 @@ def advance(
     integration = Integration() if integration is None else integration
     span = positive("periods", periods)
     every = flag("every", every)
+    report = counting(progress, "advance", "states")
     if state is None:
         require_motion(system)
         state = system.start if system.start is not None else rest_state(system.model, system.striker)
@@ -106,11 +108,11 @@ def advance(
     _, engine = resolve("cpu")
     vectors = None
     if tangent is None:
-        landings = engine.march_landing(ensemble, integration.threads, progress)
+        landings = engine.march_landing(ensemble, integration.threads, report)
     else:
         given = _checked_tangent(system, tangent, flat)
         back = system.model.linear_modes.T @ system.model.mass
-        landings, moved = engine.march_tangents(ensemble, given @ back.T, integration.threads, progress)
+        landings, moved = engine.march_tangents(ensemble, given @ back.T, integration.threads, report)
         moved[~np.isin(landings.books["status"], _REACHED)] = np.nan
         vectors = (moved @ system.model.linear_modes.T).reshape((*state.batch, *moved.shape[1:]))
     found = _states(ensemble, landings, every)
