@@ -10,7 +10,7 @@ from snapbeam.core.provenance import __version__
 from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.engines.outcomes import STATISTICS, Statistic
 from snapbeam.model.beam import Beam
-from snapbeam.model.contact import ContactLaw, HertzContact, Restitution
+from snapbeam.model.contact import ContactLaw, HertzContact, HuntCrossley, KelvinVoigt, PowerLaw, Restitution
 from snapbeam.model.drive import Drive, Recorded, Sine
 from snapbeam.model.frequencies import exact_natural_freq
 from snapbeam.model.integration import Integration
@@ -42,12 +42,15 @@ __all__ = [
     "Drive",
     "Finding",
     "HertzContact",
+    "HuntCrossley",
     "InputError",
     "InputTypeError",
     "Integration",
     "Keeping",
+    "KelvinVoigt",
     "Outcome",
     "PlausibilityWarning",
+    "PowerLaw",
     "Recorded",
     "RecordedDrive",
     "ReducedModel",

@@ -104,7 +104,10 @@ REFUSALS = [
         {"beam": {"buckling_level": 0.0}},
         "[beam] buckling_level = 0.0: must be a finite number greater than 0 m",
     ),
-    ({"contact": {"law": "spring"}}, "[contact] law = 'spring': must be one of 'hertz', 'restitution'"),
+    (
+        {"contact": {"law": "spring"}},
+        "[contact] law = 'spring': must be one of 'hertz', 'hunt_crossley'",
+    ),
     ({"contact": {"law": "restitution"}}, "[contact] coefficient: missing for law = 'restitution'"),
     (
         {"contact": {"coefficient": 0.5}},

@@ -123,6 +123,11 @@ def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
         raise InputError(
             f"tangent with contact = {system.contact!r}: its force jumps, so that the tangent flow does; give none"
         )
+    if system.contact is not None and not system.contact.keeps.tangent:
+        raise InputError(
+            f"tangent with contact = {system.contact!r}: the tangent flow is known for laws whose force depends on the "
+            "penetration alone, such as HertzContact(stiffness); give none"
+        )
     given = finite_array("tangent", tangent)
     shape = (2, flat.modes)
     if given.ndim < 3 or given.shape[-2:] != shape:

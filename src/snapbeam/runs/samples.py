@@ -76,6 +76,8 @@ def run_dataset(
     if struck:
         variables |= {"energy_contact": values[:, 3], "work_shaker": values[:, 4]}
     variables["energy_dissipated"] = values[:, 5]
+    if struck and system.contact is not None and system.contact.loses:
+        variables["energy_lost_contact"] = values[:, 6]
     at = recorded.times
     valid = np.asarray(np.isfinite(values[:, 2:]).all(axis=1) & np.isfinite(alpha).all(axis=1))
     if times is not None and at.size < times.size:

@@ -45,7 +45,8 @@ SCHEMA: dict[str, Quantity] = {
     "energy_beam": Quantity(("time",), "J", "kinetic and potential energy of the beam, above its well"),
     "energy_contact": Quantity(("time",), "J", "energy stored in the contact"),
     "work_shaker": Quantity(("time",), "J", "work done by the striker"),
-    "energy_dissipated": Quantity(("time",), "J", "energy dissipated by damping"),
+    "energy_dissipated": Quantity(("time",), "J", "energy dissipated"),
+    "energy_lost_contact": Quantity(("time",), "J", "part of it that was lost in contact"),
     "valid": Quantity(("time",), "1", "whether the sample was measured"),
 }
 """Every variable a run may have, by name; ``time``, ``cycle`` and ``mode`` are coordinates."""

@@ -242,7 +242,7 @@ def begin(memory, blocks, place, asked, i, book):
     book.touching, book.onset = int(touching), 0
     if math.isfinite(since) and since > 0.0:
         book.onset = -int(since / run.clock.tick + 0.5)
-    open_book(book, seen, energy + contact_energy(run.struck.law, seen.d))
+    open_book(book, seen, run.struck.law, energy + contact_energy(run.struck.law, seen.d))
     watch = Watch(touching, now.watch.quiet, 0, 0, 0, 0)
     return run, Now(0, now.home, now.stretch, rows, seen, watch, 0, 0, now.status)
 
