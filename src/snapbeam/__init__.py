@@ -11,7 +11,20 @@ from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.engines.outcomes import STATISTICS, Statistic
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import ContactLaw, HertzContact, HuntCrossley, KelvinVoigt, PowerLaw, Restitution
-from snapbeam.model.drive import Drive, Recorded, Sine
+from snapbeam.model.drive import (
+    AccelerationSine,
+    Burst,
+    Chirp,
+    DisplacementSine,
+    Drive,
+    Flight,
+    HalfSine,
+    Noise,
+    Recorded,
+    Sine,
+    Still,
+    TwoSines,
+)
 from snapbeam.model.frequencies import exact_natural_freq
 from snapbeam.model.integration import Integration
 from snapbeam.model.quasi_static import quasi_static_threshold
@@ -36,11 +49,17 @@ Response = Outcome
 
 __all__ = [
     "STATISTICS",
+    "AccelerationSine",
     "Accuracy",
     "Beam",
+    "Burst",
+    "Chirp",
     "ContactLaw",
+    "DisplacementSine",
     "Drive",
     "Finding",
+    "Flight",
+    "HalfSine",
     "HertzContact",
     "HuntCrossley",
     "InputError",
@@ -48,6 +67,7 @@ __all__ = [
     "Integration",
     "Keeping",
     "KelvinVoigt",
+    "Noise",
     "Outcome",
     "PlausibilityWarning",
     "PowerLaw",
@@ -64,10 +84,12 @@ __all__ = [
     "Sine",
     "State",
     "Statistic",
+    "Still",
     "StoreError",
     "Striker",
     "System",
     "Tally",
+    "TwoSines",
     "__version__",
     "advance",
     "classify",

@@ -86,9 +86,9 @@ CASES = [
     ("hunt-crossley", 3, 2, 1e-5, 3e-11),
     ("hunt-crossley", 8, 1, 3e-8, 6e-12),
     # the onset of its force is a jump, which four impacts of one mode that snaps magnify
-    ("kelvin-voigt", 1, 5, 3e-6, 6e-7),
+    pytest.param("kelvin-voigt", 1, 5, 3e-6, 6e-7, marks=pytest.mark.slow),
     ("kelvin-voigt", 3, 2, 3e-7, 6e-8),
-    ("kelvin-voigt", 8, 1, 4e-9, 7e-10),
+    pytest.param("kelvin-voigt", 8, 1, 4e-9, 7e-10, marks=pytest.mark.slow),
 ]
 
 

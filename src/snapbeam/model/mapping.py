@@ -25,7 +25,15 @@ SECTIONS = ("beam", "model", "contact", "striker", "drive", "start")
 _MATRICES = (
     "mass", "stiffness", "contact_shape", "center_shape", "tension_stiffness", "equilibrium", "length_scale",
 )  # fmt: skip
-_START = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
+_START = (
+    "amplitude",
+    "velocity",
+    "phase",
+    "striker_position",
+    "contact_time",
+    "striker_shift",
+    "striker_rate",
+)
 
 
 def parts_to_mapping(
