@@ -117,7 +117,7 @@ def test_files_that_cannot_be_used(tmp_path) -> None:
     sections = PLAIN.to_mapping() | {"start": {"phase": 1.0}}
     with pytest.raises(InputError, match=r"\[start\] amplitude: missing"):
         sb.System.from_mapping(sections)
-    with pytest.raises(InputError, match=r"\[drive\] kind = None: must be one of 'recorded', 'sine'"):
+    with pytest.raises(InputError, match=r"\[drive\] kind = None: must be one of 'burst', 'chirp'"):
         sb.System.from_mapping({name: part for name, part in PLAIN.to_mapping().items() if name != "drive"})
 
 

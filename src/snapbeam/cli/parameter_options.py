@@ -19,7 +19,8 @@ BEAM = ("beam.length", "beam.thickness", "beam.width", "beam.density", "beam.you
 MODEL = ("model.modes", "model.damping_ratio", "model.reference_freq")
 CONTACT = ("contact.stiffness", "contact.radius", "contact.young_modulus", "contact.poisson_ratio",
            "contact.coefficient", "contact.loss", "contact.restitution", "contact.speed")  # fmt: skip
-STRIKER = ("striker.location", "striker.location_m", "striker.side", "striker.gap")
+STRIKER = ("striker.location", "striker.location_m", "striker.side", "striker.gap", "striker.mass", "striker.spring",
+           "striker.damper")  # fmt: skip
 DRIVE = (
     "drive.frequency_ratio",
     "drive.frequency_hz",
@@ -50,6 +51,9 @@ _OPTIONS = {
     "drive.phase": "--drive-phase",
     "drive.velocity_m_s": "--velocity",
     "striker.location_m": "--location-m",
+    "striker.mass": "--striker-mass",
+    "striker.spring": "--striker-spring",
+    "striker.damper": "--striker-damper",
 }
 _WORDS = {
     "contact.radius": "radius of the sphere, with the two next ones in place of a stiffness, m",

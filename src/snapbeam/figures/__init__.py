@@ -2,6 +2,7 @@
 
 from snapbeam.figures.response_map import class_handles, plot_response_map
 from snapbeam.figures.run import plot_run
+from snapbeam.figures.schematic import plot_system
 from snapbeam.figures.style import CLASS_COLORS, house_style, new_figure, save_figure
 from snapbeam.figures.threshold import plot_threshold
 from snapbeam.lab.compare.dots import Dots, read_dots
@@ -14,6 +15,7 @@ __all__ = [
     "new_figure",
     "plot_response_map",
     "plot_run",
+    "plot_system",
     "plot_threshold",
     "read_dots",
     "save_figure",
