@@ -10,7 +10,16 @@ from snapbeam.core.provenance import __version__
 from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.engines.outcomes import STATISTICS, Statistic
 from snapbeam.model.beam import Beam
-from snapbeam.model.contact import ContactLaw, HertzContact, HuntCrossley, KelvinVoigt, PowerLaw, Restitution
+from snapbeam.model.contact import (
+    ContactLaw,
+    HertzContact,
+    HuntCrossley,
+    KelvinVoigt,
+    PowerLaw,
+    Restitution,
+    bending_stress,
+    hertz_stress,
+)
 from snapbeam.model.drive import (
     AccelerationSine,
     Burst,
@@ -92,9 +101,11 @@ __all__ = [
     "TwoSines",
     "__version__",
     "advance",
+    "bending_stress",
     "classify",
     "conditioning",
     "exact_natural_freq",
+    "hertz_stress",
     "load_run",
     "long_map",
     "quasi_static_threshold",

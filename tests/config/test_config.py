@@ -117,7 +117,7 @@ REFUSALS = [
         {"contact": {"coefficient": 0.5, "stiffness": 1e8}},
         "[contact] give stiffness, of Hertz's law, or coefficient, of Newton's, not both",
     ),
-    ({"drive": {"kind": "triangle"}}, "[drive] kind = 'triangle': must be one of 'recorded', 'sine'"),
+    ({"drive": {"kind": "triangle"}}, "[drive] kind = 'triangle': must be one of 'burst', 'chirp'"),
     (
         {"drive": {"kind": "recorded"}},
         "[drive] displacement, velocity, sampling_freq, frequency: missing for kind = 'recorded'",

@@ -6,6 +6,7 @@ from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.contact.kelvin_voigt import KelvinVoigt
 from snapbeam.model.contact.power_law import PowerLaw
 from snapbeam.model.contact.restitution import Restitution
+from snapbeam.model.contact.stress import bending_stress, hertz_stress
 
 __all__ = [
     "LAWS",
@@ -16,4 +17,6 @@ __all__ = [
     "KelvinVoigt",
     "PowerLaw",
     "Restitution",
+    "bending_stress",
+    "hertz_stress",
 ]
