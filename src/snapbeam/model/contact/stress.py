@@ -46,8 +46,8 @@ class HertzStress:
             Finding(
                 "contact-yields",
                 f"the contact force of {self.force:.3g} N presses with {1e-9 * self.pressure:.3g} GPa, beyond the "
-                f"onset of yield at {self.yield_force:.3g} N: Hertz's law is elastic, and the contact is softer and loses "
-                "energy",
+                f"onset of yield at {self.yield_force:.3g} N: Hertz's law is elastic, and the contact is softer "
+                "and loses energy",
                 {"pressure": self.pressure, "yield_force": self.yield_force},
             ),
         )
