@@ -2,6 +2,7 @@
 
 from snapbeam.figures.response_map import class_handles, plot_response_map
 from snapbeam.figures.run import plot_run
+from snapbeam.figures.schematic import plot_system
 from snapbeam.figures.series import plot_energies, plot_modal_amplitudes, plot_phase_portrait, plot_spectrum
 from snapbeam.figures.statistic import plot_statistic
 from snapbeam.figures.style import CLASS_COLORS, house_style, new_figure, save_figure
@@ -21,6 +22,7 @@ __all__ = [
     "plot_run",
     "plot_spectrum",
     "plot_statistic",
+    "plot_system",
     "plot_threshold",
     "read_dots",
     "save_figure",

@@ -83,6 +83,11 @@ class System:
                 f"contact = {contact!r} with modes = {model.modes}: Newton's law needs one mode, since the "
                 "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
             )
+        if striker is not None and striker.mass is not None and contact is not None and contact.impulsive:
+            raise InputError(
+                f"contact = {contact!r} with striker mass = {striker.mass:g} kg: under Newton's law the striker moves "
+                "as prescribed; leave the mass out, or use a HertzContact or a HuntCrossley"
+            )
         if striker is not None and contact is None:
             raise InputError(
                 "contact = None: a striker needs a law of contact, such as HertzContact(stiffness)"

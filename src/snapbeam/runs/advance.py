@@ -125,6 +125,16 @@ def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
         raise InputError(
             f"tangent with contact = {system.contact!r}: its force jumps, so that the tangent flow does; give none"
         )
+    if system.striker is not None and system.striker.mass is not None:
+        raise InputError(
+            f"tangent with striker mass = {system.striker.mass:g} kg: the tangent flow is that of the beam alone; give "
+            "none, or leave the mass out"
+        )
+    if system.contact is not None and not system.contact.keeps.tangent:
+        raise InputError(
+            f"tangent with contact = {system.contact!r}: the tangent flow is known for laws whose force depends on the "
+            "penetration alone, such as HertzContact(stiffness); give none"
+        )
     given = finite_array("tangent", tangent)
     shape = (2, flat.modes)
     if given.ndim < 3 or given.shape[-2:] != shape:
@@ -165,7 +175,15 @@ def _shaped(
     tangent: _Array | None,
 ) -> State:
     """States as one batch of the shape that was asked for."""
-    names = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
+    names = (
+        "amplitude",
+        "velocity",
+        "phase",
+        "striker_position",
+        "contact_time",
+        "striker_shift",
+        "striker_rate",
+    )
     shape = (len(found), *batch) if every else batch
     arrays = {}
     for name in names:
