@@ -184,7 +184,8 @@ def calibrate(
     wells = bool(measured.lower_well_freq or measured.upper_well_freq)
     if wells and not beam.is_buckled:
         raise InputError(
-            "beam: is straight, but frequencies about wells were measured; give a buckling_level"
+            "beam: is straight, but frequencies about wells were measured; give a buckling_level (in the file of "
+            "--config)"
         )
     begin = np.array([math.log(getattr(beam, name)) for name in names])
     target = np.array([item.measured for item in data])
