@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,7 @@ from snapbeam.lab.tracking.measure.series import distortion, jumps, pooled, wand
 from snapbeam.lab.tracking.measure.sticker import ShakerRows
 from snapbeam.lab.tracking.scene import Scene
 
-__all__ = ["Follower", "TrackedRows"]
+__all__ = ["Drift", "Follower", "TrackedRows"]
 
 BORDER = 14.0  # rows from the border within which a vanished object is taken to have left the region
 KEPT = 0.5  # px by which a beam may look distorted and its row still be kept, with that as its error
@@ -43,6 +44,13 @@ class TrackedRows:
         return int(np.count_nonzero(self.flags & int(flag)))
 
 
+class Drift(NamedTuple):
+    """Rows by which the camera has sunk in each frame [px], NaN where no mark was seen, and their errors."""
+
+    shift: Floats
+    error: Floats
+
+
 class Follower:
     """Collects the measurements of batch after batch and says what is wrong with each frame."""
 
@@ -54,9 +62,9 @@ class Follower:
         self._border = {"beam": False, "shaker": False}
 
     def add(
-        self, frames: NDArray[np.floating], beam: BeamRows, tip: ShakerRows | None, drift: Floats | None
+        self, frames: NDArray[np.floating], beam: BeamRows, tip: ShakerRows | None, drift: Drift | None
     ) -> None:
-        """Add the measurements of a batch of turned frames; *drift* [px] of the camera is taken out."""
+        """Add the measurements of a batch of turned frames; *drift* of the camera is taken out."""
         view, height = self.scene.beam, frames.shape[1]
         leaving = self._leaving("beam", beam.row, height)
         strip = frames[:, :, view.columns[::6]]
@@ -97,17 +105,20 @@ class Follower:
             confidence = np.minimum(confidence, tip.share * np.clip(np.nan_to_num(tip.contrast), 0.0, 1.0))
             row[lost] = np.nan
         flags[lost] = FrameFlag.DROPPED
-        shift = 0.0 if drift is None else np.where(lost, 0.0, drift)
+        shift, shift_error = (0.0, 0.0) if drift is None else drift
+        flags[~lost & ~np.isfinite(shift)] |= np.uint16(FrameFlag.GAP)  # no mark was seen
         self._parts.append(
             {
                 "row": np.where(lost, np.nan, beam.row) - shift,
-                "error": np.where(lost, np.nan, _with_blur(beam, view.edge_width, self.blur_limit)),
+                "error": np.where(
+                    lost, np.nan, np.hypot(_with_blur(beam, view.edge_width, self.blur_limit), shift_error)
+                ),
                 "slope": np.where(lost, np.nan, beam.slope),
                 "width": beam.width,
                 "thickness": np.where(lost, np.nan, beam.thickness),
                 "residual": np.where(lost, np.nan, beam.residual),
                 "shaker": row - shift,
-                "shaker_error": error,
+                "shaker_error": np.hypot(error, shift_error),
                 "confidence": confidence,
                 "flags": flags,
             }
