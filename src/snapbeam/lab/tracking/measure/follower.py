@@ -12,11 +12,13 @@ from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.flags import FrameFlag
 from snapbeam.lab.tracking.geometry import HOT
 from snapbeam.lab.tracking.measure.beam import BeamRows
-from snapbeam.lab.tracking.measure.series import distortion, jumps, pooled, wanderings
+from snapbeam.lab.tracking.measure.series import distortion, jumps, pooled, unexplained_blur, wanderings
 from snapbeam.lab.tracking.measure.sticker import ShakerRows
 from snapbeam.lab.tracking.scene import Scene
 
 __all__ = ["Drift", "Follower", "TrackedRows"]
+
+_SMEARED = 0.25  # error over what edges are wider than explained
 
 BORDER = 14.0  # rows from the border within which a vanished object is taken to have left the region
 KEPT = 0.5  # px by which a beam may look distorted and its row still be kept, with that as its error
@@ -134,7 +136,11 @@ class Follower:
         )
         odd &= np.isfinite(row)
         flags[odd] |= np.uint16(FrameFlag.DISTORTED)
-        error = np.where(odd, np.hypot(pooled(found["error"]), miss), pooled(found["error"]))
+        blur = unexplained_blur(row, found["width"], self.scene.beam.edge_width)
+        error = np.hypot(
+            pooled(found["error"]), np.where(odd, np.fmax(miss, _SMEARED * blur), _SMEARED * blur)
+        )
+        shaker_error = np.hypot(pooled(found["shaker_error"]), _SMEARED * blur)
         row[odd & (miss > KEPT)] = np.nan
         strays = jumps(row)
         row[strays] = np.nan
@@ -150,7 +156,7 @@ class Follower:
             slope=found["slope"],
             width=found["width"],
             shaker=shaker,
-            shaker_error=np.where(np.isfinite(shaker), pooled(found["shaker_error"]), np.nan),
+            shaker_error=np.where(np.isfinite(shaker), shaker_error, np.nan),
             confidence=np.where(gone, 0.0, found["confidence"]),
             flags=flags,
         )
@@ -177,7 +183,7 @@ def _with_blur(beam: BeamRows, usual: float, limit: float) -> Floats:
     """Standard errors of the beam's row, widened in frames whose edges are too wide for their windows."""
     with np.errstate(invalid="ignore"):
         wide = beam.width > limit
-    return np.where(wide, np.hypot(beam.error, 0.25 * (beam.width - usual)), beam.error)
+    return np.where(wide, np.hypot(beam.error, _SMEARED * (beam.width - usual)), beam.error)
 
 
 def _assign(
