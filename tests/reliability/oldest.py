@@ -1,6 +1,6 @@
 """The lower bounds of pyproject.toml as versions to install: what ``make test-oldest`` tests with.
 
-    python oldest.py EXTRA... > requirements.txt
+python oldest.py EXTRA... > requirements.txt
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ from snapbeam.sweeps.compute.cluster import Cluster, open_client, parse_cluster
 from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.compute.tasks import Keeper, MemoryKeeper, Rows, Stage
 from snapbeam.sweeps.compute.workers import ClusterWorkers, Failure, HereWorkers, Workers
+from snapbeam.sweeps.errors import StoreError
 from snapbeam.sweeps.export import to_dataset, to_netcdf
 from snapbeam.sweeps.keep.store import MapStore
 from snapbeam.sweeps.points import Points
@@ -123,6 +124,10 @@ class StoreKeeper:
                 f"{stage.name}: {len(damaged)} of {stage.tasks} tasks were damaged and are computed again"
             )
         todo = sorted(damaged if self.only_damaged else pending, key=_scattered)
+        if todo and store.read_only:
+            raise StoreError(
+                f"store = {str(store.path)!r}: is read-only, and {len(todo)} of {stage.tasks} tasks are to be computed"
+            )
         sizes = {task: int(np.diff(stage.bounds(task))[0]) for task in todo}
         total, done = sum(sizes.values()), 0
         if total < stage.size and not self.only_damaged:

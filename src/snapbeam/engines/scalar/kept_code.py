@@ -78,7 +78,9 @@ class _PrivateFolder(_CacheLocator):
             locator.ensure_cache_path()
         except OSError:
             return None
-        _say(f"compiled code is kept in {locator.get_cache_path()}: neither the package nor HOME can be written")
+        _say(
+            f"compiled code is kept in {locator.get_cache_path()}: neither the package nor HOME can be written"
+        )
         return locator
 
 
@@ -94,7 +96,9 @@ def private_folder() -> str:
     folder = Path(tempfile.gettempdir()) / f"snapbeam-{owner}"
     folder.mkdir(mode=0o700, exist_ok=True)
     found = folder.lstat()
-    if not stat.S_ISDIR(found.st_mode) or (os.name != "nt" and (found.st_uid != owner or found.st_mode & 0o022)):
+    if not stat.S_ISDIR(found.st_mode) or (
+        os.name != "nt" and (found.st_uid != owner or found.st_mode & 0o022)
+    ):
         raise PermissionError(f"{folder} is not this user's alone")
     return str(folder)
 

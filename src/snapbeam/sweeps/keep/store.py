@@ -12,6 +12,7 @@ What is done is read from the ledger and the hash of the data, never from the da
 
 from __future__ import annotations
 
+import errno
 import json
 import warnings
 from collections import Counter
@@ -26,7 +27,7 @@ from snapbeam.core.validate import InputError, integer
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Stage, chunk_size
 from snapbeam.sweeps.errors import StoreError
-from snapbeam.sweeps.keep.durable import StoreLock, durable_write, member, refuse_links
+from snapbeam.sweeps.keep.durable import PARTIAL, StoreLock, durable_write, member, refuse_links
 from snapbeam.sweeps.keep.ledger import Ledger, Record
 
 __all__ = ["MapStore", "StoredRows", "read_stored_config"]
@@ -34,6 +35,7 @@ __all__ = ["MapStore", "StoredRows", "read_stored_config"]
 _FORMAT = {"format": "snapbeam map", "format_version": 2}
 _DATA = "runs.zarr"
 _TABLES = ("integers", "numbers")
+_NOT_HERE = (errno.EROFS, errno.EACCES, errno.EPERM)
 _KNOWN = {"map.json", "ledger.jsonl", "lock", _DATA}
 
 
@@ -71,10 +73,17 @@ class MapStore:
         self.work = work
         if chunk is not None:
             chunk = integer("chunk", chunk, 1, 10**7)
-        self.path.mkdir(exist_ok=True)
-        refuse_links(self.path)
-        self._lock = StoreLock(self.path / "lock").__enter__()
         try:
+            self.path.mkdir(exist_ok=True)
+        except OSError as error:
+            raise self._cannot_write(error) from error
+        _refuse_foreign(self.path)
+        self._lock = StoreLock(self.path / "lock")
+        self.read_only = False
+        """Whether it stands where nothing can be written, so that it can only be read."""
+        try:
+            self._take_lock()
+            refuse_links(self.path, sweep=not self.read_only)
             self.chunk = self._describe(chunk, config)
             self.ledger = Ledger(self.path / "ledger.jsonl")
         except BaseException:
@@ -99,6 +108,14 @@ class MapStore:
         """Let another process write the store."""
         self._lock.__exit__(None, None, None)
 
+    def _take_lock(self) -> None:
+        try:
+            self._lock.__enter__()
+        except OSError as error:
+            self.read_only = error.errno in _NOT_HERE and (self.path / "map.json").is_file()
+            if not self.read_only:
+                raise self._cannot_write(error) from error
+
     def _describe(self, chunk: int | None, config: dict[str, Any] | None) -> int:
         file = self.path / "map.json"
         wanted = json.loads(canonical_json(self.work.parameters))
@@ -106,14 +123,15 @@ class MapStore:
             held = _read_description(file)
             _refuse_other(self.path, held["parameters"], wanted)
             return int(held["chunk"])
-        if any(entry.name not in _KNOWN for entry in self.path.iterdir()):
-            raise InputError(f"store = {str(self.path)!r}: is not empty and holds no map")
         setup = self.work.setup
         chunk = chunk_size(setup.points.size, setup.integration.engine) if chunk is None else chunk
         held = _FORMAT | {"parameters": wanted, "parameter_hash": parameter_hash(wanted), "chunk": chunk}
         if config is not None:
             held["config"] = config
-        durable_write(file, (json.dumps(held, indent=1) + "\n").encode())
+        try:
+            durable_write(file, (json.dumps(held, indent=1) + "\n").encode())
+        except OSError as error:
+            raise self._cannot_write(error) from error
         return chunk
 
     def _warn_of_mixture(self) -> None:
@@ -136,7 +154,10 @@ class MapStore:
         from snapbeam.sweeps.keep.tables import open_tables
 
         member(stage.name)
-        self._arrays[stage.name] = open_tables(self.path / _DATA, stage, self.work)
+        try:
+            self._arrays[stage.name] = open_tables(self.path / _DATA, stage, self.work, self.read_only)
+        except OSError as error:
+            raise self._cannot_write(error) from error
         for task in range(stage.tasks):
             record = self.ledger.records.get((stage.name, task))
             if record is None or record.state != "done":
@@ -200,9 +221,10 @@ class MapStore:
         )
 
     def _cannot_write(self, error: OSError) -> StoreError:
+        what = "make room" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "make it writable"
         return StoreError(
             f"store = {str(self.path)!r}: cannot be written, {error.strerror or error}; no finished task is "
-            "lost: make room and give the same command again"
+            f"lost: {what} and give the same command again"
         )
 
     def _load(self, stage: Stage, task: int) -> ResultTable | None:
@@ -276,6 +298,13 @@ def _store_folder(path: str | Path) -> Path:
     if not folder.parent.is_dir():
         raise InputError(f"store = {str(path)!r}: {str(folder.parent)!r} is not an existing folder")
     return folder
+
+
+def _refuse_foreign(folder: Path) -> None:
+    """Refuse a folder that holds something and no map, before anything is written into it."""
+    names = {entry.name for entry in folder.iterdir() if not entry.name.endswith(PARTIAL)}
+    if "map.json" not in names and names - _KNOWN:
+        raise InputError(f"store = {str(folder)!r}: is not empty and holds no map")
 
 
 def _read_description(file: Path) -> dict[str, Any]:
