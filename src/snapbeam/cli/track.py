@@ -124,7 +124,8 @@ def track(
     Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
     frame.png --report quality.png
     """
-    from snapbeam.core.files import atomic_path, check_writable
+    from snapbeam.core.files import check_writable
+    from snapbeam.core.netcdf import write_netcdf
     from snapbeam.core.validate import integer
 
     check_writable(output, "output", (".nc",))
@@ -166,8 +167,7 @@ def track(
                 progress=tell,
             )
         elapsed = time.monotonic() - start
-        with atomic_path(output) as temporary:
-            dataset.to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(dataset, output)
         files = [output]
         if picture is not None or report is not None:
             import matplotlib

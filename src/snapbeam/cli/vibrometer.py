@@ -58,7 +58,8 @@ def vibrometer(
 
     Example: snapbeam vibrometer velocity.csv --frequency 100 --plot drive.png --json drive.json
     """
-    from snapbeam.core.files import atomic_path, check_writable
+    from snapbeam.core.files import check_writable
+    from snapbeam.core.netcdf import write_netcdf
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
     from snapbeam.lab.drive.vibrometer import SNR_LIMIT, measure_drive
 
@@ -103,8 +104,7 @@ def vibrometer(
         from snapbeam.lab.drive.record import recorded_drive
 
         resampled = recorded_drive(data, drive_sampling_freq or 1e5, measurement=drive)
-        with atomic_path(drive_output) as temporary:
-            resampled.to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(resampled, drive_output)
         console.print(f"Written: {file_line(drive_output)}")
     if plot is not None:
         from snapbeam.figures.vibrometer import plot_drive

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.files import check_writable
+from snapbeam.core.netcdf import write_netcdf
 from snapbeam.core.validate import InputError, InputTypeError, flag, integer
 from snapbeam.sweeps.compute.cluster import Cluster, open_client, parse_cluster
 from snapbeam.sweeps.compute.task import PointWork
@@ -228,8 +229,7 @@ def _result(
         dataset["computed"] = (points.dims, points.arranged(rows.computed.ravel()), labels)
         if target is None:
             return dataset
-        with atomic_path(target) as temporary:
-            dataset.to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(dataset, target)
     elif target is None:
         return to_dataset(work, points, rows, attrs)
     else:

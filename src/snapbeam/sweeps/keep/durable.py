@@ -13,6 +13,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from snapbeam.core.files import lives
 from snapbeam.core.validate import InputError
 from snapbeam.sweeps.errors import StoreError
 
@@ -155,22 +156,10 @@ def _holder(handle: int) -> str:
     for _ in range(20):
         said = os.pread(handle, 32, 0).decode(errors="replace").strip()
         kind, _, number = said.partition(" ")
-        if kind == "process" and number.isdecimal() and _lives(int(number)):
+        if kind == "process" and number.isdecimal() and lives(int(number)):
             return said
         time.sleep(0.05)
     return said or "unknown"
-
-
-def _lives(process: int) -> bool:
-    if os.name == "nt":
-        return True
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        return True
-    return True
 
 
 def _lock(handle: int) -> None:
