@@ -144,7 +144,7 @@ class StoreKeeper:
                 tally.failed.append((stage.name, task, result.reason))
                 self.note(f"{stage.name}: task {task} was given up: it {result.reason}")
             else:
-                store.commit(stage, task, result.columns, result.processor)
+                store.commit(stage, task, result.columns, result.maker)
                 tally.computed += 1
                 tally.runs += sizes[task] * self.work.runs_per_point
             done += sizes[task]

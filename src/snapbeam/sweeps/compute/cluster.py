@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snapbeam.core.validate import InputError, integer
 from snapbeam.engines.cpu.driver import usable_cores
+from snapbeam.sweeps.errors import StoreError
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -109,8 +110,17 @@ def open_client(cluster: Cluster) -> Iterator[Client]:
     except ImportError as error:
         raise InputError("dask is needed for --cluster: install snapbeam[cluster]") from error
     if cluster.kind == "address":
-        with Client(cluster.address, timeout="30s", set_as_default=False) as client:
+        try:
+            client = Client(cluster.address, timeout="30s", set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise StoreError(
+                f"cluster = {cluster.address!r}: no scheduler answers there ({error})"
+            ) from error
+        try:
             yield client
+        finally:
+            with suppress(Exception):  # a scheduler that is gone cannot be taken leave of
+                client.close(timeout=5)
         return
     with dask.config.set({"distributed.comm.timeouts.connect": "60s"}):
         made = _local(cluster.workers) if cluster.kind == "local" else _slurm(cluster.slurm)

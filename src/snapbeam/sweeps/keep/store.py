@@ -16,14 +16,16 @@ import errno
 import json
 import warnings
 from collections import Counter
+from dataclasses import asdict, fields
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 
-from snapbeam.core.provenance import __version__, canonical_json, parameter_hash, processor_name
+from snapbeam.core.provenance import canonical_json, parameter_hash
 from snapbeam.core.validate import InputError, integer
+from snapbeam.sweeps.compute.maker import Maker, differences, this_maker
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Stage, chunk_size
 from snapbeam.sweeps.errors import StoreError
@@ -32,7 +34,7 @@ from snapbeam.sweeps.keep.ledger import Ledger, Record
 
 __all__ = ["MapStore", "StoredRows", "read_stored_config"]
 
-_FORMAT = {"format": "snapbeam map", "format_version": 2}
+_FORMAT = {"format": "snapbeam map", "format_version": 3}
 _DATA = "runs.zarr"
 _TABLES = ("integers", "numbers")
 _NOT_HERE = (errno.EROFS, errno.EACCES, errno.EPERM)
@@ -92,7 +94,8 @@ class MapStore:
         self.damaged: list[tuple[str, int]] = []
         """Tasks whose data did not match the ledger when this store was opened."""
         self._arrays: dict[str, Any] = {}
-        self._processor = processor_name()
+        self.maker = this_maker(work.setup.system)
+        """What computes in this process."""
         self._model = work.model_hash()
         self._warn_of_mixture()
 
@@ -135,19 +138,16 @@ class MapStore:
         return chunk
 
     def _warn_of_mixture(self) -> None:
-        for record in self.ledger.records.values():
-            if record.state == "done" and (record.version, record.processor, record.model) != (
-                __version__,
-                self._processor,
-                self._model,
-            ):
-                warnings.warn(
-                    f"the store was begun with snapbeam {record.version} on a {record.processor} processor "
-                    f"and goes on with snapbeam {__version__} on {self._processor}: its points are equal to "
-                    "rounding, not bit for bit",
-                    stacklevel=4,
-                )
-                return
+        done = [record for record in self.ledger.records.values() if record.state == "done"]
+        if words := _mixture([*map(_maker_of, done), self.maker], {*(r.model for r in done), self._model}):
+            version, processor = next(
+                (r.version, r.processor) for r in done if _maker_of(r) != self.maker or r.model != self._model
+            )
+            warnings.warn(
+                f"the store was begun with snapbeam {version} on a {processor} processor and goes on with snapbeam "
+                f"{self.maker.version} on {self.maker.processor}: its points are equal {words}",
+                stacklevel=4,
+            )
 
     def open_stage(self, stage: Stage) -> None:
         """Check every finished task of a stage against the ledger, and drop those that are damaged."""
@@ -182,7 +182,7 @@ class MapStore:
         """Tasks of a stage that were found damaged when it was opened."""
         return [task for name, task in self.damaged if name == stage.name]
 
-    def commit(self, stage: Stage, task: int, columns: ResultTable, processor: str = "") -> None:
+    def commit(self, stage: Stage, task: int, columns: ResultTable, maker: Maker | None = None) -> None:
         """Write the results of a task, have them on the disk, and then say in the ledger that it is done."""
         start, stop = stage.bounds(task)
         if any(len(table) != stop - start for table in columns):
@@ -192,18 +192,18 @@ class MapStore:
         try:
             for name, table in zip(_TABLES, columns, strict=True):
                 self._arrays[stage.name][name][start:stop] = table
-            self._record(stage, task, "done", columns.content_hash(), processor)
+            self._record(stage, task, "done", columns.content_hash(), maker or self.maker)
         except OSError as error:
             raise self._cannot_write(error) from error
 
     def fail(self, stage: Stage, task: int, reason: str) -> None:
         """Say in the ledger that a task could not be computed, and why."""
         try:
-            self._record(stage, task, "failed", reason, "")
+            self._record(stage, task, "failed", reason, self.maker)
         except OSError as error:
             raise self._cannot_write(error) from error
 
-    def _record(self, stage: Stage, task: int, state: str, content: str, processor: str) -> None:
+    def _record(self, stage: Stage, task: int, state: str, content: str, maker: Maker) -> None:
         setup = self.work.setup
         self.ledger.write(
             Record(
@@ -213,10 +213,9 @@ class MapStore:
                 parameters=self.work.task_hash(stage.columns(task)),
                 content=content,
                 engine=setup.integration.engine,
-                version=__version__,
                 step=setup.plan.step,
-                processor=processor or self._processor,
                 model=self._model,
+                **asdict(maker),
             )
         )
 
@@ -245,21 +244,43 @@ class MapStore:
     def made_with(self) -> dict[str, str]:
         """Attributes that say what computed the finished tasks, and how far their numbers can be trusted."""
         done = [record for record in self.ledger.records.values() if record.state == "done"]
-        kinds = Counter((record.engine, record.version, record.processor, record.model) for record in done)
+        kinds = Counter((record.engine, _maker_of(record)) for record in done)
         made = "; ".join(
-            f"{count} tasks by engine {engine}, snapbeam {version}, processor {processor}"
-            for (engine, version, processor, _), count in kinds.items()
+            f"{count} tasks by engine {engine}, snapbeam {by.version}, processor {by.processor}, {by.libraries}, "
+            f"code {by.code}, arithmetic {by.arithmetic}"
+            for (engine, by), count in kinds.items()
         )
+        words = _mixture([by for _, by in kinds], {record.model for record in done})
         same = (
-            "bit for bit, whatever the tasks, their order, the threads, the workers and the interruptions"
-            if len(kinds) <= 1
-            else "to rounding: more than one engine, version or type of processor took part"
+            words
+            or "bit for bit, whatever the tasks, their order, the threads, the workers and the interruptions"
         )
         failed = [record for record in self.ledger.records.values() if record.state == "failed"]
         attrs = {"computed_by": made, "reproducible": same}
         if failed:
             attrs["failed_tasks"] = "; ".join(f"{r.stage} {r.task}: {r.content}" for r in failed)
         return attrs
+
+
+def _maker_of(record: Record) -> Maker:
+    return Maker(**{field.name: getattr(record, field.name) for field in fields(Maker)})
+
+
+def _mixture(makers: list[Maker], models: set[str]) -> str:
+    """How far numbers agree that several made; nothing where they agree in every bit."""
+    found = differences(makers)
+    if len(models) > 1 and not found:
+        found = ["reduction of the model"]
+    if not found:
+        return ""
+    how = (
+        "as far as the code does" if {"code", "version"} & _apart(makers) else "to rounding, not bit for bit"
+    )
+    return f"{how}: more than one {' and '.join(found)} took part"
+
+
+def _apart(makers: list[Maker]) -> set[str]:
+    return {name for name in ("version", "code") if len({getattr(each, name) for each in makers}) > 1}
 
 
 class StoredRows:
