@@ -5,6 +5,7 @@ python worker_driver.py FOLDER MAPS KILLS SEED
 
 from __future__ import annotations
 
+import faulthandler
 import json
 import os
 import random
@@ -59,6 +60,7 @@ def compute(store, work, stage, client, said):
 
 def main(folder, maps, kills, seed):
     """Compute *maps* maps under *kills* kills and print what was seen as JSON."""
+    faulthandler.register(signal.SIGUSR1, all_threads=True)
     work = PointWork(map_setup(**ASKED))
     grid = work.setup.points
     stage = Stage("base", grid, CHUNK)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from snapbeam.core.provenance import __version__, code_hash
+from snapbeam.sweeps.compute.crew import Crew
 from snapbeam.sweeps.compute.maker import Maker, this_maker
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Stage
@@ -28,8 +29,6 @@ ATTEMPTS = 3
 _POLL = 0.5
 _DELIVERY_POLL = 2.0
 _RECONNECT = 30.0
-_MOST_LOST = 12
-"""Workers, for each that is there, that may go without any task finished."""
 _GONE = (OSError, TimeoutError, asyncio.TimeoutError, CancelledError, asyncio.CancelledError, RuntimeError)
 """What calls to a scheduler that is not there any more raise."""
 
@@ -101,11 +100,12 @@ class ClusterWorkers:
         queue = deque(tasks)
         flying: dict[Future, tuple[int, str]] = {}
         trouble: Counter[int] = Counter()
-        crew = _Crew(self.note)
+        crew = Crew(self.client, self.note)
         try:
             while queue or flying:
                 there = self._workers()
-                crew.now(there)
+                with _answered():
+                    crew.now(there)
                 idle = there.keys() - {address for _, address in flying.values()}
                 for address in sorted(idle)[: len(queue)]:
                     task = queue.popleft()
@@ -121,8 +121,7 @@ class ClusterWorkers:
                         outcome = self._outcome(future, address)
                     future.release()
                     if isinstance(outcome, TaskResult):
-                        crew.succeeded = True
-                        crew.lost.clear()
+                        crew.finished()
                         yield task, outcome
                         continue
                     trouble[task] += 1
@@ -206,30 +205,6 @@ class ClusterWorkers:
         with suppress(*_GONE):
             future.cancel(force=True)
         return Failure(reason)
-
-
-class _Crew:
-    """Who is there; tells when that changes between none and some, and when too many went without a result."""
-
-    def __init__(self, note: Callable[[str], object]) -> None:
-        self.note = note
-        self.succeeded = False
-        self.known: set[str] | None = None
-        self.lost: set[str] = set()
-        """Workers that went since the last task was finished."""
-
-    def now(self, there: Mapping[str, int]) -> None:
-        """Look at who is there."""
-        before, self.known = self.known, set(there)
-        if before is None or bool(before) != bool(there):
-            self.note("waiting for workers" if not there else f"workers: {len(there)}")
-        self.lost |= (before or set()) - self.known
-        most = _MOST_LOST * max(1, len(there))
-        if len(self.lost) > most:
-            raise StoreError(
-                f"the workers cannot compute this map: {len(self.lost)} of them came and went and no task was "
-                "finished; they may have too little memory for one: give them more, or smaller tasks (chunk)"
-            )
 
 
 def _gone(why: object) -> StoreError:
