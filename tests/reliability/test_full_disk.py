@@ -159,3 +159,13 @@ def test_orphans_of_killed_writers_are_swept(tmp_path, tried):
         mine.write_text("whole")
     assert os.listdir(tmp_path) == ["map.nc"] and (tmp_path / "map.nc").read_text() == "whole"
     tried("writers killed in the middle of a file")
+
+
+def test_every_netcdf_file_is_written_that_way():
+    """Nothing in the package hands a path on a disk to the HDF5 library to write to."""
+    package = Path(sb.__file__).parent
+    for file in package.rglob("*.py"):
+        text = file.read_text()
+        assert not re.search(
+            r"\.to_netcdf\(|h5netcdf\.File\((?!stream)|h5py\.File\((?!stream).*[\"'](w|a)", text
+        ), file

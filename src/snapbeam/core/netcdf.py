@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import h5netcdf
     import xarray as xr
 
-__all__ = ["netcdf_file", "write_netcdf"]
+__all__ = ["hdf5_stream", "netcdf_file", "write_netcdf"]
 
 
 def write_netcdf(
@@ -62,17 +62,25 @@ def netcdf_file(path: str | os.PathLike[str]) -> Iterator[h5netcdf.File]:
     """Give a NetCDF file to write to, which is put at *path* if all went well; errors as of :func:`write_netcdf`."""
     import h5netcdf
 
-    target = Path(path)
-    with atomic_path(target) as temporary:
-        with _Stream(temporary) as stream:
-            with h5netcdf.File(stream, "w", invalid_netcdf=False) as file:
-                yield file
-            stream.settle()
-        if stream.trouble is not None:
-            raise _kept_elsewhere(target, temporary, stream)
+    with atomic_path(path) as temporary, hdf5_stream(temporary, Path(path)) as stream:
+        with h5netcdf.File(stream, "w", invalid_netcdf=False) as file:
+            yield file
 
 
-def _kept_elsewhere(target: Path, temporary: Path, stream: _Stream) -> NoRoomError:
+@contextmanager
+def hdf5_stream(path: Path, target: Path | None = None) -> Iterator[io.RawIOBase]:
+    """Give a stream that h5py can write to, and have what it wrote in the file *path*.
+
+    *target* is the name to tell in errors, those of :func:`write_netcdf`.
+    """
+    with _Stream(path) as stream:
+        yield stream
+        stream.settle()
+    if stream.trouble is not None:
+        raise _kept_elsewhere(target or path, stream)
+
+
+def _kept_elsewhere(target: Path, stream: _Stream) -> NoRoomError:
     """Save what did not fit where there is room, if there is; the error to raise."""
     size = len(stream.held.getbuffer())
     free = _free(target.parent)
