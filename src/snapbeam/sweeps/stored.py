@@ -34,6 +34,12 @@ __all__ = ["Keeping", "Tally", "compute_sweep"]
 Note = Callable[[str], object]
 
 
+_POINT_BYTES = 700
+"""Memory that a point of a sweep takes until its dataset is made."""
+_MEMORY = 4 * 2**30
+_MOST_POINTS = 10**9
+
+
 class _Incomplete(Exception):
     """A stage that is only checked has tasks that were never done."""
 
@@ -175,11 +181,24 @@ def compute_sweep(
     asked = None if cluster is None else parse_cluster(cluster)
     if keeping.path is None and asked is not None:
         raise InputError("cluster: needs a store")
+    _require_room(setup.points.size, keeping)
     work = PointWork(setup, replicas)
     with _keeper(work, keeping, asked) as keeper:
         points, rows = _computed(keeper, levels, progress)
         more = {} if not isinstance(keeper, StoreKeeper) else keeper.store.made_with()
         return _result(work, points, rows, more, target)
+
+
+def _require_room(points: int, keeping: Keeping) -> None:
+    """Refuse a sweep whose results would not fit, before anything is computed."""
+    size = points * _POINT_BYTES
+    if keeping.path is None and size > _MEMORY:
+        raise InputError(
+            f"{points} points would take {size / 2**30:.3g} GiB of memory, the limit is {_MEMORY / 2**30:.0f} GiB: "
+            "give fewer points, or a store"
+        )
+    if points > _MOST_POINTS:
+        raise InputError(f"{points} points: must be at most {_MOST_POINTS}")
 
 
 def _computed(keeper: Keeper, levels: int, progress: Progress | None) -> tuple[Points, Rows]:
