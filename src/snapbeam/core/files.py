@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.core.validate import InputError, InputTypeError, shown
 
 __all__ = ["NoRoomError", "atomic_path", "check_writable", "lives"]
 
@@ -36,7 +36,7 @@ def check_writable(
         If the folder is missing or cannot be written to, *path* is a folder, or its suffix is not allowed.
     """
     if not isinstance(path, (str, os.PathLike)):
-        raise InputTypeError(f"{name} = {path!r}: must be a path, not {type(path).__name__}")
+        raise InputTypeError(f"{name} = {shown(path)}: must be a path, not {type(path).__name__}")
     target = Path(path)
     if suffixes and target.suffix.lower() not in suffixes:
         raise InputError(f"{name} = {str(path)!r}: must end in {' or '.join(suffixes)}")

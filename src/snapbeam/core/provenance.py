@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.core.validate import InputError, InputTypeError, shown
 
 __all__ = [
     "__version__",
@@ -147,10 +147,10 @@ def _plain(value: Any, name: str) -> Any:
         return value
     if isinstance(value, float):
         if not math.isfinite(value):
-            raise InputError(f"{name} = {value!r}: must be finite")
+            raise InputError(f"{name} = {shown(value)}: must be finite")
         return int(value) if value.is_integer() and abs(value) < 2.0**53 else value
     raise InputTypeError(
-        f"{name} = {value!r}: must be numbers, text or lists of these, not {type(value).__name__}"
+        f"{name} = {shown(value)}: must be numbers, text or lists of these, not {type(value).__name__}"
     )
 
 

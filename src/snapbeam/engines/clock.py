@@ -143,8 +143,8 @@ def require_affordable(integration: Integration, modes: int, lengths: _Array, st
         allowed = "an hour's" if integration.max_steps is None else "max_steps"
         spent = _words(seconds_of(float(steps[longest]), modes))
         raise InputError(
-            f"a run of {steps[longest]:.3g} steps of {lengths[longest]:.3g} s, some {spent} on one core: must be at most {most:.3g} steps ({allowed}); "
-            "ask for fewer cycles or longer steps, or for a larger max_steps"
+            f"a run of {steps[longest]:.3g} steps of {lengths[longest]:.3g} s, some {spent} on one core: must be at "
+            f"most {most:.3g} steps ({allowed}); ask for fewer cycles or longer steps, or for a larger max_steps"
         )
 
 

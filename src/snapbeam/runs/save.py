@@ -11,7 +11,7 @@ import numpy as np
 from snapbeam.core.codes import ResponseClass, RunStatus
 from snapbeam.core.files import check_writable
 from snapbeam.core.netcdf import write_netcdf
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, file_path
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import quantities
@@ -66,6 +66,7 @@ def load_run(path: str | os.PathLike[str]) -> Run:
     """
     import xarray as xr
 
+    path = file_path("path", path)
     try:
         parts = {name: xr.load_dataset(path, engine="h5netcdf", group=name) for name in (None, *_GROUPS)}
     except (OSError, ValueError, KeyError) as error:

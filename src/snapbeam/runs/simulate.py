@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
 from snapbeam.core.findings import tell
-from snapbeam.core.validate import InputError, InputTypeError, finite_array
+from snapbeam.core.validate import InputError, InputTypeError, finite_array, shown
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.engines.ensemble import Ensemble
@@ -115,7 +115,7 @@ def simulate(
     """
     system, integration = asked(model, parts, options)
     if progress is not None and not callable(progress):
-        raise InputTypeError(f"progress = {progress!r}: must be callable, as progress(share)")
+        raise InputTypeError(f"progress = {shown(progress)}: must be callable, as progress(share)")
     tell(system.findings())
     plan, reached = plans_of(system, integration, run_columns(system, {}))[0], None
     if integration.tolerance is not None:

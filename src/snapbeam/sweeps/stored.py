@@ -13,7 +13,7 @@ import numpy as np
 
 from snapbeam.core.files import check_writable
 from snapbeam.core.netcdf import write_netcdf
-from snapbeam.core.validate import InputError, InputTypeError, flag, integer
+from snapbeam.core.validate import InputError, InputTypeError, flag, integer, shown
 from snapbeam.sweeps.compute.cluster import Cluster, open_client, parse_cluster
 from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.compute.tasks import Keeper, MemoryKeeper, Rows, Stage
@@ -93,7 +93,7 @@ class Keeping:
 
     def __post_init__(self) -> None:
         if self.path is not None and not isinstance(self.path, (str, os.PathLike)):
-            raise InputTypeError(f"store = {self.path!r}: must be a folder")
+            raise InputTypeError(f"store = {shown(self.path)}: must be a folder")
         flag("verify", self.verify)
         if self.path is None and self.verify:
             raise InputError("verify: needs a store")
@@ -174,9 +174,9 @@ def compute_sweep(
     """Compute a sweep that was checked; see :func:`snapbeam.sweep`."""
     levels = integer("refine_levels", refine_levels, 0, MAX_LEVELS)
     if replicas is not None and not isinstance(replicas, Replicas):
-        raise InputTypeError(f"replicas = {replicas!r}: must be a number of repeats, or Replicas")
+        raise InputTypeError(f"replicas = {shown(replicas)}: must be a number of repeats, or Replicas")
     if progress is not None and not callable(progress):
-        raise InputTypeError(f"progress = {progress!r}: must be callable, as progress(done, total)")
+        raise InputTypeError(f"progress = {shown(progress)}: must be callable, as progress(done, total)")
     target = None if output is None else check_writable(output, "output", (".nc",))
     asked = None if cluster is None else parse_cluster(cluster)
     if keeping.path is None and asked is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from snapbeam.core.validate import InputTypeError
+from snapbeam.core.validate import InputTypeError, shown
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 
@@ -47,6 +47,6 @@ class Striker:
     def __post_init__(self) -> None:
         if not isinstance(self.drive, Drive):
             raise InputTypeError(
-                f"drive = {self.drive!r}: must be a drive, such as Sine(frequency_ratio=1.2, ...)"
+                f"drive = {shown(self.drive)}: must be a drive, such as Sine(frequency_ratio=1.2, ...)"
             )
         check_fields(self)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snapbeam.core.validate import InputError, integer
+from snapbeam.core.validate import InputError, integer, shown
 from snapbeam.engines.cpu.driver import usable_cores
 from snapbeam.sweeps.errors import StoreError
 
@@ -59,7 +59,7 @@ def parse_cluster(text: str) -> Cluster:
         If it is none of these; of a file, with the key that is wrong.
     """
     if not isinstance(text, str) or not text:
-        raise InputError(f"cluster = {text!r}: must be {_FORMS}")
+        raise InputError(f"cluster = {shown(text)}: must be {_FORMS}")
     kind, colon, rest = text.partition(":")
     if kind == "local" and colon:
         if not rest.isdecimal():
@@ -69,7 +69,7 @@ def parse_cluster(text: str) -> Cluster:
         return Cluster("address", address=text)
     if text.endswith(".toml"):
         return Cluster("slurm", slurm=_read_slurm(Path(text)))
-    raise InputError(f"cluster = {text!r}: must be {_FORMS}")
+    raise InputError(f"cluster = {shown(text)}: must be {_FORMS}")
 
 
 def _read_slurm(path: Path) -> dict[str, Any]:
@@ -87,7 +87,7 @@ def _read_slurm(path: Path) -> dict[str, Any]:
             raise InputError(f"{path.name}: [slurm] {name}: unknown key; must be one of {', '.join(_SLURM)}")
         if not isinstance(value, _SLURM[name]) or isinstance(value, bool):
             raise InputError(
-                f"{path.name}: [slurm] {name} = {value!r}: must be of type {_SLURM[name].__name__}"
+                f"{path.name}: [slurm] {name} = {shown(value)}: must be of type {_SLURM[name].__name__}"
             )
     for name in _NEEDED:
         if name not in given:
