@@ -6,6 +6,7 @@ import numpy as np
 
 import snapbeam as sb
 import snapbeam.lab as lab
+from snapbeam.core.codes import ResponseClass
 
 LOCATION = 1.0 / 2.1
 BEAM = sb.Beam(
@@ -23,7 +24,7 @@ SPOILED = {"test03": "cut short", "test07": "begins in motion", "test10": "anoth
 
 
 def write_test(folder, name, ratio, velocity, *, seed=0, spoiled=None):
-    """Write ``<name>.cihx`` with its pixels and ``<name>_vib.csv``."""
+    """Write ``<name>.cihx`` with its pixels and ``<name>_vib.csv``; what is true of it."""
     first = MODEL.natural_freq[0]
     frequency = ratio * first
     speed = velocity * BEAM.buckling_level * 2.0 * np.pi * first
@@ -31,6 +32,7 @@ def write_test(folder, name, ratio, velocity, *, seed=0, spoiled=None):
     true = lab.render_vibrometer(frequency, speed, snr_db=100.0, **lasting)
     motion = sb.RecordedDrive.from_dataset(lab.recorded_drive(true, 1e5), location=LOCATION)
     run = sb.simulate(MODEL, motion, CONTACT, cycles=CYCLES)
+    clean = ResponseClass(run.response.response).label
     if spoiled == "begins in motion":
         run = run.dataset.isel(time=run.dataset.time.values > 3.3 / frequency)
         run = run.assign_coords(time=("time", run.time.values - run.time.values[0], run.time.attrs))
@@ -45,16 +47,15 @@ def write_test(folder, name, ratio, velocity, *, seed=0, spoiled=None):
         frequency *= 1.4
     seen = lab.render_vibrometer(frequency, speed, snr_db=30.0, seed=seed, **lasting)
     lab.write_signal(folder / f"{name}_vib.csv", seen)
-    return frequency, speed, recording
+    return {"frequency": frequency, "speed": speed, "response": clean}
 
 
 def write_campaign(folder, points=POINTS):
-    """Write all tests; their true frequency [Hz] and velocity [m/s] by name."""
+    """Write all tests; what is true of them by name: frequency [Hz], speed [m/s] and response."""
     truth = {}
     for number, (ratio, velocity) in enumerate(points, start=1):
         name = f"test{number:02d}"
-        found = write_test(folder, name, ratio, velocity, seed=number, spoiled=SPOILED.get(name))
-        truth[name] = found[:2]
+        truth[name] = write_test(folder, name, ratio, velocity, seed=number, spoiled=SPOILED.get(name))
     return truth
 
 

@@ -4,10 +4,10 @@ import re
 
 import numpy as np
 import pytest
-from mistakes import decays, drives, others, scenes
+from mistakes import table
 from mistakes.case import KINDS, looked
+from mistakes.table import CASES
 
-CASES = (*scenes.CASES, *drives.CASES, *decays.CASES, *others.CASES)
 ENDS = ("right", "flagged", "refused")
 
 
@@ -32,3 +32,19 @@ def test_a_mistake_is_right_or_flagged_or_refused(case, tmp_path):
     for finding in outcome.findings:
         assert finding.code in KINDS
         assert all(np.isfinite(value) for value in finding.numbers.values())
+
+
+def test_the_table_of_the_documentation_has_every_case():
+    written = table.FILE.read_text(encoding="utf-8")
+    for case in CASES:
+        line = next(
+            line for line in written.splitlines() if line.startswith(f"| {case.mistake} | {case.end} |")
+        )
+        assert f"`{case.code}`" in line or not case.code
+
+
+@pytest.mark.slow
+def test_the_table_of_the_documentation_is_what_comes_of_the_cases():
+    numbers = re.compile(r"[-+]?\d+(\.\d+)?")  # the last digits are the machine's own
+    written = table.FILE.read_text(encoding="utf-8")
+    assert numbers.sub("#", table.text(table.measured())) == numbers.sub("#", written)

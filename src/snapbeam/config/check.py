@@ -12,7 +12,7 @@ import numpy as np
 from snapbeam.config.axes import parse_axis
 from snapbeam.config.parameters import Parameter, lookup, parameters
 from snapbeam.config.physical import PHYSICAL, physical_name
-from snapbeam.core.validate import InputError, mapping, shown
+from snapbeam.core.validate import InputError, finite, mapping, shown
 from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
 from snapbeam.model.paper_values import BEAM
@@ -40,13 +40,13 @@ def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, A
     """What was given, by section and name, and a line for everything that is wrong."""
     lines: list[str] = []
     found: dict[str, dict[str, Any]] = {}
-    for section, name, value, shown in _entries(sections, lines):
+    for section, name, value, named in _entries(sections, lines):
         if section != "axes" and name in found.get(section, {}):
             message = f"{name}: is given in two sections"
         else:
             message = _checked(section, name, value, found)
         if message:
-            lines.append(f"[{shown}] {message}")
+            lines.append(f"[{named}] {message}")
     return found, lines
 
 
@@ -74,12 +74,17 @@ def _entries(sections: Mapping[str, Any], lines: list[str]) -> list[tuple[str, s
 
 
 def _place(section: str, name: str, value: Any) -> tuple[str, str]:
-    """Where something belongs; version 0.1 had the striker and its drive in one section, and axes by short names."""
+    """Where something belongs.
+
+    Version 0.1 had the striker and its drive in one section, axes by short names, and the reference frequency in [run].
+    """
     if section == "shaker":
         return ("drive" if name in ("frequency_ratio", "velocity_amplitude") else "striker"), name
     if section == "map":
         single = isinstance(value, (int, float)) and not isinstance(value, bool)
         return (_OF_MAP[name], name) if single else ("axes", f"{_OF_MAP[name]}.{name}")
+    if section == "run" and name == "reference_freq":
+        return "model", name
     return section, name
 
 
@@ -117,12 +122,13 @@ def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any
 def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
     item = row.quantity
     unit = "" if item.unit == "1" else f" in {item.unit}"
-    if item.kind is float and not (name == "damping_ratio" and isinstance(value, list)):
+    if item.kind is float and not (name == "damping_ratio" and isinstance(value, (list, np.ndarray))):
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return f"{name} = {shown(value)}: must be a number{unit}", None
-        if not math.isfinite(value):
+        try:
+            value = finite(name, value)
+        except InputError:
             return f"{name} = {shown(value)}: must be a finite number{unit}", None
-        value = float(value)
         message = _implausible(row, name, value)
         if message:
             return message, None
@@ -130,7 +136,7 @@ def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
         return f"{name} = {shown(value)}: must be a whole number{unit}", None
     elif item.kind is str and not isinstance(value, str):
         return f"{name} = {shown(value)}: must be text", None
-    elif item.kind is object or isinstance(value, list):
+    elif item.kind is object or isinstance(value, (list, np.ndarray)):
         return _array(name, value)
     try:
         return "", item.check(name, value)

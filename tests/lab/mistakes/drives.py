@@ -119,7 +119,8 @@ CASES = (
     Case(TURNED, "ten percent more amplitude in the camera", half_the_amplitude, "flagged", "alignment.amplitude"),
     Case(DROPOUT, "5 ms at zero", dropout(0.005), "flagged", "vibrometer.dropout"),
     Case(DROPOUT, "10 ms at zero", dropout(0.010), "flagged", "vibrometer.dropout"),
-    Case(DROPOUT, "5 ms at zero while the shaker starts", dropout(0.005, 0.107), "refused", words="dropout"),
+    Case(DROPOUT, "5 ms at zero while the shaker starts", dropout(0.005, 0.107), "refused", words="dropout",
+         sees="values that stand still, or jump, while the shaker starts"),
     Case(CLIPPED, "tops cut at 0.7 of the amplitude", clipped(0.7), "flagged", "vibrometer.clipped"),
     Case(CLIPPED, "tops cut at 0.95 of the amplitude", clipped(0.95), "flagged", "vibrometer.clipped"),
     Case(ONSET, "a start-up over 20 ms from rest", gentle(0.02), "right", sees="the first motion above the noise, "

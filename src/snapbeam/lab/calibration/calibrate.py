@@ -19,7 +19,7 @@ from snapbeam.config import config_from_mapping, dump_config
 from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError, InputTypeError, choice, integer, shown
 from snapbeam.lab.calibration import wording as words
-from snapbeam.lab.calibration.fit import directions, search, sensitivity
+from snapbeam.lab.calibration.fit import directions, open_upwards, search, sensitivity
 from snapbeam.lab.calibration.measurements import ContactTest, Measurements, load_measurements
 from snapbeam.lab.plausibility.calibration import KINDS
 from snapbeam.model.beam import Beam
@@ -216,6 +216,9 @@ def calibrate(
         covariance = keep @ inner @ keep.T * scatter**2
         undetermined = tuple(name for i, name in enumerate(names) if (keep @ keep.T)[i, i] < 1.0 - 1e-4)
         findings += words.links(names, covariance, undetermined)
+        if "buckling_level" not in undetermined and open_upwards(residual, logs, names):
+            undetermined += ("buckling_level",)
+            findings.append(words.at_least(math.exp(logs[names.index("buckling_level")])))
         if freedom <= 0:
             findings.append(KINDS["no_check"].found())
     result = _changed(beam, names, logs)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from snapbeam.lab.calibration.calibrate import Calibration
     from snapbeam.lab.calibration.measurements import Measurements
 
-__all__ = ["ASSUMED", "doubts", "links", "remarks", "with_error"]
+__all__ = ["ASSUMED", "at_least", "doubts", "links", "remarks", "with_error"]
 
 ASSUMED = 0.005
 """Standard error of a frequency for which none is given, as a share of it."""
@@ -73,6 +73,15 @@ def links(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, 
                 )
                 told.append(KINDS["linked"].found(told=words, correlation=linked))
     return told
+
+
+def at_least(level: float) -> Finding:
+    """What to say where any buckling level [m] above the one found meets the data as well."""
+    text = (
+        f"any buckling_level above {level * 1e3:.4g} mm meets the measured frequencies as well: the first one about "
+        "a well may be that of the antisymmetric mode, which does not depend on the level; measure the symmetric one"
+    )
+    return KINDS["undetermined"].found(told=text, least=level)
 
 
 def remarks(result: Calibration, measured: Measurements) -> list[str]:

@@ -61,7 +61,7 @@ class TestResult:
     snr_db: float = _NAN
     measured_share: float = _NAN
     delay_s: float = _NAN
-    polarity: int = 1
+    polarity: float = _NAN
     gain: float = _NAN
     findings: tuple[tuple[str, str, str], ...] = ()
     fingerprint: str = ""
@@ -164,7 +164,7 @@ def _measured(test: Test, settings: CampaignSettings, folder: Path, findings: li
         snr_db=drive.steady.sinad,
         measured_share=float(np.mean(valid)),
         delay_s=_NAN if alignment is None else alignment.delay,
-        polarity=1 if alignment is None else alignment.polarity,
+        polarity=_NAN if alignment is None else alignment.polarity,
         gain=_NAN if alignment is None else alignment.gain,
         findings=tuple(_plain(one) for one in findings),
     )

@@ -12,6 +12,7 @@ from typing import Any
 
 from snapbeam.core.provenance import __version__
 from snapbeam.core.validate import InputError, integer
+from snapbeam.lab.compare.response import LEAST_CYCLES
 from snapbeam.lab.tracking.settings import TrackingSettings
 
 __all__ = ["CampaignSettings", "load_settings"]
@@ -34,7 +35,7 @@ class CampaignSettings:
         ``channel``, ``units``, ``sensitivity``, ``sampling_freq`` and ``columns`` as for
         :func:`snapbeam.lab.read_signal`.
     cycles
-        Cycles of excitation that the response class is asked for.
+        Cycles of excitation that the response class is asked for; the rule needs 20.
     """
 
     camera: Mapping[str, Any] = field(default_factory=dict)
@@ -47,7 +48,7 @@ class CampaignSettings:
             for key in getattr(self, name):
                 if key not in known:
                     raise InputError(f"{name} {key}: unknown; must be among {', '.join(known)}")
-        integer("cycles", self.cycles, 1)
+        integer("cycles", self.cycles, LEAST_CYCLES)
         if self.tracking.buckling_level is None:
             raise InputError(
                 "buckling_level (--buckling-level): must be given, in m, or no response can be told"

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from snapbeam.lab.tracking.edges import EdgeFit, Floats, edge_profile
 from snapbeam.lab.tracking.scene import EdgeShape
@@ -23,6 +24,8 @@ _STEP = 0.25  # px
 _REACH = 5.0
 _LEAST = 200  # windows
 _CERTAIN = 30.0  # chi-square by which a bent edge must be worse than a straight one
+_LIKELY = 0.4  # |log gamma| of a curve that is taken before stronger ones
+_CENTRES = 24  # tried on either side of 0
 _GAMMAS = np.exp(np.linspace(math.log(0.25), math.log(4.0), 81))
 
 
@@ -78,9 +81,16 @@ def _symmetry(x: Floats, y: Floats, error: Floats, ratio: float, sign: float) ->
     best = int(np.argmin(scatter))
     freedom = max(float(np.count_nonzero((x > 0.0) & (x < 4.0))) - 2.0, 1.0)
     unit = max(1.0, scatter[best] / freedom)
+    # a strong curve can bend one symmetric edge into another: one near 1 that does as well is the likelier
+    likely = np.flatnonzero(np.abs(np.log(_GAMMAS)) < _LIKELY)
+    other = int(likely[np.argmin(scatter[likely])])
+    if (scatter[other] - scatter[best]) / unit < _CERTAIN:
+        best, unit = other, max(1.0, scatter[other] / freedom)
     worse = (float(np.interp(0.0, np.log(_GAMMAS), scatter)) - scatter[best]) / unit
-    near = np.abs(scatter - scatter[best]) / unit < 1.0
-    spread = np.log(_GAMMAS[near])
+    alike = (np.abs(scatter - scatter[best]) / unit < 1.0) & (
+        np.abs(np.log(_GAMMAS / _GAMMAS[best])) < _LIKELY
+    )
+    spread = np.log(_GAMMAS[alike])
     log_se = max(0.5 * float(np.ptp(spread)), 0.5 * math.log(_GAMMAS[1] / _GAMMAS[0]))
     gamma = float(_GAMMAS[best])
     shift = float(centres[best]) if worse > _CERTAIN else 0.0
@@ -100,14 +110,16 @@ def _light(y: Floats, error: Floats, gamma: float, ratio: float, sign: float) ->
 def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:
     """Chi-square of an edge turned about its centre against itself, least over the centre, and the centre."""
     away = np.arange(0.5, 4.0 / _STEP) * _STEP
-    best, where = math.inf, 0.0
-    for centre in np.linspace(-0.8, 0.8, 65):
+
+    def chi(centre: float) -> float:
         total = np.interp(centre + away, x, light) + np.interp(centre - away, x, light) - 1.0
         spread = np.hypot(np.interp(centre + away, x, error), np.interp(centre - away, x, error))
-        chi = float(np.sum((total / np.hypot(spread, 5e-4)) ** 2))
-        if chi < best:
-            best, where = chi, float(centre)
-    return best, where
+        return float(np.sum((total / np.hypot(spread, 5e-4)) ** 2))
+
+    near = min(np.linspace(-0.8, 0.8, 2 * _CENTRES + 1), key=chi)
+    step = 0.8 / _CENTRES
+    found = minimize_scalar(chi, bounds=(near - step, near + step), method="bounded", options={"xatol": 1e-4})
+    return float(found.fun), float(found.x)
 
 
 def _binned(offset: Floats, share: Floats) -> tuple[Floats, Floats, Floats]:
