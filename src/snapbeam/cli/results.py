@@ -54,10 +54,9 @@ def read_overlay(dots: Path | None, reference_freq: float | None, buckling_level
 
 def write_map(dataset: xr.Dataset, path: Path) -> Path:
     """Write a dataset to a NetCDF file, whole or not at all."""
-    from snapbeam.core.files import atomic_path
+    from snapbeam.core.netcdf import write_netcdf
 
-    with atomic_path(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
+    write_netcdf(dataset, path)
     return path
 
 

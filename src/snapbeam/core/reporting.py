@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable
 
-from snapbeam.core.validate import InputTypeError
+from snapbeam.core.validate import InputTypeError, shown
 
 __all__ = ["counting", "sharing"]
 
@@ -52,7 +52,7 @@ def counting(progress: _Counts | bool | None, what: str, noun: str = "points") -
         line = _Line(what)
         return lambda done, total: line.say(done / max(total, 1), f"{done} of {total} {noun}")
     if not callable(progress):
-        raise InputTypeError(f"progress = {progress!r}: must be True or callable, as progress(done, total)")
+        raise InputTypeError(f"progress = {shown(progress)}: must be True or callable, as progress(done, total)")
     return progress
 
 
@@ -64,6 +64,6 @@ def sharing(progress: _Shares | bool | None, what: str) -> _Shares | None:
         line = _Line(what)
         return lambda share: line.say(share, f"{100.0 * share:.0f} %")
     if not callable(progress):
-        raise InputTypeError(f"progress = {progress!r}: must be True or callable, as progress(share)")
+        raise InputTypeError(f"progress = {shown(progress)}: must be True or callable, as progress(share)")
     own: _Shares = progress
     return own

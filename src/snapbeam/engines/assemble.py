@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError
-from snapbeam.engines.clock import Clocked, clocked
+from snapbeam.engines.clock import Clocked, clocked, most_steps
 from snapbeam.engines.columns import RUN
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.plan import Plan, plan_steps
@@ -107,7 +107,7 @@ def make_ensemble(
         highest=highest,
         contact_rows=places.rows,
         starts=starts,
-        max_steps=integration.max_steps,
+        max_steps=most_steps(integration, system.model.modes),
         high_omega=integration.high_frequency_ratio * system.scale.omega,
         cycles=time.cycles,
     )

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.codes import ResponseClass, RunStatus, classify
+from snapbeam.core.codes import ResponseClass, RunStatus, class_of
 from snapbeam.core.validate import InputError
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def _rms(column: str, per_speed: bool) -> Callable[[Reading], Values]:
 
 def _response(reading: Reading) -> Values:
     book = reading.book
-    kinds = classify(
+    kinds = class_of(
         book["crossings"], book["crossings_last_quarter"], reading.cycles, -reading.first_side * book["side"]
     )
     return np.where(reading.good, kinds, ResponseClass.UNKNOWN)

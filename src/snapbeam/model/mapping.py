@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, mapping, shown
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import LAWS, ContactLaw
 from snapbeam.model.drive import DRIVES, Drive
@@ -80,11 +80,12 @@ def _fields(part: Any) -> dict[str, Any]:
 
 def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """The parts that sections describe."""
+    mapping("sections", sections)
     for name, values in sections.items():
         if name not in SECTIONS:
             raise InputError(f"[{name}]: unknown section; must be one of {', '.join(SECTIONS)}")
         if not isinstance(values, Mapping):
-            raise InputError(f"{name} = {values!r}: must be a section [{name}]")
+            raise InputError(f"{name} = {shown(values)}: must be a section [{name}]")
     parts: dict[str, Any] = {"model": _model(sections)}
     if "contact" in sections:
         parts["contact"] = _chosen(sections["contact"], "contact", "law", LAWS)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.core.validate import InputError, finite_array
+from snapbeam.core.validate import InputError, finite_array, mapping, shown
 
 __all__ = ["ModalState", "State"]
 
@@ -188,7 +188,7 @@ class State:
 
 def _finite_where_known(name: str, value: ArrayLike, passed: Mapping[str, _Array] | None) -> _Array:
     """Numbers that are finite, but for states that were not reached, as their status says."""
-    status = None if passed is None else passed.get("status")
+    status = None if passed is None else mapping("passed", passed).get("status")
     if status is None:
         return finite_array(name, value)
     array = np.array(value, dtype=np.float64)
@@ -206,7 +206,10 @@ def _spread(name: str, array: _Array, batch: tuple[int, ...]) -> _Array:
 
 def _maybe(name: str, value: ArrayLike, batch: tuple[int, ...]) -> _Array:
     """Numbers of which NaN means that none is given."""
-    array = np.asarray(value)
+    try:
+        array = np.asarray(value)
+    except Exception:
+        raise InputError(f"{name} = {shown(value)}: must be an array of numbers") from None
     if array.dtype.kind not in "iuf" or np.isinf(array).any():
-        raise InputError(f"{name} = {value!r}: must be finite numbers, or NaN for none")
+        raise InputError(f"{name} = {shown(value)}: must be finite numbers, or NaN for none")
     return _spread(name, array.astype(np.float64), batch)

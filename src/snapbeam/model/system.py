@@ -16,7 +16,7 @@ import numpy as np
 from snapbeam.core.files import atomic_path, check_writable
 from snapbeam.core.findings import Finding
 from snapbeam.core.provenance import canonical_json
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.core.validate import InputError, InputTypeError, file_path, shown
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.doubts import doubts_of
 from snapbeam.model.drive import Scale
@@ -68,15 +68,17 @@ class System:
     def __post_init__(self) -> None:
         model, contact, striker, start = self.model, self.contact, self.striker, self.start
         if not isinstance(model, ReducedModel):
-            raise InputTypeError(f"model = {model!r}: must be a ReducedModel")
+            raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")
         if isinstance(striker, (Shaker, RecordedDrive)):
             striker = striker.striker()
             object.__setattr__(self, "striker", striker)
         if striker is not None and not isinstance(striker, Striker):
-            raise InputTypeError(f"striker = {striker!r}: must be a Striker, a Shaker or a RecordedDrive")
+            raise InputTypeError(
+                f"striker = {shown(striker)}: must be a Striker, a Shaker or a RecordedDrive"
+            )
         if contact is not None and not isinstance(contact, ContactLaw):
             raise InputTypeError(
-                f"contact = {contact!r}: must be a law of contact, such as HertzContact(stiffness)"
+                f"contact = {shown(contact)}: must be a law of contact, such as HertzContact(stiffness)"
             )
         if contact is not None and contact.most_modes is not None and model.modes > contact.most_modes:
             raise InputError(
@@ -96,7 +98,7 @@ class System:
             model.require_bistable("a run")
         if start is not None:
             if not isinstance(start, State):
-                raise InputTypeError(f"start = {start!r}: must be a State")
+                raise InputTypeError(f"start = {shown(start)}: must be a State")
             if start.batch:
                 raise InputError(f"start: a batch of shape {start.batch}: must be one state")
             if start.modes != model.modes:
@@ -205,6 +207,7 @@ class System:
         """
         import tomllib
 
+        path = file_path("path", path)
         try:
             with open(path, "rb") as stream:
                 sections = tomllib.load(stream)
@@ -212,6 +215,8 @@ class System:
             raise InputError(f"path = {str(path)!r}: cannot be read, {error.strerror or error}") from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
             raise InputError(f"path = {str(path)!r}: is no TOML, {error}") from None
+        except ValueError as error:  # an integer of thousands of digits
+            raise InputError(f"path = {str(path)!r}: cannot be read, {error}") from None
         return cls.from_mapping(sections)
 
     def describe(self) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
 from snapbeam.core.reporting import counting
-from snapbeam.core.validate import InputError, InputTypeError, finite_array, flag, positive
+from snapbeam.core.validate import InputError, InputTypeError, finite_array, flag, positive, shown
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble
 from snapbeam.engines.ensemble import Ensemble
@@ -83,9 +83,9 @@ def advance(
         For bad input; for tangents under a law of contact whose force jumps; for more periods than a record holds.
     """
     if not isinstance(system, System):
-        raise InputTypeError(f"system = {system!r}: must be a System")
+        raise InputTypeError(f"system = {shown(system)}: must be a System")
     if state is not None and not isinstance(state, State):
-        raise InputTypeError(f"state = {state!r}: must be a State")
+        raise InputTypeError(f"state = {shown(state)}: must be a State")
     integration = Integration() if integration is None else integration
     span = positive("periods", periods)
     every = flag("every", every)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from snapbeam.core.validate import InputError, InputTypeError, axis, finite_array
+from snapbeam.core.validate import InputError, InputTypeError, axis, finite_array, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -158,7 +158,7 @@ def check_trajectory(dataset: xr.Dataset, require: Iterable[str] = ("displacemen
             raise InputError(f"{name} with dimensions {variable.dims}: must have dimensions {quantity.dims}")
         units = variable.attrs.get("units")
         if _FORMER_UNITS.get(str(units), units) != quantity.units:
-            raise InputError(f"{name} in units {units!r}: must be in {quantity.units!r}")
+            raise InputError(f"{name} in units {shown(units)}: must be in {quantity.units!r}")
         good = np.isfinite(variable.values)
         if valid is not None and name not in _COORDINATES:
             good = good | ~(valid if good.ndim == 1 else valid[:, None])

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from snapbeam.core.reporting import counting
-from snapbeam.core.validate import InputError, InputTypeError, flag, integer, positive, within
+from snapbeam.core.validate import InputError, InputTypeError, flag, integer, positive, shown, within
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.integration import Integration
 from snapbeam.model.reduction import ReducedModel
@@ -290,7 +290,7 @@ def threshold_curve(
 def _several(models: Any) -> list[ReducedModel]:
     listed = list(models) if isinstance(models, Sequence) else []
     if not listed or not all(isinstance(each, ReducedModel) for each in listed):
-        raise InputTypeError(f"model = {models!r}: must be a ReducedModel or a list of them")
+        raise InputTypeError(f"model = {shown(models)}: must be a ReducedModel or a list of them")
     modes = [each.modes for each in listed]
     if len(set(modes)) < len(modes):
         raise InputError(f"model: the numbers of modes {modes} must differ from each other")

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.parameters import lookup
 from snapbeam.core.reporting import counting
-from snapbeam.core.validate import InputError, choice, within
+from snapbeam.core.validate import InputError, choice, shown, within
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.sweeps.points import Grid, points_of
@@ -91,7 +91,7 @@ def threshold(
     row = lookup(along)
     if not row.is_run or row.quantity.kind is not float:
         raise InputError(
-            f"along = {along!r}: must be a number that may differ between runs, such as velocity_amplitude"
+            f"along = {shown(along)}: must be a number that may differ between runs, such as velocity_amplitude"
         )
     if not isinstance(over, Mapping) or not over:
         raise InputError(f"over = {over!r}: must map at least one parameter to an array of values")
@@ -99,7 +99,7 @@ def threshold(
         raise InputError(f"{along}: must be an array of at least two values to choose from")
     asked = Integration() if integration is None else integration
     if not isinstance(asked, Integration):
-        raise InputError(f"integration = {integration!r}: must be an Integration")
+        raise InputError(f"integration = {shown(integration)}: must be an Integration")
     points = points_of({**over, row.name: values})
     assert isinstance(points, Grid)
     setup = sweep_setup(system, points, asked.replace(early_decision=True))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.findings import Finding
-from snapbeam.core.validate import InputError, integer, positive
+from snapbeam.core.validate import InputError, file_path, integer, positive, shown
 from snapbeam.lab.camera.sources.base import FrameSource
 from snapbeam.lab.camera.sources.opening import open_source
 from snapbeam.lab.plausibility.recording import KINDS
@@ -133,7 +133,7 @@ def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> 
         return (0, shape[0], 0, shape[1])
     if len(value) != 4:
         raise InputError(
-            f"region = {value!r}: must be (first row, last row + 1, first column, last column + 1)"
+            f"region = {shown(value)}: must be (first row, last row + 1, first column, last column + 1)"
         )
     top = integer("region[0]", value[0], 0, shape[0] - 1)
     bottom = integer("region[1]", value[1], top + 1, shape[0])
@@ -184,7 +184,7 @@ def open_recording(
         If the file is malformed, or if frame rate or pixel size stand neither in the file nor in the call:
         they are never guessed.
     """
-    path = Path(path)
+    path = file_path("path", path)
     source = open_source(path)
     try:
         given = None if frame_rate is None else positive("frame_rate", frame_rate, "Hz")

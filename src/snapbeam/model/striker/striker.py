@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 
@@ -69,7 +69,7 @@ class Striker:
     def __post_init__(self) -> None:
         if not isinstance(self.drive, Drive):
             raise InputTypeError(
-                f"drive = {self.drive!r}: must be a drive, such as Sine(frequency_ratio=1.2, ...)"
+                f"drive = {shown(self.drive)}: must be a drive, such as Sine(frequency_ratio=1.2, ...)"
             )
         check_fields(self)
         if self.mass is None:
