@@ -8,6 +8,19 @@ from snapbeam.core.codes import ResponseClass, RunStatus, classify
 from snapbeam.core.findings import Finding, PlausibilityWarning
 from snapbeam.core.provenance import __version__
 from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.dynamics.attractors import Attractor, Attractors, attractors
+from snapbeam.dynamics.basins import basins
+from snapbeam.dynamics.bifurcation import bifurcation_diagram
+from snapbeam.dynamics.edge import EdgeState, edge_state
+from snapbeam.dynamics.lifetimes.lifetime_map import lifetime_map
+from snapbeam.dynamics.lifetimes.survival import Survival
+from snapbeam.dynamics.lyapunov import lyapunov, separation_exponent
+from snapbeam.dynamics.measures import basin_entropy, integrity, uncertainty_exponent
+from snapbeam.dynamics.orbits.branch import Branch, Event
+from snapbeam.dynamics.orbits.continuation import continue_orbit, switch_branch
+from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit, periodic_orbit
+from snapbeam.dynamics.sections import poincare
+from snapbeam.dynamics.starts import Starts
 from snapbeam.engines.outcomes import STATISTICS, Statistic
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import ContactLaw, HertzContact, Restitution
@@ -37,15 +50,22 @@ Response = Outcome
 __all__ = [
     "STATISTICS",
     "Accuracy",
+    "Attractor",
+    "Attractors",
     "Beam",
+    "Branch",
     "ContactLaw",
     "Drive",
+    "EdgeState",
+    "Event",
     "Finding",
     "HertzContact",
     "InputError",
     "InputTypeError",
     "Integration",
     "Keeping",
+    "NoOrbit",
+    "Orbit",
     "Outcome",
     "PlausibilityWarning",
     "Recorded",
@@ -59,23 +79,39 @@ __all__ = [
     "RunStatus",
     "Shaker",
     "Sine",
+    "Starts",
     "State",
     "Statistic",
     "StoreError",
     "Striker",
+    "Survival",
     "System",
     "Tally",
     "__version__",
     "advance",
+    "attractors",
+    "basin_entropy",
+    "basins",
+    "bifurcation_diagram",
     "classify",
     "conditioning",
+    "continue_orbit",
+    "edge_state",
     "exact_natural_freq",
+    "integrity",
+    "lifetime_map",
     "load_run",
     "long_map",
+    "lyapunov",
+    "periodic_orbit",
+    "poincare",
     "quasi_static_threshold",
     "response_map",
+    "separation_exponent",
     "simulate",
     "sweep",
+    "switch_branch",
     "threshold",
     "threshold_curve",
+    "uncertainty_exponent",
 ]

@@ -8,6 +8,7 @@ import typer
 
 from snapbeam.cli.calibrate import calibrate
 from snapbeam.cli.compare import compare
+from snapbeam.cli.dynamics import dynamics
 from snapbeam.cli.frequencies import frequencies
 from snapbeam.cli.identify import identify
 from snapbeam.cli.info import info
@@ -34,6 +35,7 @@ app = typer.Typer(
 app.command("map")(compute_map)
 app.command("threshold")(threshold)
 app.command("simulate")(simulate)
+app.add_typer(dynamics, name="dynamics")
 app.command("frequencies")(frequencies)
 app.command("plot")(plot)
 app.command("paper")(paper)

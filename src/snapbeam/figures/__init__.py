@@ -1,5 +1,13 @@
 """Pictures of results; they compute nothing."""
 
+from snapbeam.figures.dynamics import (
+    plot_basins,
+    plot_diagram,
+    plot_exponents,
+    plot_lifetimes,
+    plot_section,
+    plot_survival,
+)
 from snapbeam.figures.response_map import class_handles, plot_response_map
 from snapbeam.figures.run import plot_run
 from snapbeam.figures.style import CLASS_COLORS, house_style, new_figure, save_figure
@@ -12,8 +20,14 @@ __all__ = [
     "class_handles",
     "house_style",
     "new_figure",
+    "plot_basins",
+    "plot_diagram",
+    "plot_exponents",
+    "plot_lifetimes",
     "plot_response_map",
     "plot_run",
+    "plot_section",
+    "plot_survival",
     "plot_threshold",
     "read_dots",
     "save_figure",
