@@ -286,10 +286,10 @@ def branch(
 @with_parameters(*_ALL)
 def basins(
     given: Any,
-    amplitude: Annotated[
+    amplitudes: Annotated[
         str, typer.Option(help="amplitude[1]: start:stop:count.", rich_help_panel=_OWN)
     ] = "-1.6:1.6:200",
-    velocity: Annotated[
+    velocities: Annotated[
         str, typer.Option(help="velocity[1]: start:stop:count.", rich_help_panel=_OWN)
     ] = "-1:1:200",
     periods: Annotated[
@@ -315,8 +315,8 @@ def basins(
     _checked(output, plot)
     begun = time.monotonic()
     plane = {
-        "amplitude[1]": parse_axis("amplitude", amplitude),
-        "velocity[1]": parse_axis("velocity", velocity),
+        "amplitude[1]": parse_axis("amplitudes", amplitudes),
+        "velocity[1]": parse_axis("velocities", velocities),
     }
     found = attractors(
         settings.system,
@@ -326,8 +326,9 @@ def basins(
     with progress(None, "basins", "periods") as report:
         dataset = basins_of(found, plane, periods=200 if periods is None else periods, progress=report)
     lines = [f"{len(found.found)} attractors in {duration(time.monotonic() - begun)}"]
-    lines += [f"{i}: {each!r}, {100 * float((dataset['basin'] == i).mean()):.3g} % of the plane".replace("<Attractor: ", "").replace(">,", ",")
-              for i, each in enumerate(found.found)]  # fmt: skip
+    for number, each in enumerate(found.found):
+        share = 100.0 * float((dataset["basin"] == number).mean())
+        lines.append(f"{number}: {repr(each).strip('<>')}, {share:.3g} % of the plane")
     lines.append(f"undecided: {100 * dataset.attrs['undecided']:.3g} %")
     entropy = basin_entropy(dataset["basin"].values, 5)
     lines.append(f"basin entropy {entropy.basin:.3g}, at borders {entropy.boundary:.3g}")

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from cmcrameri import cm
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, Rectangle
 
 from snapbeam.core.validate import InputError
 from snapbeam.figures.axes import dress, edges_of, positions
@@ -74,14 +74,17 @@ def _lifetime_cells(dataset: xr.Dataset, ax: Axes, dims: list[str]) -> None:
         figure = ax.get_figure()
         assert figure is not None
         figure.colorbar(cells, ax=ax, label="Lifetime of snapping (cycles)", extend="both")
-    endless = (np.isnan(values) & (dataset["runs_snapping"].values.T > 0)).astype(float)
+    endless = np.isnan(values) & (dataset["runs_snapping"].values.T > 0)
+    hatched: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.4", "hatch": "//////", "linewidth": 0.0}
+    for row, column in np.argwhere(endless):
+        low, left = edges[1][row], edges[0][column]
+        size = edges[0][column + 1] - left, edges[1][row + 1] - low
+        ax.add_patch(Rectangle((left, low), *size, **hatched))
     if endless.any():
-        shown = np.where(endless > 0, 1.0, np.nan)
-        ax.pcolor(*edges, shown, hatch="////", alpha=0.0)
         ax.legend(
-            handles=[Patch(facecolor="white", edgecolor="0.3", hatch="////", label="no end seen")],
-            loc="upper left",
-        )
+            handles=[Patch(**hatched, label="snaps on, no end seen")],
+            loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
+        )  # fmt: skip
     dress(ax.xaxis, dataset, dims[0])
     dress(ax.yaxis, dataset, dims[1])
 
@@ -103,7 +106,8 @@ def plot_survival(
             color = cm.batlow(0.05 + 0.85 * i / max(len(rows) - 1, 1))
             times = np.sort(row[np.isfinite(row)])
             share = 1.0 - np.arange(1, times.size + 1) / row.size
-            name = labels[i] if labels is not None else f"point {i + 1}"
+            alone = f"{row.size} runs" if len(rows) == 1 else f"point {i + 1}"
+            name = labels[i] if labels is not None else alone
             ax.step(np.append(0.0, times), np.append(1.0, share), where="post", color=color, label=name)
             if np.isfinite(tau[i]) and np.isfinite(delay[i]):
                 begun = float((row > delay[i]).mean())
