@@ -193,7 +193,9 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
     x, y = branch[along].values, branch["center_displacement"].values
     stable = branch["stable"].values
     ax.plot(x, np.where(stable, y, np.nan), color=_LINE, linewidth=1.1)
-    ax.plot(x, np.where(~stable, y, np.nan), color=_LINE, linewidth=0.9, dashes=(3, 2))
+    # up to the stable orbits beside them, so that no gap is left
+    beside = ~stable | np.append(~stable[1:], False) | np.append(False, ~stable[:-1])
+    ax.plot(x, np.where(beside, y, np.nan), color=_LINE, linewidth=0.9, dashes=(3, 2))
     handles = [
         Line2D([], [], color=_LINE, linewidth=1.1, label="stable orbit"),
         Line2D([], [], color=_LINE, linewidth=0.9, dashes=(3, 2), label="unstable orbit"),
