@@ -74,6 +74,6 @@ bench: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks -o $(BENCH)
 
 clean:
-	rm -rf build dist docs/_build docs/gallery docs/_paper docs/sg_execution_times.rst .pytest_cache .mypy_cache \
+	rm -rf build dist docs/_build docs/gallery docs/_paper docs/_generated docs/sg_execution_times.rst .pytest_cache .mypy_cache \
 		.ruff_cache .import_linter_cache .hypothesis
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +

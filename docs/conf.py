@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import logging
 import os
+import sys
 from pathlib import Path
 from typing import Any
+
+from docutils import nodes
+from sphinx.domains.python._object import PyXrefMixin
+from sphinx.ext.napoleon.docstring import GoogleDocstring
 
 from snapbeam.core.provenance import __version__
 
 # Figures of the paper are drawn from full-size data that were computed once.
 DATA = Path(__file__).parent / "data"
+os.environ["SNAPBEAM_PAPER_DATA"] = str(DATA)  # read by the examples
+sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 os.environ.setdefault("MPLBACKEND", "Agg")
 logging.getLogger("fontTools").setLevel(logging.WARNING)
 
@@ -21,13 +28,15 @@ version = release = __version__
 
 extensions = [
     "myst_parser",
+    "reference",
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "data", "gallery/**/*.ipynb", "gallery/**/*.py", "gallery/**/*.json"]
+exclude_patterns = ["_build", "_ext", "_generated", "data"]
+exclude_patterns += [f"gallery/**/*.{kind}" for kind in ("ipynb", "py", "json")]
 templates_path: list[str] = []
 
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
@@ -36,6 +45,7 @@ myst_heading_anchors = 3
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 napoleon_google_docstring = False
+napoleon_use_param = False  # types are words: "array of shape (N,)" names no class
 napoleon_use_rtype = False
 
 html_theme = "furo"
@@ -49,6 +59,26 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "min_reported_time": 60,
 }
+
+
+def keep_whole(self: Any) -> tuple[str, list[str]]:
+    """The docstring of an attribute as it stands: Napoleon would take what is before a colon for its type."""
+    return "", self._dedent(list(self._consume_to_end()))
+
+
+GoogleDocstring._consume_inline_attribute = keep_whole
+
+_link = PyXrefMixin.make_xrefs
+
+
+def link_errors_only(self: Any, rolename: str, domain: str, target: str, *more: Any, **options: Any) -> Any:
+    """Types are words, such as "array of shape (N,)": they name no class and no attribute ``shape``."""
+    if rolename == "exc":
+        return _link(self, rolename, domain, target, *more, **options)
+    return [options.get("contnode") or nodes.emphasis(target, target)]
+
+
+PyXrefMixin.make_xrefs = link_errors_only
 
 
 def draw_paper(app: Any) -> None:

@@ -295,8 +295,11 @@ def test_a_file_of_version_0_1_means_what_it_meant():
         {
             "shaker": {"frequency_ratio": 1.1, "velocity_amplitude": 0.2, "location": 0.3, "side": "above"},
             "map": {"frequency_ratio": "0.5:2:4", "velocity_amplitude": 0.25},
+            "run": {"cycles": 20, "reference_freq": 80.0},
         }
     )
+    assert old.system.get("model.reference_freq") == 80.0
+    assert old.integration == Integration(cycles=20)
     assert old.system.get("drive.frequency_ratio") == 1.1
     assert old.system.get("striker.location") == 0.3
     assert old.system.get("striker.side") == "above"

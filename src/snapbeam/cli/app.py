@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from snapbeam.cli.calibrate import calibrate
+from snapbeam.cli.campaign import campaign
 from snapbeam.cli.compare import compare
 from snapbeam.cli.dynamics import dynamics
 from snapbeam.cli.frequencies import frequencies
@@ -44,6 +45,7 @@ app.command("vibrometer")(vibrometer)
 app.command("identify")(identify)
 app.command("calibrate")(calibrate)
 app.command("compare")(compare)
+app.command("campaign")(campaign)
 app.command("info")(info)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from snapbeam.cli import options as opt
-from snapbeam.cli.console import door, duration, file_line, out, progress
+from snapbeam.cli.console import answer, door, duration, file_line, out, progress
 from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
@@ -35,6 +35,8 @@ dynamics = typer.Typer(
 _ALL = (*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN)
 _AXES = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location", "model.modes")
 _OWN = "Question"
+_FEW = 4000
+"""Numbers of a variable, at most, that are told as plain ones."""
 Output = Annotated[
     Path,
     typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"),
@@ -62,6 +64,8 @@ def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, picture: str, 
     files = [write_map(dataset, output)]
     if plot is not None:
         files.append(draw_dynamics(dataset, plot, picture))
+    small = {str(name): each.values for name, each in dataset.data_vars.items() if each.size <= _FEW}
+    answer(found=small, words=lines, files=files)
     out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
 
 
@@ -75,7 +79,7 @@ def lifetimes(
     phase: Annotated[
         bool, typer.Option("--phase", help="Start at any phase of the drive.", rich_help_panel=_OWN)
     ] = False,
-    quiet: Annotated[
+    quiet_cycles: Annotated[
         float | None,
         opt.number_option("Cycles without a crossing after which snapping has ended (50).", _OWN),
     ] = None,
@@ -108,7 +112,8 @@ def lifetimes(
     with progress(None, "lifetimes", "points") as report:
         dataset = lifetime_map(
             settings.system, settings.axes() or None, settings.integration.replace(cycles=cycles, threads=threads),
-            starts=chosen, survival=Survival(quiet=50.0 if quiet is None else quiet), store=store, progress=report,
+            starts=chosen, survival=Survival(quiet=50.0 if quiet_cycles is None else quiet_cycles), store=store,
+            progress=report,
         )  # fmt: skip
     runs = int(dataset["last_snap"].size)
     lines = [f"{runs} runs in {duration(time.monotonic() - begun)}"]

@@ -73,12 +73,17 @@ def _entries(sections: Mapping[str, Any], lines: list[str]) -> list[tuple[str, s
 
 
 def _place(section: str, name: str, value: Any) -> tuple[str, str]:
-    """Where something belongs; version 0.1 had the striker and its drive in one section, and axes by short names."""
+    """Where something belongs.
+
+    Version 0.1 had the striker and its drive in one section, axes by short names, and the reference frequency in [run].
+    """
     if section == "shaker":
         return ("drive" if name in ("frequency_ratio", "velocity_amplitude") else "striker"), name
     if section == "map":
         single = isinstance(value, (int, float)) and not isinstance(value, bool)
         return (_OF_MAP[name], name) if single else ("axes", f"{_OF_MAP[name]}.{name}")
+    if section == "run" and name == "reference_freq":
+        return "model", name
     return section, name
 
 
@@ -116,7 +121,7 @@ def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any
 def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
     item = row.quantity
     unit = "" if item.unit == "1" else f" in {item.unit}"
-    if item.kind is float and not (name == "damping_ratio" and isinstance(value, list)):
+    if item.kind is float and not (name == "damping_ratio" and isinstance(value, (list, np.ndarray))):
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return f"{name} = {value!r}: must be a number{unit}", None
         if not math.isfinite(value):
@@ -129,7 +134,7 @@ def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
         return f"{name} = {value!r}: must be a whole number{unit}", None
     elif item.kind is str and not isinstance(value, str):
         return f"{name} = {value!r}: must be text", None
-    elif item.kind is object or isinstance(value, list):
+    elif item.kind is object or isinstance(value, (list, np.ndarray)):
         return _array(name, value)
     try:
         return "", item.check(name, value)

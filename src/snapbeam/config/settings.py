@@ -15,9 +15,10 @@ from snapbeam.config.parameters import lookup
 from snapbeam.config.physical import PHYSICAL, checked_physical, physical_name, unit_of
 from snapbeam.core.validate import InputError
 from snapbeam.model.contact import HertzContact
-from snapbeam.model.integration import Integration
+from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import parts_from_mapping
 from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
+from snapbeam.model.quantity import quantities
 from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.system import System
 
@@ -56,13 +57,49 @@ class Config:
 
     @cached_property
     def defaulted(self) -> tuple[str, ...]:
-        """Names of what was not given and takes the paper's value, although something beside it was given."""
-        names = []
-        for section, values in self._defaults().items():
-            own = self.section(section)
-            if own:
-                names += [f"{section}.{name}" for name in values if name not in own]
-        return tuple(names)
+        """Names of what takes the value of the paper's beam although another beam was spoken of."""
+        if not self.section("beam"):
+            return ()
+        found, swept = self._defaults(), self.axes() if self.section("axes") else {}
+        return tuple(
+            f"{section}.{name}"
+            for section in ("beam", "model", "contact")
+            for name in found[section]
+            if name not in self.section(section) and name != "modes" and f"{section}.{name}" not in swept
+        )
+
+    def whole(self, axes: Mapping[str, Any] | None = None) -> Config:
+        """Everything, what was not given too, as a file would hold it: to print, to keep, to start another file from.
+
+        Parameters
+        ----------
+        axes : mapping of str to array_like, optional
+            The axes by dotted name, in place of those that were given.
+        """
+        axes = self.axes() if axes is None and self.section("axes") else dict(axes or {})
+        if self.model.length_scale is None:  # a beam that does not buckle makes no system
+            sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
+        else:
+            sections = {
+                name: {key: value for key, value in values.items() if f"{name}.{key}" not in axes}
+                for name, values in self.system.to_mapping().items()
+            }
+            sections.pop("start", None)
+            if self.section("start"):
+                sections["start"] = self.section("start")
+        own = {name: getattr(self.integration, name) for name in quantities(Integration)}
+        if own["cycles"] is None:
+            own["cycles"] = CYCLES
+        sections["run"] = {
+            name: value for name, value in own.items() if value is not None and f"run.{name}" not in axes
+        }
+        if axes:
+            whole_number = {name: lookup(name).quantity.kind is int for name in axes}
+            sections["axes"] = {
+                name: np.asarray(values, dtype=int if whole_number[name] else None).tolist()
+                for name, values in axes.items()
+            }
+        return config_from_mapping(sections)
 
     def _defaults(self) -> dict[str, dict[str, Any]]:
         beam = {

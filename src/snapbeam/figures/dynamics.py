@@ -232,10 +232,12 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         if "running" in dataset:
             period = np.arange(1, dataset.sizes["period"] + 1)
             ax.axhline(0.0, color="0.6", linewidth=0.5)
-            for number in range(dataset.sizes["exponent_number"]):
-                ax.plot(
-                    period, dataset["running"].values[:, 0, number], color=cm.batlow(0.8 * number / 8 % 1.0)
-                )
+            shown = min(dataset.sizes["exponent_number"], 10)
+            for number in range(shown):
+                color = cm.batlow(0.85 * number / max(shown - 1, 1))
+                label = rf"$\lambda_{{{number + 1}}}$"
+                ax.plot(period, dataset["running"].values[:, 0, number], color=color, label=label)
+            ax.legend(loc="best", ncols=2)
             ax.set(xlabel="Periods of the drive", ylabel=r"Lyapunov exponent so far (s$^{-1}$)", xscale="log")
         elif len(dims) == 1:
             x, _ = positions(dataset, dims[0])

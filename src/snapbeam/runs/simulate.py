@@ -82,9 +82,9 @@ def simulate(
 ) -> Run:
     """Integrate one run and record it.
 
-    The beam starts at rest in the well on the striker's far side, the tip touching it (Eqs. 11-18), or where the
-    system says.  Without a striker the beam vibrates freely from the system's start, and a cycle is one of the first
-    mode.
+    The beam starts at rest in the well that the striker pushes it out of (the lower one for a striker below), the tip
+    touching it (Eqs. 11-18), or where the system says.  Without a striker the beam vibrates freely from the system's
+    start, and a cycle is one of the first mode.
 
     Called as ``simulate(system, integration)``, or, as in version 0.1, with the parts and options by themselves:
     ``simulate(model, shaker, contact, cycles, step=..., tolerance=..., accuracy=..., engine=..., initial_state=...,

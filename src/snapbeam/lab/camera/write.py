@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from snapbeam.core.files import atomic_path, check_writable
 from snapbeam.core.validate import InputError, integer, positive, within
-from snapbeam.lab.camera.mraw import frame_bytes
-from snapbeam.lab.camera.photron import header_text
+from snapbeam.lab.camera.photron.pixels import frame_bytes
+from snapbeam.lab.camera.photron.text import header_text
 
 __all__ = ["write_photron", "write_video"]
 

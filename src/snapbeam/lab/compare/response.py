@@ -25,7 +25,7 @@ __all__ = ["MeasuredResponse", "measure_response"]
 
 _Array = NDArray[np.float64]
 _HYSTERESIS = 5.0  # in standard deviations of the noise
-_LEAST_CYCLES = 20  # the rule of more than n/5 crossings in n cycles means nothing below n = 5
+LEAST_CYCLES = 20  # the rule of more than n/5 crossings in n cycles means nothing below n = 5
 _WHOLE = 0.98  # share of the wanted cycles that counts as all of them
 
 
@@ -130,8 +130,8 @@ def measure_response(
         reasons.append(f"the noise, {sigma:.2g} b, hides crossings (hysteresis {hysteresis:.2g} b)")
     if first == 0 or final == 0:
         reasons.append("the displacement never leaves the hysteresis about zero")
-    if wanted < _LEAST_CYCLES:
-        reasons.append(f"too short to tell: {wanted} cycles, the rule needs {_LEAST_CYCLES}")
+    if wanted < LEAST_CYCLES:
+        reasons.append(f"too short to tell: {wanted} cycles, the rule needs {LEAST_CYCLES}")
     certain_continuous = late > wanted / 20.0
     if total < _WHOLE * wanted and not certain_continuous:
         reasons.append(f"too short to tell: {total:.1f} of {wanted} cycles recorded")
