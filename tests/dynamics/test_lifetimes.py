@@ -84,6 +84,16 @@ def test_the_tip_stands_still_in_space() -> None:
     assert len(np.unique(ds.last_snap)) > 1
 
 
+def test_runs_that_snap_on_are_followed_to_the_end() -> None:
+    """One mode at a point where many runs go on: none is stopped because it is sure to be called continuous."""
+    ds = sb.lifetime_map(system_of(1), None, sb.Integration(cycles=400), starts=24, after=[200, 350])
+    lasting = ds.last_snap.values[ds.last_snap.values > 350.0]
+    assert lasting.size == int(ds.runs_snapping) >= 8
+    assert (lasting > 390.0).all(), "they still cross in the last cycles"
+    assert float(ds.snapping_probability.sel(after=350)) == pytest.approx(lasting.size / 24)
+    assert (ds.status.values[ds.last_snap.values > 350.0] == sb.RunStatus.OK).all()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("point", MEASURED)
 def test_measured_lifetimes_come_again(point) -> None:

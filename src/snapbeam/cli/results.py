@@ -109,7 +109,7 @@ def draw_dynamics(dataset: xr.Dataset, path: Path, picture: str) -> Path:
 
     if picture == "branch":
         return _save(figures.plot_diagram(None, branches=[dataset]), path)
-    plots = {
+    plots: dict[str, Any] = {
         "lifetimes": figures.plot_lifetimes, "survival": figures.plot_survival, "diagram": figures.plot_diagram,
         "exponents": figures.plot_exponents, "section": figures.plot_section, "basins": figures.plot_basins,
     }  # fmt: skip

@@ -31,10 +31,17 @@ def _axes(ax: Axes | None, width: str = "single", height: float = 72.0) -> Axes:
     return new_figure(width, height).add_subplot() if ax is None else ax
 
 
-def plot_lifetimes(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+def plot_lifetimes(
+    dataset: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    limits: tuple[float, float] | None = None,
+    legend: bool = True,
+) -> Axes:
     """Draw the lifetime of snapping: along one parameter with its interval, or over two in colours.
 
-    Points without a lifetime are white where nothing snapped and hatched where runs snap on with no end seen.
+    Points without a lifetime are white where nothing snapped and hatched where runs snap on with no end seen.  *limits*
+    are those of the colours, in cycles.
 
     Raises
     ------
@@ -59,17 +66,20 @@ def plot_lifetimes(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             ax.legend(loc="best")
             dress(ax.xaxis, dataset, dims[0])
         else:
-            _lifetime_cells(dataset, ax, dims)
+            _lifetime_cells(dataset, ax, dims, limits, legend)
         fix_ticks(ax)
     return ax
 
 
-def _lifetime_cells(dataset: xr.Dataset, ax: Axes, dims: list[str]) -> None:
+def _lifetime_cells(
+    dataset: xr.Dataset, ax: Axes, dims: list[str], limits: tuple[float, float] | None, legend: bool
+) -> None:
     values = dataset["lifetime"].values.T
     known = values[np.isfinite(values) & (values > 0.0)]
     edges = [edges_of(dataset, name) for name in dims]
     if known.size:
-        norm = LogNorm(max(float(np.quantile(known, 0.02)), 1.0), float(np.quantile(known, 0.98)) * 1.001)
+        low, high = (float(np.quantile(known, share)) for share in (0.02, 0.98))
+        norm = LogNorm(*((max(low, 1.0), max(high, low) * 1.001) if limits is None else limits))
         cells = ax.pcolormesh(*edges, values, cmap=cm.batlow, norm=norm, rasterized=True)
         figure = ax.get_figure()
         assert figure is not None
@@ -80,7 +90,7 @@ def _lifetime_cells(dataset: xr.Dataset, ax: Axes, dims: list[str]) -> None:
         low, left = edges[1][row], edges[0][column]
         size = edges[0][column + 1] - left, edges[1][row + 1] - low
         ax.add_patch(Rectangle((left, low), *size, **hatched))
-    if endless.any():
+    if endless.any() and legend:
         ax.legend(
             handles=[Patch(**hatched, label="snaps on, no end seen")],
             loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
@@ -123,8 +133,8 @@ def plot_survival(
         )
         ax.set_xlim(left=0.0)
         handles, _ = ax.get_legend_handles_labels()
-        handles.append(Line2D([], [], color="0.3", dashes=(4, 2), linewidth=0.7, label="fitted exponential"))
-        ax.legend(handles=handles, loc="best")
+        handles.append(Line2D([], [], color="0.3", dashes=(4, 2), linewidth=0.7, label="fitted"))
+        ax.legend(handles=handles, loc="upper right", handlelength=1.0, fontsize=6)
         fix_ticks(ax)
     return ax
 

@@ -202,10 +202,10 @@ def refit(
     last, status = runs["last_snap"].values, runs["status"].values
     good = np.isin(status, _REACHED)
     snapped = good & np.isfinite(last)
-    decided = runs["end_is_final"].values | (status == int(RunStatus.DECIDED)) & (runs["end_well"].values > 0)
+    # what ended early provably snaps no more
+    settled = runs["end_is_final"].values | (status == int(RunStatus.DECIDED))
     observed = cycles - survival.quiet
-    # a run that was decided without a proof of its end was decided to be continuous
-    lasting = snapped & ~decided & ((last > observed) | (status == int(RunStatus.DECIDED)))
+    lasting = snapped & ~settled & (last > observed)
     time = np.where(snapped, np.where(lasting, np.minimum(last, observed), last), np.nan)
     fit = fit_lifetime(time, snapped & ~lasting, survival.delay, survival.confidence)
     words: dict[str, tuple[Any, str]] = {

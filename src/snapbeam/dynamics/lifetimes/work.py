@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -11,9 +12,9 @@ from numpy.typing import NDArray
 
 from snapbeam.core.codes import RunStatus
 from snapbeam.dynamics.starts import Starts
-from snapbeam.engines.assemble import cycles_of, run_columns
-from snapbeam.model.state import State
-from snapbeam.model.system import System
+from snapbeam.engines.answer import statistics_of
+from snapbeam.engines.assemble import cycles_of, make_ensemble, run_columns
+from snapbeam.engines.registry import resolve
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.points import Columns
 from snapbeam.sweeps.setup import Progress
@@ -63,20 +64,45 @@ class LifetimeWork(PointWork):
         side = -1 if self.setup.system.striker is None or self.setup.system.striker.side == "below" else 1
         for s in range(count):
 
-            def start(system: System, state: State | None, number: int = s) -> State:
-                return self.starts.state(system, number, state)
-
-            def report(done: int, _: int, before: int = s * size) -> None:
+            def report(done: int, s: int = s) -> None:
                 if progress is not None:
-                    progress((before + done) // count, size)
+                    progress((s * size + done) // count, size)
 
-            found = self.setup.march(points, threads, report, start=start)
+            found = self._march(points, s, threads, report)
             integers[0, s], integers[1, s] = found["status"], found["crossings"]
             integers[2, s] = found["crossings_last_quarter"]
             integers[3, s] = np.where(found["final_well"] == side, -1, 1)
             integers[4, s] = found["end_is_final"]
             numbers[s] = found["last_crossing"] / cycle
         return ResultTable(integers.reshape(-1, size).T.copy(), numbers.T.copy())
+
+    def _march(
+        self, points: Columns, number: int, threads: int | None, report: Callable[[int], object]
+    ) -> dict[str, NDArray[Any]]:
+        """Every point from one start.
+
+        A run ends early where it provably snaps no more, and never because it is sure to be called continuous: how
+        long it goes on is what is asked.
+        """
+        setup, found, done = self.setup, dict[str, NDArray[Any]](), 0
+        size = next(iter(points.values())).size
+        for system, integration, which, own in setup.groups(points):
+            begun = self.starts.state(system, number, setup.start_of(system, own))
+            columns = {name: values for name, values in own.items() if not name.startswith("start.")}
+            ensemble = make_ensemble(system, integration, columns, start=begun)
+            ensemble.runs["decide_crossings"] = -1
+            engine = resolve(
+                integration.engine, modes=system.model.modes, law=ensemble.law, drive=ensemble.drive
+            )[1]
+
+            def inside(finished: int, _: int, before: int = done) -> object:
+                return report(before + finished)
+
+            books = engine.run_ensemble(ensemble, threads, inside)
+            for name, values in statistics_of(ensemble, books).items():
+                found.setdefault(name, np.zeros(size, dtype=values.dtype))[which] = values
+            done += which.size
+        return found
 
     def _cycles(self, points: Columns) -> NDArray[np.float64]:
         """Seconds of a cycle of each point."""

@@ -31,6 +31,10 @@ POINTS = {"frequency_ratio": (1.21, 1.625, 2.5, 3.5), "velocity_amplitude": (0.2
 ENDLESS = (1.625, 0.3)
 """Where one mode snaps on in many runs; its exponents are measured with 32 modes."""
 _SEED = 118291
+_SCALE = (5.0, 5000.0)
+"""Of the colours, cycles."""
+_APART = 1.0
+"""Cycles by which the ends of two runs must differ."""
 
 
 def _system(modes: int, ratio: float, velocity: float) -> sb.System:
@@ -47,25 +51,25 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     cycles = results.pick(120, LONG_CYCLES)
     survival = sb.Survival(quiet=results.pick(20.0, 50.0))
     axes = {
-        "frequency_ratio": results.pick(np.linspace(0.5, 4.0, 3), np.linspace(0.2, 4.0, 20)),
-        "velocity_amplitude": results.pick(np.linspace(0.1, 0.65, 3), np.linspace(0.05, 0.65, 13)),
+        "frequency_ratio": results.pick(np.linspace(0.5, 4.0, 3), np.linspace(0.25, 4.0, 16)),
+        "velocity_amplitude": results.pick(np.linspace(0.1, 0.65, 3), np.linspace(0.1, 0.64, 10)),
     }
     for modes in results.pick((1, 2), (1, 2, 4, 8, 32)):
         found[f"modes_{modes}"] = sb.lifetime_map(
-            _system(modes, *ENDLESS), axes, sb.Integration(cycles=cycles), starts=results.pick(3, 16),
+            _system(modes, *ENDLESS), axes, sb.Integration(cycles=cycles), starts=results.pick(3, 8),
             survival=survival, after=results.pick(None, (200, 500, 950)),
             progress=results.progress(f"lifetimes, N = {modes}"),
         )  # fmt: skip
     most = results.pick(2, 32)
     points = xr.Dataset({name: ("point", np.array(values)) for name, values in POINTS.items()})
     found["points"] = sb.lifetime_map(
-        _system(most, *ENDLESS), points, sb.Integration(cycles=cycles), starts=results.pick(8, 400),
+        _system(most, *ENDLESS), points, sb.Integration(cycles=cycles), starts=results.pick(8, 250),
         survival=survival, progress=results.progress("lifetimes at four points"),
     )  # fmt: skip
     for accuracy in ("map", "reference"):
         long = sb.Integration(cycles=results.pick(200, 10_000), accuracy=accuracy)
         found[f"long_{accuracy}"] = sb.lifetime_map(
-            _system(1, *ENDLESS), None, long, starts=results.pick(4, 64), survival=survival
+            _system(1, *ENDLESS), None, long, starts=results.pick(4, 24), survival=survival
         )
     found["exponents"] = _exponents(results, most)
     found["sensitivity"] = _sensitivity(results, most)
@@ -75,7 +79,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 def _exponents(results: Results, modes: int) -> xr.Dataset:
     """The largest exponent while it snaps, of several runs."""
     system = _system(modes, *ENDLESS)
-    starts = sb.Starts(count=results.pick(2, 32))
+    starts = sb.Starts(count=results.pick(2, 16))
     states = [starts.state(system, number) for number in range(starts.count)]
     batch = sb.State(
         amplitude=np.array([state.amplitude for state in states]),
@@ -85,19 +89,24 @@ def _exponents(results: Results, modes: int) -> xr.Dataset:
 
 
 def _sensitivity(results: Results, modes: int) -> xr.Dataset:
-    """Share of random points whose outcome after some cycles changes with a relative change of V."""
+    """Share of random points at which the last snap moves by more than a cycle with a relative change of V.
+
+    Two runs part after ln(1/epsilon)/lambda, and both still snap then with a probability that falls as kappa says: the
+    share goes with epsilon to the power kappa/lambda.
+    """
     import xarray as xr
 
-    count, cycles = results.pick(6, 400), results.pick(30, 100)
+    count, cycles = results.pick(6, 400), results.pick(30, LONG_CYCLES)
     base = np.random.default_rng(_SEED).uniform(0.27, 0.33, count)
-    sizes = np.logspace(-11.0, -3.0, results.pick(2, 9))
-    system, how = _system(modes, *ENDLESS), sb.Integration(cycles=cycles)
-    snapping = []
+    sizes = np.logspace(-12.0, -4.0, results.pick(2, 9))
+    system, how = _system(modes, *ENDLESS), sb.Integration(cycles=cycles, early_decision=True)
+    cycle = 1.0 / (system.model.reference_freq * ENDLESS[0])
+    ends = []
     for size in (0.0, *sizes):
         ds = sb.sweep(system, xr.Dataset({"velocity_amplitude": ("point", base * (1.0 + size))}), how)
-        snapping.append(ds["crossings_last_quarter"].values > 0)
-    changed = np.array([(each != snapping[0]).sum() for each in snapping[1:]])
-    labels = {"units": "1", "long_name": "points whose outcome changes"}
+        ends.append(ds["last_crossing"].fillna(0.0).values / cycle)
+    changed = np.array([(np.abs(each - ends[0]) > _APART).sum() for each in ends[1:]])
+    labels = {"units": "1", "long_name": "points whose last snap moves by more than a cycle"}
     return xr.Dataset(
         {"changed": ("size", changed, labels)},
         {"size": ("size", sizes, {"units": "1", "long_name": "relative change of V"})},
@@ -113,11 +122,12 @@ def draw(results: Results) -> Figure:
         figure = new_figure("double", 118.0)
         axes = figure.subplots(2, 3).ravel()
         for ax, (name, ds) in zip(axes, maps.items(), strict=False):
-            plot_lifetimes(ds, ax)
+            plot_lifetimes(ds, ax, limits=_SCALE, legend=False)
             ax.set_title(f"$N$ = {name[6:]}", loc="left")
         for ax in axes[len(maps) : -1]:
             ax.set_visible(False)
         pairs = zip(*POINTS.values(), strict=True)
-        plot_survival(data["points"], axes[-1], labels=[rf"$\Omega$ = {a:g}, $V$ = {b:g}" for a, b in pairs])
+        plot_survival(data["points"], axes[-1], labels=[f"{a:g}, {b:g}" for a, b in pairs])
+        axes[-1].get_legend().set_title(r"$\Omega$, $V$", {"size": 6})
         panel_letters([*axes[: len(maps)], axes[-1]])
     return figure
