@@ -52,7 +52,9 @@ def counting(progress: _Counts | bool | None, what: str, noun: str = "points") -
         line = _Line(what)
         return lambda done, total: line.say(done / max(total, 1), f"{done} of {total} {noun}")
     if not callable(progress):
-        raise InputTypeError(f"progress = {shown(progress)}: must be True or callable, as progress(done, total)")
+        raise InputTypeError(
+            f"progress = {shown(progress)}: must be True or callable, as progress(done, total)"
+        )
     return progress
 
 
