@@ -8,6 +8,7 @@ import typer
 
 from snapbeam.cli.calibrate import calibrate
 from snapbeam.cli.compare import compare
+from snapbeam.cli.explore import explore
 from snapbeam.cli.frequencies import frequencies
 from snapbeam.cli.identify import identify
 from snapbeam.cli.info import info
@@ -36,6 +37,7 @@ app.command("threshold")(threshold)
 app.command("simulate")(simulate)
 app.command("frequencies")(frequencies)
 app.command("plot")(plot)
+app.command("explore")(explore)
 app.command("paper")(paper)
 app.command("track")(track)
 app.command("vibrometer")(vibrometer)
