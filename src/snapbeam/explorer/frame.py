@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import html
-from pathlib import Path
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import panel as pn
 from bokeh.events import ConnectionLost, DocumentReady
 from bokeh.models import CustomJS
 
+from snapbeam.explorer.look import sheet, styled
+
 if TYPE_CHECKING:
-    from snapbeam.explorer.look import Look
     from snapbeam.explorer.page import Page
     from snapbeam.explorer.views.run import RunView
 
-__all__ = ["framed", "sheet"]
+__all__ = ["framed"]
 
 _FIRST = "Click on the map, use the arrow keys, or type numbers, to see the run of a point."
 _GONE = """
@@ -54,24 +55,10 @@ window.location.search = search.toString();
 """
 
 
-def sheet(look: Look) -> str:
-    """The page's style sheet."""
-    text = (Path(__file__).parent / "page.css").read_text(encoding="utf-8")
-    names = {
-        name: getattr(look, name) for name in ("page", "card", "text", "faint", "grid", "accent", "striker")
-    }
-    variables = "".join(f"--sb-{name}: {value};" for name, value in names.items())
-    return (
-        f":root, :host {{ {variables} color-scheme: {'dark' if look.name == 'dark' else 'light'}; }}\n{text}"
-    )
-
-
 def framed(page: Page) -> Any:
     """All of a page."""
     look, shared = page.look, page.shared
-    pn.config.raw_css = []
-    style = sheet(look)
-    _styled(page.card.layout, style)
+    pn.config.raw_css = [sheet(look)]
     name = html.escape(shared.source.name)
     title = pn.pane.HTML(
         f'<h1>snapbeam <span class="faint">{name}</span></h1>', margin=0, sizing_mode="stretch_width"
@@ -82,9 +69,24 @@ def framed(page: Page) -> Any:
         title, page.target, page.compare, dark, sizing_mode="stretch_width", css_classes=["top"], margin=0
     )
     map_tab = pn.Column(page.card.layout, page.typed, sizing_mode="stretch_width", margin=0)
+    map_tab.insert(0, page.old)
+    others = page_tabs(page)
     left = pn.Tabs(
-        ("Map", map_tab), *page_tabs(page), dynamic=True, sizing_mode="stretch_width", css_classes=["left"]
+        ("Map", map_tab),
+        *((title, pn.Column(sizing_mode="stretch_width", margin=0)) for title in others),
+        sizing_mode="stretch_width",
+        css_classes=["left"],
     )
+
+    def turned() -> None:
+        """Fill a tab when it is first looked at."""
+        at = left.active
+        if at > 0 and not left[at].objects:
+            made = list(others.values())[at - 1]()
+            styled(made, look)
+            left[at].objects = [made]
+
+    left.param.watch(lambda _: page.post(turned), "active")
     page.runs[0].layout.css_classes = ["card", "right"]
     page.runs[0].head.object = f'<span class="faint">{_FIRST}</span>'
     body = pn.FlexBox(
@@ -96,11 +98,11 @@ def framed(page: Page) -> Any:
         css_classes=["body"],
     )
     whole = pn.Column(top, body, sizing_mode="stretch_width", margin=0, css_classes=["whole"])
-    _styled(whole, style)
+    styled(whole, look)
 
     def add_run(view: RunView) -> None:
         view.layout.css_classes = ["card", "right"]
-        _styled(view.layout, style)
+        styled(view.layout, look)
         body.append(view.layout)
 
     page.add_run = add_run
@@ -111,15 +113,14 @@ def framed(page: Page) -> Any:
         doc.js_on_event(ConnectionLost, CustomJS(code=_GONE))
         doc.add_root(page.bar)
         doc.add_root(page.keys)
+        doc.add_root(page.downloads.source)
     return whole
 
 
-def page_tabs(page: Page) -> list[tuple[str, Any]]:
-    """The tabs beside the map."""
-    return []
-
-
-def _styled(item: Any, style: str) -> None:
-    for each in item.select():
-        if style not in each.stylesheets:
-            each.stylesheets = [*each.stylesheets, style]
+def page_tabs(page: Page) -> dict[str, Callable[[], Any]]:
+    """The tabs beside the map, by title: what makes them."""
+    found: dict[str, Callable[[], Any]] = {}
+    card = page.system_card
+    if card is not None:
+        found["System"] = lambda: card.layout
+    return found | {"Take away": lambda: page.take.layout}

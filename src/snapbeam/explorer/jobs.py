@@ -65,6 +65,7 @@ class Jobs:
     def __init__(self, runs: int = 2, windows: int = 1) -> None:
         self._runs = ThreadPoolExecutor(runs, "snapbeam-run")
         self._windows = ThreadPoolExecutor(windows, "snapbeam-window")
+        self._exports = ThreadPoolExecutor(1, "snapbeam-export")
         self._waiting = 0
         self._free = threading.Condition()
 
@@ -87,6 +88,10 @@ class Jobs:
         """Do *work* when nothing more urgent is to be done."""
         self._windows.submit(_guarded, work, done, token)
 
+    def export(self, work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
+        """Make a file, one at a time."""
+        self._exports.submit(_guarded, work, done, token)
+
     def give_way(self, token: Token) -> None:
         """Wait while a run is computed."""
         with self._free:
@@ -98,6 +103,7 @@ class Jobs:
         """Take no more work, and drop what has not begun."""
         self._runs.shutdown(wait=False, cancel_futures=True)
         self._windows.shutdown(wait=False, cancel_futures=True)
+        self._exports.shutdown(wait=False, cancel_futures=True)
 
 
 def _guarded(work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,18 +17,9 @@ from snapbeam import ResponseClass
 from snapbeam.figures import CLASS_COLORS
 
 __all__ = [
-    "DARK",
-    "LIGHT",
-    "Look",
-    "class_chip",
-    "colors_of",
-    "columns",
-    "figure",
-    "inner_size",
-    "legend",
-    "look_of",
-    "sequential",
-]
+    "DARK", "LIGHT", "Look", "blend", "class_chip", "colors_of", "columns", "figure", "fit", "inner_size", "legend", "look_of",
+    "sequential", "sheet", "styled",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -80,6 +72,27 @@ def look_of(theme: str) -> Look:
     return DARK if theme == "dark" else LIGHT
 
 
+@cache
+def sheet(look: Look) -> str:
+    """The page's style sheet."""
+    text = (Path(__file__).parent / "page.css").read_text(encoding="utf-8")
+    names = {
+        name: getattr(look, name) for name in ("page", "card", "text", "faint", "grid", "accent", "striker")
+    }
+    variables = "".join(f"--sb-{name}: {value};" for name, value in names.items())
+    return (
+        f":root, :host {{ {variables} color-scheme: {'dark' if look.name == 'dark' else 'light'}; }}\n{text}"
+    )
+
+
+def styled(item: Any, look: Look) -> None:
+    """Give a part of the page, and all that is in it, the page's style sheet."""
+    style = sheet(look)
+    for each in item.select():
+        if style not in each.stylesheets:
+            each.stylesheets = [*each.stylesheets, style]
+
+
 def figure(look: Look, **options: Any) -> Any:
     """An empty Bokeh figure in the house's look."""
     settings: dict[str, Any] = {
@@ -111,10 +124,22 @@ def figure(look: Look, **options: Any) -> Any:
     return plot
 
 
-def legend(plot: Any, look: Look, where: str = "top_right") -> None:
-    """Dress the legend of a figure."""
-    for item in plot.legend:
-        item.location = where
+def fit(plot: Any, *curves: NDArray[Any]) -> None:
+    """Let a figure show all of some curves."""
+    known = [curve[np.isfinite(curve)] for curve in curves]
+    known = [curve for curve in known if curve.size]
+    if known:
+        low, high = min(float(each.min()) for each in known), max(float(each.max()) for each in known)
+        room = 0.06 * (high - low) or 0.5
+        plot.y_range.update(start=low - room, end=high + room)
+
+
+def legend(plot: Any, look: Look) -> None:
+    """Put the legend of a figure above it."""
+    for item in list(plot.legend):
+        plot.center.remove(item)
+        plot.add_layout(item, "above")
+        item.location = "top_left"
         item.orientation = "horizontal"
         item.background_fill_color = look.card
         item.background_fill_alpha = 0.75
@@ -135,6 +160,15 @@ def inner_size(plot: Any, otherwise: tuple[int, int]) -> tuple[int, int]:
         except UnsetValueError:
             found.append(value)
     return found[0], found[1]
+
+
+def blend(first: str, last: str, steps: int = 64) -> list[str]:
+    """Colours from one to another."""
+    ends = [np.array([int(color[i : i + 2], 16) for i in (1, 3, 5)]) for color in (first, last)]
+    mixed = [
+        np.round(ends[0] + share * (ends[1] - ends[0])).astype(int) for share in np.linspace(0.0, 1.0, steps)
+    ]
+    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in mixed]
 
 
 def columns(**values: Any) -> ColumnDataSource:

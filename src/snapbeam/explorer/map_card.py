@@ -26,6 +26,8 @@ from snapbeam.figures import CLASS_COLORS
 
 __all__ = ["MapCard"]
 
+_HEIGHT = 345
+"""Pixels of the figure."""
 _REST = 350
 """Milliseconds that a view must rest before it is computed."""
 _PUSH = 0.2
@@ -58,6 +60,7 @@ class MapCard:
         self.source = shared.source
         self.system, self.integration = shared.system, shared.integration
         self.changed = False
+        self.dots: Any = None
         self.marks: list[tuple[dict[str, Any], str]] = []
         self.asked: Callable[[Point], None] = lambda _: None
         self.moved: Callable[[], None] = lambda: None
@@ -164,7 +167,7 @@ class MapCard:
         """Make the figure anew, of other axes."""
         self.cancel("")
         self.plane = Plane.of(self.source, self.x.value, self.y.value, self._fixed())
-        self.view = MapView(self.look, self.plane.x, self.plane.y)
+        self.view = MapView(self.look, self.plane.x, self.plane.y, _HEIGHT)
         if (
             view is not None
             and len(view) == 4
@@ -212,9 +215,7 @@ class MapCard:
         name, layers = self.show.value, self.layers.value
         words: list[str] = []
         try:
-            values = (
-                self.plane.values(name) if not (self.changed and self.source.skeleton.data_vars) else None
-            )
+            values = self.plane.values(name)
         except InputError as error:
             values = None
             words.append(str(error))
@@ -222,6 +223,7 @@ class MapCard:
         label, unit = self.source.label(name)
         title = f"{label}{'' if unit == '1' else f' ({unit})'}"
         self.view.show(name, values, limits, "" if name == "response" else title)
+        self.view.fade(self.changed)
         self.show_windows()
         words.append(
             self.view.show_quasi_static("quasi" in layers, self.source.scalars() | self._fixed_short())
@@ -256,7 +258,7 @@ class MapCard:
         return {lookup(name).short: value for name, value in self.plane.fixed_values().items()}
 
     def _draw_dots(self, wanted: bool, words: list[str]) -> None:
-        dots = getattr(self, "dots", None)
+        dots = self.dots
         empty = np.zeros(0)
         if not wanted or dots is None:
             self.view.show_dots(empty, empty, empty)
@@ -291,6 +293,11 @@ class MapCard:
         self.key.object = (
             f'<div class="key">{" &nbsp; ".join(items)}</div>' if self.show.value == "response" else ""
         )
+
+    def say(self, words: str) -> None:
+        """Add a line to what is wrong."""
+        self._words.append(words)
+        self.tell()
 
     def tell(self, words: str = "") -> None:
         """Say how far windows are, and what is wrong."""

@@ -12,14 +12,18 @@ import panel as pn
 from bokeh.models import ColumnDataSource
 
 import snapbeam as sb
-from snapbeam import InputError, Run, RunStatus
+from snapbeam import InputError, Integration, Run, RunStatus, System
 from snapbeam.explorer.address import Address, number
+from snapbeam.explorer.downloads import Downloads
+from snapbeam.explorer.frame import framed
 from snapbeam.explorer.jobs import Token
 from snapbeam.explorer.limits import RUN_SECONDS, check_run, samples_of
 from snapbeam.explorer.look import Look, look_of
 from snapbeam.explorer.map_card import MapCard
 from snapbeam.explorer.points import Point, compared
 from snapbeam.explorer.shared import Shared
+from snapbeam.explorer.system_card import SystemCard, changed_parameters
+from snapbeam.explorer.take_card import TakeCard
 from snapbeam.explorer.views.run import RunView
 
 __all__ = ["Page"]
@@ -57,15 +61,25 @@ class Page:
             options=["A", "B"], value="A", visible=False, align="center"
         )
         self.compare.param.watch(lambda _: self.post(self._compared), "value")
+        self.downloads = Downloads()
         self.fields: dict[str, Any] = {}
         self.typed = pn.FlexBox(margin=0)
+        self.old = pn.pane.HTML("", sizing_mode="stretch_width", margin=0, css_classes=["old-words"])
         self.go = pn.widgets.Button(name="Run", button_type="primary", width=70, align="end")
         self.go.on_click(lambda _: self.post(self._ask_typed))
         self._make_fields()
         self.bar = ColumnDataSource({"search": [""]}, name="address")
         self.keys = ColumnDataSource({"key": [""], "count": [0]}, name="keys")
         self.keys.on_change("data", lambda _, __, data: self._key(str(data["key"][0])))
-        self.layout = self._make_layout()
+        self.changes: dict[str, Any] = {}
+        self.take = TakeCard(self)
+        self.system_card: SystemCard | None = None
+        if shared.system is not None:
+            self.system_card = SystemCard(
+                shared.system, shared.integration, self.post, self.downloads, self.look
+            )
+            self.system_card.used = self._use
+        self.layout = framed(self)
         self._begin()
 
     # ------------------------------------------------------------------ the page's own thread
@@ -95,13 +109,6 @@ class Page:
             if token is not None:
                 token.cancel()
 
-    # ------------------------------------------------------------------ layout
-
-    def _make_layout(self) -> Any:
-        from snapbeam.explorer.frame import framed
-
-        return framed(self)
-
     def _make_fields(self) -> None:
         names = [*self.card.plane.names, *self.card.plane.fixed_values()]
         from snapbeam.config import lookup
@@ -113,7 +120,18 @@ class Page:
         self.typed.objects = [*self.fields.values(), self.go]
 
     def _begin(self) -> None:
-        """Show the run that the address names, once the page stands."""
+        """Show what the address names, once the page stands."""
+        if self.address.changes and self.system_card is not None:
+            try:
+                of_run = {
+                    key[4:]: item for key, item in self.address.changes.items() if key.startswith("run.")
+                }
+                own = {key: item for key, item in self.address.changes.items() if not key.startswith("run.")}
+                first, how = self.system_card.first
+                check_run(first.replace(**own), how.replace(**of_run))
+                self.system_card.take(first.replace(**own), how.replace(**of_run))
+            except InputError as error:
+                self.card.say(f"address, set: {error}")
         at = dict(self.address.at)
         names = set(self.card.plane.names) | set(self.card.plane.fixed_values())
         if at and names <= at.keys():
@@ -195,6 +213,7 @@ class Page:
         view.show(run, point.words(), fresh=fresh)
         view.say("map", words, bad=not same)
         view.say("conditioning", "")
+        self.take.refresh()
         self._condition(which, point, run, token)
 
     def _condition(self, which: int, point: Point, run: Run, token: Token) -> None:
@@ -208,6 +227,21 @@ class Page:
             self.post(tell)
 
         self.shared.jobs.run(lambda t: conditioned(run, t), done, token)
+
+    def _use(self, system: System, integration: Integration) -> None:
+        """Compute with another system from now on, and say what is old."""
+        assert self.system_card is not None
+        self.changes = changed_parameters(self.system_card.first, (system, integration))
+        self.card.use(system, integration, bool(self.changes))
+        names = ", ".join(f"{name} = {_brief(value)}" for name, value in list(self.changes.items())[:6])
+        old = f"The map is old: it is of the system before. Changed: {names}" if self.changes else ""
+        if not self.shared.source.skeleton.data_vars:
+            old = f"Changed: {names}" if self.changes else ""
+        self.old.object = f'<p class="old" role="status">{html.escape(old)}</p>' if old else ""
+        for view, point in zip(self.runs, self.points, strict=False):
+            if view.run is not None and point is not None:
+                view.say("old", "old: of the system before; run it again to see the changed one", bad=True)
+        self._write_address()
 
     def _mark(self) -> None:
         names = ("A", "B") if self.compare.value else ("",)
@@ -271,13 +305,13 @@ class Page:
     # ------------------------------------------------------------------ address
 
     def _write_address(self) -> None:
-        if not hasattr(self, "bar"):
+        if not hasattr(self, "changes"):  # it is still being made
             return
-        card, point = self.card, self.points[self.which] if hasattr(self, "points") else None
+        card, point = self.card, self.points[self.which]
         view = None if card.view.is_whole else card.view.view
         address = Address(
             card.x.value, card.y.value, card.show.value, {} if point is None else point.values, view,
-            getattr(self, "changes", {}), self.address.theme,
+            self.changes, self.address.theme,
         )  # fmt: skip
         self.bar.data = {"search": [address.write()]}
 
@@ -288,6 +322,5 @@ def _even_times(system: Any, integration: Any, count: int) -> np.ndarray:
     return np.linspace(0.0, integration.cycles_or_default / frequency, count)
 
 
-def note(words: str) -> str:
-    """Words as a note of the page."""
-    return f'<p class="note">{html.escape(words)}</p>'
+def _brief(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -64,6 +64,7 @@ class Axis:
         skeleton = source.skeleton
         at, words = positions(skeleton, name)
         text, unit = source.label(name)
+        text = text.replace("omega_1", "ω₁")
         symbol = ""
         if "parameter" in skeleton[name].attrs or name in (
             "frequency_ratio",

@@ -22,6 +22,8 @@ __all__ = ["Gate", "is_loopback", "make_server"]
 
 _LOG = logging.getLogger("snapbeam.explorer")
 _COOKIE = "snapbeam_token"
+_OWN = "static/extensions/panel/"
+"""Where the server keeps what pages are made of; what Panel is not told it fetches from elsewhere."""
 
 
 def is_loopback(address: str) -> bool:
@@ -156,6 +158,7 @@ def _factory(shared: Shared) -> Callable[[], Any]:
                 f"<p>{SESSIONS} pages are open, the most that there may be: close one of them.</p>"
             )
         shared.pages += 1
+        pn.state.curdoc.template_variables.setdefault("dist_url", _OWN)
         try:
             made = Page(shared, dict(pn.state.session_args))
         except BaseException:

@@ -42,9 +42,12 @@ def _shared(what: Any, system: System | None, integration: Integration | None) -
         import panel as pn
     except ImportError as error:
         raise InputError(_MISSING) from error
+    from bokeh.settings import settings
+
     from snapbeam.explorer.shared import Shared
     from snapbeam.explorer.source import opened
 
+    settings.resources = "server"  # whatever a page is made of comes from this machine
     pn.extension()
     file = Path(what) if isinstance(what, (str, Path)) else None
     return Shared(opened(what, system=system, integration=integration), file)
@@ -127,6 +130,9 @@ def serve(
     InputError
         If *what* is no map, or the address cannot be served.
     """
+    import matplotlib
+
+    matplotlib.use("Agg")  # pictures are drawn beside the page, for files alone
     shared = _shared(what, system, integration)
     from snapbeam.explorer.server import make_server
 

@@ -88,6 +88,17 @@ class Window:
             return None
         return _middle(row, stride, self.y.size), _middle(column, stride, self.x.size)
 
+    def own(self) -> NDArray[np.bool_]:
+        """Which cells hold a run of their own, not that of the block they lie in; shape (ny, nx)."""
+        rows, columns = np.indices(self.stride.shape)
+        stride = np.maximum(self.stride.astype(np.int64), 1)
+        middle = [
+            np.minimum(at // stride * stride + stride // 2, size - 1)
+            for at, size in ((rows, self.y.size), (columns, self.x.size))
+        ]
+        found: NDArray[np.bool_] = (self.stride > 0) & (middle[0] == rows) & (middle[1] == columns)
+        return found
+
     def covers(self, x: float, y: float) -> bool:
         """Whether a place lies in it."""
         left, right, low, high = self.bounds

@@ -10,7 +10,7 @@ import panel as pn
 from bokeh.models import ColumnDataSource, CustomJS, Label, Range1d, Select, Slider, Toggle
 from numpy.typing import NDArray
 
-from snapbeam.explorer.look import figure, inner_size
+from snapbeam.explorer.look import figure, inner_size, sheet
 from snapbeam.explorer.views.part import Part, across, within
 
 if TYPE_CHECKING:
@@ -19,6 +19,12 @@ if TYPE_CHECKING:
 __all__ = ["BeamView"]
 
 _POSITIONS = 121
+_CONTROLS = """
+.bk-btn, .bk-input { background: var(--sb-card); color: var(--sb-text); border-color: var(--sb-faint); }
+.bk-btn.bk-active, .bk-btn:hover { background: var(--sb-grid); color: var(--sb-text); }
+.bk-slider-title, .bk-slider-value { color: var(--sb-text); }
+.noUi-target { background: var(--sb-grid); }
+"""
 _FRAMES = 6000
 _MODES = 32
 _DRAW = """
@@ -92,6 +98,8 @@ class BeamView(Part):
     def build(self) -> list[Any]:
         look = self.look
         self.run: Run | None = None
+        self.fresh = True
+        self.count = 0
         empty: list[float] = []
         self.frames = ColumnDataSource(
             {"t": empty, "striker": empty, "force": empty}, name=self.named("frames")
@@ -104,7 +112,7 @@ class BeamView(Part):
         )
         striker = ColumnDataSource({"x": empty, "y": empty, "color": empty}, syncable=False)
         self.plot = figure(
-            look, name=self.named("beam-plot"), height=330,
+            look, name=self.named("beam-plot"), height=330, title=" ",
             x_axis_label="position (mm)", y_axis_label="displacement (mm)",
             x_range=Range1d(0.0, 1.0), y_range=Range1d(-1.0, 1.0), tools="pan,wheel_zoom,reset",
         )  # fmt: skip
@@ -124,15 +132,13 @@ class BeamView(Part):
         )
         self.plot.add_layout(words)
         self.cursor.follow(
-            _DRAW, frames=self.frames, shapes=self.shapes, amplitudes=self.amplitudes, modes=self.modes,
+            _DRAW, self.meta, frames=self.frames, shapes=self.shapes, amplitudes=self.amplitudes, modes=self.modes,
             meta=self.meta, beam=beam, striker=striker, words=words,
         )  # fmt: skip
-        sheets = [
-            f":host {{ color: {look.text}; --bk-text: {look.text}; }} .noUi-target {{ background: {look.grid}; }}"
-        ]
-        toggle = Toggle(label="► Play", name=self.named("play"), width=90)
+        sheets = [sheet(look), _CONTROLS]
+        toggle = Toggle(label="► Play", name=self.named("play"), width=90, stylesheets=sheets)
         speed = Slider(
-            title="speed (log₁₀ of cycles a second)",
+            title="speed (log₁₀ cycles/s)",
             start=-2.0,
             end=1.5,
             value=-0.3,
@@ -140,7 +146,7 @@ class BeamView(Part):
             width=210,
             stylesheets=sheets,
         )
-        linger = Toggle(label="slow at impacts", active=True, width=120)
+        linger = Toggle(label="slow at impacts", active=True, width=120, stylesheets=sheets)
         scrub = Slider(
             title="",
             show_value=False,
@@ -158,14 +164,11 @@ class BeamView(Part):
             "active", CustomJS(args=shared | {"speed": speed, "linger": linger, "scrub": scrub}, code=_PLAY)
         )
         scrub.js_on_change("value", CustomJS(args=shared, code=_SCRUB))
-        redraw = "place.data = {t: [Math.max(place.data.t[0], frames.data.t[0])]};"
-        self.meta.js_on_change(
-            "data", CustomJS(args={"place": self.cursor.place, "frames": self.frames}, code=redraw)
-        )
         self.scale = Select(
             title="",
             options=["exaggerated to fit", "true proportions", "10 times", "100 times"],
             value="exaggerated to fit",
+            stylesheets=sheets,
             width=160,
         )
         self.scale.on_change("value", lambda attr, old, new: self._rescale())
@@ -209,6 +212,11 @@ class BeamView(Part):
             "force": np.nan_to_num(force),
         }
         self.reach = 1.35 * scale * max(1.0, float(np.nanmax(np.abs(dataset["center_displacement"].values))))
+        if (
+            self.fresh
+        ):  # the browser draws when it is told of a change, which what comes with the figure is not
+            self.fresh = False
+            self.cursor.later(self._rescale, 300)
         self.plot.x_range.update(start=-0.02 * along[-1], end=1.02 * along[-1])
         self._rescale()
 
@@ -224,11 +232,12 @@ class BeamView(Part):
         )
         self.plot.y_range.update(start=-half, end=half)
         self.plot.title.text = f"Displacements {fit / half:.3g} times as large as lengths"
+        self.count += 1
         striker = run.system.striker
         location = 0.5 if striker is None else striker.location
         side = 1 if striker is None or striker.side == "below" else -1
         self.meta.data = {
             "modes": [min(run.system.model.modes, _MODES)], "half": [0.5e3 * beam.thickness], "at": [location * length],
             "side": [side], "reach": [1e3 * half], "tip": [0.008 * length], "taper": [0.05 * half],
-            "hot": [self.look.second], "cold": [self.look.striker],
+            "hot": [self.look.second], "cold": [self.look.striker], "count": [self.count],
         }  # fmt: skip

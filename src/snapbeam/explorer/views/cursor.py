@@ -19,8 +19,8 @@ class Cursor:
     ``place``.
     """
 
-    def __init__(self, look: Look, suffix: str, post: Callable[[Callable[[], None]], None]) -> None:
-        self.look, self.suffix, self.post = look, suffix, post
+    def __init__(self, look: Look, suffix: str, later: Callable[[Callable[[], None], int], Any]) -> None:
+        self.look, self.suffix, self.later = look, suffix, later
         self.range = Range1d(0.0, 1.0)
         self.place = ColumnDataSource({"t": [0.0]}, syncable=False)
 
@@ -40,9 +40,11 @@ class Cursor:
         follow = CustomJS(args={"line": line, "place": self.place}, code="line.location = place.data.t[0];")
         self.place.js_on_change("data", follow)
 
-    def follow(self, code: str, **arguments: Any) -> None:
-        """Run *code* in the browser whenever the cursor moves; ``t`` is where it is."""
-        self.place.js_on_change(
-            "data",
-            CustomJS(args={"place": self.place} | arguments, code=f"const t = place.data.t[0];\n{code}"),
-        )
+    def follow(self, code: str, *also: Any, **arguments: Any) -> None:
+        """Run *code* in the browser whenever the cursor moves, or the data of one of *also* change.
+
+        In the code ``t`` is where the cursor is.
+        """
+        script = CustomJS(args={"place": self.place} | arguments, code=f"const t = place.data.t[0];\n{code}")
+        for source in (self.place, *also):
+            source.js_on_change("data", script)

@@ -56,7 +56,7 @@ class MapView:
             look, name="map", height=height,
             x_axis_type="log" if x.log else "linear", y_axis_type="log" if y.log else "linear",
             x_range=Range1d(*x.span, bounds=None), y_range=Range1d(*y.span, bounds=None),
-            x_axis_label=x.label, y_axis_label=y.label, tools="pan,box_zoom,wheel_zoom,reset",
+            x_axis_label=x.label, y_axis_label=y.label, title="", tools="pan,box_zoom,wheel_zoom,reset",
             active_scroll="wheel_zoom", active_drag="box_zoom",
         )  # fmt: skip
         self.plot.grid.visible = False
@@ -65,7 +65,7 @@ class MapView:
                 bokeh_axis.ticker = FixedTicker(ticks=axis.at.tolist())
                 bokeh_axis.major_label_overrides = dict(zip(axis.at.tolist(), axis.words, strict=True))
         self.base = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []}, name="map-base")
-        self.plot.image_rgba("image", "x", "y", "dw", "dh", source=self.base)
+        self.whole = self.plot.image_rgba("image", "x", "y", "dw", "dh", source=self.base)
         self.tiles = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []}, name="map-windows")
         self.plot.image_rgba("image", "x", "y", "dw", "dh", source=self.tiles)
         self.frames = columns(left=[], right=[], bottom=[], top=[])
@@ -196,6 +196,10 @@ class MapView:
             "image": [colors_of(name, seen.values, limits)],
             "x": [seen.x], "y": [seen.y], "dw": [seen.width], "dh": [seen.height],
         }  # fmt: skip
+
+    def fade(self, old: bool) -> None:
+        """Show the map pale, if it is of another system than what is computed."""
+        self.whole.glyph.global_alpha = 0.3 if old else 1.0
 
     def show_windows(self, windows: list[Window], name: str) -> None:
         """Lay windows over the map, the finest uppermost."""

@@ -8,7 +8,7 @@ import numpy as np
 import panel as pn
 from numpy.typing import NDArray
 
-from snapbeam.explorer.look import Look
+from snapbeam.explorer.look import Look, styled
 from snapbeam.explorer.views.cursor import Cursor
 
 if TYPE_CHECKING:
@@ -39,7 +39,11 @@ class Part:
         """Build it, the first time."""
         if not self.built:
             self.built = True
-            self.place.objects = self.build()
+            parts = self.build()
+            for part in parts:  # before they are on the page, not after
+                if hasattr(part, "select"):
+                    styled(part, self.look)
+            self.place.objects = parts
 
     def build(self) -> list[Any]:
         """What stands in it."""

@@ -51,7 +51,7 @@ class RunView:
     ) -> None:
         self.look, self.name, self.later = look, name, later
         self.run: Run | None = None
-        self.cursor = Cursor(look, "" if name == "A" else f"-{name}", post)
+        self.cursor = Cursor(look, "" if name == "A" else f"-{name}", later)
         self.parts = [
             Waveform(look, self.cursor), Phase(look, self.cursor), Spectrum(look, self.cursor),
             Modal(look, self.cursor), Energy(look, self.cursor), Impacts(look, self.cursor, self._closer),
@@ -67,7 +67,8 @@ class RunView:
             *((part.title, part.place) for part in self.parts), dynamic=True, sizing_mode="stretch_width", margin=0
         )  # fmt: skip
         self.tabs.param.watch(lambda _: post(self._activated), "active")
-        self.parts[0].activate()
+        for part in self.parts:  # all at once: what follows the cursor must be known before the page is
+            part.activate()
         self._moved = 0
         self._quiet = False
         for edge in ("start", "end"):
@@ -138,8 +139,7 @@ class RunView:
             self.active.show(self.run, min(start, end), max(start, end))
 
     def _activated(self) -> None:
-        self.active.activate()
-        self._draw()
+        self.later(self._draw, _SETTLE)  # once the browser has what it is to be drawn in
 
     def _range_moved(self) -> None:
         if self._quiet:

@@ -44,7 +44,8 @@ class Spectrum(Part):
         self.sources = {name: columns(x=[], y=[]) for name in ("center_displacement", "displacement")}
         self.sources["center_displacement"].name = self.named("spectrum")
         plot = figure(
-            look, height=420, y_axis_type="log", y_axis_label="amplitude (b)", x_axis_label="frequency over f₁",
+            look, height=420, title=" ", y_axis_type="log", y_axis_label="amplitude (b)",
+            x_axis_label="frequency over f₁", x_range=(0.0, 12.0), y_range=(1e-7, 1.0),
             tools="pan,box_zoom,wheel_zoom,reset", active_drag="box_zoom",
         )  # fmt: skip
         for (name, source), color, label in zip(
