@@ -17,8 +17,8 @@ from snapbeam import ResponseClass
 from snapbeam.figures import CLASS_COLORS
 
 __all__ = [
-    "DARK", "LIGHT", "Look", "blend", "class_chip", "colors_of", "columns", "figure", "fit", "inner_size", "legend", "look_of",
-    "sequential", "sheet", "styled",
+    "DARK", "LIGHT", "Look", "blend", "class_chip", "colors_of", "columns", "figure", "fit", "inner_size", "legend",
+    "look_of", "sequential", "sheet", "styled",
 ]  # fmt: skip
 
 

@@ -28,6 +28,8 @@ from snapbeam.explorer.views.run import RunView
 
 __all__ = ["Page"]
 
+_GROWTH = 1500
+"""Milliseconds between two looks at a store that may be growing."""
 _QUICK = 4000
 """Samples of a run that is shown at once; all others follow."""
 
@@ -80,6 +82,9 @@ class Page:
             )
             self.system_card.used = self._use
         self.layout = framed(self)
+        self._version = shared.source.version
+        if shared.source.growing and self.doc is not None:
+            self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
         self._begin()
 
     # ------------------------------------------------------------------ the page's own thread
@@ -137,6 +142,24 @@ class Page:
         if at and names <= at.keys():
             self.post(lambda: self.ask(Point({name: at[name] for name in at if name in names})))
 
+    def _look_for_more(self) -> None:
+        """Show what was added to a store since the last look."""
+        source = self.shared.source
+
+        def done(_: Any, error: str) -> None:
+            def tell() -> None:
+                if error:
+                    self.card.tell(error)
+                elif source.version != self._version:
+                    self._version = source.version
+                    self.card.redraw()
+                    attrs = source.attrs
+                    self.card.tell(f"store: {attrs.get('points_done')} of {attrs.get('points_total')} points")
+
+            self.post(tell)
+
+        self.shared.jobs.export(lambda _: source.refresh(), done, Token())
+
     # ------------------------------------------------------------------ runs
 
     @property
@@ -180,8 +203,11 @@ class Page:
         count = samples_of(system, integration)
         times = None if count is None else _even_times(system, integration, count)
         run = sb.simulate(system, integration, sample_times=times, progress=token.check)
-        held = self.card.expected(point)
-        same, words = compared(held, run.outcome, str(self.shared.source.attrs.get("engine", "cpu")))
+        try:
+            held = self.card.expected(point)
+            same, words = compared(held, run.outcome, str(self.shared.source.attrs.get("engine", "cpu")))
+        except InputError as error:  # the run stands, although its map cannot be read any more
+            same, words = False, str(error)
         if times is not None:
             words += f"; recorded at {times.size} instants, the most that a page may ask for"
         return run, words, same

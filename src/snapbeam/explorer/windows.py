@@ -86,16 +86,13 @@ class Window:
         stride = int(self.stride[row, column])
         if stride == 0:
             return None
-        return _middle(row, stride, self.y.size), _middle(column, stride, self.x.size)
+        return _middle(row, stride), _middle(column, stride)
 
     def own(self) -> NDArray[np.bool_]:
         """Which cells hold a run of their own, not that of the block they lie in; shape (ny, nx)."""
         rows, columns = np.indices(self.stride.shape)
         stride = np.maximum(self.stride.astype(np.int64), 1)
-        middle = [
-            np.minimum(at // stride * stride + stride // 2, size - 1)
-            for at, size in ((rows, self.y.size), (columns, self.x.size))
-        ]
+        middle = [at // stride * stride + stride // 2 for at in (rows, columns)]
         found: NDArray[np.bool_] = (self.stride > 0) & (middle[0] == rows) & (middle[1] == columns)
         return found
 
@@ -105,8 +102,8 @@ class Window:
         return left <= x <= right and low <= y <= high
 
 
-def _middle(at: int, stride: int, size: int) -> int:
-    return min(at // stride * stride + stride // 2, size - 1)
+def _middle(at: int, stride: int) -> int:
+    return at // stride * stride + stride // 2
 
 
 def _spread(low: float, high: float, cells: int, log: bool) -> _Array:
@@ -126,9 +123,10 @@ def planned(
 ) -> Window:
     """A window whose finest cells are *cell* pixels wide, wider if there would be too many."""
     width = max(cell, 1)
-    while (pixels[0] // width + 1) * (pixels[1] // width + 1) > WINDOW_POINTS:
+    while (pixels[0] // width + 27) * (pixels[1] // width + 27) > WINDOW_POINTS:
         width += 1
-    nx, ny = (max(size // width, 2) for size in pixels)
+    # whole blocks of the coarsest level, so that the middle of every block is that of a finer one
+    nx, ny = (max(round(size / width / _STRIDES[0]), 1) * _STRIDES[0] for size in pixels)
     x, y = _spread(*bounds[:2], nx, log[0]), _spread(*bounds[2:], ny, log[1])
     return Window(system, integration, names, x, y, bounds, log, key)
 
@@ -136,7 +134,7 @@ def planned(
 def _blocks(size: int, stride: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """First cells of the blocks along an axis, and the cells of their points."""
     first = np.arange(0, size, stride)
-    return first, np.minimum(first + stride // 2, size - 1)
+    return first, first + stride // 2
 
 
 def compute(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], None]) -> Window:
@@ -190,11 +188,7 @@ def compute(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], N
 def _known(window: Window, row: int, column: int) -> bool:
     """Whether the run of this very cell has been made: it is the point of a coarser block."""
     stride = int(window.stride[row, column])
-    return bool(
-        stride
-        and _middle(row, stride, window.y.size) == row
-        and _middle(column, stride, window.x.size) == column
-    )
+    return bool(stride and _middle(row, stride) == row and _middle(column, stride) == column)
 
 
 def _structure_order(
