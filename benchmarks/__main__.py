@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from benchmarks import ensemble, levels, requests, scaling, tried, work_precision
+from benchmarks import ensemble, explorer, levels, requests, scaling, tried, work_precision
 from benchmarks.peers import PEERS, methods
 
 _PARTS = {
@@ -15,6 +15,7 @@ _PARTS = {
     "requests": requests.run,
     "levels": levels.run,
     "tried": tried.run,
+    "explorer": explorer.run,
 }
 
 

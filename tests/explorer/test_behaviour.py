@@ -170,6 +170,13 @@ def test_a_map_of_a_million_points(tab, serve, system, tmp_path):
 # ---------------------------------------------------------------------- taking away
 
 
+_COMMAND = """
+import shlex, sys
+from snapbeam.cli import app
+app(shlex.split(sys.argv[1])[1:])
+"""
+
+
 def _saved(page, button, tmp_path):
     with page.page.expect_download() as waiting:
         page.page.get_by_role("button", name=button, exact=True).click()
@@ -197,7 +204,7 @@ def test_what_is_taken_away_is_what_is_shown(tab, served, small_map, folder, tmp
     lines = page.page.locator("pre.python").inner_text()
     # the command and the lines, as a person would run them
     made = subprocess.run(
-        [sys.executable, "-c", "import sys, shlex; from snapbeam.cli import app; app(shlex.split(sys.argv[1])[1:])", command],
+        [sys.executable, "-c", _COMMAND, command],
         cwd=folder, capture_output=True, text=True, env=dict(os.environ), check=False,
     )  # fmt: skip
     assert made.returncode == 0, made.stderr

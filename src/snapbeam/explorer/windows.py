@@ -155,7 +155,7 @@ def compute(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], N
             (int(a), int(b), int(i), int(j))
             for a, i in zip(row0, rows, strict=True)
             for b, j in zip(column0, columns, strict=True)
-            if not (window.stride[a, b] and int(window.stride[i, j]) == stride)
+            if not 0 < int(window.stride[a, b]) <= stride
         ]
         order = _structure_order(todo, structural)
         at = 0
