@@ -26,7 +26,8 @@ __all__ = ["measured", "run"]
 
 _STAND = """() => { const d = window.Bokeh && Bokeh.documents[0]; const m = d && d.get_model_by_name('map');
   const s = m && d.get_model_by_name('map-base');
-  return s && s.data.image.length === 1 && Bokeh.index.find_one(m) && Bokeh.index.find_one(m).frame.bbox.width > 10; }"""
+  const view = s && s.data.image.length === 1 && Bokeh.index.find_one(m);
+  return view && view.frame.bbox.width > 10; }"""
 _WATCH = """() => {
   const source = Bokeh.documents[0].get_model_by_name('waveform');
   window.shown = [];

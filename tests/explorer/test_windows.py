@@ -89,7 +89,7 @@ def test_zooming_computes_what_is_seen_and_a_click_runs_its_points(tab, served):
       p.x_range.setv({start: 1.0, end: 1.3}); p.y_range.setv({start: 0.1, end: 0.2}); }""")
     page.page.get_by_role("button", name="Compute view").click()
     page.wait(lambda: "points" in page.state() and len(page.data("map-windows", "image")) == 1, "a window")
-    page.wait(lambda: "cells of 9" in page.state() or "cells of 3" in page.state(), "finer cells")
+    page.wait(lambda: "blocks of 9" in page.state() or "blocks of 3" in page.state(), "finer cells")
     page.page.get_by_role("button", name="Stop").click()
     page.wait(lambda: "stopped" in page.state(), "the end of it")
     page.click(1.151, 0.152)

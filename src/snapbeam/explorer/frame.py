@@ -87,11 +87,11 @@ def framed(page: Page) -> Any:
             left[at].objects = [made]
 
     left.param.watch(lambda _: page.post(turned), "active")
-    page.runs[0].layout.css_classes = ["card", "right"]
+    runs = pn.FlexBox(page.runs[0].layout, margin=0, css_classes=["right"])
     page.runs[0].head.object = f'<span class="faint">{_FIRST}</span>'
     body = pn.FlexBox(
         left,
-        page.runs[0].layout,
+        runs,
         margin=0,
         sizing_mode="stretch_width",
         flex_wrap="wrap",
@@ -101,9 +101,8 @@ def framed(page: Page) -> Any:
     styled(whole, look)
 
     def add_run(view: RunView) -> None:
-        view.layout.css_classes = ["card", "right"]
         styled(view.layout, look)
-        body.append(view.layout)
+        runs.append(view.layout)
 
     page.add_run = add_run
     doc = page.doc
@@ -120,7 +119,6 @@ def framed(page: Page) -> Any:
 def page_tabs(page: Page) -> dict[str, Callable[[], Any]]:
     """The tabs beside the map, by title: what makes them."""
     found: dict[str, Callable[[], Any]] = {}
-    card = page.system_card
-    if card is not None:
-        found["System"] = lambda: card.layout
-    return found | {"Take away": lambda: page.take.layout}
+    if page.shared.system is not None:
+        found["System"] = lambda: page.system_card().layout
+    return found | {"Take away": lambda: page.take_card().layout}

@@ -467,7 +467,7 @@ class MapCard:
         left = (window.size - window.done) * window.seconds
         finest = int(window.stride[window.stride > 0].min()) if (window.stride > 0).any() else 27
         self.tell(
-            f"window: {window.done} of {window.size} points, {left:.0f} s to the finest; cells of {finest} now"
+            f"window: {window.done} of {window.size} points, {left:.0f} s to the finest; blocks of {finest} cells now"
         )
 
     def _ended(self, window: Window, token: Token, words: str) -> None:

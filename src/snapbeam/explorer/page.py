@@ -74,18 +74,30 @@ class Page:
         self.keys = ColumnDataSource({"key": [""], "count": [0]}, name="keys")
         self.keys.on_change("data", lambda _, __, data: self._key(str(data["key"][0])))
         self.changes: dict[str, Any] = {}
-        self.take = TakeCard(self)
-        self.system_card: SystemCard | None = None
-        if shared.system is not None:
-            self.system_card = SystemCard(
-                shared.system, shared.integration, self.post, self.downloads, self.look
-            )
-            self.system_card.used = self._use
+        self._take: TakeCard | None = None
+        self._system: SystemCard | None = None
         self.layout = framed(self)
         self._version = shared.source.version
         if shared.source.growing and self.doc is not None:
             self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
         self._begin()
+
+    def system_card(self) -> SystemCard:
+        """The card of the system, made when it is first needed."""
+        if self._system is None:
+            assert self.shared.system is not None
+            self._system = SystemCard(
+                self.shared.system, self.shared.integration, self.post, self.downloads, self.look
+            )
+            self._system.used = self._use
+        return self._system
+
+    def take_card(self) -> TakeCard:
+        """The card of what can be taken away, made when it is first needed."""
+        if self._take is None:
+            self._take = TakeCard(self)
+            self._take.refresh()
+        return self._take
 
     # ------------------------------------------------------------------ the page's own thread
 
@@ -126,15 +138,15 @@ class Page:
 
     def _begin(self) -> None:
         """Show what the address names, once the page stands."""
-        if self.address.changes and self.system_card is not None:
+        if self.address.changes and self.shared.system is not None:
             try:
                 of_run = {
                     key[4:]: item for key, item in self.address.changes.items() if key.startswith("run.")
                 }
                 own = {key: item for key, item in self.address.changes.items() if not key.startswith("run.")}
-                first, how = self.system_card.first
+                first, how = self.shared.system, self.shared.integration
                 check_run(first.replace(**own), how.replace(**of_run))
-                self.system_card.take(first.replace(**own), how.replace(**of_run))
+                self.system_card().take(first.replace(**own), how.replace(**of_run))
             except InputError as error:
                 self.card.say(f"address, set: {error}")
         at = dict(self.address.at)
@@ -239,7 +251,8 @@ class Page:
         view.show(run, point.words(), fresh=fresh)
         view.say("map", words, bad=not same)
         view.say("conditioning", "")
-        self.take.refresh()
+        if self._take is not None:
+            self._take.refresh()
         self._condition(which, point, run, token)
 
     def _condition(self, which: int, point: Point, run: Run, token: Token) -> None:
@@ -256,8 +269,10 @@ class Page:
 
     def _use(self, system: System, integration: Integration) -> None:
         """Compute with another system from now on, and say what is old."""
-        assert self.system_card is not None
-        self.changes = changed_parameters(self.system_card.first, (system, integration))
+        assert self.shared.system is not None
+        self.changes = changed_parameters(
+            (self.shared.system, self.shared.integration), (system, integration)
+        )
         self.card.use(system, integration, bool(self.changes))
         names = ", ".join(f"{name} = {_brief(value)}" for name, value in list(self.changes.items())[:6])
         old = f"The map is old: it is of the system before. Changed: {names}" if self.changes else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -217,7 +218,8 @@ def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) 
         window.names[0]: ("point", window.x[columns]),
         window.names[1]: ("point", window.y[rows]),
     })  # fmt: skip
-    found = sweep(window.system, table, window.integration, progress=token.check)
+    spare = max(1, (os.cpu_count() or 2) - 1)  # a run that is clicked on needs a core
+    found = sweep(window.system, table, window.integration.replace(threads=spare), progress=token.check)
     for name, item in found.data_vars.items():
         if item.dims != ("point",):
             continue

@@ -74,7 +74,7 @@ class RunView:
         for edge in ("start", "end"):
             self.cursor.range.on_change(edge, lambda attr, old, new: self._range_moved())
         self.layout = pn.Column(
-            self.head, self.note, self.tabs, sizing_mode="stretch_width", css_classes=["card"]
+            self.head, self.note, self.tabs, sizing_mode="stretch_width", css_classes=["card", "run"]
         )
         self.notes: dict[str, str] = {}
 
