@@ -18,11 +18,12 @@ import snapbeam as sb
 import snapbeam.lab as lab
 from snapbeam import paper
 from snapbeam.figures.calibration import plot_calibration
-from snapbeam.figures.compare import plot_dot_comparison, plot_waveform_comparison
+from snapbeam.figures.dot_comparison import plot_dot_comparison
 from snapbeam.figures.identification import plot_decay
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
 from snapbeam.figures.tracking import plot_frame, plot_tracking_quality
 from snapbeam.figures.vibrometer import plot_drive
+from snapbeam.figures.waveform_comparison import plot_waveform_comparison
 from snapbeam.lab.compare.dots import Dots
 
 folder = tempfile.TemporaryDirectory()
@@ -89,7 +90,7 @@ measured = lab.Measurements(
     buckling_level=0.5e-3,
 )
 calibration = lab.calibrate(measured)
-for text in (*calibration.findings, *calibration.warnings):
+for text in (*calibration.remarks, *calibration.warnings):
     print("-", text)
 figure = plot_calibration(calibration)
 
@@ -191,7 +192,7 @@ print(alignment.description, f"(truth {0.03 - 0.1:.4f} s)")
 start = drive.startup.onset + alignment.delay
 seen = lab.measure_response(tracked, drive.steady.frequency, cycles=cycles, start=start)
 print("measured: ", seen.description)
-print("simulated:", simulated.response.response.label, f"({simulated.response.crossings} crossings)")
+print("simulated:", simulated.outcome.response.label, f"({simulated.outcome.crossings} crossings)")
 
 onsets = lab.contact_onsets(tracked).onset.values
 comparison = lab.compare_waveforms(

@@ -49,7 +49,7 @@ def test_the_papers_numbers(tmp_path):
     assert 0.0008e-3 < found.standard_errors["buckling_level"] < 0.002e-3
     assert found.well_freq == pytest.approx(80.9, abs=0.02)  # the mean of 81.3 and 80.5 Hz
     assert found.start_well_freq == pytest.approx(81.853, abs=0.001)
-    told = "\n".join(found.findings)
+    told = "\n".join(found.remarks)
     assert "0.335 mm" in told and "81.85 Hz" in told and "80.90 Hz" in told
     assert "0.44 mm measured (-9.4%)" in told and "0.5 mm measured (-33.8%)" in told
     assert any("unequal wells lie outside the symmetric model" in text for text in found.warnings)

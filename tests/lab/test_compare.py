@@ -15,7 +15,8 @@ from snapbeam.cli.identify import identify
 from snapbeam.cli.vibrometer import vibrometer
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
-from snapbeam.figures.compare import plot_dot_comparison, plot_waveform_comparison
+from snapbeam.figures.dot_comparison import plot_dot_comparison
+from snapbeam.figures.waveform_comparison import plot_waveform_comparison
 from snapbeam.lab.compare.dots import Dots
 from snapbeam.lab.compare.maps import compare_dots
 from snapbeam.lab.compare.waveforms import compare_waveforms

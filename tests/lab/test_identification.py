@@ -16,7 +16,8 @@ from snapbeam.core.codes import ResponseClass, classify
 from snapbeam.core.validate import InputError
 from snapbeam.figures.identification import plot_decay
 from snapbeam.lab.compare.response import measure_response
-from snapbeam.lab.decay.identify import METHODS, compare_wells, identify_decay
+from snapbeam.lab.decay.identify import METHODS, identify_decay
+from snapbeam.lab.decay.wells import compare_wells
 from snapbeam.lab.signals.signal import make_signal
 from snapbeam.model.paper_values import BEAM
 from snapbeam.runs.schema import trajectory_dataset

@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from snapbeam import InputError
-from snapbeam.lab.camera.mraw import pack_12bit, unpack_12bit
-from snapbeam.lab.camera.photron import read_header
+from snapbeam.lab.camera.photron.header import read_header
+from snapbeam.lab.camera.photron.pixels import pack_12bit, unpack_12bit
 from snapbeam.lab.camera.recording import open_recording
 from snapbeam.lab.camera.write import write_photron, write_video
 
@@ -39,7 +39,7 @@ def test_photron_round_trip(tmp_path, suffix, depth, high):
         assert recording.exposure == pytest.approx(1e-5)
         assert recording.max_value == high
         assert recording.time[-1] == pytest.approx(4e-4)
-    with open_recording(path.with_suffix(".mraw"), pixel_size=1.0, region=(3, 11, 5, 20)) as recording:
+    with open_recording(path.with_suffix(".mraw"), pixel_size=1e-4, region=(3, 11, 5, 20)) as recording:
         np.testing.assert_array_equal(np.concatenate(list(recording.batches(2))), data[:, 3:11, 5:20])
 
 
@@ -181,7 +181,7 @@ def edit(path, old, new):
         ("<recordRate>10000<", "<recordRate>nan<", "recordInfo/recordRate"),
         ("<shutterSpeed>100000<", "<shutterSpeed>0<", "recordInfo/shutterSpeed"),
         ("<type>Mono<", "<type>Color<", "imageDataInfo/colorInfo/type"),
-        ("<fileFormat>MRaw<", "<fileFormat>Tiff<", "imageFileInfo/fileFormat"),
+        ("<fileFormat>MRaw<", "<fileFormat>Avi<", "imageFileInfo/fileFormat"),
         ("<recordRate>10000</recordRate>", "", "frame rate"),
         ("</cih>", "", "no <cih>"),
         ("</imageDataInfo>", "", "not well-formed"),
@@ -315,9 +315,9 @@ def test_header_fields_are_read_from_both_kinds(tmp_path):
     for suffix in (".cih", ".cihx"):
         path = write_photron(tmp_path / f"a{suffix}", frames(), exposure=1.25e-6, comment="run 7", **SCALES)
         header = read_header(path)
-        assert header.exposure == pytest.approx(1.25e-6)
+        assert header.timing.exposure == pytest.approx(1.25e-6)
         assert header.comment == "run 7"
-        assert header.frame_rate == pytest.approx(1e4)
+        assert header.timing.frame_rate == pytest.approx(1e4)
 
 
 def test_a_missing_library_is_named_with_its_cure(tmp_path, monkeypatch):

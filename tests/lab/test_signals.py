@@ -10,15 +10,9 @@ from hypothesis import strategies as st
 
 from snapbeam.core.validate import InputError
 from snapbeam.lab.signals.files import read_channels, read_signal, write_signal
-from snapbeam.lab.signals.signal import (
-    check_signal,
-    even_sampling,
-    from_sep5,
-    make_signal,
-    parse_sensitivity,
-    si_unit,
-    to_sep5,
-)
+from snapbeam.lab.signals.sep5 import from_sep5, to_sep5
+from snapbeam.lab.signals.signal import check_signal, even_sampling, make_signal
+from snapbeam.lab.signals.units import parse_sensitivity, si_unit
 
 KINDS = ("csv", "wav", "uff", "tdms", "h5", "npz")
 QUICK = settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)

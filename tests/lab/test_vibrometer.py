@@ -7,9 +7,10 @@ import pytest
 
 from snapbeam.core.validate import InputError
 from snapbeam.lab.drive.align import align
+from snapbeam.lab.drive.displacement import displacement_from_velocity
 from snapbeam.lab.drive.record import recorded_drive
-from snapbeam.lab.drive.vibrometer import displacement_from_velocity, measure_drive
-from snapbeam.lab.signals.signal import Samples, make_signal
+from snapbeam.lab.drive.vibrometer import measure_drive
+from snapbeam.lab.signals.signal import SignalSamples, make_signal
 from snapbeam.lab.signals.sine_fit import fit_sine, spectral_peak
 
 V, ONSET, TAU = 0.03, 0.0504, 0.015
@@ -35,7 +36,7 @@ def record(snr: float = 25.0, freq: float = 100.0, over: float = 0.3, cycles: in
 def test_sine_fit_is_exact_without_noise():
     time = 0.37 + np.arange(1500) / 1e4
     y = 0.1 + 0.03 * np.cos(2.0 * np.pi * 99.3 * time + 1.1) + 0.001 * np.cos(4.0 * np.pi * 99.3 * time)
-    fit = fit_sine(Samples(y, time, 1e4))
+    fit = fit_sine(SignalSamples(y, time, 1e4))
     assert fit.frequency == pytest.approx(99.3, rel=1e-11)
     assert fit.amplitude == pytest.approx(0.03, rel=1e-10)
     assert fit.phase == pytest.approx(1.1, abs=1e-8)
@@ -49,7 +50,7 @@ def test_standard_errors_of_the_sine_fit_cover_the_truth():
     truth = 0.1 + 0.03 * np.cos(2.0 * np.pi * 99.3 * time + 1.1)
     scores = []
     for _ in range(150):
-        fit = fit_sine(Samples(truth + 0.004 * rng.standard_normal(1500), time, 1e4), 99.0, 3)
+        fit = fit_sine(SignalSamples(truth + 0.004 * rng.standard_normal(1500), time, 1e4), 99.0, 3)
         turn = np.angle(np.exp(1j * (fit.phase - 1.1)))
         scores.append(
             [
@@ -68,7 +69,7 @@ def test_snr_and_distortion_are_told_apart():
     time = np.arange(20_000) / 2e4
     rng = np.random.default_rng(2)
     y = np.cos(2.0 * np.pi * 100.0 * time) + 0.1 * np.cos(2.0 * np.pi * 300.0 * time + 0.5)
-    fit = fit_sine(Samples(y + np.sqrt(0.5) * 0.1 * rng.standard_normal(time.size), time, 2e4))
+    fit = fit_sine(SignalSamples(y + np.sqrt(0.5) * 0.1 * rng.standard_normal(time.size), time, 2e4))
     assert fit.snr == pytest.approx(20.0, abs=0.1)
     assert fit.distortion == pytest.approx(0.1, rel=0.02)
     assert fit.sinad == pytest.approx(20.0 - 10.0 * np.log10(2.0), abs=0.1)
@@ -200,12 +201,15 @@ def test_resampling_noise_free_is_faithful():
         (lambda: measure_drive(np.zeros(5)), "DataArray"),
         (lambda: measure_drive(record()[0], 2e4), "half the sampling rate"),
         (lambda: measure_drive(record()[0], tolerance=0.7), "tolerance"),
-        (lambda: fit_sine(Samples(np.cos(np.arange(100) * 0.06), np.arange(100) / 1e4, 1e4), 95.0), "2"),
+        (
+            lambda: fit_sine(SignalSamples(np.cos(np.arange(100) * 0.06), np.arange(100) / 1e4, 1e4), 95.0),
+            "2",
+        ),
         (lambda: recorded_drive(record()[0], 1500.0), "sampling_freq"),
         (lambda: recorded_drive(record()[0], 1e5, bandwidth=110.0), "bandwidth"),
         (lambda: align(record()[0], record()[0]), "units 'm/s'"),
         (lambda: align(record()[0], record()[0], polarity=0), "polarity"),
-        (lambda: spectral_peak(Samples(np.ones(100), np.arange(100.0), 1.0)), "no oscillation"),
+        (lambda: spectral_peak(SignalSamples(np.ones(100), np.arange(100.0), 1.0)), "no oscillation"),
     ],
 )
 def test_refusals(make, word):

@@ -7,7 +7,9 @@ from typing import Annotated
 import typer
 
 from snapbeam.cli.calibrate import calibrate
+from snapbeam.cli.campaign import campaign
 from snapbeam.cli.compare import compare
+from snapbeam.cli.draw import draw
 from snapbeam.cli.explore import explore
 from snapbeam.cli.frequencies import frequencies
 from snapbeam.cli.identify import identify
@@ -38,12 +40,14 @@ app.command("simulate")(simulate)
 app.command("frequencies")(frequencies)
 app.command("plot")(plot)
 app.command("explore")(explore)
+app.command("draw")(draw)
 app.command("paper")(paper)
 app.command("track")(track)
 app.command("vibrometer")(vibrometer)
 app.command("identify")(identify)
 app.command("calibrate")(calibrate)
 app.command("compare")(compare)
+app.command("campaign")(campaign)
 app.command("info")(info)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,6 +11,10 @@ from snapbeam.cli import lab
 from snapbeam.cli import options as opt
 from snapbeam.cli.console import door, file_line, out
 from snapbeam.cli.parameter_options import configured
+
+if TYPE_CHECKING:
+    from snapbeam.core.findings import Finding
+    from snapbeam.lab.calibration.measurements import ContactTest
 
 __all__ = ["calibrate"]
 
@@ -31,8 +35,10 @@ def calibrate(
     straight: Annotated[
         str | None, _list_option("Natural frequencies without load, Hz.")
     ] = None,
-    lower_well: Annotated[str | None, _list_option("About the lower well, Hz.")] = None,
-    upper_well: Annotated[str | None, _list_option("About the upper well, Hz.")] = None,
+    lower_well: Annotated[
+        str | None, _list_option("About the lower well, Hz; 81.3s or 159a says symmetric or antisymmetric.")
+    ] = None,
+    upper_well: Annotated[str | None, _list_option("About the upper well, Hz, likewise.")] = None,
     damping: Annotated[str | None, _list_option("Damping ratios from free decays.")] = None,
     frequency_se: Annotated[
         float | None, opt.number_option("Standard error of these frequencies, Hz (0.5 %).", _MEASURED)
@@ -42,6 +48,16 @@ def calibrate(
     ] = None,
     measured_buckling_level: Annotated[
         float | None, opt.number_option("Buckling level by gauge, m, to compare with.", _MEASURED)
+    ] = None,
+    impacts: Annotated[
+        Path | None,
+        typer.Option(
+            help="NetCDF file of tracked impacts on a heavy body, for the contact stiffness.", metavar="FILE",
+            rich_help_panel=_MEASURED,
+        ),
+    ] = None,
+    effective_mass: Annotated[
+        float | None, opt.number_option("1/(1/m1 + 1/m2) of the two bodies of --impacts, kg.", _MEASURED)
     ] = None,
     config: Annotated[
         Path | None,
@@ -64,7 +80,8 @@ def calibrate(
         ),
     ] = None,
     plot: opt.Plot = None,
-    report: lab.Report = None,
+    report: lab.JsonFile = None,
+    strict: lab.Strict = False,
 ) -> None:  # fmt: skip
     """Fit thickness and buckling level to measured natural frequencies, and say what the data leave open.
 
@@ -78,11 +95,12 @@ def calibrate(
 
     from snapbeam.config import config_from_mapping, override
     from snapbeam.core.files import check_writable
+    from snapbeam.core.findings import refuse
     from snapbeam.core.validate import InputError
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
     from snapbeam.lab.calibration.calibrate import Measurements, load_measurements
     from snapbeam.lab.calibration.calibrate import calibrate as fit_beam
-    from snapbeam.lab.calibration.report import with_error
+    from snapbeam.lab.calibration.wording import with_error
 
     for name, path, suffixes in (
         ("output", output, (".toml",)), ("plot", plot, FIGURE_SUFFIXES), ("json", report, (".json",)),
@@ -101,11 +119,24 @@ def calibrate(
         ("damping_ratio", damping),
     ):  # fmt: skip
         if text is not None:
+            text, shapes = _shapes(text)
+            if shapes and not name.endswith("well_freq"):
+                raise InputError(f"{name} = {text!r}: only frequencies about a well carry a shape, s or a")
+            if shapes:
+                given[name.replace("_freq", "_shape")] = shapes
             given[name] = lab.numbers(name, text)
             given[f"{name}_se"] = frequency_se if "freq" in name else None
     for name, value in (("thickness", measured_thickness), ("buckling_level", measured_buckling_level)):
         if value is not None:
             given[name] = value
+    told: tuple[Finding, ...] = ()
+    if impacts is not None:
+        if effective_mass is None:
+            raise InputError(
+                "effective_mass (--effective-mass): must be given with impacts (--impacts), in kg"
+            )
+        tests, told = _contact_tests(impacts, effective_mass)
+        given["contact"] = (*given.get("contact", ()), *tests)
     if not given:
         raise InputError("measurements: give a TOML file, or frequencies as options; see --help")
     beam = settings.model.beam
@@ -118,8 +149,8 @@ def calibrate(
     if result.damping_ratio is not None:
         console.print(f"  {'damping_ratio':<20}{result.damping_ratio:.5g} +- {result.damping_ratio_se:.2g}")
     if result.contact_stiffness is not None:
-        told = f"{result.contact_stiffness:.4g} +- {result.contact_stiffness_se:.2g} N/m^1.5"
-        console.print(f"  {'contact stiffness':<20}{told}")
+        words = f"{result.contact_stiffness:.4g} +- {result.contact_stiffness_se:.2g} N/m^1.5"
+        console.print(f"  {'contact stiffness':<20}{words}")
     table = Table(box=None, pad_edge=False)
     for title in ("", "measured (Hz)", "model (Hz)", "difference (standard errors)"):
         table.add_column(title, justify="right" if title else "left")
@@ -127,10 +158,12 @@ def calibrate(
         measured = f"{item.measured:.4g} +- {item.standard_error:.2g}"
         table.add_row(item.name, measured, f"{item.model:.3f}", f"{item.deviation:+.2f}")
     console.print(table)
-    for text in result.findings:
+    for text in result.remarks:
         console.print(f"- {text}")
-    for text in result.warnings:
-        console.print(f"[yellow]beware:[/] {text}")
+    findings = (*told, *result.findings)
+    lab.tell_findings(console, findings)
+    if strict:
+        refuse(findings, "calibration")
     if output is not None:
         result.write_config(output)
         console.print(f"Written: {file_line(output)}")
@@ -140,5 +173,42 @@ def calibrate(
         save_figure(plot_calibration(result), plot)
         console.print(f"Written: {file_line(plot)}")
     if report is not None:
-        lab.write_report(report, result.summary())
+        lab.write_json(report, result.summary())
         console.print(f"Written: {file_line(report)}")
+
+
+def _shapes(text: str) -> tuple[str, tuple[str, ...]]:
+    """Numbers without the letters behind them, and the shapes that these say: ``159a,165s``."""
+    words = {"s": "symmetric", "a": "antisymmetric"}
+    parts = [part.strip() for part in text.split(",")]
+    if not any(part[-1:] in words for part in parts):
+        return text, ()
+    return ",".join(part[:-1] if part[-1:] in words else part for part in parts), tuple(
+        words.get(part[-1:], part) for part in parts
+    )
+
+
+def _contact_tests(path: Path, effective_mass: float) -> tuple[tuple[ContactTest, ...], tuple[Finding, ...]]:
+    """The contact stiffness of tracked impacts as one test, and what is to be said of it."""
+    from snapbeam.cli.results import open_result
+    from snapbeam.core.validate import InputError
+    from snapbeam.lab.calibration.impacts import stiffness_from_impacts
+    from snapbeam.lab.calibration.measurements import HERTZ_TIME, ContactTest
+    from snapbeam.lab.tracking.onsets import contact_onsets
+
+    found = stiffness_from_impacts(contact_onsets(open_result(path)), effective_mass)
+    out().print(
+        f"  impacts             {found.impacts}, duration with speed to the power {found.exponent:+.2f} +- "
+        f"{found.exponent_se:.2f}: {found.stiffness:.3g} +- {found.stiffness_se:.1g} N/m^1.5"
+    )
+    if any(one.code == "contact.exponent" for one in found.findings):
+        raise InputError(f"{path}: {found.findings[0].words}")
+    # one collision at 1 m/s that stands for all
+    duration = HERTZ_TIME * (1.25 * effective_mass / found.stiffness) ** 0.4
+    share = (
+        found.stiffness_se / found.stiffness / 2.69
+    )  # a test's error of both its numbers gives 2.69 times itself
+    test = ContactTest(
+        closing_speed=1.0, duration=duration, effective_mass=effective_mass, relative_error=max(share, 1e-6)
+    )
+    return (test,), found.findings

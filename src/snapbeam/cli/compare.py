@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from snapbeam.core.findings import Finding
+
 __all__ = ["compare"]
 
 _RUN = "Measured run"
@@ -40,7 +42,16 @@ def compare(
     ] = 200,
     window: opt.Window = None,
     plot: opt.Plot = None,
-    report: lab.Report = None,
+    overlay: Annotated[
+        bool,
+        typer.Option(
+            "--overlay",
+            help="Draw both waveforms of --plot over each other, and their difference.",
+            rich_help_panel="Output",
+        ),
+    ] = False,
+    report: lab.JsonFile = None,
+    strict: lab.Strict = False,
 ) -> None:
     """Compare measured responses with a simulated map, or a measured waveform with a simulated one.
 
@@ -50,6 +61,7 @@ def compare(
     Example: snapbeam compare tests.csv map.nc --plot agreement.png
     """
     from snapbeam.core.files import check_writable
+    from snapbeam.core.findings import refuse
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
 
     if plot is not None:
@@ -59,22 +71,25 @@ def compare(
     dataset = open_result(simulated)
     if measured.suffix.lower() == ".csv":
         summary, figure = _dots(measured, dataset, plot is not None)
+        findings: tuple[Finding, ...] = ()
     else:
-        summary, figure = _run(
+        summary, figure, findings = _run(
             open_result(measured),
             dataset,
             frequency,
             start,
             cycles,
             opt.parse_window(window),
-            plot is not None,
+            ("overlay" if overlay else "beside") if plot is not None else "",
         )
     console = out()
     if plot is not None and figure is not None:
         save_figure(figure, plot)
         console.print(f"Written: {file_line(plot)}")
+    if strict:
+        refuse(findings, str(measured))
     if report is not None:
-        lab.write_report(report, summary)
+        lab.write_json(report, summary)
         console.print(f"Written: {file_line(report)}")
 
 
@@ -110,7 +125,7 @@ def _dots(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | N
         console.print(f"[yellow]note[/] {note}")
     figure = None
     if draw:
-        from snapbeam.figures.compare import plot_dot_comparison
+        from snapbeam.figures.dot_comparison import plot_dot_comparison
 
         figure = plot_dot_comparison(dataset, dots, result)
     return result.summary(), figure
@@ -127,8 +142,11 @@ def _run(
     start: float | None,
     cycles: int,
     window: tuple[float, float] | None,
-    draw: bool,
-) -> tuple[dict, Figure | None]:
+    draw: str,
+) -> tuple[dict, Figure | None, tuple[Finding, ...]]:
+    import numpy as np
+
+    from snapbeam.core.findings import findings_of
     from snapbeam.lab.compare.response import measure_response
     from snapbeam.lab.compare.waveforms import compare_waveforms
 
@@ -149,6 +167,10 @@ def _run(
         f"  shaker              rms difference {result.shaker_rms_difference:.4g} b, amplitude ratio "
         f"{result.amplitude_ratio:.4f}"
     )
+    parted = "never" if np.isnan(result.parted) else f"at cycle {result.parted:.2f}"
+    console.print(f"  the two part        {parted} (by more than {result.apart:.2g} b)")
+    findings = (*findings_of(run), *result.findings)
+    lab.tell_findings(console, findings)
     summary = {
         "measured_response": seen.response.label,
         "measured_crossings": seen.crossings,
@@ -158,10 +180,12 @@ def _run(
         "shaker_rms_difference_b": result.shaker_rms_difference,
         "amplitude_ratio": result.amplitude_ratio,
         "shift_cycles": result.shift,
+        "parted_cycle": result.parted,
+        "findings": [one.plain() for one in findings],
     }
     figure = None
     if draw:
-        from snapbeam.figures.compare import plot_waveform_comparison
+        from snapbeam.figures.waveform_comparison import plot_waveform_comparison, plot_waveform_overlay
 
-        figure = plot_waveform_comparison(result, window)
-    return summary, figure
+        figure = (plot_waveform_overlay if draw == "overlay" else plot_waveform_comparison)(result, window)
+    return summary, figure, findings

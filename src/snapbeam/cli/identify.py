@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -40,12 +41,30 @@ def identify(
         float | None,
         opt.number_option("b, m: hold the softening near that of one mode, 0.75 (a/b)^2.", _DECAY),
     ] = None,
+    mirror_channel: Annotated[
+        str | None,
+        typer.Option(
+            help="Channel of a second sensor at the mirror place: tells symmetric modes from antisymmetric ones.",
+            metavar="NAME",
+            rich_help_panel=_DECAY,
+        ),
+    ] = None,
     channel: lab.Channel = None,
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
     sampling_freq: lab.SamplingFreq = None,
+    columns: lab.Columns = None,
     plot: opt.Plot = None,
-    report: lab.Report = None,
+    stabilisation: Annotated[
+        Path | None,
+        typer.Option(
+            help="Picture of the stabilisation diagram from which modes were read.",
+            metavar="FILE",
+            rich_help_panel="Output",
+        ),
+    ] = None,
+    report: lab.JsonFile = None,
+    strict: lab.Strict = False,
 ) -> None:
     """Identify natural frequency, damping ratio and softening from a free decay, with standard errors.
 
@@ -56,16 +75,19 @@ def identify(
     from rich.table import Table
 
     from snapbeam.core.files import check_writable
+    from snapbeam.core.findings import refuse
     from snapbeam.core.validate import choice
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
     from snapbeam.lab.decay.identify import METHODS, identify_decay
+    from snapbeam.lab.decay.shapes import mode_shapes
 
-    if plot is not None:
-        check_writable(plot, "plot", FIGURE_SUFFIXES)
+    for name, path in (("plot", plot), ("stabilisation", stabilisation)):
+        if path is not None:
+            check_writable(path, name, FIGURE_SUFFIXES)
     if report is not None:
         check_writable(report, "json", (".json",))
     choice("method", method, (*METHODS, "all"))
-    data = lab.open_signal(signal, channel, units, sensitivity, sampling_freq)
+    data = lab.open_signal(signal, channel, units, sensitivity, sampling_freq, columns)
     rough = lab.numbers("frequencies", frequencies) or None
     fits = {
         name: identify_decay(
@@ -94,13 +116,31 @@ def identify(
             )
     console.print(table)
     console.print("softening: relative fall of the first frequency at the starting amplitude")
-    for note in dict.fromkeys(note for fit in fits.values() for note in fit.notes):
-        console.print(f"[yellow]note[/] {note}")
+    for mode in first.modes[:1]:
+        if mode.law != "viscous":
+            strength = f"{mode.law_strength:.3f} +- {mode.law_strength_se:.3f}"
+            console.print(f"damping: viscous and {mode.law}, {strength} times as strong at the start")
+    if mirror_channel is not None:
+        second = lab.open_signal(signal, mirror_channel, units, sensitivity, sampling_freq, columns)
+        shapes = mode_shapes(data, second, first)
+        told = ", ".join(
+            f"{mode.natural_freq:.4g} Hz {kind}" for mode, kind in zip(first.modes, shapes, strict=True)
+        )
+        console.print(f"shapes: {told}")
+    findings = tuple({one.code: one for fit in fits.values() for one in fit.findings}.values())
+    lab.tell_findings(console, findings)
     if plot is not None:
         from snapbeam.figures.identification import plot_decay
 
         save_figure(plot_decay(data, first), plot)
         console.print(f"Written: {file_line(plot)}")
+    if stabilisation is not None:
+        from snapbeam.figures.identification import plot_stabilisation
+
+        save_figure(plot_stabilisation(data, first), stabilisation)
+        console.print(f"Written: {file_line(stabilisation)}")
+    if strict:
+        refuse(findings, str(signal))
     if report is not None:
-        lab.write_report(report, {name: fit.summary() for name, fit in fits.items()})
+        lab.write_json(report, {name: fit.summary() for name, fit in fits.items()})
         console.print(f"Written: {file_line(report)}")

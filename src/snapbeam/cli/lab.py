@@ -1,22 +1,26 @@
-"""What the laboratory commands share: the options of a signal file, and reports as JSON."""
+"""What the laboratory commands share: the options of a signal file, findings, and figures as JSON."""
 
 from __future__ import annotations
 
-import json
-import math
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.console import Console
+from rich.markup import escape
 
 from snapbeam.cli import options as opt
+from snapbeam.cli.console import write_json
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from snapbeam.core.findings import Finding
+
 __all__ = [
-    "Channel", "Report", "SamplingFreq", "Sensitivity", "SignalFile", "Units", "numbers", "open_signal",
-    "write_report",
+    "Channel", "Columns", "JsonFile", "SamplingFreq", "Sensitivity", "SignalFile", "Strict", "Units", "numbers",
+    "open_signal", "tell_findings", "whole_numbers", "write_json",
 ]  # fmt: skip
 
 _SIGNAL = "Signal"
@@ -24,7 +28,10 @@ _OUTPUT = "Output"
 
 SignalFile = Annotated[
     Path,
-    typer.Argument(help="CSV, WAV, UFF-58, TDMS, HDF5 or NumPy file of a time series.", metavar="SIGNAL"),
+    typer.Argument(
+        help="Text table, WAV, UFF-58, TDMS, LVM, MATLAB, HDF5 or NumPy file of a time series.",
+        metavar="SIGNAL",
+    ),
 ]
 Channel = Annotated[
     str | None,
@@ -39,7 +46,7 @@ Units = Annotated[
 Sensitivity = Annotated[
     str | None,
     typer.Option(
-        help="What a volt, or full scale (FS) of a sound file, stands for: '125 mm/s/V', '0.5 m/s/FS'.",
+        help="What a volt, or full scale (FS) of a sound file, stands for: '125 mm/s/V', '100 mV/g', '0.5 m/s/FS'.",
         rich_help_panel=_SIGNAL,
     ),
 ]
@@ -47,25 +54,74 @@ SamplingFreq = Annotated[
     float | None,
     opt.number_option("Samples per second, Hz, where the file does not say.", _SIGNAL),
 ]
-Report = Annotated[
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        help="Names and units of the columns of a table without a header: 'time [s],velocity [mm/s]'.",
+        rich_help_panel=_SIGNAL,
+        metavar="NAME [UNIT],...",
+    ),
+]
+Strict = Annotated[
+    bool,
+    typer.Option(
+        "--strict",
+        help="Refuse a result with any finding that makes it doubtful; write none.",
+        rich_help_panel=_OUTPUT,
+    ),
+]
+JsonFile = Annotated[
     Path | None,
     typer.Option(
-        "--json", help="JSON file of the figures to write.", rich_help_panel=_OUTPUT, metavar="FILE"
+        "--json",
+        help="JSON file of the figures to write; - for standard output, in place of the words.",
+        rich_help_panel=_OUTPUT,
+        metavar="FILE",
     ),
 ]
 
 
 def open_signal(
-    path: Path, channel: str | None, units: str | None, sensitivity: str | None, sampling_freq: float | None
+    path: Path,
+    channel: str | None,
+    units: str | None,
+    sensitivity: str | None,
+    sampling_freq: float | None,
+    columns: str | None = None,
 ) -> xr.DataArray:
     """Read a signal; a channel given as a whole number is counted, unless one has that name."""
     from snapbeam.lab.signals.files import read_channels, read_signal
 
     chosen: str | int | None = channel
     if channel is not None and channel.isdigit():
-        names = [entry["name"] for entry in read_channels(path, sampling_freq)]
+        names = [entry["name"] for entry in read_channels(path, sampling_freq, columns)]
         chosen = channel if channel in names else int(channel)
-    return read_signal(path, chosen, units=units, sensitivity=sensitivity, sampling_freq=sampling_freq)
+    return read_signal(
+        path, chosen, units=units, sensitivity=sensitivity, sampling_freq=sampling_freq, columns=columns
+    )
+
+
+def tell_findings(console: Console, findings: Iterable[Finding]) -> None:
+    """Print findings, the gravest first, each with its code."""
+    order = {"wrong": 0, "doubt": 1, "note": 2}
+    style = {"wrong": "bold red", "doubt": "yellow", "note": "dim"}
+    for one in sorted(findings, key=lambda finding: order[finding.severity.value]):
+        kind = one.severity.value
+        console.print(f"[{style[kind]}]{kind}[/] {escape(f'[{one.code}]')} {escape(one.words)}")
+
+
+def whole_numbers(name: str, text: str, count: int) -> tuple[int, ...]:
+    """Return *count* whole numbers separated by colons and commas, such as ``0:160,20:84``."""
+    from snapbeam.core.validate import InputError
+
+    try:
+        values = tuple(int(part) for part in text.replace(":", ",").split(","))
+    except ValueError:
+        values = ()
+    if len(values) != count:
+        example = ("0", "0:20", "", "0:160,20:84")[count - 1] if count <= 4 else ""
+        raise InputError(f"{name} = {text!r}: must be {count} whole numbers, such as {example}")
+    return values
 
 
 def numbers(name: str, text: str | None) -> tuple[float, ...]:
@@ -78,23 +134,3 @@ def numbers(name: str, text: str | None) -> tuple[float, ...]:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise InputError(f"{name} = {text!r}: must be numbers separated by commas") from None
-
-
-def write_report(path: Path, summary: dict[str, Any]) -> None:
-    """Write plain numbers and words to a JSON file, whole or not at all; what is not finite becomes null."""
-    from snapbeam.core.files import atomic_path, check_writable
-
-    target = check_writable(path, "json", (".json",))
-    with atomic_path(target) as temporary:
-        text = json.dumps(_plain(summary), indent=2, ensure_ascii=False, allow_nan=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value

@@ -54,19 +54,16 @@ def read_overlay(dots: Path | None, reference_freq: float | None, buckling_level
 
 def write_map(dataset: xr.Dataset, path: Path) -> Path:
     """Write a dataset to a NetCDF file, whole or not at all."""
-    from snapbeam.core.files import atomic_path
+    from snapbeam.core.netcdf import write_netcdf
 
-    with atomic_path(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
+    write_netcdf(dataset, path)
     return path
 
 
 def _save(drawn: Any, path: Path) -> Path:
     from snapbeam.figures import save_figure
 
-    figure = drawn.get_figure(root=True) if hasattr(drawn, "get_figure") else drawn
-    assert figure is not None
-    return save_figure(figure, path)
+    return save_figure(drawn, path)
 
 
 def draw_map(dataset: xr.Dataset, path: Path, overlay: Any, threshold_line: bool) -> Path:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from snapbeam.cli import lab
 from snapbeam.cli.console import door, duration, file_line, out, progress
+
+if TYPE_CHECKING:
+    from snapbeam.lab.camera.recording import Recording
 
 __all__ = ["track"]
 
@@ -17,26 +21,12 @@ _SCENE = "Scene"
 _OUTPUT = "Output"
 
 
-def _numbers(name: str, text: str | None, count: int) -> tuple[int, ...] | None:
-    from snapbeam.core.validate import InputError
-
-    if text is None:
-        return None
-    try:
-        values = tuple(int(part) for part in text.replace(":", ",").split(","))
-    except ValueError:
-        values = ()
-    if len(values) != count:
-        raise InputError(f"{name} = {text!r}: must be {count} whole numbers, such as 0:160,20:84")
-    return values
-
-
 @door
 def track(
     recording: Annotated[
         Path,
         typer.Argument(
-            help="Photron .cih/.cihx, .avi, .mp4, .mov, a TIFF stack, or a folder of numbered images.",
+            help="Photron .cih/.cihx, .cine, .avi, .mp4, .mov, TIFF, .npy, .h5, or a folder of numbered images.",
             metavar="RECORDING",
         ),
     ],
@@ -78,6 +68,66 @@ def track(
     shaker: Annotated[
         bool, typer.Option("--shaker/--no-shaker", help="Follow the shaker too.", rich_help_panel=_SCENE)
     ] = True,
+    marker: Annotated[
+        bool,
+        typer.Option(
+            "--marker/--no-marker", help="Look for a sticker on the shaker.", rich_help_panel=_SCENE
+        ),
+    ] = True,
+    tip_distance: Annotated[
+        float | None,
+        typer.Option(help="From the shaker's tip to the sticker's nearer edge, m.", rich_help_panel=_SCENE),
+    ] = None,
+    beam_thickness: Annotated[
+        float | None,
+        typer.Option(help="Thickness of the beam by gauge, m, to check by.", rich_help_panel=_SCENE),
+    ] = None,
+    columns: Annotated[
+        int, typer.Option(help="Columns to fit the beam's edge in.", rich_help_panel=_SCENE)
+    ] = 24,
+    blur_limit: Annotated[
+        float | None,
+        typer.Option(
+            help="Edge width, px, from which a frame is flagged as blurred.", rich_help_panel=_SCENE
+        ),
+    ] = None,
+    gamma: Annotated[
+        float,
+        typer.Option(help="Exponent of grey level over light, to undo.", rich_help_panel=_CAMERA),
+    ] = 1.0,
+    background: Annotated[
+        Path | None,
+        typer.Option(
+            help="Image of the scene without beam and shaker, to subtract.",
+            metavar="FILE",
+            rich_help_panel=_CAMERA,
+        ),
+    ] = None,
+    fixed_mark: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Part of the region that shows something that stands still; the camera's drift against it is "
+            "taken out. May be repeated.",
+            metavar="ROW:ROW,COLUMN:COLUMN",
+            rich_help_panel=_CAMERA,
+        ),
+    ] = None,
+    scale_marks: Annotated[
+        str | None,
+        typer.Option(
+            help="Pixel size from two marks a known distance apart, m: ROW,COLUMN:ROW,COLUMN=0.010.",
+            metavar="MARKS",
+            rich_help_panel=_CAMERA,
+        ),
+    ] = None,
+    rest_frames: Annotated[
+        str | None,
+        typer.Option(
+            help="Frames at rest: how many at the start, or FIRST:LAST+1; negative from the end.",
+            metavar="N or A:B",
+            rich_help_panel=_SCENE,
+        ),
+    ] = None,
     buckling_level: Annotated[
         float | None,
         typer.Option(help="b, m, to normalise by; millimetres only by default.", rich_help_panel=_SCENE),
@@ -114,17 +164,19 @@ def track(
     video_every: Annotated[
         int, typer.Option(help="Show every so many-th frame in --video.", rich_help_panel=_OUTPUT)
     ] = 1,
+    strict: lab.Strict = False,
 ) -> None:
     """Measure the displacement of beam and shaker in every frame of a high-speed recording.
 
     Finds the beam, the shaker and a sticker on it, fits their edges to a fraction of a pixel, and writes the
     displacements with standard errors and flags to a NetCDF file.  What could not be measured is flagged and
-    left out, never filled in.
+    left out, never filled in.  What makes the result doubtful is said, and under --strict refused.
 
     Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
     frame.png --report quality.png
     """
-    from snapbeam.core.files import atomic_path, check_writable
+    from snapbeam.core.files import check_writable
+    from snapbeam.core.netcdf import write_netcdf
     from snapbeam.core.validate import integer
 
     check_writable(output, "output", (".nc",))
@@ -138,37 +190,29 @@ def track(
         check_writable(video, "video", (".mp4", ".mov", ".avi"))
     integer("frame", frame, 0)
     integer("video_every", video_every, 1)
-    from snapbeam.lab.camera.recording import open_recording
+    from snapbeam.core.findings import findings_of, refuse
     from snapbeam.lab.tracking.quality import tracking_report
+    from snapbeam.lab.tracking.settings import TrackingSettings
     from snapbeam.lab.tracking.track import track as track_recording
 
-    part = _numbers("region", region, 4)
+    settings = TrackingSettings(
+        buckling_level=buckling_level, location=location, rest_displacement=rest_displacement,
+        rest_frames=_rest(rest_frames), beam_thickness=beam_thickness, side=side, objects=objects,
+        threshold=threshold, gamma=gamma, shaker=shaker, marker=marker, tip_distance=tip_distance, columns=columns,
+        contact_column=contact_column, blur_limit=blur_limit,
+        fixed_marks=[lab.whole_numbers("fixed_mark", text, 4) for text in fixed_mark or ()],  # type: ignore[misc]
+    )  # fmt: skip
+    part = None if region is None else lab.whole_numbers("region", region, 4)
     start = time.monotonic()
-    with open_recording(
-        recording,
-        frame_rate=frame_rate,
-        pixel_size=pixel_size,
-        region=None if part is None else (part[0], part[1], part[2], part[3]),
-    ) as opened:
+    with _opened(recording, frame_rate, pixel_size, part, scale_marks) as opened:
         if picture is not None:
             integer("frame", frame, 0, len(opened) - 1)
+        if background is not None:
+            settings = settings.changed(background=_picture(background, opened))
         with progress(len(opened), "track", "frames") as tell:
-            dataset = track_recording(
-                opened,
-                buckling_level=buckling_level,
-                location=location,
-                rest_displacement=rest_displacement,
-                side=side,
-                objects=objects,
-                threshold=threshold,
-                shaker=shaker,
-                contact_column=contact_column,
-                progress=tell,
-            )
+            dataset = track_recording(opened, settings, progress=tell)
         elapsed = time.monotonic() - start
-        with atomic_path(output) as temporary:
-            dataset.to_netcdf(temporary, engine="h5netcdf")
-        files = [output]
+        files = []
         if picture is not None or report is not None:
             import matplotlib
 
@@ -180,13 +224,77 @@ def track(
                 files.append(save_figure(plot_frame(opened, dataset, frame), picture))
             if report is not None:
                 files.append(save_figure(plot_tracking_quality(dataset), report))
+        if strict:  # the pictures show what is wrong; the result is not written
+            refuse(findings_of(dataset), str(recording))
+        write_netcdf(dataset, output)
+        files.insert(0, output)
         if video is not None:
             from snapbeam.figures.tracking_video import annotated_video
 
             with progress(len(opened), "video", "frames") as tell:
                 files.append(annotated_video(opened, dataset, video, every=video_every, progress=tell))
     console = out()
-    console.print(tracking_report(dataset), markup=False)
+    console.print(tracking_report(dataset, findings=False), markup=False)
+    lab.tell_findings(console, findings_of(dataset))
     console.print(f"{len(opened) / elapsed:.0f} frames/s, {duration(elapsed)}")
     for path in files:
         console.print(f"wrote {file_line(path)}")
+
+
+def _rest(text: str | None) -> int | tuple[int, int] | None:
+    """Frames at rest from "20" or "-40:0"."""
+    if text is None:
+        return None
+    if ":" in text:
+        first, last = lab.whole_numbers("rest_frames", text, 2)
+        return first, last
+    return lab.whole_numbers("rest_frames", text, 1)[0]
+
+
+def _opened(
+    path: Path,
+    frame_rate: float | None,
+    pixel_size: float | None,
+    region: tuple[int, ...] | None,
+    scale_marks: str | None,
+) -> Recording:
+    """Open a recording, its pixel size taken from two marks if they are given."""
+    from snapbeam.core.validate import InputError
+    from snapbeam.lab.camera.marks import pixel_size_from_marks
+    from snapbeam.lab.camera.recording import open_recording
+
+    part = None if region is None else (region[0], region[1], region[2], region[3])
+    if scale_marks is None:
+        return open_recording(path, frame_rate=frame_rate, pixel_size=pixel_size, region=part)
+    if pixel_size is not None:
+        raise InputError("pixel_size (--pixel-size) and scale_marks (--scale-marks): must be given only one")
+    try:
+        marks, length = scale_marks.split("=")
+        first, second = (tuple(float(v) for v in mark.split(",")) for mark in marks.split(":"))
+        distance = float(length)
+        if len(first) != 2 or len(second) != 2:
+            raise ValueError
+    except ValueError:
+        raise InputError(
+            f"scale_marks = {scale_marks!r}: must read ROW,COLUMN:ROW,COLUMN=METRES, such as 10,20:10,420=0.010"
+        ) from None
+    with open_recording(path, frame_rate=frame_rate, pixel_size=1e-6, region=part) as once:
+        size, error = pixel_size_from_marks(once, (first[0], first[1]), (second[0], second[1]), distance)
+    out().print(f"pixel size {size * 1e6:.4f} +- {error * 1e6:.4f} um from the marks")
+    return open_recording(path, frame_rate=frame_rate, pixel_size=size, region=part)
+
+
+def _picture(path: Path, recording: Recording) -> Any:
+    """A picture of the empty scene, cut to the region of a recording."""
+    from snapbeam.core.validate import InputError
+    from snapbeam.lab.camera.sources.images import load_image
+
+    image = load_image(path)
+    top, bottom, left, right = recording.region
+    if image.shape == recording.shape:
+        return image
+    if image.shape[0] < bottom or image.shape[1] < right:
+        raise InputError(
+            f"background = {str(path)!r}: of shape {image.shape}, smaller than the recording's region"
+        )
+    return image[top:bottom, left:right]

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from snapbeam.cli import lab
 from snapbeam.cli import options as opt
 from snapbeam.cli.console import door, file_line, out
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 __all__ = ["vibrometer"]
 
@@ -30,6 +27,7 @@ def vibrometer(
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
     sampling_freq: lab.SamplingFreq = None,
+    columns: lab.Columns = None,
     camera: Annotated[
         Path | None,
         typer.Option(
@@ -37,6 +35,23 @@ def vibrometer(
             metavar="FILE", rich_help_panel="Drive",
         ),
     ] = None,
+    polarity: Annotated[
+        int | None,
+        typer.Option(
+            help="1 or -1: whether vibrometer and camera count the same direction as positive; found from the start.",
+            rich_help_panel="Drive",
+        ),
+    ] = None,
+    near: Annotated[
+        float | None,
+        opt.number_option("Delay of the camera's clock, s, known to half a cycle, as from a trigger.", "Drive"),
+    ] = None,
+    amplitude: Annotated[
+        float | None, opt.number_option("Amplitude as set, m/s (or m), to check by.", "Drive")
+    ] = None,
+    amplitude_from: Annotated[
+        str, typer.Option(help="vibrometer or camera: whose amplitude the drive has.", rich_help_panel="Drive")
+    ] = "vibrometer",
     drive_output: Annotated[
         Path | None,
         typer.Option(
@@ -48,7 +63,8 @@ def vibrometer(
         float | None, opt.number_option("Samples per second of --drive-output, Hz (100000).", "Output")
     ] = None,
     plot: opt.Plot = None,
-    report: lab.Report = None,
+    report: lab.JsonFile = None,
+    strict: lab.Strict = False,
 ) -> None:  # fmt: skip
     """Measure the shaker's motion in a vibrometer record and say whether the test is acceptable.
 
@@ -58,7 +74,9 @@ def vibrometer(
 
     Example: snapbeam vibrometer velocity.csv --frequency 100 --plot drive.png --json drive.json
     """
-    from snapbeam.core.files import atomic_path, check_writable
+    from snapbeam.core.files import check_writable
+    from snapbeam.core.findings import doubtful, refuse
+    from snapbeam.core.netcdf import write_netcdf
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
     from snapbeam.lab.drive.vibrometer import SNR_LIMIT, measure_drive
 
@@ -69,12 +87,14 @@ def vibrometer(
     ):
         if path is not None:
             check_writable(path, name, suffixes)
-    data = lab.open_signal(signal, channel, units, sensitivity, sampling_freq)
+    data = lab.open_signal(signal, channel, units, sensitivity, sampling_freq, columns)
     limit = SNR_LIMIT if snr_limit is None else snr_limit
-    drive = measure_drive(data, frequency, snr_limit=limit)
+    drive = measure_drive(data, frequency, amplitude=amplitude, snr_limit=limit)
     fit, summary = drive.steady, drive.summary()
     console = out()
     verdict = "[green]accepted[/]" if drive.accepted else "[bold red]not accepted[/]"
+    if drive.accepted and doubtful(drive.findings):
+        verdict = "[yellow]accepted, but doubtful[/]"
     console.print(f"{signal.name}: {verdict} (sine to noise and distortion above {limit:g} dB)")
     console.print(f"  frequency    {fit.frequency:.6g} +- {fit.frequency_se:.1g} Hz")
     console.print(f"  amplitude    {fit.amplitude:.6g} +- {fit.amplitude_se:.1g} {drive.units}")
@@ -84,54 +104,39 @@ def vibrometer(
         f"  distortion   {100.0 * fit.distortion:.3f} % (noise alone: {100.0 * fit.distortion_floor:.3f} %)"
     )
     console.print(f"  start-up     {summary['startup']}")
-    for note in drive.notes:
-        console.print(f"  [yellow]note[/]         {note}")
+    findings = drive.findings
+    alignment = None
     if camera is not None:
+        from snapbeam.cli.results import open_result
         from snapbeam.lab.drive.align import align
+        from snapbeam.lab.drive.seen import shaker_signal
 
-        alignment = align(_shaker_of(camera), data, frequency)
+        alignment = align(shaker_signal(open_result(camera)), data, frequency, polarity=polarity, near=near)
+        findings += alignment.findings
         summary["alignment"] = {
-            "delay_s": alignment.delay,
-            "delay_se_s": alignment.delay_se,
-            "certain": alignment.certain,
-            "polarity": alignment.polarity,
-            "gain": alignment.gain,
+            "delay_s": alignment.delay, "delay_se_s": alignment.delay_se, "certain": alignment.certain,
+            "polarity": alignment.polarity, "gain": alignment.gain, "gain_se": alignment.gain_se,
             "clock_difference": alignment.clock_difference,
-        }
+            "findings": [one.plain() for one in alignment.findings],
+        }  # fmt: skip
         console.print(f"  alignment    {alignment.description}")
-    if drive_output is not None:
-        from snapbeam.lab.drive.record import recorded_drive
-
-        resampled = recorded_drive(data, drive_sampling_freq or 1e5, measurement=drive)
-        with atomic_path(drive_output) as temporary:
-            resampled.to_netcdf(temporary, engine="h5netcdf")
-        console.print(f"Written: {file_line(drive_output)}")
+    lab.tell_findings(console, findings)
     if plot is not None:
         from snapbeam.figures.vibrometer import plot_drive
 
         save_figure(plot_drive(data, drive), plot)
         console.print(f"Written: {file_line(plot)}")
+    if strict:
+        refuse(findings, str(signal))
+    if drive_output is not None:
+        from snapbeam.lab.drive.record import recorded_drive
+
+        resampled = recorded_drive(
+            data, drive_sampling_freq or 1e5, measurement=drive, alignment=alignment, polarity=polarity,
+            amplitude_from=amplitude_from,
+        )  # fmt: skip
+        write_netcdf(resampled, drive_output)
+        console.print(f"Written: {file_line(drive_output)}")
     if report is not None:
-        lab.write_report(report, summary)
+        lab.write_json(report, summary)
         console.print(f"Written: {file_line(report)}")
-
-
-def _shaker_of(path: Path) -> xr.DataArray:
-    """The shaker's displacement [m] in a tracked recording, over its longest stretch without dropouts."""
-    import numpy as np
-
-    from snapbeam.cli.results import open_result
-    from snapbeam.core.validate import InputError
-    from snapbeam.lab.signals.signal import make_signal
-
-    tracked = open_result(path)
-    if "shaker_displacement_mm" not in tracked or "time" not in tracked.coords:
-        raise InputError(f"{path}: has no shaker_displacement_mm over time; it must come from snapbeam track")
-    values = tracked["shaker_displacement_mm"].values
-    good = np.concatenate(([0], np.isfinite(values).astype(np.int8), [0]))
-    runs = np.flatnonzero(np.diff(good)).reshape(-1, 2)
-    if not runs.size:
-        raise InputError(f"{path}: the shaker was found in no frame")
-    first, last = runs[np.argmax(runs[:, 1] - runs[:, 0])]
-    time = tracked["time"].values[first:last]
-    return make_signal(values[first:last], "mm", time=time, name="shaker seen by the camera")

@@ -7,15 +7,27 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.lab.signals.signal import check_signal
+from snapbeam.figures.findings import draw_findings, findings_height
+from snapbeam.figures.style import (
+    BEAM_COLOR,
+    CENTER_COLOR,
+    COLUMN_WIDTHS,
+    SHAKER_COLOR,
+    fix_ticks,
+    house_style,
+    new_figure,
+)
+from snapbeam.lab.decay.cycles import noise_level
+from snapbeam.lab.decay.laws import envelope as law_envelope
+from snapbeam.lab.decay.poles import find_poles
+from snapbeam.lab.signals.signal import SignalSamples, check_signal
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from snapbeam.lab.decay.model import DecayFit
 
-__all__ = ["plot_decay"]
+__all__ = ["plot_decay", "plot_stabilisation"]
 
 _SCALE = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "V": (1.0, "V"), "m/s^2": (1.0, "m/s²"), "b": (1.0, "b")}
 
@@ -36,10 +48,12 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
     scale, unit = _SCALE.get(fit.units, (1.0, fit.units))
     mode = fit.modes[0]
     rate = 2.0 * np.pi * mode.natural_freq * mode.damping_ratio
-    envelope = mode.amplitude * np.exp(-rate * (time - fit.start))
+    envelope = mode.amplitude * law_envelope(mode.law, time - fit.start, rate, mode.law_strength)
     middle = float(values.mean())
+    told = fit.findings
     with house_style():
-        figure = new_figure("double", 105.0)
+        figure = new_figure("double", 105.0 + findings_height(told, COLUMN_WIDTHS["double"]))
+        draw_findings(figure, told)
         grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 1.1))
         top = figure.add_subplot(grid[0, :])
         top.plot(time, scale * (values - middle), color=BEAM_COLOR, linewidth=0.5, label="measured")
@@ -71,6 +85,73 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
         right.set(xlabel=f"Amplitude ({unit})", ylabel="Frequency (Hz)")
         right.margins(x=0.03)
         right.set_title(f"$f_0$ = {mode.natural_freq:.3f} $\\pm$ {mode.natural_freq_se:.3f} Hz", loc="left")
-        right.legend(loc="lower left")
+        right.legend(loc="best")
         fix_ticks(top, left, right)
+    return figure
+
+
+def plot_stabilisation(signal: xr.DataArray, fit: DecayFit) -> Figure:
+    """Draw the poles of a decay at every order of the matrix pencil over its spectrum.
+
+    A mode is what stays where it is from order to order (filled); the modes identified stand as lines.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        The free decay.
+    fit : DecayFit
+        What :func:`snapbeam.lab.decay.identify.identify_decay` made of it.
+    """
+    samples = check_signal(signal)
+    part = (samples.time >= fit.start) & (samples.time <= fit.stop)
+    cut = SignalSamples(samples.values[part], samples.time[part], samples.sampling_freq)
+    poles = fit.poles if fit.poles is not None else find_poles(cut, noise_level(cut))[1]
+    n = cut.values.size
+    window = np.cos(0.5 * np.pi * np.arange(n) / n) ** 2
+    level = np.abs(np.fft.rfft((cut.values - cut.values.mean()) * window))
+    freq = np.fft.rfftfreq(n, 1.0 / cut.sampling_freq)
+    with house_style():
+        figure = new_figure("double", 80.0)
+        ax = figure.subplots()
+        back = ax.twinx()
+        back.semilogy(freq[1:], level[1:] / level.max(), color="0.7", linewidth=0.6, zorder=0)
+        back.set_ylabel("Spectrum (of its maximum)")
+        ax.set_zorder(back.get_zorder() + 1)
+        ax.patch.set_visible(False)
+        light = (poles.damping_ratio > 0.0) & (
+            poles.damping_ratio < 0.1
+        )  # heavier ones are no modes of a beam
+        free, stable = ~poles.stable & light, poles.stable & light
+        ax.plot(
+            poles.frequency[free],
+            poles.order[free],
+            "o",
+            ms=2.5,
+            mfc="none",
+            mec=BEAM_COLOR,
+            mew=0.4,
+            label="new",
+        )
+        ax.plot(
+            poles.frequency[stable],
+            poles.order[stable],
+            "o",
+            ms=3,
+            color=SHAKER_COLOR,
+            label="stable",
+        )
+        for k, mode in enumerate(fit.modes):
+            ax.axvline(
+                mode.natural_freq,
+                color=CENTER_COLOR,
+                linewidth=1.2,
+                zorder=0,
+                label="identified" if k == 0 else None,
+            )
+        highest = max(mode.natural_freq for mode in fit.modes)
+        ax.set(
+            xlabel="Frequency (Hz)", ylabel="Order", xlim=(0.0, min(3.0 * highest, cut.sampling_freq / 2.0))
+        )
+        figure.legend(loc="outside upper right", ncols=3)
+        fix_ticks(ax, back)
     return figure

@@ -8,11 +8,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import doubtful, findings_of
 from snapbeam.core.validate import InputError, integer
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
+from snapbeam.figures.findings import draw_findings, findings_height
+from snapbeam.figures.style import BEAM_COLOR, COLUMN_WIDTHS, SHAKER_COLOR, house_style, new_figure
 from snapbeam.lab.tracking.flags import FrameFlag
+from snapbeam.lab.tracking.geometry import Orientation
 from snapbeam.lab.tracking.quality import check_tracked, tracking_quality
-from snapbeam.lab.tracking.scene import Orientation
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,9 +87,13 @@ def plot_frame(recording: Recording, dataset: xr.Dataset, frame: int = 0) -> Fig
     index, at = _check_pair(recording, dataset, frame)
     picture = recording.frame(at)
     height, width = picture.shape
-    size = 77.0 * min(max(height / width, 0.12), 1.4) + 26.0
+    told = doubtful(findings_of(dataset))
+    size = (
+        77.0 * min(max(height / width, 0.12), 1.4) + 26.0 + findings_height(told, COLUMN_WIDTHS["single"], 3)
+    )
     with house_style():
         figure = new_figure("single", size)
+        draw_findings(figure, told, 3)
         axes = figure.subplots()
         low, high = np.percentile(picture, (0.2, 99.8))
         axes.imshow(picture, cmap="gray", vmin=low, vmax=max(high, low + 1), interpolation="nearest")
@@ -100,7 +106,7 @@ def plot_frame(recording: Recording, dataset: xr.Dataset, frame: int = 0) -> Fig
         axes.set_title(f"frame {index}, {1e3 * float(dataset['time'][index]):.2f} ms: {flag_words(flags)}")
         _scale_bar(axes, recording, width, height)
         if seen:
-            figure.legend(loc="outside lower center", ncols=2, handlelength=1.8)
+            figure.legend(loc="outside upper center", ncols=2, handlelength=1.8)
     return figure
 
 
@@ -125,8 +131,10 @@ def plot_tracking_quality(dataset: xr.Dataset) -> Figure:
     time = 1e3 * dataset["time"].values
     pixel = dataset.attrs["pixel_size"] * 1e3
     shaker = "shaker_displacement_mm" in dataset
+    told = findings_of(dataset)
     with house_style():
-        figure = new_figure("double", 120.0)
+        figure = new_figure("double", 120.0 + findings_height(told, COLUMN_WIDTHS["double"]))
+        draw_findings(figure, told)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.6, 1.8))
         top.plot(time, dataset["displacement_mm"], color=BEAM_COLOR, label="beam at the shaker")
         if shaker:

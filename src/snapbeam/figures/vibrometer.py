@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
-from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
+from snapbeam.figures.findings import draw_findings, findings_height
+from snapbeam.figures.style import (
+    BEAM_COLOR,
+    CENTER_COLOR,
+    COLUMN_WIDTHS,
+    SHAKER_COLOR,
+    fix_ticks,
+    house_style,
+    new_figure,
+)
 from snapbeam.lab.signals.signal import check_signal
 
 if TYPE_CHECKING:
@@ -36,15 +45,18 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
     scale, unit, word = _SCALE[drive.units]
     fit = drive.steady
     begin = fit.start if drive.startup is None else drive.startup.onset
+    told = drive.findings
     with house_style():
-        figure = new_figure("double", 105.0)
+        figure = new_figure("double", 105.0 + findings_height(told, COLUMN_WIDTHS["double"]))
+        draw_findings(figure, told)
         grid = figure.add_gridspec(2, 2, height_ratios=(1.1, 1.0))
         top = figure.add_subplot(grid[0, :])
         period = 1.0 / fit.frequency
         near = (time >= begin - 2.0 * period) & (time <= begin + cycles * period)
         shown = 1e3 * (time[near] - begin)
         top.plot(shown, scale * (values[near] - fit.offset), color=BEAM_COLOR, label="measured")
-        sine = np.where(time[near] >= begin, fit.waveform(time[near]) - fit.offset, np.nan)
+        model = fit.waveform(time[near], harmonics=not drive.clipping.found) - fit.offset
+        sine = np.where(time[near] >= begin, model, np.nan)
         top.plot(shown, scale * sine, color=SHAKER_COLOR, dashes=(4, 2), label="steady sine")
         since = "start" if drive.startup is not None else "first steady cycle"
         top.set(xlabel=f"Time after the {since} (ms)", ylabel=f"{word} ({unit})", xlim=(shown[0], shown[-1]))
@@ -55,9 +67,21 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
         left.axhline(scale * fit.amplitude, color=SHAKER_COLOR, dashes=(4, 2), linewidth=0.9)
         if drive.startup is not None:
             left.axvspan(begin, begin + drive.startup.duration, color=CENTER_COLOR, alpha=0.4, linewidth=0.0)
-        top_amplitude = 1.12 * scale * float(drive.cycle_amplitude.max())
+        for flaw in drive.flaws:
+            low = float(time[flaw.first])
+            high = float(time[min(flaw.last, time.size - 1)])
+            wide = max(high - low, 0.002 * float(time[-1] - time[0]))
+            left.axvspan(low, low + wide, color=SHAKER_COLOR, alpha=0.5, linewidth=0.0)
+            top.axvspan(
+                1e3 * (low - begin), 1e3 * (high - begin), color=SHAKER_COLOR, alpha=0.3, linewidth=0.0
+            )
+        for cut in (drive.clipping.low, drive.clipping.high):
+            if np.isfinite(cut):
+                top.axhline(scale * (cut - fit.offset), color=SHAKER_COLOR, linewidth=0.6, dashes=(1, 2))
+        top_amplitude = 1.12 * scale * max(float(drive.cycle_amplitude.max()), fit.amplitude)
         left.set(xlabel="Time (s)", ylabel=f"Amplitude of a cycle ({unit})", ylim=(0.0, top_amplitude))
-        left.set_title("shaded: start-up" if drive.startup else "begins in motion", loc="left")
+        words = "shaded: start-up" if drive.startup else "begins in motion"
+        left.set_title(words + ("; red: dropouts" if drive.flaws else ""), loc="left")
 
         right = figure.add_subplot(grid[1, 1])
         steady = values[(time >= fit.start) & (time < fit.stop)]

@@ -8,6 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
+from snapbeam.core.findings import Finding, ImplausibleError, Severity, findings_of
+
 _HOMES = {
     "Alignment": "drive.align",
     "align": "drive.align",
@@ -15,17 +17,21 @@ _HOMES = {
     "ContactTest": "calibration.calibrate",
     "Measurements": "calibration.calibrate",
     "calibrate": "calibration.calibrate",
+    "stiffness_from_impacts": "calibration.impacts",
     "load_measurements": "calibration.calibrate",
     "MeasuredDots": "compare.maps",
     "compare_dots": "compare.maps",
     "compare_waveforms": "compare.waveforms",
     "write_photron": "camera.write",
     "write_video": "camera.write",
-    "compare_wells": "decay.identify",
+    "compare_wells": "decay.wells",
     "identify_decay": "decay.identify",
+    "mode_shapes": "decay.shapes",
     "MeasuredResponse": "compare.response",
     "measure_response": "compare.response",
     "FrameFlag": "tracking.flags",
+    "TrackingSettings": "tracking.settings",
+    "pixel_size_from_marks": "camera.marks",
     "contact_onsets": "tracking.onsets",
     "tracking_quality": "tracking.quality",
     "tracking_report": "tracking.quality",
@@ -35,11 +41,12 @@ _HOMES = {
     "read_channels": "signals.files",
     "read_signal": "signals.files",
     "write_signal": "signals.files",
-    "from_sep5": "signals.signal",
+    "from_sep5": "signals.sep5",
     "make_signal": "signals.signal",
-    "to_sep5": "signals.signal",
+    "to_sep5": "signals.sep5",
     "SineFit": "signals.sine_fit",
     "fit_sine": "signals.sine_fit",
+    "Defects": "synthetic.defects",
     "SyntheticCamera": "synthetic.recording",
     "SyntheticStage": "synthetic.recording",
     "render_recording": "synthetic.recording",
@@ -47,11 +54,11 @@ _HOMES = {
     "render_vibrometer": "synthetic.run",
     "track": "tracking.track",
     "DriveMeasurement": "drive.vibrometer",
-    "displacement_from_velocity": "drive.vibrometer",
+    "displacement_from_velocity": "drive.displacement",
     "measure_drive": "drive.vibrometer",
 }
 
-__all__ = sorted(_HOMES)
+__all__ = ["Finding", "ImplausibleError", "Severity", "findings_of", *sorted(_HOMES)]
 
 
 def __getattr__(name: str) -> Any:

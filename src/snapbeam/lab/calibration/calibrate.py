@@ -16,10 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.config import config_from_mapping, dump_config
-from snapbeam.core.validate import InputError, InputTypeError, choice, integer
-from snapbeam.lab.calibration import report as words
-from snapbeam.lab.calibration.fit import directions, search, sensitivity
+from snapbeam.core.findings import Finding
+from snapbeam.core.validate import InputError, InputTypeError, choice, integer, shown
+from snapbeam.lab.calibration import wording as words
+from snapbeam.lab.calibration.fit import directions, open_upwards, search, sensitivity
 from snapbeam.lab.calibration.measurements import ContactTest, Measurements, load_measurements
+from snapbeam.lab.calibration.parity import either_well, shape_findings
+from snapbeam.lab.plausibility.calibration import KINDS
 from snapbeam.model.beam import Beam
 from snapbeam.model.paper_values import BEAM, MODES
 from snapbeam.model.reduction import ReducedModel
@@ -55,7 +58,7 @@ class Calibration:
     standard errors were raised, 1 if the data agree.  ``well_freq``, ``start_well_freq``, ``gauge_well_freq``
     [Hz] are the first frequency about a well of the result, of the beam the fit started from, and of the
     result with the gauge's geometry; ``either_well`` holds the buckling level [m] that each well alone would
-    ask for.  ``findings`` and ``warnings`` say in words what was found and what to beware of.
+    ask for.  ``remarks`` say in words what was found, ``findings`` what to beware of.
     """
 
     beam: Beam
@@ -76,8 +79,13 @@ class Calibration:
     start_well_freq: float | None
     gauge_well_freq: float | None
     either_well: tuple[float, ...]
-    findings: tuple[str, ...]
-    warnings: tuple[str, ...]
+    remarks: tuple[str, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The findings in words."""
+        return tuple(one.words for one in self.findings)
 
     def sections(self) -> dict[str, dict[str, Any]]:
         """The result as the sections of a parameter file."""
@@ -114,14 +122,14 @@ class Calibration:
             "start_well_freq": self.start_well_freq,
             "gauge_well_freq": self.gauge_well_freq,
             "either_well": list(self.either_well),
-            "findings": list(self.findings),
-            "warnings": list(self.warnings),
+            "remarks": list(self.remarks),
+            "findings": [one.plain() for one in self.findings],
         }
 
     def write_config(self, path: str | os.PathLike[str]) -> None:
         """Write the parameter file that ``snapbeam map --config`` reads, with the findings as comments."""
         told = [f"{name} = {words.with_error(self, name)}" for name in self.values]
-        comment = ["Calibrated from measurements.", *told, *self.findings]
+        comment = ["Calibrated from measurements.", *told, *self.remarks]
         comment += [f"Warning: {text}" for text in self.warnings]
         dump_config(config_from_mapping(self.sections()), path, "\n".join(comment))
 
@@ -176,7 +184,8 @@ def calibrate(
     wells = bool(measured.lower_well_freq or measured.upper_well_freq)
     if wells and not beam.is_buckled:
         raise InputError(
-            "beam: is straight, but frequencies about wells were measured; give a buckling_level"
+            "beam: is straight, but frequencies about wells were measured; give a buckling_level (in the file of "
+            "--config)"
         )
     begin = np.array([math.log(getattr(beam, name)) for name in names])
     target = np.array([item.measured for item in data])
@@ -191,21 +200,28 @@ def calibrate(
     logs = begin
     covariance = np.zeros((0, 0))
     undetermined: tuple[str, ...] = ()
-    warnings: list[str] = []
+    findings: list[Finding] = []
     scatter, freedom = 1.0, len(data)
     if names:
         keep = directions(sensitivity(frequencies, begin, errors))
         freedom = len(data) - keep.shape[1]
         logs = search(residual, begin, keep, names, freedom)
         jacobian = sensitivity(frequencies, logs, errors)
+        # where the fit ends the data may respond to less than where it began
+        here = directions(jacobian)
+        if here.shape[1] < keep.shape[1]:
+            keep, freedom = here, len(data) - here.shape[1]
         chi = float(np.sum(residual(logs) ** 2))
         scatter = max(1.0, math.sqrt(chi / freedom)) if freedom > 0 else 1.0
         inner = np.linalg.inv((jacobian @ keep).T @ (jacobian @ keep))
         covariance = keep @ inner @ keep.T * scatter**2
         undetermined = tuple(name for i, name in enumerate(names) if (keep @ keep.T)[i, i] < 1.0 - 1e-4)
-        warnings += words.link_warnings(names, covariance, undetermined)
+        findings += words.links(names, covariance, undetermined)
+        if "buckling_level" not in undetermined and open_upwards(residual, logs, names):
+            undetermined += ("buckling_level",)
+            findings.append(words.at_least(math.exp(logs[names.index("buckling_level")])))
         if freedom <= 0:
-            warnings.append("as many parameters as measured values: nothing is left to check the model with")
+            findings.append(KINDS["no_check"].found())
     result = _changed(beam, names, logs)
     fitted = _model(result, data, count)
     residuals = tuple(
@@ -213,7 +229,7 @@ def calibrate(
         for item, f in zip(data, fitted, strict=True)
     )
     values = {name: math.exp(log) for name, log in zip(names, logs, strict=True)}
-    spread = np.sqrt(np.diag(covariance))
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     standard = {
         name: values[name] * float(s)
         for name, s in zip(names, spread, strict=True)
@@ -245,13 +261,14 @@ def calibrate(
         well_freq=_first_freq(result, count) if wells else None,
         start_well_freq=_first_freq(beam, count) if wells else None,
         gauge_well_freq=_first_freq(result.replace(**gauges), count) if wells and gauges else None,
-        either_well=_either_well(result, measured, count),
+        either_well=either_well(result, measured, count),
+        remarks=(),
         findings=(),
-        warnings=(),
     )
-    told = words.warnings(answer, measured)
+    findings += shape_findings(result, measured, count) if wells else []
+    findings += words.doubts(answer, measured)
     return dataclasses.replace(
-        answer, findings=tuple(words.findings(answer, measured)), warnings=(*warnings, *told)
+        answer, remarks=tuple(words.remarks(answer, measured)), findings=tuple(findings)
     )
 
 
@@ -260,6 +277,7 @@ class _Datum:
     name: str
     state: str
     mode: int
+    parity: int  # of the mode, 0 where modes are told by their order only
     measured: float
     standard_error: float
 
@@ -271,8 +289,16 @@ def _data(measured: Measurements, modes: int) -> list[_Datum]:
         errors = getattr(measured, f"{state}_freq_se") or [words.ASSUMED * value for value in values]
         if len(values) > modes:
             raise InputError(f"{state}_freq: {len(values)} frequencies for a model of {modes} modes")
+        shapes = getattr(measured, f"{state}_shape", ())
+        seen = {1: 0, -1: 0}
         for i, (value, error) in enumerate(zip(values, errors, strict=True)):
-            data.append(_Datum(f"{word}, mode {i + 1}", state, i, value, error))
+            if not shapes:
+                data.append(_Datum(f"{word}, mode {i + 1}", state, i, 0, value, error))
+                continue
+            parity = 1 if shapes[i] == "symmetric" else -1
+            name = f"{word}, {shapes[i]} mode {seen[parity] + 1}"
+            data.append(_Datum(name, state, seen[parity], parity, value, error))
+            seen[parity] += 1
     return data
 
 
@@ -281,7 +307,7 @@ def _fitted(measured: Measurements, fit: tuple[str, ...] | None) -> list[str]:
     if fit is None:
         return ["thickness"] * bool(measured.straight_freq) + ["buckling_level"] * wells
     if isinstance(fit, str) or len(set(fit)) < len(fit):
-        raise InputError(f"fit = {fit!r}: must be a tuple of different names among {', '.join(FITTED)}")
+        raise InputError(f"fit = {shown(fit)}: must be a tuple of different names among {', '.join(FITTED)}")
     for name in fit:
         choice("fit", name, FITTED)
     if "buckling_level" in fit and not wells:
@@ -295,39 +321,22 @@ def _changed(beam: Beam, names: list[str], logs: _Array) -> Beam:
 
 
 def _model(beam: Beam, data: list[_Datum], modes: int) -> _Array:
-    states = {item.state == "straight" for item in data}
-    freq = {
-        straight: ReducedModel.from_beam(
-            beam.replace(axial_load=0.0) if straight else beam, modes
-        ).natural_freq
-        for straight in states
+    models = {
+        straight: ReducedModel.from_beam(beam.replace(axial_load=0.0) if straight else beam, modes)
+        for straight in {item.state == "straight" for item in data}
     }
-    return np.array([freq[item.state == "straight"][item.mode] for item in data])
+    out = []
+    for item in data:
+        model = models[item.state == "straight"]
+        freq = model.natural_freq
+        if item.parity:
+            freq = freq[model.parity == item.parity]
+        out.append(freq[item.mode])
+    return np.array(out)
 
 
 def _first_freq(beam: Beam, modes: int) -> float:
     return float(ReducedModel.from_beam(beam, modes).natural_freq[0])
-
-
-def _either_well(beam: Beam, measured: Measurements, modes: int) -> tuple[float, ...]:
-    """Buckling level [m] that the first frequency of each well alone asks for; empty if they agree."""
-    from scipy.optimize import newton
-
-    wells = (measured.lower_well_freq, measured.upper_well_freq)
-    if not all(wells) or wells[0][0] == wells[1][0]:
-        return ()
-    level, levels = beam.buckling_level, []
-    here = _first_freq(beam, modes)
-    for goal in (values[0] for values in wells):
-
-        def miss(factor: float, goal: float = goal) -> float:
-            return _first_freq(beam.replace(buckling_level=abs(factor) * level), modes) / goal - 1.0
-
-        try:
-            levels.append(level * float(newton(miss, 1.0, x1=goal / here + 1e-6, tol=1e-7, maxiter=12)))
-        except RuntimeError:  # no level gives that frequency
-            return ()
-    return tuple(levels)
 
 
 def _mean(

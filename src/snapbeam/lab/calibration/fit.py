@@ -8,11 +8,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["directions", "search", "sensitivity"]
+__all__ = ["directions", "open_upwards", "search", "sensitivity"]
 
 _Array = NDArray[np.float64]
 STARTS = (1.0, 0.75, 1.33, 0.55, 1.8)
 """Buckling levels to start from, over the given one."""
+HIGHER = (1.05, 1.15, 1.3)
+"""Buckling levels that are tried beyond the one found, over it."""
 UNDETERMINED = 1e-5
 """Least singular value of the relative sensitivities that counts as a response, over the greatest."""
 
@@ -50,6 +52,19 @@ def search(
         if best <= enough:
             break
     return found
+
+
+def open_upwards(residual: Callable[[_Array], _Array], logs: _Array, names: list[str]) -> bool:
+    """Whether any higher buckling level meets the data as well as the one found.
+
+    So it is where the only frequency about a well is that of the antisymmetric mode, which does not depend on
+    the level; the symmetric one lies above it from b/r = 6.2 on.
+    """
+    if "buckling_level" not in names:
+        return False
+    least = float(np.sum(residual(logs) ** 2))
+    higher = (logs + np.array([math.log(by) * (name == "buckling_level") for name in names]) for by in HIGHER)
+    return all(float(np.sum(residual(one) ** 2)) < least + 4.0 for one in higher)
 
 
 def directions(jacobian: _Array) -> _Array:

@@ -8,14 +8,13 @@ import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any
 
-from snapbeam.core.validate import InputError, InputTypeError, positive
+from snapbeam.core.validate import InputError, InputTypeError, choice, file_path, positive, shown
 
-__all__ = ["ContactTest", "Measurements", "load_measurements"]
+__all__ = ["HERTZ_TIME", "ContactTest", "Measurements", "load_measurements"]
 
-_HERTZ_TIME = 2.943275  # contact time over d/v for a force k d^1.5: 2 int_0^1 dx/sqrt(1 - x^2.5)
+HERTZ_TIME = 2.943275  # contact time over d/v for a force k d^1.5: 2 int_0^1 dx/sqrt(1 - x^2.5)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +61,7 @@ class ContactTest:
         """Contact stiffness [N/m^1.5] and its standard error."""
         v, t, f, m = self.closing_speed, self.duration, self.peak_force, self.effective_mass
         if t is not None:
-            depth = t * v / _HERTZ_TIME
+            depth = t * v / HERTZ_TIME
             if f is not None:
                 stiffness, power = f / depth**1.5, math.hypot(1.0, 1.5)
             else:
@@ -90,6 +89,10 @@ class Measurements:
         Natural frequencies about either well, Hz.
     straight_freq_se, lower_well_freq_se, upper_well_freq_se : float or sequence of float, optional
         Their standard errors, Hz.
+    lower_well_shape, upper_well_shape : sequence of str, optional
+        "symmetric" or "antisymmetric" for each frequency about a well.  Where given, frequencies are matched
+        to the model's modes of that shape in their order; else to all modes in their order, which at a
+        buckling level of some 6 radii of gyration changes.
     damping_ratio : sequence of float
         From free decays.
     damping_ratio_se : float or sequence of float, optional
@@ -104,6 +107,8 @@ class Measurements:
     lower_well_freq_se: float | Sequence[float] | None = None
     upper_well_freq: Sequence[float] = ()
     upper_well_freq_se: float | Sequence[float] | None = None
+    lower_well_shape: Sequence[str] = ()
+    upper_well_shape: Sequence[str] = ()
     damping_ratio: Sequence[float] = ()
     damping_ratio_se: float | Sequence[float] | None = None
     thickness: float | None = None
@@ -123,6 +128,19 @@ class Measurements:
                 object.__setattr__(self, f"{name}_se", checked)
             if "freq" in name and any(b <= a for a, b in itertools.pairwise(values)):
                 raise InputError(f"{name} = {list(values)}: must increase, one frequency a mode")
+        for name in ("lower_well", "upper_well"):
+            shapes = getattr(self, f"{name}_shape")
+            if isinstance(shapes, str):
+                raise InputTypeError(
+                    f"{name}_shape = {shown(shapes)}: must be a list of words, one for each frequency"
+                )
+            object.__setattr__(self, f"{name}_shape", tuple(shapes))
+            for i, shape in enumerate(shapes):
+                choice(f"{name}_shape[{i}]", shape, ("symmetric", "antisymmetric"))
+            if shapes and len(shapes) != len(getattr(self, f"{name}_freq")):
+                raise InputError(
+                    f"{name}_shape: {len(shapes)} word(s), {name}_freq has {len(getattr(self, f'{name}_freq'))}"
+                )
         if any(ratio >= 1.0 for ratio in self.damping_ratio):
             raise InputError(f"damping_ratio = {list(self.damping_ratio)}: must lie in (0, 1)")
         for name in ("thickness", "buckling_level"):
@@ -134,7 +152,7 @@ def _numbers(name: str, values: Any) -> tuple[float, ...]:
     if isinstance(values, (int, float)) and not isinstance(values, bool):
         values = (values,)
     if isinstance(values, (str, bytes, Mapping)) or not hasattr(values, "__iter__"):
-        raise InputTypeError(f"{name} = {values!r}: must be a list of numbers")
+        raise InputTypeError(f"{name} = {shown(values)}: must be a list of numbers")
     return tuple(positive(f"{name}[{i}]", value) for i, value in enumerate(values))
 
 
@@ -154,7 +172,7 @@ def load_measurements(path: str | os.PathLike[str]) -> tuple[Measurements, dict[
     InputError
         If the file cannot be read, or holds an unknown or unusable entry; the message names file and entry.
     """
-    source = Path(path)
+    source = file_path("path", path)
     try:
         sections = tomllib.loads(source.read_text(encoding="utf-8"))
     except OSError as error:

@@ -10,10 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, integer, positive
-from snapbeam.lab.camera.sources import FrameSource, open_source
+from snapbeam.core.findings import Finding
+from snapbeam.core.validate import InputError, file_path, integer, positive, shown
+from snapbeam.lab.camera.sources.base import FrameSource
+from snapbeam.lab.camera.sources.opening import open_source
+from snapbeam.lab.plausibility.recording import KINDS
 
 __all__ = ["Recording", "open_recording"]
+
+_LARGEST_PIXEL = 0.01  # m
 
 
 class Recording:
@@ -40,6 +45,10 @@ class Recording:
         Grey level at which a pixel is saturated.
     metadata
         What else the file says.
+    findings
+        What in the file makes measurements in it doubtful.
+    edge_error
+        Standard error [px] that the way the file stores pictures adds to every edge.
     """
 
     def __init__(
@@ -49,6 +58,7 @@ class Recording:
         frame_rate: float,
         pixel_size: float,
         region: tuple[int, int, int, int],
+        findings: tuple[Finding, ...] = (),
     ) -> None:
         self.path = path
         self._source = source
@@ -60,6 +70,8 @@ class Recording:
         self.exposure = source.exposure
         self.max_value = source.max_value
         self.metadata: dict[str, Any] = dict(source.metadata)
+        self.findings = findings
+        self.edge_error = source.edge_error
 
     def __len__(self) -> int:
         return int(self.numbers.size)
@@ -121,12 +133,24 @@ def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> 
         return (0, shape[0], 0, shape[1])
     if len(value) != 4:
         raise InputError(
-            f"region = {value!r}: must be (first row, last row + 1, first column, last column + 1)"
+            f"region = {shown(value)}: must be (first row, last row + 1, first column, last column + 1)"
         )
     top = integer("region[0]", value[0], 0, shape[0] - 1)
     bottom = integer("region[1]", value[1], top + 1, shape[0])
     left = integer("region[2]", value[2], 0, shape[1] - 1)
     return (top, bottom, left, integer("region[3]", value[3], left + 1, shape[1]))
+
+
+def _rate_findings(source: FrameSource, given: float | None) -> tuple[Finding, ...]:
+    """What to say of a frame rate that was given although the file says something."""
+    if given is None:
+        return ()
+    if source.frame_rate_question:
+        return (KINDS["contradiction"].found(given=given),)
+    stated = source.frame_rate
+    if stated is not None and abs(given / stated - 1.0) > 1e-3:
+        return (KINDS["rate_given"].found(given=given, stated=stated),)
+    return ()
 
 
 def open_recording(
@@ -141,11 +165,13 @@ def open_recording(
     Parameters
     ----------
     path
-        A Photron header (.cih, .cihx) or its .mraw; a video (.avi, .mp4, .mov, .mkv); a TIFF stack; a folder
-        of numbered images or a pattern such as ``"run3/img_*.png"``.
+        A Photron header (.cih, .cihx) or its .mraw; a video (.avi, .mp4, .mov, .mkv); Phantom's .cine; a TIFF
+        stack; an array (.npy, or .h5, ``"file.h5::name"`` where it holds several); a folder of numbered images
+        or a pattern such as ``"run3/img_*.png"``.
     frame_rate
         Frames per second [Hz] of what is in the file.  Overrides the file.  A video must be given it: the
-        rate in a video file is how fast it plays.  A Photron header gives record rate over skipped frames.
+        rate in a video file is how fast it plays.  A Photron header gives record rate over skipped frames,
+        and must be given it too where its fields contradict each other.
     pixel_size
         Metres per pixel in the plane of the beam.  Overrides the file.  Photron (.cihx) and ImageJ files may
         hold it; nearly always it is measured with a scale in view.
@@ -158,18 +184,31 @@ def open_recording(
         If the file is malformed, or if frame rate or pixel size stand neither in the file nor in the call:
         they are never guessed.
     """
-    path = Path(path)
+    path = file_path("path", path)
     source = open_source(path)
     try:
-        rate = source.frame_rate if frame_rate is None else positive("frame_rate", frame_rate, "Hz")
+        given = None if frame_rate is None else positive("frame_rate", frame_rate, "Hz")
         size = source.pixel_size if pixel_size is None else positive("pixel_size", pixel_size, "m")
+        rate = source.frame_rate if given is None else given
         if rate is None:
             played = source.metadata.get("playback_rate")
             hint = f"; it plays at {played:g} Hz, which need not be how it was recorded" if played else ""
-            raise InputError(f"{path}: the frame rate is not in the file{hint}; give frame_rate in Hz")
+            why = source.frame_rate_question or (
+                f"the frame rate is not in the file{hint}; give frame_rate (--frame-rate) in Hz"
+            )
+            raise InputError(f"{path}: {why}")
         if size is None:
-            raise InputError(f"{path}: the pixel size is not in the file; give pixel_size in m")
-        return Recording(path, source, rate, size, _region(region, source.shape))
+            hint = f"; {source.pixel_size_hint}" if source.pixel_size_hint else ""
+            raise InputError(
+                f"{path}: the pixel size is not in the file{hint}; give pixel_size (--pixel-size) in m"
+            )
+        if size > _LARGEST_PIXEL:
+            raise InputError(
+                f"pixel_size (--pixel-size) = {size:g}: a pixel of {size:g} m; must be at most {_LARGEST_PIXEL:g} m, "
+                "in metres, such as 12e-6 for 12 um"
+            )
+        findings = (*source.findings, *_rate_findings(source, given))
+        return Recording(path, source, rate, size, _region(region, source.shape), findings)
     except BaseException:
         source.close()
         raise

@@ -5,14 +5,14 @@ from __future__ import annotations
 import csv
 import math
 import os
+import re
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError, positive
+from snapbeam.core.validate import InputError, file_path, positive
 
 __all__ = ["Dots", "read_dots"]
 
@@ -22,6 +22,11 @@ _Array = NDArray[np.float64]
 _FREQUENCY = ("frequency_ratio", "frequency_hz")
 _VELOCITY = ("velocity_amplitude", "velocity_m_s")
 _COLUMNS = (*_FREQUENCY, *_VELOCITY, "location", "response")
+# What a table of tests says beside; read over here.
+_BESIDE = (
+    "test", "recording", "vibrometer", "frequency_se_hz", "velocity_se_m_s", "crossings", "cycles", "snr_db",
+    "measured_share", "delay_s", "polarity", "gain", "status", "findings", "comment",
+)  # fmt: skip
 
 _CLASSES = {kind.label: kind for kind in ResponseClass}
 _CLASSES |= {kind.label.replace("interwell ", "").replace(" interwell", ""): kind for kind in ResponseClass}
@@ -59,7 +64,9 @@ def read_dots(
 
     Columns: ``frequency_ratio`` or ``frequency_hz``; ``velocity_amplitude`` (V) or ``velocity_m_s`` (the
     amplitude in m/s); ``location`` (x_s, may be left out); ``response``, one of intrawell, transient 1,
-    transient 2, continuous, unknown, or the number of the class.  Lines that start with ``#`` are comments.
+    transient 2, continuous, unknown, or the number of the class; and those beside which
+    ``snapbeam campaign`` writes.  Cells are separated by commas, semicolons or tabs; with the latter two the
+    decimal sign may be a comma.  Lines that start with ``#`` are comments.
 
     Parameters
     ----------
@@ -75,15 +82,19 @@ def read_dots(
     InputError
         Names the file, the line and the column of what cannot be used.
     """
-    file = Path(path)
+    file = file_path("path", path)
     try:
         text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"dots = {str(path)!r}: cannot be read, {reason}") from error
+    first = next(
+        (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
+    )
+    mark = next((one for one in (";", "\t") if one in first), ",")
     rows = [
         (number, [cell.strip() for cell in cells])
-        for number, cells in enumerate(csv.reader(text.splitlines()), start=1)
+        for number, cells in enumerate(csv.reader(text.splitlines(), delimiter=mark), start=1)
         if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#")
     ]
     if not rows:
@@ -101,11 +112,15 @@ def read_dots(
     velocity = header.index(next(name for name in _VELOCITY if name in header))
     place = header.index("location") if "location" in header else None
     points, kinds = [], []
-    for number, cells in rows[1:]:
+    for number, raw in rows[1:]:
+        cells = raw if mark == "," else [_pointed(cell) for cell in raw]
         if len(cells) != len(header):
             raise InputError(
                 f"{file.name}, line {number}: has {len(cells)} cells, the header names {len(header)}"
             )
+        status = cells[header.index("status")] if "status" in header else "measured"
+        if status != "measured":
+            continue  # a test that gave no number is a row of words
         location = math.nan
         if place is not None and cells[place]:
             location = _number(file.name, number, "location", cells[place], 1.0)
@@ -123,7 +138,7 @@ def read_dots(
 
 def _check_header(name: str, header: list[str]) -> None:
     for column in header:
-        if column not in _COLUMNS:
+        if column not in (*_COLUMNS, *_BESIDE):
             raise InputError(f"{name}: unknown column {column!r}; must be among {', '.join(_COLUMNS)}")
         if header.count(column) > 1:
             raise InputError(f"{name}: column {column!r} stands there twice")
@@ -148,6 +163,11 @@ def _number(name: str, line: int, column: str, cell: str, below: float = math.in
     if not 0.0 < value < below:
         raise InputError(f"{name}, line {line}, column {column!r}: {cell!r} must be {allowed}")
     return value
+
+
+def _pointed(cell: str) -> str:
+    """A cell with its decimal comma, if it is a number with one, made a point."""
+    return cell.replace(",", ".") if re.fullmatch(r"[-+]?\d+,\d+([eE][-+]?\d+)?", cell) else cell
 
 
 def _kind(name: str, line: int, cell: str) -> ResponseClass:

@@ -25,7 +25,7 @@ __all__ = ["MeasuredResponse", "measure_response"]
 
 _Array = NDArray[np.float64]
 _HYSTERESIS = 5.0  # in standard deviations of the noise
-_LEAST_CYCLES = 20  # the rule of more than n/5 crossings in n cycles means nothing below n = 5
+LEAST_CYCLES = 20  # the rule of more than n/5 crossings in n cycles means nothing below n = 5
 _WHOLE = 0.98  # share of the wanted cycles that counts as all of them
 
 
@@ -130,8 +130,8 @@ def measure_response(
         reasons.append(f"the noise, {sigma:.2g} b, hides crossings (hysteresis {hysteresis:.2g} b)")
     if first == 0 or final == 0:
         reasons.append("the displacement never leaves the hysteresis about zero")
-    if wanted < _LEAST_CYCLES:
-        reasons.append(f"too short to tell: {wanted} cycles, the rule needs {_LEAST_CYCLES}")
+    if wanted < LEAST_CYCLES:
+        reasons.append(f"too short to tell: {wanted} cycles, the rule needs {LEAST_CYCLES}")
     certain_continuous = late > wanted / 20.0
     if total < _WHOLE * wanted and not certain_continuous:
         reasons.append(f"too short to tell: {total:.1f} of {wanted} cycles recorded")
@@ -160,7 +160,9 @@ def _noise(values: _Array, good: NDArray[np.bool_]) -> float:
     whole = good[:-3] & good[1:-2] & good[2:-1] & good[3:]
     thirds = (values[3:] - 3.0 * values[2:-1] + 3.0 * values[1:-2] - values[:-3])[whole]
     if thirds.size < 8:
-        raise InputError("run: too few neighbouring valid samples to estimate the noise; state noise")
+        raise InputError(
+            "run: too few neighbouring valid samples to estimate the noise; state noise, in units of b"
+        )
     return float(np.median(np.abs(thirds)) / 0.6745 / math.sqrt(20.0))
 
 

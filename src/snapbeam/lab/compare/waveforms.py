@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError, positive
-from snapbeam.lab.signals.signal import Samples
+from snapbeam.lab.compare.start import start_of_shaker
+from snapbeam.lab.plausibility.comparison import KINDS
+from snapbeam.lab.signals.signal import SignalSamples
 from snapbeam.lab.signals.sine_fit import SineFit, fit_sine
 from snapbeam.runs.schema import check_trajectory
 
@@ -20,6 +23,9 @@ if TYPE_CHECKING:
 __all__ = ["WaveformComparison", "compare_waveforms"]
 
 _Array = NDArray[np.float64]
+_APART = 0.1  # b, by which two beams must differ to have parted
+_SHIFTED = 0.15  # cycles by which a known start may be off
+_RATIO = 0.05  # share by which the shakers' amplitudes may differ
 
 
 @dataclass(frozen=True)
@@ -30,7 +36,9 @@ class WaveformComparison:
     ``frequency_ratio`` (multiples of the excitation): amplitude spectra of the two displacements [b].
     ``shift`` [cycles] was added to the measured clock.  ``rms_difference`` [b] and ``correlation`` are
     those of the beam, ``shaker_rms_difference`` [b] that of the shaker; ``measured_rms`` and
-    ``simulated_rms`` [b] are the beam's motion about its mean.
+    ``simulated_rms`` [b] are the beam's motion about its mean.  ``parted`` [cycles] is where the two beams
+    first stay more than ``apart`` [b] from each other for half a cycle, NaN if they never do.  ``findings``
+    is what makes the comparison doubtful.
     """
 
     waveforms: xr.Dataset
@@ -42,8 +50,11 @@ class WaveformComparison:
     measured_rms: float
     simulated_rms: float
     amplitude_ratio: float
+    parted: float
+    apart: float
     measured_impacts: _Array
     simulated_impacts: _Array
+    findings: tuple[Finding, ...]
 
 
 def compare_waveforms(
@@ -66,7 +77,7 @@ def compare_waveforms(
         Excitation frequency [Hz] of the measured run, where it has no coordinate ``cycle``.
     start : float, optional
         Start of the excitation in the measured run [s]; it says which cycle is the first, the phase of the
-        shaker says the rest.  The first sample if left out.
+        shaker says the rest.  Read from the shaker if left out, and the first sample if it begins in motion.
     cycles : (float, float), optional
         The part to compare, counted from the start; all that both have if left out.
     measured_onsets, simulated_onsets : array_like, optional
@@ -84,6 +95,8 @@ def compare_waveforms(
             check_trajectory(run, require=("displacement", "shaker_displacement"))
         except InputError as error:
             raise InputError(f"{name}: {error}") from error
+    if start is None and frequency is not None:
+        start = start_of_shaker(measured, positive("frequency", frequency, "Hz"))
     clock, rate = _clock(measured, frequency, start)
     if "cycle" not in simulated.coords:
         raise InputError("simulated: must have the coordinate cycle")
@@ -109,7 +122,7 @@ def compare_waveforms(
         "simulated_shaker": _on(grid, model_clock, simulated["shaker_displacement"].values),
     }
     waveforms = xr.Dataset(
-        {name: ("cycle", value, {"units": "b"}) for name, value in columns.items()},
+        {name: ("cycle", value, {"units": "1"}) for name, value in columns.items()},
         {"cycle": ("cycle", grid, {"long_name": "cycles of excitation", "units": "1"})},
     )
     one, two = columns["measured_displacement"], columns["simulated_displacement"]
@@ -120,6 +133,10 @@ def compare_waveforms(
     shaker = shaker[np.isfinite(shaker)]
     spread = float(np.std(one[both])), float(np.std(two[both]))
     same = float(np.corrcoef(one[both], two[both])[0, 1]) if min(spread) > 0.0 else math.nan
+    apart = max(_APART, 5.0 * float(measured.attrs.get("displacement_error_b", 0.0)))
+    findings = _findings(
+        columns, grid, shift, seen.amplitude / wanted.amplitude, start is not None or frequency is None
+    )
     return WaveformComparison(
         waveforms=waveforms,
         spectra=_spectra(grid, step, columns),
@@ -130,6 +147,9 @@ def compare_waveforms(
         measured_rms=spread[0],
         simulated_rms=spread[1],
         amplitude_ratio=seen.amplitude / wanted.amplitude,
+        parted=_parted(grid, one - two, apart),
+        apart=apart,
+        findings=tuple(findings),
         measured_impacts=_impacts(
             measured_onsets, start or float(measured["time"][0]), rate, shift, low, high
         ),
@@ -137,11 +157,53 @@ def compare_waveforms(
     )
 
 
+def _findings(
+    columns: dict[str, _Array], grid: _Array, shift: float, ratio: float, started: bool
+) -> list[Finding]:
+    """What the two shakers say of the comparison; *started* says that their first cycle is known."""
+    told = []
+    if not started:
+        told.append(KINDS["no_start"].found())
+    else:
+        same = _same_way(columns, grid, shift)
+        if abs(abs(shift) - 0.5) < 0.2 and same < -0.5:
+            told.append(KINDS["turned_over"].found(correlation=same))
+        elif abs(shift) > _SHIFTED:
+            told.append(KINDS["shifted"].found(shift=shift))
+    if abs(ratio - 1.0) > _RATIO:
+        told.append(KINDS["amplitude"].found(ratio=ratio))
+    missing = float(np.mean(~np.isfinite(columns["measured_displacement"])))
+    if missing > 0.1:
+        told.append(KINDS["gaps"].found(share_percent=100.0 * missing))
+    return told
+
+
+def _same_way(columns: dict[str, _Array], grid: _Array, shift: float) -> float:
+    """Correlation of the two shakers over the first cycles as they were started, the shift undone."""
+    early = grid <= grid[0] + 6.0
+    moved = np.interp(grid[early], grid - shift, columns["measured_shaker"], left=np.nan, right=np.nan)
+    other = columns["simulated_shaker"][early]
+    both = np.isfinite(moved) & np.isfinite(other)
+    if both.sum() < 32 or min(np.std(moved[both]), np.std(other[both])) == 0.0:
+        return 0.0
+    return float(np.corrcoef(moved[both], other[both])[0, 1])
+
+
+def _parted(grid: _Array, difference: _Array, apart: float) -> float:
+    """Cycle from which two runs stay apart for half a cycle on average; NaN if they never do."""
+    step = float(grid[1] - grid[0])
+    width = max(1, round(0.5 / step))
+    square = np.where(np.isfinite(difference), difference, 0.0) ** 2
+    mean = np.sqrt(np.convolve(square, np.ones(width) / width, mode="valid"))
+    beyond = np.flatnonzero(mean > apart)
+    return float(grid[beyond[0]]) if beyond.size else math.nan
+
+
 def _clock(run: xr.Dataset, frequency: float | None, start: float | None) -> tuple[_Array, float]:
     time = np.asarray(run["time"].values, dtype=np.float64)
     if frequency is None:
         if "cycle" not in run.coords:
-            raise InputError("measured: has no coordinate cycle; state frequency (Hz)")
+            raise InputError("measured: has no coordinate cycle; state frequency (--frequency), Hz")
         return np.asarray(run["cycle"].values, dtype=np.float64), _cycles_per_second(run)
     rate = positive("frequency", frequency, "Hz")
     begin = float(time[0]) if start is None else float(start)
@@ -165,7 +227,9 @@ def _shaker_sine(run: xr.Dataset, clock: _Array) -> SineFit:
     begin = clock[good][0] + span / 3.0 if span > 6.0 else clock[good][0]
     count = int(min((clock[good][-1] - begin) * 64, 20_000))
     even = begin + (clock[good][-1] - begin) * np.arange(count) / count
-    samples = Samples(np.interp(even, clock[good], values[good]), even, count / (clock[good][-1] - begin))
+    samples = SignalSamples(
+        np.interp(even, clock[good], values[good]), even, count / (clock[good][-1] - begin)
+    )
     return fit_sine(samples, 1.0, 1, fixed=True)
 
 
@@ -188,7 +252,7 @@ def _spectra(grid: _Array, step: float, columns: dict[str, _Array]) -> xr.Datase
         good = np.isfinite(values)
         filled = np.where(good, values, np.interp(grid, grid[good], values[good]))
         amplitude = 2.0 * np.abs(np.fft.rfft((filled - filled.mean()) * window)) / window.sum()
-        data[name] = ("frequency_ratio", amplitude, {"units": "b"})
+        data[name] = ("frequency_ratio", amplitude, {"units": "1"})
     ratio = np.fft.rfftfreq(grid.size, step)
     return xr.Dataset(data, {"frequency_ratio": ("frequency_ratio", ratio, {"units": "1"})})
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError
 from snapbeam.lab.decay.model import ModeEstimate, law_priors
-from snapbeam.lab.signals.signal import Samples
+from snapbeam.lab.signals.signal import SignalSamples
 
 __all__ = ["Cycles", "backbone", "hilbert_cycles", "noise_level", "peak_cycles", "regress"]
 
@@ -31,7 +31,7 @@ class Cycles(NamedTuple):
     noise: float
 
 
-def noise_level(samples: Samples) -> float:
+def noise_level(samples: SignalSamples) -> float:
     """Standard deviation of white noise in a signal, from the top third of its spectrum (median power)."""
     values = (samples.values - samples.values.mean()) * np.hanning(samples.values.size)
     power = np.abs(np.fft.rfft(values)) ** 2 / np.sum(np.hanning(values.size) ** 2)
@@ -39,7 +39,7 @@ def noise_level(samples: Samples) -> float:
     return float(np.sqrt(np.median(top) / math.log(2.0)))
 
 
-def _band(samples: Samples, frequency: float) -> _Array:
+def _band(samples: SignalSamples, frequency: float) -> _Array:
     """The part of a signal between 0.5 and 1.5 times *frequency*, without phase shift."""
     from scipy.signal import butter, sosfiltfilt
 
@@ -50,7 +50,7 @@ def _band(samples: Samples, frequency: float) -> _Array:
     return filtered
 
 
-def hilbert_cycles(samples: Samples, frequency: float, sigma: float) -> Cycles:
+def hilbert_cycles(samples: SignalSamples, frequency: float, sigma: float) -> Cycles:
     """Amplitude and phase of each cycle from the analytic signal, averaged over one period of *frequency*.
 
     Three cycles at either end, which the filter and the transform distort, are left out.
@@ -71,7 +71,7 @@ def hilbert_cycles(samples: Samples, frequency: float, sigma: float) -> Cycles:
     return _usable(Cycles(middle[3:-3], np.abs(mean[3:-3]), phase[3:-3], noise))
 
 
-def peak_cycles(samples: Samples, frequency: float, sigma: float) -> Cycles:
+def peak_cycles(samples: SignalSamples, frequency: float, sigma: float) -> Cycles:
     """Height and time of each maximum of the filtered mode, located by a parabola through three samples."""
     from scipy.signal import find_peaks
 

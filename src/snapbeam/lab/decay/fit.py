@@ -13,39 +13,48 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from snapbeam.core.validate import InputError
+from snapbeam.lab.decay.laws import DampingLaw, envelope
 from snapbeam.lab.decay.model import ModeEstimate, law_priors
-from snapbeam.lab.signals.signal import Samples
+from snapbeam.lab.signals.signal import SignalSamples
 from snapbeam.lab.signals.sine_fit import white_variance
 
 __all__ = ["FitResult", "explain", "fit_decay"]
+
+_SLOW = 4  # degree of the polynomial that is fitted beside the modes
 
 _Array = NDArray[np.float64]
 
 
 class FitResult(NamedTuple):
-    """Modes, what they leave, and the noise: near the first mode (of ``explain``: the last) and overall."""
+    """Modes, what they leave, and the noise: near the first mode (of ``explain``: the last) and overall.
+
+    ``alone`` is the record with all modes but the first taken out.
+    """
 
     modes: list[ModeEstimate]
     residual: _Array
+    alone: _Array
     noise_near: float
     noise_rms: float
 
 
 def fit_decay(
-    samples: Samples,
+    samples: SignalSamples,
     guesses: list[ModeEstimate],
     units: str,
     *,
     soften: bool = True,
     known: tuple[float, float] | None = None,
+    law: DampingLaw | None = None,
 ) -> FitResult:
     """Fit decaying modes to a signal, starting from *guesses* (the first is the one that softens most).
 
     Parameters
     ----------
-    samples : Samples
+    samples : SignalSamples
     guesses : list of ModeEstimate
     units : str
         Unit of the signal; tells displacement from velocity.
@@ -53,6 +62,8 @@ def fit_decay(
         Whether frequencies may depend on amplitude.
     known : (float, float), optional
         Softening kappa of the first mode and its standard deviation, known beforehand.
+    law : DampingLaw, optional
+        A second law by which the first mode is damped; its strength is fitted too.
 
     Raises
     ------
@@ -76,11 +87,14 @@ def fit_decay(
     if soften:
         for name, (mean, _) in prior.items():
             parameters.add(name, mean)
+    if law is not None:
+        parameters.add("h", law.strength, min=0.0, max=100.0)
+    name = "viscous" if law is None else law.name
     trifle = 1e-12 * float(np.abs(y).max())
     sigma = max(explain(samples, guesses, units, soften).noise_near, trifle)
 
     def residual(value: dict[str, float]) -> _Array:
-        design = _design(t, value, len(guesses), soften)
+        design = _design(t, value, len(guesses), soften, name)
         solution = _solve(design, y)
         parts = [(y - design @ solution) / sigma]
         if soften:
@@ -95,7 +109,7 @@ def fit_decay(
 
     search = lmfit.Minimizer(wrapped, parameters, scale_covar=False, calc_covar=False)
     value = dict(search.leastsq(xtol=1e-9, ftol=1e-9).params.valuesdict())
-    design = _design(t, value, len(guesses), soften)
+    design = _design(t, value, len(guesses), soften, name)
     solution = _solve(design, y)
     rest = y - design @ solution
     fitted = [value[f"f{i}"] for i in range(len(guesses))]
@@ -124,33 +138,40 @@ def fit_decay(
                 softening=value[f"s{i}"] / first**2 if soften else 0.0,
                 softening_se=error[f"s{i}"] * stretch / first**2 if soften else 0.0,
                 method="fit",
+                law=name if i == 0 else "viscous",
+                law_strength=value["h"] if law is not None and i == 0 else 0.0,
+                law_strength_se=error["h"] if law is not None and i == 0 else 0.0,
             )
         )
     rms = math.sqrt(float(rest @ rest) / max(y.size - free, 1))
-    return FitResult(modes, rest, near[0], rms)
+    alone = _alone(design, solution, rest, columns)
+    return FitResult(modes, rest, alone, near[0], rms)
 
 
-def explain(samples: Samples, modes: list[ModeEstimate], units: str, soften: bool) -> FitResult:
+def explain(samples: SignalSamples, modes: list[ModeEstimate], units: str, soften: bool) -> FitResult:
     """What given modes leave of a signal, their amplitudes and phases fitted, all else kept."""
     t = samples.time - samples.time[0]
     first = modes[0].amplitude ** 2
     value = {name: mean for name, (mean, _) in law_priors(units).items()}
     for i, mode in enumerate(modes):
         value |= {f"f{i}": mode.natural_freq, f"z{i}": mode.damping_ratio, f"s{i}": mode.softening * first}
-    design = _design(t, value, len(modes), soften)
-    rest = samples.values - design @ _solve(design, samples.values)
+    value["h"] = modes[0].law_strength
+    design = _design(t, value, len(modes), soften, modes[0].law)
+    solution = _solve(design, samples.values)
+    rest = samples.values - design @ solution
     free = design.shape[1] + 3 * len(modes)
     frequencies = [mode.natural_freq for mode in modes]
     lines = [0.0, *frequencies, *(2.0 * f for f in frequencies)]
     near = math.sqrt(white_variance(rest, samples.sampling_freq, frequencies[-1], lines, free))
-    return FitResult(modes, rest, near, math.sqrt(float(rest @ rest) / max(t.size - free, 1)))
+    alone = _alone(design, solution, rest, _columns(len(modes), soften))
+    return FitResult(modes, rest, alone, near, math.sqrt(float(rest @ rest) / max(t.size - free, 1)))
 
 
 def _errors(residual: Callable[[dict[str, float]], _Array], value: dict[str, float]) -> dict[str, float]:
     """Standard errors from the Jacobian at the minimum, by central differences."""
     columns = []
     for name, center in value.items():
-        step = {"f": 1e-7 * center, "z": 1e-4 * center}.get(name[0], 1e-5)
+        step = {"f": 1e-7 * center, "z": 1e-4 * center, "h": 1e-4}.get(name[0], 1e-5)
         sides = [residual({**value, name: center + sign * step}) for sign in (1.0, -1.0)]
         columns.append((sides[0] - sides[1]) / (2.0 * step))
     jacobian = np.column_stack(columns)
@@ -166,30 +187,53 @@ def _columns(count: int, soften: bool) -> list[int]:
     return [1 + 2 * i + (3 if soften and i > 0 else 0) for i in range(count)]
 
 
-def _design(t: _Array, value: dict[str, float], count: int, soften: bool) -> _Array:
+def _design(t: _Array, value: dict[str, float], count: int, soften: bool, law: str) -> _Array:
     columns = [np.ones_like(t)]
     omega0 = 2.0 * math.pi * value["f0"]
     delta0 = value["z0"] * omega0
-    fall = np.exp(-2.0 * delta0 * t)
-    steep = max(delta0, 1e-12)
-    first = (1.0 - fall) / (2.0 * steep)
-    second = (1.0 - fall**2) / (4.0 * steep)
+    own, fall, first, second = _first_envelope(t, delta0, law, value.get("h", 0.0))
     for i in range(count):
         omega = 2.0 * math.pi * value[f"f{i}"]
         zeta = value[f"z{i}"]
-        envelope = np.exp(-zeta * omega * t)
+        shape = own if i == 0 else np.exp(-zeta * omega * t)
         clock = t
         if soften:
             s = value[f"s{i}"]
             clock = t - s * first - (value["q"] * s * s * second if i == 0 else 0.0)
             if i == 0:
-                envelope = envelope * (1.0 + value["r"] * s * fall)
+                shape = shape * (1.0 + value["r"] * s * fall)
         turn = np.exp(1j * (omega * math.sqrt(1.0 - zeta * zeta)) * clock)
-        columns += [envelope * turn.real, envelope * turn.imag]
+        columns += [shape * turn.real, shape * turn.imag]
         if soften and i == 0:
             double = turn * turn
             columns += [fall, fall * double.real, fall * double.imag]
-    return np.column_stack(columns)
+    # whatever else moves slowly must not be told by the rate at which the mean shift of a softening mode falls
+    slow = np.polynomial.legendre.legvander(2.0 * (t - t[0]) / (t[-1] - t[0]) - 1.0, _SLOW)
+    return np.column_stack([*columns, *slow[:, 1:].T])
+
+
+def _first_envelope(
+    t: _Array, decay_rate: float, law: str, strength: float
+) -> tuple[_Array, _Array, _Array, _Array]:
+    """Envelope E of the first mode, E^2, and the integrals of E^2 and E^4 from the start."""
+    if law == "viscous":
+        own = np.exp(-decay_rate * t)
+        fall = own * own
+        steep = max(decay_rate, 1e-12)
+        return own, fall, (1.0 - fall) / (2.0 * steep), (1.0 - fall**2) / (4.0 * steep)
+    own = envelope(law, t, decay_rate, strength)
+    fall = own * own
+    first = cumulative_trapezoid(fall, t, initial=0.0)
+    return own, fall, first, cumulative_trapezoid(fall * fall, t, initial=0.0)
+
+
+def _alone(design: _Array, solution: _Array, rest: _Array, columns: list[int]) -> _Array:
+    """What is left of a record without all modes but the first."""
+    first = np.ones(solution.size, dtype=bool)
+    for column in columns[1:]:
+        first[column : column + 2] = False
+    alone: _Array = rest + design[:, first] @ solution[first]
+    return alone
 
 
 def _solve(design: _Array, y: _Array) -> _Array:

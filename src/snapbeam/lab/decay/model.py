@@ -20,6 +20,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import Finding, doubtful
+from snapbeam.lab.decay.drift import Line
+from snapbeam.lab.decay.poles import Stabilisation
+
 __all__ = ["DecayFit", "ModeEstimate", "law_priors"]
 
 _Array = NDArray[np.float64]
@@ -31,7 +35,9 @@ class ModeEstimate:
 
     ``natural_freq`` [Hz] at zero amplitude and ``damping_ratio``, with standard errors; ``amplitude`` at
     the start of the analysed part, in the unit of the signal; ``softening`` kappa in f = natural_freq (1 -
-    kappa a^2), per squared unit of the signal, where a is the amplitude of the first mode.
+    kappa a^2), per squared unit of the signal, where a is the amplitude of the first mode.  ``law`` is how it
+    is damped, "viscous", "dry" or "quadratic", the latter two beside viscous damping and ``law_strength``
+    times as strong at the start; the damping ratio is that of the viscous part.
     """
 
     natural_freq: float
@@ -44,6 +50,9 @@ class ModeEstimate:
     softening: float
     softening_se: float
     method: str
+    law: str = "viscous"
+    law_strength: float = 0.0
+    law_strength_se: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -53,7 +62,9 @@ class DecayFit:
     ``snr`` [dB] is that of the first mode at the start; ``backbone_amplitude`` and ``backbone_freq`` [Hz],
     with ``backbone_freq_se``, are the amplitude and frequency of the first mode over successive parts of
     the decay; ``envelope_time``, ``envelope`` its amplitude cycle by cycle; ``residual_whiteness`` the
-    noise near the first mode over the noise elsewhere, 1 if the model says it all.
+    noise near the first mode over the noise elsewhere; ``misfit`` what the fit leaves at the first mode over
+    what the noise about it explains, 1 if the model says it all.  ``lines`` are sines that do not decay, taken
+    out; ``poles`` the stabilisation diagram, where one was needed; ``findings`` what makes the result doubtful.
     """
 
     modes: tuple[ModeEstimate, ...]
@@ -63,12 +74,20 @@ class DecayFit:
     stop: float
     units: str
     residual_whiteness: float
-    notes: tuple[str, ...]
+    misfit: float
+    lines: tuple[Line, ...]
+    poles: Stabilisation | None = field(repr=False)
+    findings: tuple[Finding, ...]
     backbone_amplitude: _Array = field(repr=False)
     backbone_freq: _Array = field(repr=False)
     backbone_freq_se: _Array = field(repr=False)
     envelope_time: _Array = field(repr=False)
     envelope: _Array = field(repr=False)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The findings that make the result doubtful, in words."""
+        return tuple(one.words for one in doubtful(self.findings))
 
     @property
     def natural_freq(self) -> float:
@@ -91,17 +110,24 @@ class DecayFit:
             "amplitude_se",
             "softening",
             "softening_se",
+            "law_strength",
+            "law_strength_se",
         )
         return {
             "method": self.modes[0].method,
             "units": self.units,
-            "modes": [{name: float(getattr(mode, name)) for name in names} for mode in self.modes],
+            "modes": [
+                {"law": mode.law, **{name: float(getattr(mode, name)) for name in names}}
+                for mode in self.modes
+            ],
             "noise_rms": self.noise_rms,
             "snr_db": self.snr,
             "start_s": self.start,
             "stop_s": self.stop,
             "residual_whiteness": self.residual_whiteness,
-            "notes": list(self.notes),
+            "misfit": self.misfit,
+            "lines_hz": [line.frequency for line in self.lines],
+            "findings": [one.plain() for one in self.findings],
         }
 
 

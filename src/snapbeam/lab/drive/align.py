@@ -13,9 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, finite
-from snapbeam.lab.drive.vibrometer import DriveMeasurement, displacement_from_velocity, measure_drive
-from snapbeam.lab.signals.signal import Samples, check_signal
+from snapbeam.core.findings import Finding
+from snapbeam.core.validate import InputError, finite, shown
+from snapbeam.lab.drive.displacement import displacement_from_velocity
+from snapbeam.lab.drive.vibrometer import DriveMeasurement, measure_drive
+from snapbeam.lab.plausibility.alignment import KINDS
+from snapbeam.lab.signals.signal import SignalSamples, check_signal
 from snapbeam.lab.signals.sine_fit import SineFit, fit_sine
 
 if TYPE_CHECKING:
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Alignment", "align"]
 
 _Array = NDArray[np.float64]
+_SAME = 0.02  # share by which two calibrated amplitudes may differ
 _CERTAIN = 25.0  # chi-square by which the best cycle must beat the next
 
 
@@ -34,7 +38,8 @@ class Alignment:
     ``delay`` and ``delay_se`` in s; ``polarity`` is -1 if a motion that is positive for one is negative for
     the other; ``gain``, the camera's amplitude over the vibrometer's, is 1 if both are calibrated;
     ``clock_difference``, the camera's frequency over the vibrometer's less 1, and its standard error;
-    ``certain`` says whether the start of the motion told the cycle, ``margin`` by what chi-square.
+    ``certain`` says whether the start of the motion told the cycle, ``margin`` by what chi-square;
+    ``findings`` what makes the alignment doubtful.
     """
 
     delay: float
@@ -47,6 +52,7 @@ class Alignment:
     certain: bool
     margin: float
     period: float
+    findings: tuple[Finding, ...]
 
     @property
     def description(self) -> str:
@@ -55,15 +61,10 @@ class Alignment:
         text = (
             f"t_camera = t_vibrometer {sign} {abs(self.delay):.7f} s (standard error {self.delay_se:.1e} s)"
         )
+        if self.polarity < 0:
+            text += "; turned over (polarity -1)"
         if not self.certain:
-            text += (
-                f"; whole cycles of {self.period:.6g} s remain open: the start of the motion is not in both "
-                "records, or does not tell them apart"
-            )
-        if abs(self.clock_difference) > 4.0 * self.clock_difference_se:
-            text += f"; the clocks differ by {self.clock_difference:.1e}"
-        if abs(self.gain - 1.0) > max(4.0 * self.gain_se, 0.01):
-            text += f"; the camera sees {self.gain:.4f} times the vibrometer's amplitude: check the scales"
+            text += f"; whole cycles of {self.period:.6g} s remain open"
         return text
 
 
@@ -97,7 +98,7 @@ def align(
         If a signal is unfit, or the two do not oscillate at the same frequency.
     """
     if polarity not in (None, 1, -1):
-        raise InputError(f"polarity = {polarity!r}: must be 1, -1 or None")
+        raise InputError(f"polarity = {shown(polarity)}: must be 1, -1 or None")
     check_signal(camera, "m", "camera")
     seen = measure_drive(camera, frequency)
     check_signal(vibrometer, ("m/s", "m"), "vibrometer")
@@ -128,26 +129,64 @@ def align(
         delay, sign, best = ranked[0]
         margin = ranked[1][2] - best if len(ranked) > 1 else math.inf
         certain = margin > _CERTAIN and math.isfinite(best)
+    other = [c[2] for c in candidates if c[1] != sign]
+    own = min((c[2] for c in candidates if c[1] == sign), default=math.inf)
+    turned = bool(other) and math.isfinite(own) and min(other) - own > _CERTAIN
     delay, delay_se = _refine(camera, moved, seen, felt, delay, sign)
     gain = one.amplitude / two.amplitude
+    gain_se = gain * math.hypot(one.amplitude_se / one.amplitude, two.amplitude_se / two.amplitude)
+    told = _Told(
+        sign, polarity is not None, turned, certain, period, gain, gain_se, difference, difference_se
+    )
     return Alignment(
         delay=delay,
         delay_se=delay_se,
         polarity=sign,
         gain=gain,
-        gain_se=gain * math.hypot(one.amplitude_se / one.amplitude, two.amplitude_se / two.amplitude),
+        gain_se=gain_se,
         clock_difference=difference,
         clock_difference_se=difference_se,
         certain=certain,
         margin=margin,
         period=period,
+        findings=tuple(_findings(told)),
     )
 
 
-def _window(signal: xr.DataArray, start: float, stop: float) -> Samples:
+@dataclass(frozen=True)
+class _Told:
+    """What the findings of an alignment are drawn from; ``turned`` says that the start told the polarity."""
+
+    polarity: int
+    given: bool
+    turned: bool
+    certain: bool
+    period: float
+    gain: float
+    gain_se: float
+    clocks: float
+    clocks_se: float
+
+
+def _findings(told: _Told) -> list[Finding]:
+    found = []
+    if not told.given and not told.turned:
+        found.append(KINDS["polarity_open"].found())
+    elif told.polarity < 0:
+        found.append(KINDS["polarity"].found())
+    if not told.certain:
+        found.append(KINDS["cycle_open"].found(period_ms=1e3 * told.period))
+    if abs(told.gain - 1.0) > max(5.0 * told.gain_se, _SAME):
+        found.append(KINDS["amplitude"].found(gain=told.gain, error=told.gain_se))
+    if abs(told.clocks) > 4.0 * told.clocks_se:
+        found.append(KINDS["clocks"].found(difference=told.clocks))
+    return found
+
+
+def _window(signal: xr.DataArray, start: float, stop: float) -> SignalSamples:
     samples = check_signal(signal)
     inside = (samples.time >= start) & (samples.time < stop)
-    return Samples(samples.values[inside], samples.time[inside], samples.sampling_freq)
+    return SignalSamples(samples.values[inside], samples.time[inside], samples.sampling_freq)
 
 
 def _candidates(
@@ -209,7 +248,8 @@ def _refine(
     common = felt.steady.frequency
     if (stop - start) * common < 5.0:
         raise InputError(
-            f"camera and vibrometer share {(stop - start) * common:.1f} steady cycles: must be 5"
+            f"camera and vibrometer share {max((stop - start) * common, 0.0):.1f} steady cycles when their clocks are "
+            f"{delay:.4g} s apart: must be at least 5; record both from before the start, or give near (--near)"
         )
     one = fit_sine(_window(camera, start, stop), common, fixed=True)
     two = fit_sine(_window(moved, start - delay, stop - delay), common, fixed=True)

@@ -6,8 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.core.validate import InputError, positive
-from snapbeam.lab.drive.vibrometer import DriveMeasurement, displacement_from_velocity, measure_drive
+from snapbeam.core.findings import to_json
+from snapbeam.core.validate import InputError, choice, positive, shown
+from snapbeam.lab.drive.align import Alignment
+from snapbeam.lab.drive.displacement import displacement_from_velocity
+from snapbeam.lab.drive.vibrometer import DriveMeasurement, measure_drive
+from snapbeam.lab.plausibility.vibrometer import KINDS as VIBROMETER
 from snapbeam.lab.signals.signal import check_signal
 
 if TYPE_CHECKING:
@@ -22,6 +26,9 @@ def recorded_drive(
     *,
     bandwidth: float | None = None,
     measurement: DriveMeasurement | None = None,
+    alignment: Alignment | None = None,
+    polarity: int | None = None,
+    amplitude_from: str = "vibrometer",
 ) -> xr.Dataset:
     """Resample a measured drive, start-up transient included, for use in the model, without adding energy.
 
@@ -41,6 +48,12 @@ def recorded_drive(
         of the measured sampling rate.
     measurement : DriveMeasurement, optional
         That of this velocity; measured here if left out.
+    alignment : Alignment, optional
+        With the camera: turns the drive over where the vibrometer counts the other direction as positive.
+    polarity : {1, -1}, optional
+        -1 to turn the drive over, instead of what the alignment says.
+    amplitude_from : {"vibrometer", "camera"}
+        Whose amplitude the drive has; the camera's needs an alignment.
 
     Returns
     -------
@@ -51,7 +64,8 @@ def recorded_drive(
     Raises
     ------
     InputError
-        If the result could not hold the bandwidth, or the record is too short for the filter.
+        If the result could not hold the bandwidth, the record is too short for the filter, or its start-up is
+        broken by a dropout.
     """
     import xarray as xr
     from scipy.interpolate import CubicSpline
@@ -60,6 +74,10 @@ def recorded_drive(
     samples = check_signal(velocity, "m/s", "velocity")
     rate = positive("sampling_freq", sampling_freq, "Hz")
     drive = measurement or measure_drive(velocity)
+    if drive.startup is not None and not drive.has_start:
+        words = next(one.words for one in drive.findings if one.code == VIBROMETER["dropout_in_start"].code)
+        raise InputError(f"velocity: {words}; cut the record after its start-up, or record again")
+    scale = _scale(alignment, polarity, amplitude_from)
     top = 0.4 * samples.sampling_freq
     wanted = 10.0 * drive.steady.frequency if bandwidth is None else positive("bandwidth", bandwidth, "Hz")
     band = min(wanted, top)
@@ -71,7 +89,7 @@ def recorded_drive(
         raise InputError(
             f"sampling_freq = {rate:g} Hz: must be at least 2.5 times the bandwidth, {band:g} Hz"
         )
-    position = displacement_from_velocity(velocity, drive).values
+    position = scale * displacement_from_velocity(velocity, drive).values
     nyquist = samples.sampling_freq / 2.0
     width = 0.25 * band
     length, beta = kaiserord(80.0, width / nyquist)
@@ -100,9 +118,25 @@ def recorded_drive(
         {"time": ("time", time - start, {"units": "s", "long_name": "time since the start"})},
         {
             "frequency": drive.steady.frequency,
-            "velocity_amplitude": drive.steady.amplitude,
+            "velocity_amplitude": abs(scale) * drive.steady.amplitude,
+            "polarity": 1 if scale > 0.0 else -1,
+            "amplitude_from": amplitude_from,
+            "findings": to_json((*drive.findings, *(alignment.findings if alignment else ()))),
             "bandwidth": band,
             "begins_at_rest": int(drive.startup is not None),
             "source_start": start,
         },
     )
+
+
+def _scale(alignment: Alignment | None, polarity: int | None, amplitude_from: str) -> float:
+    """Factor from the vibrometer's motion to the drive's."""
+    choice("amplitude_from", amplitude_from, ("vibrometer", "camera"))
+    if polarity not in (None, 1, -1):
+        raise InputError(f"polarity (--polarity) = {shown(polarity)}: must be 1 or -1")
+    if amplitude_from == "camera" and alignment is None:
+        raise InputError(
+            "amplitude_from (--amplitude-from) = 'camera': needs an alignment with a camera (--camera)"
+        )
+    sign = polarity if polarity is not None else (alignment.polarity if alignment is not None else 1)
+    return float(sign) * (alignment.gain if alignment is not None and amplitude_from == "camera" else 1.0)

@@ -1,4 +1,4 @@
-"""What a laser vibrometer says about the shaker: steady sine, start-up transient, displacement.
+"""What a laser vibrometer says about the shaker: steady sine, start-up transient, flaws of the record.
 
 The paper accepts a test when the signal-to-noise ratio of the shaker's velocity exceeds 15 dB, and names the
 start-up transient as a cause of disagreement with simulations (sections 2 and 4.1).
@@ -13,20 +13,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, finite, within
-from snapbeam.lab.signals.signal import Samples, check_signal, make_signal
-from snapbeam.lab.signals.sine_fit import SineFit, fit_sine, spectral_peak
+from snapbeam.core.findings import Finding, doubtful
+from snapbeam.core.validate import InputError, finite, positive, within
+from snapbeam.lab.drive.onset import find_onset, moves_outside, moving_part
+from snapbeam.lab.drive.steady import robust_fit, settled_cycles, steady_fit, with_wander
+from snapbeam.lab.plausibility.vibrometer import KINDS
+from snapbeam.lab.signals.flaws import Clipping, Flaw, stuck_runs
+from snapbeam.lab.signals.signal import SignalSamples, check_signal
+from snapbeam.lab.signals.sine_fit import SineFit, spectral_peak
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["DriveMeasurement", "StartUp", "displacement_from_velocity", "measure_drive"]
+__all__ = ["SNR_LIMIT", "DriveMeasurement", "StartUp", "measure_drive"]
 
 _Array = NDArray[np.float64]
-_NOISE_FLOOR = 1e-6
-"""Of the amplitude: a record without noise is taken to have this much, or the sums that find its start
-would lose it to rounding."""
 SNR_LIMIT = 15.0
+_STEADY = 0.03  # share by which the cycles of a steady motion may stray
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,8 @@ class DriveMeasurement:
     ``steady`` is the sine fitted after the start-up; ``startup`` is None where the record begins in motion;
     ``stop`` [s] is the end of the motion or of the record; ``cycle_time`` [s] and ``cycle_amplitude`` follow
     the amplitude cycle by cycle; ``accepted`` says whether ``steady.sinad`` exceeds ``snr_limit`` [dB].
+    ``flaws`` are samples (first, one past the last) that are no part of the motion, ``clipping`` the levels
+    at which tops are cut off; ``findings`` what makes the result doubtful.
     """
 
     steady: SineFit
@@ -72,7 +77,9 @@ class DriveMeasurement:
     stop: float
     snr_limit: float
     units: str
-    notes: tuple[str, ...]
+    flaws: tuple[Flaw, ...]
+    clipping: Clipping
+    findings: tuple[Finding, ...]
     cycle_time: _Array = field(repr=False)
     cycle_amplitude: _Array = field(repr=False)
 
@@ -80,6 +87,17 @@ class DriveMeasurement:
     def accepted(self) -> bool:
         """Whether the steady motion is near enough to a sine: noise and distortion below the limit."""
         return self.steady.sinad > self.snr_limit
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The findings that make the result doubtful, in words."""
+        return tuple(one.words for one in doubtful(self.findings))
+
+    @property
+    def has_start(self) -> bool:
+        """Whether the start-up is in the record and sound."""
+        broken = KINDS["dropout_in_start"].code
+        return self.startup is not None and all(one.code != broken for one in self.findings)
 
     def summary(self) -> dict[str, Any]:
         """The figures as plain numbers and words, in SI, for a table or a JSON file."""
@@ -108,7 +126,7 @@ class DriveMeasurement:
             "overshoot": None if start is None else start.overshoot,
             "first_cycle_ratio": None if start is None else start.first_cycle_ratio,
             "startup": "the record begins in motion" if start is None else start.description,
-            "notes": list(self.notes),
+            "findings": [one.plain() for one in self.findings],
         }
 
 
@@ -116,10 +134,13 @@ def measure_drive(
     signal: xr.DataArray,
     frequency: float | None = None,
     *,
+    amplitude: float | None = None,
     snr_limit: float = SNR_LIMIT,
     tolerance: float = 0.05,
 ) -> DriveMeasurement:
     """Measure the shaker's motion: find where it starts and settles, and fit the steady sine.
+
+    Dropouts and tops that are cut off are found in what the sine leaves and kept out of the fit.
 
     Parameters
     ----------
@@ -127,6 +148,8 @@ def measure_drive(
         Velocity [m/s] or displacement [m] of the shaker.
     frequency : float, optional
         The excitation frequency [Hz] as set, used as a guess; the highest peak of the spectrum if left out.
+    amplitude : float, optional
+        The amplitude as set, in the unit of the signal, to check by.
     snr_limit : float
         Least ratio [dB] of the sine to noise and distortion of an acceptable test; the paper's 15 dB.
     tolerance : float
@@ -141,169 +164,166 @@ def measure_drive(
     samples = check_signal(signal, ("m/s", "m"), "signal")
     limit = finite("snr_limit", snr_limit)
     tol = within("tolerance", tolerance, 0.0, 0.5)
+    stated = None if amplitude is None else positive("amplitude", amplitude)
     guess = spectral_peak(samples) if frequency is None else frequency
-    first, last = _moving_part(samples, guess)
+    first, last = moving_part(samples, guess)
     moving = _slice(samples, first, last)
+    outside = moves_outside(samples, guess, first, last)
     span = moving.values.size / samples.sampling_freq * guess
     if span < 8.0:
         raise InputError(
             f"signal: the shaker moves for {span:.1f} cycles of {guess:g} Hz: must be at least 8"
         )
-    rough = fit_sine(_slice(moving, moving.values.size // 3, None), guess, 3)
-    notes = []
-
-    onset, uncertainty = _onset(samples, first, rough)
-    start = samples.time[0] if onset is None else onset
+    rough = robust_fit(_slice(moving, moving.values.size // 3, None), guess, 3)
+    onset, uncertainty = find_onset(samples, first, rough)
+    start = float(samples.time[0]) if onset is None else onset
     period = 1.0 / rough.frequency
     stop = float(moving.time[-1]) + 1.0 / samples.sampling_freq
     times, cycles = _cycle_phasors(samples, rough, start, stop)
     noise = rough.noise_rms * math.sqrt(2.0 / (period * samples.sampling_freq))
     tol = max(tol, 4.0 * noise / rough.amplitude)
-    settled = 0
-    for _ in range(3):
-        reference = np.median(cycles[max(settled, cycles.size // 3) :].real) + 1j * np.median(
-            cycles[max(settled, cycles.size // 3) :].imag
-        )
-        off = np.flatnonzero(np.abs(cycles / reference - 1.0) > tol)
-        early = off[off < cycles.size // 2]
-        settled = int(early[-1]) + 1 if early.size else 0
-    late = off[off >= cycles.size // 2]
-    if late.size > 0.05 * cycles.size:
-        notes.append(f"{late.size} of {cycles.size} cycles stray from the steady sine late in the record")
-    margin = 0 if settled == 0 else max(2 * settled, 5)
+    settled, stray = settled_cycles(cycles, tol)
+    margin = 1 if settled == 0 else max(2 * settled, 5)
     begin = start + min(settled + margin, max(settled, cycles.size // 2)) * period
-    steady = fit_sine(_between(samples, begin, stop - 0.25 * period), rough.frequency)
+    part = _between(samples, begin, stop - 0.25 * period)
+    steady, flaws, clipping = steady_fit(part, rough.frequency)
     if steady.cycles < 5.0:
         raise InputError(f"signal: only {steady.cycles:.1f} cycles of steady motion: must be at least 5")
-    amplitudes = np.abs(cycles)
+    shift = int(np.searchsorted(samples.time, part.time[0] - 0.25 / samples.sampling_freq))
+    everywhere = [Flaw(flaw.first + shift, flaw.last + shift) for flaw in flaws]
+    steady, wander = with_wander(steady, times, cycles, everywhere, samples, begin)
     startup = None
+    amplitudes = np.abs(cycles)
+    broken: list[Flaw] = []
     if onset is not None:
-        peak = float(amplitudes[: settled + 1].max() / steady.amplitude - 1.0)
-        startup = StartUp(
-            onset=onset,
-            onset_uncertainty=uncertainty,
-            duration=settled * period,
-            cycles=float(settled),
-            overshoot=peak if peak > tol else 0.0,
-            first_cycle_ratio=float(amplitudes[0] / steady.amplitude),
-            tolerance=tol,
-        )
-    if steady.sinad <= limit:
-        cause = "noise" if steady.snr <= limit else "distortion"
-        notes.append(f"sine to noise and distortion {steady.sinad:.1f} dB, not above {limit:g} dB: {cause}")
+        startup = _start_up(onset, uncertainty, settled, period, amplitudes, steady.amplitude, tol)
+        broken = _broken_start(samples, onset, onset + settled * period, steady, clipping)
+    findings = [
+        *_flaw_findings(samples, everywhere, broken, clipping),
+        *_doubts(steady, limit, wander, stray, frequency, stated),
+        *_start_findings(startup, period),
+        *([KINDS["interrupted"].found(outside_ms=1e3 * outside)] if outside > 3.0 * period else []),
+    ]
     return DriveMeasurement(
         steady=steady,
         startup=startup,
         stop=stop,
         snr_limit=limit,
         units=str(signal.attrs["units"]),
-        notes=tuple(notes),
+        flaws=(*broken, *everywhere),
+        clipping=clipping,
+        findings=tuple(findings),
         cycle_time=times,
         cycle_amplitude=amplitudes,
     )
 
 
-def displacement_from_velocity(
-    velocity: xr.DataArray, measurement: DriveMeasurement | None = None
-) -> xr.DataArray:
-    """Integrate the shaker's velocity to its displacement [m] without drift.
-
-    The velocity's cubic spline is integrated exactly.  What noise and offset add is a slow drift; it is found
-    where the truth is known, at rest (zero) and in steady motion (zero mean over a cycle), as a smoothing
-    spline that follows nothing faster than about four cycles, and subtracted.  The start-up transient is
-    bridged, so it keeps its shape.  The shaker's suspension is taken to hold its mean position.
-
-    Parameters
-    ----------
-    velocity : xarray.DataArray
-        Velocity [m/s].
-    measurement : DriveMeasurement, optional
-        That of this velocity; measured here if left out.
-
-    Raises
-    ------
-    InputError
-        As :func:`measure_drive`.
-    """
-    from scipy.interpolate import CubicSpline, make_smoothing_spline
-
-    samples = check_signal(velocity, "m/s", "velocity")
-    drive = measurement or measure_drive(velocity)
-    period = 1.0 / drive.steady.frequency
-    time = samples.time
-    quiet_until = time[0] if drive.startup is None else drive.startup.onset - drive.startup.onset_uncertainty
-    spline = CubicSpline(time, samples.values - drive.steady.offset)
-    position, integral = spline.antiderivative(1), spline.antiderivative(2)
-    settled = drive.steady.start if drive.startup is None else drive.startup.onset + drive.startup.duration
-    edges = [np.arange(settled, drive.steady.stop - period, period)]
-    if quiet_until - time[0] > period:
-        edges.append(np.arange(quiet_until - period, time[0], -period)[::-1])
-    if time[-1] - drive.stop > 10.0 * period:
-        edges.append(np.arange(drive.stop + 5.0 * period, time[-1] - period, period))
-    edge = np.sort(np.concatenate(edges))
-    mean = (integral(edge + period) - integral(edge)) / period
-    scaled = (edge + 0.5 * period - time[0]) / period
-    drift = make_smoothing_spline(scaled, mean, lam=(4.0 / (2.0 * math.pi)) ** 4)
-    values = position(time) - drift((time - time[0]) / period)
-    return make_signal(
-        values,
-        "m",
-        samples.sampling_freq,
-        start=float(time[0]),
-        name="shaker displacement",
-        attrs={key: value for key, value in velocity.attrs.items() if key not in ("units", "long_name")},
+def _start_up(
+    onset: float,
+    uncertainty: float,
+    settled: int,
+    period: float,
+    amplitudes: _Array,
+    steady: float,
+    tol: float,
+) -> StartUp:
+    peak = float(amplitudes[: settled + 1].max() / steady - 1.0)
+    return StartUp(
+        onset=onset,
+        onset_uncertainty=uncertainty,
+        duration=settled * period,
+        cycles=float(settled),
+        overshoot=peak if peak > tol else 0.0,
+        first_cycle_ratio=float(amplitudes[0] / steady),
+        tolerance=tol,
     )
 
 
-def _slice(samples: Samples, first: int, last: int | None) -> Samples:
-    return Samples(samples.values[first:last], samples.time[first:last], samples.sampling_freq)
+def _broken_start(
+    samples: SignalSamples, onset: float, end: float, steady: SineFit, clipping: Clipping
+) -> list[Flaw]:
+    """Values that stand still, or jump farther than the motion can, between the onset and the steady motion.
+
+    The first quarter of a cycle may jump: a velocity can begin anywhere.
+    """
+    quarter = 0.25 / steady.frequency
+    inside = np.flatnonzero((samples.time > onset + quarter) & (samples.time < end + 4.0 * quarter))
+    if inside.size < 8:
+        return []
+    first = int(inside[0])
+    values = samples.values[inside]
+    fastest = 2.0 * math.pi * steady.frequency / samples.sampling_freq * 2.5 * steady.amplitude
+    steps = np.abs(np.diff(values))
+    jumps = np.flatnonzero(steps > max(fastest, 0.3 * steady.amplitude) + 8.0 * steady.noise_rms)
+    least = max(5, int(0.06 * samples.sampling_freq / steady.frequency))
+    cut = clipping.touches(values)
+    found = [run for run in stuck_runs(values, least) if not cut[run.first]]
+    if jumps.size >= 2:
+        found.append(Flaw(int(jumps[0]), int(jumps[-1]) + 2))
+    elif jumps.size:
+        found.append(Flaw(int(jumps[0]), int(jumps[0]) + 2))
+    return [Flaw(flaw.first + first, flaw.last + first) for flaw in found]
 
 
-def _between(samples: Samples, start: float, stop: float) -> Samples:
+def _flaw_findings(
+    samples: SignalSamples, flaws: list[Flaw], broken: list[Flaw], clipping: Clipping
+) -> list[Finding]:
+    told = []
+    for name, some in (("dropout", flaws), ("dropout_in_start", broken)):
+        if some:
+            total = sum(flaw.last - flaw.first for flaw in some) / samples.sampling_freq
+            at = float(samples.time[some[0].first])
+            told.append(KINDS[name].found(count=len(some), total_ms=1e3 * total, at=at))
+    if clipping.found:
+        told.append(KINDS["clipped"].found(share_percent=100.0 * clipping.share))
+    return told
+
+
+def _doubts(
+    steady: SineFit,
+    limit: float,
+    wander: float,
+    stray: float,
+    frequency: float | None,
+    stated: float | None,
+) -> list[Finding]:
+    told = []
+    noise = steady.noise_rms * math.sqrt(2.0 * steady.cycles / steady.samples) / steady.amplitude
+    if wander > max(_STEADY, 3.0 * noise) or stray > 0.05:
+        told.append(KINDS["unsteady"].found(stray_percent=100.0 * max(wander, stray)))
+    if frequency is not None and abs(steady.frequency - frequency) > max(
+        0.002 * frequency, 6.0 * steady.frequency_se
+    ):
+        told.append(KINDS["frequency"].found(found=steady.frequency, stated=frequency))
+    if stated is not None and abs(steady.amplitude - stated) > max(0.05 * stated, 6.0 * steady.amplitude_se):
+        share = 100.0 * (steady.amplitude / stated - 1.0)
+        told.append(KINDS["amplitude"].found(found=steady.amplitude, stated=stated, share_percent=share))
+    if steady.sinad <= limit:
+        cause = "noisy" if steady.snr <= limit else "distorted"
+        told.append(KINDS[cause].found(sinad_db=steady.sinad, limit_db=limit))
+    return told
+
+
+def _start_findings(startup: StartUp | None, period: float) -> list[Finding]:
+    if startup is None:
+        return [KINDS["no_rest"].found()]
+    if startup.onset_uncertainty > 0.05 * period:
+        return [KINDS["slow_start"].found(uncertainty_ms=1e3 * startup.onset_uncertainty)]
+    return []
+
+
+def _slice(samples: SignalSamples, first: int, last: int | None) -> SignalSamples:
+    return SignalSamples(samples.values[first:last], samples.time[first:last], samples.sampling_freq)
+
+
+def _between(samples: SignalSamples, start: float, stop: float) -> SignalSamples:
     inside = np.flatnonzero((samples.time >= start) & (samples.time < stop))
     if inside.size == 0:
         return _slice(samples, 0, 0)
     return _slice(samples, int(inside[0]), int(inside[-1]) + 1)
 
 
-def _moving_part(samples: Samples, frequency: float) -> tuple[int, int]:
-    """First and last (exclusive) sample of the longest stretch that oscillates at *frequency*."""
-    n = samples.values.size
-    width = max(3, round(samples.sampling_freq / frequency))
-    if width >= n:
-        return 0, n
-    turn = np.exp(-2j * math.pi * frequency * (samples.time - samples.time[0]))
-    total = np.concatenate(([0.0], np.cumsum((samples.values - np.median(samples.values)) * turn)))
-    level = np.abs(total[width:] - total[:-width]) / width
-    on = level > 0.3 * np.quantile(level, 0.9)
-    bounds = np.flatnonzero(np.diff(np.concatenate(([0], on.astype(np.int8), [0]))))
-    runs = bounds.reshape(-1, 2)
-    longest = runs[np.argmax(runs[:, 1] - runs[:, 0])]
-    return int(longest[0]), min(int(longest[1]) + width - 1, n)
-
-
-def _onset(samples: Samples, first: int, rough: SineFit) -> tuple[float | None, float]:
-    """Time the motion starts, the likeliest change of variance; None where the record begins in motion."""
-    width = round(samples.sampling_freq / rough.frequency)
-    quiet = samples.values[:first]
-    if quiet.size < max(8, width // 8):
-        return None, 0.0
-    rest = float(np.median(quiet))
-    noise = max(float(np.std(quiet)), _NOISE_FLOOR * rough.amplitude)
-    level = rough.amplitude / math.sqrt(2.0)
-    if noise > 0.5 * level:
-        return None, 0.0
-    begin, end = max(quiet.size - width, 0), min(first + 2 * width, samples.values.size)
-    square = (samples.values[begin:end] - rest) ** 2
-    gain = 0.5 * square * (1.0 / noise**2 - 1.0 / level**2) - math.log(level / noise)
-    after = np.concatenate((np.cumsum(gain[::-1])[::-1], [0.0]))
-    at = begin + int(np.argmax(after))
-    hidden = min(noise / rough.amplitude, 1.0)
-    uncertainty = (1.0 + hidden * width / (2.0 * math.pi)) / samples.sampling_freq
-    return float(samples.time[min(at, samples.time.size - 1)]), uncertainty
-
-
-def _cycle_phasors(samples: Samples, fit: SineFit, start: float, stop: float) -> tuple[_Array, Any]:
+def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: float) -> tuple[_Array, Any]:
     """Middle [s] and complex amplitude, turning with the fitted sine, of each whole cycle."""
     period = 1.0 / fit.frequency
     count = int((stop - start) * fit.frequency + 1e-6)

@@ -1,4 +1,4 @@
-"""Files of measured time series: CSV, WAV, UFF-58, TDMS, HDF5 and NumPy, read into signals and written back.
+"""Files of measured time series, read into signals and written back.
 
 Units are stated, by the file or by the caller, or the file is refused; a file and a caller that
 contradict each other are refused too.  Whatever a reading library trips over comes out as an
@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.validate import InputError, InputTypeError, positive
-from snapbeam.lab.signals.formats import READERS, WRITERS, Channel
-from snapbeam.lab.signals.signal import check_signal, make_signal, parse_sensitivity, si_unit
+from snapbeam.core.validate import InputError, InputTypeError, positive, shown
+from snapbeam.lab.signals.formats.channel import Channel, Told
+from snapbeam.lab.signals.formats.registry import READERS, WRITERS
+from snapbeam.lab.signals.signal import check_signal, make_signal
+from snapbeam.lab.signals.units import parse_sensitivity, si_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,7 +27,9 @@ if TYPE_CHECKING:
 __all__ = ["read_channels", "read_signal", "write_signal"]
 
 
-def read_channels(path: str | os.PathLike[str], sampling_freq: float | None = None) -> list[Channel]:
+def read_channels(
+    path: str | os.PathLike[str], sampling_freq: float | None = None, columns: str | None = None
+) -> list[Channel]:
     """Return every channel of a file as a SEP 5 dictionary, in the units of the file.
 
     Parameters
@@ -48,7 +52,7 @@ def read_channels(path: str | os.PathLike[str], sampling_freq: float | None = No
         If the file is missing, cut short, of no known kind, without sampling rate, or without a channel.
     """
     if not isinstance(path, (str, os.PathLike)):
-        raise InputTypeError(f"path = {path!r}: must be a path, not {type(path).__name__}")
+        raise InputTypeError(f"path = {shown(path)}: must be a path, not {type(path).__name__}")
     source = Path(path)
     reader = READERS.get(source.suffix.lower())
     if reader is None:
@@ -61,7 +65,7 @@ def read_channels(path: str | os.PathLike[str], sampling_freq: float | None = No
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            channels = reader(source, rate)
+            channels = reader(source, Told(rate, columns))
     except InputError as error:
         raise InputError(error.args[0] if str(source) in str(error) else f"{source}: {error}") from error
     except ImportError as error:
@@ -85,7 +89,7 @@ def read_channels(path: str | os.PathLike[str], sampling_freq: float | None = No
         if told is None and "time" not in channel:
             if rate is None:
                 raise InputError(
-                    f"{source}: {channel['name']} has no sampling rate; state sampling_freq (Hz)"
+                    f"{source}: {channel['name']} has no sampling rate; state sampling_freq (--sampling-freq) in Hz"
                 )
             channel["fs"] = rate
     return channels
@@ -98,6 +102,7 @@ def read_signal(
     units: str | None = None,
     sensitivity: str | None = None,
     sampling_freq: float | None = None,
+    columns: str | None = None,
 ) -> xr.DataArray:
     """Read one channel of a file as a signal in SI.
 
@@ -126,12 +131,12 @@ def read_signal(
         Naming the file and the field: a missing or contradicting unit, an unknown channel, NaN, times that
         do not increase or have gaps, a truncated file.
     """
-    channels = read_channels(path, sampling_freq)
+    channels = read_channels(path, sampling_freq, columns)
     names = [entry["name"] for entry in channels]
     listing = ", ".join(repr(name) for name in names)
     if channel is None:
         if len(channels) > 1:
-            raise InputError(f"{path}: holds the channels {listing}; choose one with channel")
+            raise InputError(f"{path}: holds the channels {listing}; choose one with channel (--channel)")
         entry = channels[0]
     elif isinstance(channel, int) and not isinstance(channel, bool):
         if not 0 <= channel < len(channels):
@@ -152,16 +157,22 @@ def _to_signal(entry: Channel, units: str | None, sensitivity: str | None, sourc
     if stated and units and si_unit(name, stated) != si_unit(name, units):
         raise InputError(f"{name} is in {stated!r} but units = {units!r} was given")
     unit = stated or units
-    if unit is None:
-        raise InputError(f"{name} has no stated unit; state units, such as 'mm/s'")
-    factor, base = si_unit(name, unit)
+    if unit is None and sensitivity is None:
+        raise InputError(
+            f"{name} has no stated unit; state units (--units), such as 'mm/s', or sensitivity (--sensitivity)"
+        )
+    scale, target, per = (
+        (1.0, "", "") if sensitivity is None else parse_sensitivity("sensitivity", sensitivity)
+    )
+    factor, base = si_unit(name, unit or per)
     if sensitivity is not None:
-        scale, target, per = parse_sensitivity("sensitivity", sensitivity)
         if per != base:
             raise InputError(f"{name} is in {unit!r} but sensitivity = {sensitivity!r} is per {per}")
         factor, base = factor * scale, target
     elif base == "FS":
-        raise InputError(f"{name} is a fraction of full scale; state sensitivity, such as '0.5 m/s/FS'")
+        raise InputError(
+            f"{name} is a fraction of full scale; state sensitivity (--sensitivity), such as '0.5 m/s/FS'"
+        )
     data = np.asarray(entry["data"], dtype=np.float64)
     bad = np.flatnonzero(~np.isfinite(data))
     if bad.size:

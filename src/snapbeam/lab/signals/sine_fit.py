@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.validate import InputError, integer, positive
-from snapbeam.lab.signals.signal import Samples
+from snapbeam.lab.signals.signal import SignalSamples
 
 __all__ = ["SineFit", "fit_sine", "spectral_peak", "white_variance"]
 
@@ -91,7 +91,7 @@ def _decibel(power: float, other: float) -> float:
     return 10.0 * math.log10(power / other) if other > 0.0 else math.inf
 
 
-def spectral_peak(samples: Samples, low: float = 0.0, high: float | None = None) -> float:
+def spectral_peak(samples: SignalSamples, low: float = 0.0, high: float | None = None) -> float:
     """Frequency [Hz] of the highest peak of the spectrum (Hann window, parabola through its logarithm).
 
     Raises
@@ -136,17 +136,23 @@ def white_variance(
         near &= np.abs(line - other) > 2.0
     if near.sum() < 16:
         return float(residual @ residual / max(n - free, 1))
-    return float(power[near].mean())
+    mean, robust = float(power[near].mean()), float(np.median(power[near])) / math.log(2.0)
+    return robust if mean > 3.0 * robust else mean  # a line beside is no noise
 
 
 def fit_sine(
-    samples: Samples, frequency: float | None = None, harmonics: int = 10, *, fixed: bool = False
+    samples: SignalSamples,
+    frequency: float | None = None,
+    harmonics: int = 10,
+    *,
+    fixed: bool = False,
+    keep: NDArray[np.bool_] | None = None,
 ) -> SineFit:
     """Fit a sine, its harmonics and an offset to evenly sampled numbers.
 
     Parameters
     ----------
-    samples : Samples
+    samples : SignalSamples
         From :func:`~snapbeam.lab.signals.signal.check_signal`.
     frequency : float, optional
         A guess [Hz]; the highest peak of the spectrum if left out.
@@ -154,6 +160,8 @@ def fit_sine(
         Multiples to fit, the sine itself included; those above 0.95 of the Nyquist frequency are left out.
     fixed : bool
         Whether *frequency* is known and kept.
+    keep : bool array, optional
+        Samples to use; all if left out.
 
     Returns
     -------
@@ -174,6 +182,9 @@ def fit_sine(
     y, time, rate = samples
     guess = spectral_peak(samples) if frequency is None else positive("frequency", frequency, "Hz")
     n = y.size
+    used = np.ones(n, dtype=bool) if keep is None else np.asarray(keep, dtype=bool)
+    if np.count_nonzero(used) < 0.2 * n:
+        raise InputError(f"signal: only {np.count_nonzero(used)} of {n} samples are sound")
     span = n / rate
     if guess >= rate / 2:
         raise InputError(f"frequency = {guess:g} Hz: must lie below half the sampling rate, {rate / 2:g} Hz")
@@ -182,14 +193,15 @@ def fit_sine(
     count = max(1, min(integer("harmonics", harmonics, 1, 100), int(0.95 * rate / 2 / guess), (n - 4) // 8))
     middle = float(time[0] + (n - 1) / (2 * rate))
     t = time - middle
+    where, target = t[used], y[used]
     omega = 2.0 * math.pi * guess
     for _ in range(1 if fixed else 30):
-        design = _design(t, omega, count)
-        solution = _least_squares(design, y)
-        slope = _slope(t, design, solution)
+        design = _design(where, omega, count)
+        solution = _least_squares(design, target)
+        slope = _slope(where, design, solution)
         if fixed:
             break
-        step = _least_squares(np.column_stack((design, slope)), y - design @ solution)[-1]
+        step = _least_squares(np.column_stack((design, slope)), target - design @ solution)[-1]
         limit = math.pi / span
         omega += float(np.clip(step, -limit, limit))
         if abs(omega / (2.0 * math.pi) - guess) > 2.0 / span:
@@ -198,10 +210,11 @@ def fit_sine(
             )
         if abs(step) < 1e-11 * omega:
             break
-    design = _design(t, omega, count)
-    solution = _least_squares(design, y)
-    slope = _slope(t, design, solution)
-    residual = y - design @ solution
+    design = _design(where, omega, count)
+    solution = _least_squares(design, target)
+    slope = _slope(where, design, solution)
+    residual = np.zeros(n)
+    residual[used] = (target - design @ solution) * math.sqrt(n / target.size)
     full = design if fixed else np.column_stack((design, slope * (2.0 * math.pi)))
     scale = np.linalg.norm(full, axis=0)
     free = full.shape[1]

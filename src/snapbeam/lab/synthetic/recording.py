@@ -2,33 +2,38 @@
 it.
 
 An ideal scene of a beam and a rounded shaker with a sticker is drawn as sharp edges, blurred by the optics,
-integrated over each pixel and over the exposure, lit unevenly, and given noise and a finite bit depth.  The
+integrated over each pixel and over the exposure, lit unevenly, spoiled as asked, and given noise and a finite
+bit depth.  The optics are a Gaussian, as the tracker assumes, or a lens out of focus, as it does not.  The
 truth is the mean of the displacement over each exposure, exactly, for motion that is linear between the given
 samples.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError, axis, finite, finite_array, integer
+from snapbeam.core.validate import InputError, axis, choice, finite, finite_array, integer
 from snapbeam.lab.camera.write import write_photron, write_video
-from snapbeam.lab.synthetic.exposure import expose, step_table
+from snapbeam.lab.synthetic.area import AreaPicture
+from snapbeam.lab.synthetic.defects import Defects
+from snapbeam.lab.synthetic.picture import GaussianPicture, glare_light, lamp_light
+from snapbeam.lab.synthetic.sensor import read_out, with_fixture
 from snapbeam.lab.synthetic.setup import SyntheticCamera, SyntheticStage
-from snapbeam.lab.tracking.edges import Floats, edge_profile
-from snapbeam.lab.tracking.scene import Orientation
+from snapbeam.lab.tracking.edges import Floats
+from snapbeam.lab.tracking.geometry import Orientation
 from snapbeam.runs.schema import trajectory_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["SyntheticCamera", "SyntheticRecording", "SyntheticStage", "render_recording"]
+__all__ = ["Defects", "SyntheticCamera", "SyntheticRecording", "SyntheticStage", "render_recording"]
 
 
 class SyntheticRecording:
@@ -45,19 +50,26 @@ class SyntheticRecording:
         self,
         camera: SyntheticCamera,
         stage: SyntheticStage,
+        defects: Defects,
         truth: xr.Dataset,
         instants: _Instants,
-        spoiled: dict[str, frozenset[int]],
         seed: int,
     ) -> None:
         self.camera = camera
         self.stage = stage
+        self.defects = defects
         self.truth = truth
         self.seed = seed
         self._instants = instants
         self._turn = Orientation(stage.side, camera.shape)
-        self._picture = _Picture(camera, stage, instants.zero_row)
-        self._spoiled = spoiled
+        self._picture = (
+            GaussianPicture(camera, stage)
+            if camera.lens == "gaussian"
+            else AreaPicture(camera, stage, defects.texture, seed)
+        )
+        shape = self._picture.outline
+        self._lamp = lamp_light(camera, shape.height, shape.width)
+        self._spoiled = defects.frames(len(self))
 
     def __len__(self) -> int:
         return int(self.truth.sizes["time"])
@@ -65,22 +77,33 @@ class SyntheticRecording:
     def frame(self, index: int) -> NDArray[np.uint16]:
         """One frame, integers (height, width)."""
         index = integer("index", index, 0, len(self) - 1)
-        if index in self._spoiled.get("blank", ()):
+        if index in self._spoiled["blank"]:
             return np.zeros(self.camera.shape, dtype=np.uint16)
-        if index > 0 and index in self._spoiled.get("repeated", ()):
+        if index > 0 and index in self._spoiled["repeated"]:
             return self.frame(index - 1)
-        beam, tip = self._instants.rows(index)
-        blurred = index in self._spoiled.get("blurred", ())
-        light = self._picture.draw(beam, tip, blurred=blurred)
-        if index in self._spoiled.get("glare", ()):
-            light = light + self._picture.glare(float(beam.mean()))
-        full = 2**self.camera.bit_depth - 1
-        if math.isfinite(self.camera.snr_db):
-            noise = abs(self.stage.beam - self.stage.background) / 10.0 ** (self.camera.snr_db / 20.0)
-            rng = np.random.default_rng([self.seed, index])
-            light = light + noise * rng.standard_normal(light.shape, dtype=np.float32)
-        grey = np.clip(np.rint(light * full), 0, full).astype(np.uint16)
+        rng = np.random.default_rng([self.seed, index])
+        grey = read_out(self._light(index), self.camera, self.stage, self.defects, rng)
         return _turn_back(self._turn, grey)
+
+    def _light(self, index: int) -> NDArray[np.float32]:
+        """Light of one frame on the sensor, shares of full scale, shaker below."""
+        defects, shape = self.defects, self._picture.outline
+        beam, tip = self._instants.rows(index)
+        shift = defects.drift * index / max(len(self) - 1, 1)
+        if index in self._spoiled["hidden"]:
+            beam = beam - 10.0 * shape.height
+        light = self._picture.draw(beam + shift, tip + shift, blurred=index in self._spoiled["blurred"])
+        if defects.fixture is not None:
+            light = with_fixture(light, defects.fixture, shift, self.camera.blur)
+        light = light * self._lamp
+        if index in self._spoiled["glare"]:
+            light = light + glare_light(
+                shape.height, shape.width, float(beam.mean()), defects.glare_strength, defects.glare_wide
+            )
+        if defects.flicker:
+            turn = 2.0 * math.pi * 100.0 * index / self.camera.frame_rate
+            light = light * np.float32(1.0 + defects.flicker * math.sin(turn))
+        return light
 
     def __iter__(self) -> Iterator[NDArray[np.uint16]]:
         for index in range(len(self)):
@@ -159,57 +182,6 @@ class _Instants:
         return beam, self.zero_row - np.interp(at, self.time, self.shaker) / size
 
 
-class _Picture:
-    """Draws the turned scene, shaker below."""
-
-    def __init__(self, camera: SyntheticCamera, stage: SyntheticStage, zero_row: float) -> None:
-        upright = stage.side in ("below", "above")
-        self.height, self.width = camera.shape if upright else camera.shape[::-1]
-        size = camera.pixel_size
-        self.stage = stage
-        self.thickness = stage.beam_thickness / size
-        self.centre = (self.width - 1) / 2.0
-        x = np.arange(self.width) - self.centre
-        self.slope = stage.slope * x
-        radius, half = stage.tip_radius / size, 0.5 * stage.shaker_width / size
-        reach = np.minimum(np.abs(x), radius)
-        self.profile = radius - np.sqrt(radius * radius - reach * reach)
-        self.cover = edge_profile(x + half, camera.blur) - edge_profile(x - half, camera.blur)
-        self.cover[self.cover < 1e-6] = 0.0
-        self.marker = (stage.marker_distance / size, (stage.marker_distance + stage.marker_thickness) / size)
-        self.tables = {False: step_table(camera.blur), True: step_table(camera.blur + 4.0)}
-        across = 1.0 + camera.light[0] * (x / self.width)
-        down = 1.0 + camera.light[1] * (np.arange(self.height) / self.height - 0.5)
-        self.light = (down[:, None] * across[None, :]).astype(np.float32)
-
-    def draw(self, beam: Floats, tip: Floats, *, blurred: bool) -> NDArray[np.float32]:
-        """Light of one exposure without noise."""
-        stage = self.stage
-        steps = np.zeros((self.height, self.width))
-        steps[0] = stage.background
-        expose(
-            steps,
-            beam - 0.5 * self.thickness,
-            tip + 0.5 * self.thickness,
-            self.slope,
-            self.thickness,
-            self.profile,
-            self.cover,
-            *self.marker,
-            stage.beam - stage.background,
-            stage.shaker - stage.background,
-            stage.marker - stage.shaker if stage.marker_thickness > 0.0 else 0.0,
-            self.tables[blurred],
-        )
-        return np.cumsum(steps, axis=0).astype(np.float32) * self.light
-
-    def glare(self, row: float) -> NDArray[np.float32]:
-        """A reflection that saturates the beam about the contact."""
-        rows = (np.arange(self.height) - row) / (0.12 * self.height)
-        columns = (np.arange(self.width) - self.centre) / (0.3 * self.width)
-        return (4.0 * np.exp(-(rows[:, None] ** 2) - columns[None, :] ** 2)).astype(np.float32)
-
-
 def _turn_back(turn: Orientation, picture: NDArray[np.uint16]) -> NDArray[np.uint16]:
     if turn.side in ("above", "left"):
         picture = picture[::-1]
@@ -223,13 +195,11 @@ def render_recording(
     *,
     camera: SyntheticCamera | None = None,
     stage: SyntheticStage | None = None,
+    defects: Defects | None = None,
     rest_frames: int = 10,
     zero_row: float | None = None,
-    glare_frames: Sequence[int] = (),
-    blurred_frames: Sequence[int] = (),
-    repeated_frames: Sequence[int] = (),
-    blank_frames: Sequence[int] = (),
     seed: int = 0,
+    **spoiled: Any,
 ) -> SyntheticRecording:
     """Draw what a high-speed camera would see of a known motion.
 
@@ -243,15 +213,17 @@ def render_recording(
         where equal.
     camera, stage
         The camera and the scene; the paper's camera at 384 x 384 pixels unless given.
+    defects
+        What goes wrong; nothing unless given.
     rest_frames
         Frames before the motion begins, at the first displacement.
     zero_row
         Row of the middle of the beam at zero displacement, in the picture turned so that the shaker is below;
         chosen so that everything stays in the region unless given.
-    glare_frames, blurred_frames, repeated_frames, blank_frames
-        Frames to spoil: a reflection, 4 px more blur, a repeat of the frame before, black.
     seed
         Of the noise; each frame's noise depends on the seed and its number only.
+    **spoiled
+        Fields of :class:`Defects`, such as ``blank_frames``, to change in *defects*.
 
     Returns
     -------
@@ -265,6 +237,10 @@ def render_recording(
     """
     camera = SyntheticCamera() if camera is None else camera
     stage = SyntheticStage() if stage is None else stage
+    known = [field.name for field in dataclasses.fields(Defects)]
+    for name in spoiled:
+        choice("defect", name, tuple(known))
+    defects = dataclasses.replace(Defects() if defects is None else defects, **spoiled)
     instants = axis("time", time, -math.inf, math.inf)
     if instants.size < 2:
         raise InputError(f"time of {instants.size} sample: must hold at least 2")
@@ -288,18 +264,8 @@ def render_recording(
     start = float(instants[0]) - rest / camera.frame_rate
     moving = _Instants(instants, sign * beam, sign * shaker, camera, start, row)
     means = moving.means(start + np.arange(count) / camera.frame_rate)
-    spoiled = {
-        "glare": glare_frames,
-        "blurred": blurred_frames,
-        "repeated": repeated_frames,
-        "blank": blank_frames,
-    }
-    chosen = {
-        name: frozenset(integer(f"{name}_frames[{i}]", value, 0, count - 1) for i, value in enumerate(values))
-        for name, values in spoiled.items()
-    }
     disturbed = np.zeros(count, dtype=np.int8)
-    for frames in chosen.values():
+    for frames in defects.frames(count).values():
         disturbed[list(frames)] = 1
     truth = trajectory_dataset(
         np.arange(count) / camera.frame_rate, attrs=_attributes(camera, stage, rest, row, seed)
@@ -311,7 +277,7 @@ def render_recording(
     ):
         truth[name] = ("time", 1e3 * motion, {"units": "mm", "long_name": long_name})
     truth["disturbed"] = ("time", disturbed, {"units": "1", "long_name": "whether the frame was spoiled"})
-    return SyntheticRecording(camera, stage, truth, moving, chosen, seed)
+    return SyntheticRecording(camera, stage, defects, truth, moving, seed)
 
 
 def _attributes(

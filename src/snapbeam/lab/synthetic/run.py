@@ -60,7 +60,7 @@ def render_run(
     )
     for name in ("displacement", "shaker_displacement", "penetration"):
         values = recording.truth[f"{name}_mm"]
-        recording.truth[name] = ("time", values.values / (scale * 1e3), {**values.attrs, "units": "b"})
+        recording.truth[name] = ("time", values.values / (scale * 1e3), {**values.attrs, "units": "1"})
     recording.truth.attrs["buckling_level"] = scale
     return recording
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from snapbeam.core.validate import InputError, choice, integer, nonnegative, positive, within
-from snapbeam.lab.tracking.scene import SIDES
+from snapbeam.lab.tracking.geometry import SIDES
 
 __all__ = ["SyntheticCamera", "SyntheticStage"]
 
@@ -29,6 +29,8 @@ class SyntheticCamera:
         20 log10(contrast of the beam's edge / standard deviation of the pixel noise); infinite for no noise.
     blur
         Blur of the optics, standard deviation in pixels.
+    lens
+        "gaussian", the edges that the tracker fits; "disk", a lens out of focus that sees areas.
     light
         Relative change of the light from left to right and from top to bottom.
     """
@@ -40,6 +42,7 @@ class SyntheticCamera:
     bit_depth: int = 12
     snr_db: float = 30.0
     blur: float = 0.8
+    lens: str = "gaussian"
     light: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
@@ -56,6 +59,7 @@ class SyntheticCamera:
         integer("bit_depth", self.bit_depth, 8, 16)
         if not (isinstance(self.snr_db, float) and math.isinf(self.snr_db) and self.snr_db > 0.0):
             within("snr_db", self.snr_db, -20.0, 200.0, closed="both", unit="dB")
+        choice("lens", self.lens, ("gaussian", "disk"))
         within("blur", self.blur, 0.0, 20.0, closed="left", unit="px")
         for name, change in zip(("light[0]", "light[1]"), self.light, strict=True):
             within(name, change, -1.0, 1.0)

@@ -22,6 +22,8 @@ class FrameFlag(IntFlag):
     MERGED = 16
     LOW_CONTRAST = 32
     OUT_OF_REGION = 64
+    JUMP = 128
+    DISTORTED = 256
 
     @property
     def advice(self) -> str:
@@ -30,11 +32,29 @@ class FrameFlag(IntFlag):
 
 
 _ADVICE = {
-    FrameFlag.GAP: "an edge was not found; look at the frame, narrow the region or set the threshold",
-    FrameFlag.BLUR: "the edges are much wider than usual; shorten the exposure or refocus",
+    FrameFlag.GAP: (
+        "an edge was not found; look at the frame (--picture, --frame), narrow region (--region) or set "
+        "threshold (--threshold)"
+    ),
+    FrameFlag.BLUR: (
+        "the edges are much wider than usual; shorten the exposure or refocus (blur_limit, --blur-limit, "
+        "moves the limit)"
+    ),
     FrameFlag.DROPPED: "the camera lost the frame: it is absent, blank or a repeat of the one before",
-    FrameFlag.GLARE: "light saturates the edge; turn the lamp or choose other columns",
+    FrameFlag.GLARE: (
+        "light saturates the edge; turn the lamp or choose other columns (contact_column, --contact-column)"
+    ),
     FrameFlag.MERGED: "beam and shaker touch and the shaker shows no edge of its own; put a sticker on it",
-    FrameFlag.LOW_CONTRAST: "the edge is too faint; add light or set objects and threshold",
-    FrameFlag.OUT_OF_REGION: "the object left the region; make the region taller",
+    FrameFlag.LOW_CONTRAST: (
+        "the edge is too faint; add light or set objects (--objects) and threshold (--threshold)"
+    ),
+    FrameFlag.OUT_OF_REGION: "the object left the region; make region (--region) taller",
+    FrameFlag.JUMP: (
+        "the position leaves its neighbours for a frame or few and comes back: something else was taken for "
+        "the object; look at the frame (--picture, --frame)"
+    ),
+    FrameFlag.DISTORTED: (
+        "the beam looks thicker or thinner than usual, or its edge is no step: light or another object lies "
+        "on it; look at the frame (--picture, --frame)"
+    ),
 }

@@ -39,8 +39,8 @@ def contact_onsets(
     Returns
     -------
     xarray.Dataset
-        Over ``impact``: ``onset`` and ``duration`` [s], ``frames`` in contact, ``closing_speed`` [m/s]
-        before the onset (NaN where fewer than two frames precede it), and ``bounded``.
+        Over ``impact``: ``onset`` and ``duration`` [s] with their standard errors, ``frames`` in contact,
+        ``closing_speed`` [m/s] before the onset (NaN where fewer than two frames precede it), ``bounded``.
 
     Raises
     ------
@@ -68,13 +68,16 @@ def contact_onsets(
     for start, stop, bounded in _contacts(gap, limit):
         if stop - start < minimum_frames:
             continue
-        onset, speed = _crossing(time, gap, start, -1, limit, noise)
-        end, _ = _crossing(time, gap, stop - 1, +1, limit, noise)
-        rows.append((onset + middle, max(end - onset, 0.0), stop - start, speed, bounded))
-    table = np.array(rows, dtype=np.float64).reshape(-1, 5)
+        onset, speed, onset_error = _crossing(time, gap, start, -1, limit, noise)
+        end, _, end_error = _crossing(time, gap, stop - 1, +1, limit, noise)
+        span = math.hypot(onset_error, end_error)
+        rows.append((onset + middle, onset_error, max(end - onset, 0.0), span, stop - start, speed, bounded))
+    table = np.array(rows, dtype=np.float64).reshape(-1, 7)
     names = {
         "onset": ("s", "time at which contact begins"),
+        "onset_stderr": ("s", "standard error of the onset"),
         "duration": ("s", "duration of the contact"),
+        "duration_stderr": ("s", "standard error of the duration"),
         "frames": ("1", "frames in contact"),
         "closing_speed": ("m/s", "speed at which tip and beam close"),
         "bounded": ("1", "whether both ends of the contact were seen"),
@@ -95,10 +98,11 @@ def _label(units: str, long_name: str) -> dict[str, str]:
 
 
 def _noise(dataset: xr.Dataset) -> float:
-    """Standard deviation of the penetration [mm] from the standard errors of both edges."""
+    """Standard deviation of the penetration [mm] from the noise of both edges."""
+    scale = float(dataset.attrs.get("pixel_size", 0.0)) * 1e3
     errors = [
-        float(np.nanmedian(dataset[name].values))
-        for name in ("displacement_stderr_mm", "shaker_stderr_mm")
+        scale * float(np.nanmedian(dataset[name].values))
+        for name in ("beam_row_stderr", "tip_row_stderr")
         if name in dataset and np.isfinite(dataset[name].values).any()
     ]
     return float(np.hypot(errors[0], errors[1])) if len(errors) == 2 else 0.0
@@ -127,8 +131,8 @@ def _contacts(gap: np.ndarray, limit: float) -> list[tuple[int, int, bool]]:
 
 def _crossing(
     time: np.ndarray, gap: np.ndarray, edge: int, step: int, limit: float, noise: float
-) -> tuple[float, float]:
-    """Time at which a line through the frames beyond *edge* meets zero, and its speed [m/s].
+) -> tuple[float, float, float]:
+    """Time at which a line through the frames beyond *edge* meets zero, its speed [m/s], the time's error.
 
     As few frames as the noise allows, two to five, since beam and tip do not move in straight lines.
 
@@ -142,8 +146,9 @@ def _crossing(
             break
         outside.append(k)
         k += step
+    usual = float(np.median(np.diff(time)))
     if len(outside) < 2:
-        return float(time[edge]), float("nan")
+        return float(time[edge]), float("nan"), 0.5 * usual
     frame = abs(float(time[outside[0]] - time[edge]))
     for count in range(2, len(outside) + 1):
         slope, level = np.polyfit(time[outside[:count]] - time[edge], gap[outside[:count]], 1)
@@ -151,9 +156,14 @@ def _crossing(
         if slope * step < 0.0 and 2.0 * noise / math.sqrt(count) < 0.2 * abs(slope) * frame:
             break
     if slope * step >= 0.0:
-        return float(time[edge]), float("nan")
+        return float(time[edge]), float("nan"), 0.5 * usual
     inside = edge
     while 0 <= inside - step < gap.size and gap[inside] < -noise and gap[inside - step] > -limit:
         inside -= step
     low, high = sorted((float(time[outside[0]]), float(time[inside])))
-    return float(np.clip(time[edge] - level / slope, low, high)), float(abs(slope) * 1e-3)
+    at = float(np.clip(time[edge] - level / slope, low, high))
+    used = time[outside[:count]]
+    lever = (at - float(used.mean())) ** 2 / float(np.sum((used - used.mean()) ** 2))
+    # the motion bends within a frame, so no onset is known better than to a tenth of one
+    error = math.hypot(noise / abs(slope) * math.sqrt(1.0 / count + lever), 0.1 * usual)
+    return at, float(abs(slope) * 1e-3), error

@@ -1,62 +1,47 @@
-"""What a recording shows: where the beam, the shaker's tip and its sticker are, and how to look there.
+"""What a recording shows, in turned pixels: the beam, the shaker, its sticker and its tip.
 
-All work is done in one orientation: the beam crosses the picture from left to right, the shaker stands below
-it and rows count downwards.  Other set-ups are turned into it by :class:`Orientation`.
+A scene is built whole by the survey and never changes.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import NamedTuple
+import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.lab.tracking.edges import Floats
 
-__all__ = ["Orientation", "Runs", "Scene", "ShakerRows", "gather", "spread_columns"]
+__all__ = ["BeamView", "EdgeShape", "Scene", "ShakerView", "Sticker", "TipOutline"]
 
-SIDES = ("below", "above", "left", "right")
-HALF = 6  # half height of the fit windows, pixels
-HOT = 0.25  # share of saturated pixels in its windows beyond which an edge is not trusted
+_OUTLINE = 3.0  # widths of the edge, of its misfit, by which a tip in the beam's light may lie off
 
 
 @dataclass(frozen=True)
-class Orientation:
-    """The side of the beam on which the shaker stands, and the turn that brings it below."""
+class BeamView:
+    """The beam and the light on it.
 
-    side: str
-    shape: tuple[int, int]
-
-    @property
-    def sign(self) -> float:
-        """+1 where the shaker pushes in the positive direction (up or right), -1 where against it."""
-        return 1.0 if self.side in ("below", "left") else -1.0
-
-    def turn(self, frames: NDArray) -> NDArray:
-        """Frames (n, height, width) with the shaker below."""
-        if self.side in ("left", "right"):
-            frames = frames.transpose(0, 2, 1)
-        return frames[:, ::-1] if self.side in ("above", "left") else frames
-
-    def back(self, rows: Floats, columns: Floats) -> tuple[Floats, Floats]:
-        """(rows, columns) of the picture as recorded, from those of the turned one."""
-        if self.side == "below":
-            return rows, columns
-        if self.side == "above":
-            return self.shape[0] - 1.0 - rows, columns
-        return columns, (self.shape[1] - 1.0 - rows if self.side == "left" else rows)
-
-
-@dataclass
-class Scene:
-    """What the survey found, in turned pixels.
-
-    ``groups`` are columns that see only the beam (or, if there are none, the columns about the contact);
-    ``rod`` the columns covered by the shaker.  The shaker's reference row is the middle of its sticker, or
-    without one the tip itself; ``tip_profile`` are the rows of the tip at ``tip_columns`` and ``tip_offset``
-    the row of the tip at the contact, both counted from that reference; ``tip_light`` is the contrast of the
-    beam in those columns.
+    Attributes
+    ----------
+    threshold, bright
+        Grey level that parts objects from the background, and which side of it objects are on.
+    contrast, noise
+        Step of grey levels at the beam's edge, and standard deviation of a pixel.
+    saturated, hot_share
+        Grey level at which pixels are saturated (infinite if none is), and the usual share of such pixels
+        about the edges.
+    edge_width, width_table
+        Blur of the edges [px], and the table that turns fitted widths into true ones.
+    thickness, thickness_error
+        Rows from the far to the near edge, and the standard error.
+    columns, contact_column
+        Where the edge is fitted, and the column it is wanted at.
+    groups, merged
+        Columns that see the beam alone; if there are none, the columns about the contact, and ``merged`` says
+        that the shaker may grow out of the beam there.
+    fixtures
+        (first row, one past the last) of bars that cross the picture and never move.
     """
 
     threshold: float
@@ -64,24 +49,16 @@ class Scene:
     contrast: float
     noise: float
     saturated: float
+    hot_share: float
     edge_width: float
+    width_table: tuple[Floats, Floats]
     thickness: float
-    beam_columns: NDArray[np.intp]
+    thickness_error: float
+    columns: NDArray[np.intp]
     contact_column: float
-    groups: list[NDArray[np.intp]]
-    rod: tuple[int, int] | None = None
-    width_table: tuple[Floats, Floats] | None = None
-    marker_columns: NDArray[np.intp] | None = None
-    marker_thickness: float = np.nan
-    marker_sign: float = 1.0
-    marker_contrast: float = np.nan
-    template: Floats | None = None
-    template_head: int = 0
-    tip_columns: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
-    tip_profile: Floats = field(default_factory=lambda: np.empty(0))
-    tip_light: Floats = field(default_factory=lambda: np.empty(0))
-    tip_offset: float = np.nan
-    tip_source: str = "no shaker"
+    groups: tuple[NDArray[np.intp], ...]
+    merged: bool
+    fixtures: tuple[tuple[int, int], ...]
 
     @property
     def sign(self) -> float:
@@ -89,40 +66,107 @@ class Scene:
         return 1.0 if self.bright else -1.0
 
 
-def gather(
-    frames: NDArray[np.floating], rows: NDArray, columns: NDArray[np.intp], half: int
-) -> tuple[Floats, NDArray[np.bool_]]:
-    """Windows of 2 half + 1 rows about *rows* (n, columns), and which of them lie inside the frame."""
-    centre = np.where(np.isfinite(rows), np.rint(rows), -1e6).astype(np.int64)
-    inside = (centre >= half) & (centre < frames.shape[1] - half)
-    index = np.clip(centre, half, frames.shape[1] - 1 - half)[..., None] + np.arange(-half, half + 1)
-    picked = frames[np.arange(frames.shape[0])[:, None, None], index, columns[None, :, None]]
-    return picked.astype(np.float64), inside
+@dataclass(frozen=True)
+class Sticker:
+    """A mark on the shaker: a band between two steps of opposite sign.
+
+    ``thickness`` [px]; ``sign`` and ``contrast`` of its upper step; ``template`` is its profile, in which the
+    upper edge stands at ``head``.
+    """
+
+    columns: NDArray[np.intp]
+    thickness: float
+    sign: float
+    contrast: float
+    template: Floats
+    head: int
 
 
-def spread_columns(low: int, high: int, count: int) -> NDArray[np.intp]:
-    """Up to *count* different columns from *low* to *high*, both included, evenly spread."""
-    return np.unique(np.rint(np.linspace(low, high, min(count, max(high - low + 1, 1)))).astype(np.intp))
+@dataclass(frozen=True)
+class TipOutline:
+    """Rows of the tip at ``columns``, counted from the shaker's reference, and the beam's contrast there."""
+
+    columns: NDArray[np.intp]
+    profile: Floats
+    light: Floats
 
 
-class ShakerRows(NamedTuple):
-    """Row of the shaker's reference in each frame, its standard error, and the quality of the edges."""
+@dataclass(frozen=True)
+class ShakerView:
+    """The shaker: the ``rod`` of columns it covers, and what of it is followed.
 
-    row: Floats
-    error: Floats
-    share: Floats
-    contrast: Floats
-    width: Floats
-    merged: NDArray[np.bool_]
-    saturated: Floats
+    The reference row is the middle of the sticker, or without one the tip itself; ``tip_offset`` is the row
+    of the tip at the contact counted from it and ``tip_error`` its standard error; ``tip_source`` says in
+    words where that is known from; ``isolated`` that the sticker was all that could be seen of the shaker.
+    """
+
+    rod: tuple[int, int]
+    sticker: Sticker | None
+    outline: TipOutline
+    tip_offset: float
+    tip_error: float
+    tip_source: str
+    isolated: bool
+
+    @property
+    def mark(self) -> str:
+        """What is followed: "sticker" or "tip"."""
+        return "tip" if self.sticker is None else "sticker"
+
+    @property
+    def lowest(self) -> float:
+        """Rows from the reference to the lowest pixel needed."""
+        if self.sticker is not None:
+            return self.sticker.thickness / 2.0
+        return float(self.outline.profile.max()) if self.outline.profile.size else 0.0
 
 
-@dataclass
-class Runs:
-    """First object from the far side in each column of each frame, (frames, columns), and what follows it."""
+@dataclass(frozen=True)
+class EdgeShape:
+    """The mean shape of the beam's edge over the sample, against what a linear camera would show.
 
-    start: NDArray[np.intp]
-    end: NDArray[np.intp]
-    found: NDArray[np.bool_]
-    after: NDArray[np.intp]  # first row of the next object
-    follows: NDArray[np.bool_]
+    Attributes
+    ----------
+    misfit
+        Root mean square of what the blurred step leaves of the mean edge, share of the contrast.
+    gamma, gamma_se
+        Exponent of grey level over light that makes the edge symmetric, and its standard error; NaN if the
+        sample was too small to tell.
+    shift
+        Rows by which the fitted edge lies outside the one that is symmetric in light.
+    clipped
+        Share of saturated pixels in the middle of the beam.
+    """
+
+    misfit: float
+    gamma: float
+    gamma_se: float
+    shift: float
+    clipped: float
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that the survey found: the beam, the shaker if one is followed, and the shape of the edges.
+
+    ``striker_in_view`` says that a shaker was seen that is not followed.
+    """
+
+    beam: BeamView
+    shaker: ShakerView | None
+    shape: EdgeShape
+    striker_in_view: bool
+
+    @property
+    def placed_error(self) -> float:
+        """Standard error [px] of where the tip stands against the beam, the same in all frames.
+
+        A tip that is followed by its own outline is seen against the beam through the same lens: what the
+        blurred step leaves of an edge is left there several times over.
+        """
+        if self.shaker is None:
+            return 0.0
+        lens = 0.0
+        if self.shaker.sticker is None and math.isfinite(self.shape.misfit):
+            lens = _OUTLINE * self.shape.misfit * self.beam.edge_width
+        return math.hypot(self.shaker.tip_error, self.beam.thickness_error, lens)

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, choice, finite, finite_array, integer, positive, within
+from snapbeam.lab.camera.marks import profile_shift
 from snapbeam.lab.camera.recording import Recording
-from snapbeam.lab.tracking.beam_edge import measure_beam
 from snapbeam.lab.tracking.edges import Floats
-from snapbeam.lab.tracking.scene import SIDES, Orientation
-from snapbeam.lab.tracking.shaker import measure_shaker
-from snapbeam.lab.tracking.survey import survey
-from snapbeam.lab.tracking.tracked import Follower, tracked_dataset
+from snapbeam.lab.tracking.geometry import Orientation
+from snapbeam.lab.tracking.measure.beam import measure_beam
+from snapbeam.lab.tracking.measure.follower import Drift, Follower
+from snapbeam.lab.tracking.measure.shaker import measure_shaker
+from snapbeam.lab.tracking.settings import TrackingSettings
+from snapbeam.lab.tracking.survey.levels import pixel_noise, saturation_level
+from snapbeam.lab.tracking.survey.survey import survey
+from snapbeam.lab.tracking.tracked import tracked_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,26 +28,15 @@ __all__ = ["track"]
 
 _SAMPLE_PIXELS = 6_000_000
 _HEAD = 8
-_BATCH_PIXELS = 6_000_000
+_BATCH_PIXELS = 5_000_000
 
 
 def track(
     recording: Recording,
+    settings: TrackingSettings | None = None,
     *,
-    buckling_level: float | None = None,
-    location: float = 0.5,
-    rest_displacement: float | None = None,
-    rest_frames: int | None = None,
-    side: str = "below",
-    objects: str = "auto",
-    threshold: float | None = None,
-    background: ArrayLike | None = None,
-    shaker: bool = True,
-    marker: bool = True,
-    columns: int = 24,
-    contact_column: float | None = None,
-    blur_limit: float | None = None,
     progress: Callable[[int, int], None] | None = None,
+    **changes: Any,
 ) -> xr.Dataset:
     """Measure the displacement of beam and shaker tip in every frame of a recording.
 
@@ -58,102 +50,59 @@ def track(
     ----------
     recording
         An open recording.
-    buckling_level
-        b [m].  If given, displacements are also returned in units of b.
-    location
-        Location x_s/L of the contact, which sets the displacement of the beam at rest.
-    rest_displacement
-        Displacement of the beam [m] at rest, the one length a camera cannot know.
-        Unless given, the well that faces the shaker: -(b/2)(1 - cos 2 pi x_s/L), of opposite sign for a
-        shaker above; 0 without ``buckling_level``.
-    rest_frames
-        Frames at the start in which the beam is at rest; unless given, the first half of those before it
-        first departs from their mean by three standard errors.
-    side
-        Side of the beam on which the shaker stands: "below", "above", "left" or "right".  Up (or right) is
-        positive.
-    objects
-        "bright" or "dark" against the background, or "auto": unlike the rows beyond the beam.
-    threshold
-        Grey level for binarising; Otsu's from the sample unless given.
-    background
-        A picture of the scene without beam and shaker, shape (height, width), to subtract.
-    shaker, marker
-        Whether a shaker is in the picture, and whether to look for a sticker on it.
-    columns
-        Columns in which the beam's edge is fitted.
-    contact_column
-        Column of the contact (or row, for a shaker at the left or right); found from the tip unless given.
-    blur_limit
-        Edge width [px] beyond which a frame is flagged as blurred; 2.5 times the usual plus 0.5 unless given.
+    settings
+        What is known of the recording and how to look at it; the defaults of :class:`TrackingSettings`
+        unless given.
     progress
         Called with (frames done, frames in all).
+    **changes
+        Settings by name, such as ``buckling_level`` or ``side``, in place of those in *settings*.
 
     Returns
     -------
     xarray.Dataset
         Over ``time`` [s]: ``displacement``, ``shaker_displacement``, ``penetration`` in b and, with
-        ``_mm``, in mm; ``displacement_stderr_mm`` and ``shaker_stderr_mm`` from the scatter of the columns;
-        ``confidence`` from 0 to 1; ``flags`` (:class:`FrameFlag`); ``valid``; ``edge_width`` [px]; and, for
-        drawing, ``beam_row``, ``beam_slope``, ``tip_row``, ``marker_row`` [px, turned picture].  What could
-        not be measured is NaN and flagged, never filled in; frames missing from the numbering appear so.
+        ``_mm``, in mm; ``displacement_stderr_mm`` and ``shaker_stderr_mm`` from the scatter of the columns,
+        the rest position and what the findings widen; ``confidence`` from 0 to 1; ``flags``
+        (:class:`FrameFlag`); ``valid``; ``edge_width`` [px]; and, for drawing, ``beam_row``, ``beam_slope``,
+        ``tip_row``, ``marker_row`` [px, turned picture], with the noise of the first and third in
+        ``beam_row_stderr`` and ``tip_row_stderr``.  What could not be measured is NaN and flagged, never
+        filled in; frames missing from the numbering appear so.  The attribute ``findings`` holds what makes
+        the result doubtful; :func:`snapbeam.lab.findings_of` reads it.
 
     Raises
     ------
     InputError
-        For parameters out of range, or a recording in which beam or shaker cannot be found.
+        For settings out of range, or a recording in which beam or shaker cannot be found.
     """
-    side = choice("side", side, SIDES)
-    objects = choice("objects", objects, ("auto", "bright", "dark"))
-    level = None if buckling_level is None else positive("buckling_level", buckling_level, "m")
-    place = within("location", location, 0.0, 1.0)
-    threshold = None if threshold is None else finite("threshold", threshold)
-    columns = integer("columns", columns, 3, 1000)
-    rest_frames = None if rest_frames is None else integer("rest_frames", rest_frames, 1, len(recording))
-    turn = Orientation(side, recording.shape)
-    if rest_displacement is None:
-        rest = 0.0 if level is None else -turn.sign * level * 0.5 * (1.0 - math.cos(2.0 * math.pi * place))
-    else:
-        rest = finite("rest_displacement", rest_displacement)
-    if contact_column is not None:
-        across = recording.shape[1] if side in ("below", "above") else recording.shape[0]
-        contact_column = within("contact_column", contact_column, 0.0, across - 1.0, closed="both", unit="px")
-    limit = None if blur_limit is None else positive("blur_limit", blur_limit, "px")
-    prepare = _Prepare(recording, turn, background)
+    wanted = (settings or TrackingSettings()).changed(**changes)
+    wanted = wanted.checked_for(recording.shape, len(recording))
+    turn = Orientation(wanted.side, recording.shape)
     sample, head = _sample(recording)
+    noise = pixel_noise(turn.turn(sample).astype(np.float32))
+    saturated = saturation_level(sample, float(recording.max_value), noise)
+    prepare = _Prepare(recording, turn, wanted, saturated)
     scene = survey(
-        prepare(sample),
-        threshold=threshold,
-        objects=objects,
-        shaker=shaker,
-        marker=marker,
-        columns=columns,
-        contact_column=contact_column,
-        max_value=prepare.saturation,
-        head=head,
+        prepare(sample), wanted, saturated=prepare.saturated, pixel_size=recording.pixel_size, head=head
     )
-    follower = Follower(scene, limit)
+    marks = _FixedMarks(sample[:head], wanted, turn)
+    follower = Follower(scene, wanted.blur_limit)
     size = int(np.clip(_BATCH_PIXELS // (recording.shape[0] * recording.shape[1]), 4, 128))
     done = 0
     for batch in recording.batches(size):
         frames = prepare(batch)
-        beam = measure_beam(scene, frames)
-        tip = measure_shaker(scene, frames, beam.row + scene.thickness, beam.slope) if shaker else None
-        follower.add(frames, beam, tip)
+        beam = measure_beam(scene.beam, frames)
+        near = beam.row + scene.beam.thickness
+        tip = (
+            None
+            if scene.shaker is None
+            else measure_shaker(scene.beam, scene.shaker, frames, near, beam.slope)
+        )
+        follower.add(frames, beam, tip, marks(batch))
         done += batch.shape[0]
         if progress is not None:
             progress(done, len(recording))
-    found = follower.result()
-    return tracked_dataset(
-        found,
-        recording,
-        scene,
-        turn,
-        rest=rest,
-        rest_frames=rest_frames,
-        buckling_level=level,
-        location=place,
-    )
+    return tracked_dataset(follower.result(recording.numbers), recording, scene, wanted, marks.largest)
 
 
 def _sample(recording: Recording) -> tuple[NDArray[np.integer], int]:
@@ -167,21 +116,64 @@ def _sample(recording: Recording) -> tuple[NDArray[np.integer], int]:
 
 
 class _Prepare:
-    """Turn a batch of frames so that the shaker stands below, and subtract the background."""
+    """Turn a batch of frames so that the shaker stands below, undo the camera's curve, take the background out."""
 
-    def __init__(self, recording: Recording, turn: Orientation, background: ArrayLike | None) -> None:
+    def __init__(
+        self, recording: Recording, turn: Orientation, settings: TrackingSettings, saturated: float
+    ) -> None:
         self.turn = turn
-        self.saturation = float(recording.max_value)
+        self.full = float(recording.max_value)
+        self.power = 1.0 / settings.gamma
+        self.saturated = saturated
+        if math.isfinite(saturated) and settings.gamma != 1.0:
+            self.saturated = float(self._light(np.array(saturated, dtype=np.float32)))
         self.background: Floats | None = None
-        if background is not None:
-            picture = finite_array("background", background, 2)
-            if picture.shape != recording.shape:
-                raise InputError(f"background of shape {picture.shape}: must be of shape {recording.shape}")
+        if settings.background is not None:
+            picture = self._light(np.asarray(settings.background, dtype=np.float32))
             self.background = (picture - np.median(picture)).astype(np.float32)
-            self.saturation = math.inf
+            self.saturated = math.inf
+
+    def _light(self, grey: NDArray) -> NDArray[np.float32]:
+        if self.power == 1.0:
+            return grey
+        light: NDArray[np.float32] = (
+            np.float32(self.full) * np.maximum(grey / np.float32(self.full), 0.0) ** np.float32(self.power)
+        ).astype(np.float32)
+        return light
 
     def __call__(self, batch: NDArray[np.integer]) -> NDArray[np.float32]:
-        frames = batch.astype(np.float32)
+        frames = self._light(batch.astype(np.float32))
         if self.background is not None:
             frames -= self.background
         return self.turn.turn(frames)
+
+
+class _FixedMarks:
+    """Rows by which the camera has sunk against marks that stand still, batch by batch."""
+
+    def __init__(self, head: NDArray[np.integer], settings: TrackingSettings, turn: Orientation) -> None:
+        self.marks = settings.fixed_marks
+        self.turn = turn
+        self.references = [self._profiles(head, mark).mean(0) for mark in self.marks]
+        self.largest = 0.0
+
+    def _profiles(self, batch: NDArray[np.integer], mark: tuple[int, int, int, int]) -> NDArray[np.float64]:
+        top, bottom, left, right = mark
+        part = self.turn.turn(batch[:, top:bottom, left:right].astype(np.float64))
+        profile: NDArray[np.float64] = part.mean(-1)
+        return profile
+
+    def __call__(self, batch: NDArray[np.integer]) -> Drift | None:
+        if not self.marks:
+            return None
+        total, weight = np.zeros(batch.shape[0]), np.zeros(batch.shape[0])
+        for mark, reference in zip(self.marks, self.references, strict=True):
+            shift, error = profile_shift(self._profiles(batch, mark), reference)
+            sound = np.isfinite(shift) & np.isfinite(error) & (error < 1.0)
+            inverse = np.where(sound, 1.0 / np.maximum(error, 1e-3) ** 2, 0.0)
+            total += np.where(sound, shift, 0.0) * inverse
+            weight += inverse
+        drift: Floats = np.where(weight > 0.0, total / np.maximum(weight, 1e-30), np.nan)
+        if np.isfinite(drift).any():
+            self.largest = max(self.largest, float(np.nanmax(np.abs(drift))))
+        return Drift(drift, 1.0 / np.sqrt(np.maximum(weight, 1e-30)))

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.core.validate import InputError, InputTypeError, nonnegative, positive, within
+from snapbeam.core.validate import InputError, InputTypeError, nonnegative, positive, shown, within
 from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.quantity import RUN, quantity
 
@@ -102,7 +102,9 @@ def _pair(name: str, value: tuple[float, float]) -> list[tuple[int, float]]:
     try:
         items = list(value)
     except TypeError:
-        raise InputTypeError(f"{name} = {value!r}: must be two numbers, of the sphere and the flat") from None
+        raise InputTypeError(
+            f"{name} = {shown(value)}: must be two numbers, of the sphere and the flat"
+        ) from None
     if len(items) != 2:
-        raise InputError(f"{name} = {value!r}: must be two numbers, of the sphere and the flat")
+        raise InputError(f"{name} = {shown(value)}: must be two numbers, of the sphere and the flat")
     return list(enumerate(items))

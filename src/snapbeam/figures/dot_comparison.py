@@ -1,0 +1,68 @@
+"""Measured responses on a simulated map, those that disagree marked, with a table of the classes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from snapbeam.figures.response_map import plot_response_map
+from snapbeam.figures.style import fix_ticks, house_style, new_figure
+from snapbeam.lab.compare.dots import Dots
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from snapbeam.lab.compare.maps import DotComparison
+
+__all__ = ["plot_dot_comparison"]
+
+_DRAWN = ("frequency_ratio", "location", "velocity_amplitude")  # across first, then upward
+
+
+def plot_dot_comparison(dataset: xr.Dataset, dots: Dots, result: DotComparison) -> Figure:
+    """Draw measured responses on a map, and the table of measured against simulated classes beside it.
+
+    Dots whose class is not that of the map are crossed out.
+    """
+    with house_style():
+        figure = new_figure("double", 92.0)
+        grid = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0))
+        left = plot_response_map(dataset, figure.add_subplot(grid[0]), dots=dots)
+        _mark_disagreeing(left, dataset, result)
+        ax = figure.add_subplot(grid[1])
+        counts = result.confusion
+        rows = np.maximum(counts.sum(axis=1, keepdims=True), 1)
+        ax.imshow(counts / rows, cmap="Greys", vmin=0.0, vmax=1.0, origin="upper")
+        for (i, j), value in np.ndenumerate(counts):
+            dark = value / rows[i, 0] > 0.5
+            ax.text(j, i, str(value), ha="center", va="center", color="white" if dark else "black")
+        names = [kind.label.replace(" interwell", "\ninterwell") for kind in result.classes]
+        ax.set_xticks(np.arange(len(names)), names, rotation=40, ha="right", rotation_mode="anchor")
+        ax.set_yticks(np.arange(len(names)), names)
+        ax.set(xlabel="Simulated", ylabel="Measured")
+        low, high = result.agreement_interval
+        ax.set_title(
+            f"{100 * result.agreement:.0f} % of {result.used} agree "
+            f"(95 %: {100 * low:.0f} to {100 * high:.0f} %), × do not"
+            if result.used
+            else "no measured point counts",
+            loc="left",
+        )
+        fix_ticks(ax)
+    return figure
+
+
+def _mark_disagreeing(ax: Axes, dataset: xr.Dataset, result: DotComparison) -> None:
+    """Cross out the dots that count and whose class is not that of the map."""
+    table = result.table
+    wrong = (table["used"].values == 1) & (table["measured"].values != table["simulated"].values)
+    if not wrong.any():
+        return
+    across, upward = (name for name in _DRAWN if name in dataset["response"].squeeze().dims)
+    ax.plot(
+        table[across].values[wrong], table[upward].values[wrong], "x", color="black", markersize=8.5,
+        markeredgewidth=1.1, zorder=2.9,
+    )  # fmt: skip

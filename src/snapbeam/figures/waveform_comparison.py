@@ -1,0 +1,143 @@
+"""Measured beside simulated waveforms with their spectra (Fig. 4 of the paper), and one laid over the other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from snapbeam.core.validate import InputError, finite
+from snapbeam.figures.findings import draw_findings, findings_height
+from snapbeam.figures.style import (
+    BEAM_COLOR,
+    CENTER_COLOR,
+    COLUMN_WIDTHS,
+    SHAKER_COLOR,
+    fix_ticks,
+    house_style,
+    new_figure,
+)
+
+if TYPE_CHECKING:
+    from snapbeam.lab.compare.waveforms import WaveformComparison
+
+__all__ = ["plot_waveform_comparison", "plot_waveform_overlay"]
+
+
+def plot_waveform_comparison(
+    result: WaveformComparison, window: tuple[float, float] | None = None, multiples: float = 8.0
+) -> Figure:
+    """Draw a measured run to the left of a simulated one: beam and shaker over cycles, below their spectra.
+
+    Impacts, where they are known, stand as ticks along the lower edge.
+
+    Parameters
+    ----------
+    result : WaveformComparison
+    window : (float, float), optional
+        First and last cycle to draw; all by default.
+    multiples : float
+        Highest frequency of the spectra, in multiples of the excitation frequency.
+    """
+    low, high = (finite("window", value) for value in window) if window else (None, None)
+    waveforms = result.waveforms.sel(cycle=slice(low, high))
+    if waveforms.sizes["cycle"] < 2:
+        raise InputError(f"window = {window}: holds none of the compared cycles")
+    cycle = waveforms["cycle"].values
+    columns = (
+        ("measured", "measured_displacement", "measured_shaker", result.measured_impacts),
+        ("simulated", "simulated_displacement", "simulated_shaker", result.simulated_impacts),
+    )
+    with house_style():
+        told = result.findings
+        figure = new_figure("double", 100.0 + findings_height(told, COLUMN_WIDTHS["double"], 3))
+        draw_findings(figure, told, 3)
+        axes = figure.subplots(2, 2, sharey="row", height_ratios=(1.5, 1.0))
+        for i, (name, beam, shaker, impacts) in enumerate(columns):
+            top, bottom = axes[0, i], axes[1, i]
+            top.axhline(0.0, color="0.7", linewidth=0.5)
+            top.plot(cycle, waveforms[beam], color=BEAM_COLOR, label="beam, at the shaker")
+            top.plot(cycle, waveforms[shaker], color=SHAKER_COLOR, label="shaker")
+            shown = impacts[(impacts >= cycle[0]) & (impacts <= cycle[-1])]
+            if shown.size:
+                top.plot(
+                    shown, np.full(shown.size, 0.02), "|", color=BEAM_COLOR, markersize=5,
+                    transform=top.get_xaxis_transform(), label="impact",
+                )  # fmt: skip
+            top.set(xlabel=r"Cycles of excitation $\tau$", xlim=(cycle[0], cycle[-1]))
+            top.set_title(name, loc="left")
+            ratio = result.spectra["frequency_ratio"].values
+            inside = (ratio > 0.0) & (ratio <= multiples)
+            bottom.semilogy(ratio[inside], result.spectra[beam].values[inside], color=BEAM_COLOR)
+            bottom.set(xlabel="Frequency (multiples of the excitation)", xlim=(0.0, multiples))
+        axes[0, 0].set_ylabel("Displacement $w$ ($b$)")
+        axes[1, 0].set_ylabel("Beam spectrum ($b$)")
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper center", ncols=3)
+        figure.align_ylabels(axes[:, 0])
+        fix_ticks(*axes.flat)
+    return figure
+
+
+def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float] | None = None) -> Figure:
+    """Draw a simulated run over a measured one: beams, shakers, and their difference; where they part is marked.
+
+    Parameters
+    ----------
+    result : WaveformComparison
+    window : (float, float), optional
+        First and last cycle to draw; all by default.
+    """
+    low, high = (finite("window", value) for value in window) if window else (None, None)
+    waveforms = result.waveforms.sel(cycle=slice(low, high))
+    if waveforms.sizes["cycle"] < 2:
+        raise InputError(f"window = {window}: holds none of the compared cycles")
+    cycle = waveforms["cycle"].values
+    told = result.findings
+    with house_style():
+        figure = new_figure("double", 105.0 + findings_height(told, COLUMN_WIDTHS["double"], 3))
+        draw_findings(figure, told, 3)
+        top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
+        pairs = (
+            (top, "displacement", "beam, at the shaker"),
+            (middle, "shaker", "shaker"),
+        )
+        for ax, name, word in pairs:
+            if ax is top:
+                ax.axhline(0.0, color="0.8", linewidth=0.5)
+            ax.plot(cycle, waveforms[f"measured_{name}"], color=BEAM_COLOR, label="measured")
+            ax.plot(
+                cycle, waveforms[f"simulated_{name}"], color=SHAKER_COLOR, dashes=(4, 1.5), linewidth=0.8,
+                label="simulated",
+            )  # fmt: skip
+            ax.set_ylabel(f"{word} ($b$)")
+        for ax, impacts, color, height in (
+            (top, result.measured_impacts, BEAM_COLOR, 0.03),
+            (top, result.simulated_impacts, SHAKER_COLOR, 0.09),
+        ):
+            shown = impacts[(impacts >= cycle[0]) & (impacts <= cycle[-1])]
+            if shown.size:
+                ax.plot(
+                    shown, np.full(shown.size, height), "|", color=color, markersize=5,
+                    transform=ax.get_xaxis_transform(),
+                )  # fmt: skip
+        difference = waveforms["measured_displacement"] - waveforms["simulated_displacement"]
+        bottom.axhspan(-result.apart, result.apart, color=CENTER_COLOR, alpha=0.35, linewidth=0.0)
+        bottom.plot(cycle, difference, color=BEAM_COLOR, linewidth=0.7)
+        bottom.set(
+            xlabel=r"Cycles of excitation $\tau$", ylabel="difference ($b$)", xlim=(cycle[0], cycle[-1])
+        )
+        if cycle[0] <= result.parted <= cycle[-1]:
+            for ax in (top, middle, bottom):
+                ax.axvline(result.parted, color="0.45", linewidth=0.8, dashes=(2, 2))
+        parted = "they never part" if np.isnan(result.parted) else f"they part at cycle {result.parted:.1f}"
+        top.set_title(
+            f"{parted}; RMS difference {result.rms_difference:.3f} $b$, correlation {result.correlation:.3f}",
+            loc="left",
+        )
+        handles, labels = top.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper right", ncols=2)
+        figure.align_ylabels((top, middle, bottom))
+        fix_ticks(top, middle, bottom)
+    return figure

@@ -1,0 +1,1 @@
+"""Photron recordings: headers (.cih, .cihx) and pixels (.mraw), read and written."""

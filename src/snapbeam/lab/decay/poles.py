@@ -1,0 +1,224 @@
+"""Modes of a free decay by the matrix pencil, with a stabilisation diagram.
+
+A sum of decaying sines obeys a linear recurrence.  The leading vectors of the matrix of its shifted windows
+span the same space whether they begin at the first row or the second, so the matrix that turns one into the
+other has the poles exp((-delta + i omega)/f_s) as eigenvalues (Y. Hua and T. K. Sarkar, IEEE Trans. Acoust.
+38, 1990, 814; the subspace form of R. Roy and T. Kailath, IEEE Trans. Acoust. 37, 1989, 984).  How many poles
+there are is not known: a mode is what stays where it is while more and more are asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from snapbeam.lab.signals.signal import SignalSamples
+
+__all__ = ["Pole", "Stabilisation", "find_poles", "thinned", "without_poles"]
+
+_Array = NDArray[np.float64]
+_WINDOW = 240  # samples of a window
+_WINDOWS = 6000  # of them used
+_MOST = 40  # poles asked for at most, two a mode
+_SAME = (
+    0.01,
+    0.3,
+    0.004,
+)  # shares of frequency and damping ratio, and damping ratio, within which a pole stays
+_STABLE = 4  # orders in a row at which a pole must stay
+_LARGEST_DAMPING = 0.25
+_BANDS = (0.02, 0.42)  # of the sampling rate, in which poles of one stage count
+
+
+class Pole(NamedTuple):
+    """A mode of a decay: frequency [Hz] undamped, damping ratio, amplitude at the start, and how it compares.
+
+    ``energy`` is the sum of its squares over the record over that of the noise in its band, ``orders`` at how
+    many orders it stayed.
+    """
+
+    frequency: float
+    damping_ratio: float
+    amplitude: float
+    energy: float
+    orders: int
+
+
+class Stabilisation(NamedTuple):
+    """Every pole at every order: ``order``, ``frequency`` [Hz], ``damping_ratio``, and whether it is stable."""
+
+    order: NDArray[np.int64]
+    frequency: _Array
+    damping_ratio: _Array
+    stable: NDArray[np.bool_]
+
+
+def thinned(samples: SignalSamples, factor: int) -> SignalSamples:
+    """Every *factor*-th sample after a low-pass without phase shift; the filter's ends are left out."""
+    from scipy.signal import firwin, oaconvolve
+
+    if factor <= 1:
+        return samples
+    half = 10 * factor
+    taps = firwin(2 * half + 1, 0.8 / factor, window="hamming")
+    smooth = oaconvolve(samples.values, taps, mode="valid")
+    time = samples.time[half : samples.time.size - half]
+    return SignalSamples(smooth[::factor], time[::factor], samples.sampling_freq / factor)
+
+
+def find_poles(samples: SignalSamples, noise: float) -> tuple[list[Pole], Stabilisation]:
+    """The modes of a decay, strongest first, and the diagram from which they were read.
+
+    The record is looked at in stages, each thinned to a quarter of the one before, so that low frequencies are
+    seen in long windows.
+
+    Parameters
+    ----------
+    samples
+        The decay, from its start on.
+    noise
+        Standard deviation of white noise in it.
+    """
+    found: list[Pole] = []
+    rows: list[tuple[int, float, float, bool]] = []
+    factor = 1
+    while samples.values.size // factor >= 96:
+        stage = thinned(samples, factor)
+        if stage.values.size < 96:
+            break
+        low = _BANDS[0] if samples.values.size // (4 * factor) < 160 else 0.25 * _BANDS[1]
+        poles, table = _stage(stage, low * stage.sampling_freq, _BANDS[1] * stage.sampling_freq)
+        rows += table
+        found += poles
+        factor *= 4
+    lowest = 4.0 * samples.sampling_freq / samples.values.size
+    merged = _merged([pole for pole in found if pole.frequency > lowest])
+    weighed = _weighed(samples, merged, noise)
+    diagram = Stabilisation(
+        np.array([row[0] for row in rows], dtype=np.int64),
+        np.array([row[1] for row in rows], dtype=np.float64),
+        np.array([row[2] for row in rows], dtype=np.float64),
+        np.array([row[3] for row in rows], dtype=bool),
+    )
+    return sorted(weighed, key=lambda pole: -pole.energy), diagram
+
+
+def _stage(
+    samples: SignalSamples, low: float, high: float
+) -> tuple[list[Pole], list[tuple[int, float, float, bool]]]:
+    """Stable poles of one stage between two frequencies [Hz], and its part of the diagram."""
+    values = samples.values - samples.values.mean()
+    n = values.size
+    length = min(n // 2, _WINDOW)
+    count = n - length + 1
+    every = max(1, count // _WINDOWS)
+    windows = np.lib.stride_tricks.sliding_window_view(values, length)[::every]
+    gram = np.zeros((length, length))
+    for first in range(0, windows.shape[0], 2000):
+        part = np.ascontiguousarray(windows[first : first + 2000])
+        gram += part.T @ part
+    most = min(_MOST, length // 3)
+    most -= most % 2
+    _, vectors = eigh(gram, subset_by_index=(length - most, length - 1), driver="evr")
+    vectors = vectors[:, ::-1]
+    # the columns are orthonormal, so the least squares solution of every order follows from one product
+    shifted = vectors[:-1].T @ vectors[1:]
+    ends = vectors[-1]
+    last: list[tuple[float, float]] = []
+    tracks: list[list[tuple[float, float]]] = []
+    owner: dict[int, int] = {}
+    rows: list[tuple[int, float, float, bool]] = []
+    for order in range(2, most + 1, 2):
+        end = ends[:order]
+        part = shifted[:order, :order]
+        turn = part + np.outer(end, end @ part) / max(1.0 - float(end @ end), 1e-12)
+        roots = np.linalg.eigvals(turn)
+        s = np.log(roots.astype(np.complex128)) * samples.sampling_freq
+        poles = [
+            (abs(one) / (2.0 * math.pi), -one.real / abs(one))
+            for one in s
+            if one.imag > 0.0 and abs(one) > 0.0
+        ]
+        poles = [one for one in poles if low <= one[0] <= high and -0.02 < one[1] < _LARGEST_DAMPING]
+        fresh: dict[int, int] = {}
+        for k, pole in enumerate(poles):
+            match = _nearest(pole, last)
+            known = owner.get(match) if match is not None else None
+            if known is None:
+                tracks.append([pole])
+                known = len(tracks) - 1
+            else:
+                tracks[known].append(pole)
+            fresh[k] = known
+            rows.append((order, pole[0], pole[1], len(tracks[known]) >= _STABLE))
+        last, owner = poles, fresh
+    out = []
+    for track in tracks:
+        if len(track) >= _STABLE:
+            middle = np.median(np.array(track), axis=0)
+            out.append(Pole(float(middle[0]), float(middle[1]), math.nan, math.nan, len(track)))
+    return out, rows
+
+
+def _nearest(pole: tuple[float, float], others: list[tuple[float, float]]) -> int | None:
+    """Which of *others* is the same pole, if any."""
+    best, where = math.inf, None
+    for k, other in enumerate(others):
+        apart = abs(other[0] / pole[0] - 1.0)
+        damped = abs(other[1] - pole[1])
+        if apart < _SAME[0] and damped < max(_SAME[1] * abs(pole[1]), _SAME[2]) and apart < best:
+            best, where = apart, k
+    return where
+
+
+def _merged(poles: list[Pole]) -> list[Pole]:
+    """Poles of all stages, each mode once: the one that stayed longest."""
+    out: list[Pole] = []
+    for pole in sorted(poles, key=lambda one: -one.orders):
+        if all(abs(pole.frequency / other.frequency - 1.0) > 0.015 for other in out):
+            out.append(pole)
+    return out
+
+
+def _weighed(samples: SignalSamples, poles: list[Pole], noise: float) -> list[Pole]:
+    """Amplitudes and energies of poles, by linear least squares on the record."""
+    floor = max(noise, 1e-9 * float(np.abs(samples.values).max()))
+    return [
+        pole._replace(amplitude=amplitude, energy=float(part @ part) / floor**2)
+        for pole, amplitude, part in zip(poles, *_parts(samples, poles), strict=True)
+    ]
+
+
+def without_poles(samples: SignalSamples, poles: list[Pole], others: list[Pole]) -> SignalSamples:
+    """A record less the sines of *poles*, their amplitudes fitted together with those of *others*."""
+    if not poles:
+        return samples
+    _, parts = _parts(samples, [*poles, *others])
+    return SignalSamples(samples.values - sum(parts[: len(poles)]), samples.time, samples.sampling_freq)
+
+
+def _parts(samples: SignalSamples, poles: list[Pole]) -> tuple[list[float], list[_Array]]:
+    """Amplitude of each pole at the start, and its part of the record."""
+    if not poles:
+        return [], []
+    t = samples.time - samples.time[0]
+    columns = [np.ones_like(t)]
+    for pole in poles:
+        omega = 2.0 * math.pi * pole.frequency
+        zeta = min(max(pole.damping_ratio, 0.0), 0.99)
+        wave = np.exp((-zeta * omega + 1j * omega * math.sqrt(1.0 - zeta * zeta)) * t)
+        columns += [wave.real, wave.imag]
+    design = np.column_stack(columns)
+    scale = np.linalg.norm(design, axis=0)
+    gram = (design.T @ design) / np.outer(scale, scale)
+    solution = np.linalg.lstsq(gram, (design.T @ samples.values) / scale, rcond=1e-10)[0] / scale
+    amplitudes, parts = [], []
+    for k in range(len(poles)):
+        c, s = solution[1 + 2 * k], solution[2 + 2 * k]
+        amplitudes.append(math.hypot(c, s))
+        parts.append(np.asarray(c * columns[1 + 2 * k] + s * columns[2 + 2 * k]))
+    return amplitudes, parts

@@ -1,0 +1,1 @@
+"""What a measurement says against itself: findings as data, one module an instrument."""

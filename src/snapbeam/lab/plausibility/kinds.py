@@ -1,0 +1,36 @@
+"""What a finding can be: its code, its severity, what it is seen by and what it says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from snapbeam.core.findings import Finding, Severity
+
+__all__ = ["Kind", "table"]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of finding.
+
+    ``sees`` is what gives it away, for the table in the documentation; ``says`` its words, with the numbers in
+    braces and the way out; ``options`` the arguments that are the way out, each also an option of the command
+    line.
+    """
+
+    code: str
+    severity: Severity
+    sees: str
+    says: str
+    options: tuple[str, ...] = ()
+
+    def found(self, severity: Severity | None = None, told: str = "", **numbers: float) -> Finding:
+        """The finding with its numbers, in words; *told* stands for ``{told}`` in them."""
+        words = self.says.format(told=told, **numbers)
+        return Finding(self.code, words, numbers, severity or self.severity)
+
+
+def table(*kinds: Kind) -> Mapping[str, Kind]:
+    """Kinds by the part of their code after the dot."""
+    return {one.code.partition(".")[2]: one for one in kinds}

@@ -1,0 +1,1 @@
+"""Rows of beam and shaker in every frame, and what is wrong with each."""

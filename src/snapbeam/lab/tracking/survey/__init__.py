@@ -1,0 +1,1 @@
+"""Finding out from a sample of frames what a recording shows, before it is followed."""

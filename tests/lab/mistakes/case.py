@@ -1,0 +1,74 @@
+"""A mistake, what is made of it, and how it is told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from snapbeam import InputError
+from snapbeam.core.findings import Finding
+from snapbeam.lab.plausibility import (
+    alignment,
+    calibration,
+    comparison,
+    decay,
+    recording,
+    tracking,
+    vibrometer,
+)
+from snapbeam.lab.plausibility.kinds import Kind
+
+KINDS: Mapping[str, Kind] = {
+    kind.code: kind
+    for module in (alignment, calibration, comparison, decay, recording, tracking, vibrometer)
+    for kind in module.KINDS.values()
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of a case.
+
+    ``ratio`` is the largest error of any number, in its standard errors; NaN where no number was asked.
+    """
+
+    findings: tuple[Finding, ...] = ()
+    refusal: str = ""
+    ratio: float = math.nan
+
+
+@dataclass(frozen=True)
+class Case:
+    """One mistake.
+
+    ``look`` makes it in a folder and measures it.  ``end`` is what must come of it: "right", "flagged" with the
+    finding ``code``, or "refused" with words that match ``words``.  ``sees`` says what gives it away, where
+    that is no finding's.
+    """
+
+    group: str
+    mistake: str
+    look: Callable[[Path], Outcome] = field(repr=False)
+    end: str
+    code: str = ""
+    words: str = ""
+    sees: str = ""
+
+
+def looked(case: Case, folder: Path) -> Outcome:
+    """The outcome of a case; a refusal is one."""
+    try:
+        return case.look(folder)
+    except InputError as error:
+        return Outcome(refusal=str(error).replace(f"{folder}/", ""))
+
+
+def off(measured, truth, error) -> float:
+    """The largest error over its standard error."""
+    miss = np.abs(np.asarray(measured, dtype=float) - truth)
+    known = np.isfinite(miss)
+    return float(np.max(miss[known] / np.broadcast_to(error, miss.shape)[known])) if known.any() else math.nan

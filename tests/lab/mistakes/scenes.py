@@ -1,0 +1,182 @@
+"""Mistakes in front of the camera and in it."""
+
+from __future__ import annotations
+
+import numpy as np
+from lab_waveforms import BUCKLING_LEVEL, FRAME_RATE, PIXEL, impacts
+from random_scenes import write
+
+from snapbeam.lab import (
+    Defects,
+    SyntheticCamera,
+    SyntheticStage,
+    findings_of,
+    open_recording,
+    render_recording,
+    track,
+)
+from snapbeam.lab.synthetic.defects import Fixture
+
+from .case import Case, Outcome, off
+
+CAMERA = {"frame_rate": FRAME_RATE, "pixel_size": PIXEL, "shape": (160, 96), "lens": "disk"}
+TALL = {"shape": (192, 96)}
+DARK = {"shaker": 0.12, "background": 0.12, "marker": 0.9, "marker_distance": 0.35e-3}
+STICKER = "Sticker and striker"
+SCENE = "Something else in view"
+LIGHT = "Light and curve of the camera"
+REST = "Recording that begins in motion"
+
+
+def scene(
+    folder,
+    *,
+    camera=None,
+    stage=None,
+    defects=None,
+    motion=None,
+    rest=24,
+    name="scene.cihx",
+    opened=None,
+    **settings,
+):
+    """Draw a scene with a lens that is not the tracker's, write, read and track it."""
+    time, beam, shaker, *_ = impacts(4) if motion is None else motion
+    drawn = render_recording(
+        time,
+        beam,
+        shaker,
+        camera=SyntheticCamera(**(CAMERA | (camera or {}))),
+        stage=SyntheticStage(**({"shaker_width": 0.8e-3} | (stage or {}))),
+        defects=Defects(**(defects or {})),
+        rest_frames=rest,
+    )
+    path = write(drawn, folder / name)
+    at_rest = {"rest_displacement": -BUCKLING_LEVEL} | settings
+    with open_recording(
+        path, **({"frame_rate": FRAME_RATE, "pixel_size": PIXEL} | (opened or {}))
+    ) as recording:
+        tracked = track(recording, **at_rest)
+    truth, ratio = drawn.truth, 0.0
+    for value, error in (
+        ("displacement_mm", "displacement_stderr_mm"),
+        ("shaker_displacement_mm", "shaker_stderr_mm"),
+    ):
+        if value in tracked:
+            ratio = max(ratio, off(tracked[value], truth[value].values, tracked[error].values))
+    return Outcome(tuple(findings_of(tracked)), "", ratio)
+
+
+def begun_late():
+    """The motion from its middle on."""
+    time, beam, shaker, *_ = impacts(4)
+    first = int(np.searchsorted(time, 0.0105))
+    return time[first:] - time[first], beam[first:], shaker[first:]
+
+
+def case(group, mistake, end, code="", words="", sees="", **of_the_scene):
+    return Case(group, mistake, lambda folder: scene(folder, **of_the_scene), end, code, words, sees)
+
+
+def light(mistake, end, code="", **of_the_scene):
+    return case(LIGHT, mistake, end, code, **of_the_scene)
+
+
+CASES = (
+    case(
+        STICKER,
+        "dark striker before a dark background, with a white sticker",
+        "flagged",
+        "camera.sticker_alone",
+        camera=TALL,
+        stage=DARK,
+    ),
+    case(
+        STICKER,
+        "the same, and the distance from sticker to tip is given",
+        "right",
+        sees="tip_distance (--tip-distance) says where the tip is",
+        camera=TALL,
+        stage=DARK,
+        tip_distance=0.35e-3,
+    ),
+    case(
+        STICKER,
+        "the sticker taken for the striker (--no-marker)",
+        "flagged",
+        "camera.never_touches",
+        camera=TALL,
+        stage=DARK,
+        marker=False,
+    ),
+    case(
+        STICKER,
+        "--no-shaker with the striker in view",
+        "right",
+        code="camera.striker_in_view",
+        sees="columns that the striker enters are left out",
+        shaker=False,
+    ),
+    case(
+        SCENE,
+        "a bright bar, such as a clamp, that crosses the picture and never moves",
+        "right",
+        code="camera.fixture",
+        sees="of the bands that cross the picture, the one that moves is the beam",
+        camera=TALL,
+        defects={"fixture": Fixture(15.0, 5.0, 0.8)},
+    ),
+    case(
+        SCENE,
+        "nothing in the picture moves",
+        "flagged",
+        "camera.no_motion",
+        motion=(np.linspace(0.0, 0.05, 4000), np.full(4000, -BUCKLING_LEVEL), np.full(4000, -BUCKLING_LEVEL - 2e-4)),
+    ),
+    case(
+        SCENE,
+        "glare across all columns in 80 frames",
+        "flagged",
+        "camera.distorted",
+        defects={"glare_frames": tuple(range(60, 140)), "glare_strength": 0.5, "glare_wide": True},
+    ),
+    case(
+        SCENE,
+        "glare over a part of the beam in 80 frames",
+        "flagged",
+        "camera.lost",
+        defects={"glare_frames": tuple(range(60, 140)), "glare_strength": 1.0, "glare_wide": False},
+    ),
+    case(
+        SCENE,
+        "the beam hidden in every seventh frame",
+        "right",
+        sees="no edge of the beam's contrast: the frame is flagged, and holds no number",
+        defects={"hidden_frames": tuple(range(100, 200, 7))},
+    ),
+    light("12 bits in a file of 16, overexposed by 1.8", "flagged", "camera.overexposed",
+          defects={"gain": 2.5}, name="scene.tif"),
+    light("overexposed by 1.3", "flagged", "camera.overexposed", defects={"gain": 1.8}),
+    light("grey levels that are light to the power of 0.45", "flagged", "camera.gamma", defects={"gamma": 0.45}),
+    light("grey levels that are light to the power of 2.2", "flagged", "camera.gamma", defects={"gamma": 2.2}),
+    light("the same, undone", "right", sees="gamma (--gamma) 2.2 turns grey levels into light",
+          defects={"gamma": 2.2}, gamma=2.2),
+    light("video with lossy compression", "flagged", "recording.lossy", name="scene.mp4"),
+    case(REST, "the beam moves in the first frame", "flagged", "camera.no_rest", motion=begun_late(), rest=0),
+    case(
+        "Pixel size",
+        "--pixel-size 12 for 12 um",
+        "refused",
+        words=r"pixel_size \(--pixel-size\) = 12: a pixel of 12 m; must be at most 0.01 m",
+        sees="a pixel larger than any beam",
+        opened={"pixel_size": 12.0},
+    ),
+    case(
+        "Pixel size",
+        "a pixel size twice the true one, beside a gauge",
+        "flagged",
+        "camera.thickness",
+        opened={"pixel_size": 2 * PIXEL},
+        beam_thickness=0.4e-3,
+    ),
+)  # fmt: skip

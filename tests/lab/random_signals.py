@@ -1,0 +1,201 @@
+"""Signals drawn at random, good ones and ones with one thing wrong, and how far off a measurement of them is."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+
+from snapbeam import InputError
+from snapbeam.core.findings import doubtful
+from snapbeam.lab import findings_of, identify_decay, make_signal, measure_drive, render_vibrometer
+
+DRIVE_DEFECTS = (
+    "dropout", "hold", "spikes", "clipped", "clipped on one side", "clipped before the noise", "gentle start",
+    "begins in motion", "amplitude wanders", "interrupted", "wrong frequency set", "drifting zero",
+)  # fmt: skip
+DECAY_DEFECTS = (
+    "clipped", "clipped before the noise", "drift", "close modes", "quadratic damping", "dry friction", "second hit",
+    "hum", "dropout", "release within", "more modes", "asked off",
+)  # fmt: skip
+
+
+@dataclass
+class Outcome:
+    """How a signal came out: the worst error in standard errors, of which number, and what was said."""
+
+    ratio: float
+    worst: str
+    codes: tuple[str, ...]
+    refusal: str = ""
+
+    @property
+    def flagged(self) -> bool:
+        return bool(self.codes) or bool(self.refusal)
+
+
+def drive_signal(rng, kind):
+    """A vibrometer's record, what is true of it, and what a person says of it."""
+    freq, amplitude = rng.uniform(40.0, 300.0), 0.03
+    onset = rng.uniform(0.05, 0.2)
+    start_up = float(np.exp(rng.uniform(np.log(0.003), np.log(0.03))))
+    share = float(rng.choice([0.0, 0.4, -0.3]))
+    if kind == "gentle start":
+        start_up, share = float(np.exp(rng.uniform(np.log(0.02), np.log(0.15)))), 1.0
+    length = onset + max(60.0 / freq, 10.0 * start_up)
+    signal = render_vibrometer(
+        freq, amplitude, duration=length, onset=onset, start_up=start_up, start_up_share=share,
+        phase=rng.uniform(-3.0, 3.0), distortion=float(rng.choice([0.0, 0.01, 0.03])), snr_db=rng.uniform(20.0, 42.0),
+        seed=int(rng.integers(2**31)),
+    )  # fmt: skip
+    values, time, rate = signal.values.copy(), signal["time"].values, 20_000.0
+    truth = {"amplitude": amplitude, "frequency": freq, "onset": onset}
+    options = {"frequency": freq * rng.uniform(0.999, 1.001)}
+    at = int(rate * rng.uniform(onset + 0.5 * (length - onset), length - 0.02))
+    size = int(rate * rng.uniform(0.001, 0.015))
+    if kind == "dropout":
+        values[at : at + size] = 0.0
+    elif kind == "hold":
+        values[at : at + size] = values[at]
+    elif kind == "spikes":
+        values[rng.integers(int(rate * onset), values.size, 6)] += rng.choice([-3.0, 3.0], 6) * amplitude
+    elif kind == "clipped":
+        values = np.clip(values, *(np.array([-1.0, 1.0]) * rng.uniform(0.5, 0.93) * amplitude))
+    elif kind == "clipped on one side":
+        values = np.minimum(values, rng.uniform(0.5, 0.9) * amplitude)
+    elif kind == "clipped before the noise":
+        level = rng.uniform(0.55, 0.9) * amplitude
+        noise = 0.01 * amplitude * rng.standard_normal(values.size)
+        clean = render_vibrometer(
+            freq,
+            amplitude,
+            duration=length,
+            onset=onset,
+            start_up=start_up,
+            start_up_share=share,
+            snr_db=200.0,
+        )
+        values = np.clip(clean.values, -level, level) + noise[: clean.size]
+    elif kind == "begins in motion":
+        keep = time > onset + 6.0 * start_up + 5.0 / freq
+        values, time = values[keep], time[keep]
+        del truth["onset"]
+    elif kind == "amplitude wanders":
+        values = values * (1.0 + rng.uniform(0.03, 0.1) * np.sin(2.0 * np.pi * 2.0 * time))
+        del truth["amplitude"]  # there is no one amplitude
+    elif kind == "interrupted":
+        hole = int(rate * (onset + 0.5 * (length - onset)))
+        values[hole : hole + int(12.0 * rate / freq)] *= 0.0
+    elif kind == "wrong frequency set":
+        options["frequency"] = freq * float(rng.choice([0.992, 1.008]))
+    elif kind == "drifting zero":
+        values = values + 0.3 * amplitude * time / time[-1]
+    return make_signal(values, "m/s", time=time, name="velocity"), truth, options
+
+
+def fading(time, freq, zeta):
+    """A sine that dies away."""
+    return np.exp(-zeta * 2.0 * np.pi * freq * time) * np.cos(2.0 * np.pi * freq * time)
+
+
+def decay_signal(rng, kind):
+    """A free decay, what is true of it, and what a person says of it."""
+    freq, zeta, rate = (
+        rng.uniform(40.0, 200.0),
+        float(np.exp(rng.uniform(np.log(0.002), np.log(0.015)))),
+        5000.0,
+    )
+    length = float(np.clip(3.0 / (2.0 * np.pi * freq * zeta), 20.0 / freq, 1.2))
+    time = np.arange(int(length * rate)) / rate
+    omega = 2.0 * np.pi * freq
+    fall = np.exp(-zeta * omega * time)
+    if kind == "quadratic damping":
+        strength = rng.uniform(0.5, 4.0)
+        fall = fall / (1.0 + strength * (1.0 - fall))
+    elif kind == "dry friction":
+        strength = rng.uniform(0.05, 0.4)
+        fall = np.maximum((1.0 + strength) * fall - strength, 0.0)
+    soft = rng.uniform(0.0, 0.02) if kind in ("", "drift", "hum", "release within") else 0.0
+    clock = time - soft * np.cumsum(fall**2) / rate
+    phase = rng.uniform(-3.0, 3.0)
+    values = fall * np.cos(omega * np.sqrt(1.0 - zeta**2) * clock + phase)
+    if (kind == "" and rng.random() < 0.4) or kind == "more modes":
+        other, damping = freq * rng.uniform(1.8, 6.0), zeta * rng.uniform(0.7, 2.0)
+        values = values + rng.uniform(0.1, 0.5) * np.exp(-damping * 2.0 * np.pi * other * time) * np.cos(
+            2.0 * np.pi * other * time
+        )
+    noise = 10.0 ** (-rng.uniform(18.0, 40.0) / 20.0) / np.sqrt(2.0)
+    truth, options = {"natural_freq": freq, "damping_ratio": zeta}, {}
+    at = int(rng.uniform(0.25, 0.5) * time.size)
+    if kind == "close modes":
+        other = freq * (1.0 + rng.uniform(0.02, 0.12))
+        values = values + rng.uniform(0.3, 0.7) * np.exp(-zeta * 1.1 * 2.0 * np.pi * other * time) * np.cos(
+            2.0 * np.pi * other * time
+        )
+    elif kind == "second hit":
+        since = np.maximum(time - time[at], 0.0)
+        values = values + rng.uniform(0.3, 1.0) * (time >= time[at]) * np.exp(-zeta * omega * since) * np.sin(
+            omega * since
+        )
+    elif kind == "drift":
+        shape = rng.integers(3)
+        values = (
+            values
+            + rng.uniform(0.3, 2.0)
+            * (time / length, np.exp(-time / rng.uniform(0.1, 0.4)), np.sin(4.0 * time / length))[shape]
+        )
+    elif kind == "hum":
+        hum = float(rng.choice([50.0, 60.0, 100.0, 120.0])) * rng.uniform(0.999, 1.001)
+        values = values + rng.uniform(0.05, 0.5) * np.cos(2.0 * np.pi * hum * time + 1.0)
+    elif kind == "release within":
+        before = np.full(int(rng.uniform(0.05, 0.3) * rate), rng.choice([0.0, 1.0]))
+        values = np.concatenate([before, values])
+    elif kind == "asked off":
+        options = {"frequencies": [freq * rng.uniform(0.93, 1.07)]}
+    level = rng.uniform(0.45, 0.8)
+    if kind == "clipped before the noise":
+        values = np.clip(values, -level, level)
+    values = values + noise * rng.standard_normal(values.size)
+    if kind == "clipped":
+        values = np.clip(values, -level, level)
+    elif kind == "dropout":
+        values[at : at + int(rate * rng.uniform(0.004, 0.02))] = 0.0
+    units = str(rng.choice(["m", "m/s"]))
+    return make_signal(values, units, rate, name="decay"), truth, options
+
+
+def judged_drive(rng, kind):
+    """The outcome of a vibrometer's record."""
+    signal, truth, options = drive_signal(rng, kind)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        try:
+            drive = measure_drive(signal, **options)
+        except InputError as error:
+            return Outcome(0.0, "", (), str(error))
+    ratios = {}
+    for name in ("amplitude", "frequency"):
+        if name in truth:
+            ratios[name] = abs(getattr(drive.steady, name) - truth[name]) / getattr(
+                drive.steady, f"{name}_se"
+            )
+    if "onset" in truth and drive.startup is not None:
+        ratios["onset"] = abs(drive.startup.onset - truth["onset"]) / drive.startup.onset_uncertainty
+    worst = max(ratios, key=ratios.get, default="")
+    return Outcome(ratios.get(worst, 0.0), worst, tuple(one.code for one in doubtful(findings_of(drive))))
+
+
+def judged_decay(rng, kind):
+    """The outcome of a decay."""
+    signal, truth, options = decay_signal(rng, kind)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        try:
+            fit = identify_decay(signal, **options)
+        except InputError as error:
+            return Outcome(0.0, "", (), str(error))
+    mode = fit.modes[0]
+    ratios = {name: abs(getattr(mode, name) - truth[name]) / getattr(mode, f"{name}_se") for name in truth}
+    worst = max(ratios, key=ratios.get)
+    return Outcome(ratios[worst], worst, tuple(one.code for one in doubtful(fit.findings)))

@@ -1,0 +1,72 @@
+"""Ordinary mistakes of a laboratory: each comes out right, or flagged, or refused with a way out."""
+
+import re
+
+import numpy as np
+import pytest
+from mistakes import table
+from mistakes.case import KINDS, looked
+from mistakes.table import CASES
+
+ENDS = ("right", "flagged", "refused")
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.group}: {case.mistake}")
+def test_a_mistake_is_right_or_flagged_or_refused(case, tmp_path):
+    outcome = looked(case, tmp_path)
+    assert case.end in ENDS
+    if case.end == "refused":
+        assert outcome.refusal, f"not refused; {outcome.findings}"
+        assert re.search(case.words, outcome.refusal), outcome.refusal
+        return
+    assert not outcome.refusal, outcome.refusal
+    codes = {finding.code: finding for finding in outcome.findings}
+    if case.code:
+        assert case.code in codes, f"{case.code} not told; {list(codes)}"
+    if case.end == "flagged":
+        assert codes[case.code].doubtful
+    if case.end == "right":
+        # a number within its standard errors, which five of them are sure to cover
+        assert not outcome.ratio > 5.0
+    # what is told fills its words with the numbers it carries, and its kind is listed
+    for finding in outcome.findings:
+        assert finding.code in KINDS
+        assert all(np.isfinite(value) for value in finding.numbers.values())
+
+
+def test_the_table_of_the_documentation_has_every_case():
+    written = table.FILE.read_text(encoding="utf-8")
+    for case in CASES:
+        line = next(
+            line for line in written.splitlines() if line.startswith(f"| {case.mistake} | {case.end} |")
+        )
+        assert f"`{case.code}`" in line or not case.code
+
+
+@pytest.mark.slow
+def test_the_table_of_the_documentation_is_what_comes_of_the_cases():
+    numbers = re.compile(r"[-+]?\d+(\.\d+)?")  # the last digits are the machine's own
+    written = table.FILE.read_text(encoding="utf-8")
+    assert numbers.sub("#", table.text(table.measured())) == numbers.sub("#", written)
+
+
+def flags():
+    """Every option of every command of the laboratory."""
+    from typer.main import get_command
+
+    from snapbeam.cli.app import app
+
+    commands = get_command(app).commands
+    asked = (
+        commands[name] for name in ("track", "vibrometer", "identify", "calibrate", "compare", "campaign")
+    )
+    return {flag for one in asked for option in one.params for flag in (*option.opts, *option.secondary_opts)}
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.code)
+def test_a_finding_names_its_way_out_as_python_and_as_the_command_line_do(kind):
+    named = set(re.findall(r"--[a-z]+(?:-[a-z]+)*", kind.says))
+    assert named <= flags(), named - flags()
+    for option in kind.options:
+        assert re.search(rf"\b{option}\b", kind.says), option
+        assert named, "an argument without the command's flag"

@@ -1,0 +1,22 @@
+"""The laboratory's public names are where its own list says."""
+
+import pytest
+
+import snapbeam
+import snapbeam.core.findings as findings
+import snapbeam.lab as lab
+
+
+@pytest.mark.parametrize("name", lab.__all__)
+def test_every_public_name_is_there(name):
+    assert getattr(lab, name).__module__.startswith("snapbeam.")
+    assert name in dir(lab)
+
+
+def test_a_finding_of_the_laboratory_is_a_finding_of_the_package():
+    assert lab.Finding is findings.Finding is snapbeam.Finding
+
+
+def test_a_name_that_is_not_there():
+    with pytest.raises(AttributeError, match="vibrometer"):
+        lab.vibrometer  # noqa: B018
