@@ -18,13 +18,14 @@ PLOT ?= map.png
 # Where the benchmarks write; the docs show what is in docs/images
 BENCH ?= out/bench
 
-.PHONY: help map test test-slow test-oldest lint docs bench dist clean
+.PHONY: help map explorer-deps test test-slow test-oldest lint docs bench dist clean
 
 help:
 	@echo "make map        compute the response map ($(MAP), $(PLOT)); variables: MODES CYCLES FREQUENCY_RATIO"
 	@echo "                VELOCITY_AMPLITUDE LOCATION MAP PLOT"
 	@echo "make test       lint, types, import contracts and the tests"
 	@echo "make test-slow  the tests that take longer"
+	@echo "make explorer-deps   what the explorer and its tests in a browser need"
 	@echo "make test-oldest  the tests with the oldest packages that are allowed, on Python 3.11"
 	@echo "make docs       the documentation, in docs/_build/html"
 	@echo "make bench      the benchmarks, in out/bench; variable: BENCH"
@@ -56,6 +57,12 @@ $(VENV)/.installed-bench: pyproject.toml constraints.txt $(VENV)/.installed-test
 map: $(VENV)/.installed-run
 	$(BIN)/snapbeam map --modes $(MODES) --cycles $(CYCLES) --frequency-ratio $(FREQUENCY_RATIO) \
 		--velocity-amplitude $(VELOCITY_AMPLITUDE) --location $(LOCATION) -o $(MAP) --plot $(PLOT)
+
+# The browser is the system's: its tests are skipped, with a line, where there is none.
+explorer-deps: $(VENV)/.installed-test
+	$(PIP) install --constraint constraints.txt --editable ".[explorer,explorer-test]"
+	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null \
+		|| echo "no Chromium: install it with the system's packages (Debian: apt-get install chromium), or set CHROMIUM"
 
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check .

@@ -16,6 +16,7 @@ _PARTS = {
     "requests": "requests",
     "levels": "levels",
     "tried": "tried",
+    "explorer": "explorer",
 }
 
 

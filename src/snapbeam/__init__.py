@@ -4,6 +4,8 @@ A clamped-clamped beam pressed past buckling is struck by a shaker; its reduced 
 is classed, and sweeps show where it snaps.
 """
 
+from typing import Any
+
 from snapbeam.core.codes import ResponseClass, RunStatus, classify
 from snapbeam.core.findings import Finding, PlausibilityWarning
 from snapbeam.core.provenance import __version__
@@ -63,6 +65,7 @@ from snapbeam.runs.simulate import simulate
 from snapbeam.runs.tolerance import Accuracy, conditioning
 from snapbeam.sweeps.doors import long_map, response_map, threshold_curve
 from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.reading import read_store
 from snapbeam.sweeps.replicas import Replicas
 from snapbeam.sweeps.stored import Keeping, Tally
 from snapbeam.sweeps.sweep import sweep
@@ -136,6 +139,7 @@ __all__ = [
     "continue_orbit",
     "edge_state",
     "exact_natural_freq",
+    "explore",
     "hertz_stress",
     "integrity",
     "lifetime_map",
@@ -145,6 +149,7 @@ __all__ = [
     "periodic_orbit",
     "poincare",
     "quasi_static_threshold",
+    "read_store",
     "response_map",
     "separation_exponent",
     "simulate",
@@ -154,3 +159,12 @@ __all__ = [
     "threshold_curve",
     "uncertainty_exponent",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """The explorer, when it is first asked for: the package does without what draws pages."""
+    if name == "explore":
+        from importlib import import_module
+
+        return import_module("snapbeam.explorer").explore
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -11,6 +11,7 @@ from snapbeam.cli.campaign import campaign
 from snapbeam.cli.compare import compare
 from snapbeam.cli.draw import draw
 from snapbeam.cli.dynamics import dynamics
+from snapbeam.cli.explore import explore
 from snapbeam.cli.frequencies import frequencies
 from snapbeam.cli.identify import identify
 from snapbeam.cli.info import info
@@ -40,6 +41,7 @@ app.command("simulate")(simulate)
 app.add_typer(dynamics, name="dynamics")
 app.command("frequencies")(frequencies)
 app.command("plot")(plot)
+app.command("explore")(explore)
 app.command("draw")(draw)
 app.command("paper")(paper)
 app.command("track")(track)
