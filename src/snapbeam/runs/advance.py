@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.core.validate import InputError, InputTypeError, finite_array, flag, positive, shown
+from snapbeam.core.validate import (
+    InputError,
+    InputTypeError,
+    callback,
+    finite_array,
+    flag,
+    instance,
+    positive,
+    shown,
+)
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble
 from snapbeam.engines.ensemble import Ensemble
@@ -85,7 +94,10 @@ def advance(
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if state is not None and not isinstance(state, State):
         raise InputTypeError(f"state = {shown(state)}: must be a State")
-    integration = Integration() if integration is None else integration
+    integration = instance(
+        "integration", Integration() if integration is None else integration, Integration, "an Integration"
+    )
+    callback("progress", progress)
     span = positive("periods", periods)
     every = flag("every", every)
     if state is None:

@@ -58,7 +58,7 @@ def si_unit(name: str, unit: str) -> tuple[float, str]:
     """
     if not isinstance(unit, str):
         raise InputTypeError(
-            f"unit of {name} = {shown(unit)}: must be text such as 'mm/s', not {type(unit).__name__}"
+            f"unit of {name if isinstance(name, str) else shown(name)} = {shown(unit)}: must be text such as 'mm/s', not {type(unit).__name__}"
         )
     word = unit.strip().replace("\u03bc", "u").replace("\u00b5", "u").replace(" ", "").replace("*", "")
     word = _WORDS.get(word.lower(), word)
