@@ -18,7 +18,7 @@ PLOT ?= map.png
 # Where the benchmarks write; the docs show what is in docs/images
 BENCH ?= out/bench
 
-.PHONY: help map test test-slow test-oldest lint docs bench clean
+.PHONY: help map test test-slow test-oldest lint docs bench dist clean
 
 help:
 	@echo "make map        compute the response map ($(MAP), $(PLOT)); variables: MODES CYCLES FREQUENCY_RATIO"
@@ -28,6 +28,7 @@ help:
 	@echo "make test-oldest  the tests with the oldest packages that are allowed, on Python 3.11"
 	@echo "make docs       the documentation, in docs/_build/html"
 	@echo "make bench      the benchmarks, in out/bench; variable: BENCH"
+	@echo "make dist       wheel and source archive, each installed alone and run"
 	@echo "make clean      remove what was built (not the environment, not results)"
 
 $(BIN)/python:
@@ -87,6 +88,12 @@ docs: $(VENV)/.installed-docs
 
 bench: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks -o $(BENCH)
+
+dist: $(VENV)/.installed-test
+	$(PIP) install --constraint constraints.txt build
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist .
+	$(BIN)/python tests/release/alone.py dist
 
 clean:
 	rm -rf build dist docs/_build docs/gallery docs/_paper docs/_generated docs/sg_execution_times.rst .pytest_cache .mypy_cache \

@@ -7,11 +7,34 @@ is classed, and sweeps show where it snaps.
 from snapbeam.core.codes import ResponseClass, RunStatus, classify
 from snapbeam.core.findings import Finding, PlausibilityWarning
 from snapbeam.core.provenance import __version__
+from snapbeam.core.showing import register_accessor
 from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.engines.outcomes import STATISTICS, Statistic
 from snapbeam.model.beam import Beam
-from snapbeam.model.contact import ContactLaw, HertzContact, Restitution
-from snapbeam.model.drive import Drive, Recorded, Sine
+from snapbeam.model.contact import (
+    ContactLaw,
+    HertzContact,
+    HuntCrossley,
+    KelvinVoigt,
+    PowerLaw,
+    Restitution,
+    bending_stress,
+    hertz_stress,
+)
+from snapbeam.model.drive import (
+    AccelerationSine,
+    Burst,
+    Chirp,
+    DisplacementSine,
+    Drive,
+    Flight,
+    HalfSine,
+    Noise,
+    Recorded,
+    Sine,
+    Still,
+    TwoSines,
+)
 from snapbeam.model.frequencies import exact_natural_freq
 from snapbeam.model.integration import Integration
 from snapbeam.model.quasi_static import quasi_static_threshold
@@ -33,21 +56,33 @@ from snapbeam.sweeps.sweep import sweep
 from snapbeam.sweeps.threshold import threshold
 
 Response = Outcome
+register_accessor()
+del register_accessor
 
 __all__ = [
     "STATISTICS",
+    "AccelerationSine",
     "Accuracy",
     "Beam",
+    "Burst",
+    "Chirp",
     "ContactLaw",
+    "DisplacementSine",
     "Drive",
     "Finding",
+    "Flight",
+    "HalfSine",
     "HertzContact",
+    "HuntCrossley",
     "InputError",
     "InputTypeError",
     "Integration",
     "Keeping",
+    "KelvinVoigt",
+    "Noise",
     "Outcome",
     "PlausibilityWarning",
+    "PowerLaw",
     "Recorded",
     "RecordedDrive",
     "ReducedModel",
@@ -61,15 +96,19 @@ __all__ = [
     "Sine",
     "State",
     "Statistic",
+    "Still",
     "StoreError",
     "Striker",
     "System",
     "Tally",
+    "TwoSines",
     "__version__",
     "advance",
+    "bending_stress",
     "classify",
     "conditioning",
     "exact_natural_freq",
+    "hertz_stress",
     "load_run",
     "long_map",
     "quasi_static_threshold",

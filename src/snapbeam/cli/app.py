@@ -9,6 +9,7 @@ import typer
 from snapbeam.cli.calibrate import calibrate
 from snapbeam.cli.campaign import campaign
 from snapbeam.cli.compare import compare
+from snapbeam.cli.draw import draw
 from snapbeam.cli.frequencies import frequencies
 from snapbeam.cli.identify import identify
 from snapbeam.cli.info import info
@@ -37,6 +38,7 @@ app.command("threshold")(threshold)
 app.command("simulate")(simulate)
 app.command("frequencies")(frequencies)
 app.command("plot")(plot)
+app.command("draw")(draw)
 app.command("paper")(paper)
 app.command("track")(track)
 app.command("vibrometer")(vibrometer)

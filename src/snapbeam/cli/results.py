@@ -63,9 +63,7 @@ def write_map(dataset: xr.Dataset, path: Path) -> Path:
 def _save(drawn: Any, path: Path) -> Path:
     from snapbeam.figures import save_figure
 
-    figure = drawn.get_figure(root=True) if hasattr(drawn, "get_figure") else drawn
-    assert figure is not None
-    return save_figure(figure, path)
+    return save_figure(drawn, path)
 
 
 def draw_map(dataset: xr.Dataset, path: Path, overlay: Any, threshold_line: bool) -> Path:

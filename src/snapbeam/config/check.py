@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from snapbeam.config.axes import parse_axis
+from snapbeam.config.contact import MATERIALS, WANTED
 from snapbeam.config.parameters import Parameter, lookup, parameters
 from snapbeam.config.physical import PHYSICAL, physical_name
 from snapbeam.core.validate import InputError, finite, mapping, shown
@@ -17,15 +18,9 @@ from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
 from snapbeam.model.paper_values import BEAM
 
-__all__ = ["MATERIALS", "SECTIONS", "checked_sections", "contradictions", "parsed_axis", "with_section"]
+__all__ = ["SECTIONS", "checked_sections", "contradictions", "parsed_axis", "with_section"]
 
 SECTIONS = ("beam", "model", "contact", "striker", "drive", "start", "axes", "run")
-MATERIALS = {
-    "radius": ("m", "radius of the sphere", (1e-9, 10.0, "mm")),
-    "young_modulus": ("Pa", "Young's moduli of sphere and beam", None),
-    "poisson_ratio": ("1", "Poisson ratios of sphere and beam", None),
-}
-"""What a Hertzian stiffness may follow from: unit, words and plausible sizes."""
 _OF_MAP = {"frequency_ratio": "drive", "velocity_amplitude": "drive", "location": "striker"}
 """Names that a section [map] of version 0.1 may hold, and the sections they belong to."""
 _SYMBOLS = {
@@ -92,7 +87,7 @@ def _known(section: str, found: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Names that a section may hold."""
     names = [row.name.partition(".")[2] for row in parameters().values() if row.section == section]
     names += [name.partition(".")[2] for name in PHYSICAL if name.startswith(f"{section}.")]
-    return names + {"contact": ["law", *MATERIALS], "drive": ["kind"]}.get(section, [])
+    return names + {"contact": ["law", *MATERIALS, *WANTED], "drive": ["kind"]}.get(section, [])
 
 
 def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any]]) -> str:
@@ -169,8 +164,9 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
             return f"{name} = {value!r}: must be one of {', '.join(map(repr, known))}", None
         return "", value
     full = f"{section}.{name}"
-    if full in PHYSICAL or name == "radius":
+    if full in PHYSICAL or name == "radius" or name in WANTED:
         unit = PHYSICAL[full].unit if full in PHYSICAL else "m"
+        unit = WANTED[name][0] if name in WANTED else unit
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
             return f"{name} = {shown(value)}: must be a number in {unit}", None
         window = MATERIALS[name][2] if name in MATERIALS else None

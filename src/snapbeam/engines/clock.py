@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError
 from snapbeam.engines.plan import Plan
-from snapbeam.model.drive import Recorded
+from snapbeam.model.drive import HORIZON, Recorded
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 
@@ -78,11 +78,13 @@ def clocked(
         table["end"] = table["period"] * int(cycles)
         if not cycles.is_integer():
             table["end"] = np.rint(table["period"] * cycles).astype(np.int64)
+        table["landing"] = table["period"]
+        if drive is not None and not drive.repeats:
+            _whole_steps(cycle, lengths, float(HORIZON))  # refused if that cannot be counted
+            table["period"] *= HORIZON
     require_affordable(integration, system.model.modes, lengths, table["end"] / SUBDIVISION)
     if periods is None:
         table["landing"] = table["end"]
-    elif not isinstance(drive, Recorded):
-        table["landing"] = table["period"]
     table["last_quarter"] = table["end"] // 4 * 3
     return Clocked(cycles)
 

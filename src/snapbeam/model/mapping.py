@@ -25,7 +25,15 @@ SECTIONS = ("beam", "model", "contact", "striker", "drive", "start")
 _MATRICES = (
     "mass", "stiffness", "contact_shape", "center_shape", "tension_stiffness", "equilibrium", "length_scale",
 )  # fmt: skip
-_START = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
+_START = (
+    "amplitude",
+    "velocity",
+    "phase",
+    "striker_position",
+    "contact_time",
+    "striker_shift",
+    "striker_rate",
+)
 
 
 def parts_to_mapping(
@@ -50,7 +58,9 @@ def parts_to_mapping(
     if contact is not None:
         sections["contact"] = {"law": contact.name} | _fields(contact)
     if striker is not None:
-        own = {name: getattr(striker, name) for name in quantities(Striker)}
+        # without a mass there is no suspension
+        left_out = ("spring", "damper") if striker.mass is None else ()
+        own = {name: getattr(striker, name) for name in quantities(Striker) if name not in left_out}
         sections["striker"] = {name: value for name, value in own.items() if value is not None}
         sections["drive"] = {"kind": striker.drive.name} | _fields(striker.drive)
     if start is not None:

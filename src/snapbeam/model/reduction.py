@@ -226,16 +226,26 @@ class ReducedModel:
         """Number of modes N."""
         return self.equilibrium.size
 
-    def shape_at(self, location: float) -> _Array:
-        """phi_i at a location x_s in (0, 1) of the length; shape (N,), m^0.5.
+    def shape_at(self, location: ArrayLike) -> _Array:
+        """phi_i at a location x_s in [0, 1] of the length, or at each of several; shape (..., N), m^0.5.
 
         A model given by matrices has its one contact point and returns it whatever the location.
         """
-        location = within("location", location, 0.0, 1.0)
+        if np.ndim(location) == 0:
+            at: Any = within("location", location, 0.0, 1.0, closed="both")
+        else:
+            at = finite_array("location", location)
+            if at.size and (at.min() < 0.0 or at.max() > 1.0):
+                raise InputError(f"location from {at.min():g} to {at.max():g}: must lie in [0, 1]")
         if self.beam is None:
             assert self.contact_shape is not None
-            return self.contact_shape
-        return BucklingModes(self.beam.length, self.modes).shape(location * self.beam.length)
+            several = np.ndim(at) > 0
+            return (
+                np.broadcast_to(self.contact_shape, (*at.shape, self.modes))
+                if several
+                else self.contact_shape
+            )
+        return np.moveaxis(BucklingModes(self.beam.length, self.modes).shape(at * self.beam.length), 0, -1)
 
     @cached_property
     def lightest_contact_mass(self) -> float:
@@ -250,6 +260,7 @@ class ReducedModel:
 
         It falls like rho S L / N as modes are added.
         """
+        location = within("location", location, 0.0, 1.0)
         compliance = float(np.sum((self.linear_modes.T @ self.shape_at(location)) ** 2))
         if not compliance > _LEAST_COMPLIANCE:
             raise InputError(f"location = {location!r}: is so near a clamp that the beam does not move there")

@@ -85,6 +85,11 @@ class System:
                 f"contact = {contact!r} with modes = {model.modes}: Newton's law needs one mode, since the "
                 "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
             )
+        if striker is not None and striker.mass is not None and contact is not None and contact.impulsive:
+            raise InputError(
+                f"contact = {contact!r} with striker mass = {striker.mass:g} kg: under Newton's law the striker moves "
+                "as prescribed; leave the mass out, or use a HertzContact or a HuntCrossley"
+            )
         if striker is not None and contact is None:
             raise InputError(
                 "contact = None: a striker needs a law of contact, such as HertzContact(stiffness)"
@@ -224,6 +229,12 @@ class System:
             lines.append(f"{section:8s}  {words}")
         return "\n".join(lines)
 
+    def _repr_html_(self) -> str:
+        from snapbeam.core.showing import html_table
+
+        rows = [(section, text.strip()) for section, _, text in map(_parted, self.describe().splitlines())]
+        return html_table(f"System, hash {self.hash[:12]}", rows)
+
     def __repr__(self) -> str:
         parts = [f"modes={self.model.modes}", f"contact={self.contact!r}"]
         if self.striker is not None:
@@ -256,3 +267,7 @@ def _brief(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return f"array of shape {value.shape}" if value.size > 4 else json.dumps(value.tolist())
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _parted(line: str) -> tuple[str, str, str]:
+    return line.partition("  ")

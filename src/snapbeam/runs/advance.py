@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
+from snapbeam.core.reporting import counting
 from snapbeam.core.validate import (
     InputError,
     InputTypeError,
-    callback,
     finite_array,
     flag,
     instance,
@@ -52,7 +52,7 @@ def advance(
     *,
     integration: Integration | None = None,
     every: bool = False,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> State:
     """Where a system stands some periods of the excitation after it stood in a state.
 
@@ -76,7 +76,7 @@ def advance(
         Whether to give the states after each period, along a new first dimension, instead of the last one; their
         ``passed`` is of the whole way, but for the status, which is of each state.
     progress : callable, optional
-        Called as ``progress(done, total)`` with states.
+        Called as ``progress(done, total)`` with states; True writes a line to standard error.
 
     Returns
     -------
@@ -97,9 +97,9 @@ def advance(
     integration = instance(
         "integration", Integration() if integration is None else integration, Integration, "an Integration"
     )
-    callback("progress", progress)
     span = positive("periods", periods)
     every = flag("every", every)
+    report = counting(progress, "advance", "states")
     if state is None:
         require_motion(system)
         state = system.start if system.start is not None else rest_state(system.model, system.striker)
@@ -118,11 +118,11 @@ def advance(
     _, engine = resolve("cpu")
     vectors = None
     if tangent is None:
-        landings = engine.march_landing(ensemble, integration.threads, progress)
+        landings = engine.march_landing(ensemble, integration.threads, report)
     else:
         given = _checked_tangent(system, tangent, flat)
         back = system.model.linear_modes.T @ system.model.mass
-        landings, moved = engine.march_tangents(ensemble, given @ back.T, integration.threads, progress)
+        landings, moved = engine.march_tangents(ensemble, given @ back.T, integration.threads, report)
         moved[~np.isin(landings.books["status"], _REACHED)] = np.nan
         vectors = (moved @ system.model.linear_modes.T).reshape((*state.batch, *moved.shape[1:]))
     found = _states(ensemble, landings, every)
@@ -134,6 +134,16 @@ def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
     if system.contact is not None and not system.contact.keeps.smooth:
         raise InputError(
             f"tangent with contact = {system.contact!r}: its force jumps, so that the tangent flow does; give none"
+        )
+    if system.striker is not None and system.striker.mass is not None:
+        raise InputError(
+            f"tangent with striker mass = {system.striker.mass:g} kg: the tangent flow is that of the beam alone; give "
+            "none, or leave the mass out"
+        )
+    if system.contact is not None and not system.contact.keeps.tangent:
+        raise InputError(
+            f"tangent with contact = {system.contact!r}: the tangent flow is known for laws whose force depends on the "
+            "penetration alone, such as HertzContact(stiffness); give none"
         )
     given = finite_array("tangent", tangent)
     shape = (2, flat.modes)
@@ -175,7 +185,15 @@ def _shaped(
     tangent: _Array | None,
 ) -> State:
     """States as one batch of the shape that was asked for."""
-    names = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
+    names = (
+        "amplitude",
+        "velocity",
+        "phase",
+        "striker_position",
+        "contact_time",
+        "striker_shift",
+        "striker_rate",
+    )
     shape = (len(found), *batch) if every else batch
     arrays = {}
     for name in names:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass, RunStatus
+from snapbeam.core.showing import html_table
 from snapbeam.core.validate import InputError, integer, mapping
 from snapbeam.engines.outcomes import STATISTICS
 
@@ -81,6 +82,10 @@ class Outcome(Mapping[str, Any]):
     def __repr__(self) -> str:
         ended = "" if self.status is RunStatus.OK else f", {self.status.name}"
         return f"<Outcome {self.response.label}{ended}, {self.crossings} crossings, {self.impacts} impacts>"
+
+    def _repr_html_(self) -> str:
+        rows = [line.split(maxsplit=1) for line in self.table().splitlines()]
+        return html_table(f"Outcome: {self.response.label}", rows)
 
     def table(self) -> str:
         """Every statistic with its unit and its meaning, a line each."""

@@ -49,7 +49,15 @@ def save_run(run: Run, path: str | os.PathLike[str]) -> None:
     if run.accuracy is not None:
         described["snapbeam_accuracy"] = _json(vars(run.accuracy))
     if run.end is not None:
-        names = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
+        names = (
+            "amplitude",
+            "velocity",
+            "phase",
+            "striker_position",
+            "contact_time",
+            "striker_shift",
+            "striker_rate",
+        )
         described["snapbeam_end"] = _json({name: getattr(run.end, name) for name in names})
     root = run.dataset.assign_attrs(described)
     groups = {None: root, "impacts": run.impacts.assign_attrs({}), "outcome": outcome_dataset(run.outcome)}

@@ -44,8 +44,12 @@ SCHEMA: dict[str, Quantity] = {
     "modal_velocity": Quantity(("time", "mode"), "m^0.5/s", "modal velocity"),
     "energy_beam": Quantity(("time",), "J", "kinetic and potential energy of the beam, above its well"),
     "energy_contact": Quantity(("time",), "J", "energy stored in the contact"),
+    "energy_striker": Quantity(
+        ("time",), "J", "energy of the striker's motion beyond that of its drive, in its suspension included"
+    ),
     "work_shaker": Quantity(("time",), "J", "work done by the striker"),
-    "energy_dissipated": Quantity(("time",), "J", "energy dissipated by damping"),
+    "energy_dissipated": Quantity(("time",), "J", "energy dissipated"),
+    "energy_lost_contact": Quantity(("time",), "J", "part of it that was lost in contact"),
     "valid": Quantity(("time",), "1", "whether the sample was measured"),
 }
 """Every variable a run may have, by name; ``time``, ``cycle`` and ``mode`` are coordinates."""

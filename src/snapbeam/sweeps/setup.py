@@ -104,6 +104,7 @@ class SweepSetup:
                     modes=system.model.modes,
                     law=ensemble.law,
                     drive=ensemble.drive,
+                    body=ensemble.structure.body_mass is not None,
                 )[1]
                 books = engine.run_ensemble(ensemble, threads, report)
                 for name, values in statistics_of(ensemble, books).items():
@@ -291,6 +292,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         cycles=integration.cycles_or_default,
         modes=system.model.modes,
         law=law,
+        body=system.striker is not None and system.striker.mass is not None,
         **({} if system.striker is None else {"drive": type(system.striker.drive)}),
     )[0]
     setup = SweepSetup(system, integration.replace(engine=resolved), points)

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from snapbeam.core.reporting import counting
 from snapbeam.core.validate import integer
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
@@ -29,7 +30,7 @@ def sweep(
     refine_levels: int = 0,
     replicas: Replicas | int | None = None,
     output: str | os.PathLike[str] | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
     """Class and statistics of the response over any parameters, and any mixture of them.
 
@@ -59,7 +60,7 @@ def sweep(
     output : path, optional
         NetCDF file to write, a block at a time, so that memory does not grow with the sweep.
     progress : callable, optional
-        Called as ``progress(done, total)`` with points.
+        Called as ``progress(done, total)`` with points; True writes a line to standard error.
 
     Returns
     -------
@@ -91,5 +92,5 @@ def sweep(
         refine_levels=refine_levels,
         replicas=repeats,
         output=output,
-        progress=progress,
+        progress=counting(progress, "sweep"),
     )

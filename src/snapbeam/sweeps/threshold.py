@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.parameters import lookup
+from snapbeam.core.reporting import counting
 from snapbeam.core.validate import InputError, choice, shown, within
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
@@ -44,7 +45,7 @@ def threshold(
     *,
     search: str = "fast",
     share: float = 0.1,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> xr.Dataset:
     """The threshold of interwell response, sought along one parameter over any others, as a band.
 
@@ -70,7 +71,8 @@ def threshold(
     share : float
         Runs of the fast search over those of the full map.
     progress : callable, optional
-        Called as ``progress(done, total)`` with runs; the total is what the search may take at most.
+        Called as ``progress(done, total)`` with runs, of which the total is what the search may take at most; True
+        writes a line to standard error.
 
     Returns
     -------
@@ -101,7 +103,7 @@ def threshold(
     points = points_of({**over, row.name: values})
     assert isinstance(points, Grid)
     setup = sweep_setup(system, points, asked.replace(early_decision=True))
-    return _searched(setup, row.name, search, share, progress)
+    return _searched(setup, row.name, search, share, counting(progress, "threshold", "runs"))
 
 
 def _searched(

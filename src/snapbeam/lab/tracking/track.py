@@ -15,7 +15,7 @@ from snapbeam.lab.camera.recording import Recording
 from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.geometry import Orientation
 from snapbeam.lab.tracking.measure.beam import measure_beam
-from snapbeam.lab.tracking.measure.follower import Follower
+from snapbeam.lab.tracking.measure.follower import Drift, Follower
 from snapbeam.lab.tracking.measure.shaker import measure_shaker
 from snapbeam.lab.tracking.settings import TrackingSettings
 from snapbeam.lab.tracking.survey.levels import pixel_noise, saturation_level
@@ -167,7 +167,7 @@ class _FixedMarks:
         profile: NDArray[np.float64] = part.mean(-1)
         return profile
 
-    def __call__(self, batch: NDArray[np.integer]) -> Floats | None:
+    def __call__(self, batch: NDArray[np.integer]) -> Drift | None:
         if not self.marks:
             return None
         total, weight = np.zeros(batch.shape[0]), np.zeros(batch.shape[0])
@@ -180,4 +180,4 @@ class _FixedMarks:
         drift: Floats = np.where(weight > 0.0, total / np.maximum(weight, 1e-30), np.nan)
         if np.isfinite(drift).any():
             self.largest = max(self.largest, float(np.nanmax(np.abs(drift))))
-        return drift
+        return Drift(drift, 1.0 / np.sqrt(np.maximum(weight, 1e-30)))
