@@ -2,7 +2,7 @@
 
 A new function or command is among them the day it is public.  Run as a program for a long campaign:
 
-    python fuzz.py CALLS SEED REPORT
+    python fuzz.py CALLS SEED REPORT [SECONDS]
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import fractions
 import importlib
 import inspect
 import json
+import math
 import os
 import pkgutil
 import random
@@ -23,6 +24,7 @@ import tempfile
 import time
 import traceback
 import warnings
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -183,19 +185,20 @@ def _trouble(error: BaseException) -> str:
     return f"{type(error).__name__} at {where}"
 
 
-def judged(function: Any, *fixed: Any, **named: Any) -> str:
+def judged(function: Any, fixed: Sequence[Any] = (), named: Mapping[str, Any] | None = None) -> str:
     """Call it: "" for a refusal, a finite result or a status; what is wrong otherwise.
 
     One that takes long may compile a kernel, once on a machine: it is given time for that, and called again.
     """
-    said = _judged(LONGEST, function, *fixed, **named)
+    named = {} if named is None else named
+    said = _judged(LONGEST, function, fixed, named)
     if said.startswith("over"):
-        _judged(6.0 * LONGEST, function, *fixed, **named)
-        said = _judged(LONGEST, function, *fixed, **named)
+        _judged(6.0 * LONGEST, function, fixed, named)
+        said = _judged(LONGEST, function, fixed, named)
     return said
 
 
-def _judged(longest: float, function: Any, *fixed: Any, **named: Any) -> str:
+def _judged(longest: float, function: Any, fixed: Sequence[Any], named: Mapping[str, Any]) -> str:
     previous = signal.signal(signal.SIGALRM, _ring)
     signal.setitimer(signal.ITIMER_REAL, longest)
     try:
@@ -270,12 +273,14 @@ def judged_command(words: list[str]) -> str:
     return "" if ended[0].exit_code in (0, 1, 2) else f"status {ended[0].exit_code}"
 
 
-def campaign(calls: int, seed: int, share_of_commands: float = 0.1) -> tuple[int, dict[str, list[str]]]:
+def campaign(
+    calls: int, seed: int, share_of_commands: float = 0.1, seconds: float = math.inf
+) -> tuple[int, dict[str, list[str]]]:
     """So many calls; returns how many were made, and examples of what went wrong, by what and where."""
     draw = random.Random(seed)
     functions, programs = public(), commands()
     programs = {name: each for name, each in programs.items() if name not in _LONG_COMMANDS}
-    names, wrong, made = list(functions), collections.defaultdict(list), 0
+    names, wrong, made, start = list(functions), collections.defaultdict(list), 0, time.monotonic()
     for each in (None, [0.1, 0.2]):  # kernels are compiled, or loaded, before anything is timed
         sb.simulate(SYSTEM, SHORT) if each is None else sb.sweep(
             SYSTEM, {"drive.velocity_amplitude": each}, SHORT
@@ -284,7 +289,7 @@ def campaign(calls: int, seed: int, share_of_commands: float = 0.1) -> tuple[int
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
         try:
-            while made < calls:
+            while made < calls and time.monotonic() - start < seconds:
                 if draw.random() < share_of_commands:
                     name = draw.choice(list(programs))
                     words = command_line(name, programs[name], draw)
@@ -294,7 +299,7 @@ def campaign(calls: int, seed: int, share_of_commands: float = 0.1) -> tuple[int
                     given = arguments(functions[name], draw)
                     if given is None:
                         continue
-                    said = judged(functions[name], *given[0], **given[1])
+                    said = judged(functions[name], *given)
                     shown = f"{name} {_short(given)}" if said else ""
                 made += 1
                 if said:
@@ -311,11 +316,11 @@ def _short(given: Any) -> str:
         return "?"
 
 
-def main(calls: int, seed: int, report: Path) -> None:
+def main(calls: int, seed: int, report: Path, seconds: float = math.inf) -> None:
     """A campaign whose result is written to a file: what is tried may close any stream."""
     report = report.absolute()
     start = time.monotonic()
-    made, wrong = campaign(calls, seed)
+    made, wrong = campaign(calls, seed, seconds=seconds)
     seen = {"calls": made, "kinds": len(wrong), "wrong": sum(map(len, wrong.values()))}
     lines = [json.dumps(seen | {"seconds": round(time.monotonic() - start)})]
     for name, examples in sorted(wrong.items(), key=lambda item: -len(item[1])):
@@ -324,4 +329,4 @@ def main(calls: int, seed: int, report: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3]))
+    main(int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3]), *map(float, sys.argv[4:]))
