@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+import importlib.util
 import logging
 import os
+import shutil
+import sys
 from pathlib import Path
 from typing import Any
+
+from docutils import nodes
+from sphinx.domains.python._object import PyXrefMixin
+from sphinx.ext.napoleon.docstring import GoogleDocstring
 
 from snapbeam.core.provenance import __version__
 
 # Figures of the paper are drawn from full-size data that were computed once.
 DATA = Path(__file__).parent / "data"
+os.environ["SNAPBEAM_PAPER_DATA"] = str(DATA)  # read by the examples
+sys.path.insert(0, str(Path(__file__).parent / "_ext"))
 os.environ.setdefault("MPLBACKEND", "Agg")
 logging.getLogger("fontTools").setLevel(logging.WARNING)
 
@@ -21,13 +30,15 @@ version = release = __version__
 
 extensions = [
     "myst_parser",
+    "reference",
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "data", "gallery/**/*.ipynb", "gallery/**/*.py", "gallery/**/*.json"]
+exclude_patterns = ["_build", "_ext", "_generated", "data"]
+exclude_patterns += [f"gallery/**/*.{kind}" for kind in ("ipynb", "py", "json")]
 templates_path: list[str] = []
 
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
@@ -36,9 +47,19 @@ myst_heading_anchors = 3
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 napoleon_google_docstring = False
+napoleon_use_param = False  # types are words: "array of shape (N,)" names no class
 napoleon_use_rtype = False
 
+highlight_language = "text"
+# MathJax from a package, beside the pages: formulas are set without a network too.
+_MATHJAX = importlib.util.find_spec("sphinx-mathjax-offline")
+assert _MATHJAX is not None and _MATHJAX.origin is not None
+mathjax_path = "mathjax.js"
+
 html_theme = "furo"
+html_static_path = ["_static", "_generated/static"]
+html_css_files = ["wide.css"]
+html_theme_options = {"source_repository": "", "navigation_with_keys": True}
 html_title = f"snapbeam {version}"
 
 sphinx_gallery_conf = {
@@ -49,6 +70,26 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "min_reported_time": 60,
 }
+
+
+def keep_whole(self: Any) -> tuple[str, list[str]]:
+    """The docstring of an attribute as it stands: Napoleon would take what is before a colon for its type."""
+    return "", self._dedent(list(self._consume_to_end()))
+
+
+GoogleDocstring._consume_inline_attribute = keep_whole
+
+_link = PyXrefMixin.make_xrefs
+
+
+def link_errors_only(self: Any, rolename: str, domain: str, target: str, *more: Any, **options: Any) -> Any:
+    """Types are words, such as "array of shape (N,)": they name no class and no attribute ``shape``."""
+    if rolename == "exc":
+        return _link(self, rolename, domain, target, *more, **options)
+    return [options.get("contnode") or nodes.emphasis(target, target)]
+
+
+PyXrefMixin.make_xrefs = link_errors_only
 
 
 def draw_paper(app: Any) -> None:
@@ -68,6 +109,14 @@ def draw_paper(app: Any) -> None:
             figure = recipe(results=results)
             save_figure(figure, folder / f"{name}{suffix}")
             plt.close(figure)
+
+
+_HERE = Path(__file__).parent
+(_HERE / "_generated" / "static").mkdir(parents=True, exist_ok=True)
+shutil.copyfile(
+    Path(_MATHJAX.origin).parent / "static" / "mathjax" / "tex-svg.js",
+    _HERE / "_generated" / "static" / "mathjax.js",
+)
 
 
 def setup(app: Any) -> None:

@@ -11,23 +11,25 @@ rest in its lower well and moves as
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.figures import plot_run
 
-model = sb.ReducedModel.from_beam(paper.BEAM, modes=32, damping_ratio=paper.DAMPING_RATIO)
-shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18, location=paper.LOCATION)
-run = sb.simulate(model, shaker, paper.CONTACT, cycles=40)
+system = sb.System(
+    sb.ReducedModel.from_beam(paper.BEAM, modes=32, damping_ratio=paper.DAMPING_RATIO),
+    contact=paper.CONTACT,
+    striker=sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18, location=paper.LOCATION),
+)
+run = sb.simulate(system, sb.Integration(cycles=40))
 
 # %%
 # What it did, from statistics that are kept while it runs:
 
-print(run.response.response.label)
-print(f"{run.response.crossings} crossings, the last at {1e3 * run.response.last_crossing:.1f} ms")
-print(f"{run.response.impacts} impacts, the hardest {run.response.peak_force:.2f} N")
+print(run.outcome.response.label)
+print(f"{run.outcome.crossings} crossings, the last at {1e3 * run.outcome.last_crossing:.1f} ms")
+print(f"{run.outcome.impacts} impacts, the hardest {run.outcome.peak_force:.2f} N")
 
 # %%
 # The waveform, and the hardest impact closer:
 
-figure = plot_run(run.dataset, window=(0.0, 20.0))
+ax = run.plot(window=(0.0, 20.0))
 
 # %%
 # The law of contact dissipates nothing, so the work of the shaker is in the beam, in the contact or lost to

@@ -13,15 +13,13 @@ import snapbeam as sb
 from snapbeam import paper
 from snapbeam.figures import plot_response_map
 
-model = sb.ReducedModel.from_beam(paper.BEAM, modes=4, damping_ratio=paper.DAMPING_RATIO)
-ds = sb.response_map(
-    model,
-    paper.CONTACT,
-    frequency_ratio=np.linspace(0.1, 4.0, 16),
-    velocity_amplitude=np.linspace(0.02, 0.65, 12),
-    location=paper.LOCATION,
-    cycles=80,
+system = sb.System(
+    sb.ReducedModel.from_beam(paper.BEAM, modes=4, damping_ratio=paper.DAMPING_RATIO),
+    contact=paper.CONTACT,
+    striker=sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, location=paper.LOCATION),
 )
+axes = {"frequency_ratio": np.linspace(0.1, 4.0, 16), "velocity_amplitude": np.linspace(0.02, 0.65, 12)}
+ds = sb.sweep(system, axes, sb.Integration(cycles=80))
 
 # %%
 # The dashed line is the quasi-static threshold of one mode, :math:`V_\mathrm{QS1} = \Omega \sin^2 \pi x_s`

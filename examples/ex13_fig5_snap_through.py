@@ -2,8 +2,8 @@ r"""
 Through the unstable equilibrium
 ================================
 
-Fig. 5: while the first modal amplitude passes zero, the shape of the beam is that of the higher modes, the
-second first of all. Grey: where they are greater than the first.
+Fig. 5: while the first modal amplitude passes zero, the shape of the beam is that of the higher modes, most often the
+third. Grey: where they are together greater than the first.
 """
 
 import numpy as np
@@ -21,3 +21,10 @@ alpha = run.modal_amplitude.values / abs(along.attrs["rest_amplitude"])
 near = np.abs(alpha[:, 0]) < 0.05
 others = np.sqrt((alpha[near, 1:] ** 2).sum(axis=1))
 print(f"{100 * (others > np.abs(alpha[near, 0])).mean():.0f} %")
+
+# %%
+# And which of them is the greatest?
+
+leading = np.abs(alpha[near, 1:]).argmax(axis=1) + 2
+for mode in np.unique(leading):
+    print(f"mode {mode}: {100 * (leading == mode).mean():.0f} %")

@@ -192,7 +192,7 @@ print(alignment.description, f"(truth {0.03 - 0.1:.4f} s)")
 start = drive.startup.onset + alignment.delay
 seen = lab.measure_response(tracked, drive.steady.frequency, cycles=cycles, start=start)
 print("measured: ", seen.description)
-print("simulated:", simulated.response.response.label, f"({simulated.response.crossings} crossings)")
+print("simulated:", simulated.outcome.response.label, f"({simulated.outcome.crossings} crossings)")
 
 onsets = lab.contact_onsets(tracked).onset.values
 comparison = lab.compare_waveforms(

@@ -77,7 +77,8 @@ def test_refusals_come_before_computing(cli, tmp_path, args, message):
     result = cli(*args)
     assert result.exit_code == 2, result.output
     assert message in result.stderr
-    assert result.stderr.startswith("error: ")
+    said = [line for line in result.stderr.splitlines() if not line.startswith("note: ")]
+    assert said[0].startswith("error: ")
     assert "Traceback" not in result.output
     assert not list(tmp_path.iterdir())
 

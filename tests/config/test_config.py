@@ -104,7 +104,10 @@ REFUSALS = [
         {"beam": {"buckling_level": 0.0}},
         "[beam] buckling_level = 0.0: must be a finite number greater than 0 m",
     ),
-    ({"contact": {"law": "spring"}}, "[contact] law = 'spring': must be one of 'hertz', 'restitution'"),
+    (
+        {"contact": {"law": "spring"}},
+        "[contact] law = 'spring': must be one of 'hertz', 'hunt_crossley'",
+    ),
     ({"contact": {"law": "restitution"}}, "[contact] coefficient: missing for law = 'restitution'"),
     (
         {"contact": {"coefficient": 0.5}},
@@ -114,7 +117,7 @@ REFUSALS = [
         {"contact": {"coefficient": 0.5, "stiffness": 1e8}},
         "[contact] give stiffness, of Hertz's law, or coefficient, of Newton's, not both",
     ),
-    ({"drive": {"kind": "triangle"}}, "[drive] kind = 'triangle': must be one of 'recorded', 'sine'"),
+    ({"drive": {"kind": "triangle"}}, "[drive] kind = 'triangle': must be one of 'burst', 'chirp'"),
     (
         {"drive": {"kind": "recorded"}},
         "[drive] displacement, velocity, sampling_freq, frequency: missing for kind = 'recorded'",
@@ -295,8 +298,11 @@ def test_a_file_of_version_0_1_means_what_it_meant():
         {
             "shaker": {"frequency_ratio": 1.1, "velocity_amplitude": 0.2, "location": 0.3, "side": "above"},
             "map": {"frequency_ratio": "0.5:2:4", "velocity_amplitude": 0.25},
+            "run": {"cycles": 20, "reference_freq": 80.0},
         }
     )
+    assert old.system.get("model.reference_freq") == 80.0
+    assert old.integration == Integration(cycles=20)
     assert old.system.get("drive.frequency_ratio") == 1.1
     assert old.system.get("striker.location") == 0.3
     assert old.system.get("striker.side") == "above"

@@ -128,14 +128,17 @@ KINDS = {
     "hertz": Kind(8, paper.CONTACT),
     "restitution": Kind(1, sb.Restitution(0.6)),
     "plastic": Kind(1, sb.Restitution(0.0)),
+    "hunt-crossley": Kind(8, sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)),
+    "kelvin-voigt": Kind(3, sb.KelvinVoigt(2e6, 20.0)),
+    "power": Kind(3, sb.PowerLaw.from_stiffness(4e11, 2.0)),
     "recorded": Kind(4, paper.CONTACT, recorded=True),
     "recorded restitution": Kind(1, sb.Restitution(0.8), recorded=True),
 }
 """Every law of contact and every drive there is: what is asked of one is asked of all."""
 
 
-SLOW = {"recorded restitution"}
-"""A kernel of its own, half a minute to compile, for what the others test one by one."""
+SLOW = {"recorded restitution", "kelvin-voigt", "power"}
+"""Kernels of their own, half a minute to compile, for what the others test one by one."""
 
 
 @pytest.fixture(

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import functools
+import inspect
+import io
+import json
 import logging
+import math
+import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from enum import IntEnum
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Annotated, Any, ParamSpec, TypeVar
 
 import typer
 from rich.console import Console
@@ -30,15 +38,18 @@ __all__ = [
     "FAILED",
     "INTERRUPTED",
     "REFUSED",
+    "answer",
     "compiling_told",
     "counted",
     "door",
     "duration",
     "errors",
     "file_line",
+    "notes",
     "out",
     "pace",
     "progress",
+    "write_json",
 ]
 
 FAILED = 1
@@ -49,9 +60,75 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 
+@dataclass
+class _Asked:
+    """How a command is to speak, and what it has found so far."""
+
+    quiet: bool = False
+    json: Path | None = None
+    found: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def silent(self) -> bool:
+        """Whether standard output is not for words."""
+        return self.quiet or self.json == Path("-")
+
+
+_ASKED: ContextVar[_Asked] = ContextVar("asked", default=_Asked())  # noqa: B039  a default that is never changed
+
+_JSON = Annotated[
+    Path | None,
+    typer.Option(
+        "--json", help="JSON file of what was found to write; - for standard output, in place of the words.",
+        rich_help_panel="Output", metavar="FILE",
+    ),
+]  # fmt: skip
+_QUIET = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="Say nothing but what went wrong.", rich_help_panel="Output"),
+]
+
+
 def out() -> Console:
-    """Return the console of results, standard output."""
-    return Console(highlight=False, soft_wrap=True)
+    """Return the console of results, standard output; one that nobody hears if words were not asked for."""
+    silent = _ASKED.get().silent
+    return Console(highlight=False, soft_wrap=True, file=io.StringIO() if silent else None)
+
+
+def answer(**found: Any) -> None:
+    """Say what a command found as plain values, for ``--json``."""
+    _ASKED.get().found.update(found)
+
+
+def write_json(path: Path, found: Mapping[str, Any]) -> None:
+    """Write plain numbers and words to a JSON file, whole or not at all, or, for ``-``, to standard output.
+
+    What is not finite becomes null.
+    """
+    from snapbeam.core.files import atomic_path, check_writable
+
+    text = json.dumps(_plain(found), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    if path == Path("-"):
+        sys.stdout.write(text)
+        return
+    with atomic_path(check_writable(path, "json", (".json",))) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, IntEnum):
+        return getattr(value, "label", value.name.lower())
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value
 
 
 def errors() -> Console:
@@ -59,15 +136,38 @@ def errors() -> Console:
     return Console(stderr=True, highlight=False, soft_wrap=True)
 
 
+def notes() -> Console:
+    """Return the console of what is said on the way: standard error, or nobody."""
+    return Console(
+        stderr=True, highlight=False, soft_wrap=True, file=io.StringIO() if _ASKED.get().quiet else None
+    )
+
+
 def door(command: Callable[_P, _R]) -> Callable[_P, _R]:
-    """End a command that cannot go on with one clear line, and with the exit status that says why."""
+    """End a command that cannot go on with one clear line, and with the exit status that says why.
+
+    Every command gets ``--quiet``, and ``--json`` if it has none of its own: what it :func:`answer`\\ s.
+    """
+    signature = inspect.signature(command, eval_str=True)
+    own = next((name for name, each in signature.parameters.items() if "--json" in _flags(each)), None)
 
     @functools.wraps(command)
     def guarded(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        quiet, path = bool(kwargs.pop("quiet", False)), kwargs.get(own) if own else kwargs.pop("json", None)
+        asked = _Asked(quiet, path if isinstance(path, Path) else None)
+        token = _ASKED.set(asked)
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = _show_warning  # type: ignore[assignment]
-                return command(*args, **kwargs)
+                if asked.json is not None and asked.json != Path("-"):
+                    from snapbeam.core.files import check_writable
+
+                    check_writable(asked.json, "json", (".json",))
+                try:
+                    return command(*args, **kwargs)
+                finally:
+                    if asked.json is not None and own is None and asked.found:
+                        write_json(asked.json, asked.found)
         except InputError as error:
             errors().print(f"[bold red]error:[/] {escape(str(error))}")
             raise typer.Exit(REFUSED) from None
@@ -79,8 +179,26 @@ def door(command: Callable[_P, _R]) -> Callable[_P, _R]:
         except KeyboardInterrupt:
             errors().print("interrupted; no file was left half written")
             raise typer.Exit(INTERRUPTED) from None
+        finally:
+            _ASKED.reset(token)
 
+    more = [inspect.Parameter("quiet", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_QUIET)]
+    if own is None:
+        more.append(inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_JSON))
+    kept = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values()]
+    guarded.__signature__ = inspect.Signature(kept + more)  # type: ignore[attr-defined]
+    guarded.__annotations__ = {}
     return guarded
+
+
+def _flags(parameter: inspect.Parameter) -> tuple[str, ...]:
+    """The names that a parameter has on the command line, where they were given."""
+    options = getattr(parameter.annotation, "__metadata__", ())
+    # typer takes the first name for a default until it makes the command
+    named = (
+        (getattr(each, "default", None), *(getattr(each, "param_decls", None) or ())) for each in options
+    )
+    return tuple(flag for names in named for flag in names if isinstance(flag, str) and flag.startswith("-"))
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:
@@ -140,7 +258,9 @@ def progress(
     is not counted.
     """
     console = errors()
-    if console.is_terminal:
+    if _ASKED.get().quiet:
+        yield lambda done, all_of_them: None
+    elif console.is_terminal:
         columns = (TextColumn(task), BarColumn(), MofNCompleteColumn(), _RateColumn(what))
         with Progress(*columns, console=console, transient=True) as bar, compiling_told(bar.console):
             shown = bar.add_task(task, total=total, start=False)
@@ -158,6 +278,9 @@ def progress(
 @contextmanager
 def compiling_told(console: Console) -> Iterator[None]:
     """Show what the engines log, which is when they are compiled."""
+    if _ASKED.get().quiet:
+        yield
+        return
     log = logging.getLogger("snapbeam")
     handler = _Handler(console)
     before = log.level

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from snapbeam.cli import options as opt
-from snapbeam.cli.console import door, out
+from snapbeam.cli.console import answer, door, out
 from snapbeam.cli.parameter_options import BEAM, MODEL, configured, with_parameters
 
 __all__ = ["frequencies"]
@@ -35,6 +35,10 @@ def frequencies(
     exact = exact_natural_freq(beam, count=count)
     straight = exact_natural_freq(beam.replace(axial_load=0.0), count=count)
     state = f"buckled by b = {1e3 * beam.buckling_level:.4g} mm" if beam.is_buckled else "not buckled"
+    answer(
+        axial_load=beam.axial_load, critical_load=beam.critical_load, buckling_level=beam.buckling_level,
+        modes=model.modes, reduced=reduced[:count], exact=exact, without_load=straight,
+    )  # fmt: skip
     console = out()
     load = f"P = {beam.axial_load:.4f} N, P_cr = {beam.critical_load:.4f} N"
     console.print(f"{load}: {state}; {model.modes} modes")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from snapbeam.cli.console import door, out
+from snapbeam.cli.console import answer, door, out
 
 __all__ = ["info"]
 
@@ -21,6 +21,10 @@ def info(
     from snapbeam.cli.summary import class_table, parameter_table, status_lines
 
     dataset = open_result(file)
+    answer(
+        sizes=dict(dataset.sizes), attributes=dict(dataset.attrs),
+        variables={str(name): dict(each.attrs) for name, each in dataset.variables.items()},
+    )  # fmt: skip
     console = out()
     sizes = ", ".join(f"{name} {size}" for name, size in dataset.sizes.items())
     console.print(f"[bold]{file.name}[/]: {sizes}" if sizes else f"[bold]{file.name}[/]")

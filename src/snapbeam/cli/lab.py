@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 from rich.markup import escape
 
 from snapbeam.cli import options as opt
+from snapbeam.cli.console import write_json
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,7 +73,10 @@ Strict = Annotated[
 JsonFile = Annotated[
     Path | None,
     typer.Option(
-        "--json", help="JSON file of the figures to write.", rich_help_panel=_OUTPUT, metavar="FILE"
+        "--json",
+        help="JSON file of the figures to write; - for standard output, in place of the words.",
+        rich_help_panel=_OUTPUT,
+        metavar="FILE",
     ),
 ]
 
@@ -132,23 +134,3 @@ def numbers(name: str, text: str | None) -> tuple[float, ...]:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
         raise InputError(f"{name} = {text!r}: must be numbers separated by commas") from None
-
-
-def write_json(path: Path, summary: dict[str, Any]) -> None:
-    """Write plain numbers and words to a JSON file, whole or not at all; what is not finite becomes null."""
-    from snapbeam.core.files import atomic_path, check_writable
-
-    target = check_writable(path, "json", (".json",))
-    with atomic_path(target) as temporary:
-        text = json.dumps(_plain(summary), indent=2, ensure_ascii=False, allow_nan=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value

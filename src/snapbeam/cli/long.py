@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from snapbeam.cli import options as opt
-from snapbeam.cli.console import duration, errors, pace, progress
+from snapbeam.cli.console import duration, notes, pace, progress
 
 if TYPE_CHECKING:
     from snapbeam.config import Config
@@ -185,7 +185,7 @@ class LongReport:
 
     def note(self, text: str) -> None:
         """Say something once."""
-        errors().print(text, markup=False)
+        notes().print(text, markup=False)
         self.log(text)
 
     def progress(self, done: int, total: int) -> None:
@@ -207,8 +207,12 @@ class LongReport:
             return
         from snapbeam.core.provenance import created_now
 
-        with self._log.open("a", encoding="utf-8") as stream:
-            stream.write(f"{created_now()}  {text}\n")
+        try:
+            with self._log.open("a", encoding="utf-8") as stream:
+                stream.write(f"{created_now()}  {text}\n")
+        except OSError as error:  # no reason to give up what is computed
+            where, self._log = self._log, None
+            self.note(f"log {str(where)!r}: cannot be written any more, {error.strerror or error}")
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import typer
 
 from snapbeam.cli import long
 from snapbeam.cli import options as opt
-from snapbeam.cli.console import FAILED, door, out
+from snapbeam.cli.console import FAILED, answer, door, out
 from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
@@ -26,7 +26,7 @@ __all__ = ["compute_map"]
 
 _AXES = (
     "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
-    "striker.location", "striker.location_m",
+    "striker.location", "striker.location_m", "model.modes",
 )  # fmt: skip
 
 
@@ -56,10 +56,10 @@ def compute_map(
     0.01:0.65:40 --location 1/2.1 -o map.nc --plot map.png
     """
     from snapbeam.cli.results import check_pictures, draw_map, read_overlay
-    from snapbeam.cli.summary import map_summary
+    from snapbeam.cli.summary import map_facts, map_summary
     from snapbeam.core.files import check_writable
 
-    settings = long.resumed(given, keeping, configured(given))
+    settings = long.resumed(given, keeping, configured(given, _axes_of))
     axes = _axes_of(settings, given)
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
@@ -101,6 +101,7 @@ def compute_map(
     files = [output]
     if plot is not None:
         files.append(draw_map(dataset, plot, overlay, threshold_line))
+    answer(**map_facts(dataset), seconds=elapsed, files=files)
     out().print(map_summary(dataset, files, None if long.is_long(keeping) else elapsed))
     out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")
     if tally.failed:
@@ -108,14 +109,16 @@ def compute_map(
 
 
 def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
-    """The axes that were named; of frequency ratio and velocity amplitude, where neither is, the default ones."""
+    """The axes that were named.
+
+    Where nothing but the paper's own axes and the number of modes is named, the frequency ratio and the velocity
+    amplitude have their default axes unless they have a value.
+    """
     from snapbeam.config import DEFAULT_AXES, PHYSICAL
 
-    named = settings.axes()
-    if any(text for text in given.get("axis") or ()) or any(
-        name not in ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
-        for name in named
-    ):
+    named: dict[str, Any] = settings.axes()
+    order = ("model.modes", "drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
+    if any(text for text in given.get("axis") or ()) or any(name not in order for name in named):
         return named
     drive = settings.section("drive")
     axes = dict(named)
@@ -124,7 +127,6 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
         physical = {row.parameter: full.partition(".")[2] for full, row in PHYSICAL.items()}[name]
         if name not in named and field not in drive and physical not in drive:
             axes |= settings.axes({name: text}) if not named else _default(name, text)
-    order = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
     axes = {name: axes[name] for name in sorted(axes, key=lambda each: order.index(each))}
     if not axes:
         import numpy as np

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from snapbeam.cli import options as opt
-from snapbeam.cli.console import door, duration, errors, file_line, out
+from snapbeam.cli.console import answer, door, duration, file_line, notes, out
 
 __all__ = ["paper"]
 
@@ -75,8 +75,8 @@ def paper(
     size = "full" if full else "quick"
     results = Results(size, read=data, write=output if full else None, progress=_Tell())
     names = [name for name in FIGURES if figure in (name, "all")]
-    if dots is not None and not {"fig6", "fig7", "fig8"} & set(names):
-        raise InputError(f"dots: {figure} shows no measured responses; fig6, fig7 and fig8 do")
+    _check_measured(figure, names, dots, measured)
+    written: list[Path] = []
     for name in names:
         start = time.monotonic()
         given: dict[str, Any] = (
@@ -85,6 +85,7 @@ def paper(
         if measured and name == "fig4":
             given["measured"] = [str(file) for file in measured]
         files = FIGURES[name].write(output, results=results, **given)
+        written += files
         out().print(f"{name}: {FIGURES[name].about} ({size}, {duration(time.monotonic() - start)})")
         for file in files:
             out().print(f"  {file_line(file)}")
@@ -94,9 +95,34 @@ def paper(
             rows, files = write_claims(output, kept, Results("quick", progress=_Tell()))
         else:
             rows, files = write_claims(output, results)
+        written += files
+        answer(claims=summary(rows))
         out().print(f"claims ({'stored' if stored else size}): {summary(rows)}")
         for file in files:
             out().print(f"  {file_line(file)}")
+
+    answer(figure=figure, size=size, files=written)
+
+
+def _check_measured(figure: str, names: list[str], dots: Path | None, measured: list[Path] | None) -> None:
+    """Refuse, before anything is computed, measured responses and runs that cannot be shown."""
+    from snapbeam.cli.results import read_overlay
+    from snapbeam.core.validate import InputError
+    from snapbeam.paper import BEAM
+    from snapbeam.paper.recipes.fig4 import read_measured
+    from snapbeam.paper.system import paper_model
+
+    if dots is not None:
+        if not {"fig6", "fig7", "fig8"} & set(names):
+            raise InputError(f"dots: {figure} shows no measured responses; fig6, fig7 and fig8 do")
+        read_overlay(dots, paper_model(1).reference_freq, BEAM.buckling_level)
+    if measured:
+        if "fig4" not in names:
+            raise InputError(f"measured: {figure} shows no measured run; fig4 does")
+        if len(measured) != 3:
+            raise InputError(f"measured: {len(measured)} files; fig4 shows three")
+        for file in measured:
+            read_measured(file)
 
 
 class _Tell:
@@ -112,4 +138,4 @@ class _Tell:
         if tenths > self.tenths.get(what, 0):
             self.tenths[what] = tenths
             elapsed = duration(time.monotonic() - self.start[what])
-            errors().print(f"{what}: {done} of {total}, {elapsed}")
+            notes().print(f"{what}: {done} of {total}, {elapsed}")

@@ -8,6 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.markup import escape
+
+from snapbeam.cli.console import answer, notes, out
 
 if TYPE_CHECKING:
     from snapbeam.config import Config
@@ -18,8 +21,9 @@ BEAM = ("beam.length", "beam.thickness", "beam.width", "beam.density", "beam.you
         "beam.axial_load")  # fmt: skip
 MODEL = ("model.modes", "model.damping_ratio", "model.reference_freq")
 CONTACT = ("contact.stiffness", "contact.radius", "contact.young_modulus", "contact.poisson_ratio",
-           "contact.coefficient")  # fmt: skip
-STRIKER = ("striker.location", "striker.location_m", "striker.side", "striker.gap")
+           "contact.coefficient", "contact.loss", "contact.restitution", "contact.speed")  # fmt: skip
+STRIKER = ("striker.location", "striker.location_m", "striker.side", "striker.gap", "striker.mass", "striker.spring",
+           "striker.damper")  # fmt: skip
 DRIVE = (
     "drive.frequency_ratio",
     "drive.frequency_hz",
@@ -44,23 +48,35 @@ _OPTIONS = {
     "contact.young_modulus": "--contact-young-modulus",
     "contact.poisson_ratio": "--contact-poisson-ratio",
     "contact.coefficient": "--restitution-coefficient",
+    "contact.loss": "--contact-loss",
+    "contact.restitution": "--contact-restitution",
+    "contact.speed": "--restitution-speed",
     "drive.phase": "--drive-phase",
     "drive.velocity_m_s": "--velocity",
     "striker.location_m": "--location-m",
+    "striker.mass": "--striker-mass",
+    "striker.spring": "--striker-spring",
+    "striker.damper": "--striker-damper",
 }
 _WORDS = {
     "contact.radius": "radius of the sphere, with the two next ones in place of a stiffness, m",
     "contact.young_modulus": "Young's moduli of sphere and beam, Pa: E1,E2",
     "contact.poisson_ratio": "Poisson ratios of sphere and beam: nu1,nu2",
     "contact.coefficient": "coefficient of restitution, for one mode, in place of Hertz's law",
+    "contact.loss": "loss chi of the contact, s/m: Hunt and Crossley's law",
+    "contact.restitution": "share of its speed that a free mass keeps, with the next one in place of a loss",
+    "contact.speed": "speed at which it keeps that share, m/s",
     "beam.axial_load": "axial load, N, compression positive; instead of --buckling-level",
     "model.reference_freq": "frequency that Omega and V are normalised by, Hz; the model's first by default",
+    "model.damping_ratio": "damping ratio of every linear mode, or one for each: zeta1,zeta2,...",
     "run.step": "step in free flight, s; follows from the model by default",
     "run.accuracy": "accuracy level: map, or reference, far finer, to check with",
     "run.engine": "what integrates; auto takes the fastest there is",
     "run.early_decision": "end a run once its response class is certain; its other statistics then stop there",
 }
 _PAIRS = ("contact.young_modulus", "contact.poisson_ratio")
+_LISTS = ("model.damping_ratio",)
+"""One number, or one for each linear mode."""
 
 
 def with_parameters(
@@ -90,7 +106,7 @@ def with_parameters(
             given = {full: arguments.pop(key) for key, (full, _) in added.items()}
             given |= {
                 key: arguments.pop(key)
-                for key in ("config", "set_", "axis", "from_", "point")
+                for key in ("config", "set_", "axis", "from_", "point", "print_config")
                 if key in arguments
             }
             return function(given=given, **arguments)
@@ -133,11 +149,15 @@ def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
         help="Point of the map of --from, the nearest there is: name=value,name=value.",
         metavar="NAME=VALUE,...",
     )
+    shown = typer.Option(
+        "--print-config", help="Print every parameter as a parameter file, what was not given too, and stop."
+    )
     found: dict[str, tuple[Any, Any]] = {
         "config": (None, Annotated[Path | None, config]),
         "from_": (None, Annotated[Path | None, source]),
         "point": (None, Annotated[str | None, point]),
         "set_": (None, Annotated[list[str] | None, anything]),
+        "print_config": (False, Annotated[bool, shown]),
     }
     if with_axes:
         axis = typer.Option(
@@ -173,6 +193,8 @@ def _option(name: str, is_axis: bool) -> Any:
         return Annotated[str | None, typer.Option(flag, metavar="VALUES", **options)]
     if name in _PAIRS:
         return Annotated[str | None, typer.Option(flag, metavar="A,B", **options)]
+    if name in _LISTS:
+        return Annotated[str | None, typer.Option(flag, metavar="NUMBER|A,B,...", **options)]
     if row is not None and row.quantity.kind is str:
         return Annotated[str | None, typer.Option(flag, metavar="|".join(row.quantity.choices), **options)]
     if row is not None and row.quantity.kind is int:
@@ -202,10 +224,12 @@ def parse_count(text: str) -> int:
         raise typer.BadParameter(f"{text!r} is not a whole number") from None
 
 
-def configured(given: Mapping[str, Any], **more: Mapping[str, Any]) -> Config:
+def configured(
+    given: Mapping[str, Any], axes_of: Callable[[Config, Mapping[str, Any]], dict[str, Any]] | None = None
+) -> Config:
     """The parameters of the ``--config`` file overridden by what was given on the command line.
 
-    *more* holds further overrides, by section.
+    *axes_of* says what the axes of a command are, those that it has by itself among them, for ``--print-config``.
     """
     from snapbeam.config import Config, load_config, lookup, override, same_axis
     from snapbeam.core.validate import InputError
@@ -217,7 +241,7 @@ def configured(given: Mapping[str, Any], **more: Mapping[str, Any]) -> Config:
         if given.get("config") is not None:
             raise InputError("from, config: give one of the two")
         config = config_of_file(given["from_"], given.get("point"))
-    sections: dict[str, dict[str, Any]] = {name: dict(values) for name, values in more.items()}
+    sections: dict[str, dict[str, Any]] = {}
     axes: dict[str, Any] = {}
     for name, value in given.items():
         section, dot, field = name.partition(".")
@@ -243,7 +267,30 @@ def configured(given: Mapping[str, Any], **more: Mapping[str, Any]) -> Config:
             raise InputError(f"{same}: is given as a single value and as an axis")
     if axes:
         sections["axes"] = sections.get("axes", {}) | axes
-    return override(config, sections)
+    config = override(config, sections)
+    if given.get("print_config"):
+        from snapbeam.config import config_text
+
+        printed = config.whole(None if axes_of is None else axes_of(config, given))
+        out().print(config_text(printed), markup=False, end="")
+        answer(**printed.to_mapping())
+        raise typer.Exit
+    if config.defaulted:
+        whole = config.whole().to_mapping()
+        values = ", ".join(
+            f"{name} = {_shown(whole, name)}" for name in config.defaulted if name.partition(".")[0] in whole
+        )
+        notes().print(f"[bold yellow]note:[/] taken from the paper's beam: {escape(values)}")
+    return config
+
+
+def _shown(sections: Mapping[str, Mapping[str, Any]], name: str) -> str:
+    """A value with its unit."""
+    from snapbeam.config import lookup
+
+    section, _, field = name.partition(".")
+    value, unit = sections[section][field], lookup(name).quantity.unit
+    return f"{value:.6g}{'' if unit == '1' else ' ' + unit}"
 
 
 def _is_axis(name: str, value: str) -> bool:
@@ -252,7 +299,7 @@ def _is_axis(name: str, value: str) -> bool:
 
     row = parameters().get(name)
     numeric = name in PHYSICAL or (row is not None and row.quantity.kind in (float, int))
-    return numeric and name not in _PAIRS and (":" in value or "," in value)
+    return numeric and name not in (*_PAIRS, *_LISTS) and (":" in value or "," in value)
 
 
 def _assignment(text: str, option: str) -> tuple[str, str]:
@@ -274,7 +321,7 @@ def _value(name: str, value: Any) -> Any:
     row = parameters().get(name)
     kind = float if row is None else row.quantity.kind
     try:
-        if name in _PAIRS:
+        if name in _PAIRS or (name in _LISTS and "," in value):
             return [float(part) for part in value.split(",")]
         if kind is bool:
             return {"true": True, "false": False}[value.lower()]

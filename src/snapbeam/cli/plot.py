@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snapbeam.cli import options as opt
-from snapbeam.cli.console import door, file_line, out
+from snapbeam.cli.console import answer, door, file_line, out
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -65,6 +65,7 @@ def plot(
         attrs = dataset.attrs
         overlay = read_overlay(dots, attrs.get("reference_freq"), attrs.get("beam_buckling_level"))
         draw_map(dataset, output, overlay, threshold_line)
+    answer(files=[output])
     out().print(f"Written: {file_line(output)}")
 
 

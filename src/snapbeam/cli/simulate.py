@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from snapbeam.cli import options as opt
-from snapbeam.cli.console import FAILED, compiling_told, door, duration, errors, file_line, out
+from snapbeam.cli.console import FAILED, answer, compiling_told, door, duration, errors, file_line, out
 from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
@@ -57,6 +57,10 @@ def simulate(
         ),
     ] = None,
     window: opt.Window = None,
+    samples: Annotated[
+        int | None,
+        opt.count_option("Samples per cycle, evenly spaced (200, and the steps of each contact).", "Output"),
+    ] = None,
 ) -> None:
     """Compute one run and say how the beam responds.
 
@@ -92,7 +96,9 @@ def simulate(
         system = system.replace(striker=recorded)
     start = time.monotonic()
     with compiling_told(errors()), _share_done() as progress:
-        run = sb.simulate(system, integration, progress=progress)
+        run = sb.simulate(
+            system, integration, sample_times=_even(system, integration, samples), progress=progress
+        )
     console = out()
     console.print(_told(run, time.monotonic() - start))
     if output is not None:
@@ -102,8 +108,27 @@ def simulate(
         console.print(f"Written: {file_line(draw_run(run.dataset, plot, part))}")
     if animate is not None:
         console.print(f"Written: {file_line(_animated(run.dataset, animate, part))}")
+    files = [path for path in (output, plot, animate) if path is not None]
+    answer(outcome=run.outcome, seconds=time.monotonic() - start, system=run.system.hash, files=files)
     if run.outcome.status not in (sb.RunStatus.OK, sb.RunStatus.DECIDED):
         raise typer.Exit(FAILED)
+
+
+def _even(system: Any, integration: Any, samples: int | None) -> Any:
+    """Instants of so many samples a cycle, evenly spaced to the end; None if no number was given."""
+    if samples is None:
+        return None
+    import numpy as np
+
+    from snapbeam.core.validate import integer
+    from snapbeam.runs.request import cycle_of
+
+    integer("samples", samples, 1, 100_000)
+    drive = system.striker.drive
+    cycles = integration.cycles_or_default
+    if not drive.harmonic and integration.cycles is None:
+        cycles = int(round(drive.duration * drive.frequency, 9))
+    return np.linspace(0.0, cycles * cycle_of(system), cycles * samples + 1)
 
 
 class _share_done:

@@ -24,6 +24,7 @@ __all__ = [
     "coordinate_text",
     "deepest_notch",
     "lowest_interwell",
+    "map_facts",
     "map_summary",
     "parameter_table",
     "status_lines",
@@ -56,6 +57,21 @@ def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | Non
     lines_after += [f"Written: {file_line(path)}" for path in files]
     lines_after += ["Next:", *(f"  {line}" for line in _suggestions(dataset, files, low))]
     return Group(*lines, class_table(dataset), *lines_after)
+
+
+def map_facts(dataset: xr.Dataset) -> dict[str, Any]:
+    """What a map shows, as plain values: points of each class and status, the lowest interwell point, the notch."""
+    kinds, codes = np.asarray(dataset["response"].values), np.asarray(dataset["status"].values)
+    low = lowest_interwell(dataset)
+    return {
+        "sizes": {str(name): int(size) for name, size in dataset["response"].sizes.items()},
+        "classes": {kind.label: int((kinds == kind).sum()) for kind in ResponseClass},
+        "statuses": {
+            kind.name.lower(): int((codes == kind).sum()) for kind in RunStatus if (codes == kind).any()
+        },
+        "lowest_interwell": low,
+        "deepest_notch": None if low is None else deepest_notch(dataset),
+    }
 
 
 def _modes(dataset: xr.Dataset) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from snapbeam.cli import options as opt
-from snapbeam.cli.console import door, duration, file_line, out, progress
+from snapbeam.cli.console import answer, door, duration, file_line, out, progress
 from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
@@ -25,6 +25,8 @@ from snapbeam.cli.summary import coordinate_text
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from snapbeam.config import Config
 
 __all__ = ["threshold"]
 
@@ -73,23 +75,15 @@ def threshold(
     -o threshold.nc --plot threshold.png
     """
     from snapbeam.cli.results import check_pictures, draw_threshold, write_map
-    from snapbeam.config import lookup, parse_axis
+    from snapbeam.config import lookup
     from snapbeam.core.files import check_writable
-    from snapbeam.core.validate import InputError
 
-    settings = configured(given)
+    settings = configured(given, lambda config, _: _axes_of(config, along))
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
     name = lookup(along).name
-    axes = settings.axes()
-    values = axes.pop(name, None)
-    if values is None:
-        if name != "drive.velocity_amplitude":
-            raise InputError(f"{along}: give the values to choose from, as --axis {along}=start:stop:count")
-        values = np.atleast_1d(parse_axis("velocity_amplitude", _VALUES))
-    if not [each for each in axes if each != "model.modes"]:
-        axes["drive.frequency_ratio"] = np.atleast_1d(parse_axis("frequency_ratio", "0.1:4:64"))
-    axes = dict(sorted(axes.items(), key=lambda item: lookup(item[0]).is_run))
+    axes = _axes_of(settings, along)
+    values = axes.pop(name)
 
     from snapbeam.sweeps.threshold import threshold as find
 
@@ -105,7 +99,31 @@ def threshold(
     files = [write_map(dataset, output)]
     if plot is not None:
         files.append(draw_threshold(dataset, plot))
+    names = ("first_interwell", "always_interwell")
+    answer(
+        along=dataset.attrs["along"],
+        axes={str(each): dataset[each].values for each in dataset["first_interwell"].dims},
+        **{each: dataset[each].values for each in names},
+        runs=dataset.attrs["runs"], seconds=elapsed, files=files,
+    )  # fmt: skip
     out().print(*_summary(dataset, elapsed), *(f"Written: {file_line(path)}" for path in files), sep="\n")
+
+
+def _axes_of(settings: Config, along: str) -> dict[str, Any]:
+    """The axes of a search, those of the structure first, and the values to choose from."""
+    from snapbeam.config import lookup, parse_axis
+    from snapbeam.core.validate import InputError
+
+    axes: dict[str, Any] = settings.axes()
+    name = lookup(along).name
+    values = axes.pop(name, None)
+    if values is None:
+        if name != "drive.velocity_amplitude":
+            raise InputError(f"{along}: give the values to choose from, as --axis {along}=start:stop:count")
+        values = np.atleast_1d(parse_axis("velocity_amplitude", _VALUES))
+    if not [each for each in axes if each != "model.modes"]:
+        axes["drive.frequency_ratio"] = np.atleast_1d(parse_axis("frequency_ratio", "0.1:4:64"))
+    return dict(sorted(axes.items(), key=lambda item: lookup(item[0]).is_run)) | {name: values}
 
 
 def _summary(dataset: xr.Dataset, elapsed: float) -> list[str]:

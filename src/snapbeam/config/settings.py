@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.config.check import MATERIALS, checked_sections, contradictions, parsed_axis, with_section
+from snapbeam.config.check import checked_sections, contradictions, parsed_axis, with_section
+from snapbeam.config.contact import MATERIALS, contact_of, contact_rivals, law_of
 from snapbeam.config.parameters import lookup
 from snapbeam.config.physical import PHYSICAL, checked_physical, physical_name, unit_of
-from snapbeam.core.validate import InputError
-from snapbeam.model.contact import HertzContact
-from snapbeam.model.integration import Integration
+from snapbeam.core.validate import InputError, instance, mapping
+from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import parts_from_mapping
 from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
+from snapbeam.model.quantity import quantities
 from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.system import System
 
@@ -32,7 +33,7 @@ DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude":
 # What stands for the same thing in a section: giving one set takes the other away.
 _RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
     "beam": [({"buckling_level"}, {"axial_load"})],
-    "contact": [({"stiffness"}, set(MATERIALS)), ({"coefficient"}, {"stiffness", *MATERIALS})],
+    "contact": contact_rivals(),
     "drive": [({"frequency_ratio"}, {"frequency_hz"}), ({"velocity_amplitude"}, {"velocity_m_s"})],
     "striker": [({"location"}, {"location_m"})],
 }
@@ -56,13 +57,49 @@ class Config:
 
     @cached_property
     def defaulted(self) -> tuple[str, ...]:
-        """Names of what was not given and takes the paper's value, although something beside it was given."""
-        names = []
-        for section, values in self._defaults().items():
-            own = self.section(section)
-            if own:
-                names += [f"{section}.{name}" for name in values if name not in own]
-        return tuple(names)
+        """Names of what takes the value of the paper's beam although another beam was spoken of."""
+        if not self.section("beam"):
+            return ()
+        found, swept = self._defaults(), self.axes() if self.section("axes") else {}
+        return tuple(
+            f"{section}.{name}"
+            for section in ("beam", "model", "contact")
+            for name in found[section]
+            if name not in self.section(section) and name != "modes" and f"{section}.{name}" not in swept
+        )
+
+    def whole(self, axes: Mapping[str, Any] | None = None) -> Config:
+        """Everything, what was not given too, as a file would hold it: to print, to keep, to start another file from.
+
+        Parameters
+        ----------
+        axes : mapping of str to array_like, optional
+            The axes by dotted name, in place of those that were given.
+        """
+        axes = self.axes() if axes is None and self.section("axes") else dict(axes or {})
+        if self.model.length_scale is None:  # a beam that does not buckle makes no system
+            sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
+        else:
+            sections = {
+                name: {key: value for key, value in values.items() if f"{name}.{key}" not in axes}
+                for name, values in self.system.to_mapping().items()
+            }
+            sections.pop("start", None)
+            if self.section("start"):
+                sections["start"] = self.section("start")
+        own = {name: getattr(self.integration, name) for name in quantities(Integration)}
+        if own["cycles"] is None:
+            own["cycles"] = CYCLES
+        sections["run"] = {
+            name: value for name, value in own.items() if value is not None and f"run.{name}" not in axes
+        }
+        if axes:
+            whole_number = {name: lookup(name).quantity.kind is int for name in axes}
+            sections["axes"] = {
+                name: np.asarray(values, dtype=int if whole_number[name] else None).tolist()
+                for name, values in axes.items()
+            }
+        return config_from_mapping(sections)
 
     def _defaults(self) -> dict[str, dict[str, Any]]:
         beam = {
@@ -72,7 +109,11 @@ class Config:
         if not {"buckling_level", "axial_load"} & own.keys():
             beam["buckling_level"] = BEAM.buckling_level
         contact: dict[str, Any] = {}
-        if not self.section("contact"):
+        of_contact = self.section("contact")
+        if (
+            law_of(of_contact) in ("hertz", "hunt_crossley")
+            and not {"stiffness", *MATERIALS} & of_contact.keys()
+        ):
             contact = {"stiffness": CONTACT.stiffness}
         drive = dict(DEFAULT_DRIVE)
         given = self.section("drive")
@@ -101,7 +142,7 @@ class Config:
         sections: dict[str, Any] = {
             name: values | self.section(name) for name, values in self._defaults().items()
         }
-        sections["contact"] = self._contact(sections["contact"])
+        sections["contact"] = contact_of(sections["contact"])
         sections["drive"].setdefault("kind", "sine")
         later = {
             f"{section}.{name}": sections[section].pop(name)
@@ -128,16 +169,6 @@ class Config:
         sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
         found: ReducedModel = parts_from_mapping(sections)["model"]
         return found
-
-    @staticmethod
-    def _contact(values: dict[str, Any]) -> dict[str, Any]:
-        materials = {name: values.pop(name) for name in MATERIALS if name in values}
-        if materials:
-            moduli, ratios = tuple(materials["young_modulus"]), tuple(materials["poisson_ratio"])
-            values["stiffness"] = HertzContact.from_materials(materials["radius"], moduli, ratios).stiffness
-        if "law" not in values:
-            values["law"] = "restitution" if "coefficient" in values else "hertz"
-        return values
 
     @cached_property
     def integration(self) -> Integration:
@@ -227,6 +258,9 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]]) -> Confi
 
     A value takes an axis over the same parameter away.
     """
+    instance("config", config, Config, "a Config")
+    for name, own in mapping("sections", sections).items():
+        mapping(str(name), own)
     merged: dict[str, dict[str, Any]] = {name: dict(values) for name, values in config.given.items()}
     for section, values in sections.items():
         own = {name: value for name, value in values.items() if value is not None}

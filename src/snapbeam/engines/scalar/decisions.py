@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from snapbeam.engines.scalar.compile import compiled, inlined
-from snapbeam.engines.scalar.contact import peak_force
+from snapbeam.engines.scalar.contact import mark_of, peak_force
 from snapbeam.engines.scalar.signals import count_crossings, first_rise, sign_of, widened
 
 __all__ = [
@@ -105,12 +105,12 @@ def clock_of(run, max_steps):
 
 
 @compiled
-def open_book(book, seen, energy):
+def open_book(book, seen, law, energy):
     """Begin a run's statistics with what is seen of it at the start."""
     book.side = sign_of(seen.c, 0)
     book.min_displacement, book.max_displacement = seen.w, seen.w
     book.min_center, book.max_center = seen.c, seen.c
-    book.deepest = max(seen.d, 0.0)
+    book.deepest = mark_of(law, seen.d, seen.dv)
     book.first_energy = energy
 
 

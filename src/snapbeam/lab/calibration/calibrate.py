@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from snapbeam.config import config_from_mapping, dump_config
 from snapbeam.core.findings import Finding
-from snapbeam.core.validate import InputError, InputTypeError, choice, integer
+from snapbeam.core.validate import InputError, InputTypeError, choice, integer, shown
 from snapbeam.lab.calibration import wording as words
 from snapbeam.lab.calibration.fit import directions, open_upwards, search, sensitivity
 from snapbeam.lab.calibration.measurements import ContactTest, Measurements, load_measurements
@@ -307,7 +307,7 @@ def _fitted(measured: Measurements, fit: tuple[str, ...] | None) -> list[str]:
     if fit is None:
         return ["thickness"] * bool(measured.straight_freq) + ["buckling_level"] * wells
     if isinstance(fit, str) or len(set(fit)) < len(fit):
-        raise InputError(f"fit = {fit!r}: must be a tuple of different names among {', '.join(FITTED)}")
+        raise InputError(f"fit = {shown(fit)}: must be a tuple of different names among {', '.join(FITTED)}")
     for name in fit:
         choice("fit", name, FITTED)
     if "buckling_level" in fit and not wells:

@@ -1,0 +1,198 @@
+"""Doors that lead where they say: what commands suggest runs, and what they print can be read by a program."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import tomllib
+
+import numpy as np
+import pytest
+import typer.main
+import xarray as xr
+from typer.testing import CliRunner
+
+import snapbeam as sb
+from snapbeam.cli.app import app
+from snapbeam.config import load_config
+
+RUNNER = CliRunner()
+SMALL = ["--modes", "1", "--cycles", "12"]
+MAPS = {
+    "the paper's axes": [*SMALL, "--frequency-ratio", "0.6:1.8:5", "--velocity-amplitude", "0.05:0.6:7"],
+    "over location": [*SMALL, "--location", "0.2:0.5:4", "--velocity-amplitude", "0.1:0.6:5", "--frequency-ratio",
+                      "1.3"],
+    "one axis": [*SMALL, "--velocity-amplitude", "0.1:0.6:6", "--frequency-ratio", "1.3"],
+    "one point": [*SMALL, "--velocity-amplitude", "0.5", "--frequency-ratio", "1.3"],
+    "any axes": ["--cycles", "12", "--modes", "2", "--axis", "beam.thickness=3.8e-4:4.2e-4:3", "--axis",
+                 "velocity_amplitude=0.1:0.6:4", "--side", "above"],
+    "numbers of modes": ["--modes", "1,2", "--cycles", "12", "--frequency-ratio", "1:1.5:2", "--velocity-amplitude",
+                         "0.1:0.6:4"],
+    "a beam of its own": [*SMALL, "--length", "0.1", "--thickness", "3e-4", "--buckling-level", "2e-4",
+                          "--contact-stiffness", "1e8", "--damping-ratio", "0.01", "--frequency-ratio", "0.6:1.8:4",
+                          "--velocity-amplitude", "0.05:0.6:4"],
+    "refined, repeated": [*SMALL, "--frequency-ratio", "0.6:1.8:3", "--velocity-amplitude", "0.1:0.6:3", "--refine",
+                          "1", "--replicas", "2"],
+}  # fmt: skip
+
+
+def run(*words: str) -> str:
+    result = RUNNER.invoke(app, [str(word) for word in words])
+    assert result.exit_code == 0, f"{' '.join(map(str, words))}\n{result.output}"
+    return result.stdout
+
+
+def suggested(said: str) -> list[list[str]]:
+    """The commands below "Next:"."""
+    lines = said.partition("Next:\n")[2].splitlines()
+    found = [re.split(r"\s{3,}", line.strip(), maxsplit=1)[1] for line in lines if line.startswith("  ")]
+    return [shlex.split(line) for line in found]
+
+
+@pytest.mark.parametrize(
+    "name", [name if name == "any axes" else pytest.param(name, marks=pytest.mark.slow) for name in MAPS]
+)
+def test_every_suggestion_runs_and_is_of_the_same_system(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    said = run("map", *MAPS[name], "-o", "a map.nc")
+    ds = xr.load_dataset("a map.nc")
+    commands = suggested(said)
+    assert commands
+    for words in commands:
+        if words[0] == "python":
+            assert words[1] == "-c"
+            exec(words[2])
+            continue
+        assert words[0] == "snapbeam"
+        if words[1] == "map":  # the very same, on few points and cycles
+            words = [re.sub(r":40$", ":2", word) for word in words] + ["--cycles", "4"]
+        run(*words[1:])
+    see = [words for words in commands if words[1] == "simulate"]
+    assert len(see) == (1 if (ds.response >= 1).any() else 0)
+    for words in see:
+        told = json.loads(run(*[w for w in words[1:] if w not in ("--plot", "run.png")], "--json", "-"))
+        at = (
+            dict(part.split("=") for part in words[words.index("--point") + 1].split(","))
+            if "--point" in words
+            else {}
+        )
+        point = ds
+        for axis, value in at.items():
+            assert float(value) in ds[axis].values, "to the last digit"
+            point = point.sel({axis: float(value)})
+        point = point.squeeze()
+        assert told["outcome"]["response"] == sb.ResponseClass(int(point.response)).label
+        assert told["outcome"]["crossings"] == int(point.crossings)
+        assert told["outcome"]["peak_force"] == pytest.approx(float(point.peak_force), rel=1e-6)
+
+
+def leaves(group, before=()):
+    """Every command by its words, those of groups of commands too."""
+    for name, command in sorted(group.commands.items()):
+        words = (*before, name)
+        yield from leaves(command, words) if hasattr(command, "commands") else [(" ".join(words), command)]
+
+
+LEAVES = dict(leaves(typer.main.get_command(app)))
+
+
+@pytest.mark.parametrize("command", LEAVES)
+def test_json_and_quiet_everywhere(command):
+    flags = {flag for each in LEAVES[command].params for flag in each.opts}
+    assert {"--json", "--quiet"} <= flags
+
+
+def test_json_goes_to_standard_output_alone(tmp_path):
+    words = ["simulate", *SMALL]
+    result = RUNNER.invoke(app, [*words, "--json", "-"])
+    found = json.loads(result.stdout)
+    assert found["outcome"]["response"] in {kind.label for kind in sb.ResponseClass}
+    assert set(found["outcome"]) == set(sb.STATISTICS)
+    assert RUNNER.invoke(app, [*words, "--quiet"]).output == ""
+    said = RUNNER.invoke(app, [*words, "--json", str(tmp_path / "a.json")])
+    again = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
+    assert again["outcome"] == found["outcome"] and "impacts" in said.stdout
+    refused = RUNNER.invoke(app, ["simulate", "--cycles", "0", "--json", "-", "--quiet"])
+    assert refused.exit_code == 2 and refused.stdout == "" and "cycles = 0" in refused.stderr
+
+
+def test_frequencies_and_thresholds_as_json(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    found = json.loads(run("frequencies", "--count", "3", "--json", "-"))
+    assert found["reduced"] == pytest.approx([81.853, 159.268, 380.441], abs=1e-3)
+    axes = ["--frequency-ratio", "0.8:1.6:3", "--velocity-amplitude", "0.05:0.6:12"]
+    found = json.loads(run("threshold", *SMALL, *axes, "--json", "-"))
+    ds = xr.load_dataset("threshold.nc")
+    np.testing.assert_array_equal(found["first_interwell"], ds.first_interwell.values)
+    assert found["axes"]["frequency_ratio"] == pytest.approx([0.8, 1.2, 1.6])
+
+
+@pytest.mark.parametrize("words", [
+    ["map", *MAPS["numbers of modes"]], ["map", *MAPS["any axes"]], ["map", "--modes", "1"],
+    ["simulate", "--frequency-hz", "100", "--velocity", "0.03", "--location-m", "0.07", "--gap", "1e-5"],
+    ["threshold", "--modes", "1,2"], ["simulate", "--modes", "3", "--damping-ratio", "0.01,0.02,0.03"],
+    ["simulate", "--contact-radius", "2.5e-3", "--contact-young-modulus", "3.5e9,2e11", "--contact-poisson-ratio",
+     "0.36,0.3"],
+])  # fmt: skip
+def test_printed_config_is_the_same_system(words, tmp_path):
+    printed = run(*words, "--print-config")
+    assert tomllib.loads(printed)["run"]["cycles"] in (12, 200)
+    file = tmp_path / "printed.toml"
+    file.write_text(printed, encoding="utf-8")
+    assert run(words[0], "--config", str(file), "--print-config") == printed
+    config = load_config(file)
+    assert config.defaulted == ()
+    if words[0] == "simulate":
+        direct = json.loads(run(*words, "--cycles", "2", "--json", "-"))
+        again = json.loads(run("simulate", "--config", str(file), "--cycles", "2", "--json", "-"))
+        assert again["system"] == direct["system"] and again["outcome"] == direct["outcome"]
+
+
+def test_what_the_paper_lent_is_told(tmp_path):
+    file = tmp_path / "beam.toml"
+    file.write_text("[beam]\nlength = 0.2\n[model]\nmodes = 1\n[run]\ncycles = 4\n", encoding="utf-8")
+    told = RUNNER.invoke(app, ["simulate", "--config", str(file)]).stderr
+    for text in (
+        "beam.thickness = 0.0004 m",
+        "beam.density = 7800 kg/m^3",
+        "contact.stiffness = 4e+08 N/m^1.5",
+    ):
+        assert text in told
+    assert "beam.length" not in told
+    assert "taken from" not in RUNNER.invoke(app, ["simulate", *SMALL]).stderr
+
+
+def test_damping_of_each_mode_and_samples(tmp_path):
+    file = tmp_path / "run.nc"
+    run(
+        "simulate",
+        "--modes",
+        "2",
+        "--damping-ratio",
+        "0.01,0.02",
+        "--cycles",
+        "4",
+        "--samples",
+        "50",
+        "-o",
+        file,
+    )
+    read = sb.load_run(file)
+    np.testing.assert_array_equal(read.system.model.damping_ratio, [0.01, 0.02])
+    assert read.dataset.sizes["time"] == 4 * 50 + 1
+    np.testing.assert_allclose(np.diff(read.dataset.cycle), 0.02, rtol=1e-9)
+    refused = RUNNER.invoke(app, ["simulate", "--modes", "2", "--damping-ratio", "0.01,0.02,0.03"])
+    assert refused.exit_code == 2 and "damping_ratio" in refused.stderr
+
+
+@pytest.mark.parametrize("words", [
+    ["paper", "fig6", "--dots", "nosuch.csv"], ["paper", "fig4", "--measured", "nosuch.nc"],
+    ["paper", "fig2", "--dots", "nosuch.csv"], ["simulate", "--window", "5:2"], ["map", "--threads", "0"],
+    ["simulate", "--samples", "0"], ["simulate", "--json", "nosuch/a.json"],
+])  # fmt: skip
+def test_refusals_come_before_computing(words, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = RUNNER.invoke(app, words)
+    assert result.exit_code == 2 and "error:" in result.stderr
+    assert not re.search(r"\d+ of \d+|to compute", result.output)

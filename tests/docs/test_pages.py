@@ -1,0 +1,108 @@
+"""What the pages say: their code runs, their commands exist, no public name is missing from the interface."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from importlib import import_module
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import pytest
+import typer.main
+
+from snapbeam.cli.app import app
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")])
+CODE = ("systems.md", "sweeps.md", "states.md", "getting-started.md", "README.md")
+"""Pages whose blocks of Python run, one after the other, as they stand; README's is the one that takes seconds."""
+COMMANDS = typer.main.get_command(app).commands
+
+
+def blocks(path: Path, kind: str) -> list[str]:
+    """Fenced blocks of a kind."""
+    found: list[list[str]] = []
+    inside: str | None = None
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if line.startswith("```"):
+            inside = line[3:].strip() if inside is None else None
+            if inside == kind:
+                found.append([])
+        elif inside == kind:
+            found[-1].append(line)
+    return ["\n".join(lines) + "\n" for lines in found]
+
+
+def commands(path: Path) -> list[list[str]]:
+    """Every command line of a page: in blocks of text, continued lines joined."""
+    found = []
+    for text in [*blocks(path, ""), *blocks(path, "sh"), *blocks(path, "bash")]:
+        for line in text.replace("\\\n", " ").splitlines():
+            if line.startswith("snapbeam "):
+                words = shlex.split(line.partition("  #")[0])
+                found.append([word for word in words if word != "..."])
+    return found
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
+def test_python_is_python(path):
+    for block in blocks(path, "python"):
+        compile(block, path.name, "exec")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CODE)
+def test_code_runs(name, tmp_path, monkeypatch, capsys):
+    path = next(page for page in PAGES if page.name == name)
+    monkeypatch.chdir(tmp_path)
+    scope: dict[str, object] = {}
+    for block in blocks(path, "python"):
+        if 'open_dataset("map.nc")' in block:
+            continue  # of a file that a command before it made
+        exec(compile(block, name, "exec"), scope)
+    plt.close("all")
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
+def test_commands_exist_with_their_options(path):
+    for words in commands(path):
+        assert words[1] in COMMANDS, words
+        known = {flag for each in COMMANDS[words[1]].params for flag in (*each.opts, *each.secondary_opts)}
+        for word in words[2:]:
+            if word.startswith("-") and not re.match(r"-?-?[\d.]", word):
+                assert word.partition("=")[0] in known, f"{word} in {' '.join(words)}"
+
+
+def test_there_are_commands_in_the_pages():
+    assert sum(len(commands(path)) for path in PAGES) > 15
+
+
+@pytest.mark.parametrize("module", ["snapbeam", "snapbeam.lab", "snapbeam.figures", "snapbeam.config"])
+def test_interface_page_is_complete(module):
+    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    if f".. automodule:: {module}\n   :members:\n" in text:
+        assert sorted(set(re.findall(r":exclude-members: (.*)", text))) == ["Finding, Severity"]  # above them
+        return  # Sphinx lists every name of its __all__
+    named = set(re.findall(r"::(?: |[\w ]*snapbeam\.)?([\w.]+)$", text, re.MULTILINE))
+    missing = [
+        name for name in import_module(module).__all__ if name not in named and not name.startswith("_")
+    ]
+    assert not missing
+
+
+def test_modules_of_the_interface_page_exist():
+    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    for name in re.findall(r"automodule:: (\S+)", text):
+        import_module(name)
+
+
+def test_every_page_is_in_the_tree():
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    listed = {
+        line.strip()
+        for tree in re.findall(r"```\{toctree\}(.*?)```", index, re.DOTALL)
+        for line in tree.splitlines()
+    }
+    pages = {path.stem for path in (ROOT / "docs").glob("*.md")} - {"index"}
+    assert pages <= listed, pages - listed
