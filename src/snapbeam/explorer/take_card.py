@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import panel as pn
 
 from snapbeam import InputError
+from snapbeam.core.netcdf import write_netcdf
 from snapbeam.explorer.downloads import drawing, file_bytes
 from snapbeam.explorer.jobs import Token
 from snapbeam.explorer.limits import UPLOAD
@@ -217,7 +218,7 @@ class TakeCard:
             whole = source.skeleton.drop_vars(list(source.skeleton.data_vars))
             for name in source.numbers():
                 whole[name] = source.values(name)
-            whole.to_netcdf(path, engine="h5netcdf")
+            write_netcdf(whole, path)
 
         self._make("map", ".nc", write)
 
@@ -227,7 +228,7 @@ class TakeCard:
             self.words.object = '<p class="bad">no window was computed</p>'
             return
         dataset = window_dataset(window)
-        self._make("window", ".nc", lambda path, _: dataset.to_netcdf(path, engine="h5netcdf"))
+        self._make("window", ".nc", lambda path, _: write_netcdf(dataset, path))
 
     def _dots(self, content: bytes | None) -> None:
         from snapbeam.figures import read_dots

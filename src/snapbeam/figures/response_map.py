@@ -72,6 +72,9 @@ def plot_response_map(
     InputError
         If the dataset is no map of one or two axes.
     """
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "response" in dataset and _is_line(dataset):
         return _line(dataset, ax, dots is not None or threshold_line, legend)
     across, upward, kinds = _two_axes(dataset)

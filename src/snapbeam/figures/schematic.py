@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, instance
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
 from snapbeam.model.drive import Flight
 from snapbeam.model.modes import BucklingModes
@@ -52,6 +52,8 @@ def plot_system(system: System, title: str = "") -> Figure:
     InputError
         For a structure given by matrices.
     """
+    instance("system", system, System, "a System")
+    instance("title", title, str, "text")
     if system.model.beam is None:
         raise InputError("system: a structure given by matrices has no shape; give a model made from a beam")
     figure = new_figure("double", 52.0)

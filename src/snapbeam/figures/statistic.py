@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, instance
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.figures.axes import dress, edges_of, positions
 from snapbeam.figures.captions import scale_of
@@ -52,7 +52,10 @@ def plot_statistic(
     InputError
         If there is no such variable, or it is over more than two axes.
     """
-    if name not in dataset:
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if instance("name", name, str, "text") not in dataset:
         raise InputError(f"variable = {name!r}: the map has {', '.join(map(str, dataset.data_vars))}")
     values = dataset[name].squeeze()
     dims = [str(each) for each in values.dims]

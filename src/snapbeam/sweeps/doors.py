@@ -65,7 +65,7 @@ def map_setup(
     axes, scalars = {}, {}
     for name, value in given.items():
         full, low, high, closed = _AXES[name]
-        if finite_array(name, value).ndim == 0:
+        if _is_number(value):
             scalars[name] = within(name, value, low, high, closed=closed)
         else:
             axes[full] = value
@@ -82,6 +82,14 @@ def map_setup(
     points = points_of(axes) if axes else PointList({"striker.location": np.array([shaker.location])})
     system = System(model, contact, shaker)  # type: ignore[arg-type]
     return sweep_setup(system, points, Integration(cycles=integer("cycles", cycles, 1, 10**7), **options))
+
+
+def _is_number(value: Any) -> bool:
+    """Whether it stands for the whole map; lists of unequal lengths do not."""
+    try:
+        return np.ndim(value) == 0
+    except ValueError:
+        return False
 
 
 def response_map(

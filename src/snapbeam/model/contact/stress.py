@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.findings import Finding
-from snapbeam.core.validate import InputError, finite_array, nonnegative, positive
+from snapbeam.core.validate import InputError, InputTypeError, finite_array, nonnegative, positive, shown
 
 __all__ = ["HertzStress", "bending_stress", "hertz_stress"]
 
@@ -94,6 +94,8 @@ def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array
     """
     from snapbeam.model.modes import BucklingModes
 
+    if not hasattr(model, "beam"):
+        raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")
     beam = model.beam
     if beam is None:
         raise InputError(
