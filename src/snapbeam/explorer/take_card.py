@@ -260,8 +260,7 @@ def _draw_run(run: Run, window: tuple[float, float], path: Any) -> None:
     from snapbeam.figures import plot_run, save_figure
 
     with drawing:
-        figure = plot_run(run.dataset, window)
-        _save(save_figure, figure, path)
+        _save(save_figure, plot_run(run.dataset, window), path)
 
 
 def _draw_map(cut: xr.Dataset, name: str, quasi: bool, dots: Any, path: Any) -> None:
@@ -271,12 +270,13 @@ def _draw_map(cut: xr.Dataset, name: str, quasi: bool, dots: Any, path: Any) -> 
         raise InputError(f"{name}: the figures draw the response class; show it, or take the data")
     with drawing:
         ax = plot_response_map(cut, threshold_line=quasi, dots=dots)
-        _save(save_figure, ax.figure, path)
+        _save(save_figure, ax, path)
 
 
-def _save(save_figure: Any, figure: Any, path: Any) -> None:
+def _save(save_figure: Any, drawn: Any, path: Any) -> None:
     import matplotlib.pyplot as plt
 
+    figure = drawn.get_figure(root=True) if hasattr(drawn, "get_figure") else drawn
     try:
         save_figure(figure, path)
     finally:
