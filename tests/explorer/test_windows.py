@@ -10,7 +10,7 @@ import snapbeam as sb
 pytest.importorskip("panel")
 
 from snapbeam.explorer.jobs import Cancelled, Jobs, Token
-from snapbeam.explorer.windows import compute, planned
+from snapbeam.explorer.maps.windows import compute, planned
 
 NAMES = ("drive.frequency_ratio", "drive.velocity_amplitude")
 

@@ -264,12 +264,13 @@ def _draw_run(run: Run, window: tuple[float, float], path: Any) -> None:
 
 
 def _draw_map(cut: xr.Dataset, name: str, quasi: bool, dots: Any, path: Any) -> None:
-    from snapbeam.figures import plot_response_map, save_figure
+    from snapbeam.figures import plot_response_map, plot_statistic, save_figure
 
-    if name != "response":
-        raise InputError(f"{name}: the figures draw the response class; show it, or take the data")
     with drawing:
-        ax = plot_response_map(cut, threshold_line=quasi, dots=dots)
+        if name == "response":
+            ax = plot_response_map(cut, threshold_line=quasi, dots=dots)
+        else:
+            ax = plot_statistic(cut, name)
         _save(save_figure, ax, path)
 
 
@@ -289,7 +290,7 @@ def window_dataset(window: Any) -> xr.Dataset:
 
     from snapbeam import STATISTICS
     from snapbeam.config import lookup
-    from snapbeam.explorer.source import axes_dataset
+    from snapbeam.explorer.maps.source import axes_dataset
 
     dataset = axes_dataset(
         window.system, {window.names[1]: window.y, window.names[0]: window.x}, window.integration
