@@ -11,6 +11,19 @@ from snapbeam.core.findings import Finding, PlausibilityWarning
 from snapbeam.core.provenance import __version__
 from snapbeam.core.showing import register_accessor
 from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.dynamics.attractors import Attractor, Attractors, attractors
+from snapbeam.dynamics.basins import basins
+from snapbeam.dynamics.bifurcation import bifurcation_diagram
+from snapbeam.dynamics.edge import EdgeState, edge_state
+from snapbeam.dynamics.lifetimes.lifetime_map import lifetime_map
+from snapbeam.dynamics.lifetimes.survival import Survival
+from snapbeam.dynamics.lyapunov import lyapunov, separation_exponent
+from snapbeam.dynamics.measures import basin_entropy, integrity, uncertainty_exponent
+from snapbeam.dynamics.orbits.branch import Branch, Event
+from snapbeam.dynamics.orbits.continuation import continue_orbit, switch_branch
+from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit, periodic_orbit
+from snapbeam.dynamics.sections import poincare
+from snapbeam.dynamics.starts import Starts
 from snapbeam.engines.outcomes import STATISTICS, Statistic
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import (
@@ -66,12 +79,17 @@ __all__ = [
     "STATISTICS",
     "AccelerationSine",
     "Accuracy",
+    "Attractor",
+    "Attractors",
     "Beam",
+    "Branch",
     "Burst",
     "Chirp",
     "ContactLaw",
     "DisplacementSine",
     "Drive",
+    "EdgeState",
+    "Event",
     "Finding",
     "Flight",
     "HalfSine",
@@ -82,7 +100,9 @@ __all__ = [
     "Integration",
     "Keeping",
     "KelvinVoigt",
+    "NoOrbit",
     "Noise",
+    "Orbit",
     "Outcome",
     "PlausibilityWarning",
     "PowerLaw",
@@ -97,31 +117,47 @@ __all__ = [
     "RunStatus",
     "Shaker",
     "Sine",
+    "Starts",
     "State",
     "Statistic",
     "Still",
     "StoreError",
     "Striker",
+    "Survival",
     "System",
     "Tally",
     "TwoSines",
     "__version__",
     "advance",
+    "attractors",
+    "basin_entropy",
+    "basins",
     "bending_stress",
+    "bifurcation_diagram",
     "classify",
     "conditioning",
+    "continue_orbit",
+    "edge_state",
     "exact_natural_freq",
     "explore",
     "hertz_stress",
+    "integrity",
+    "lifetime_map",
     "load_run",
     "long_map",
+    "lyapunov",
+    "periodic_orbit",
+    "poincare",
     "quasi_static_threshold",
     "read_store",
     "response_map",
+    "separation_exponent",
     "simulate",
     "sweep",
+    "switch_branch",
     "threshold",
     "threshold_curve",
+    "uncertainty_exponent",
 ]
 
 

@@ -18,6 +18,7 @@ from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.compute.tasks import MemoryKeeper, Stage
 from snapbeam.sweeps.doors import map_setup
 
+sys.path.insert(0, str(Path(__file__).parent))
 PACKAGE = Path(snapbeam.__file__).parent
 _tried = pytest.StashKey[Counter]()
 

@@ -10,6 +10,7 @@ from snapbeam.cli.calibrate import calibrate
 from snapbeam.cli.campaign import campaign
 from snapbeam.cli.compare import compare
 from snapbeam.cli.draw import draw
+from snapbeam.cli.dynamics import dynamics
 from snapbeam.cli.explore import explore
 from snapbeam.cli.frequencies import frequencies
 from snapbeam.cli.identify import identify
@@ -37,6 +38,7 @@ app = typer.Typer(
 app.command("map")(compute_map)
 app.command("threshold")(threshold)
 app.command("simulate")(simulate)
+app.add_typer(dynamics, name="dynamics")
 app.command("frequencies")(frequencies)
 app.command("plot")(plot)
 app.command("explore")(explore)

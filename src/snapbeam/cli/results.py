@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "check_pictures",
+    "draw_dynamics",
     "draw_map",
     "draw_run",
     "draw_threshold",
@@ -94,3 +95,19 @@ def draw_run(dataset: xr.Dataset, path: Path, window: tuple[float, float] | None
     from snapbeam.figures import plot_run
 
     return _save(plot_run(dataset, window), path)
+
+
+def draw_dynamics(dataset: xr.Dataset, path: Path, picture: str) -> Path:
+    """Draw results of dynamics to a picture file."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from snapbeam.figures import dynamics as figures
+
+    if picture == "branch":
+        return _save(figures.plot_diagram(None, branches=[dataset]), path)
+    plots: dict[str, Any] = {
+        "lifetimes": figures.plot_lifetimes, "survival": figures.plot_survival, "diagram": figures.plot_diagram,
+        "exponents": figures.plot_exponents, "section": figures.plot_section, "basins": figures.plot_basins,
+    }  # fmt: skip
+    return _save(plots[picture](dataset), path)

@@ -14,7 +14,7 @@ from snapbeam.config.check import checked_sections, contradictions, parsed_axis,
 from snapbeam.config.contact import MATERIALS, contact_of, contact_rivals, law_of
 from snapbeam.config.parameters import lookup
 from snapbeam.config.physical import PHYSICAL, checked_physical, physical_name, unit_of
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, instance, mapping
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import parts_from_mapping
 from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
@@ -258,6 +258,9 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]]) -> Confi
 
     A value takes an axis over the same parameter away.
     """
+    instance("config", config, Config, "a Config")
+    for name, own in mapping("sections", sections).items():
+        mapping(str(name), own)
     merged: dict[str, dict[str, Any]] = {name: dict(values) for name, values in config.given.items()}
     for section, values in sections.items():
         own = {name: value for name, value in values.items() if value is not None}

@@ -13,7 +13,7 @@ from snapbeam.config.parameters import parameters
 from snapbeam.config.physical import PHYSICAL
 from snapbeam.config.settings import Config, config_from_mapping
 from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.validate import InputError, file_path
+from snapbeam.core.validate import InputError, file_path, instance
 
 __all__ = ["config_text", "dump_config", "load_config"]
 
@@ -56,6 +56,8 @@ def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "")
 
 def config_text(config: Config, comment: str = "") -> str:
     """What was given, as the text of a parameter file."""
+    instance("config", config, Config, "a Config")
+    instance("comment", comment, str, "text")
     table = parameters()
     lines = [f"# {line}" for line in comment.splitlines()]
     for section, values in config.to_mapping().items():

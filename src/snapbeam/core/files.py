@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from snapbeam.core.validate import InputError, InputTypeError, shown
+from snapbeam.core.validate import InputError, file_path
 
 __all__ = ["NoRoomError", "atomic_path", "check_writable", "lives"]
 
@@ -35,9 +35,7 @@ def check_writable(
     InputError
         If the folder is missing or cannot be written to, *path* is a folder, or its suffix is not allowed.
     """
-    if not isinstance(path, (str, os.PathLike)):
-        raise InputTypeError(f"{name} = {shown(path)}: must be a path, not {type(path).__name__}")
-    target = Path(path)
+    target = file_path(name, path)
     if suffixes and target.suffix.lower() not in suffixes:
         raise InputError(f"{name} = {str(path)!r}: must end in {' or '.join(suffixes)}")
     if target.is_dir():

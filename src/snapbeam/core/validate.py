@@ -21,6 +21,7 @@ __all__ = [
     "InputError",
     "InputTypeError",
     "axis",
+    "callback",
     "choice",
     "file_path",
     "finite",
@@ -220,6 +221,13 @@ def mapping(name: str, value: Any) -> Mapping[Any, Any]:
     """Return *value* if it is a mapping, such as a dictionary."""
     if not isinstance(value, Mapping):
         raise InputTypeError(f"{name} = {shown(value)}: must be a mapping, not {type(value).__name__}")
+    return value
+
+
+def callback(name: str, value: Any) -> Any:
+    """Return *value* if it is None or can be called."""
+    if value is not None and not callable(value):
+        raise InputTypeError(f"{name} = {shown(value)}: must be callable")
     return value
 
 

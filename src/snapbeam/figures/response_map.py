@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, finite_array, instance
 from snapbeam.figures.agreement import draw_agreement
 from snapbeam.figures.axes import dress, edges_of, symbol_of
 from snapbeam.figures.captions import beam_text
@@ -132,6 +132,9 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
 
 
 def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "response" not in dataset:
         raise InputError(f"no map: it has no variable 'response' among {list(map(str, dataset.variables))}")
     response = dataset["response"].squeeze()
@@ -174,6 +177,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     kinds : int8 array, optional
         Classes of runs, whose shares then stand beside the names; unknown ones are named if there are any.
     """
+    kinds = None if kinds is None else finite_array("kinds", kinds).astype(np.int8)
     handles: list[Patch | Line2D] = []
     for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
         count = 0 if kinds is None else int((kinds == kind).sum())
@@ -184,7 +188,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
 
 
 def _percent(count: int, total: int) -> str:
-    share = 100.0 * count / total
+    share = 100.0 * count / max(total, 1)
     return "<0.1 %" if 0.0 < share < 0.1 else f"{share:.1f} %"
 
 

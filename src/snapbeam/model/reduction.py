@@ -41,6 +41,10 @@ MODEL_QUANTITIES: dict[str, tuple[Quantity, Any]] = {
 """What a reduction takes beside the beam, and its default."""
 
 
+_LEAST_COMPLIANCE = 1e-300
+"""1/kg, below which the inverse is no number."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class ReducedModel:
     """N modal amplitudes alpha with a mass, a stiffness and one tension term: the left side of Eq. (11),
@@ -257,7 +261,10 @@ class ReducedModel:
         It falls like rho S L / N as modes are added.
         """
         location = within("location", location, 0.0, 1.0)
-        return float(1.0 / np.sum((self.linear_modes.T @ self.shape_at(location)) ** 2))
+        compliance = float(np.sum((self.linear_modes.T @ self.shape_at(location)) ** 2))
+        if not compliance > _LEAST_COMPLIANCE:
+            raise InputError(f"location = {location!r}: is so near a clamp that the beam does not move there")
+        return 1.0 / compliance
 
     # ------------------------------------------------------------------ linear modes about a well
 

@@ -16,7 +16,7 @@ import numpy as np
 from snapbeam.core.files import atomic_path, check_writable
 from snapbeam.core.findings import Finding
 from snapbeam.core.provenance import canonical_json
-from snapbeam.core.validate import InputError, InputTypeError, file_path, shown
+from snapbeam.core.validate import InputError, InputTypeError, file_path, instance, shown
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.doubts import doubts_of
 from snapbeam.model.drive import Scale
@@ -136,7 +136,7 @@ class System:
             For a name that the system does not have.
         """
         found = self.parameters
-        if name not in found:
+        if instance("name", name, str, "text") not in found:
             raise InputError(f"{name}: no parameter of this system; it has {', '.join(found)}")
         return found[name]
 

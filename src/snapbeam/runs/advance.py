@@ -11,7 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
 from snapbeam.core.reporting import counting
-from snapbeam.core.validate import InputError, InputTypeError, finite_array, flag, positive, shown
+from snapbeam.core.validate import (
+    InputError,
+    InputTypeError,
+    finite_array,
+    flag,
+    instance,
+    positive,
+    shown,
+)
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble
 from snapbeam.engines.ensemble import Ensemble
@@ -86,7 +94,9 @@ def advance(
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if state is not None and not isinstance(state, State):
         raise InputTypeError(f"state = {shown(state)}: must be a State")
-    integration = Integration() if integration is None else integration
+    integration = instance(
+        "integration", Integration() if integration is None else integration, Integration, "an Integration"
+    )
     span = positive("periods", periods)
     every = flag("every", every)
     report = counting(progress, "advance", "states")

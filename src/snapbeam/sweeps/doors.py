@@ -11,7 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from snapbeam.core.reporting import counting
-from snapbeam.core.validate import InputError, InputTypeError, flag, integer, positive, shown, within
+from snapbeam.core.validate import (
+    InputError,
+    InputTypeError,
+    finite_array,
+    flag,
+    integer,
+    positive,
+    shown,
+    within,
+)
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.integration import Integration
 from snapbeam.model.reduction import ReducedModel
@@ -56,7 +65,7 @@ def map_setup(
     axes, scalars = {}, {}
     for name, value in given.items():
         full, low, high, closed = _AXES[name]
-        if np.ndim(np.asarray(value)) == 0:
+        if finite_array(name, value).ndim == 0:
             scalars[name] = within(name, value, low, high, closed=closed)
         else:
             axes[full] = value
@@ -242,12 +251,12 @@ def threshold_curve(
     """
     import xarray as xr
 
-    if np.ndim(np.asarray(velocity_amplitude)) == 0 or np.size(velocity_amplitude) < 2:
+    if finite_array("velocity_amplitude", velocity_amplitude).size < 2:
         raise InputError("velocity_amplitude: must be an array of at least two amplitudes to choose from")
     over = {
-        name: value
+        name: finite_array(name, value)
         for name, value in (("frequency_ratio", frequency_ratio), ("location", location))
-        if np.ndim(np.asarray(value)) > 0
+        if finite_array(name, value).ndim > 0
     }
     if len(over) != 1:
         raise InputError(

@@ -15,7 +15,7 @@ from snapbeam.core.files import check_writable
 from snapbeam.core.netcdf import write_netcdf
 from snapbeam.core.validate import InputError, InputTypeError, flag, integer, shown
 from snapbeam.sweeps.compute.cluster import Cluster, open_client, parse_cluster
-from snapbeam.sweeps.compute.task import PointWork
+from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Keeper, MemoryKeeper, Rows, Stage
 from snapbeam.sweeps.compute.workers import ClusterWorkers, Failure, HereWorkers, Workers
 from snapbeam.sweeps.errors import StoreError
@@ -29,7 +29,7 @@ from snapbeam.sweeps.setup import Progress, SweepSetup
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Keeping", "Tally", "compute_sweep"]
+__all__ = ["Keeping", "Tally", "compute_sweep", "compute_table"]
 
 Note = Callable[[str], object]
 
@@ -254,3 +254,26 @@ def _result(
     else:
         to_netcdf(work, points, rows, attrs, target)
     return xr.open_dataset(target, engine="h5netcdf")
+
+
+def compute_table(
+    work: PointWork, keeping: Keeping, *, cluster: str | None = None, progress: Progress | None = None
+) -> tuple[ResultTable, dict[str, Any]]:
+    """Compute any work over the points of its sweep, kept and resumed as a sweep is.
+
+    Returns
+    -------
+    table : ResultTable
+        A row a point, in the order of counting.
+    made_with : dict
+        What the store says of how it was made.
+    """
+    if progress is not None and not callable(progress):
+        raise InputTypeError(f"progress = {progress!r}: must be callable, as progress(done, total)")
+    asked = None if cluster is None else parse_cluster(cluster)
+    if keeping.path is None and asked is not None:
+        raise InputError("cluster: needs a store")
+    with _keeper(work, keeping, asked) as keeper:
+        points, rows = _computed(keeper, 0, progress)
+        table = rows.read(0, points.size)
+        return table, {} if not isinstance(keeper, StoreKeeper) else keeper.store.made_with()

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from snapbeam.core.reporting import counting
+from snapbeam.core.validate import integer
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.sweeps.replicas import Replicas
@@ -81,6 +82,8 @@ def sweep(
     """
     setup = sweep_setup(system, axes, integration)
     keeping = store if isinstance(store, Keeping) else Keeping(store)
+    if replicas is not None and not isinstance(replicas, Replicas):
+        replicas = integer("replicas", replicas, 0, 10_000)
     repeats = Replicas(replicas) if isinstance(replicas, int) and replicas else replicas or None
     return compute_sweep(
         setup,

@@ -130,7 +130,7 @@ class Measurements:
                 raise InputError(f"{name} = {list(values)}: must increase, one frequency a mode")
         for name in ("lower_well", "upper_well"):
             shapes = getattr(self, f"{name}_shape")
-            if isinstance(shapes, str):
+            if isinstance(shapes, str) or not hasattr(shapes, "__iter__"):
                 raise InputTypeError(
                     f"{name}_shape = {shown(shapes)}: must be a list of words, one for each frequency"
                 )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, positive
+from snapbeam.core.validate import InputError, instance, positive
 
 if TYPE_CHECKING:
     from snapbeam.lab.camera.recording import Recording
@@ -115,6 +115,9 @@ def pixel_size_from_marks(
         If a mark does not stand out, or the two are the same.
     """
     length = positive("distance", distance, "m")
+    from snapbeam.lab.camera.recording import Recording
+
+    instance("recording", recording, Recording, "a Recording")
     picture = recording.frame(frame).astype(np.float64)
     centres = [_centre(picture, where, reach, name) for name, where in (("first", first), ("second", second))]
     apart = float(np.hypot(*(centres[1] - centres[0])))

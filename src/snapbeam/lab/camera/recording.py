@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.findings import Finding
-from snapbeam.core.validate import InputError, file_path, integer, positive, shown
+from snapbeam.core.validate import InputError, InputTypeError, file_path, integer, positive, shown
 from snapbeam.lab.camera.sources.base import FrameSource
 from snapbeam.lab.camera.sources.opening import open_source
 from snapbeam.lab.plausibility.recording import KINDS
@@ -60,6 +60,12 @@ class Recording:
         region: tuple[int, int, int, int],
         findings: tuple[Finding, ...] = (),
     ) -> None:
+        if not isinstance(source, FrameSource):
+            raise InputTypeError(
+                f"source = {shown(source)}: must be a source of frames; open_recording opens a file"
+            )
+        if not isinstance(region, (tuple, list)) or len(region) != 4:
+            raise InputError(f"region = {shown(region)}: must be four numbers")
         self.path = path
         self._source = source
         self.frame_rate = frame_rate

@@ -57,8 +57,9 @@ def si_unit(name: str, unit: str) -> tuple[float, str]:
         If the unit is unknown; *name* says whose unit it is.
     """
     if not isinstance(unit, str):
+        where = f"unit of {name}" if isinstance(name, str) else "unit"
         raise InputTypeError(
-            f"unit of {name} = {shown(unit)}: must be text such as 'mm/s', not {type(unit).__name__}"
+            f"{where} = {shown(unit)}: must be text such as 'mm/s', not {type(unit).__name__}"
         )
     word = unit.strip().replace("\u03bc", "u").replace("\u00b5", "u").replace(" ", "").replace("*", "")
     word = _WORDS.get(word.lower(), word)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.validate import instance
 from snapbeam.lab.camera.marks import profile_shift
 from snapbeam.lab.camera.recording import Recording
 from snapbeam.lab.tracking.edges import Floats
@@ -75,6 +76,9 @@ def track(
     InputError
         For settings out of range, or a recording in which beam or shaker cannot be found.
     """
+    instance("recording", recording, Recording, "a Recording")
+    if settings is not None:
+        instance("settings", settings, TrackingSettings, "TrackingSettings")
     wanted = (settings or TrackingSettings()).changed(**changes)
     wanted = wanted.checked_for(recording.shape, len(recording))
     turn = Orientation(wanted.side, recording.shape)

@@ -87,7 +87,15 @@ class HertzContact(ContactLaw):
         """
         mass = positive("mass", mass, "kg")
         velocity = nonnegative("velocity", velocity, "m/s")
-        return float((1.25 * mass * velocity**2 / self.stiffness) ** 0.4)
+        try:
+            found = float((1.25 * mass * velocity**2 / self.stiffness) ** 0.4)
+        except OverflowError:
+            found = math.inf
+        if not math.isfinite(found):
+            raise InputError(
+                f"mass = {mass:g} kg, velocity = {velocity:g} m/s: are beyond what a number holds"
+            )
+        return found
 
     def impact_duration(self, mass: float, velocity: float) -> float:
         """Duration, s, of the impact of a free *mass* (kg) that arrives with a *velocity* (m/s).

@@ -311,7 +311,7 @@ class StoredRows:
 
 
 def _store_folder(path: str | Path) -> Path:
-    if not isinstance(path, (str, Path)):
+    if not isinstance(path, (str, Path)) or "\0" in str(path):
         raise InputError(f"store = {shown(path)}: must be a folder")
     folder = Path(path)
     if folder.exists() and not folder.is_dir():
