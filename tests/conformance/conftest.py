@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -62,6 +63,8 @@ class March:
         threads: int | None = None,
         **integration: Any,
     ) -> Marched:
+        # a limit that a march meets on its way; one that it cannot but meet is refused before
+        limit = integration.pop("max_steps", None)
         asked = sb.Integration(**({"cycles": 1} | integration))
         if contact is None:
             ensemble = make_ensemble(sb.System(model, start=start), asked)
@@ -78,6 +81,8 @@ class March:
         columns = np.broadcast_arrays(*map(np.atleast_1d, given.values()))
         points = {name: np.array(column, dtype=float) for name, column in zip(given, columns, strict=True)}
         ensemble = make_ensemble(sb.System(model, contact, striker, start), asked, points)
+        if limit is not None:
+            ensemble = dataclasses.replace(ensemble, max_steps=limit)
         return Marched(ensemble, self.engine.run_ensemble(ensemble, threads, None))
 
 

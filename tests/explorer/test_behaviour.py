@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from urllib.parse import quote, urlparse
 
 import numpy as np
@@ -60,6 +61,7 @@ def test_a_link_shows_the_same_again(tab, served, small_map):
     assert other.head() == head
 
 
+@pytest.mark.slow
 def test_two_tabs_do_not_disturb_each_other(tab, served, small_map):
     first, second = tab(served.url), tab(served.url)
     ratio, velocity = small_map["frequency_ratio"].values, small_map["velocity_amplitude"].values
@@ -78,6 +80,7 @@ def test_two_tabs_do_not_disturb_each_other(tab, served, small_map):
     )
 
 
+@pytest.mark.slow
 def test_two_points_side_by_side(tab, served, small_map):
     page = tab(served.url)
     ratio, velocity = small_map["frequency_ratio"].values, small_map["velocity_amplitude"].values
@@ -97,6 +100,7 @@ def test_two_points_side_by_side(tab, served, small_map):
     assert page.data("map-mark", "text") == ["A", "B"]
 
 
+@pytest.mark.slow
 def test_the_server_ends_and_the_page_says_so(tab, serve):
     server = serve("map.nc")
     page = tab(server.url)
@@ -106,6 +110,7 @@ def test_the_server_ends_and_the_page_says_so(tab, serve):
     page.errors.clear()  # the browser itself says that it cannot connect
 
 
+@pytest.mark.slow
 def test_a_file_that_goes_is_told_and_runs_go_on(tab, serve, small_map, tmp_path):
     path = tmp_path / "gone.nc"
     small_map.to_netcdf(path, engine="h5netcdf")
@@ -284,8 +289,9 @@ def test_pages_of_other_names_and_origins_are_refused(served):
         connection.close()
         return 101
 
-    assert asyncio.run(knock("http://evil.example")) == 403
-    assert asyncio.run(knock(served.url.rstrip("/"))) == 101
+    with ThreadPoolExecutor(1) as other:  # this thread has the browser's own loop
+        assert other.submit(asyncio.run, knock("http://evil.example")).result() == 403
+        assert other.submit(asyncio.run, knock(served.url.rstrip("/"))).result() == 101
 
 
 def test_a_token_is_asked_for(serve):
@@ -298,6 +304,7 @@ def test_a_token_is_asked_for(serve):
     assert "HttpOnly" in headers["Set-Cookie"] and "SameSite=Strict" in headers["Set-Cookie"]
 
 
+@pytest.mark.slow
 def test_other_addresses_need_a_flag(folder):
     code = "from snapbeam.cli import main; main()"
     found = subprocess.run(
@@ -308,6 +315,7 @@ def test_other_addresses_need_a_flag(folder):
     assert "--allow-remote" in found.stderr
 
 
+@pytest.mark.slow
 def test_the_same_in_a_notebook(tab, small_map):
     shown = sb.explore(small_map)
     try:

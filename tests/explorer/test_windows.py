@@ -10,7 +10,7 @@ import snapbeam as sb
 pytest.importorskip("panel")
 
 from snapbeam.explorer.jobs import Cancelled, Jobs, Token
-from snapbeam.explorer.windows import compute, planned
+from snapbeam.explorer.maps.windows import compute, planned
 
 NAMES = ("drive.frequency_ratio", "drive.velocity_amplitude")
 
@@ -96,9 +96,12 @@ def test_zooming_computes_what_is_seen_and_a_click_runs_its_points(tab, served):
     page.wait(lambda: "bit for bit" in page.notes(), "the run of a point between those of the map")
 
 
+@pytest.mark.slow
 def test_the_papers_beam_is_mapped_while_one_looks(tab, serve, folder):
     (folder / "quick.toml").write_text("[model]\nmodes = 1\n[run]\ncycles = 5\n")
     page = tab(serve("--config", "quick.toml").url)
     page.wait(lambda: len(page.data("map-windows", "image")) == 1, "a map out of nothing")
+    finer = ("blocks of 9", "blocks of 3", "blocks of 1 ", "all ")
+    page.wait(lambda: any(words in page.state() for words in finer), "the coarsest level")
     page.click(1.2, 0.3)
     page.wait(lambda: "crossings" in page.head() and "bit for bit" in page.notes(), "a run")

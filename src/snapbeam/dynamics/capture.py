@@ -16,7 +16,7 @@ __all__ = ["Ball", "Cloud", "balls_of", "cloud_of"]
 _Array = NDArray[np.float64]
 _TRIED = 48
 """States on each shell that are tried."""
-_SHELLS = 14
+_SHELLS = 9
 _LARGEST = 0.5
 """Radius of the largest shell, in units of the well's amplitude along the longest axis."""
 _SHARE = 0.5

@@ -11,7 +11,7 @@ import numpy as np
 
 from snapbeam import Integration, System
 from snapbeam.config import config_from_mapping, config_text, lookup
-from snapbeam.explorer.source import integration_mapping
+from snapbeam.explorer.maps.source import integration_mapping
 
 __all__ = ["map_command", "plain", "python_lines", "run_command", "system_toml"]
 

@@ -14,16 +14,16 @@ from bokeh.models import ColumnDataSource
 import snapbeam as sb
 from snapbeam import InputError, Integration, Run, RunStatus, System
 from snapbeam.explorer.address import Address, number
+from snapbeam.explorer.cards.map import MapCard
+from snapbeam.explorer.cards.system import SystemCard, changed_parameters
+from snapbeam.explorer.cards.take import TakeCard
 from snapbeam.explorer.downloads import Downloads
 from snapbeam.explorer.frame import framed
 from snapbeam.explorer.jobs import Token
 from snapbeam.explorer.limits import RUN_SECONDS, check_run, samples_of
 from snapbeam.explorer.look import Look, look_of
-from snapbeam.explorer.map_card import MapCard
-from snapbeam.explorer.points import Point, compared
+from snapbeam.explorer.maps.points import Point, compared
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.system_card import SystemCard, changed_parameters
-from snapbeam.explorer.take_card import TakeCard
 from snapbeam.explorer.views.run import RunView
 
 __all__ = ["Page"]
@@ -121,7 +121,7 @@ class Page:
     def close(self) -> None:
         """The tab is closed: compute nothing for it any more."""
         self.closed = True
-        self.card.cancel("")
+        self.card.control.cancel("")
         for token in self._tokens:
             if token is not None:
                 token.cancel()

@@ -9,9 +9,9 @@ from typing import Any
 
 from snapbeam import InputError, Integration, System
 from snapbeam.explorer.jobs import Jobs
-from snapbeam.explorer.points import integration_of, system_of
-from snapbeam.explorer.source import Source
-from snapbeam.explorer.windows import Window
+from snapbeam.explorer.maps.points import integration_of, system_of
+from snapbeam.explorer.maps.source import Source
+from snapbeam.explorer.maps.windows import Window
 
 __all__ = ["Shared"]
 

@@ -44,8 +44,8 @@ def _shared(what: Any, system: System | None, integration: Integration | None) -
         raise InputError(_MISSING) from error
     from bokeh.settings import settings
 
+    from snapbeam.explorer.maps.source import opened
     from snapbeam.explorer.shared import Shared
-    from snapbeam.explorer.source import opened
 
     settings.resources = "server"  # whatever a page is made of comes from this machine
     pn.extension()

@@ -318,7 +318,12 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
             axis.set_label_text(_coordinate(name))
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
         handles = [
-            Patch(facecolor=colors[i], edgecolor="black", linewidth=0.4, label=meanings[i].replace("_", " "))
+            Patch(
+                facecolor=colors[i],
+                edgecolor="black",
+                linewidth=0.4,
+                label=(f"{i - 1}: " if i else "") + meanings[i].replace("_", " "),
+            )
             for i in range(count + 1)
             if i > 0 or (labels == -1).any()
         ]

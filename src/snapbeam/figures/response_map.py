@@ -180,7 +180,10 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     kinds : int8 array, optional
         Classes of runs, whose shares then stand beside the names; unknown ones are named if there are any.
     """
-    kinds = None if kinds is None else finite_array("kinds", kinds).astype(np.int8)
+    if kinds is not None:
+        shown_kinds = np.asarray(kinds)
+        # points that a picture leaves out are NaN in it
+        kinds = finite_array("kinds", shown_kinds[shown_kinds == shown_kinds]).astype(np.int8)
     handles: list[Patch | Line2D] = []
     for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
         count = 0 if kinds is None else int((kinds == kind).sum())

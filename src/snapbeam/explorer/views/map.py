@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from snapbeam import ResponseClass, quasi_static_threshold
 from snapbeam.explorer.look import Look, colors_of, columns, figure, inner_size, sequential
-from snapbeam.explorer.raster import Axis, picture
-from snapbeam.explorer.windows import Window
+from snapbeam.explorer.maps.raster import Axis, picture
+from snapbeam.explorer.maps.windows import Window
 from snapbeam.figures import CLASS_COLORS
 
 __all__ = ["MapView"]

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 import snapbeam as sb
-from snapbeam.explorer.source import DatasetSource
+from snapbeam.explorer.maps.source import DatasetSource
 
 __all__ = ["StoreSource"]
 

@@ -261,23 +261,24 @@ def _draw_run(run: Run, window: tuple[float, float], path: Any) -> None:
     from snapbeam.figures import plot_run, save_figure
 
     with drawing:
-        figure = plot_run(run.dataset, window)
-        _save(save_figure, figure, path)
+        _save(save_figure, plot_run(run.dataset, window), path)
 
 
 def _draw_map(cut: xr.Dataset, name: str, quasi: bool, dots: Any, path: Any) -> None:
-    from snapbeam.figures import plot_response_map, save_figure
+    from snapbeam.figures import plot_response_map, plot_statistic, save_figure
 
-    if name != "response":
-        raise InputError(f"{name}: the figures draw the response class; show it, or take the data")
     with drawing:
-        ax = plot_response_map(cut, threshold_line=quasi, dots=dots)
-        _save(save_figure, ax.figure, path)
+        if name == "response":
+            ax = plot_response_map(cut, threshold_line=quasi, dots=dots)
+        else:
+            ax = plot_statistic(cut, name)
+        _save(save_figure, ax, path)
 
 
-def _save(save_figure: Any, figure: Any, path: Any) -> None:
+def _save(save_figure: Any, drawn: Any, path: Any) -> None:
     import matplotlib.pyplot as plt
 
+    figure = drawn.get_figure(root=True) if hasattr(drawn, "get_figure") else drawn
     try:
         save_figure(figure, path)
     finally:
@@ -290,7 +291,7 @@ def window_dataset(window: Any) -> xr.Dataset:
 
     from snapbeam import STATISTICS
     from snapbeam.config import lookup
-    from snapbeam.explorer.source import axes_dataset
+    from snapbeam.explorer.maps.source import axes_dataset
 
     dataset = axes_dataset(
         window.system, {window.names[1]: window.y, window.names[0]: window.x}, window.integration

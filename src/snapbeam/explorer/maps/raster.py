@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from snapbeam.figures.axes import edges_of, is_geometric, positions
 
 if TYPE_CHECKING:
-    from snapbeam.explorer.source import Source
+    from snapbeam.explorer.maps.source import Source
 
 __all__ = ["Axis", "Picture", "picture", "plain_symbol"]
 

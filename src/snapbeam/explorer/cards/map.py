@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -14,26 +13,19 @@ from numpy.typing import NDArray
 
 from snapbeam import InputError, Integration, ResponseClass, System
 from snapbeam.explorer.address import Address
-from snapbeam.explorer.jobs import Token
-from snapbeam.explorer.limits import WINDOW_SECONDS
+from snapbeam.explorer.cards.windows import WindowControl
 from snapbeam.explorer.look import Look
-from snapbeam.explorer.plane import Plane
-from snapbeam.explorer.points import Point
+from snapbeam.explorer.maps.plane import Plane
+from snapbeam.explorer.maps.points import Point
+from snapbeam.explorer.maps.windows import Window
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.views.map import MapView
-from snapbeam.explorer.windows import Window, compute, planned
 from snapbeam.figures import CLASS_COLORS
 
 __all__ = ["MapCard"]
 
 _HEIGHT = 345
 """Pixels of the figure."""
-_REST = 350
-"""Milliseconds that a view must rest before it is computed."""
-_PUSH = 0.2
-"""Seconds between two pictures of a window that fills."""
-_COARSE = 9.0
-"""Pixels of a cell above which a view is worth computing anew."""
 
 
 class MapCard:
@@ -64,11 +56,10 @@ class MapCard:
         self.marks: list[tuple[dict[str, Any], str]] = []
         self.asked: Callable[[Point], None] = lambda _: None
         self.moved: Callable[[], None] = lambda: None
-        self._token: Token | None = None
-        self._moved, self._pushed = 0, 0.0
         self._picked: tuple[float, float] | None = None
         self._words = list(address.words)
         self._make_controls(address)
+        self.control = WindowControl(self)
         self.holder = pn.Column(sizing_mode="stretch_width", margin=0)
         self.plane: Plane
         self.view: MapView
@@ -118,8 +109,8 @@ class MapCard:
             widget.param.watch(self._axes_changed, "value")
         self.show.param.watch(lambda _: self.post(self.redraw), "value")
         self.layers.param.watch(lambda _: self.post(self.redraw), "value")
-        self.stop.on_click(lambda _: self.post(lambda: self.cancel("stopped")))
-        self.again.on_click(lambda _: self.post(lambda: self.compute_view(force=True)))
+        self.stop.on_click(lambda _: self.post(lambda: self.control.cancel("stopped")))
+        self.again.on_click(lambda _: self.post(lambda: self.control.compute_view(force=True)))
         for slider in self.sliders.values():
             slider.param.watch(lambda _: self.post(self._cut_changed), "value")
         self.slider_box = pn.FlexBox(margin=0)
@@ -152,7 +143,7 @@ class MapCard:
     def _cut_changed(self) -> None:
         self.plane = replace(self.plane, fixed=self._fixed())
         self.redraw()
-        self._view_rests()
+        self.control.view_moved()
 
     def _fixed(self) -> dict[str, int]:
         return {
@@ -165,7 +156,7 @@ class MapCard:
 
     def rebuild(self, view: tuple[float, ...] | None) -> None:
         """Make the figure anew, of other axes."""
-        self.cancel("")
+        self.control.cancel("")
         self.plane = Plane.of(self.source, self.x.value, self.y.value, self._fixed())
         self.view = MapView(self.look, self.plane.x, self.plane.y, _HEIGHT)
         if (
@@ -176,15 +167,15 @@ class MapCard:
             self.view.view = (view[0], view[1], view[2], view[3])
         self.view.on_tap(self._tapped)
         self.view.on_hover(self._hovered)
-        self.view.on_view(self._view_moved)
+        self.view.on_view(self.control.view_moved)
         for edge in ("inner_width", "inner_height"):
-            self.view.plot.on_change(edge, lambda attr, old, new: self._view_rests())
+            self.view.plot.on_change(edge, lambda attr, old, new: self.control.view_moved())
         self.slider_box.objects = [
             slider for name, slider in self.sliders.items() if name not in (self.x.value, self.y.value)
         ]  # fmt: skip
         self.holder.objects = [pn.pane.Bokeh(self.view.plot, sizing_mode="stretch_width", margin=0)]
         self.redraw()
-        self._view_rests()
+        self.control.view_moved()
 
     @property
     def layout(self) -> Any:
@@ -374,121 +365,9 @@ class MapCard:
                 parts.append(f"{each.replace('_', ' ')} {held[each]:.5g}{'' if unit == '1' else f' {unit}'}")
         self.hover.object = " &nbsp;·&nbsp; ".join(parts)
 
-    # ------------------------------------------------------------------ windows
-
-    def _view_moved(self) -> None:
-        self._moved += 1
-        now = self._moved
-        self.later(lambda: self._rested() if now == self._moved else None, _REST)
-
-    def _view_rests(self) -> None:
-        self._view_moved()
-
-    def _rested(self) -> None:
-        if self.source.skeleton.data_vars and not (self.plane.x.even and self.plane.y.even):
-            self.redraw()
-        self.moved()
-        if self.auto.value and self._worth_computing():
-            self.compute_view()
-
-    def _worth_computing(self) -> bool:
-        if self.system is None or not self.plane.can_zoom or self.source.is_list:
-            return False
-        if not self.source.skeleton.data_vars or self.changed:
-            return True
-        left, right, low, high = self.view.view
-        wide, tall = self.view.pixels
-        inside = [
-            max(int(((axis.edges[:-1] < b) & (axis.edges[1:] > a)).sum()), 1)
-            for axis, a, b in ((self.plane.x, left, right), (self.plane.y, low, high))
-        ]
-        return not self.view.is_whole and max(wide / inside[0], tall / inside[1]) > _COARSE
-
-    def compute_view(self, force: bool = False) -> None:
-        """Compute what is seen, from coarse to fine, in place of what was being computed."""
-        if self.system is None or not self.plane.can_zoom:
-            self.tell("a window needs two axes of numbers, and a system" if force else "")
-            return
-        bounds = self._bounds()
-        if bounds is None:
-            return
-        key = (self.plane_key, bounds)
-        known = [window for window in self.windows() if window.key == key]
-        if known and known[0].finished:
-            return
-        self.cancel("")
-        try:
-            system, integration = Point(self.plane.fixed_values()).system(self.system, self.integration)
-        except InputError as error:
-            self.tell(str(error))
-            return
-        log = (self.plane.x.log, self.plane.y.log)
-        made = planned(system, integration, self.plane.names, bounds, log, self.view.pixels, key=key)
-        window = self.shared.window(made)
-        self._token = token = Token(WINDOW_SECONDS)
-        self.stop.visible = True
-        self.tell("computing what is seen")
-        self.shared.jobs.window(
-            lambda _: compute(window, self.shared.jobs, token, lambda w: self._grew(w, token)),
-            lambda _, words: self.post(lambda: self._ended(window, token, words)),
-            token,
-        )
-
-    def _bounds(self) -> tuple[float, float, float, float] | None:
-        """What is seen, within what the axes may be."""
-        from snapbeam.config import lookup
-
-        left, right, low, high = self.view.view
-        found: list[float] = []
-        for (a, b), name, axis in (
-            ((left, right), self.plane.names[0], self.plane.x),
-            ((low, high), self.plane.names[1], self.plane.y),
-        ):
-            item = lookup(name).quantity
-            least = max(a, item.low) if np.isfinite(item.low) else a
-            most = min(b, item.high) if np.isfinite(item.high) else b
-            if axis.log:
-                least = max(least, 1e-3 * float(axis.at[0]))
-            if not least < most:
-                return None
-            found += [least, most]
-        return found[0], found[1], found[2], found[3]
-
-    def _grew(self, window: Window, token: Token) -> None:
-        now = time.monotonic()
-        if now - self._pushed > _PUSH and not token.cancelled:
-            self._pushed = now
-            self.post(lambda: self._draw_growing(window, token))
-
-    def _draw_growing(self, window: Window, token: Token) -> None:
-        if token is not self._token:
-            return
-        self.show_windows()
-        left = (window.size - window.done) * window.seconds
-        finest = int(window.stride[window.stride > 0].min()) if (window.stride > 0).any() else 27
-        self.tell(
-            f"window: {window.done} of {window.size} points, {left:.0f} s to the finest; blocks of {finest} cells now"
-        )
-
-    def _ended(self, window: Window, token: Token, words: str) -> None:
-        if token is self._token:
-            self.stop.visible = False
-            self._token = None
-            self.show_windows()
-            self.tell(words or f"window: all {window.size} points computed")
-
-    def cancel(self, words: str) -> None:
-        """Compute no window any more."""
-        if self._token is not None:
-            self._token.cancel()
-            self._token = None
-            self.stop.visible = False
-        if words:
-            self.tell(f"{words}; what was computed is kept")
-
     def use(self, system: System, integration: Integration, changed: bool) -> None:
         """Compute points and windows of another system from now on."""
-        self.cancel("")
+        self.control.cancel("")
         self.system, self.integration, self.changed = system, integration, changed
         self.redraw()
 

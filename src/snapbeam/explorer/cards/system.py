@@ -17,7 +17,7 @@ from snapbeam.explorer.downloads import Downloads
 from snapbeam.explorer.limits import CYCLES, MODES, UPLOAD
 from snapbeam.explorer.lines import plain, system_toml
 from snapbeam.explorer.look import Look, styled
-from snapbeam.explorer.source import integration_mapping
+from snapbeam.explorer.maps.source import integration_mapping
 
 __all__ = ["SystemCard", "changed_parameters"]
 

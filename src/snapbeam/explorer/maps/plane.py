@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from snapbeam import InputError
 from snapbeam.config import lookup
-from snapbeam.explorer.points import Point, parameter_of
-from snapbeam.explorer.raster import Axis
-from snapbeam.explorer.source import Source
+from snapbeam.explorer.maps.points import Point, parameter_of
+from snapbeam.explorer.maps.raster import Axis
+from snapbeam.explorer.maps.source import Source
 
 __all__ = ["Plane"]
 

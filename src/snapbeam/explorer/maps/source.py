@@ -275,7 +275,7 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
     if isinstance(what, (str, Path)):
         path = Path(what)
         if path.is_dir():
-            from snapbeam.explorer.store import StoreSource
+            from snapbeam.explorer.maps.store import StoreSource
 
             return StoreSource(path)
         if not path.exists():
