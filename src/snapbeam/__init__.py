@@ -8,6 +8,7 @@ from typing import Any
 
 from snapbeam.core.codes import ResponseClass, RunStatus, classify
 from snapbeam.core.findings import Finding, PlausibilityWarning
+from snapbeam.core.netcdf import write_netcdf
 from snapbeam.core.provenance import __version__
 from snapbeam.core.showing import register_accessor
 from snapbeam.core.validate import InputError, InputTypeError
@@ -158,6 +159,7 @@ __all__ = [
     "threshold",
     "threshold_curve",
     "uncertainty_exponent",
+    "write_netcdf",
 ]
 
 

@@ -17,7 +17,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snapbeam.core.files import NoRoomError, atomic_path
+from snapbeam.core.files import NoRoomError, atomic_path, check_writable
+from snapbeam.core.validate import instance, mapping
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -43,14 +44,19 @@ def write_netcdf(
 
     Raises
     ------
+    InputError
+        If *data* are no datasets, or nothing can be written to *path*, which ends in ``.nc``.
     NoRoomError
         If there is no room for the file; it says how much is needed, and where the file is kept instead.
     """
     import xarray as xr
     from xarray.backends import H5NetCDFStore
 
-    groups = {None: data} if isinstance(data, xr.Dataset) else data
-    with netcdf_file(path) as file:
+    target = check_writable(path, "path", (".nc",))
+    groups = {None: data} if isinstance(data, xr.Dataset) else mapping("data", data)
+    for name, dataset in groups.items():
+        instance(f"data[{name!r}]", dataset, xr.Dataset, "an xarray.Dataset")
+    with netcdf_file(target) as file:
         for name, dataset in groups.items():
             group = None if name is None else file.create_group(name)
             store = H5NetCDFStore(file if group is None else group)

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import panel as pn
 
-from snapbeam import InputError
-from snapbeam.core.netcdf import write_netcdf
+from snapbeam import InputError, write_netcdf
 from snapbeam.explorer.downloads import drawing, file_bytes
 from snapbeam.explorer.jobs import Token
 from snapbeam.explorer.limits import UPLOAD
