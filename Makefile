@@ -18,15 +18,18 @@ PLOT ?= map.png
 # Where the benchmarks write; the docs show what is in docs/images
 BENCH ?= out/bench
 
-.PHONY: help map test test-slow lint docs bench clean
+.PHONY: help map explorer-deps test test-slow test-oldest lint docs bench dist clean
 
 help:
 	@echo "make map        compute the response map ($(MAP), $(PLOT)); variables: MODES CYCLES FREQUENCY_RATIO"
 	@echo "                VELOCITY_AMPLITUDE LOCATION MAP PLOT"
 	@echo "make test       lint, types, import contracts and the tests"
 	@echo "make test-slow  the tests that take longer"
+	@echo "make explorer-deps   what the explorer and its tests in a browser need"
+	@echo "make test-oldest  the tests with the oldest packages that are allowed, on Python 3.11"
 	@echo "make docs       the documentation, in docs/_build/html"
 	@echo "make bench      the benchmarks, in out/bench; variable: BENCH"
+	@echo "make dist       wheel and source archive, each installed alone and run"
 	@echo "make clean      remove what was built (not the environment, not results)"
 
 $(BIN)/python:
@@ -55,6 +58,12 @@ map: $(VENV)/.installed-run
 	$(BIN)/snapbeam map --modes $(MODES) --cycles $(CYCLES) --frequency-ratio $(FREQUENCY_RATIO) \
 		--velocity-amplitude $(VELOCITY_AMPLITUDE) --location $(LOCATION) -o $(MAP) --plot $(PLOT)
 
+# The browser is the system's: its tests are skipped, with a line, where there is none.
+explorer-deps: $(VENV)/.installed-test
+	$(PIP) install --constraint constraints.txt --editable ".[explorer,explorer-test]"
+	@command -v chromium >/dev/null || command -v chromium-browser >/dev/null \
+		|| echo "no Chromium: install it with the system's packages (Debian: apt-get install chromium), or set CHROMIUM"
+
 lint: $(VENV)/.installed-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -67,11 +76,31 @@ test: lint
 test-slow: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -m slow --durations=15
 
+# The lower bounds that pyproject.toml states, installed and tested.  Python 3.11 is the oldest.
+OLDEST ?= .venv-oldest
+OLDEST_PYTHON ?= python3.11
+
+$(OLDEST)/.installed: pyproject.toml tests/reliability/oldest.py
+	$(OLDEST_PYTHON) -m venv $(OLDEST)
+	$(OLDEST)/bin/python tests/reliability/oldest.py lab cluster video dev > $(OLDEST)/oldest.txt
+	$(OLDEST)/bin/python -m pip install --quiet --requirement $(OLDEST)/oldest.txt
+	$(OLDEST)/bin/python -m pip install --quiet --no-deps --editable .
+	@touch $@
+
+test-oldest: $(OLDEST)/.installed
+	$(OLDEST)/bin/python -m pytest -m "not slow" --durations=15
+
 docs: $(VENV)/.installed-docs
 	$(BIN)/python -m sphinx -W --keep-going -b html docs docs/_build/html
 
 bench: $(VENV)/.installed-bench
 	$(BIN)/python -m benchmarks -o $(BENCH)
+
+dist: $(VENV)/.installed-test
+	$(PIP) install --constraint constraints.txt build
+	rm -rf dist
+	$(BIN)/python -m build --outdir dist .
+	$(BIN)/python tests/release/alone.py dist
 
 clean:
 	rm -rf build dist docs/_build docs/gallery docs/_paper docs/_generated docs/sg_execution_times.rst .pytest_cache .mypy_cache \

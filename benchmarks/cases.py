@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam import paper
+from snapbeam.engines.assemble import make_ensemble
 from snapbeam.engines.cpu import driver as cpu_engine
-from snapbeam.engines.ensemble import Ensemble, make_ensemble
+from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.plan import Plan, plan_steps
+from snapbeam.runs.samples import joined
 
 __all__ = [
     "CONTACT",
@@ -94,28 +96,30 @@ class Case:
         model = self.model
         return float(model.equilibrium @ model.shape_at(self.location) / model.length_scale)
 
+    def system(self, factor: float = 1.0) -> sb.System:
+        """What is run; the drive is multiplied by *factor*."""
+        shaker = sb.Shaker(
+            frequency_ratio=self.frequency_ratio,
+            velocity_amplitude=self.velocity_amplitude * factor,
+            location=self.location,
+        )
+        return sb.System(self.model, CONTACT, shaker)
+
     def ensemble(
         self, plan: Plan, cycles: int, *, factor: float = 1.0, early_decision: bool = False
     ) -> Ensemble:
-        """This run, for an engine; the drive is multiplied by *factor*."""
-        return make_ensemble(
-            self.model,
-            CONTACT,
-            plan,
-            frequency_ratio=np.array([self.frequency_ratio]),
-            velocity_amplitude=np.array([self.velocity_amplitude * factor]),
-            location=np.array([self.location]),
-            side="below",
-            cycles=cycles,
-            reference_freq=self.model.reference_freq,
-            early_decision=early_decision,
-        )
+        """This run, for an engine."""
+        integration = sb.Integration(cycles=cycles, early_decision=early_decision)
+        return make_ensemble(self.system(factor), integration, plan=plan)
 
     def displacement(self, plan: Plan, factor: float = 1.0) -> _Array:
         """Displacement of the contact point from rest, in b, at :attr:`times`, by snapbeam."""
         ensemble = self.ensemble(plan, ERROR_CYCLES, factor=factor)
-        _, _, outputs = cpu_engine.record(ensemble, 0, self.times, 0, False)
-        return np.asarray(outputs.rows[:, ensemble.packed.rows] @ self.at_contact)
+        end = float(ensemble.runs["tick"][0] * ensemble.runs["end"][0])
+        recorded = joined(list(cpu_engine.record(ensemble, np.minimum(self.times, end), False)))
+        alpha = ensemble.structure.amplitudes(recorded.q)
+        shape = self.model.shape_at(self.location)
+        return np.asarray(alpha @ shape / self.model.length_scale) - self.at_rest
 
     def default_plan(self, accuracy: str = "map") -> Plan:
         """snapbeam's own choice of steps."""

@@ -21,15 +21,16 @@ def test_single_run(benchmark: Any, modes: int) -> None:
     """50 cycles at (1.21, 0.18), statistics only."""
     case = Case(modes, 1.21, 0.18)
     ensemble = case.ensemble(case.default_plan(), 50)
-    counts, _, _ = benchmark(cpu_engine.record, ensemble, 0, np.empty(0), 0, False)
-    assert counts[1] > 0
+    books = benchmark(cpu_engine.run_ensemble, ensemble, 1)
+    assert books["steps"][0] > 0
 
 
 def test_recorded_run(benchmark: Any) -> None:
     """20 cycles with 200 samples each and the energy ledger."""
     case = Case(32, 1.21, 0.18)
-    times = np.linspace(0.0, 20 * case.period, 4001)
-    benchmark(cpu_engine.record, case.ensemble(case.default_plan(), 20), 0, times, 0, True)
+    ensemble = case.ensemble(case.default_plan(), 20)
+    times = np.linspace(0.0, float(ensemble.runs["tick"][0] * ensemble.runs["end"][0]), 4001)
+    benchmark(lambda: list(cpu_engine.record(ensemble, times, False)))
 
 
 @pytest.mark.parametrize("early", [False, True])

@@ -16,8 +16,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from benchmarks.cases import CONTACT, Case
+from benchmarks.peers.equations import equations_of
+from snapbeam.engines.cpu.memory import pack
 from snapbeam.engines.cpu.rows import dot, tension_rows
-from snapbeam.engines.scalar.physics import contact_force, sincos, tension_factors
+from snapbeam.engines.scalar.physics import sincos, tension_factors
+from snapbeam.engines.structure import structure_of
 
 __all__ = ["CompiledSystem", "aligned", "compiled_system"]
 
@@ -57,18 +60,18 @@ def compiled_system(case: Case, weight: float) -> CompiledSystem:
     *weight* is omega_s / omega_1: how much looser the absolute tolerance is on velocities.  Each method is
     given the one that serves it best.
     """
-    ensemble = case.ensemble(case.default_plan(), 1)
-    packed, reals = ensemble.packed, ensemble.reals[0]
+    model, e = case.model, equations_of(case)
+    packed = pack(structure_of(model, "below"))
     layout, blocks = packed.layout, packed.blocks
     size, work = layout.size, layout.work
     memory = aligned(work + 2 * size)
     memory[:work] = packed.memory[:work]
-    memory[layout.contact : layout.contact + size] = ensemble.contact_rows[0]
-    start_q = ensemble.starts[0][:size]
-    scale = float(case.model.length_scale / np.abs(ensemble.contact_rows[0]).max())
-    rate = weight * float(case.model.omega[0])
-    offset, amplitude, omega = float(reals[0]), float(reals[1]), float(reals[2])
-    stiffness = CONTACT.stiffness
+    row = packed.spread(model.linear_modes.T @ model.shape_at(case.location))
+    memory[layout.contact : layout.contact + size] = row
+    start_q = np.zeros(size)  # at rest in the well, the tip in touch
+    scale = float(model.length_scale / np.abs(row).max())
+    rate = weight * float(model.omega[0])
+    amplitude, omega, stiffness = e.amplitude, e.drive, CONTACT.stiffness
     gamma = layout.gamma
     q, r = work, work + size
     squared, damping, g, contact = layout.omega_squared, layout.damping, layout.g, layout.contact
@@ -81,8 +84,8 @@ def compiled_system(case: Case, weight: float) -> CompiledSystem:
         gq, qr = tension_rows(memory, blocks, layout, q, r)
         along_g, along_r = tension_factors(gamma, gq, qr)
         sine, _ = sincos(omega * t)
-        depth = offset + amplitude * sine - dot(memory, size, contact, q)
-        force = contact_force(stiffness, depth)
+        depth = amplitude * sine - dot(memory, size, contact, q)
+        force = stiffness * depth * depth**0.5 if depth > 0.0 else 0.0
         for i in range(size):
             du[i] = rate * u[size + i]
             pull = along_g * memory[g + i] + along_r * memory[r + i] + force * memory[contact + i]

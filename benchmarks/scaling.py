@@ -17,13 +17,13 @@ from benchmarks.ensemble import ensemble_of, sample
 from benchmarks.report import save, table
 from benchmarks.rhs import aligned
 from benchmarks.timing import measure
-from snapbeam.engines.columns import Counts
 from snapbeam.engines.cpu import driver as cpu_engine
 from snapbeam.engines.cpu.memory import pack
 from snapbeam.engines.cpu.rows import acceleration_rows, tension_rows
 from snapbeam.engines.scalar.composition import COMPOSITIONS
 from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, splat, store
 from snapbeam.engines.scalar.physics import tension_factors
+from snapbeam.engines.structure import structure_of
 from snapbeam.model.modes import BucklingModes
 
 __all__ = ["run"]
@@ -90,10 +90,9 @@ def _modes(count: int, repeats: int) -> dict[str, Any]:
     case = Case(count, 1.21, 0.18)
     plan = case.default_plan()
     ensemble = case.ensemble(plan, 200)
-    nothing = np.empty(0)
-    timing = measure(lambda: cpu_engine.record(ensemble, 0, nothing, 0, False), repeats)
-    counts, _, _ = cpu_engine.record(ensemble, 0, nothing, 0, False)
-    kicks = int(counts[Counts.STEPS]) * COMPOSITIONS[plan.order].flow.size
+    timing = measure(lambda: cpu_engine.run_ensemble(ensemble, 1), repeats)
+    books = cpu_engine.run_ensemble(ensemble, 1)
+    kicks = int(books["steps"][0]) * COMPOSITIONS[plan.order].flow.size
     rank_one, modal = _acceleration_times(count)
     odd, even = (count + 1) // 2, count // 2
     return {
@@ -114,7 +113,7 @@ def _acceleration_times(count: int) -> tuple[float, float]:
     model = model_of(count)
     assert model.beam is not None
     gamma, inertia = model.tension_stiffness, 1.0 / model.beam.mass_per_length
-    packed = pack(model, "below")
+    packed = pack(structure_of(model, "below"))
     layout, blocks = packed.layout, packed.blocks
     size, work = layout.size, layout.work
     memory = aligned(work + 3 * size)

@@ -14,12 +14,13 @@ from benchmarks.cases import Case, model_of
 from benchmarks.report import save, table
 from benchmarks.rhs import aligned
 from benchmarks.timing import measure
-from snapbeam.engines.columns import Numbers
 from snapbeam.engines.cpu import driver as cpu_engine
 from snapbeam.engines.cpu.memory import pack
 from snapbeam.engines.cpu.rows import tension_rows
 from snapbeam.engines.plan import Plan
 from snapbeam.engines.scalar.composition import COMPOSITIONS, TURNS, Composition
+from snapbeam.engines.structure import structure_of
+from snapbeam.runs.samples import joined
 
 __all__ = ["run"]
 
@@ -101,7 +102,7 @@ def _splitting_record(
     COMPOSITIONS[key] = composition
     try:
         ensemble = case.ensemble(plan, 200)
-        timing = measure(lambda: cpu_engine.record(ensemble, 0, np.empty(0), 0, False), repeats)
+        timing = measure(lambda: cpu_engine.run_ensemble(ensemble, 1), repeats)
         error = case.error(case.displacement(plan))
     finally:
         del COMPOSITIONS[key]
@@ -120,16 +121,17 @@ def _ledger(step: float, cycles: int) -> dict[str, float]:
     for point in (_POINT, (1.625, 0.3), (0.7, 0.4)):
         case = Case(32, *point)
         ensemble = case.ensemble(case.default_plan()._replace(step=step), cycles)
-        times = np.linspace(0.0, cycles * case.period, 50 * cycles + 1)
-        _, numbers, outputs = cpu_engine.record(ensemble, 0, times, 0, True)
-        beam, contact, work, dissipated = outputs.values[:, 2:6].T
+        end = float(ensemble.runs["tick"][0] * ensemble.runs["end"][0])
+        times = np.linspace(0.0, end, 50 * cycles + 1)
+        recorded = joined(list(cpu_engine.record(ensemble, times, False)))
+        beam, contact, work, dissipated = recorded.values[:, 2:6].T
         residual = beam + contact + dissipated - work
-        worst = max(worst, float(np.abs(residual - residual[0]).max() / numbers[Numbers.GROSS_WORK]))
+        worst = max(worst, float(np.abs(residual - residual[0]).max() / recorded.books["gross_work"][0]))
     return {"step": step, "residual": worst}
 
 
 def _products() -> dict[str, float]:
-    packed = pack(model_of(32), "below")
+    packed = pack(structure_of(model_of(32), "below"))
     layout, blocks = packed.layout, packed.blocks
     work, size = layout.work, layout.size
     full = np.zeros((2, 16, 16))

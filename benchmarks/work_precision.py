@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from benchmarks.cases import POINTS, Case, stepped
 from benchmarks.charts import work_precision_chart
 from benchmarks.peers import PEERS, methods
@@ -69,8 +67,8 @@ def _snapbeam(case: Case, quick: bool) -> list[dict[str, Any]]:
         plan = stepped(case.default_plan(level), factor)
         ensemble = case.ensemble(plan, _CYCLES)
         timing = measure(
-            lambda ensemble=ensemble: cpu_engine.record(ensemble, 0, np.empty(0), 0, False),
-            3 if quick else 15,
+            lambda ensemble=ensemble: cpu_engine.run_ensemble(ensemble, 1),
+            1 if quick else 5,
         )
         setting = f"{1e6 * plan.step:.3g} us" + (", default" if factor == 1.0 else "")
         error = case.error(case.displacement(plan))
@@ -79,7 +77,7 @@ def _snapbeam(case: Case, quick: bool) -> list[dict[str, Any]]:
 
 
 def _peer(case: Case, found: Sequence[Any], quick: bool) -> list[dict[str, Any]]:
-    cycles, repeats = (5, 1) if quick else (20, 3)
+    cycles, repeats = (5, 1) if quick else (_CYCLES, 5)
     every = 2 if quick else 1
     records = []
     for method in found:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.util
 import logging
 import os
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
@@ -48,7 +50,16 @@ napoleon_google_docstring = False
 napoleon_use_param = False  # types are words: "array of shape (N,)" names no class
 napoleon_use_rtype = False
 
+highlight_language = "text"
+# MathJax from a package, beside the pages: formulas are set without a network too.
+_MATHJAX = importlib.util.find_spec("sphinx-mathjax-offline")
+assert _MATHJAX is not None and _MATHJAX.origin is not None
+mathjax_path = "mathjax.js"
+
 html_theme = "furo"
+html_static_path = ["_static", "_generated/static"]
+html_css_files = ["wide.css"]
+html_theme_options = {"source_repository": "", "navigation_with_keys": True}
 html_title = f"snapbeam {version}"
 
 sphinx_gallery_conf = {
@@ -98,6 +109,14 @@ def draw_paper(app: Any) -> None:
             figure = recipe(results=results)
             save_figure(figure, folder / f"{name}{suffix}")
             plt.close(figure)
+
+
+_HERE = Path(__file__).parent
+(_HERE / "_generated" / "static").mkdir(parents=True, exist_ok=True)
+shutil.copyfile(
+    Path(_MATHJAX.origin).parent / "static" / "mathjax" / "tex-svg.js",
+    _HERE / "_generated" / "static" / "mathjax.js",
+)
 
 
 def setup(app: Any) -> None:

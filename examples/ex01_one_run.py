@@ -11,7 +11,6 @@ rest in its lower well and moves as
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.figures import plot_run
 
 system = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=32, damping_ratio=paper.DAMPING_RATIO),
@@ -30,7 +29,7 @@ print(f"{run.outcome.impacts} impacts, the hardest {run.outcome.peak_force:.2f} 
 # %%
 # The waveform, and the hardest impact closer:
 
-figure = plot_run(run.dataset, window=(0.0, 20.0))
+ax = run.plot(window=(0.0, 20.0))
 
 # %%
 # The law of contact dissipates nothing, so the work of the shaker is in the beam, in the contact or lost to

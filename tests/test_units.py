@@ -74,7 +74,7 @@ ASKED = sb.Integration(cycles=2)
 
 def test_runs(tmp_path) -> None:
     run = sb.simulate(SYSTEM, ASKED)
-    assert check(run.dataset) == len(SCHEMA) - 1  # all but valid
+    assert check(run.dataset) == len(SCHEMA) - 3  # all but valid, and what only a striker with a mass has
     assert check(run.impacts) == 5
     run.save(tmp_path / "run.nc")
     assert check(xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="outcome")) == len(STATISTICS)

@@ -28,6 +28,10 @@ class Method(NamedTuple):
     name: str
     tolerances: tuple[float, ...]
     prepare: Callable[[Case, float], Solver]
+    options: str = ""
+    """How it is used, as tables print it."""
+    batch: Callable[[list[Case], float], Solver] | None = None
+    """Many cases at once, if it can: times and ends then have a row, or an entry, for each."""
 
 
 PEERS = ("scipy", "numbalsoda", "heyoka", "diffrax")

@@ -47,6 +47,6 @@ def _prepare(solver: Any, weight: float, case: Case, tolerance: float) -> Solver
 
 
 METHODS = (
-    Method("numbalsoda dop853", (1e-4, 1e-6, 1e-8, 1e-10), partial(_prepare, dop853, 10.0)),
-    Method("numbalsoda lsoda", (1e-8, 1e-9, 1e-10, 1e-12), partial(_prepare, lsoda, 400.0)),
+    Method("numbalsoda dop853", (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10), partial(_prepare, dop853, 10.0)),
+    Method("numbalsoda lsoda", (1e-7, 1e-8, 1e-9, 1e-10, 1e-12), partial(_prepare, lsoda, 400.0)),
 )

@@ -59,7 +59,7 @@ def _prepare(solver: str, weight: float, case: Case, tolerance: float) -> Solver
 
 
 METHODS = (
-    Method("scipy DOP853", (1e-4, 1e-6, 1e-8, 1e-10), partial(_prepare, "DOP853", 10.0)),
-    Method("scipy LSODA", (1e-8, 1e-9, 1e-10, 1e-12), partial(_prepare, "LSODA", 400.0)),
-    Method("scipy odeint", (1e-8, 1e-9, 1e-10, 1e-12), partial(_prepare, "odeint", 400.0)),
+    Method("scipy DOP853", (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10), partial(_prepare, "DOP853", 10.0)),
+    Method("scipy LSODA", (1e-7, 1e-8, 1e-9, 1e-10, 1e-12), partial(_prepare, "LSODA", 400.0)),
+    Method("scipy odeint", (1e-7, 1e-8, 1e-9, 1e-10, 1e-12), partial(_prepare, "odeint", 400.0)),
 )

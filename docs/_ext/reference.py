@@ -51,11 +51,12 @@ def parameter_tables() -> str:
             unit = "" if row.quantity.unit == "1" else row.quantity.unit
             symbol = f"${row.quantity.symbol}$" if row.quantity.symbol else ""
             limits = row.limits.replace("inf", "∞")
-            rows.append((
-                f"`{name.partition('.')[2]}`", row.quantity.words, symbol, unit, limits, shown, f"`{row.short}`",
-                "run" if row.is_run else "structure",
-            ))  # fmt: skip
-        header = ("key", "meaning", "symbol", "unit", "allowed", "default", "in datasets", "scope")
+            key = name.partition(".")[2]
+            meaning = row.quantity.words + (f", {symbol}" if symbol else "")
+            meaning += f"; in datasets `{row.short}`" if row.short != key else ""
+            scope = "run" if row.is_run else "structure"
+            rows.append((f"`{key}`", meaning, unit, limits, shown or "–", scope))
+        header = ("key", "meaning", "unit", "allowed", "default", "scope")
         parts.append(f"## [{section}]\n\n{words}\n\n" + _table(header, rows))
     return "\n".join(parts)
 
@@ -132,8 +133,14 @@ def _paragraphs(text: str) -> list[str]:
 
 def write_pages(folder: Path) -> None:
     """Write the generated parts into a folder; a file that has not changed is left alone."""
-    folder.mkdir(exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
     pages = {"parameters": parameter_tables, "variables": variable_tables, "command_line": command_line}
+    bench = folder.parent / "images" / "rivals.inc"
+    pages["rivals"] = lambda: (
+        bench.read_text(encoding="utf-8")
+        if bench.exists()
+        else "The comparison has not been run for this version: `python -m benchmarks rivals -o docs/images`.\n"
+    )
     for name, make in pages.items():
         target, text = folder / f"{name}.md", make()
         if not target.exists() or target.read_text(encoding="utf-8") != text:

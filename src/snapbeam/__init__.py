@@ -4,14 +4,53 @@ A clamped-clamped beam pressed past buckling is struck by a shaker; its reduced 
 is classed, and sweeps show where it snaps.
 """
 
+from typing import Any
+
 from snapbeam.core.codes import ResponseClass, RunStatus, classify
 from snapbeam.core.findings import Finding, PlausibilityWarning
+from snapbeam.core.netcdf import write_netcdf
 from snapbeam.core.provenance import __version__
+from snapbeam.core.showing import register_accessor
 from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.dynamics.attractors import Attractor, Attractors, attractors
+from snapbeam.dynamics.basins import basins
+from snapbeam.dynamics.bifurcation import bifurcation_diagram
+from snapbeam.dynamics.edge import EdgeState, edge_state
+from snapbeam.dynamics.lifetimes.lifetime_map import lifetime_map
+from snapbeam.dynamics.lifetimes.survival import Survival
+from snapbeam.dynamics.lyapunov import lyapunov, separation_exponent
+from snapbeam.dynamics.measures import basin_entropy, integrity, uncertainty_exponent
+from snapbeam.dynamics.orbits.branch import Branch, Event
+from snapbeam.dynamics.orbits.continuation import continue_orbit, switch_branch
+from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit, periodic_orbit
+from snapbeam.dynamics.sections import poincare
+from snapbeam.dynamics.starts import Starts
 from snapbeam.engines.outcomes import STATISTICS, Statistic
 from snapbeam.model.beam import Beam
-from snapbeam.model.contact import ContactLaw, HertzContact, Restitution
-from snapbeam.model.drive import Drive, Recorded, Sine
+from snapbeam.model.contact import (
+    ContactLaw,
+    HertzContact,
+    HuntCrossley,
+    KelvinVoigt,
+    PowerLaw,
+    Restitution,
+    bending_stress,
+    hertz_stress,
+)
+from snapbeam.model.drive import (
+    AccelerationSine,
+    Burst,
+    Chirp,
+    DisplacementSine,
+    Drive,
+    Flight,
+    HalfSine,
+    Noise,
+    Recorded,
+    Sine,
+    Still,
+    TwoSines,
+)
 from snapbeam.model.frequencies import exact_natural_freq
 from snapbeam.model.integration import Integration
 from snapbeam.model.quasi_static import quasi_static_threshold
@@ -27,27 +66,47 @@ from snapbeam.runs.simulate import simulate
 from snapbeam.runs.tolerance import Accuracy, conditioning
 from snapbeam.sweeps.doors import long_map, response_map, threshold_curve
 from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.reading import read_store
 from snapbeam.sweeps.replicas import Replicas
 from snapbeam.sweeps.stored import Keeping, Tally
 from snapbeam.sweeps.sweep import sweep
 from snapbeam.sweeps.threshold import threshold
 
 Response = Outcome
+register_accessor()
+del register_accessor
 
 __all__ = [
     "STATISTICS",
+    "AccelerationSine",
     "Accuracy",
+    "Attractor",
+    "Attractors",
     "Beam",
+    "Branch",
+    "Burst",
+    "Chirp",
     "ContactLaw",
+    "DisplacementSine",
     "Drive",
+    "EdgeState",
+    "Event",
     "Finding",
+    "Flight",
+    "HalfSine",
     "HertzContact",
+    "HuntCrossley",
     "InputError",
     "InputTypeError",
     "Integration",
     "Keeping",
+    "KelvinVoigt",
+    "NoOrbit",
+    "Noise",
+    "Orbit",
     "Outcome",
     "PlausibilityWarning",
+    "PowerLaw",
     "Recorded",
     "RecordedDrive",
     "ReducedModel",
@@ -59,23 +118,55 @@ __all__ = [
     "RunStatus",
     "Shaker",
     "Sine",
+    "Starts",
     "State",
     "Statistic",
+    "Still",
     "StoreError",
     "Striker",
+    "Survival",
     "System",
     "Tally",
+    "TwoSines",
     "__version__",
     "advance",
+    "attractors",
+    "basin_entropy",
+    "basins",
+    "bending_stress",
+    "bifurcation_diagram",
     "classify",
     "conditioning",
+    "continue_orbit",
+    "edge_state",
     "exact_natural_freq",
+    "explore",
+    "hertz_stress",
+    "integrity",
+    "lifetime_map",
     "load_run",
     "long_map",
+    "lyapunov",
+    "periodic_orbit",
+    "poincare",
     "quasi_static_threshold",
+    "read_store",
     "response_map",
+    "separation_exponent",
     "simulate",
     "sweep",
+    "switch_branch",
     "threshold",
     "threshold_curve",
+    "uncertainty_exponent",
+    "write_netcdf",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """The explorer, when it is first asked for: the package does without what draws pages."""
+    if name == "explore":
+        from importlib import import_module
+
+        return import_module("snapbeam.explorer").explore
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

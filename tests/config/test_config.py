@@ -104,7 +104,10 @@ REFUSALS = [
         {"beam": {"buckling_level": 0.0}},
         "[beam] buckling_level = 0.0: must be a finite number greater than 0 m",
     ),
-    ({"contact": {"law": "spring"}}, "[contact] law = 'spring': must be one of 'hertz', 'restitution'"),
+    (
+        {"contact": {"law": "spring"}},
+        "[contact] law = 'spring': must be one of 'hertz', 'hunt_crossley'",
+    ),
     ({"contact": {"law": "restitution"}}, "[contact] coefficient: missing for law = 'restitution'"),
     (
         {"contact": {"coefficient": 0.5}},
@@ -114,7 +117,7 @@ REFUSALS = [
         {"contact": {"coefficient": 0.5, "stiffness": 1e8}},
         "[contact] give stiffness, of Hertz's law, or coefficient, of Newton's, not both",
     ),
-    ({"drive": {"kind": "triangle"}}, "[drive] kind = 'triangle': must be one of 'recorded', 'sine'"),
+    ({"drive": {"kind": "triangle"}}, "[drive] kind = 'triangle': must be one of 'burst', 'chirp'"),
     (
         {"drive": {"kind": "recorded"}},
         "[drive] displacement, velocity, sampling_freq, frequency: missing for kind = 'recorded'",

@@ -162,15 +162,33 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
     """Whatever is of scope run may differ inside one ensemble; the engines take it as a column."""
     from snapbeam.engines.assemble import run_columns
 
-    laws = {"stiffness": paper.CONTACT, "coefficient": sb.Restitution(0.5)}
+    laws = {
+        "restitution": sb.Restitution(0.5),
+        "hunt_crossley": sb.HuntCrossley(4e8, 1.0),
+        "kelvin_voigt": sb.KelvinVoigt(1e6, 1.0),
+        "power": sb.PowerLaw(1.0, 2.0),
+    }
+    pair = {"frequency_ratio": 1.0, "velocity_amplitude": 0.1}
+    drives = {
+        "burst": sb.Burst(**pair, length=5.0),
+        "chirp": sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_length=20.0),
+        "half_sine": sb.HalfSine(displacement_amplitude=0.1, duration=0.5),
+        "noise": sb.Noise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
+        "two_sines": sb.TwoSines(**pair, second_ratio=2.0, second_amplitude=0.1),
+        "flight": sb.Flight(speed=0.4),
+        "displacement_sine": sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=0.1),
+        "acceleration_sine": sb.AccelerationSine(frequency_ratio=1.0, acceleration_amplitude=0.1),
+    }
     for name, row in TABLE.items():
         if not row.is_run:
             continue
-        law = laws.get(name.partition(".")[2], paper.CONTACT)
+        kind = next(
+            (each for each in row.kinds if each in ("hertz", "sine")), row.kinds[0] if row.kinds else ""
+        )
         system = sb.System(
             sb.ReducedModel.from_beam(paper.BEAM, modes=1),
-            law,
-            sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1),
+            laws.get(kind, paper.CONTACT),
+            sb.Striker(drive=drives.get(kind, sb.Sine(**pair))),
         )
         columns = run_columns(system, {name: np.array([0.1, 0.2, 0.3])})
         assert columns[name].tolist() == [0.1, 0.2, 0.3]

@@ -85,7 +85,11 @@ class Bouncer:
                 y = np.array([self.tip(t)[0] / self.phi, y[1] + (1.0 + self.e) * closing / self.phi])
             away = self.phi * y[1] - self.tip(t)[1]
             pressed = self.pressed(t)
-            over = self.e < 1.0 and pressed > 0.0 and 2.0 * away / (pressed * (1.0 - self.e)) < _SOON * self.period
+            over = (
+                self.e < 1.0
+                and pressed > 0.0
+                and 2.0 * away / (pressed * (1.0 - self.e)) < _SOON * self.period
+            )
             if over:
                 until = self.released(t, end)
                 inside = (times >= t) & (times <= until)

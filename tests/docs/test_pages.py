@@ -68,7 +68,11 @@ def test_code_runs(name, tmp_path, monkeypatch, capsys):
 def test_commands_exist_with_their_options(path):
     for words in commands(path):
         assert words[1] in COMMANDS, words
-        known = {flag for each in COMMANDS[words[1]].params for flag in (*each.opts, *each.secondary_opts)}
+        command = COMMANDS[words[1]]
+        if hasattr(command, "commands"):  # a group of verbs
+            assert words[2] in command.commands, words
+            command = command.commands[words[2]]
+        known = {flag for each in command.params for flag in (*each.opts, *each.secondary_opts)}
         for word in words[2:]:
             if word.startswith("-") and not re.match(r"-?-?[\d.]", word):
                 assert word.partition("=")[0] in known, f"{word} in {' '.join(words)}"
@@ -84,7 +88,7 @@ def test_interface_page_is_complete(module):
     if f".. automodule:: {module}\n   :members:\n" in text:
         assert sorted(set(re.findall(r":exclude-members: (.*)", text))) == ["Finding, Severity"]  # above them
         return  # Sphinx lists every name of its __all__
-    named = set(re.findall(r"::(?: |[\w ]*snapbeam\.)?([\w.]+)$", text, re.MULTILINE))
+    named = set(re.findall(r"::\s*(?:snapbeam\.)?([\w.]+)$", text, re.MULTILINE))
     missing = [
         name for name in import_module(module).__all__ if name not in named and not name.startswith("_")
     ]

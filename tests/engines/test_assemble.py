@@ -26,7 +26,8 @@ def test_structure_is_the_model_about_its_well(side: str) -> None:
     rng = np.random.default_rng(0)
     alpha = 1e-3 * rng.normal(size=(4, 5))
     velocity = rng.normal(size=(4, 5))
-    q, p = structure.to_modal(alpha, velocity)
+    both = [structure.to_modal(*each) for each in zip(alpha, velocity, strict=True)]
+    q, p = (np.array(part) for part in zip(*both, strict=True))
     np.testing.assert_allclose(structure.amplitudes(q), alpha, rtol=0.0, atol=1e-16)
     np.testing.assert_allclose(structure.velocities(p), velocity, rtol=1e-10)
     gq, r = q @ structure.well, q @ structure.coupling

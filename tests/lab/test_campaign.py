@@ -84,7 +84,7 @@ def test_twelve_tests_three_of_them_spoiled_interrupted_and_resumed(tmp_path):
     folder, output = tmp_path / "tests", tmp_path / "results"
     folder.mkdir()
     truth = bench.write_campaign(folder)
-    bench.coarse_map().dataset.to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
+    bench.coarse_map().to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
 
     def interrupt(done, total, result):
         assert total == len(truth)

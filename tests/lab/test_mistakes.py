@@ -45,6 +45,28 @@ def test_the_table_of_the_documentation_has_every_case():
 
 @pytest.mark.slow
 def test_the_table_of_the_documentation_is_what_comes_of_the_cases():
-    numbers = re.compile(r"[-+]?\d+(\.\d+)?")  # the last digits are the machine's own
+    numbers = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]\d+)?")  # their last digits are the machine's own
     written = table.FILE.read_text(encoding="utf-8")
     assert numbers.sub("#", table.text(table.measured())) == numbers.sub("#", written)
+
+
+def flags():
+    """Every option of every command of the laboratory."""
+    from typer.main import get_command
+
+    from snapbeam.cli.app import app
+
+    commands = get_command(app).commands
+    asked = (
+        commands[name] for name in ("track", "vibrometer", "identify", "calibrate", "compare", "campaign")
+    )
+    return {flag for one in asked for option in one.params for flag in (*option.opts, *option.secondary_opts)}
+
+
+@pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.code)
+def test_a_finding_names_its_way_out_as_python_and_as_the_command_line_do(kind):
+    named = set(re.findall(r"--[a-z]+(?:-[a-z]+)*", kind.says))
+    assert named <= flags(), named - flags()
+    for option in kind.options:
+        assert re.search(rf"\b{option}\b", kind.says), option
+        assert named, "an argument without the command's flag"

@@ -82,12 +82,17 @@ def test_pixels_on_the_higher_side_are_shifted_down(tmp_path):
 @pytest.mark.skipif(
     not (REAL / "beam.cihx").exists(), reason="the public recording is not beside the project"
 )
-def test_a_real_recording_with_its_true_time_step():
+def test_a_real_recording_that_contradicts_itself_asks_for_its_frame_rate():
     with pytest.raises(InputError, match="pixel size is not in the file"):
-        open_recording(REAL / "beam.cihx")
-    with open_recording(REAL / "beam.cihx", pixel_size=1e-4) as recording:
+        open_recording(REAL / "beam.cihx", frame_rate=20.0)
+    with pytest.raises(
+        InputError, match=r"contradicts itself: every 2500th of 400.*frame_rate \(--frame-rate\)"
+    ):
+        open_recording(REAL / "beam.cihx", pixel_size=1e-4)
+    with open_recording(REAL / "beam.cihx", pixel_size=1e-4, frame_rate=20.0) as recording:
         assert len(recording) == 4 and recording.shape == (80, 1024)
         assert recording.time_step == pytest.approx(2500 / 50_000)
+        assert {finding.code for finding in recording.findings} == {"recording.contradiction"}
         assert recording.exposure == pytest.approx(5e-6)
         assert recording.max_value == 4095
         pixels = np.fromfile(REAL / "beam.mraw", dtype="<u2").reshape(4, 80, 1024)

@@ -7,9 +7,11 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
 from snapbeam.core.validate import InputError, InputTypeError
-from snapbeam.model.contact import HertzContact, Restitution
+from snapbeam.model.contact import HertzContact, HuntCrossley, KelvinVoigt, PowerLaw, Restitution
+from snapbeam.model.contact.loss import loss_number, restitution_of_loss
 
 
 def test_from_materials() -> None:
@@ -57,3 +59,62 @@ def test_refusals() -> None:
         HertzContact.from_materials(1e-3, 1e9, (0.3, 0.3))  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"young_modulus = .*: must be two numbers"):
         HertzContact.from_materials(1e-3, (1e9,), (0.3, 0.3))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("e", [0.999999, 0.9991, 0.9989, 0.9, 0.5, 0.2, 0.01])
+def test_exact_restitution(e) -> None:
+    """The approach and the departure take the same penetration: the integrals of v dv/(1 + chi v) are equal."""
+    d = loss_number(e)
+    assert restitution_of_loss(d) == pytest.approx(e, abs=1e-12)
+    if 0.1 < e < 0.99:
+        approach = quad(lambda v: v / (1.0 + d * v), 0.0, 1.0, epsabs=0.0, epsrel=1e-12)[0]
+        departure = quad(lambda v: v / (1.0 - d * v), 0.0, e, epsabs=0.0, epsrel=1e-12, limit=500)[0]
+        assert departure == pytest.approx(approach, rel=1e-9)
+
+
+def test_presets_say_what_they_give() -> None:
+    """For e = 0.5 the published shortcuts give other restitutions; the exact one gives it at its speed alone."""
+    given = {"hunt-crossley": 0.6630, "lankarani-nikravesh": 0.7252, "flores": 0.4704, "gonthier": 0.4877}
+    for name, found in given.items():
+        law = HuntCrossley.from_restitution(4e8, 0.5, 0.05, name)
+        assert law.restitution(0.05) == pytest.approx(found, abs=1e-4)
+    law = HuntCrossley.from_restitution(4e8, 0.5, 0.05)
+    assert law.restitution(0.05) == pytest.approx(0.5, abs=1e-12)
+    assert law.restitution(0.1) < 0.5 < law.restitution(0.01)
+    assert law.speed_for(0.5) == pytest.approx(0.05, rel=1e-12)
+    assert HuntCrossley(4e8, 0.0).restitution(1.0) == 1.0
+    with pytest.raises(InputError, match="preset = 'kelvin'"):
+        HuntCrossley.from_restitution(4e8, 0.5, 0.05, "kelvin")
+    with pytest.raises(InputError, match=r"restitution = 0.0: must be a number in \(0, 1\]"):
+        HuntCrossley.from_restitution(4e8, 0.0, 0.05)
+
+
+@pytest.mark.parametrize("e", [1.0, 0.9, 0.5, math.exp(-2.0), 0.05, 0.01])
+def test_kelvin_voigt_restitution(e) -> None:
+    law, mass = KelvinVoigt.from_restitution(1e6, e, 2e-3), 2e-3
+    assert law.restitution(mass) == pytest.approx(e, abs=1e-12)
+    zeta = law.damper / (2.0 * math.sqrt(1e6 * mass))
+    # the force k d + c d' of the free mass vanishes where its speed is e times that of arrival
+    rate = np.roots([1.0, 2.0 * zeta, 1.0]).astype(complex)
+    if abs(rate[0] - rate[1]) > 1e-3 and e < 1.0:
+
+        def moved(t):
+            a = 1.0 / (rate[0] - rate[1])
+            return (a * (np.exp(rate[0] * t) - np.exp(rate[1] * t))).real
+
+        def speed(t):
+            a = 1.0 / (rate[0] - rate[1])
+            return (a * (rate[0] * np.exp(rate[0] * t) - rate[1] * np.exp(rate[1] * t))).real
+
+        end = brentq(lambda t: moved(t) + 2.0 * zeta * speed(t), 1e-3, 3.2 if zeta < 1.0 else 30.0)
+        assert -speed(end) == pytest.approx(e, abs=1e-9)
+
+
+def test_power_law_is_hertz_at_three_halves() -> None:
+    power, hertz = PowerLaw.from_stiffness(4e8, 1.5), HertzContact(4e8)
+    assert power.max_penetration(2e-3, 0.1) == pytest.approx(hertz.max_penetration(2e-3, 0.1), rel=1e-12)
+    assert power.impact_duration(2e-3, 0.1) == pytest.approx(hertz.impact_duration(2e-3, 0.1), rel=1e-12)
+    for name in ("force", "energy", "slope"):
+        assert getattr(power, name)(power, 3e-6) == pytest.approx(
+            getattr(hertz, name)(hertz, 3e-6), rel=1e-12
+        )

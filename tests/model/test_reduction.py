@@ -99,9 +99,17 @@ def test_shape_at() -> None:
     np.testing.assert_array_equal(model.shape_at(0.5), model.center_shape)
     assert (model.center_shape[1::2] == 0.0).all()
     assert model.center_shape @ model.equilibrium == pytest.approx(-BEAM.buckling_level, rel=1e-14)
-    for bad in (0.0, 1.0, -0.2, math.nan):
-        with pytest.raises(InputError, match=r"location = .*: must be a number in \(0, 1\)"):
+    for bad in (1.1, -0.2, math.nan):
+        with pytest.raises(InputError, match=r"location = .*: must be a number in \[0, 1\]"):
             model.shape_at(bad)
+    np.testing.assert_allclose(model.shape_at([0.0, 1.0]), 0.0, atol=1e-12)
+    along = model.shape_at(np.array([[0.1, 0.2, LOCATION], [0.5, 0.7, 0.9]]))
+    assert along.shape == (2, 3, 32)
+    np.testing.assert_allclose(along[0, 2], model.shape_at(LOCATION), rtol=1e-12)
+    with pytest.raises(InputError, match=r"location from 0.5 to 1.5: must lie in \[0, 1\]"):
+        model.shape_at([0.5, 1.5])
+    with pytest.raises(InputError, match=r"location = 0.*: must be a number in \(0, 1\)"):
+        model.contact_mass(0.0)
 
 
 def test_contact_mass_falls_as_modes_are_added() -> None:

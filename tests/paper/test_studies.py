@@ -24,7 +24,16 @@ def results():
     return paper.Results()
 
 
-STUDIES = ("low_frequency", "resonance", "waveforms", "transients", "windows", "disturbances", "sensitivity")
+STUDIES = (
+    "low_frequency",
+    "resonance",
+    "waveforms",
+    "transients",
+    "windows",
+    "disturbances",
+    "sensitivity",
+    "lifetimes",
+)
 
 
 @pytest.mark.parametrize("name", STUDIES)

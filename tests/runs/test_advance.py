@@ -11,6 +11,7 @@ import pytest
 import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.engines.plan import plan_steps
 
 REGULAR = {1: (1.6, 0.03), 8: (1.4, 0.03), 32: (3.5, 0.06)}
 """Omega and V of well-conditioned motions with impacts, by the number of modes."""
@@ -474,7 +475,10 @@ def test_what_cannot_be_reached_is_nan_and_says_why() -> None:
     assert_equal(found[2], sb.advance(SYSTEM, batch[2], 2))
     with pytest.raises(InputError, match=r"state amplitude\[1, 0\] = .*nan.*: must be finite"):
         sb.advance(SYSTEM, found)
-    limited = sb.advance(SYSTEM, periods=40, integration=sb.Integration(max_steps=500), every=True)
+    # as many steps as forty periods of flight would take: what contacts take beyond is too much
+    plan = plan_steps(model, SYSTEM.contact)
+    flight = 40 * math.ceil(2.0 * math.pi / (1.21 * SYSTEM.scale.omega * plan.step))
+    limited = sb.advance(SYSTEM, periods=40, integration=sb.Integration(max_steps=flight), every=True)
     reached = np.isfinite(limited.amplitude).all(axis=-1)
     assert limited.passed["status"].tolist() == [0 if each else sb.RunStatus.STEP_LIMIT for each in reached]
     assert limited[39].passed["status"] == sb.RunStatus.STEP_LIMIT

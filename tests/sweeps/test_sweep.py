@@ -402,7 +402,7 @@ def test_parameters_that_are_only_in_order_together(system) -> None:
         (
             lambda s: sb.sweep(s, {"location": [0.3]}, progress=3),
             InputTypeError,
-            "progress = 3: must be callable",
+            "progress = 3: must be True or callable",
         ),
     ],
 )

@@ -9,6 +9,9 @@ import typer
 from snapbeam.cli.calibrate import calibrate
 from snapbeam.cli.campaign import campaign
 from snapbeam.cli.compare import compare
+from snapbeam.cli.draw import draw
+from snapbeam.cli.dynamics import dynamics
+from snapbeam.cli.explore import explore
 from snapbeam.cli.frequencies import frequencies
 from snapbeam.cli.identify import identify
 from snapbeam.cli.info import info
@@ -35,8 +38,11 @@ app = typer.Typer(
 app.command("map")(compute_map)
 app.command("threshold")(threshold)
 app.command("simulate")(simulate)
+app.add_typer(dynamics, name="dynamics")
 app.command("frequencies")(frequencies)
 app.command("plot")(plot)
+app.command("explore")(explore)
+app.command("draw")(draw)
 app.command("paper")(paper)
 app.command("track")(track)
 app.command("vibrometer")(vibrometer)

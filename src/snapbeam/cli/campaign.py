@@ -39,7 +39,7 @@ def campaign(
         ),
     ] = None,
     cycles: Annotated[
-        int | None, opt.number_option("Cycles that the response class is asked for (200).", _TESTS)
+        int | None, opt.count_option("Cycles that the response class is asked for (200).", _TESTS)
     ] = None,
     buckling_level: Annotated[float | None, opt.number_option("b, m.", _TESTS)] = None,
     location: Annotated[float | None, opt.number_option("x_s, location of the contact.", _TESTS)] = None,

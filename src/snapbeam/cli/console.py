@@ -194,7 +194,11 @@ def door(command: Callable[_P, _R]) -> Callable[_P, _R]:
 def _flags(parameter: inspect.Parameter) -> tuple[str, ...]:
     """The names that a parameter has on the command line, where they were given."""
     options = getattr(parameter.annotation, "__metadata__", ())
-    return tuple(flag for each in options for flag in getattr(each, "param_decls", None) or ())
+    # typer takes the first name for a default until it makes the command
+    named = (
+        (getattr(each, "default", None), *(getattr(each, "param_decls", None) or ())) for each in options
+    )
+    return tuple(flag for names in named for flag in names if isinstance(flag, str) and flag.startswith("-"))
 
 
 def _show_warning(message: Warning | str, category: type[Warning], *_: object) -> None:

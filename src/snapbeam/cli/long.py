@@ -207,8 +207,12 @@ class LongReport:
             return
         from snapbeam.core.provenance import created_now
 
-        with self._log.open("a", encoding="utf-8") as stream:
-            stream.write(f"{created_now()}  {text}\n")
+        try:
+            with self._log.open("a", encoding="utf-8") as stream:
+                stream.write(f"{created_now()}  {text}\n")
+        except OSError as error:  # no reason to give up what is computed
+            where, self._log = self._log, None
+            self.note(f"log {str(where)!r}: cannot be written any more, {error.strerror or error}")
 
 
 @contextmanager

@@ -21,8 +21,9 @@ BEAM = ("beam.length", "beam.thickness", "beam.width", "beam.density", "beam.you
         "beam.axial_load")  # fmt: skip
 MODEL = ("model.modes", "model.damping_ratio", "model.reference_freq")
 CONTACT = ("contact.stiffness", "contact.radius", "contact.young_modulus", "contact.poisson_ratio",
-           "contact.coefficient")  # fmt: skip
-STRIKER = ("striker.location", "striker.location_m", "striker.side", "striker.gap")
+           "contact.coefficient", "contact.loss", "contact.restitution", "contact.speed")  # fmt: skip
+STRIKER = ("striker.location", "striker.location_m", "striker.side", "striker.gap", "striker.mass", "striker.spring",
+           "striker.damper")  # fmt: skip
 DRIVE = (
     "drive.frequency_ratio",
     "drive.frequency_hz",
@@ -47,15 +48,24 @@ _OPTIONS = {
     "contact.young_modulus": "--contact-young-modulus",
     "contact.poisson_ratio": "--contact-poisson-ratio",
     "contact.coefficient": "--restitution-coefficient",
+    "contact.loss": "--contact-loss",
+    "contact.restitution": "--contact-restitution",
+    "contact.speed": "--restitution-speed",
     "drive.phase": "--drive-phase",
     "drive.velocity_m_s": "--velocity",
     "striker.location_m": "--location-m",
+    "striker.mass": "--striker-mass",
+    "striker.spring": "--striker-spring",
+    "striker.damper": "--striker-damper",
 }
 _WORDS = {
     "contact.radius": "radius of the sphere, with the two next ones in place of a stiffness, m",
     "contact.young_modulus": "Young's moduli of sphere and beam, Pa: E1,E2",
     "contact.poisson_ratio": "Poisson ratios of sphere and beam: nu1,nu2",
     "contact.coefficient": "coefficient of restitution, for one mode, in place of Hertz's law",
+    "contact.loss": "loss chi of the contact, s/m: Hunt and Crossley's law",
+    "contact.restitution": "share of its speed that a free mass keeps, with the next one in place of a loss",
+    "contact.speed": "speed at which it keeps that share, m/s",
     "beam.axial_load": "axial load, N, compression positive; instead of --buckling-level",
     "model.reference_freq": "frequency that Omega and V are normalised by, Hz; the model's first by default",
     "model.damping_ratio": "damping ratio of every linear mode, or one for each: zeta1,zeta2,...",

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "check_pictures",
+    "draw_dynamics",
     "draw_map",
     "draw_run",
     "draw_threshold",
@@ -54,19 +55,16 @@ def read_overlay(dots: Path | None, reference_freq: float | None, buckling_level
 
 def write_map(dataset: xr.Dataset, path: Path) -> Path:
     """Write a dataset to a NetCDF file, whole or not at all."""
-    from snapbeam.core.files import atomic_path
+    from snapbeam.core.netcdf import write_netcdf
 
-    with atomic_path(path) as temporary:
-        dataset.to_netcdf(temporary, engine="h5netcdf")
+    write_netcdf(dataset, path)
     return path
 
 
 def _save(drawn: Any, path: Path) -> Path:
     from snapbeam.figures import save_figure
 
-    figure = drawn.get_figure(root=True) if hasattr(drawn, "get_figure") else drawn
-    assert figure is not None
-    return save_figure(figure, path)
+    return save_figure(drawn, path)
 
 
 def draw_map(dataset: xr.Dataset, path: Path, overlay: Any, threshold_line: bool) -> Path:
@@ -97,3 +95,19 @@ def draw_run(dataset: xr.Dataset, path: Path, window: tuple[float, float] | None
     from snapbeam.figures import plot_run
 
     return _save(plot_run(dataset, window), path)
+
+
+def draw_dynamics(dataset: xr.Dataset, path: Path, picture: str) -> Path:
+    """Draw results of dynamics to a picture file."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from snapbeam.figures import dynamics as figures
+
+    if picture == "branch":
+        return _save(figures.plot_diagram(None, branches=[dataset]), path)
+    plots: dict[str, Any] = {
+        "lifetimes": figures.plot_lifetimes, "survival": figures.plot_survival, "diagram": figures.plot_diagram,
+        "exponents": figures.plot_exponents, "section": figures.plot_section, "basins": figures.plot_basins,
+    }  # fmt: skip
+    return _save(plots[picture](dataset), path)

@@ -175,7 +175,8 @@ def track(
     Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
     frame.png --report quality.png
     """
-    from snapbeam.core.files import atomic_path, check_writable
+    from snapbeam.core.files import check_writable
+    from snapbeam.core.netcdf import write_netcdf
     from snapbeam.core.validate import integer
 
     check_writable(output, "output", (".nc",))
@@ -225,8 +226,7 @@ def track(
                 files.append(save_figure(plot_tracking_quality(dataset), report))
         if strict:  # the pictures show what is wrong; the result is not written
             refuse(findings_of(dataset), str(recording))
-        with atomic_path(output) as temporary:
-            dataset.to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(dataset, output)
         files.insert(0, output)
         if video is not None:
             from snapbeam.figures.tracking_video import annotated_video

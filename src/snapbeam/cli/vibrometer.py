@@ -74,8 +74,9 @@ def vibrometer(
 
     Example: snapbeam vibrometer velocity.csv --frequency 100 --plot drive.png --json drive.json
     """
-    from snapbeam.core.files import atomic_path, check_writable
+    from snapbeam.core.files import check_writable
     from snapbeam.core.findings import doubtful, refuse
+    from snapbeam.core.netcdf import write_netcdf
     from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
     from snapbeam.lab.drive.vibrometer import SNR_LIMIT, measure_drive
 
@@ -134,8 +135,7 @@ def vibrometer(
             data, drive_sampling_freq or 1e5, measurement=drive, alignment=alignment, polarity=polarity,
             amplitude_from=amplitude_from,
         )  # fmt: skip
-        with atomic_path(drive_output) as temporary:
-            resampled.to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(resampled, drive_output)
         console.print(f"Written: {file_line(drive_output)}")
     if report is not None:
         lab.write_json(report, summary)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, InputTypeError, axis
+from snapbeam.core.validate import InputError, InputTypeError, axis, finite, shown
 
 __all__ = ["Axis", "parse_axis"]
 
@@ -45,10 +45,13 @@ def parse_axis(name: str, value: float | str | Sequence[float], *, whole: bool =
     if isinstance(value, str):
         return _parse_text(name, value, _WHOLE if whole else _FORMS)
     if isinstance(value, (int, float)) and not isinstance(value, bool):
-        return _finite(name, str(value), float(value))
+        return _finite(name, shown(value), finite(name, value))
     if isinstance(value, bool) or not isinstance(value, (Sequence, np.ndarray)):
-        raise InputTypeError(f"{name} = {value!r}: must be {_FORMS}")
+        raise InputTypeError(f"{name} = {shown(value)}: must be {_FORMS}")
     return axis(name, value, -math.inf, math.inf)
+
+
+_MOST_POINTS = 10_000_000
 
 
 def _parse_text(name: str, text: str, forms: str) -> Axis:
@@ -61,9 +64,11 @@ def _parse_text(name: str, text: str, forms: str) -> Axis:
             raise InputError(f"{name} = {text!r}: the count {parts[2]!r} must be a whole number") from None
         if count < 2 or not start < stop:
             raise InputError(f"{name} = {text!r}: start must be less than stop and count at least 2")
+        if count > _MOST_POINTS:
+            raise InputError(f"{name} = {text!r}: the count must be at most {_MOST_POINTS}")
         return np.linspace(start, stop, count)
     if len(parts) != 1:
-        raise InputError(f"{name} = {text!r}: must be {forms}")
+        raise InputError(f"{name} = {shown(text)}: must be {forms}")
     numbers = [_number(name, text, part, forms) for part in text.split(",")]
     return numbers[0] if len(numbers) == 1 else axis(name, numbers, -math.inf, math.inf)
 
@@ -73,7 +78,7 @@ def _number(name: str, text: str, part: str, forms: str) -> float:
     try:
         value = float(numerator) / float(denominator) if slash else float(part)
     except (ValueError, ZeroDivisionError):
-        raise InputError(f"{name} = {text!r}: must be {forms}") from None
+        raise InputError(f"{name} = {shown(text)}: must be {forms}") from None
     return _finite(name, text, value)
 
 

@@ -10,22 +10,17 @@ from typing import Any
 import numpy as np
 
 from snapbeam.config.axes import parse_axis
+from snapbeam.config.contact import MATERIALS, WANTED
 from snapbeam.config.parameters import Parameter, lookup, parameters
 from snapbeam.config.physical import PHYSICAL, physical_name
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, finite, mapping, shown
 from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
 from snapbeam.model.paper_values import BEAM
 
-__all__ = ["MATERIALS", "SECTIONS", "checked_sections", "contradictions", "parsed_axis", "with_section"]
+__all__ = ["SECTIONS", "checked_sections", "contradictions", "parsed_axis", "with_section"]
 
 SECTIONS = ("beam", "model", "contact", "striker", "drive", "start", "axes", "run")
-MATERIALS = {
-    "radius": ("m", "radius of the sphere", (1e-9, 10.0, "mm")),
-    "young_modulus": ("Pa", "Young's moduli of sphere and beam", None),
-    "poisson_ratio": ("1", "Poisson ratios of sphere and beam", None),
-}
-"""What a Hertzian stiffness may follow from: unit, words and plausible sizes."""
 _OF_MAP = {"frequency_ratio": "drive", "velocity_amplitude": "drive", "location": "striker"}
 """Names that a section [map] of version 0.1 may hold, and the sections they belong to."""
 _SYMBOLS = {
@@ -40,26 +35,27 @@ def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, A
     """What was given, by section and name, and a line for everything that is wrong."""
     lines: list[str] = []
     found: dict[str, dict[str, Any]] = {}
-    for section, name, value, shown in _entries(sections, lines):
+    for section, name, value, named in _entries(sections, lines):
         if section != "axes" and name in found.get(section, {}):
             message = f"{name}: is given in two sections"
         else:
             message = _checked(section, name, value, found)
         if message:
-            lines.append(f"[{shown}] {message}")
+            lines.append(f"[{named}] {message}")
     return found, lines
 
 
 def _entries(sections: Mapping[str, Any], lines: list[str]) -> list[tuple[str, str, Any, str]]:
     """Section, name and value of everything given, and the section it was given in; faults go to *lines*."""
     found = []
+    mapping("sections", sections)
     shaker = sections.get("shaker")
     single = set(shaker) if isinstance(shaker, Mapping) else set()
     for section, values in sections.items():
         if section not in (*SECTIONS, "shaker", "map"):
             lines.append(f"[{section}]: unknown section{_nearest(str(section), list(SECTIONS))}")
         elif not isinstance(values, Mapping):
-            lines.append(f"{section} = {values!r}: must be a section [{section}]")
+            lines.append(f"{section} = {shown(values)}: must be a section [{section}]")
         else:
             for name, value in values.items():
                 if section == "map" and name not in _OF_MAP:
@@ -91,7 +87,7 @@ def _known(section: str, found: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Names that a section may hold."""
     names = [row.name.partition(".")[2] for row in parameters().values() if row.section == section]
     names += [name.partition(".")[2] for name in PHYSICAL if name.startswith(f"{section}.")]
-    return names + {"contact": ["law", *MATERIALS], "drive": ["kind"]}.get(section, [])
+    return names + {"contact": ["law", *MATERIALS, *WANTED], "drive": ["kind"]}.get(section, [])
 
 
 def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any]]) -> str:
@@ -123,17 +119,18 @@ def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
     unit = "" if item.unit == "1" else f" in {item.unit}"
     if item.kind is float and not (name == "damping_ratio" and isinstance(value, (list, np.ndarray))):
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            return f"{name} = {value!r}: must be a number{unit}", None
-        if not math.isfinite(value):
-            return f"{name} = {value!r}: must be a finite number{unit}", None
-        value = float(value)
+            return f"{name} = {shown(value)}: must be a number{unit}", None
+        try:
+            value = finite(name, value)
+        except InputError:
+            return f"{name} = {shown(value)}: must be a finite number{unit}", None
         message = _implausible(row, name, value)
         if message:
             return message, None
     elif item.kind is int and (isinstance(value, bool) or not isinstance(value, int)):
-        return f"{name} = {value!r}: must be a whole number{unit}", None
+        return f"{name} = {shown(value)}: must be a whole number{unit}", None
     elif item.kind is str and not isinstance(value, str):
-        return f"{name} = {value!r}: must be text", None
+        return f"{name} = {shown(value)}: must be text", None
     elif item.kind is object or isinstance(value, (list, np.ndarray)):
         return _array(name, value)
     try:
@@ -149,14 +146,14 @@ def _implausible(row: Parameter, name: str, value: float) -> str:
         return ""
     low, high, meant = item.plausible
     allowed = f"{low:g} to {high:g}{'' if item.unit == '1' else ' ' + item.unit}"
-    return f"{name} = {value!r}: must be {allowed}; is it given in {meant}?"
+    return f"{name} = {shown(value)}: must be {allowed}; is it given in {meant}?"
 
 
 def _array(name: str, value: Any) -> tuple[str, Any]:
     try:
         return "", np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
-        return f"{name} = {value!r}: must be a list of numbers", None
+        return f"{name} = {shown(value)}: must be a list of numbers", None
 
 
 def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
@@ -167,22 +164,23 @@ def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
             return f"{name} = {value!r}: must be one of {', '.join(map(repr, known))}", None
         return "", value
     full = f"{section}.{name}"
-    if full in PHYSICAL or name == "radius":
+    if full in PHYSICAL or name == "radius" or name in WANTED:
         unit = PHYSICAL[full].unit if full in PHYSICAL else "m"
+        unit = WANTED[name][0] if name in WANTED else unit
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            return f"{name} = {value!r}: must be a number in {unit}", None
+            return f"{name} = {shown(value)}: must be a number in {unit}", None
         window = MATERIALS[name][2] if name in MATERIALS else None
         if window and not window[0] <= value <= window[1]:
             return (
-                f"{name} = {value!r}: must be {window[0]:g} to {window[1]:g} m; is it given in {window[2]}?",
+                f"{name} = {shown(value)}: must be {window[0]:g} to {window[1]:g} m; is it given in {window[2]}?",
                 None,
             )
         return "", float(value)
     pair = list(value) if isinstance(value, (list, tuple)) else None
     if pair is None or len(pair) != 2 or not all(isinstance(each, (int, float)) for each in pair):
-        return f"{name} = {value!r}: must be a list of two numbers, of sphere and beam", None
+        return f"{name} = {shown(value)}: must be a list of two numbers, of sphere and beam", None
     if name == "young_modulus" and any(0.0 < each < 1e3 for each in pair):
-        return f"young_modulus = {value!r}: must be in Pa; is it given in GPa?", None
+        return f"young_modulus = {shown(value)}: must be in Pa; is it given in GPa?", None
     return "", [float(each) for each in pair]
 
 

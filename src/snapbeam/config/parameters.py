@@ -14,7 +14,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, shown
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
@@ -139,7 +139,7 @@ def lookup(name: str) -> Parameter:
         If there is none: the message names the nearest.
     """
     if not isinstance(name, str):
-        raise InputError(f"parameter {name!r}: must be a name, such as 'drive.frequency_ratio'")
+        raise InputError(f"parameter {shown(name)}: must be a name, such as 'drive.frequency_ratio'")
     table = parameters()
     if name in table:
         return table[name]

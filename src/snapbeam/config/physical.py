@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from snapbeam.config.parameters import lookup
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, choice, finite_array, instance
 from snapbeam.model.system import System
 
 __all__ = [
@@ -44,6 +43,7 @@ PHYSICAL: dict[str, Physical] = {
 
 def physical_name(name: str) -> str | None:
     """The dotted name of a parameter in its physical unit, by itself or by its last part; None if it is none."""
+    instance("name", name, str, "text")
     found = [full for full in PHYSICAL if name in (full, full.partition(".")[2])]
     return found[0] if found else None
 
@@ -60,9 +60,15 @@ def unit_of(system: System, name: str) -> float:
     return system.model.beam.length
 
 
+def _unit(system: System, name: str) -> float:
+    instance("system", system, System, "a System")
+    return unit_of(system, choice("name", name, tuple(PHYSICAL)))
+
+
 def from_physical(system: System, name: str, value: ArrayLike) -> Any:
     """Ratios from values in the physical unit of *name*."""
-    return np.asarray(value, dtype=np.float64) / unit_of(system, name)
+    unit = _unit(system, name)
+    return finite_array(name, value) / unit
 
 
 def checked_physical(system: System, name: str, value: float, shown: str) -> float:
@@ -86,4 +92,5 @@ def checked_physical(system: System, name: str, value: float, shown: str) -> flo
 
 def to_physical(system: System, name: str, value: ArrayLike) -> Any:
     """Values in the physical unit of *name* from ratios."""
-    return np.asarray(value, dtype=np.float64) * unit_of(system, name)
+    unit = _unit(system, name)
+    return finite_array(name, value) * unit

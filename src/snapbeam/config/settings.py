@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.config.check import MATERIALS, checked_sections, contradictions, parsed_axis, with_section
+from snapbeam.config.check import checked_sections, contradictions, parsed_axis, with_section
+from snapbeam.config.contact import MATERIALS, contact_of, contact_rivals, law_of
 from snapbeam.config.parameters import lookup
 from snapbeam.config.physical import PHYSICAL, checked_physical, physical_name, unit_of
-from snapbeam.core.validate import InputError
-from snapbeam.model.contact import HertzContact
+from snapbeam.core.validate import InputError, instance, mapping
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import parts_from_mapping
 from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
@@ -33,7 +33,7 @@ DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude":
 # What stands for the same thing in a section: giving one set takes the other away.
 _RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
     "beam": [({"buckling_level"}, {"axial_load"})],
-    "contact": [({"stiffness"}, set(MATERIALS)), ({"coefficient"}, {"stiffness", *MATERIALS})],
+    "contact": contact_rivals(),
     "drive": [({"frequency_ratio"}, {"frequency_hz"}), ({"velocity_amplitude"}, {"velocity_m_s"})],
     "striker": [({"location"}, {"location_m"})],
 }
@@ -109,7 +109,11 @@ class Config:
         if not {"buckling_level", "axial_load"} & own.keys():
             beam["buckling_level"] = BEAM.buckling_level
         contact: dict[str, Any] = {}
-        if not self.section("contact"):
+        of_contact = self.section("contact")
+        if (
+            law_of(of_contact) in ("hertz", "hunt_crossley")
+            and not {"stiffness", *MATERIALS} & of_contact.keys()
+        ):
             contact = {"stiffness": CONTACT.stiffness}
         drive = dict(DEFAULT_DRIVE)
         given = self.section("drive")
@@ -138,7 +142,7 @@ class Config:
         sections: dict[str, Any] = {
             name: values | self.section(name) for name, values in self._defaults().items()
         }
-        sections["contact"] = self._contact(sections["contact"])
+        sections["contact"] = contact_of(sections["contact"])
         sections["drive"].setdefault("kind", "sine")
         later = {
             f"{section}.{name}": sections[section].pop(name)
@@ -165,16 +169,6 @@ class Config:
         sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
         found: ReducedModel = parts_from_mapping(sections)["model"]
         return found
-
-    @staticmethod
-    def _contact(values: dict[str, Any]) -> dict[str, Any]:
-        materials = {name: values.pop(name) for name in MATERIALS if name in values}
-        if materials:
-            moduli, ratios = tuple(materials["young_modulus"]), tuple(materials["poisson_ratio"])
-            values["stiffness"] = HertzContact.from_materials(materials["radius"], moduli, ratios).stiffness
-        if "law" not in values:
-            values["law"] = "restitution" if "coefficient" in values else "hertz"
-        return values
 
     @cached_property
     def integration(self) -> Integration:
@@ -264,6 +258,9 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]]) -> Confi
 
     A value takes an axis over the same parameter away.
     """
+    instance("config", config, Config, "a Config")
+    for name, own in mapping("sections", sections).items():
+        mapping(str(name), own)
     merged: dict[str, dict[str, Any]] = {name: dict(values) for name, values in config.given.items()}
     for section, values in sections.items():
         own = {name: value for name, value in values.items() if value is not None}

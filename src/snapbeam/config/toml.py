@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import tomllib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from snapbeam.config.parameters import parameters
 from snapbeam.config.physical import PHYSICAL
 from snapbeam.config.settings import Config, config_from_mapping
 from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, file_path, instance
 
 __all__ = ["config_text", "dump_config", "load_config"]
 
@@ -27,7 +26,7 @@ def load_config(path: str | os.PathLike[str]) -> Config:
     InputError
         If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
     """
-    file = Path(path)
+    file = file_path("config", path)
     try:
         sections = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
@@ -57,6 +56,8 @@ def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "")
 
 def config_text(config: Config, comment: str = "") -> str:
     """What was given, as the text of a parameter file."""
+    instance("config", config, Config, "a Config")
+    instance("comment", comment, str, "text")
     table = parameters()
     lines = [f"# {line}" for line in comment.splitlines()]
     for section, values in config.to_mapping().items():

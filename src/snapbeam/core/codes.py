@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, finite_array
 
-__all__ = ["ResponseClass", "RunStatus", "classify"]
+__all__ = ["ResponseClass", "RunStatus", "class_of", "classify"]
 
 
 class ResponseClass(IntEnum):
@@ -96,13 +97,31 @@ def classify(
     -------
     int8 array of the broadcast shape, values of :class:`ResponseClass`
     """
-    total, last, duration, side = np.broadcast_arrays(
-        np.asarray(crossings), np.asarray(crossings_last_quarter), np.asarray(cycles), np.asarray(final_side)
-    )
+    given = {
+        "crossings": crossings,
+        "crossings_last_quarter": crossings_last_quarter,
+        "cycles": cycles,
+        "final_side": final_side,
+    }
+    arrays = [finite_array(name, value) for name, value in given.items()]
+    try:
+        total, last, duration, side = np.broadcast_arrays(*arrays)
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in zip(given, arrays, strict=True))
+        raise InputError(f"shapes that do not go together: {shapes}") from None
+    if (total % 1.0 != 0.0).any() or (last % 1.0 != 0.0).any():
+        raise InputError("crossings: must be whole numbers")
+    if (np.abs(side) != 1.0).any():
+        raise InputError("final_side: must be +1 or -1")
     if (total < 0).any() or (last < 0).any() or (last > total).any():
         raise InputError("crossings: must be at least crossings_last_quarter, and both at least 0")
     if (duration <= 0).any():
         raise InputError(f"cycles = {duration.min()!r}: must be greater than 0")
+    return class_of(total, last, duration, side)
+
+
+def class_of(total: Any, last: Any, duration: Any, side: Any) -> NDArray[np.int8]:
+    """As :func:`classify`, of what an engine has counted: unchecked, and without meaning for a run that failed."""
     result = np.where(side > 0, ResponseClass.TRANSIENT_2, ResponseClass.TRANSIENT_1)
     result = np.where(last * 20 > duration, ResponseClass.CONTINUOUS, result)
     result = np.where(total == 0, ResponseClass.INTRAWELL, result)

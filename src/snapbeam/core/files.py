@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import errno
+import hashlib
 import os
+import platform
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.core.validate import InputError, file_path
 
-__all__ = ["atomic_path", "check_writable"]
+__all__ = ["NoRoomError", "atomic_path", "check_writable", "lives"]
 
 
 def check_writable(
@@ -32,9 +35,7 @@ def check_writable(
     InputError
         If the folder is missing or cannot be written to, *path* is a folder, or its suffix is not allowed.
     """
-    if not isinstance(path, (str, os.PathLike)):
-        raise InputTypeError(f"{name} = {path!r}: must be a path, not {type(path).__name__}")
-    target = Path(path)
+    target = file_path(name, path)
     if suffixes and target.suffix.lower() not in suffixes:
         raise InputError(f"{name} = {str(path)!r}: must end in {' or '.join(suffixes)}")
     if target.is_dir():
@@ -55,19 +56,30 @@ def check_writable(
     return target
 
 
+class NoRoomError(OSError):
+    """A file that could not be written since the disk is full: the message says how much room is needed."""
+
+
 @contextmanager
 def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Give a temporary path beside *path* to write to, and rename it to *path* if all went well.
 
-    If the block raises, an interrupt included, the temporary file is removed and *path* is left as it was.
+    If the block raises, an interrupt included, the temporary file is removed and *path* is left as it was.  What a
+    process that was killed left of its own is removed by the next that writes there.
 
     Examples
     --------
-    >>> with atomic_path("map.nc") as temporary:  # doctest: +SKIP
-    ...     dataset.to_netcdf(temporary)
+    >>> with atomic_path("system.toml") as temporary:  # doctest: +SKIP
+    ...     temporary.write_text(text)
     """
     target = Path(path)
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.stem}.", suffix=target.suffix)
+    _sweep(target)
+    try:
+        handle, name = tempfile.mkstemp(
+            dir=target.parent, prefix=f".{target.stem}.{_HERE}-{os.getpid()}-", suffix=target.suffix
+        )
+    except OSError as error:
+        raise _said(error, target) from error
     os.close(handle)
     temporary = Path(name)
     try:
@@ -76,6 +88,47 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         os.umask(mask)
         temporary.chmod(0o666 & ~mask)
         os.replace(temporary, target)
-    except BaseException:
+    except BaseException as error:
         temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError) and not isinstance(error, NoRoomError):
+            raise _said(error, target) from error
         raise
+
+
+_HERE = hashlib.sha256(platform.node().encode()).hexdigest()[:6]
+"""A mark of this machine: the numbers of its processes mean nothing on another that shares the disk."""
+
+
+def _sweep(target: Path) -> None:
+    """Remove what killed processes of this machine left beside *target*."""
+    if os.name == "nt":
+        return
+    begin = f".{target.stem}.{_HERE}-"
+    with suppress(OSError), os.scandir(target.parent) as entries:
+        for entry in entries:
+            if entry.name.startswith(begin) and entry.name.endswith(target.suffix):
+                number = entry.name[len(begin) :].partition("-")[0]
+                if number.isdecimal() and not lives(int(number)):
+                    os.unlink(entry.path)
+
+
+def lives(process: int) -> bool:
+    """Whether a process of this machine is there."""
+    if os.name == "nt":
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def _said(error: OSError, target: Path) -> OSError:
+    """The error of a full disk in words; any other as it is."""
+    if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+        return error
+    return NoRoomError(
+        f"{str(target)!r}: cannot be written, {error.strerror}: make room and give the same command again"
+    )

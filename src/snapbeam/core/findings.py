@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, choice
 
 __all__ = [
     "Finding",
@@ -67,6 +67,8 @@ class Finding:
     severity: Severity = Severity.DOUBT
 
     def __post_init__(self) -> None:
+        words = tuple(str(each.value) for each in Severity)
+        choice("severity", self.severity, words)
         object.__setattr__(self, "severity", Severity(self.severity))
 
     @property

@@ -15,16 +15,20 @@ import platform
 import sys
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.core.validate import InputError, InputTypeError, shown
 
 __all__ = [
     "__version__",
+    "arithmetic_hash",
     "array_hash",
     "canonical_json",
+    "code_hash",
     "command_line",
     "created_now",
     "made_by",
@@ -46,6 +50,38 @@ def processor_name() -> str:
     from llvmlite import binding
 
     return str(binding.get_host_cpu_name())
+
+
+@cache
+def code_hash() -> str:
+    """Return the SHA-256 of every file of the package that a number depends on, in 16 hexadecimal digits."""
+    package = Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    for room in ("core", "config", "model", "engines", "runs", "sweeps"):
+        for path in sorted((package / room).rglob("*.py")):
+            digest.update(path.relative_to(package).as_posix().encode() + b"\0")
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def arithmetic_hash() -> str:
+    """Return the SHA-256 of how this process rounds, in 16 hexadecimal digits.
+
+    NumPy and the library of linear algebra behind it choose their code by the processor, and are told to by settings
+    such as ``OPENBLAS_CORETYPE``; a product of matrices then differs in its last digits.  What stands here is the hash
+    of a few results that depend on that choice: products, sums and functions of fixed numbers, few enough of them that
+    the number of threads does not matter.
+    """
+    numbers = np.arange(1.0, 1601.0)
+    matrix = (numbers * 0.6180339887498949 % 1.0).reshape(40, 40)
+    found = [matrix @ matrix, matrix @ matrix[0], matrix.T @ matrix[:, :7], matrix[0] @ matrix[1]]
+    found += [np.sin(numbers), np.exp(-numbers / 97.0), np.tanh(numbers / 800.0), np.sqrt(numbers)]
+    found += [np.asarray(numbers.sum()), np.asarray((1.0 / numbers).sum()), matrix.sum(axis=0)]
+    digest = hashlib.sha256()
+    for values in found:
+        digest.update(np.ascontiguousarray(values).tobytes())
+    return digest.hexdigest()[:16]
 
 
 def created_now() -> str:
@@ -111,10 +147,10 @@ def _plain(value: Any, name: str) -> Any:
         return value
     if isinstance(value, float):
         if not math.isfinite(value):
-            raise InputError(f"{name} = {value!r}: must be finite")
+            raise InputError(f"{name} = {shown(value)}: must be finite")
         return int(value) if value.is_integer() and abs(value) < 2.0**53 else value
     raise InputTypeError(
-        f"{name} = {value!r}: must be numbers, text or lists of these, not {type(value).__name__}"
+        f"{name} = {shown(value)}: must be numbers, text or lists of these, not {type(value).__name__}"
     )
 
 

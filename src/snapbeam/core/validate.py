@@ -8,7 +8,10 @@ what is allowed.  Nothing is clipped or converted silently.
 from __future__ import annotations
 
 import math
+import os
+from collections.abc import Mapping
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,13 +21,18 @@ __all__ = [
     "InputError",
     "InputTypeError",
     "axis",
+    "callback",
     "choice",
+    "file_path",
     "finite",
     "finite_array",
     "flag",
+    "instance",
     "integer",
+    "mapping",
     "nonnegative",
     "positive",
+    "shown",
     "within",
 ]
 
@@ -37,16 +45,46 @@ class InputTypeError(InputError, TypeError):
     """A parameter of a kind that cannot be used, such as text where a number belongs."""
 
 
+_LONGEST = 300
+_NO_NUMBERS = (bool, np.bool_, np.timedelta64)
+"""Kinds that count as numbers in Python or NumPy and are none here."""
+
+
 def _refuse(name: str, value: Any, allowed: str) -> InputError:
-    return InputError(f"{name} = {value!r}: must be {allowed}")
+    return InputError(f"{name} = {shown(value)}: must be {allowed}")
+
+
+def shown(value: Any) -> str:
+    """*value* as a message shows it: its representation, if it has one, and no more than a line of it."""
+    try:
+        text = repr(value)
+    except Exception:  # an integer of thousands of digits, an object that cannot describe itself
+        return f"<{type(value).__name__}>"
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
+
+
+def _require_plain(name: str, value: Any) -> None:
+    """Refuse numbers that carry more than numbers, which would be lost: a mask, a unit."""
+    if isinstance(value, np.ma.MaskedArray) or value is np.ma.masked:
+        raise InputTypeError(
+            f"{name}: must be plain numbers, not a masked array, whose hidden values would be used"
+        )
+    if type(value).__module__.partition(".")[0] != "xarray" and any(
+        hasattr(value, attribute) for attribute in ("units", "unit", "dimensionality")
+    ):
+        raise InputTypeError(f"{name} = {shown(value)}: must be plain numbers, without a unit of their own")
 
 
 def _number(name: str, value: Any, allowed: str) -> float:
+    _require_plain(name, value)
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
-        raise InputTypeError(f"{name} = {value!r}: must be {allowed}, not {type(value).__name__}")
-    return float(value)
+    if isinstance(value, _NO_NUMBERS) or not isinstance(value, Real):
+        raise InputTypeError(f"{name} = {shown(value)}: must be {allowed}, not {type(value).__name__}")
+    try:
+        return float(value)
+    except (OverflowError, ValueError, TypeError, ArithmeticError):
+        raise _refuse(name, value, allowed) from None
 
 
 def finite(name: str, value: Any, allowed: str = "a finite number") -> float:
@@ -97,18 +135,20 @@ def within(
 def integer(name: str, value: Any, low: int, high: int | None = None) -> int:
     """Return *value* as an int between *low* and *high*, both included."""
     allowed = f"an integer of at least {low}" if high is None else f"an integer in [{low}, {high}]"
+    _require_plain(name, value)
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value.item()
-    if isinstance(value, (bool, np.bool_)):
-        raise InputTypeError(f"{name} = {value!r}: must be {allowed}, not {type(value).__name__}")
+    if isinstance(value, _NO_NUMBERS):
+        raise InputTypeError(f"{name} = {shown(value)}: must be {allowed}, not {type(value).__name__}")
     if isinstance(value, Integral):
         number = int(value)
     elif isinstance(value, Real):
-        if not float(value).is_integer():
+        real = finite(name, value, allowed)
+        if not real.is_integer():
             raise _refuse(name, value, allowed)
-        number = int(float(value))
+        number = int(real)
     else:
-        raise InputTypeError(f"{name} = {value!r}: must be {allowed}, not {type(value).__name__}")
+        raise InputTypeError(f"{name} = {shown(value)}: must be {allowed}, not {type(value).__name__}")
     if number < low or (high is not None and number > high):
         raise _refuse(name, value, allowed)
     return number
@@ -117,7 +157,7 @@ def integer(name: str, value: Any, low: int, high: int | None = None) -> int:
 def flag(name: str, value: Any) -> bool:
     """Return *value* if it is True or False."""
     if not isinstance(value, (bool, np.bool_)):
-        raise InputTypeError(f"{name} = {value!r}: must be True or False, not {type(value).__name__}")
+        raise InputTypeError(f"{name} = {shown(value)}: must be True or False, not {type(value).__name__}")
     return bool(value)
 
 
@@ -125,20 +165,23 @@ def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:
     """Return *value* if it is one of the words *allowed*."""
     words = ", ".join(repr(word) for word in allowed)
     if not isinstance(value, str):
-        raise InputTypeError(f"{name} = {value!r}: must be one of {words}, not {type(value).__name__}")
+        raise InputTypeError(f"{name} = {shown(value)}: must be one of {words}, not {type(value).__name__}")
     if value not in allowed:
-        raise InputError(f"{name} = {value!r}: must be one of {words}")
+        raise InputError(f"{name} = {shown(value)}: must be one of {words}")
     return value
 
 
 def finite_array(name: str, value: Any, ndim: int | None = None) -> NDArray[np.float64]:
     """Return *value* as a float64 array; refuse text, NaN, infinity and a wrong number of dimensions."""
+    _require_plain(name, value)
     try:
         raw = np.asarray(value)
     except ValueError:
         raise InputError(f"{name}: must be an array of numbers, not a list of unequal lengths") from None
+    except Exception as error:
+        raise InputTypeError(f"{name} = {shown(value)}: must be an array of numbers ({error})") from None
     if raw.dtype.kind not in "iuf":
-        raise InputTypeError(f"{name} = {value!r}: must be an array of numbers, not of {raw.dtype}")
+        raise InputTypeError(f"{name} = {shown(value)}: must be an array of numbers, not of {raw.dtype}")
     array = np.array(raw, dtype=np.float64)
     if ndim is not None and array.ndim != ndim:
         raise InputError(f"{name} of shape {array.shape}: must have {ndim} dimension(s)")
@@ -165,3 +208,31 @@ def axis(name: str, value: Any, low: float, high: float, *, closed: str = "neith
             f"{name}[{at}] = {array[at]:g}, {name}[{at + 1}] = {array[at + 1]:g}: must be strictly increasing"
         )
     return array
+
+
+def file_path(name: str, value: Any) -> Path:
+    """Return *value* as a path; refuse what is none, such as a number, which would name a stream of the process."""
+    if not isinstance(value, (str, os.PathLike)) or "\0" in str(value):
+        raise InputTypeError(f"{name} = {shown(value)}: must be a path")
+    return Path(value)
+
+
+def mapping(name: str, value: Any) -> Mapping[Any, Any]:
+    """Return *value* if it is a mapping, such as a dictionary."""
+    if not isinstance(value, Mapping):
+        raise InputTypeError(f"{name} = {shown(value)}: must be a mapping, not {type(value).__name__}")
+    return value
+
+
+def callback(name: str, value: Any) -> Any:
+    """Return *value* if it is None or can be called."""
+    if value is not None and not callable(value):
+        raise InputTypeError(f"{name} = {shown(value)}: must be callable")
+    return value
+
+
+def instance(name: str, value: Any, kind: type, words: str) -> Any:
+    """Return *value* if it is of a kind, which *words* describe."""
+    if not isinstance(value, kind):
+        raise InputTypeError(f"{name} = {shown(value)}: must be {words}, not {type(value).__name__}")
+    return value

@@ -81,7 +81,7 @@ class Reading:
         if not model.is_bistable:
             return found
         settled = self.good & (book["energy"] < model.barrier_energy - model.well_energy)
-        if not np.isfinite(ensemble.highest).any():
+        if not (ensemble.highest > -np.inf).any():
             return np.asarray(settled)
         away = settled & (book["side"] > 0) & (book["displacement"] > np.maximum(ensemble.highest, 0.0))
         away &= book["center"] > 0.0

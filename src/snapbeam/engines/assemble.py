@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError
-from snapbeam.engines.clock import Clocked, clocked
+from snapbeam.engines.clock import Clocked, clocked, most_steps
 from snapbeam.engines.columns import RUN
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.plan import Plan, plan_steps
@@ -20,6 +20,8 @@ from snapbeam.model.contact import ContactLaw, HertzContact
 from snapbeam.model.decision import decidable_energy
 from snapbeam.model.drive import Drive, Sine
 from snapbeam.model.integration import Integration
+from snapbeam.model.quantity import RUN as RUN_SCOPE
+from snapbeam.model.quantity import quantities
 from snapbeam.model.start import rest_state
 from snapbeam.model.state import State
 from snapbeam.model.system import System
@@ -73,7 +75,7 @@ def make_ensemble(
     if state.batch and runs in (1, state.batch[0]):
         runs = state.batch[0]
     columns = {name: np.array(np.broadcast_to(values, (runs,))) for name, values in columns.items()}
-    structure = structure_of(system.model, _side(system, state, goes_on=periods is not None))
+    structure = structure_of(system.model, _side(system, state, goes_on=periods is not None), system.striker)
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
     if step_factor != 1.0:
         plans = [each._replace(step=step_factor * each.step) for each in plans]
@@ -85,6 +87,8 @@ def make_ensemble(
     table["offset"] = _offsets(system, structure, state, columns, table, places.rows, starts, driven)
     table["tip_speed"] = driven.speed
     highest = table["rest_contact"] + table["offset"] + driven.highest
+    if structure.body_mass is not None:
+        highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown
     time = clocked(table, system, integration, driven.period, plans, periods)
     _decisions(table, system, integration, time, places.location, highest)
     table["lowest"] = system.scale.length * _LOWEST[integration.accuracy]
@@ -103,7 +107,7 @@ def make_ensemble(
         highest=highest,
         contact_rows=places.rows,
         starts=starts,
-        max_steps=integration.max_steps,
+        max_steps=most_steps(integration, system.model.modes),
         high_omega=integration.high_frequency_ratio * system.scale.omega,
         cycles=time.cycles,
     )
@@ -119,7 +123,9 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
     for section, part in (("contact", system.contact), ("striker", system.striker)):
         if part is not None:
             own |= {
-                f"{section}.{name}": value for name, value in vars(part).items() if isinstance(value, float)
+                f"{section}.{name}": value
+                for name, value in vars(part).items()
+                if isinstance(value, float) and quantities(type(part))[name].scope == RUN_SCOPE
             }
     if system.striker is not None:
         own |= {f"drive.{name}": value for name, value in system.striker.drive.values().items()}
@@ -132,7 +138,19 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
 
 
 def plans_of(system: System, integration: Integration, columns: Mapping[str, _Array]) -> list[Plan]:
-    """The steps of each run: they follow from the structure and from the run's own contact."""
+    """The steps of each run: they follow from the structure and from the run's own contact.
+
+    A striker with a mass meets the beam for a shorter time, as the two masses together do: m_s m/(m_s + m).
+    """
+    plans, striker = _plans_of(system, integration, columns), system.striker
+    if striker is None or striker.mass is None:
+        return plans
+    mass = system.model.lightest_contact_mass
+    more = max(0, math.ceil(0.5 * math.log2(1.0 + mass / striker.mass) - 1e-9))
+    return [each._replace(coarsest=each.coarsest + more, finest=each.finest + more) for each in plans]
+
+
+def _plans_of(system: System, integration: Integration, columns: Mapping[str, _Array]) -> list[Plan]:
     of_contact = {name[8:]: values for name, values in columns.items() if name.startswith("contact.")}
     step, accuracy = integration.step, integration.accuracy
     runs = next(iter(columns.values())).size if columns else 1
@@ -202,7 +220,9 @@ def _drive_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Driv
     if striker.side == "above":
         highest = drive.mirrored_bounds(own, scale)
     table = np.stack([found[name] for name in drive.number_names], axis=1)
-    return _Driven(type(drive), table, cycles_of(system, columns), highest, speed, samples)
+    return _Driven(
+        drive.marched_as or type(drive), table, cycles_of(system, columns), highest, speed, samples
+    )
 
 
 class _Places(NamedTuple):
@@ -228,7 +248,8 @@ def _starts(structure: Structure, table: NDArray[Any], state: State) -> _Array:
     if modal is not None and modal.structure == structure.hash:
         table["home"] = modal.home
         return np.stack((modal.q, modal.p), axis=1)
-    pairs = [structure.to_modal(a, v) for a, v in zip(flat.amplitude, flat.velocity, strict=True)]
+    parts = (flat.amplitude, flat.velocity, flat.striker_shift, flat.striker_rate)
+    pairs = [structure.to_modal(*each) for each in zip(*parts, strict=True)]
     return np.array(pairs)
 
 

@@ -10,17 +10,20 @@ from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError
 from snapbeam.engines.plan import Plan
-from snapbeam.model.drive import Recorded
+from snapbeam.model.drive import HORIZON, Recorded
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 
-__all__ = ["SUBDIVISION", "Clocked", "clocked", "require_resolved"]
+__all__ = ["SUBDIVISION", "Clocked", "clocked", "most_steps", "require_resolved", "seconds_of"]
 
 _Array = NDArray[np.float64]
 
 SUBDIVISION = 1 << 20
 """Ticks of a flight step."""
 _MOST_TICKS = 2.0**61
+_HOUR = 3600.0
+_STEP_COST, _MODE_COST = 0.5e-6, 0.07e-6
+"""Seconds of one core for a step, and more of it for each mode."""
 _FEWEST = 4.0
 """Flight steps, at least, in a cycle of excitation and in a period of the first mode, of a step that was asked for."""
 
@@ -75,10 +78,13 @@ def clocked(
         table["end"] = table["period"] * int(cycles)
         if not cycles.is_integer():
             table["end"] = np.rint(table["period"] * cycles).astype(np.int64)
+        table["landing"] = table["period"]
+        if drive is not None and not drive.repeats:
+            _whole_steps(cycle, lengths, float(HORIZON))  # refused if that cannot be counted
+            table["period"] *= HORIZON
+    require_affordable(integration, system.model.modes, lengths, table["end"] / SUBDIVISION)
     if periods is None:
         table["landing"] = table["end"]
-    elif not isinstance(drive, Recorded):
-        table["landing"] = table["period"]
     table["last_quarter"] = table["end"] // 4 * 3
     return Clocked(cycles)
 
@@ -113,6 +119,42 @@ def require_resolved(system: System, integration: Integration, cycle: _Array) ->
                 f"step = {integration.step:g} s: does not resolve {words} of {length:.4g} s; must be at most "
                 f"{length / _FEWEST:.4g} s, a quarter of it"
             )
+
+
+def seconds_of(steps: float, modes: int) -> float:
+    """What so many steps take on one core, s, to a factor of two or three."""
+    return steps * (_STEP_COST + _MODE_COST * modes)
+
+
+def most_steps(integration: Integration, modes: int) -> int:
+    """Steps that one run may take: those that were asked for, or what one core does in an hour."""
+    if integration.max_steps is not None:
+        return integration.max_steps
+    return int(_HOUR / seconds_of(1.0, modes))
+
+
+def require_affordable(integration: Integration, modes: int, lengths: _Array, steps: _Array) -> None:
+    """Refuse runs that take more steps than they may, before they begin; *lengths* of the steps in s.
+
+    Raises
+    ------
+    InputError
+    """
+    most, longest = most_steps(integration, modes), int(np.argmax(steps))
+    if steps[longest] > most:
+        allowed = "an hour's" if integration.max_steps is None else "max_steps"
+        spent = _words(seconds_of(float(steps[longest]), modes))
+        raise InputError(
+            f"a run of {steps[longest]:.3g} steps of {lengths[longest]:.3g} s, some {spent} on one core: must be at "
+            f"most {most:.3g} steps ({allowed}); ask for fewer cycles or longer steps, or for a larger max_steps"
+        )
+
+
+def _words(seconds: float) -> str:
+    for size, unit in ((86400.0 * 365.25, "years"), (86400.0, "days"), (3600.0, "hours"), (60.0, "minutes")):
+        if seconds >= size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.2g} seconds"
 
 
 def _whole_steps(period: _Array, step: _Array, cycles: float) -> NDArray[np.int64]:

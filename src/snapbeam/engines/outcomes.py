@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.codes import ResponseClass, RunStatus, classify
+from snapbeam.core.codes import ResponseClass, RunStatus, class_of
 from snapbeam.core.validate import InputError
 
 if TYPE_CHECKING:
@@ -82,6 +82,7 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("work", np.float64, 0.0),
     ("gross_work", np.float64, 0.0),
     ("dissipated", np.float64, 0.0),  # integrated, where a ledger is kept
+    ("lost", np.float64, 0.0),  # in contact
     ("first_energy", np.float64, 0.0),
     ("energy", np.float64, 0.0),  # at the end, contact included
     ("displacement", np.float64, 0.0),  # of contact point and centre, at the end
@@ -157,7 +158,7 @@ def _rms(column: str, per_speed: bool) -> Callable[[Reading], Values]:
 
 def _response(reading: Reading) -> Values:
     book = reading.book
-    kinds = classify(
+    kinds = class_of(
         book["crossings"], book["crossings_last_quarter"], reading.cycles, -reading.first_side * book["side"]
     )
     return np.where(reading.good, kinds, ResponseClass.UNKNOWN)
@@ -257,6 +258,7 @@ _ROWS = (
         "dissipated_energy", "float64", "J", "energy dissipated: the striker's work less what the beam gained",
         _dissipated,
     ),
+    Statistic("contact_loss", "float64", "J", "energy lost in contact", _seen("lost")),
     Statistic(
         "high_frequency_share", "float64", "1", "share of the modal energy above a multiple of omega_1, over time",
         _high_share,

@@ -44,7 +44,7 @@ class Recorded(NamedTuple):
     """Linear modes about the first well, shape (samples, N)."""
     p: _Array
     values: _Array
-    """Penetration, contact force, beam energy, contact energy, work and dissipation, shape (samples, 6)."""
+    """Penetration, contact force, beam energy, contact energy, work, dissipation, loss in contact; (samples, 7)."""
     impacts: _Array
     """Onset, duration, peak force and impulse of each impact that ended, shape (impacts, 4)."""
     books: NDArray[Any]

@@ -71,6 +71,7 @@ def resolve(
     modes: int = 1,
     law: type[ContactLaw] | None = None,
     drive: type[Drive] = Sine,
+    body: bool = False,
 ) -> tuple[str, Engine]:
     """The engine that *name* stands for, and its own name.
 
@@ -88,6 +89,8 @@ def resolve(
         Modes of the model.
     law, drive : type
         Of contact, and of the striker.
+    body : bool
+        Whether the striker is a body with a mass.
 
     Raises
     ------
@@ -100,6 +103,8 @@ def resolve(
         from snapbeam.engines.cuda import driver as cuda
 
         reason = cuda.refusal(modes, law, drive)
+        if body:
+            reason = "a striker with a mass is marched by the CPU engine alone"
         if reason is None and (name == "cuda" or not cuda.simulated()):
             return "cuda", cuda
         if name == "cuda":

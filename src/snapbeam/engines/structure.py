@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.striker import Striker
 
 __all__ = ["Structure", "structure_of"]
 
@@ -46,27 +49,41 @@ class Structure:
     equilibrium: _Array
     """alpha in the well, as it is in space."""
     model: ReducedModel
+    body_mass: float | None = None
+    """Of a striker that is a body, whose own mode is then the last one; kg."""
 
     def row(self, shape: _Array) -> _Array:
         """V^T shape, seen from the striker's side."""
         row: _Array = self.sign * (self.model.linear_modes.T @ shape)
-        return row
+        return row if self.body_mass is None else np.append(row, -1.0 / math.sqrt(self.body_mass))
 
-    def to_modal(self, alpha: _Array, velocity: _Array) -> tuple[_Array, _Array]:
-        """Amplitudes of shape (..., N) and their velocities as q and p about the well."""
+    def body_of(self, values: _Array) -> _Array:
+        """The striker's own part of q or p of shape (..., N), in space and SI units; NaN if it is no body."""
+        if self.body_mass is None:
+            return np.full(values.shape[:-1], np.nan)
+        own: _Array = self.sign * values[..., -1] / math.sqrt(self.body_mass)
+        return own
+
+    def to_modal(
+        self, alpha: _Array, velocity: _Array, shift: float = np.nan, rate: float = np.nan
+    ) -> tuple[_Array, _Array]:
+        """Amplitudes of shape (N,) and their velocities as q and p about the well, and those of the striker's body."""
         back = self.model.linear_modes.T @ self.model.mass
-        if alpha.ndim == 1:
-            return back @ (alpha - self.equilibrium), back @ velocity
-        return (alpha - self.equilibrium) @ back.T, velocity @ back.T
+        q, p = back @ (alpha - self.equilibrium), back @ velocity
+        if self.body_mass is None:
+            return q, p
+        scale = self.sign * math.sqrt(self.body_mass)
+        own = [0.0 if np.isnan(value) else scale * float(value) for value in (shift, rate)]
+        return np.append(q, own[0]), np.append(p, own[1])
 
     def amplitudes(self, q: _Array) -> _Array:
         """alpha of q of shape (..., N) about the well."""
-        alpha: _Array = self.equilibrium + q @ self.model.linear_modes.T
+        alpha: _Array = self.equilibrium + q[..., : self.equilibrium.size] @ self.model.linear_modes.T
         return alpha
 
     def velocities(self, p: _Array) -> _Array:
         """Velocities of alpha, of p of shape (..., N)."""
-        velocity: _Array = p @ self.model.linear_modes.T
+        velocity: _Array = p[..., : self.equilibrium.size] @ self.model.linear_modes.T
         return velocity
 
     @cached_property
@@ -76,15 +93,21 @@ class Structure:
         for part in (self.omega, self.damping_ratio, self.coupling, self.well, self.center, self.equilibrium):
             digest.update(np.ascontiguousarray(part).tobytes())
         digest.update(np.array([self.tension_stiffness, self.sign]).tobytes())
+        if self.body_mass is not None:
+            digest.update(np.array([self.body_mass]).tobytes())
         return digest.hexdigest()
 
 
-def structure_of(model: ReducedModel, side: str) -> Structure:
-    """The structure of a reduced model, about the well that a striker from *side* pushes away from."""
+def structure_of(model: ReducedModel, side: str, striker: Striker | None = None) -> Structure:
+    """The structure of a reduced model, about the well that a striker from *side* pushes away from.
+
+    A striker that is a body of mass m_s on a spring k_s is one more linear mode, q_s = sqrt(m_s) times its displacement
+    beyond the motion that its drive gives it: no tension, contact row -1/sqrt(m_s).
+    """
     sign = 1.0 if side == "below" else -1.0
     equilibrium = sign * model.equilibrium
     modes = model.linear_modes
-    return Structure(
+    struck = Structure(
         omega=model.omega,
         damping_ratio=model.damping_ratio,
         coupling=model.tension_matrix,
@@ -97,4 +120,23 @@ def structure_of(model: ReducedModel, side: str) -> Structure:
         sign=sign,
         equilibrium=equilibrium,
         model=model,
+    )
+    return struck if striker is None or striker.mass is None else _with_body(struck, striker)
+
+
+def _with_body(structure: Structure, striker: Striker) -> Structure:
+    """The structure with the mode of a striker that is a body."""
+    assert striker.mass is not None
+    count = structure.omega.size + 1
+    coupling = np.zeros((count, count))
+    coupling[:-1, :-1] = structure.coupling
+    return dataclasses.replace(
+        structure,
+        omega=np.append(structure.omega, math.sqrt(striker.spring / striker.mass)),
+        damping_ratio=np.append(structure.damping_ratio, striker.damping_ratio),
+        coupling=coupling,
+        well=np.append(structure.well, 0.0),
+        center=np.append(structure.center, 0.0),
+        shift=np.append(structure.shift, 0.0),
+        body_mass=striker.mass,
     )

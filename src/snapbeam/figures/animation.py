@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from snapbeam.core.files import atomic_path, check_writable
 from snapbeam.core.validate import InputError, integer, nonnegative, positive
+from snapbeam.figures.captions import caption
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
 from snapbeam.model.bent import displacement_along
 from snapbeam.runs.schema import check_trajectory
@@ -27,6 +28,8 @@ _Array = NDArray[np.float64]
 
 ANIMATION_SUFFIXES = (".mp4", ".gif")
 _DOTS_PER_INCH = 100
+_WIDTH, _HEIGHT = 6.4 * 25.4, 3.6 * 25.4  # mm
+_VIDEO_DOTS = 200  # 1280 x 720 pixels
 _GIF_COLORS = 64
 _POSITIONS = 161
 
@@ -80,7 +83,9 @@ def animate_run(
     fps: float = 25.0,
     progress: Callable[[int, int], object] | None = None,
 ) -> Path:
-    """Write an animation of a run: beam and shaker, and their waveform with the present instant.
+    """Write an animation of a run: beam and striker, and their waveform with the present instant.
+
+    An MP4 has 1280 by 720 pixels, a GIF half of each.  Parameters, class and how much slower than life it is are on it.
 
     Parameters are those of :func:`frame_times`, and *path*, ending in ``.mp4`` (H.264) or ``.gif``, and
     *progress*, called as ``progress(frames done, frames in all)``.  The shape of the beam is the sum of its
@@ -99,7 +104,7 @@ def animate_run(
     """
     target = check_writable(path, "animate", ANIMATION_SUFFIXES)
     times = frame_times(dataset, window, duration=duration, slow_motion=slow_motion, fps=fps)
-    scene = _Scene(dataset, times)
+    scene = _Scene(dataset, times, fps)
 
     def frames() -> Iterator[Figure]:
         for done, at in enumerate(times, 1):
@@ -107,15 +112,22 @@ def animate_run(
             if progress is not None:
                 progress(done, times.size)
 
-    return write_frames(frames(), target, fps=fps)
+    dots = _DOTS_PER_INCH if target.suffix.lower() == ".gif" else _VIDEO_DOTS
+    return write_frames(frames(), target, fps=fps, dots_per_inch=dots)
 
 
-def write_frames(frames: Iterable[Figure], path: str | os.PathLike[str], *, fps: float = 25.0) -> Path:
+def write_frames(
+    frames: Iterable[Figure],
+    path: str | os.PathLike[str],
+    *,
+    fps: float = 25.0,
+    dots_per_inch: float = _DOTS_PER_INCH,
+) -> Path:
     """Write figures of one size, one after the other, as the frames of an MP4 (H.264) or a GIF."""
     target = check_writable(path, "animate", ANIMATION_SUFFIXES)
     rate = positive("fps", fps, "Hz")
     with house_style(), atomic_path(target) as temporary:
-        pictures = _pictures(frames)
+        pictures = _pictures(frames, dots_per_inch)
         if target.suffix.lower() == ".gif":
             _write_gif(pictures, temporary, rate)
         else:
@@ -123,7 +135,7 @@ def write_frames(frames: Iterable[Figure], path: str | os.PathLike[str], *, fps:
     return target
 
 
-def _pictures(frames: Iterable[Figure]) -> Iterator[NDArray[np.uint8]]:
+def _pictures(frames: Iterable[Figure], dots_per_inch: float) -> Iterator[NDArray[np.uint8]]:
     import matplotlib.pyplot as plt
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -133,7 +145,7 @@ def _pictures(frames: Iterable[Figure]) -> Iterator[NDArray[np.uint8]]:
             plt.close(last)
         canvas = FigureCanvasAgg(figure)
         if figure is not last:
-            figure.set_dpi(_DOTS_PER_INCH)
+            figure.set_dpi(dots_per_inch)
             canvas.draw()
             figure.set_layout_engine("none")  # what is laid out stays where it is
         last = figure
@@ -216,7 +228,8 @@ def _hardest_impact(
 class _Scene:
     """One figure whose artists move."""
 
-    def __init__(self, dataset: xr.Dataset, times: _Array) -> None:
+    def __init__(self, dataset: xr.Dataset, times: _Array, fps: float) -> None:
+        self.fps = fps
         self.time = dataset["time"].values
         inside = (self.time >= times[0]) & (self.time <= times[-1])
         self.across = dataset["cycle"].values if "cycle" in dataset.variables else self.time
@@ -227,7 +240,9 @@ class _Scene:
         self.rate = np.median(np.diff(times))
         self.times = times
         with house_style():
-            self.figure = new_figure("double", 75.0)
+            self.figure = new_figure("single", _HEIGHT)
+            self.figure.set_size_inches(_WIDTH / 25.4, _HEIGHT / 25.4)
+            self.figure.suptitle(caption(dataset, 2), x=0.02, ha="left", fontsize=8)
             grid = self.figure.add_gridspec(1, 2, width_ratios=(1.0, 1.15))
             self._beam_axes(grid, inside)
             self._wave_axes(grid, inside)
@@ -239,7 +254,7 @@ class _Scene:
         low, high = min(low, -1.0), max(high, 1.0)
         pad = 0.12 * (high - low)
         ax.set(xlim=(-0.02, 1.02), ylim=(low - 2.0 * pad, high + pad))
-        ax.set(xlabel="Position $x/L$", ylabel="Displacement $w$")
+        ax.set(xlabel="Position $x/L$", ylabel="Displacement $w/b$")
         ax.axhline(0.0, color="0.75", linewidth=0.5)
         (self.rod,) = ax.plot([], [], color=SHAKER_COLOR, linewidth=5, solid_capstyle="butt")
         (self.curve,) = ax.plot([], [], color=BEAM_COLOR, linewidth=1.6, marker="" if self.shape else "o")
@@ -250,13 +265,13 @@ class _Scene:
     def _wave_axes(self, grid: GridSpec, inside: NDArray[np.bool_]) -> None:
         ax = self.figure.add_subplot(grid[0, 1])
         x = self.across[inside]
-        ax.plot(x, self.beam[inside], color=BEAM_COLOR, label="beam, at the shaker")
+        ax.plot(x, self.beam[inside], color=BEAM_COLOR, label="beam, at the striker")
         if self.shaker is not None:
-            ax.plot(x, self.shaker[inside], color=SHAKER_COLOR, label="shaker")
+            ax.plot(x, self.shaker[inside], color=SHAKER_COLOR, label="striker")
         (self.now,) = ax.plot([], [], color="0.5", linewidth=0.6)
         (self.dot,) = ax.plot([], [], "o", color=BEAM_COLOR, markersize=3)
         low, high = ax.get_ylim()
-        ax.set(xlim=(x[0], x[-1]), ylim=(low, high + 0.15 * (high - low)))
+        ax.set(xlim=(x[0], x[-1]), ylim=(low, high + 0.15 * (high - low)), ylabel="Displacement $w/b$")
         ax.set_xlabel(r"Cycles of excitation $\tau$" if self.across is not self.time else "Time (s)")
         ax.legend(loc="upper right", ncols=2)
         fix_ticks(ax)
@@ -274,8 +289,14 @@ class _Scene:
         now = float(np.interp(at, self.time, self.across))
         self.now.set_data([now, now], [-1e3, 1e3])
         self.dot.set_data([now], [beam])
-        slow = np.interp(at, self.times[:-1], np.diff(self.times)) < 0.5 * self.rate
-        self.words.set_text(f"{1e3 * at:.3f} ms" + ("  (slow motion)" if slow else ""))
+        passing = float(np.interp(at, self.times[:-1], np.diff(self.times)))
+        slower = 1.0 / (self.fps * passing)
+        impact = "  (impact)" if passing < 0.5 * self.rate else ""
+        self.words.set_text(
+            f"{1e3 * at:.2f} ms, {slower:.2g} times slower{impact}"
+            if slower < 10
+            else f"{1e3 * at:.2f} ms, {round(slower, 1 - len(str(int(slower)))):,.0f} times slower{impact}"
+        )
         return self.figure
 
 

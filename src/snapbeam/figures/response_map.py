@@ -12,10 +12,12 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, finite_array, instance
 from snapbeam.figures.agreement import draw_agreement
 from snapbeam.figures.axes import dress, edges_of, symbol_of
+from snapbeam.figures.captions import beam_text
 from snapbeam.figures.panels import class_cells
+from snapbeam.figures.response_line import draw_response_line
 from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_figure
 from snapbeam.lab.compare.dots import Dots
 from snapbeam.model.quasi_static import quasi_static_threshold
@@ -23,7 +25,7 @@ from snapbeam.model.quasi_static import quasi_static_threshold
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["class_handles", "plot_response_map"]
+__all__ = ["UPWARD", "class_handles", "plot_response_map", "subtitle"]
 
 _Array = NDArray[np.float64]
 
@@ -41,7 +43,7 @@ def plot_response_map(
     threshold_line: bool = False,
     legend: bool = True,
 ) -> Axes:
-    """Draw the response class of every run of a map as one cell.
+    """Draw the response class of every run of a map as one cell; over one axis, with how far the centre moves.
 
     Cell borders lie midway between the points of an axis, the outermost as far out as the next one in (but
     not below zero, nor beyond the end of the beam).  Cells of a map with repeats are the paler the fewer
@@ -50,7 +52,7 @@ def plot_response_map(
     Parameters
     ----------
     dataset : xarray.Dataset
-        A map with the variable ``response`` over two axes of more than one point.
+        A map with the variable ``response`` over one or two axes of more than one point.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
     dots : Dots, optional
@@ -68,8 +70,13 @@ def plot_response_map(
     Raises
     ------
     InputError
-        If the dataset is no map of two axes.
+        If the dataset is no map of one or two axes.
     """
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if "response" in dataset and _is_line(dataset):
+        return _line(dataset, ax, dots is not None or threshold_line, legend)
     across, upward, kinds = _two_axes(dataset)
     edges = tuple(edges_of(dataset, name) for name in (across, upward))
     fixed = {
@@ -86,7 +93,7 @@ def plot_response_map(
         fix_ticks(ax)
         dress(ax.xaxis, dataset, across)
         dress(ax.yaxis, dataset, upward)
-        ax.set_title(_subtitle(dataset, fixed), loc="left")
+        ax.set_title(subtitle(dataset, (across, upward)), loc="left")
         handles = class_handles(kinds)
         if "class_share" in dataset:
             handles.append(draw_agreement(ax, dataset, (across, upward), edges))
@@ -102,7 +109,35 @@ def plot_response_map(
     return ax
 
 
+def _is_line(dataset: xr.Dataset) -> bool:
+    response = dataset["response"].squeeze()
+    return response.ndim == 1 and "point" not in response.dims
+
+
+def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) -> Axes:
+    """A map over one axis."""
+    if overlaid:
+        raise InputError("dots, threshold_line: are drawn over two axes; this map has one")
+    name = str(dataset["response"].squeeze().dims[0])
+    with house_style():
+        own = new_figure("single", 84.0 if legend else 62.0) if ax is None else None
+        ax = own.add_subplot() if own is not None else ax
+        assert ax is not None
+        fix_ticks(ax)
+        draw_response_line(ax, dataset, name)
+        ax.set_title(subtitle(dataset, (name,)), loc="left")
+        handles = class_handles(dataset["response"].values)
+        if legend and own is not None:
+            own.legend(handles=handles, loc="outside lower center", ncols=2)
+        elif legend:
+            ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
+    return ax
+
+
 def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "response" not in dataset:
         raise InputError(f"no map: it has no variable 'response' among {list(map(str, dataset.variables))}")
     response = dataset["response"].squeeze()
@@ -122,16 +157,19 @@ def _scalar(dataset: xr.Dataset, name: str) -> float | None:
     return float(dataset[name].squeeze()) if name in dataset.coords and dataset[name].size == 1 else None
 
 
-def _subtitle(dataset: xr.Dataset, fixed: dict[str, float | None]) -> str:
+def subtitle(dataset: xr.Dataset, axes: tuple[str, ...]) -> str:
+    """The beam, and what holds for the whole map: modes, cycles and the paper's coordinates that are no axes."""
     parts = []
     if "modes" in dataset.attrs:
         parts.append(f"$N$ = {int(dataset.attrs['modes'])}")
     if "cycles" in dataset.attrs:
         parts.append(f"{int(dataset.attrs['cycles'])} cycles")
-    parts += [
-        f"{symbol_of(dataset, name)} = {value:.4g}" for name, value in fixed.items() if value is not None
-    ]
-    return ", ".join(parts)
+    for name in ("frequency_ratio", "velocity_amplitude", "location"):
+        value = _scalar(dataset, name)
+        if name not in axes and value is not None:
+            parts.append(f"{symbol_of(dataset, name)} = {value:.4g}")
+    beam = "" if any(name.startswith("beam") for name in axes) else beam_text(dataset.attrs)
+    return "\n".join(line for line in (beam, ", ".join(parts)) if line)
 
 
 def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]:
@@ -142,6 +180,10 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     kinds : int8 array, optional
         Classes of runs, whose shares then stand beside the names; unknown ones are named if there are any.
     """
+    if kinds is not None:
+        shown_kinds = np.asarray(kinds)
+        # points that a picture leaves out are NaN in it
+        kinds = finite_array("kinds", shown_kinds[shown_kinds == shown_kinds]).astype(np.int8)
     handles: list[Patch | Line2D] = []
     for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
         count = 0 if kinds is None else int((kinds == kind).sum())
@@ -152,7 +194,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
 
 
 def _percent(count: int, total: int) -> str:
-    share = 100.0 * count / total
+    share = 100.0 * count / max(total, 1)
     return "<0.1 %" if 0.0 < share < 0.1 else f"{share:.1f} %"
 
 

@@ -105,8 +105,10 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
         return plt.figure(figsize=(millimetres / 25.4, positive("height", height, "mm") / 25.4))
 
 
-def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
-    """Write a figure to PNG (300 dots per inch), PDF or SVG, by the suffix; whole or not at all.
+def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
+    """Write a figure, or the one that axes are in, to PNG (300 dots per inch), PDF or SVG, by the suffix.
+
+    The file is whole or not there.
 
     Raises
     ------
@@ -114,6 +116,10 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
         If the path cannot be written or has another suffix.
     """
     target = check_writable(path, "plot", FIGURE_SUFFIXES)
+    if isinstance(figure, Axes):
+        whole = figure.get_figure(root=True)
+        assert whole is not None
+        figure = whole
     kind = target.suffix.lower().lstrip(".")
     stamp = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
     with house_style(), atomic_path(target) as temporary:

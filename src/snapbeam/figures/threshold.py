@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, instance
 from snapbeam.figures.axes import dress, positions, symbol_of
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
 from snapbeam.model.quasi_static import quasi_static_threshold
@@ -45,6 +45,9 @@ def plot_threshold(
     InputError
         If the dataset holds no threshold curve.
     """
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "first_interwell" not in dataset or "always_interwell" not in dataset:
         raise InputError(f"no threshold curve among {list(map(str, dataset.variables))}")
     dims = [str(name) for name in dataset["first_interwell"].squeeze().dims]

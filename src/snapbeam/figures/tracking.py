@@ -119,7 +119,7 @@ def _scale_bar(axes: Any, recording: Recording, width: int, height: int) -> None
     outline = {"facecolor": "black", "alpha": 0.55, "edgecolor": "none", "pad": 1.5}
     axes.plot([right - pixels, right], [row, row], color="white", lw=2.0, solid_capstyle="butt")
     axes.text(
-        right - pixels / 2, row - 0.02 * height, f"{length:g} mm", color="white", ha="center", va="bottom",
+        right, row - 0.02 * height, f"{length:g} mm", color="white", ha="right", va="bottom",
         fontsize=6, bbox=outline,
     )  # fmt: skip
 

@@ -78,7 +78,7 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
         for cut in (drive.clipping.low, drive.clipping.high):
             if np.isfinite(cut):
                 top.axhline(scale * (cut - fit.offset), color=SHAKER_COLOR, linewidth=0.6, dashes=(1, 2))
-        top_amplitude = 1.12 * scale * float(drive.cycle_amplitude.max())
+        top_amplitude = 1.12 * scale * max(float(drive.cycle_amplitude.max()), fit.amplitude)
         left.set(xlabel="Time (s)", ylabel=f"Amplitude of a cycle ({unit})", ylim=(0.0, top_amplitude))
         words = "shaded: start-up" if drive.startup else "begins in motion"
         left.set_title(words + ("; red: dropouts" if drive.flaws else ""), loc="left")

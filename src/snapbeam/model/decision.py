@@ -104,14 +104,15 @@ def decidable_energy(
 
     Free flight only loses energy, and the shaker rises to *highest* (m) at most: with less than this energy
     the beam can neither pass the lowest saddle nor come down to the shaker.  -inf where that can never
-    be said: the shaker rises above the well, or the structure is not a buckled beam.
+    be said: the shaker rises above the well, or without a bound, or the structure is not a buckled beam.
     """
     if model.beam is None or not model.is_bistable:
         return np.full(location.shape, -np.inf)
-    reach = np.maximum(highest, 0.0)
+    bounded = highest < np.inf
+    reach = np.where(bounded, np.maximum(highest, 0.0), 0.0)
     barrier = model.barrier_energy
     limit = np.minimum(least_energy_at(model, location, reach), barrier)
     places, which = np.unique(location, return_inverse=True)
     well = np.abs(np.array([float(model.shape_at(float(x)) @ model.equilibrium) for x in places]))[which]
     energy = limit - model.well_energy - RESERVE * (barrier - model.well_energy)
-    return np.where(reach < well, energy, -np.inf)
+    return np.where(bounded & (reach < well), energy, -np.inf)

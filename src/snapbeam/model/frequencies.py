@@ -19,7 +19,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputTypeError, integer
+from snapbeam.core.validate import InputTypeError, integer, shown
 from snapbeam.model.beam import Beam
 
 __all__ = ["exact_natural_freq"]
@@ -57,7 +57,7 @@ def exact_natural_freq(beam: Beam, count: int = 10) -> _Array:
         For a count out of range or something that is no beam.
     """
     if not isinstance(beam, Beam):
-        raise InputTypeError(f"beam = {beam!r}: must be a Beam")
+        raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
     count = integer("count", count, 1, _MAX_COUNT)
     unit = math.sqrt(beam.bending_stiffness / beam.mass_per_length) / beam.length**2
     if beam.is_buckled:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, mapping, shown
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import LAWS, ContactLaw
 from snapbeam.model.drive import DRIVES, Drive
@@ -25,7 +25,15 @@ SECTIONS = ("beam", "model", "contact", "striker", "drive", "start")
 _MATRICES = (
     "mass", "stiffness", "contact_shape", "center_shape", "tension_stiffness", "equilibrium", "length_scale",
 )  # fmt: skip
-_START = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
+_START = (
+    "amplitude",
+    "velocity",
+    "phase",
+    "striker_position",
+    "contact_time",
+    "striker_shift",
+    "striker_rate",
+)
 
 
 def parts_to_mapping(
@@ -50,7 +58,9 @@ def parts_to_mapping(
     if contact is not None:
         sections["contact"] = {"law": contact.name} | _fields(contact)
     if striker is not None:
-        own = {name: getattr(striker, name) for name in quantities(Striker)}
+        # without a mass there is no suspension
+        left_out = ("spring", "damper") if striker.mass is None else ()
+        own = {name: getattr(striker, name) for name in quantities(Striker) if name not in left_out}
         sections["striker"] = {name: value for name, value in own.items() if value is not None}
         sections["drive"] = {"kind": striker.drive.name} | _fields(striker.drive)
     if start is not None:
@@ -70,11 +80,12 @@ def _fields(part: Any) -> dict[str, Any]:
 
 def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """The parts that sections describe."""
+    mapping("sections", sections)
     for name, values in sections.items():
         if name not in SECTIONS:
             raise InputError(f"[{name}]: unknown section; must be one of {', '.join(SECTIONS)}")
         if not isinstance(values, Mapping):
-            raise InputError(f"{name} = {values!r}: must be a section [{name}]")
+            raise InputError(f"{name} = {shown(values)}: must be a section [{name}]")
     parts: dict[str, Any] = {"model": _model(sections)}
     if "contact" in sections:
         parts["contact"] = _chosen(sections["contact"], "contact", "law", LAWS)

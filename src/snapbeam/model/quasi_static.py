@@ -34,5 +34,11 @@ def quasi_static_threshold(location: ArrayLike, frequency_ratio: ArrayLike) -> N
         raise InputError(f"location = {bad:g}: must lie in (0, 1)")
     if (ratio <= 0.0).any():
         raise InputError(f"frequency_ratio = {ratio[ratio <= 0.0].flat[0]:g}: must be greater than 0")
+    try:
+        np.broadcast_shapes(x.shape, ratio.shape)
+    except ValueError:
+        raise InputError(
+            f"location of shape {x.shape}, frequency_ratio of shape {ratio.shape}: must go together"
+        ) from None
     threshold: NDArray[np.float64] = np.asarray(ratio * np.sin(np.pi * x) ** 2)
     return threshold

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
+
+from snapbeam.core.validate import InputError
 
 __all__ = ["rank_one_eigenpairs"]
 
 _Array = NDArray[np.float64]
+_HALVINGS = 2200
+"""More than halve any interval of two numbers until no number lies between."""
 
 
 def rank_one_eigenpairs(diagonal: _Array, c: float) -> tuple[_Array, _Array]:
@@ -34,6 +40,10 @@ def rank_one_eigenpairs(diagonal: _Array, c: float) -> tuple[_Array, _Array]:
         Columns with Y^T (Id + c 1 1^T) Y = Id.
     """
     n = diagonal.size
+    if not (np.isfinite(diagonal).all() and math.isfinite(c)):
+        raise InputError(
+            "model: its frequencies are beyond what a number holds; are the units of the beam right?"
+        )
     order = np.argsort(diagonal, kind="stable")
     d = diagonal[order]
     weight = c / (1.0 + c * n)
@@ -52,7 +62,7 @@ def rank_one_eigenpairs(diagonal: _Array, c: float) -> tuple[_Array, _Array]:
     from_origin = d[:, np.newaxis] - origin
     low = np.where(near_left, 0.0, -0.5 * width)
     high = np.where(near_left, 0.5 * width, 0.0)
-    while True:
+    for _ in range(_HALVINGS):
         shift = 0.5 * (low + high)
         if ((shift == low) | (shift == high)).all():
             break

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError, InputTypeError, integer, positive, within
+from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive, shown, within
 from snapbeam.model.beam import Beam
 from snapbeam.model.linear import LinearModes, linear_modes_of_beam, linear_modes_of_structure
 from snapbeam.model.matrices import Structure, checked_structure, damping_ratios
@@ -39,6 +39,10 @@ MODEL_QUANTITIES: dict[str, tuple[Quantity, Any]] = {
     ),
 }  # fmt: skip
 """What a reduction takes beside the beam, and its default."""
+
+
+_LEAST_COMPLIANCE = 1e-300
+"""1/kg, below which the inverse is no number."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
@@ -127,7 +131,7 @@ class ReducedModel:
             For a number of modes or a damping ratio out of range.
         """
         if not isinstance(beam, Beam):
-            raise InputTypeError(f"beam = {beam!r}: must be a Beam")
+            raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
         count = integer("modes", modes, 1, MAX_MODES)
         shapes = BucklingModes(beam.length, count)
         k = shapes.wavenumber
@@ -222,16 +226,26 @@ class ReducedModel:
         """Number of modes N."""
         return self.equilibrium.size
 
-    def shape_at(self, location: float) -> _Array:
-        """phi_i at a location x_s in (0, 1) of the length; shape (N,), m^0.5.
+    def shape_at(self, location: ArrayLike) -> _Array:
+        """phi_i at a location x_s in [0, 1] of the length, or at each of several; shape (..., N), m^0.5.
 
         A model given by matrices has its one contact point and returns it whatever the location.
         """
-        location = within("location", location, 0.0, 1.0)
+        if np.ndim(location) == 0:
+            at: Any = within("location", location, 0.0, 1.0, closed="both")
+        else:
+            at = finite_array("location", location)
+            if at.size and (at.min() < 0.0 or at.max() > 1.0):
+                raise InputError(f"location from {at.min():g} to {at.max():g}: must lie in [0, 1]")
         if self.beam is None:
             assert self.contact_shape is not None
-            return self.contact_shape
-        return BucklingModes(self.beam.length, self.modes).shape(location * self.beam.length)
+            several = np.ndim(at) > 0
+            return (
+                np.broadcast_to(self.contact_shape, (*at.shape, self.modes))
+                if several
+                else self.contact_shape
+            )
+        return np.moveaxis(BucklingModes(self.beam.length, self.modes).shape(at * self.beam.length), 0, -1)
 
     @cached_property
     def lightest_contact_mass(self) -> float:
@@ -246,7 +260,11 @@ class ReducedModel:
 
         It falls like rho S L / N as modes are added.
         """
-        return float(1.0 / np.sum((self.linear_modes.T @ self.shape_at(location)) ** 2))
+        location = within("location", location, 0.0, 1.0)
+        compliance = float(np.sum((self.linear_modes.T @ self.shape_at(location)) ** 2))
+        if not compliance > _LEAST_COMPLIANCE:
+            raise InputError(f"location = {location!r}: is so near a clamp that the beam does not move there")
+        return 1.0 / compliance
 
     # ------------------------------------------------------------------ linear modes about a well
 
@@ -315,7 +333,7 @@ class ReducedModel:
 
     def potential_energy(self, alpha: ArrayLike) -> _Array:
         """Potential energy, J, of amplitudes of shape (..., N); 0 for the straight structure."""
-        a = np.asarray(alpha, dtype=np.float64)
+        a = self._amplitudes("alpha", alpha)
         bent = a * self.stiffness if self.stiffness.ndim == 1 else a @ self.stiffness
         square = np.sum(a * a, axis=-1)
         energy: _Array = 0.5 * np.sum(a * bent, axis=-1) + 0.25 * self.tension_stiffness * square**2
@@ -323,9 +341,17 @@ class ReducedModel:
 
     def kinetic_energy(self, alpha_velocity: ArrayLike) -> _Array:
         """Kinetic energy, J, of amplitude velocities of shape (..., N)."""
-        v = np.asarray(alpha_velocity, dtype=np.float64)
+        v = self._amplitudes("alpha_velocity", alpha_velocity)
         energy: _Array = 0.5 * np.sum(v * (v @ self.mass), axis=-1)
         return energy
+
+    def _amplitudes(self, name: str, value: ArrayLike) -> _Array:
+        array = finite_array(name, value)
+        if array.ndim == 0 or array.shape[-1] != self.modes:
+            raise InputError(
+                f"{name} of shape {array.shape}: must have the shape (..., {self.modes}), a number a mode"
+            )
+        return array
 
     @property
     def wells(self) -> _Array:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.core.validate import InputError, finite_array
+from snapbeam.core.validate import InputError, finite_array, mapping, shown
 
 __all__ = ["ModalState", "State"]
 
@@ -49,6 +49,9 @@ class State:
     contact_time : array_like of shape (...)
         Seconds since the present contact began; negative where tip and beam are apart, NaN where the
         penetration decides.
+    striker_shift, striker_rate : array_like of shape (...)
+        Of a striker that is a body: displacement (m) and velocity (m/s) of its tip beyond the motion of its
+        drive, positive towards the upper well; NaN where there is none.
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitude and velocity that were carried along, k of them.
     passed : mapping, optional
@@ -68,6 +71,8 @@ class State:
     phase: _Array = np.nan  # type: ignore[assignment]
     striker_position: _Array = None  # type: ignore[assignment]
     contact_time: _Array = np.nan  # type: ignore[assignment]
+    striker_shift: _Array = np.nan  # type: ignore[assignment]
+    striker_rate: _Array = np.nan  # type: ignore[assignment]
     tangent: _Array | None = None
     passed: Mapping[str, _Array] | None = field(default=None, repr=False)
     modal: ModalState | None = field(default=None, repr=False)
@@ -91,6 +96,8 @@ class State:
         position = np.nan if self.striker_position is None else self.striker_position
         found["striker_position"] = _maybe("state striker_position", position, batch)
         found["contact_time"] = _maybe("state contact_time", self.contact_time, batch)
+        for name in ("striker_shift", "striker_rate"):
+            found[name] = _maybe(f"state {name}", getattr(self, name), batch)
         for name, array in found.items():
             array.setflags(write=False)
             object.__setattr__(self, name, array)
@@ -130,6 +137,8 @@ class State:
             phase=self.phase[index],
             striker_position=self.striker_position[index],
             contact_time=self.contact_time[index],
+            striker_shift=self.striker_shift[index],
+            striker_rate=self.striker_rate[index],
             tangent=tangent,
             passed=passed,
             modal=modal,
@@ -149,6 +158,8 @@ class State:
             phase=self.phase.ravel(),
             striker_position=self.striker_position.ravel(),
             contact_time=self.contact_time.ravel(),
+            striker_shift=self.striker_shift.ravel(),
+            striker_rate=self.striker_rate.ravel(),
             modal=modal,
         )
 
@@ -171,13 +182,13 @@ class State:
         amplitude[..., :kept], velocity[..., :kept] = self.amplitude[..., :kept], self.velocity[..., :kept]
         return State(
             amplitude=amplitude, velocity=velocity, phase=self.phase, striker_position=self.striker_position,
-            contact_time=self.contact_time,
+            contact_time=self.contact_time, striker_shift=self.striker_shift, striker_rate=self.striker_rate,
         )  # fmt: skip
 
 
 def _finite_where_known(name: str, value: ArrayLike, passed: Mapping[str, _Array] | None) -> _Array:
     """Numbers that are finite, but for states that were not reached, as their status says."""
-    status = None if passed is None else passed.get("status")
+    status = None if passed is None else mapping("passed", passed).get("status")
     if status is None:
         return finite_array(name, value)
     array = np.array(value, dtype=np.float64)
@@ -195,7 +206,10 @@ def _spread(name: str, array: _Array, batch: tuple[int, ...]) -> _Array:
 
 def _maybe(name: str, value: ArrayLike, batch: tuple[int, ...]) -> _Array:
     """Numbers of which NaN means that none is given."""
-    array = np.asarray(value)
+    try:
+        array = np.asarray(value)
+    except Exception:
+        raise InputError(f"{name} = {shown(value)}: must be an array of numbers") from None
     if array.dtype.kind not in "iuf" or np.isinf(array).any():
-        raise InputError(f"{name} = {value!r}: must be finite numbers, or NaN for none")
+        raise InputError(f"{name} = {shown(value)}: must be finite numbers, or NaN for none")
     return _spread(name, array.astype(np.float64), batch)

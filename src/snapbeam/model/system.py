@@ -16,7 +16,7 @@ import numpy as np
 from snapbeam.core.files import atomic_path, check_writable
 from snapbeam.core.findings import Finding
 from snapbeam.core.provenance import canonical_json
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.core.validate import InputError, InputTypeError, file_path, instance, shown
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.doubts import doubts_of
 from snapbeam.model.drive import Scale
@@ -68,20 +68,27 @@ class System:
     def __post_init__(self) -> None:
         model, contact, striker, start = self.model, self.contact, self.striker, self.start
         if not isinstance(model, ReducedModel):
-            raise InputTypeError(f"model = {model!r}: must be a ReducedModel")
+            raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")
         if isinstance(striker, (Shaker, RecordedDrive)):
             striker = striker.striker()
             object.__setattr__(self, "striker", striker)
         if striker is not None and not isinstance(striker, Striker):
-            raise InputTypeError(f"striker = {striker!r}: must be a Striker, a Shaker or a RecordedDrive")
+            raise InputTypeError(
+                f"striker = {shown(striker)}: must be a Striker, a Shaker or a RecordedDrive"
+            )
         if contact is not None and not isinstance(contact, ContactLaw):
             raise InputTypeError(
-                f"contact = {contact!r}: must be a law of contact, such as HertzContact(stiffness)"
+                f"contact = {shown(contact)}: must be a law of contact, such as HertzContact(stiffness)"
             )
         if contact is not None and contact.most_modes is not None and model.modes > contact.most_modes:
             raise InputError(
                 f"contact = {contact!r} with modes = {model.modes}: Newton's law needs one mode, since the "
                 "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
+            )
+        if striker is not None and striker.mass is not None and contact is not None and contact.impulsive:
+            raise InputError(
+                f"contact = {contact!r} with striker mass = {striker.mass:g} kg: under Newton's law the striker moves "
+                "as prescribed; leave the mass out, or use a HertzContact or a HuntCrossley"
             )
         if striker is not None and contact is None:
             raise InputError(
@@ -91,7 +98,7 @@ class System:
             model.require_bistable("a run")
         if start is not None:
             if not isinstance(start, State):
-                raise InputTypeError(f"start = {start!r}: must be a State")
+                raise InputTypeError(f"start = {shown(start)}: must be a State")
             if start.batch:
                 raise InputError(f"start: a batch of shape {start.batch}: must be one state")
             if start.modes != model.modes:
@@ -129,7 +136,7 @@ class System:
             For a name that the system does not have.
         """
         found = self.parameters
-        if name not in found:
+        if instance("name", name, str, "text") not in found:
             raise InputError(f"{name}: no parameter of this system; it has {', '.join(found)}")
         return found[name]
 
@@ -200,6 +207,7 @@ class System:
         """
         import tomllib
 
+        path = file_path("path", path)
         try:
             with open(path, "rb") as stream:
                 sections = tomllib.load(stream)
@@ -207,6 +215,8 @@ class System:
             raise InputError(f"path = {str(path)!r}: cannot be read, {error.strerror or error}") from None
         except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
             raise InputError(f"path = {str(path)!r}: is no TOML, {error}") from None
+        except ValueError as error:  # an integer of thousands of digits
+            raise InputError(f"path = {str(path)!r}: cannot be read, {error}") from None
         return cls.from_mapping(sections)
 
     def describe(self) -> str:
@@ -218,6 +228,12 @@ class System:
             )
             lines.append(f"{section:8s}  {words}")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        from snapbeam.core.showing import html_table
+
+        rows = [(section, text.strip()) for section, _, text in map(_parted, self.describe().splitlines())]
+        return html_table(f"System, hash {self.hash[:12]}", rows)
 
     def __repr__(self) -> str:
         parts = [f"modes={self.model.modes}", f"contact={self.contact!r}"]
@@ -251,3 +267,7 @@ def _brief(value: Any) -> str:
     if isinstance(value, np.ndarray):
         return f"array of shape {value.shape}" if value.size > 4 else json.dumps(value.tolist())
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _parted(line: str) -> tuple[str, str, str]:
+    return line.partition("  ")

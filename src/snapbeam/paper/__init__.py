@@ -44,6 +44,7 @@ __all__ = [
     "fig8",
     "figA9",
     "figB10",
+    "lifetimes",
     "low_frequency",
     "resonance",
     "sensitivity",
@@ -70,6 +71,7 @@ resonance = Recipe("resonance", "the resonance of the intrawell response and the
 waveforms = Recipe(
     "waveforms", "snap-throughs, impacts and modes of runs at random points of fig6", "studies"
 )
+lifetimes = Recipe("lifetimes", "how long snapping lasts over the plane of fig6 and fig7", "studies")
 transients = Recipe("transients", "what still changes after the cycles of fig7", "studies")
 windows = Recipe("windows", "amplitudes of transient responses near a clamp and near the centre", "studies")
 disturbances = Recipe(
@@ -81,7 +83,7 @@ FIGURES: dict[str, Recipe] = {
     recipe.name: recipe
     for recipe in (
         fig2, fig3, fig4, fig5, fig6, fig7, fig8, figA9, figB10, si5,
-        low_frequency, resonance, waveforms, transients, windows, disturbances, sensitivity,
+        low_frequency, resonance, waveforms, transients, lifetimes, windows, disturbances, sensitivity,
     )
 }  # fmt: skip
 """Every recipe by name: the figures of the paper, its fifth video, and those that its claims need beside."""

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.files import check_writable
+from snapbeam.core.netcdf import write_netcdf
 from snapbeam.core.validate import InputError
 from snapbeam.engines.mark import engine_mark
 
@@ -21,13 +22,16 @@ __all__ = ["load_results", "save_results"]
 def save_results(results: Mapping[str, xr.Dataset], path: Path, size: str) -> Path:
     """Write datasets, by name, with 32-bit floats; coordinates keep their 64 bits.
 
-    Every dataset keeps the attributes that say what it was computed from and by what; the file says which engine it was,
-    by its fingerprint.
+    Every dataset keeps the attributes that say what it was computed from and by what; the file says which engine
+    it was, by its fingerprint.
     """
     import xarray as xr
 
     target = check_writable(path, "output", (".nc",))
-    groups, encoding = {}, {}
+    groups: dict[str | None, xr.Dataset] = {
+        None: xr.Dataset(attrs={"paper_size": size, "engine_fingerprint": engine_mark()})
+    }
+    encoding: dict[str | None, dict[str, dict[str, object]]] = {}
     for name, dataset in results.items():
         compact = dataset.copy()
         packed: dict[str, dict[str, object]] = {}
@@ -37,12 +41,8 @@ def save_results(results: Mapping[str, xr.Dataset], path: Path, size: str) -> Pa
             packed[str(key)] = {"zlib": True, "complevel": 9, "shuffle": True} if variable.ndim else {}
             if variable.dtype == np.float64 and variable.ndim:
                 packed[str(key)]["dtype"] = "float32"
-        groups[f"/{name}"], encoding[f"/{name}"] = compact, packed
-    tree = xr.DataTree.from_dict(groups)
-    tree.attrs["paper_size"] = size
-    tree.attrs["engine_fingerprint"] = engine_mark()
-    with atomic_path(target) as temporary:
-        tree.to_netcdf(temporary, engine="h5netcdf", encoding=encoding)
+        groups[name], encoding[name] = compact, packed
+    write_netcdf(groups, target, encoding)
     return target
 
 

@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.core.validate import InputError, InputTypeError, finite_array, flag, positive
+from snapbeam.core.reporting import counting
+from snapbeam.core.validate import (
+    InputError,
+    InputTypeError,
+    finite_array,
+    flag,
+    instance,
+    positive,
+    shown,
+)
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble
 from snapbeam.engines.ensemble import Ensemble
@@ -43,7 +52,7 @@ def advance(
     *,
     integration: Integration | None = None,
     every: bool = False,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> State:
     """Where a system stands some periods of the excitation after it stood in a state.
 
@@ -67,7 +76,7 @@ def advance(
         Whether to give the states after each period, along a new first dimension, instead of the last one; their
         ``passed`` is of the whole way, but for the status, which is of each state.
     progress : callable, optional
-        Called as ``progress(done, total)`` with states.
+        Called as ``progress(done, total)`` with states; True writes a line to standard error.
 
     Returns
     -------
@@ -82,12 +91,15 @@ def advance(
         For bad input; for tangents under a law of contact whose force jumps; for more periods than a record holds.
     """
     if not isinstance(system, System):
-        raise InputTypeError(f"system = {system!r}: must be a System")
+        raise InputTypeError(f"system = {shown(system)}: must be a System")
     if state is not None and not isinstance(state, State):
-        raise InputTypeError(f"state = {state!r}: must be a State")
-    integration = Integration() if integration is None else integration
+        raise InputTypeError(f"state = {shown(state)}: must be a State")
+    integration = instance(
+        "integration", Integration() if integration is None else integration, Integration, "an Integration"
+    )
     span = positive("periods", periods)
     every = flag("every", every)
+    report = counting(progress, "advance", "states")
     if state is None:
         require_motion(system)
         state = system.start if system.start is not None else rest_state(system.model, system.striker)
@@ -106,11 +118,11 @@ def advance(
     _, engine = resolve("cpu")
     vectors = None
     if tangent is None:
-        landings = engine.march_landing(ensemble, integration.threads, progress)
+        landings = engine.march_landing(ensemble, integration.threads, report)
     else:
         given = _checked_tangent(system, tangent, flat)
         back = system.model.linear_modes.T @ system.model.mass
-        landings, moved = engine.march_tangents(ensemble, given @ back.T, integration.threads, progress)
+        landings, moved = engine.march_tangents(ensemble, given @ back.T, integration.threads, report)
         moved[~np.isin(landings.books["status"], _REACHED)] = np.nan
         vectors = (moved @ system.model.linear_modes.T).reshape((*state.batch, *moved.shape[1:]))
     found = _states(ensemble, landings, every)
@@ -122,6 +134,16 @@ def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
     if system.contact is not None and not system.contact.keeps.smooth:
         raise InputError(
             f"tangent with contact = {system.contact!r}: its force jumps, so that the tangent flow does; give none"
+        )
+    if system.striker is not None and system.striker.mass is not None:
+        raise InputError(
+            f"tangent with striker mass = {system.striker.mass:g} kg: the tangent flow is that of the beam alone; give "
+            "none, or leave the mass out"
+        )
+    if system.contact is not None and not system.contact.keeps.tangent:
+        raise InputError(
+            f"tangent with contact = {system.contact!r}: the tangent flow is known for laws whose force depends on the "
+            "penetration alone, such as HertzContact(stiffness); give none"
         )
     given = finite_array("tangent", tangent)
     shape = (2, flat.modes)
@@ -163,7 +185,15 @@ def _shaped(
     tangent: _Array | None,
 ) -> State:
     """States as one batch of the shape that was asked for."""
-    names = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
+    names = (
+        "amplitude",
+        "velocity",
+        "phase",
+        "striker_position",
+        "contact_time",
+        "striker_shift",
+        "striker_rate",
+    )
     shape = (len(found), *batch) if every else batch
     arrays = {}
     for name in names:

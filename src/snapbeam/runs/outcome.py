@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass, RunStatus
+from snapbeam.core.showing import html_table
+from snapbeam.core.validate import InputError, integer, mapping
 from snapbeam.engines.outcomes import STATISTICS
 
 __all__ = ["Outcome"]
@@ -41,6 +43,9 @@ class Outcome(Mapping[str, Any]):
     decided_at: float
 
     def __init__(self, values: Mapping[str, Any]) -> None:
+        mapping("values", values)
+        if missing := {"response", "status"} - set(values):
+            raise InputError(f"values: without {', '.join(sorted(missing))}")
         found = {
             name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()
         }
@@ -50,6 +55,10 @@ class Outcome(Mapping[str, Any]):
     @classmethod
     def from_statistics(cls, statistics: Mapping[str, NDArray[np.generic]], index: int = 0) -> Outcome:
         """One run of what :func:`snapbeam.engines.answer.statistics_of` returns."""
+        mapping("statistics", statistics)
+        index = integer(
+            "index", index, 0, max(0, min((np.size(each) for each in statistics.values()), default=1) - 1)
+        )
         return cls({name: array[index] for name, array in statistics.items()})
 
     def __getattr__(self, name: str) -> Any:
@@ -73,6 +82,10 @@ class Outcome(Mapping[str, Any]):
     def __repr__(self) -> str:
         ended = "" if self.status is RunStatus.OK else f", {self.status.name}"
         return f"<Outcome {self.response.label}{ended}, {self.crossings} crossings, {self.impacts} impacts>"
+
+    def _repr_html_(self) -> str:
+        rows = [line.split(maxsplit=1) for line in self.table().splitlines()]
+        return html_table(f"Outcome: {self.response.label}", rows)
 
     def table(self) -> str:
         """Every statistic with its unit and its meaning, a line each."""

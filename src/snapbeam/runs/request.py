@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from snapbeam.core.validate import InputError, InputTypeError, finite_array, positive
+from snapbeam.core.validate import InputError, InputTypeError, finite_array, positive, shown
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.drive import Sine
 from snapbeam.model.integration import Integration
@@ -58,7 +58,7 @@ def system_of(
 ) -> tuple[System, Integration]:
     """What version 0.1 took as parts and options, as a system and an integration."""
     if not isinstance(model, ReducedModel):
-        raise InputTypeError(f"model = {model!r}: must be a System or a ReducedModel")
+        raise InputTypeError(f"model = {shown(model)}: must be a System or a ReducedModel")
     for name in options:
         if name not in _OPTIONS:
             raise InputTypeError(f"{name}: no parameter of a run; must be one of {', '.join(_OPTIONS)}")
@@ -80,7 +80,7 @@ def integration_of(parts: tuple[Any, ...], options: dict[str, Any]) -> Integrati
         )
     integration = given[0] if given and given[0] is not None else Integration()
     if not isinstance(integration, Integration):
-        raise InputTypeError(f"integration = {integration!r}: must be an Integration")
+        raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
     return integration
 
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from snapbeam.core.showing import html_table, plotter
+from snapbeam.core.validate import choice
+from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
@@ -14,6 +17,14 @@ from snapbeam.runs.tolerance import Accuracy
 
 if TYPE_CHECKING:
     import xarray as xr
+
+_KINDS = ("run", "modal_amplitudes", "energies", "spectrum", "phase_portrait")
+
+
+def _described(system: System) -> list[tuple[str, str, str]]:
+    """Sections of a system and what stands in them."""
+    return [line.partition("  ") for line in system.describe().splitlines()]
+
 
 __all__ = ["Run"]
 
@@ -64,6 +75,22 @@ class Run:
         from snapbeam.runs.save import save_run
 
         save_run(self, path)
+
+    def plot(self, kind: str = "run", ax: Any = None, **options: Any) -> Any:
+        """Draw the run: ``"run"``, ``"modal_amplitudes"``, ``"energies"``, ``"spectrum"`` or ``"phase_portrait"``.
+
+        Options are those of the function ``plot_...`` of :mod:`snapbeam.figures`; returns the axes.
+        """
+        choice("kind", kind, _KINDS)
+        return plotter(f"plot_{kind}")(self, ax=ax, **options)
+
+    def _repr_html_(self) -> str:
+        shown = ("crossings", "impacts", "peak_force", "shaker_work", "contact_share")
+        rows = [
+            (STATISTICS[name].words, f"{self.outcome[name]:.5g}", STATISTICS[name].unit) for name in shown
+        ]
+        rows += [(section, line.strip(), "") for section, _, line in _described(self.system)]
+        return html_table(f"Run: {self.outcome.response.label}, {self.outcome.status.advice}", rows)
 
     def __repr__(self) -> str:
         samples = self.dataset.sizes["time"]

@@ -52,9 +52,13 @@ def run_dataset(
     *times* are the instants that were asked for; those that the run did not reach are NaN, with ``valid`` = 0.
     """
     structure, model = ensemble.structure, system.model
+    values = recorded.values.copy()
     scale, speed = system.scale.length, system.scale.length * system.scale.omega
     alpha, rate = structure.amplitudes(recorded.q), structure.velocities(recorded.p)
-    values = recorded.values
+    own = np.zeros(recorded.q.shape[0])
+    if structure.body_mass is not None:
+        own = 0.5 * (recorded.p[:, -1] ** 2 + (structure.omega[-1] * recorded.q[:, -1]) ** 2)
+        values[:, 2] -= own
     location = 0.5 if system.striker is None else system.striker.location
     shape = model.shape_at(location)
     displacement = alpha @ shape / scale
@@ -75,7 +79,11 @@ def run_dataset(
     variables |= {"modal_amplitude": alpha, "modal_velocity": rate, "energy_beam": values[:, 2]}
     if struck:
         variables |= {"energy_contact": values[:, 3], "work_shaker": values[:, 4]}
+    if structure.body_mass is not None:
+        variables["energy_striker"] = own
     variables["energy_dissipated"] = values[:, 5]
+    if struck and system.contact is not None and system.contact.loses:
+        variables["energy_lost_contact"] = values[:, 6]
     at = recorded.times
     valid = np.asarray(np.isfinite(values[:, 2:]).all(axis=1) & np.isfinite(alpha).all(axis=1))
     if times is not None and at.size < times.size:

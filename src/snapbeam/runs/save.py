@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from snapbeam.core.codes import ResponseClass, RunStatus
-from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.validate import InputError
+from snapbeam.core.files import check_writable
+from snapbeam.core.netcdf import write_netcdf
+from snapbeam.core.validate import InputError, file_path
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import quantities
@@ -48,13 +49,19 @@ def save_run(run: Run, path: str | os.PathLike[str]) -> None:
     if run.accuracy is not None:
         described["snapbeam_accuracy"] = _json(vars(run.accuracy))
     if run.end is not None:
-        names = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
+        names = (
+            "amplitude",
+            "velocity",
+            "phase",
+            "striker_position",
+            "contact_time",
+            "striker_shift",
+            "striker_rate",
+        )
         described["snapbeam_end"] = _json({name: getattr(run.end, name) for name in names})
     root = run.dataset.assign_attrs(described)
-    with atomic_path(target) as temporary:
-        _write(root, temporary, "w", None)
-        _write(run.impacts.assign_attrs({}), temporary, "a", "impacts")
-        _write(outcome_dataset(run.outcome), temporary, "a", "outcome")
+    groups = {None: root, "impacts": run.impacts.assign_attrs({}), "outcome": outcome_dataset(run.outcome)}
+    write_netcdf(groups, target, {name: _encoding(dataset) for name, dataset in groups.items()})
 
 
 def load_run(path: str | os.PathLike[str]) -> Run:
@@ -67,6 +74,7 @@ def load_run(path: str | os.PathLike[str]) -> Run:
     """
     import xarray as xr
 
+    path = file_path("path", path)
     try:
         parts = {name: xr.load_dataset(path, engine="h5netcdf", group=name) for name in (None, *_GROUPS)}
     except (OSError, ValueError, KeyError) as error:
@@ -116,9 +124,8 @@ def code_flags(kinds: type[ResponseClass] | type[RunStatus]) -> dict[str, Any]:
     }
 
 
-def _write(dataset: xr.Dataset, path: Any, mode: Any, group: str | None) -> None:
-    encoding = {name: _COMPRESSION for name, variable in dataset.variables.items() if variable.ndim}
-    dataset.to_netcdf(path, mode=mode, group=group, engine="h5netcdf", encoding=encoding)
+def _encoding(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
+    return {name: _COMPRESSION for name, variable in dataset.variables.items() if variable.ndim}
 
 
 def _json(value: Any) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from snapbeam.core.validate import InputError, InputTypeError, axis, finite_array
+from snapbeam.core.validate import InputError, InputTypeError, axis, finite_array, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,8 +44,12 @@ SCHEMA: dict[str, Quantity] = {
     "modal_velocity": Quantity(("time", "mode"), "m^0.5/s", "modal velocity"),
     "energy_beam": Quantity(("time",), "J", "kinetic and potential energy of the beam, above its well"),
     "energy_contact": Quantity(("time",), "J", "energy stored in the contact"),
+    "energy_striker": Quantity(
+        ("time",), "J", "energy of the striker's motion beyond that of its drive, in its suspension included"
+    ),
     "work_shaker": Quantity(("time",), "J", "work done by the striker"),
-    "energy_dissipated": Quantity(("time",), "J", "energy dissipated by damping"),
+    "energy_dissipated": Quantity(("time",), "J", "energy dissipated"),
+    "energy_lost_contact": Quantity(("time",), "J", "part of it that was lost in contact"),
     "valid": Quantity(("time",), "1", "whether the sample was measured"),
 }
 """Every variable a run may have, by name; ``time``, ``cycle`` and ``mode`` are coordinates."""
@@ -154,7 +158,7 @@ def check_trajectory(dataset: xr.Dataset, require: Iterable[str] = ("displacemen
             raise InputError(f"{name} with dimensions {variable.dims}: must have dimensions {quantity.dims}")
         units = variable.attrs.get("units")
         if _FORMER_UNITS.get(str(units), units) != quantity.units:
-            raise InputError(f"{name} in units {units!r}: must be in {quantity.units!r}")
+            raise InputError(f"{name} in units {shown(units)}: must be in {quantity.units!r}")
         good = np.isfinite(variable.values)
         if valid is not None and name not in _COORDINATES:
             good = good | ~(valid if good.ndim == 1 else valid[:, None])

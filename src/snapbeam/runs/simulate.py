@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any, overload
 
 import numpy as np
@@ -11,9 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
 from snapbeam.core.findings import tell
+from snapbeam.core.reporting import counting, sharing
 from snapbeam.core.validate import InputError, InputTypeError, finite_array
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble, plans_of, run_columns
+from snapbeam.engines.cpu.driver import usable_cores
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.outputs import Recorded
 from snapbeam.engines.registry import resolve
@@ -50,8 +53,19 @@ def simulate(
     /,
     *,
     sample_times: ArrayLike | None = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Callable[[float], object] | bool | None = None,
 ) -> Run: ...
+
+
+@overload
+def simulate(
+    system: Sequence[System],
+    integration: Integration | None = None,
+    /,
+    *,
+    sample_times: ArrayLike | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
+) -> list[Run]: ...
 
 
 @overload
@@ -69,17 +83,17 @@ def simulate(
     sample_times: ArrayLike | None = None,
     early_decision: bool = False,
     reference_freq: float | None = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Callable[[float], object] | bool | None = None,
 ) -> Run: ...
 
 
 def simulate(
-    model: System | ReducedModel,
+    model: System | Sequence[System] | ReducedModel,
     *parts: Any,
     sample_times: ArrayLike | None = None,
-    progress: Callable[[float], object] | None = None,
+    progress: Any = None,
     **options: Any,
-) -> Run:
+) -> Run | list[Run]:
     """Integrate one run and record it.
 
     The beam starts at rest in the well that the striker pushes it out of (the lower one for a striker below), the tip
@@ -92,8 +106,8 @@ def simulate(
 
     Parameters
     ----------
-    system : System
-        What is run.
+    system : System, or a list of them
+        What is run; several are run side by side on all cores (``integration.threads``).
     integration : Integration, optional
         How: cycles, steps or accuracy or tolerance, early decision.  One recorded run is always the CPU's work.
     sample_times : array_like, optional
@@ -101,11 +115,12 @@ def simulate(
         excitation or of the first mode, and the ends of the steps of each impact.  Instants that a run which was
         decided early or failed did not reach are NaN, with ``valid`` = 0.
     progress : callable, optional
-        Called with the share of the run that is done, several times a second.
+        Called with the share of the run that is done, several times a second; True writes a line to standard error.
+        Of several runs: called as ``progress(done, total)``.
 
     Returns
     -------
-    Run
+    Run, or a list of them
 
     Raises
     ------
@@ -113,9 +128,10 @@ def simulate(
         For bad input, and for a run whose samples would take more than 4 GiB.  A run that fails numerically does not
         raise: ``run.outcome.status`` says why.
     """
+    if isinstance(model, (list, tuple)):
+        return _several(model, parts, options, sample_times, progress)
     system, integration = asked(model, parts, options)
-    if progress is not None and not callable(progress):
-        raise InputTypeError(f"progress = {progress!r}: must be callable, as progress(share)")
+    report = sharing(progress, "run")
     tell(system.findings())
     plan, reached = plans_of(system, integration, run_columns(system, {}))[0], None
     if integration.tolerance is not None:
@@ -129,7 +145,9 @@ def simulate(
     _check_memory(system, count, times is None)
     regular = np.linspace(0.0, end, count) if times is None else times
     _, engine = resolve("cpu")
-    recorded = joined(list(engine.record(ensemble, regular, times is None, progress)))
+    recorded = joined(list(engine.record(ensemble, regular, times is None, report)))
+    if report is not None:
+        report(1.0)
     lasted = end / period
     outcome = Outcome.from_statistics(statistics_of(ensemble, recorded.books, lasted))
     if times is None and outcome.status != RunStatus.OK:
@@ -152,6 +170,29 @@ def simulate(
         accuracy=reached,
         end=None if outcome.status not in _ENDED else _end_state(ensemble, recorded),
     )
+
+
+def _several(
+    systems: Sequence[Any], parts: Any, options: Any, sample_times: ArrayLike | None, progress: Any
+) -> list[Run]:
+    """Runs of several systems, on all cores: kernels give up the interpreter's lock."""
+    report = counting(progress, "simulate", "runs")
+    for at, system in enumerate(systems):
+        if not isinstance(system, System):
+            raise InputTypeError(f"system[{at}] = {system!r}: must be a System")
+    checked = [asked(system, parts, dict(options)) for system in systems]
+    threads = next((each.threads for _, each in checked), None) or usable_cores()
+    with ThreadPoolExecutor(max_workers=max(1, min(threads, len(systems) or 1))) as pool:
+        waiting = [pool.submit(simulate, system, each, sample_times=sample_times) for system, each in checked]
+        try:
+            for done, future in enumerate(as_completed(waiting), 1):
+                future.result()
+                if report is not None:
+                    report(done, len(systems))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return [future.result() for future in waiting]
 
 
 def _own_attributes(system: System, integration: Integration, lasted: float) -> dict[str, Any]:

@@ -34,8 +34,10 @@ def states_of(
         velocity=structure.velocities(p),
         phase=runs["phase"] + 2.0 * math.pi * turned,
         striker_position=np.where(
-            np.isfinite(ensemble.highest), structure.sign * (runs["rest_contact"] + runs["offset"]), np.nan
+            ensemble.highest > -np.inf, structure.sign * (runs["rest_contact"] + runs["offset"]), np.nan
         ),
         contact_time=np.where(contact_ticks >= 0, contact_ticks * tick, -1.0),
+        striker_shift=structure.body_of(q),
+        striker_rate=structure.body_of(p),
         modal=ModalState(q, p, home.astype(np.float64), np.array(runs["offset"]), structure.hash),
     )

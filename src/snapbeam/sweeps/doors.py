@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from snapbeam.core.validate import InputError, InputTypeError, flag, integer, positive, within
+from snapbeam.core.reporting import counting
+from snapbeam.core.validate import (
+    InputError,
+    InputTypeError,
+    finite_array,
+    flag,
+    integer,
+    positive,
+    shown,
+    within,
+)
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.integration import Integration
 from snapbeam.model.reduction import ReducedModel
@@ -55,7 +65,7 @@ def map_setup(
     axes, scalars = {}, {}
     for name, value in given.items():
         full, low, high, closed = _AXES[name]
-        if np.ndim(np.asarray(value)) == 0:
+        if _is_number(value):
             scalars[name] = within(name, value, low, high, closed=closed)
         else:
             axes[full] = value
@@ -74,6 +84,14 @@ def map_setup(
     return sweep_setup(system, points, Integration(cycles=integer("cycles", cycles, 1, 10**7), **options))
 
 
+def _is_number(value: Any) -> bool:
+    """Whether it stands for the whole map; lists of unequal lengths do not."""
+    try:
+        return np.ndim(value) == 0
+    except ValueError:
+        return False
+
+
 def response_map(
     model: ReducedModel,
     contact: ContactLaw,
@@ -89,7 +107,7 @@ def response_map(
     engine: str = "auto",
     early_decision: bool = False,
     threads: int | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
     """Class and statistics of the response over any of frequency ratio, velocity amplitude and location.
 
@@ -129,7 +147,7 @@ def response_map(
         cycles=cycles, side=side, reference_freq=reference_freq, step=step, accuracy=accuracy, engine=engine,
         early_decision=early_decision, threads=threads,
     )  # fmt: skip
-    return _plain(setup, compute_sweep(setup, Keeping(), progress=progress))
+    return _plain(setup, compute_sweep(setup, Keeping(), progress=counting(progress, "map")))
 
 
 def _plain(setup: SweepSetup, dataset: xr.Dataset) -> xr.Dataset:
@@ -151,7 +169,7 @@ def long_map(
     halve_step: bool = False,
     chunk: int | None = None,
     output: str | os.PathLike[str] | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
     note: Note | None = None,
     tally: Tally | None = None,
     config: dict[str, Any] | None = None,
@@ -193,7 +211,7 @@ def long_map(
         refine_levels=refine_levels,
         replicas=repeats,
         output=output,
-        progress=progress,
+        progress=counting(progress, "map"),
     )
     return _plain(setup, dataset)
 
@@ -207,7 +225,7 @@ def threshold_curve(
     location: ArrayLike = 1.0 / 2.1,
     search: str = "fast",
     share: float = 0.1,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
     **options: Any,
 ) -> xr.Dataset:
     """The threshold of interwell response along frequency ratio or location, as a band.
@@ -241,18 +259,19 @@ def threshold_curve(
     """
     import xarray as xr
 
-    if np.ndim(np.asarray(velocity_amplitude)) == 0 or np.size(velocity_amplitude) < 2:
+    if finite_array("velocity_amplitude", velocity_amplitude).size < 2:
         raise InputError("velocity_amplitude: must be an array of at least two amplitudes to choose from")
     over = {
-        name: value
+        name: finite_array(name, value)
         for name, value in (("frequency_ratio", frequency_ratio), ("location", location))
-        if np.ndim(np.asarray(value)) > 0
+        if finite_array(name, value).ndim > 0
     }
     if len(over) != 1:
         raise InputError(
             "frequency_ratio, location: one of them must be an array, the other a number, "
             f"not {len(over)} arrays"
         )
+    told = counting(progress, "threshold", "runs")
     models = [model] if isinstance(model, ReducedModel) else _several(model)
     curves = []
     for at, each in enumerate(models):
@@ -262,8 +281,8 @@ def threshold_curve(
         )  # fmt: skip
 
         def report(done: int, total: int, number: int = at) -> None:
-            if progress is not None:
-                progress(number * total + done, len(models) * total)
+            if told is not None:
+                told(number * total + done, len(models) * total)
 
         curves.append(
             threshold(
@@ -288,7 +307,7 @@ def threshold_curve(
 def _several(models: Any) -> list[ReducedModel]:
     listed = list(models) if isinstance(models, Sequence) else []
     if not listed or not all(isinstance(each, ReducedModel) for each in listed):
-        raise InputTypeError(f"model = {models!r}: must be a ReducedModel or a list of them")
+        raise InputTypeError(f"model = {shown(models)}: must be a ReducedModel or a list of them")
     modes = [each.modes for each in listed]
     if len(set(modes)) < len(modes):
         raise InputError(f"model: the numbers of modes {modes} must differ from each other")

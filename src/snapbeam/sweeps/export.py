@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from snapbeam.core.codes import ResponseClass
-from snapbeam.core.files import atomic_path
+from snapbeam.core.netcdf import netcdf_file
 from snapbeam.runs.save import code_flags
 from snapbeam.sweeps.compute.task import CLASSES, PointWork
 from snapbeam.sweeps.compute.tasks import Rows
@@ -55,10 +55,9 @@ def to_netcdf(work: PointWork, points: Points, rows: Rows, attrs: dict[str, Any]
 
     The file is the one that :func:`to_dataset` and xarray would write.
     """
-    import h5netcdf
     import h5py
 
-    with atomic_path(path) as temporary, h5netcdf.File(temporary, "w") as file:
+    with netcdf_file(path) as file:
         file.attrs.update({name: value for name, value in attrs.items() if value is not None})
         coords = _coordinates(work, points)
         scalars = " ".join(name for name, (dims, _, _) in coords.items() if name not in dims)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from snapbeam.config.parameters import Parameter, lookup, parameters, short_names
 from snapbeam.config.physical import PHYSICAL, physical_name
 from snapbeam.core.provenance import array_hash
-from snapbeam.core.validate import InputError, InputTypeError, axis, finite_array
+from snapbeam.core.validate import InputError, InputTypeError, axis, finite_array, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -169,7 +169,7 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
         return _list_of({str(name): np.asarray(given[name]) for name in given.columns})
     if not isinstance(given, Mapping):
         raise InputTypeError(
-            f"axes = {given!r}: must be a mapping of parameters to values, an xarray.Dataset or a table of points"
+            f"axes = {shown(given)}: must be a mapping of parameters to values, an xarray.Dataset or a table of points"
         )
     if not given:
         raise InputError("axes: must name at least one parameter to sweep")
@@ -198,7 +198,7 @@ def _axis(row: Parameter, name: str, values: Any) -> NDArray[Any]:
             raise InputError(f"{name} = {words}: must differ from each other")
         return np.array(words)
     if np.ndim(values) == 0:
-        raise InputError(f"{name} = {values!r}: must be an array; put a single value into the system")
+        raise InputError(f"{name} = {shown(values)}: must be an array; put a single value into the system")
     closed = item.closed if item.kind is float else "both"
     array = axis(name, values, item.low, item.high, closed=closed)
     if item.kind is int:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from snapbeam.core.validate import InputError, integer, positive
+from snapbeam.core.validate import InputError, flag, integer, positive
 from snapbeam.model.start import rest_state
 from snapbeam.model.state import State
 from snapbeam.model.system import System
@@ -44,6 +44,7 @@ class Replicas:
 
     def __post_init__(self) -> None:
         integer("replicas", self.count, 0, 10_000)
+        flag("halve_step", self.halve_step)
         positive("replica_size", self.size, "m")
         integer("replica_seed", self.seed, 0, 2**63 - 1)
         if self.count == 0 and not self.halve_step:

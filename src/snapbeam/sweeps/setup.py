@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from snapbeam.config.parameters import lookup
 from snapbeam.core.codes import ResponseClass, RunStatus
 from snapbeam.core.findings import tell
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.engines.outcomes import STATISTICS
@@ -104,6 +104,7 @@ class SweepSetup:
                     modes=system.model.modes,
                     law=ensemble.law,
                     drive=ensemble.drive,
+                    body=ensemble.structure.body_mass is not None,
                 )[1]
                 books = engine.run_ensemble(ensemble, threads, report)
                 for name, values in statistics_of(ensemble, books).items():
@@ -274,10 +275,10 @@ class SweepSetup:
 def sweep_setup(system: System, axes: Any, integration: Integration | None = None) -> SweepSetup:
     """Check what is asked of a sweep; the parameters are those of :func:`snapbeam.sweep`."""
     if not isinstance(system, System):
-        raise InputTypeError(f"system = {system!r}: must be a System")
+        raise InputTypeError(f"system = {shown(system)}: must be a System")
     integration = Integration() if integration is None else integration
     if not isinstance(integration, Integration):
-        raise InputTypeError(f"integration = {integration!r}: must be an Integration")
+        raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
     if integration.tolerance is not None:
         raise InputError(
             f"tolerance = {integration.tolerance:g}: is for one run; give a sweep a step, or accuracy = 'reference'"
@@ -291,6 +292,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         cycles=integration.cycles_or_default,
         modes=system.model.modes,
         law=law,
+        body=system.striker is not None and system.striker.mass is not None,
         **({} if system.striker is None else {"drive": type(system.striker.drive)}),
     )[0]
     setup = SweepSetup(system, integration.replace(engine=resolved), points)

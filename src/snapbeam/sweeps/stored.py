@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.validate import InputError, InputTypeError, flag, integer
+from snapbeam.core.files import check_writable
+from snapbeam.core.netcdf import write_netcdf
+from snapbeam.core.validate import InputError, InputTypeError, flag, integer, shown
 from snapbeam.sweeps.compute.cluster import Cluster, open_client, parse_cluster
-from snapbeam.sweeps.compute.task import PointWork
+from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Keeper, MemoryKeeper, Rows, Stage
 from snapbeam.sweeps.compute.workers import ClusterWorkers, Failure, HereWorkers, Workers
+from snapbeam.sweeps.errors import StoreError
 from snapbeam.sweeps.export import to_dataset, to_netcdf
 from snapbeam.sweeps.keep.store import MapStore
 from snapbeam.sweeps.points import Points
@@ -27,9 +29,15 @@ from snapbeam.sweeps.setup import Progress, SweepSetup
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Keeping", "Tally", "compute_sweep"]
+__all__ = ["Keeping", "Tally", "compute_sweep", "compute_table"]
 
 Note = Callable[[str], object]
+
+
+_POINT_BYTES = 700
+"""Memory that a point of a sweep takes until its dataset is made."""
+_MEMORY = 4 * 2**30
+_MOST_POINTS = 10**9
 
 
 class _Incomplete(Exception):
@@ -85,7 +93,7 @@ class Keeping:
 
     def __post_init__(self) -> None:
         if self.path is not None and not isinstance(self.path, (str, os.PathLike)):
-            raise InputTypeError(f"store = {self.path!r}: must be a folder")
+            raise InputTypeError(f"store = {shown(self.path)}: must be a folder")
         flag("verify", self.verify)
         if self.path is None and self.verify:
             raise InputError("verify: needs a store")
@@ -123,6 +131,10 @@ class StoreKeeper:
                 f"{stage.name}: {len(damaged)} of {stage.tasks} tasks were damaged and are computed again"
             )
         todo = sorted(damaged if self.only_damaged else pending, key=_scattered)
+        if todo and store.read_only:
+            raise StoreError(
+                f"store = {str(store.path)!r}: is read-only, and {len(todo)} of {stage.tasks} tasks are to be computed"
+            )
         sizes = {task: int(np.diff(stage.bounds(task))[0]) for task in todo}
         total, done = sum(sizes.values()), 0
         if total < stage.size and not self.only_damaged:
@@ -138,7 +150,7 @@ class StoreKeeper:
                 tally.failed.append((stage.name, task, result.reason))
                 self.note(f"{stage.name}: task {task} was given up: it {result.reason}")
             else:
-                store.commit(stage, task, result.columns, result.processor)
+                store.commit(stage, task, result.columns, result.maker)
                 tally.computed += 1
                 tally.runs += sizes[task] * self.work.runs_per_point
             done += sizes[task]
@@ -162,18 +174,31 @@ def compute_sweep(
     """Compute a sweep that was checked; see :func:`snapbeam.sweep`."""
     levels = integer("refine_levels", refine_levels, 0, MAX_LEVELS)
     if replicas is not None and not isinstance(replicas, Replicas):
-        raise InputTypeError(f"replicas = {replicas!r}: must be a number of repeats, or Replicas")
+        raise InputTypeError(f"replicas = {shown(replicas)}: must be a number of repeats, or Replicas")
     if progress is not None and not callable(progress):
-        raise InputTypeError(f"progress = {progress!r}: must be callable, as progress(done, total)")
+        raise InputTypeError(f"progress = {shown(progress)}: must be callable, as progress(done, total)")
     target = None if output is None else check_writable(output, "output", (".nc",))
     asked = None if cluster is None else parse_cluster(cluster)
     if keeping.path is None and asked is not None:
         raise InputError("cluster: needs a store")
+    _require_room(setup.points.size, keeping)
     work = PointWork(setup, replicas)
     with _keeper(work, keeping, asked) as keeper:
         points, rows = _computed(keeper, levels, progress)
         more = {} if not isinstance(keeper, StoreKeeper) else keeper.store.made_with()
         return _result(work, points, rows, more, target)
+
+
+def _require_room(points: int, keeping: Keeping) -> None:
+    """Refuse a sweep whose results would not fit, before anything is computed."""
+    size = points * _POINT_BYTES
+    if keeping.path is None and size > _MEMORY:
+        raise InputError(
+            f"{points} points would take {size / 2**30:.3g} GiB of memory, the limit is {_MEMORY / 2**30:.0f} GiB: "
+            "give fewer points, or a store"
+        )
+    if points > _MOST_POINTS:
+        raise InputError(f"{points} points: must be at most {_MOST_POINTS}")
 
 
 def _computed(keeper: Keeper, levels: int, progress: Progress | None) -> tuple[Points, Rows]:
@@ -223,10 +248,32 @@ def _result(
         dataset["computed"] = (points.dims, points.arranged(rows.computed.ravel()), labels)
         if target is None:
             return dataset
-        with atomic_path(target) as temporary:
-            dataset.to_netcdf(temporary, engine="h5netcdf")
+        write_netcdf(dataset, target)
     elif target is None:
         return to_dataset(work, points, rows, attrs)
     else:
         to_netcdf(work, points, rows, attrs, target)
     return xr.open_dataset(target, engine="h5netcdf")
+
+
+def compute_table(
+    work: PointWork, keeping: Keeping, *, cluster: str | None = None, progress: Progress | None = None
+) -> tuple[ResultTable, dict[str, Any]]:
+    """Compute any work over the points of its sweep, kept and resumed as a sweep is.
+
+    Returns
+    -------
+    table : ResultTable
+        A row a point, in the order of counting.
+    made_with : dict
+        What the store says of how it was made.
+    """
+    if progress is not None and not callable(progress):
+        raise InputTypeError(f"progress = {progress!r}: must be callable, as progress(done, total)")
+    asked = None if cluster is None else parse_cluster(cluster)
+    if keeping.path is None and asked is not None:
+        raise InputError("cluster: needs a store")
+    with _keeper(work, keeping, asked) as keeper:
+        points, rows = _computed(keeper, 0, progress)
+        table = rows.read(0, points.size)
+        return table, {} if not isinstance(keeper, StoreKeeper) else keeper.store.made_with()

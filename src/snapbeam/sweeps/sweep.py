@@ -6,6 +6,8 @@ import os
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from snapbeam.core.reporting import counting
+from snapbeam.core.validate import integer
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.sweeps.replicas import Replicas
@@ -28,7 +30,7 @@ def sweep(
     refine_levels: int = 0,
     replicas: Replicas | int | None = None,
     output: str | os.PathLike[str] | None = None,
-    progress: Callable[[int, int], object] | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
     """Class and statistics of the response over any parameters, and any mixture of them.
 
@@ -58,7 +60,7 @@ def sweep(
     output : path, optional
         NetCDF file to write, a block at a time, so that memory does not grow with the sweep.
     progress : callable, optional
-        Called as ``progress(done, total)`` with points.
+        Called as ``progress(done, total)`` with points; True writes a line to standard error.
 
     Returns
     -------
@@ -80,6 +82,8 @@ def sweep(
     """
     setup = sweep_setup(system, axes, integration)
     keeping = store if isinstance(store, Keeping) else Keeping(store)
+    if replicas is not None and not isinstance(replicas, Replicas):
+        replicas = integer("replicas", replicas, 0, 10_000)
     repeats = Replicas(replicas) if isinstance(replicas, int) and replicas else replicas or None
     return compute_sweep(
         setup,
@@ -88,5 +92,5 @@ def sweep(
         refine_levels=refine_levels,
         replicas=repeats,
         output=output,
-        progress=progress,
+        progress=counting(progress, "sweep"),
     )

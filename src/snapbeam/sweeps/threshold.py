@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.parameters import lookup
-from snapbeam.core.validate import InputError, choice, within
+from snapbeam.core.reporting import counting
+from snapbeam.core.validate import InputError, choice, shown, within
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.sweeps.points import Grid, points_of
@@ -44,7 +45,7 @@ def threshold(
     *,
     search: str = "fast",
     share: float = 0.1,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> xr.Dataset:
     """The threshold of interwell response, sought along one parameter over any others, as a band.
 
@@ -70,7 +71,8 @@ def threshold(
     share : float
         Runs of the fast search over those of the full map.
     progress : callable, optional
-        Called as ``progress(done, total)`` with runs; the total is what the search may take at most.
+        Called as ``progress(done, total)`` with runs, of which the total is what the search may take at most; True
+        writes a line to standard error.
 
     Returns
     -------
@@ -89,7 +91,7 @@ def threshold(
     row = lookup(along)
     if not row.is_run or row.quantity.kind is not float:
         raise InputError(
-            f"along = {along!r}: must be a number that may differ between runs, such as velocity_amplitude"
+            f"along = {shown(along)}: must be a number that may differ between runs, such as velocity_amplitude"
         )
     if not isinstance(over, Mapping) or not over:
         raise InputError(f"over = {over!r}: must map at least one parameter to an array of values")
@@ -97,11 +99,11 @@ def threshold(
         raise InputError(f"{along}: must be an array of at least two values to choose from")
     asked = Integration() if integration is None else integration
     if not isinstance(asked, Integration):
-        raise InputError(f"integration = {integration!r}: must be an Integration")
+        raise InputError(f"integration = {shown(integration)}: must be an Integration")
     points = points_of({**over, row.name: values})
     assert isinstance(points, Grid)
     setup = sweep_setup(system, points, asked.replace(early_decision=True))
-    return _searched(setup, row.name, search, share, progress)
+    return _searched(setup, row.name, search, share, counting(progress, "threshold", "runs"))
 
 
 def _searched(

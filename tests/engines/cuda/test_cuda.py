@@ -59,7 +59,7 @@ JOBS = {
     "a block of sixteen": Job(ensemble_of(2, 1.6, 0.4, 0.04), Options(1, fewest_threads=16)),
     "sixth order": Job(ensemble_of(1, 3.5, 0.5, 0.1, accuracy="reference")),
     "decided": Job(ensemble_of(1, 1.4 + 26 / 110 * 5, 0.1 + 5 / 22, 20, early_decision=True)),
-    "step limit": Job(ensemble_of(1, 1.6, 0.4, 1, max_steps=5)),
+    "step limit": Job(dataclasses.replace(ensemble_of(1, 1.6, 0.4, 1), max_steps=5)),
     "not finite": Job(_absurd(ensemble_of(1, 1.6, 0.4, 1))),
 }
 

@@ -46,8 +46,14 @@ def plain(law, penetration, deepest):
 
 @cache
 def some_of(name: str) -> list[sb.ContactLaw]:
-    values = {"hertz": (1e5, 4e8, 1e12), "restitution": (0.0, 0.6, 1.0)}
-    return [LAWS[name](value) for value in values[name]]
+    values = {
+        "hertz": ((1e5,), (4e8,), (1e12,)),
+        "hunt_crossley": ((4e8, 0.0), (4e8, 0.5), (1e12, 3.0)),
+        "kelvin_voigt": ((1e5, 0.0), (1e7, 3.0)),
+        "power": ((0.4, 1.0), (0.4, 1.5), (10.0, 2.5)),
+        "restitution": ((0.0,), (0.6,), (1.0,)),
+    }
+    return [LAWS[name](*value) for value in values[name]]
 
 
 @pytest.mark.parametrize("name", LAWS)

@@ -30,6 +30,7 @@ from snapbeam.engines.cpu.state import (
 )
 from snapbeam.engines.cpu.step import Done, Step, prepare, take_step, take_two
 from snapbeam.engines.scalar.compile import compiled, inlined
+from snapbeam.engines.scalar.contact import released_at
 from snapbeam.engines.scalar.decisions import contact_level, flight_level, ticks_of
 from snapbeam.engines.scalar.tip import seen_from
 
@@ -37,7 +38,7 @@ __all__ = ["Kept", "choose", "march_many"]
 
 _RUNNING = int(RunStatus.RUNNING)
 _NO_STEP = Step(0, 0, 0.0, 0.0, False, 0, 0, 0, 0, 0, 0, 0)
-_NOTHING_DONE = Done(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_NOTHING_DONE = Done(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Kept(NamedTuple):
@@ -65,7 +66,8 @@ def choose(memory, blocks, place, run, now, book):
     book.steps += 1
     level = flight_level(clock, watch.quiet, stretch, layout.stretch)
     if watch.touching:
-        level = max(level, contact_level(clock, (t - book.onset) * clock.tick, seen.d, seen.dv))
+        left = released_at(run.struck.law, seen.d, seen.dv)
+        level = max(level, contact_level(clock, (t - book.onset) * clock.tick, left, seen.dv))
     ticks, at = ticks_of(clock, level), run.coefficients + (level + 1) * run.slot
     # up to the next state that is handed out, or to the end
     limit = min((now.landed + 1) * clock.landing, clock.end)

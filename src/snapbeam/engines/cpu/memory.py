@@ -127,7 +127,8 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
     second = first._replace(
         g=first.work + work, contact=first.work + work + size, work=first.work + work + 2 * size
     )
-    stages, weights = in_memory(ensemble.order, second.work + WORK_ROWS * size + slots)
+    at = second.work + WORK_ROWS * size + slots
+    stages, weights = in_memory(ensemble.order, at, general=ensemble.law.lossy)
     table = stages.flow + weights.size
     length = table + ensemble.samples.size
     raw = np.zeros(length + _ALIGNMENT // 8)

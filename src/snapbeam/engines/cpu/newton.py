@@ -52,7 +52,9 @@ def strike(memory, blocks, place, run, tip, p, seen, when, phase, book, outputs)
     memory[p] += c * impulse
     book.work += impulse * speed
     book.gross_work += abs(impulse * speed)
-    book.dissipated += 0.5 * (1.0 - e * e) * seen.dv * seen.dv / (c * c)
+    lost = 0.5 * (1.0 - e * e) * seen.dv * seen.dv / (c * c)
+    book.dissipated += lost
+    book.lost += lost
     book.total_impulse += impulse
     if outputs is not None:
         at = book.impacts - outputs.marks[1]
@@ -89,7 +91,9 @@ def _stuck(memory, place, run, seen, p, book):
     away = run.struck.law.coefficient * seen.dv
     book.impulse = -away / (c * c)
     book.work += book.impulse * (seen.wv + seen.dv)
-    book.dissipated += 0.5 * away * away / (c * c)
+    lost = 0.5 * away * away / (c * c)
+    book.dissipated += lost
+    book.lost += lost
     book.deepest = 0.0
     book.touching = 1
 

@@ -9,7 +9,7 @@ from snapbeam.engines.cpu.rows import modal_energy
 from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.scalar.compile import compiled, inlined
-from snapbeam.engines.scalar.contact import contact_energy, contact_force
+from snapbeam.engines.scalar.contact import contact_energy, felt_force
 from snapbeam.engines.scalar.decisions import Seen
 from snapbeam.engines.scalar.physics import tension_energy
 
@@ -27,10 +27,11 @@ __all__ = [
     "take_up",
 ]
 
-VALUES = 6
-"""Penetration, contact force, beam energy, contact energy, work and dissipation of a sample."""
+VALUES = 7
+"""Penetration, contact force, beam energy, contact energy, work, dissipation and loss in contact of a sample."""
 MARKS, REALS = 24, 10
 """Integers and floats of a run that was laid aside."""
+_TOGETHER = Seen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _MOST_IN_CONTACT = 96
 """Steps of one contact whose ends are recorded."""
 
@@ -64,7 +65,7 @@ def has_room(now, book, outputs):
 
 
 @inlined
-def _write(memory, layout, home, q, p, outputs, sample, when, tip, depth, energy, work, dissipated):
+def _write(memory, layout, home, q, p, outputs, sample, when, tip, seen, energy, work, dissipated, lost):
     """One sample, about the first well."""
     size = layout.size
     for row in range(size):
@@ -73,12 +74,13 @@ def _write(memory, layout, home, q, p, outputs, sample, when, tip, depth, energy
             outputs.rows[sample, row] += memory[layout.shift + row]
         outputs.rows[sample, size + row] = memory[p + row]
     outputs.at[sample] = when
-    outputs.values[sample, 0] = depth
-    outputs.values[sample, 1] = contact_force(tip.law, depth)
+    outputs.values[sample, 0] = seen.d
+    outputs.values[sample, 1] = felt_force(tip.law, seen.d, seen.dv)
     outputs.values[sample, 2] = energy
-    outputs.values[sample, 3] = contact_energy(tip.law, depth)
+    outputs.values[sample, 3] = contact_energy(tip.law, seen.d)
     outputs.values[sample, 4] = work
     outputs.values[sample, 5] = dissipated
+    outputs.values[sample, 6] = lost
 
 
 @compiled
@@ -97,11 +99,11 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, book, o
             q2, p2, run.spare + 2 * size, step.r
         )  # fmt: skip
         here = take_step(memory, blocks, layout, stages, tip, short, True)
-        depth = observe(memory, layout, tip, step.phase + tip.drive.omega * part, q2, p2).d
+        about = observe(memory, layout, tip, step.phase + tip.drive.omega * part, q2, p2)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, here.gq, here.qr)
         _write(
-            memory, layout, now.home, q2, p2, outputs, sample, times[done], tip, depth, energy,
-            book.work + here.work, book.dissipated + here.dissipated,
+            memory, layout, now.home, q2, p2, outputs, sample, times[done], tip, about, energy,
+            book.work + here.work, book.dissipated + here.dissipated + here.lost, book.lost + here.lost,
         )  # fmt: skip
         sample, done = sample + 1, done + 1
     outputs.marks[0] = done
@@ -125,8 +127,8 @@ def record_held(memory, blocks, layout, run, tip, now, step, book, outputs):
         force, gq, qr = hold(memory, blocks, layout, tip, phase, q2, p2, run.spare + 2 * size)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, gq, qr)
         _write(
-            memory, layout, now.home, q2, p2, outputs, sample, times[done], tip, 0.0, energy,
-            book.work + work, book.dissipated + dissipated,
+            memory, layout, now.home, q2, p2, outputs, sample, times[done], tip, _TOGETHER, energy,
+            book.work + work, book.dissipated + dissipated, book.lost,
         )  # fmt: skip
         outputs.values[sample, 1] = force
         sample, done = sample + 1, done + 1
@@ -135,14 +137,14 @@ def record_held(memory, blocks, layout, run, tip, now, step, book, outputs):
 
 
 @inlined
-def record_aside(memory, layout, tip, now, short, here, when, depth, sample, book, outputs):
+def record_aside(memory, layout, tip, now, short, here, when, about, sample, book, outputs):
     """Write down the end of a look ahead in contact; returns how many samples there are."""
     if not outputs.in_contact:
         return sample
     energy = modal_energy(memory, layout, short.q1, short.p1) + tension_energy(layout.gamma, here.gq, here.qr)
     _write(
-        memory, layout, now.home, short.q1, short.p1, outputs, sample, when, tip, depth, energy,
-        book.work + here.work, book.dissipated + here.dissipated,
+        memory, layout, now.home, short.q1, short.p1, outputs, sample, when, tip, about, energy,
+        book.work + here.work, book.dissipated + here.dissipated + here.lost, book.lost + here.lost,
     )  # fmt: skip
     return sample + 1
 
@@ -160,8 +162,8 @@ def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, boo
     outputs.marks[2] += 1
     energy = modal_energy(memory, layout, step.q1, step.p1) + tension_energy(layout.gamma, done.gq, done.qr)
     _write(
-        memory, layout, now.home, step.q1, step.p1, outputs, sample, when, tip, seen1.d, energy, book.work,
-        book.dissipated,
+        memory, layout, now.home, step.q1, step.p1, outputs, sample, when, tip, seen1, energy, book.work,
+        book.dissipated, book.lost,
     )  # fmt: skip
     return sample + 1
 

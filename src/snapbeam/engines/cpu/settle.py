@@ -6,12 +6,14 @@ import math
 from typing import NamedTuple
 
 from snapbeam.core.codes import RunStatus
+from snapbeam.engines.cpu.hardest import hardest_point
 from snapbeam.engines.cpu.look import look_inside
-from snapbeam.engines.cpu.recording import record_aside, record_contact, record_instants
+from snapbeam.engines.cpu.recording import record_contact, record_instants
 from snapbeam.engines.cpu.rows import dot, flow_coefficients, modal_energies, modal_energy, speed_bound
 from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot, look_slot
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.scalar.compile import inlined
+from snapbeam.engines.scalar.contact import jumps, slack_at
 from snapbeam.engines.scalar.decisions import (
     Seen,
     count_in_step,
@@ -25,12 +27,14 @@ from snapbeam.engines.scalar.decisions import (
 )
 from snapbeam.engines.scalar.extras import observe as observe_extras
 from snapbeam.engines.scalar.physics import tension_energy
-from snapbeam.engines.scalar.signals import first_fall, turning_point, widened
+from snapbeam.engines.scalar.signals import first_fall
 from snapbeam.engines.scalar.tip import seen_from
 
 __all__ = ["settle"]
 
 _OK, _DECIDED, _RUNNING = int(RunStatus.OK), int(RunStatus.DECIDED), int(RunStatus.RUNNING)
+_LOCATIONS = 4
+"""Newton steps in which the onset of a force that begins with a jump is located, at most."""
 _NOT_FINITE, _STEP_LIMIT = int(RunStatus.NOT_FINITE), int(RunStatus.STEP_LIMIT)
 
 
@@ -58,15 +62,6 @@ def cut_to(step, run, ticks, length):
 
 
 @inlined
-def aside(step, run, length, size):
-    """*step*, cut to *length* and written to the spare rows: a look ahead."""
-    return Step(
-        0, cut_slot(run), length, step.phase, step.touching, step.q, step.p, step.k,
-        run.spare, run.spare + size, run.spare + 2 * size, step.r
-    )  # fmt: skip
-
-
-@inlined
 def meets(memory, layout, run, now, tip, step, seen1, room):
     """Whether and where a step enters or leaves the contact."""
     seen, clock, tick = now.seen, run.clock, run.clock.tick
@@ -79,6 +74,10 @@ def meets(memory, layout, run, now, tip, step, seen1, room):
             if seen.d > 0.0:
                 fall = first_fall(seen.d, seen.dv, seen1.d, seen1.dv, step.length)
                 cut = max(1, int(fall * step.ticks))
+        slack = slack_at(tip.law, seen.d, seen.dv, seen1.d, seen1.dv, step.length)
+        if slack >= 0.0 and slack * step.ticks + 1.0 < cut:
+            # the force has an edge there, though the contact goes on
+            event, cut = False, int(slack * step.ticks) + 1
         return Met(event, cut, entry, safe_gap, safe_center, pieces, piece)
     size = layout.size
     if after > safe_gap:
@@ -104,29 +103,6 @@ def meets(memory, layout, run, now, tip, step, seen1, room):
             if entry >= 0.0:
                 event, cut = True, min(step.ticks, int(entry / tick))
     return Met(event, cut, entry, safe_gap, safe_center, pieces, piece)
-
-
-@inlined
-def _deepest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, book, outputs):
-    """The greatest penetration of a contact so far, its turning point within the step included.
-
-    Returns that and how many samples there are: the turning point is one where the run is recorded.
-    """
-    seen, deepest = now.seen, max(book.deepest, seen1.d)
-    turn = turning_point(seen.d, seen.dv, seen1.d, seen1.dv, step.length) if seen.dv > 0.0 else -1.0
-    if turn > 0.0 and widened(seen.d, deepest, seen.d, seen.dv, seen1.d, seen1.dv, step.length)[1] > deepest:
-        part, size = turn * step.length, layout.size
-        prepare(memory, layout, stages, run.struck.drive, part, cut_slot(run))
-        ledger = None if outputs is None else True
-        short = aside(step, run, part, size)
-        here = take_step(memory, blocks, layout, stages, tip, short, ledger)
-        there = step.phase + tip.drive.omega * part
-        depth = observe(memory, layout, tip, there, run.spare, run.spare + size).d
-        if outputs is not None:
-            when = now.t * run.clock.tick + part
-            sample = record_aside(memory, layout, tip, now, short, here, when, depth, sample, book, outputs)
-        deepest = max(deepest, depth)
-    return deepest, sample
 
 
 @inlined
@@ -189,14 +165,17 @@ def settle(memory, blocks, place, run, now, step, done, room, book, asked, outpu
         status = _STEP_LIMIT if book.steps >= clock.max_steps else _RUNNING
         watch = Watch(True, now.watch.quiet, met.safe_gap, met.safe_center, now.watch.weighed, now.watch.beat)
         return Now(t, now.home, now.stretch, now.rows, seen, watch, now.sample, now.landed, status), step
-    whole, cut, found = step.ticks, met.cut, touching or not met.event
+    whole, cut = step.ticks, met.cut
+    looks = 0 if touching or not met.event else _LOCATIONS if jumps(tip.law) else 1
     while cut != step.ticks:
         step = cut_to(step, run, cut, cut * tick)
         prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
         done = take_step(memory, blocks, layout, stages, tip, step, ledger)
         about = observe(memory, layout, tip, step.phase + omega * step.length, step.q1, step.p1)
-        if not found:
-            cut, found = entry_again(clock, cut, whole, about), True
+        if looks > 0:
+            looks -= 1
+            least = 0.5 * tick if jumps(tip.law) else (clock.step >> clock.finest) * tick
+            cut = entry_again(clock, cut, whole, about, least)
     seen1 = Seen(about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv)
     sample = now.sample
     if outputs is not None:
@@ -204,14 +183,15 @@ def settle(memory, blocks, place, run, now, step, done, room, book, asked, outpu
 
     # statistics of the step
     if touching:
-        book.deepest, sample = _deepest_point(
+        book.deepest, sample = hardest_point(
             memory, blocks, layout, stages, run, tip, now, step, seen1, sample, book, outputs
         )
         book.impulse += done.impulse
         book.work += done.work
         book.gross_work += done.gross
+        book.lost += done.lost
     if outputs is not None:
-        book.dissipated += done.dissipated
+        book.dissipated += done.dissipated + done.lost
     track(book, seen, seen1, step.length)
     if touching or t + step.ticks > met.safe_center:
         count_in_step(

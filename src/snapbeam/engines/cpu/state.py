@@ -28,7 +28,7 @@ from snapbeam.engines.scalar.decisions import (
     open_book,
 )
 from snapbeam.engines.scalar.physics import tension_energy, tension_factors
-from snapbeam.engines.scalar.tip import Tip, numbers_of, seen_from
+from snapbeam.engines.scalar.tip import Tip, drive_rate, numbers_of, seen_from
 
 __all__ = ["Asked", "Now", "Place", "Room", "Rows", "Run", "Watch", "begin", "change_well", "finish", "land"]
 
@@ -176,7 +176,7 @@ def run_of(memory, layout, stages, asked, i):
     for level in range(clock.finest + 2):
         length, at = 2.0 * step_time / (1 << level), coefficients + level * slot
         prepare(memory, layout, stages, struck.drive, length, at)
-    fastest = struck.drive.omega
+    fastest = drive_rate(struck.drive)
     for row in range(size):
         fastest = max(fastest, memory[layout.omega + row])
     finest_look = _TWO_PI / (PIECES * fastest)
@@ -242,7 +242,7 @@ def begin(memory, blocks, place, asked, i, book):
     book.touching, book.onset = int(touching), 0
     if math.isfinite(since) and since > 0.0:
         book.onset = -int(since / run.clock.tick + 0.5)
-    open_book(book, seen, energy + contact_energy(run.struck.law, seen.d))
+    open_book(book, seen, run.struck.law, energy + contact_energy(run.struck.law, seen.d))
     watch = Watch(touching, now.watch.quiet, 0, 0, 0, 0)
     return run, Now(0, now.home, now.stretch, rows, seen, watch, 0, 0, now.status)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from snapbeam.engines.cpu.push import Push, damped, no_push
 from snapbeam.engines.cpu.rows import (
     acceleration_rows,
     dot,
@@ -18,7 +19,7 @@ from snapbeam.engines.cpu.rows import (
 )
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS
-from snapbeam.engines.scalar.contact import contact_force
+from snapbeam.engines.scalar.contact import contact_force, is_lossy
 from snapbeam.engines.scalar.decisions import Seen
 from snapbeam.engines.scalar.lanes import WIDTH, load, store
 from snapbeam.engines.scalar.physics import sincos, tension_factors
@@ -56,16 +57,9 @@ class Done(NamedTuple):
     work: float
     """Of the striker."""
     gross: float
+    lost: float
+    """In the contact."""
     dissipated: float
-
-
-class Push(NamedTuple):
-    """The contact within a step: the force at the present kick, and its quadratures so far."""
-
-    force: float
-    impulse: float
-    work: float
-    gross: float
 
 
 @compiled
@@ -100,7 +94,10 @@ def _begin_push(step, stages, size):
 
 @inlined
 def _push(memory, layout, stages, tip, step, drive0, stage, weight, push):
-    """The contact at a stage of a step in contact; *push* as it was if the step is a free one."""
+    """The contact at a stage of a step in contact; *push* as it was if the step is a free one.
+
+    Of a law that loses energy, what its force is to follow from, in :func:`~snapbeam.engines.cpu.push.damped`.
+    """
     if not step.touching:
         return push
     here = step.q1 if stage > 0 else step.q
@@ -110,12 +107,17 @@ def _push(memory, layout, stages, tip, step, drive0, stage, weight, push):
     now = step.phase + memory[stages.elapsed + stage] * step.length * tip.drive.omega
     motion, velocity = turned_motion(tip.drive, memory, now, sine, cosine)
     penetration = tip.offset + motion - dot(memory, layout.size, layout.contact, here)
+    if is_lossy(tip.law):
+        return Push(0.0, push.impulse, push.work, push.gross, push.lost, penetration, velocity)
     force = contact_force(tip.law, penetration)
     return Push(
         force,
         push.impulse + weight * force,
         push.work + weight * force * velocity,
         push.gross + weight * abs(force * velocity),
+        0.0,
+        0.0,
+        0.0,
     )
 
 
@@ -132,9 +134,8 @@ def _first(memory, layout, step, weight, force, ledger):
 
 
 @inlined
-def _kick(memory, layout, stages, step, stage, weight, gq, qr, force, ledger):
-    """The kick of a stage after the first, and the flow after it unless it is the last; g.q and q.Gq are known."""
-    along_g, along_r = tension_factors(layout.gamma, gq, qr)
+def _kick(memory, layout, stages, step, stage, weight, along_g, along_r, force, ledger):
+    """The kick of a stage after the first, and the flow after it unless it is the last."""
     q1, p1, k1, r = step.q1, step.p1, step.k1, step.r
     if stage == stages.flows:
         # the acceleration is kept for the next step
@@ -159,16 +160,19 @@ def take_step(memory, blocks, layout, stages, tip, step, ledger):
     Dissipation is added up unless *ledger* is None; nothing else depends on it, to the last bit.
     """
     drive0 = _begin_push(step, stages, layout.size)
-    push, gq, qr, dissipated = Push(0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
+    push, gq, qr, dissipated = no_push(), 0.0, 0.0, 0.0
     for stage in range(stages.flows + 1):
         weight = memory[stages.kick + stage] * step.length
         push = _push(memory, layout, stages, tip, step, drive0, stage, weight, push)
         if stage == 0:
+            push = damped(memory, layout, tip, step, stage, weight, 0.0, 0.0, push)
             dissipated += _first(memory, layout, step, weight, push.force, ledger)
             continue
         gq, qr = tension_rows(memory, blocks, layout, step.q1, step.r)
-        dissipated += _kick(memory, layout, stages, step, stage, weight, gq, qr, push.force, ledger)
-    return Done(gq, qr, push.impulse, push.work, push.gross, dissipated)
+        along_g, along_r = tension_factors(layout.gamma, gq, qr)
+        push = damped(memory, layout, tip, step, stage, weight, along_g, along_r, push)
+        dissipated += _kick(memory, layout, stages, step, stage, weight, along_g, along_r, push.force, ledger)
+    return Done(gq, qr, push.impulse, push.work, push.gross, push.lost, dissipated)
 
 
 @compiled
@@ -178,20 +182,26 @@ def take_two(memory, blocks, stages, layout_a, tip_a, a, layout_b, tip_b, b):
     A single trajectory leaves the processor waiting for sums most of the time; the other one uses that time.
     """
     drive_a, drive_b = _begin_push(a, stages, layout_a.size), _begin_push(b, stages, layout_b.size)
-    push_a, gq_a, qr_a = Push(0.0, 0.0, 0.0, 0.0), 0.0, 0.0
+    push_a, gq_a, qr_a = no_push(), 0.0, 0.0
     push_b, gq_b, qr_b = push_a, 0.0, 0.0
     for stage in range(stages.flows + 1):
         weight_a, weight_b = memory[stages.kick + stage] * a.length, memory[stages.kick + stage] * b.length
         push_a = _push(memory, layout_a, stages, tip_a, a, drive_a, stage, weight_a, push_a)
         push_b = _push(memory, layout_b, stages, tip_b, b, drive_b, stage, weight_b, push_b)
         if stage == 0:
+            push_a = damped(memory, layout_a, tip_a, a, stage, weight_a, 0.0, 0.0, push_a)
+            push_b = damped(memory, layout_b, tip_b, b, stage, weight_b, 0.0, 0.0, push_b)
             _first(memory, layout_a, a, weight_a, push_a.force, None)
             _first(memory, layout_b, b, weight_b, push_b.force, None)
             continue
         gq_a, qr_a, gq_b, qr_b = tension_rows_twice(memory, blocks, layout_a, a.q1, a.r, layout_b, b.q1, b.r)
-        _kick(memory, layout_a, stages, a, stage, weight_a, gq_a, qr_a, push_a.force, None)
-        _kick(memory, layout_b, stages, b, stage, weight_b, gq_b, qr_b, push_b.force, None)
+        g_a, r_a = tension_factors(layout_a.gamma, gq_a, qr_a)
+        g_b, r_b = tension_factors(layout_b.gamma, gq_b, qr_b)
+        push_a = damped(memory, layout_a, tip_a, a, stage, weight_a, g_a, r_a, push_a)
+        push_b = damped(memory, layout_b, tip_b, b, stage, weight_b, g_b, r_b, push_b)
+        _kick(memory, layout_a, stages, a, stage, weight_a, g_a, r_a, push_a.force, None)
+        _kick(memory, layout_b, stages, b, stage, weight_b, g_b, r_b, push_b.force, None)
     return (
-        Done(gq_a, qr_a, push_a.impulse, push_a.work, push_a.gross, 0.0),
-        Done(gq_b, qr_b, push_b.impulse, push_b.work, push_b.gross, 0.0),
+        Done(gq_a, qr_a, push_a.impulse, push_a.work, push_a.gross, push_a.lost, 0.0),
+        Done(gq_b, qr_b, push_b.impulse, push_b.work, push_b.gross, push_b.lost, 0.0),
     )

@@ -172,7 +172,10 @@ def step_function(functions: Functions) -> Any:
                     here, slot, purpose = length, fixed.cut_slot, _CUT
                     continue
             if event and not found:
-                cut, found = _entry_again(clock, span, whole, seen1), True
+                cut, found = (
+                    _entry_again(clock, span, whole, seen1, (clock.step >> clock.finest) * tick),
+                    True,
+                )
                 if cut != span:
                     span, length = cut, cut * tick
                     here, slot, purpose = length, fixed.cut_slot, _CUT

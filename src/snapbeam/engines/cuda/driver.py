@@ -70,6 +70,8 @@ def refusal(modes: int, law: type[ContactLaw] | None = None, drive: type[Drive] 
         return (
             f"the law of contact {law.name!r}, whose impacts last no time, is marched by the CPU engine alone"
         )
+    if law is not None and law.lossy:
+        return f"the law of contact {law.name!r}, which loses energy, is marched by the CPU engine alone"
     if not drive.harmonic:
         return f"the drive {drive.name!r} is marched by the CPU engine alone"
     if modes > MOST_MODES:

@@ -2,7 +2,8 @@
 
 Functions are compiled into the kernel that calls them, across files and with the law of contact and the drive that
 it marches; a kernel is what is kept on disk.  Numba alone would keep it until the file that it stands in changes.
-Here it is kept under a fingerprint of everything that it bakes in (:mod:`~snapbeam.engines.scalar.fingerprint`).
+Here it is kept under a fingerprint of everything that it bakes in (:mod:`~snapbeam.engines.scalar.fingerprint`), with a
+check sum (:mod:`~snapbeam.engines.scalar.kept_code`).
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from typing import Any
 
 from numba import njit, typeof
 from numba.core import event
-from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
 
 from snapbeam.engines.scalar.fingerprint import fingerprint
+from snapbeam.engines.scalar.kept_code import keep_code
 from snapbeam.engines.scalar.parts import pipeline
 
 __all__ = ["INLINE", "INLINE_HERE", "compiled", "inlined", "kernel", "ready"]
@@ -65,22 +66,7 @@ def kernel(function: Callable[..., Any], kinds: tuple[type, ...]) -> Any:
     """A kernel for some laws of contact and drives, kept on disk under the fingerprint of what it bakes in."""
     dispatcher = njit(**_OPTIONS)(function)
     mark = fingerprint(kinds)
-    if mark is None:
-        return dispatcher
-    try:
-        dispatcher.enable_caching()
-        cache_of: FunctionCache = dispatcher._cache
-        cache_of._cache_file = IndexDataCacheFile(
-            cache_path=cache_of._cache_path,
-            filename_base=f"{cache_of._impl.filename_base}-{mark}",
-            source_stamp=cache_of._impl.locator.get_source_stamp(),
-        )
-    except (
-        AttributeError,
-        RuntimeError,
-    ):  # no place to keep compiled code, or a Numba that keeps it otherwise
-        return njit(**_OPTIONS)(function)
-    return dispatcher
+    return dispatcher if mark is None else keep_code(dispatcher, mark)
 
 
 class _Telling(event.Listener):

@@ -12,14 +12,23 @@ from typing import Any
 from numba.extending import overload
 
 from snapbeam.engines.scalar.compile import INLINE, inlined
+from snapbeam.engines.scalar.losses import Loss, lossy_kick
+from snapbeam.engines.scalar.signals import cubic
 
 __all__ = [
     "contact_energy",
     "contact_force",
     "contact_slope",
+    "felt_force",
     "is_impulsive",
+    "is_lossy",
+    "jumps",
+    "kick_force",
+    "mark_of",
     "peak_force",
+    "released_at",
     "scalar_function",
+    "slack_at",
 ]
 
 
@@ -73,15 +82,17 @@ def _contact_slope(law, penetration):
 def peak_force(law: Any, deepest: float) -> float:
     """Greatest force of a contact, N, from what a book calls the deepest point of it.
 
-    That is the greatest penetration, or, under a law whose impacts last no time, the greatest force while the bodies
-    stay together.
+    That is the greatest penetration, or, under a law whose impacts last no time or whose force is not greatest where
+    the penetration is, the greatest force while the bodies stay together.
     """
-    return deepest if type(law).owner.impulsive else contact_force(law, deepest)
+    owner = type(law).owner
+    return deepest if owner.impulsive or owner.lossy else contact_force(law, deepest)
 
 
 @overload(peak_force, jit_options=INLINE)
 def _peak_force(law, deepest):
-    if law.instance_class.owner.impulsive:
+    owner = law.instance_class.owner
+    if owner.impulsive or owner.lossy:
         return lambda law, deepest: deepest
     return lambda law, deepest: contact_force(law, deepest)
 
@@ -95,3 +106,149 @@ def is_impulsive(law: Any) -> bool:
 def _is_impulsive(law):
     impulsive = bool(law.instance_class.owner.impulsive)
     return lambda law: impulsive
+
+
+def is_lossy(law: Any) -> bool:
+    """Whether the force under the law depends on the rate of penetration."""
+    return bool(type(law).owner.lossy)
+
+
+@overload(is_lossy, jit_options=INLINE)
+def _is_lossy(law):
+    lossy = bool(law.instance_class.owner.lossy)
+    return lambda law: lossy
+
+
+def jumps(law: Any) -> bool:
+    """Whether a force that is integrated begins with a jump, so that it matters when exactly it begins."""
+    owner = type(law).owner
+    return bool(owner.lossy and not owner.keeps.smooth)
+
+
+@overload(jumps, jit_options=INLINE)
+def _jumps(law):
+    owner = law.instance_class.owner
+    found = bool(owner.lossy and not owner.keeps.smooth)
+    return lambda law: found
+
+
+def felt_force(law: Any, penetration: float, rate: float) -> float:
+    """The force on tip and beam, N, at a penetration and its rate."""
+    owner: Any = type(law).owner
+    if not owner.lossy or penetration <= 0.0:
+        return contact_force(law, penetration)
+    return max(0.0, float(owner.force(law, penetration) + owner.damping(law, penetration) * rate))
+
+
+@overload(felt_force, jit_options=INLINE)
+def _felt_force(law, penetration, rate):
+    owner = law.instance_class.owner
+    if not owner.lossy:
+        return lambda law, penetration, rate: contact_force(law, penetration)
+    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping")
+
+    def implementation(law, penetration, rate):
+        if penetration > 0.0:
+            return max(0.0, force(law, penetration) + damping(law, penetration) * rate)
+        return 0.0
+
+    return implementation
+
+
+def kick_force(law: Any, penetration: float, rate: float, mobility: float, push: float, weight: float) -> Any:
+    """The mean force of a kick of *weight* seconds, N, and the energy lost in it; see :func:`lossy_kick`.
+
+    Of laws that lose energy; *rate* is that of the penetration before the kick.
+    """
+    raise TypeError("kick_force runs in compiled code only")
+
+
+@overload(kick_force, jit_options=INLINE)
+def _kick_force(law, penetration, rate, mobility, push, weight):
+    owner = law.instance_class.owner
+    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping")
+
+    def implementation(law, penetration, rate, mobility, push, weight):
+        if weight == 0.0:
+            return Loss(0.0, 0.0)
+        # at the very onset rounding leaves a penetration of either sign
+        at = max(penetration, 0.0)
+        given = lossy_kick(force(law, at), damping(law, at), mobility, push, rate, weight)
+        return Loss(given.impulse / weight, given.lost)
+
+    return implementation
+
+
+def mark_of(law: Any, penetration: float, rate: float) -> float:
+    """What a book keeps the greatest of in a contact: the penetration, or the force of a law that loses energy."""
+    return max(penetration, 0.0) if not type(law).owner.lossy else felt_force(law, penetration, rate)
+
+
+@overload(mark_of, jit_options=INLINE)
+def _mark_of(law, penetration, rate):
+    if law.instance_class.owner.lossy:
+        return lambda law, penetration, rate: felt_force(law, penetration, rate)
+    return lambda law, penetration, rate: max(penetration, 0.0)
+
+
+def slack_at(law: Any, d0: float, v0: float, d1: float, v1: float, length: float) -> float:
+    """Where in (0, 1) of a step in contact the force vanishes or begins, though the penetration does not; -1: nowhere.
+
+    Penetration and rate are those at the two ends, the cubic through them is followed.
+    """
+    raise TypeError("slack_at runs in compiled code only")
+
+
+@overload(slack_at, jit_options=INLINE)
+def _slack_at(law, d0, v0, d1, v1, length):
+    owner = law.instance_class.owner
+    if not owner.lossy:
+        return lambda law, d0, v0, d1, v1, length: -1.0
+    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping")
+
+    def implementation(law, d0, v0, d1, v1, length):
+        if d0 <= 0.0:
+            return -1.0
+        first = force(law, d0) + damping(law, d0) * v0
+        low, high, last = 0.0, 1.0, -1.0
+        if d1 > 0.0:
+            last = force(law, d1) + damping(law, d1) * v1
+        if first * last >= 0.0:
+            return -1.0
+        c0, c1, c2, c3 = cubic(d0, v0, d1, v1, length)
+        for _ in range(40):
+            s = 0.5 * (low + high)
+            d = c0 + s * (c1 + s * (c2 + s * c3))
+            felt = -1.0
+            if d > 0.0:
+                felt = force(law, d) + damping(law, d) * (c1 + s * (2.0 * c2 + s * 3.0 * c3)) / length
+            if felt * first > 0.0:
+                low = s
+            else:
+                high = s
+        return high
+
+    return implementation
+
+
+def released_at(law: Any, penetration: float, rate: float) -> float:
+    """The way to the release, m: the penetration, or what is left of it until the force vanishes, roughly."""
+    raise TypeError("released_at runs in compiled code only")
+
+
+@overload(released_at, jit_options=INLINE)
+def _released_at(law, penetration, rate):
+    owner = law.instance_class.owner
+    if not owner.lossy:
+        return lambda law, penetration, rate: penetration
+    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping")
+
+    def implementation(law, penetration, rate):
+        if penetration > 0.0 and rate < 0.0:
+            felt = force(law, penetration) + damping(law, penetration) * rate
+            left = damping(law, 0.0) * rate
+            if felt > 0.0 and left < 0.0:
+                return penetration * felt / (felt - left)
+        return penetration
+
+    return implementation

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from snapbeam.engines.scalar.compile import compiled, inlined
-from snapbeam.engines.scalar.contact import peak_force
+from snapbeam.engines.scalar.contact import mark_of, peak_force
 from snapbeam.engines.scalar.signals import count_crossings, first_rise, sign_of, widened
 
 __all__ = [
@@ -106,12 +106,12 @@ def clock_of(run, max_steps):
 
 
 @compiled
-def open_book(book, seen, energy):
+def open_book(book, seen, law, energy):
     """Begin a run's statistics with what is seen of it at the start."""
     book.side = sign_of(seen.c, 0)
     book.min_displacement, book.max_displacement = seen.w, seen.w
     book.min_center, book.max_center = seen.c, seen.c
-    book.deepest = max(seen.d, 0.0)
+    book.deepest = mark_of(law, seen.d, seen.dv)
     book.first_energy = energy
 
 
@@ -211,16 +211,16 @@ def first_entry(looked, pieces, piece):
 
 
 @compiled
-def entry_again(clock, cut, whole, seen):
+def entry_again(clock, cut, whole, seen, least):
     """Where a step of *whole* ticks is to be cut that was cut at *cut*, where the gap has not just closed.
 
     What was seen inside the step was seen by linear modes under a tension that changes evenly; a step that ends there
-    knows better.  The finest contact step is as near as counts.
+    knows better.  *least*, a time, is as near as counts.
     """
     if seen.dv > 0.0:
         late = seen.d / seen.dv
-        if abs(late) > (clock.step >> clock.finest) * clock.tick:
-            return min(max(1, cut - int(late / clock.tick)), whole)
+        if abs(late) > least:
+            return min(max(1, cut - round(late / clock.tick)), whole)
     return cut
 
 

@@ -12,7 +12,7 @@ from snapbeam.engines.scalar.compile import INLINE, inlined
 from snapbeam.engines.scalar.contact import scalar_function
 from snapbeam.engines.scalar.physics import shaker_motion, sincos
 
-__all__ = ["Tip", "numbers_of", "seen_from", "tip_acceleration", "tip_motion", "turned_motion"]
+__all__ = ["Tip", "drive_rate", "numbers_of", "seen_from", "tip_acceleration", "tip_motion", "turned_motion"]
 
 
 class Tip(NamedTuple):
@@ -101,6 +101,18 @@ def _turned_motion(drive, memory, argument, sine, cosine):
         )
     motion = scalar_function(drive.instance_class.owner, "motion")
     return lambda drive, memory, argument, sine, cosine: motion(drive, memory, argument)
+
+
+def drive_rate(drive: Any) -> float:
+    """Greatest angular frequency of a drive's motion, rad/s."""
+    return float(drive.fastest if "fastest" in drive._fields else drive.omega)
+
+
+@overload(drive_rate, jit_options=INLINE)
+def _drive_rate(drive):
+    if "fastest" in drive.fields:
+        return lambda drive: drive.fastest
+    return lambda drive: drive.omega
 
 
 def numbers_of(template: Any, table: Any, row: int) -> Any:

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from snapbeam.config import config_from_mapping, dump_config
 from snapbeam.core.findings import Finding
-from snapbeam.core.validate import InputError, InputTypeError, choice, integer
+from snapbeam.core.validate import InputError, InputTypeError, choice, integer, shown
 from snapbeam.lab.calibration import wording as words
 from snapbeam.lab.calibration.fit import directions, open_upwards, search, sensitivity
 from snapbeam.lab.calibration.measurements import ContactTest, Measurements, load_measurements
+from snapbeam.lab.calibration.parity import either_well, shape_findings
 from snapbeam.lab.plausibility.calibration import KINDS
 from snapbeam.model.beam import Beam
 from snapbeam.model.paper_values import BEAM, MODES
@@ -29,7 +30,6 @@ from snapbeam.model.reduction import ReducedModel
 __all__ = ["Calibration", "ContactTest", "Measurements", "Residual", "calibrate", "load_measurements"]
 
 _Array = NDArray[np.float64]
-_CROSSING = 0.05  # share within which the first two frequencies may be in the other order
 FITTED = ("thickness", "young_modulus", "density", "length", "buckling_level")
 
 
@@ -184,7 +184,8 @@ def calibrate(
     wells = bool(measured.lower_well_freq or measured.upper_well_freq)
     if wells and not beam.is_buckled:
         raise InputError(
-            "beam: is straight, but frequencies about wells were measured; give a buckling_level"
+            "beam: is straight, but frequencies about wells were measured; give a buckling_level (in the file of "
+            "--config)"
         )
     begin = np.array([math.log(getattr(beam, name)) for name in names])
     target = np.array([item.measured for item in data])
@@ -260,11 +261,11 @@ def calibrate(
         well_freq=_first_freq(result, count) if wells else None,
         start_well_freq=_first_freq(beam, count) if wells else None,
         gauge_well_freq=_first_freq(result.replace(**gauges), count) if wells and gauges else None,
-        either_well=_either_well(result, measured, count),
+        either_well=either_well(result, measured, count),
         remarks=(),
         findings=(),
     )
-    findings += _shape_findings(result, measured, count) if wells else []
+    findings += shape_findings(result, measured, count) if wells else []
     findings += words.doubts(answer, measured)
     return dataclasses.replace(
         answer, remarks=tuple(words.remarks(answer, measured)), findings=tuple(findings)
@@ -306,7 +307,7 @@ def _fitted(measured: Measurements, fit: tuple[str, ...] | None) -> list[str]:
     if fit is None:
         return ["thickness"] * bool(measured.straight_freq) + ["buckling_level"] * wells
     if isinstance(fit, str) or len(set(fit)) < len(fit):
-        raise InputError(f"fit = {fit!r}: must be a tuple of different names among {', '.join(FITTED)}")
+        raise InputError(f"fit = {shown(fit)}: must be a tuple of different names among {', '.join(FITTED)}")
     for name in fit:
         choice("fit", name, FITTED)
     if "buckling_level" in fit and not wells:
@@ -336,57 +337,6 @@ def _model(beam: Beam, data: list[_Datum], modes: int) -> _Array:
 
 def _first_freq(beam: Beam, modes: int) -> float:
     return float(ReducedModel.from_beam(beam, modes).natural_freq[0])
-
-
-def _shape_findings(beam: Beam, measured: Measurements, modes: int) -> list[Finding]:
-    """Whether the order of the modes about a well is in doubt where nothing else tells them apart."""
-    told = [measured.lower_well_shape, measured.upper_well_shape]
-    given = [freq for freq in (measured.lower_well_freq, measured.upper_well_freq) if freq]
-    if modes < 2 or any(told) or not given:
-        return []
-    model = ReducedModel.from_beam(beam, modes)
-    symmetric = float(model.natural_freq[model.parity > 0][0])
-    other = model.natural_freq[model.parity < 0]
-    if not other.size:
-        return []
-    antisymmetric = float(other[0])
-    if antisymmetric < symmetric:
-        return [KINDS["antisymmetric"].found(frequency=antisymmetric)]
-    if symmetric > (1.0 - _CROSSING) * antisymmetric:
-        return [KINDS["crossing"].found(symmetric=symmetric, antisymmetric=antisymmetric)]
-    return []
-
-
-def _either_well(beam: Beam, measured: Measurements, modes: int) -> tuple[float, ...]:
-    """Buckling level [m] that the first symmetric frequency of each well alone asks for; empty if they agree."""
-    from scipy.optimize import newton
-
-    goals = []
-    for state in ("lower_well", "upper_well"):
-        values, shapes = getattr(measured, f"{state}_freq"), getattr(measured, f"{state}_shape")
-        fitting = (
-            [f for f, shape in zip(values, shapes, strict=True) if shape == "symmetric"] if shapes else values
-        )
-        goals += list(fitting[:1])
-    if len(goals) < 2 or goals[0] == goals[1]:
-        return ()
-    level, levels = beam.buckling_level, []
-
-    def symmetric(at: float) -> float:
-        model = ReducedModel.from_beam(beam.replace(buckling_level=abs(at) * level), modes)
-        return float(model.natural_freq[model.parity > 0][0])
-
-    here = symmetric(1.0)
-    for goal in goals:
-
-        def miss(factor: float, goal: float = goal) -> float:
-            return symmetric(factor) / goal - 1.0
-
-        try:
-            levels.append(level * float(newton(miss, 1.0, x1=goal / here + 1e-6, tol=1e-7, maxiter=12)))
-        except RuntimeError:  # no level gives that frequency
-            return ()
-    return tuple(levels)
 
 
 def _mean(

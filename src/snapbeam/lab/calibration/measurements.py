@@ -8,10 +8,9 @@ import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any
 
-from snapbeam.core.validate import InputError, InputTypeError, choice, positive
+from snapbeam.core.validate import InputError, InputTypeError, choice, file_path, positive, shown
 
 __all__ = ["HERTZ_TIME", "ContactTest", "Measurements", "load_measurements"]
 
@@ -131,9 +130,9 @@ class Measurements:
                 raise InputError(f"{name} = {list(values)}: must increase, one frequency a mode")
         for name in ("lower_well", "upper_well"):
             shapes = getattr(self, f"{name}_shape")
-            if isinstance(shapes, str):
+            if isinstance(shapes, str) or not hasattr(shapes, "__iter__"):
                 raise InputTypeError(
-                    f"{name}_shape = {shapes!r}: must be a list of words, one for each frequency"
+                    f"{name}_shape = {shown(shapes)}: must be a list of words, one for each frequency"
                 )
             object.__setattr__(self, f"{name}_shape", tuple(shapes))
             for i, shape in enumerate(shapes):
@@ -153,7 +152,7 @@ def _numbers(name: str, values: Any) -> tuple[float, ...]:
     if isinstance(values, (int, float)) and not isinstance(values, bool):
         values = (values,)
     if isinstance(values, (str, bytes, Mapping)) or not hasattr(values, "__iter__"):
-        raise InputTypeError(f"{name} = {values!r}: must be a list of numbers")
+        raise InputTypeError(f"{name} = {shown(values)}: must be a list of numbers")
     return tuple(positive(f"{name}[{i}]", value) for i, value in enumerate(values))
 
 
@@ -173,7 +172,7 @@ def load_measurements(path: str | os.PathLike[str]) -> tuple[Measurements, dict[
     InputError
         If the file cannot be read, or holds an unknown or unusable entry; the message names file and entry.
     """
-    source = Path(path)
+    source = file_path("path", path)
     try:
         sections = tomllib.loads(source.read_text(encoding="utf-8"))
     except OSError as error:

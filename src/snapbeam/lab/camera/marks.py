@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, positive
+from snapbeam.core.validate import InputError, instance, positive
 
 if TYPE_CHECKING:
     from snapbeam.lab.camera.recording import Recording
@@ -16,6 +16,8 @@ __all__ = ["pixel_size_from_marks", "profile_shift"]
 
 _Array = NDArray[np.float64]
 _FARTHEST = 30  # rows
+_SMOOTH = 1.2  # rows
+_RASTER = 0.005  # px, error of a curve drawn between pixels of another phase
 
 
 def profile_shift(profiles: _Array, reference: _Array) -> tuple[_Array, _Array]:
@@ -37,6 +39,7 @@ def profile_shift(profiles: _Array, reference: _Array) -> tuple[_Array, _Array]:
         If the reference is too short or too even to show a shift.
     """
     from scipy.interpolate import CubicSpline
+    from scipy.ndimage import gaussian_filter1d
 
     rows = reference.size
     reach = min(_FARTHEST, (rows - 8) // 3)
@@ -46,6 +49,9 @@ def profile_shift(profiles: _Array, reference: _Array) -> tuple[_Array, _Array]:
         raise InputError(
             "fixed mark (--fixed-mark): shows nothing that could be followed; choose another part"
         )
+    # finer than two pixels the raster shows other things in each frame
+    profiles = gaussian_filter1d(np.asarray(profiles, dtype=np.float64), _SMOOTH, axis=1)
+    reference = gaussian_filter1d(np.asarray(reference, dtype=np.float64), _SMOOTH)
     inner = np.arange(reach, rows - reach, dtype=np.float64)
     part = profiles[:, reach : rows - reach]
     part = part - part.mean(1, keepdims=True)
@@ -70,10 +76,13 @@ def profile_shift(profiles: _Array, reference: _Array) -> tuple[_Array, _Array]:
             step = np.where(solution[:, 1] > 0.0, solution[:, 2] / solution[:, 1], 0.0)
         found = found + np.clip(np.nan_to_num(step), -0.7, 0.7)
     rest = full - np.einsum("nri,ni->nr", design, solution)
-    variance = (rest**2).sum(1) / max(inner.size - 3, 1)
+    variance = (rest**2).sum(1) / max(inner.size - 3, 1) * 2.0 * np.sqrt(np.pi) * _SMOOTH
+    smooth = gaussian_filter1d(design, _SMOOTH, axis=1)
+    inverse = np.linalg.inv(gram)
+    spread = np.einsum("ni,nri->nr", inverse[:, 2], smooth)
     with np.errstate(divide="ignore", invalid="ignore"):
-        error = np.sqrt(variance * np.linalg.inv(gram)[:, 2, 2]) / np.abs(solution[:, 1])
-    return found, error
+        error = np.sqrt(variance * (spread**2).sum(1)) / np.abs(solution[:, 1])
+    return found, np.hypot(error, _RASTER)
 
 
 def pixel_size_from_marks(
@@ -106,6 +115,9 @@ def pixel_size_from_marks(
         If a mark does not stand out, or the two are the same.
     """
     length = positive("distance", distance, "m")
+    from snapbeam.lab.camera.recording import Recording
+
+    instance("recording", recording, Recording, "a Recording")
     picture = recording.frame(frame).astype(np.float64)
     centres = [_centre(picture, where, reach, name) for name, where in (("first", first), ("second", second))]
     apart = float(np.hypot(*(centres[1] - centres[0])))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.findings import Finding
-from snapbeam.core.validate import InputError, integer, positive
+from snapbeam.core.validate import InputError, InputTypeError, file_path, integer, positive, shown
 from snapbeam.lab.camera.sources.base import FrameSource
 from snapbeam.lab.camera.sources.opening import open_source
 from snapbeam.lab.plausibility.recording import KINDS
@@ -60,6 +60,12 @@ class Recording:
         region: tuple[int, int, int, int],
         findings: tuple[Finding, ...] = (),
     ) -> None:
+        if not isinstance(source, FrameSource):
+            raise InputTypeError(
+                f"source = {shown(source)}: must be a source of frames; open_recording opens a file"
+            )
+        if not isinstance(region, (tuple, list)) or len(region) != 4:
+            raise InputError(f"region = {shown(region)}: must be four numbers")
         self.path = path
         self._source = source
         self.frame_rate = frame_rate
@@ -133,7 +139,7 @@ def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> 
         return (0, shape[0], 0, shape[1])
     if len(value) != 4:
         raise InputError(
-            f"region = {value!r}: must be (first row, last row + 1, first column, last column + 1)"
+            f"region = {shown(value)}: must be (first row, last row + 1, first column, last column + 1)"
         )
     top = integer("region[0]", value[0], 0, shape[0] - 1)
     bottom = integer("region[1]", value[1], top + 1, shape[0])
@@ -184,7 +190,7 @@ def open_recording(
         If the file is malformed, or if frame rate or pixel size stand neither in the file nor in the call:
         they are never guessed.
     """
-    path = Path(path)
+    path = file_path("path", path)
     source = open_source(path)
     try:
         given = None if frame_rate is None else positive("frame_rate", frame_rate, "Hz")

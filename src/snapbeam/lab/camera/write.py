@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.validate import InputError, integer, positive, within
+from snapbeam.core.validate import InputError, integer, positive, shown, within
 from snapbeam.lab.camera.photron.pixels import frame_bytes
 from snapbeam.lab.camera.photron.text import header_text
 
@@ -90,12 +90,12 @@ def write_photron(
     shutter = 1.0 / (rate * skip) if exposure is None else positive("exposure", exposure, "s")
     bits = integer("bit_depth", (12 if kind == ".cihx" else 16) if bit_depth is None else bit_depth, 8, 16)
     if bits not in (8, 12, 16):
-        raise InputError(f"bit_depth = {bit_depth!r}: must be 8, 12 or 16")
+        raise InputError(f"bit_depth = {shown(bit_depth)}: must be 8, 12 or 16")
     effective = integer(
         "effective_bits", min(bits, 12) if effective_bits is None else effective_bits, 1, bits
     )
     if "\n" in comment or "\r" in comment:
-        raise InputError(f"comment = {comment!r}: must be a single line")
+        raise InputError(f"comment = {shown(comment)}: must be a single line")
     shape: list[int] = []
     with atomic_path(path) as header, atomic_path(path.with_suffix(".mraw")) as mraw:
         with open(mraw, "wb") as file:

@@ -14,6 +14,7 @@ import numpy as np
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.files import atomic_path
 from snapbeam.core.findings import Finding, Severity, findings_of
+from snapbeam.core.netcdf import write_netcdf
 from snapbeam.core.validate import InputError
 from snapbeam.lab.camera.recording import open_recording
 from snapbeam.lab.campaign.pairing import Test
@@ -130,8 +131,7 @@ def _measured(test: Test, settings: CampaignSettings, folder: Path, findings: li
         tracking = tracking.changed(location=test.location)
     with open_recording(test.recording, **settings.camera) as recording:
         tracked = track(recording, tracking)
-    with atomic_path(folder / f"{test.name}.nc") as temporary:
-        tracked.to_netcdf(temporary, engine="h5netcdf")
+    write_netcdf(tracked, folder / f"{test.name}.nc")
     findings += findings_of(tracked)
     seen = measure_drive(shaker_signal(tracked), test.frequency)
     drive, alignment = seen, None

@@ -7,7 +7,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from snapbeam.core.validate import InputError, positive, within
+from snapbeam.core.validate import InputError, positive, shown, within
 from snapbeam.lab.camera.sources.images import IMAGE_SUFFIXES
 from snapbeam.lab.camera.sources.opening import RECORDING_SUFFIXES
 from snapbeam.lab.signals.formats.registry import READERS
@@ -152,4 +152,4 @@ def _number(cell: str | None, mark: str, where: str, column: str) -> float | Non
     except ValueError as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"{where}: {column} = {cell!r}: must be a number") from None
+        raise InputError(f"{where}: {column} = {shown(cell)}: must be a number") from None

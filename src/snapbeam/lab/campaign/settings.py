@@ -48,7 +48,7 @@ class CampaignSettings:
             for key in getattr(self, name):
                 if key not in known:
                     raise InputError(f"{name} {key}: unknown; must be among {', '.join(known)}")
-        integer("cycles", self.cycles, LEAST_CYCLES)
+        object.__setattr__(self, "cycles", integer("cycles", self.cycles, LEAST_CYCLES))
         if self.tracking.buckling_level is None:
             raise InputError(
                 "buckling_level (--buckling-level): must be given, in m, or no response can be told"

@@ -7,13 +7,12 @@ import math
 import os
 import re
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError, positive
+from snapbeam.core.validate import InputError, file_path, positive
 
 __all__ = ["Dots", "read_dots"]
 
@@ -83,7 +82,7 @@ def read_dots(
     InputError
         Names the file, the line and the column of what cannot be used.
     """
-    file = Path(path)
+    file = file_path("path", path)
     try:
         text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:

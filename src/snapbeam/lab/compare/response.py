@@ -160,7 +160,9 @@ def _noise(values: _Array, good: NDArray[np.bool_]) -> float:
     whole = good[:-3] & good[1:-2] & good[2:-1] & good[3:]
     thirds = (values[3:] - 3.0 * values[2:-1] + 3.0 * values[1:-2] - values[:-3])[whole]
     if thirds.size < 8:
-        raise InputError("run: too few neighbouring valid samples to estimate the noise; state noise")
+        raise InputError(
+            "run: too few neighbouring valid samples to estimate the noise; state noise, in units of b"
+        )
     return float(np.median(np.abs(thirds)) / 0.6745 / math.sqrt(20.0))
 
 

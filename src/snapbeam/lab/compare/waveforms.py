@@ -203,7 +203,7 @@ def _clock(run: xr.Dataset, frequency: float | None, start: float | None) -> tup
     time = np.asarray(run["time"].values, dtype=np.float64)
     if frequency is None:
         if "cycle" not in run.coords:
-            raise InputError("measured: has no coordinate cycle; state frequency (Hz)")
+            raise InputError("measured: has no coordinate cycle; state frequency (--frequency), Hz")
         return np.asarray(run["cycle"].values, dtype=np.float64), _cycles_per_second(run)
     rate = positive("frequency", frequency, "Hz")
     begin = float(time[0]) if start is None else float(start)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from snapbeam.core.findings import Finding
 from snapbeam.lab.decay.cycles import Cycles
@@ -119,8 +120,7 @@ def _halves(
     shape = envelope(mode.law, t, rate, mode.law_strength)
     log_rest = np.log(cycles.amplitude) - np.log(shape)
     s = mode.softening * mode.amplitude**2 if soften else 0.0
-    steps = np.gradient(t)
-    clock = t - s * np.cumsum(shape**2 * steps)
+    clock = t - s * cumulative_trapezoid(shape**2, t, initial=0.0)
     phase_rest = cycles.phase - omega * math.sqrt(1.0 - mode.damping_ratio**2) * clock
     weight = cycles.amplitude**2
     # halves of equal weight, so that both tell as much

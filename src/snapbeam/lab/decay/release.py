@@ -113,7 +113,9 @@ def find_jump(cycles: Cycles) -> Jump | None:
     n, span = cycles.time.size, 6
     if n < 2 * span + 2:
         return None
-    log_a, phase = np.log(cycles.amplitude), cycles.phase
+    log_a = np.log(cycles.amplitude)
+    # cycles begin at whole samples, so they are not quite evenly spaced: their phase is told against time
+    phase = cycles.phase - np.polyval(np.polyfit(cycles.time, cycles.phase, 1), cycles.time)
     x = np.arange(span, dtype=np.float64)
     steps = np.zeros((2, n))
     errors = np.full(n, math.inf)

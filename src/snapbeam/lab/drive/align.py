@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.findings import Finding
-from snapbeam.core.validate import InputError, finite
+from snapbeam.core.validate import InputError, finite, shown
 from snapbeam.lab.drive.displacement import displacement_from_velocity
 from snapbeam.lab.drive.vibrometer import DriveMeasurement, measure_drive
 from snapbeam.lab.plausibility.alignment import KINDS
@@ -97,8 +97,8 @@ def align(
     InputError
         If a signal is unfit, or the two do not oscillate at the same frequency.
     """
-    if polarity not in (None, 1, -1):
-        raise InputError(f"polarity = {polarity!r}: must be 1, -1 or None")
+    if polarity is not None and (np.ndim(polarity) or polarity not in (1, -1)):
+        raise InputError(f"polarity = {shown(polarity)}: must be 1, -1 or None")
     check_signal(camera, "m", "camera")
     seen = measure_drive(camera, frequency)
     check_signal(vibrometer, ("m/s", "m"), "vibrometer")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from snapbeam.core.findings import to_json
-from snapbeam.core.validate import InputError, choice, positive
+from snapbeam.core.validate import InputError, choice, positive, shown
 from snapbeam.lab.drive.align import Alignment
 from snapbeam.lab.drive.displacement import displacement_from_velocity
 from snapbeam.lab.drive.vibrometer import DriveMeasurement, measure_drive
@@ -133,7 +133,7 @@ def _scale(alignment: Alignment | None, polarity: int | None, amplitude_from: st
     """Factor from the vibrometer's motion to the drive's."""
     choice("amplitude_from", amplitude_from, ("vibrometer", "camera"))
     if polarity not in (None, 1, -1):
-        raise InputError(f"polarity (--polarity) = {polarity!r}: must be 1 or -1")
+        raise InputError(f"polarity (--polarity) = {shown(polarity)}: must be 1 or -1")
     if amplitude_from == "camera" and alignment is None:
         raise InputError(
             "amplitude_from (--amplitude-from) = 'camera': needs an alignment with a camera (--camera)"

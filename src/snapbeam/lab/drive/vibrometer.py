@@ -6,7 +6,6 @@ start-up transient as a cause of disagreement with simulations (sections 2 and 4
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -17,10 +16,11 @@ from numpy.typing import NDArray
 from snapbeam.core.findings import Finding, doubtful
 from snapbeam.core.validate import InputError, finite, positive, within
 from snapbeam.lab.drive.onset import find_onset, moves_outside, moving_part
+from snapbeam.lab.drive.steady import robust_fit, settled_cycles, steady_fit, with_wander
 from snapbeam.lab.plausibility.vibrometer import KINDS
-from snapbeam.lab.signals.flaws import Clipping, Flaw, find_clipping, find_flaws, sound_samples, stuck_runs
+from snapbeam.lab.signals.flaws import Clipping, Flaw, stuck_runs
 from snapbeam.lab.signals.signal import SignalSamples, check_signal
-from snapbeam.lab.signals.sine_fit import SineFit, fit_sine, spectral_peak
+from snapbeam.lab.signals.sine_fit import SineFit, spectral_peak
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,7 +29,6 @@ __all__ = ["SNR_LIMIT", "DriveMeasurement", "StartUp", "measure_drive"]
 
 _Array = NDArray[np.float64]
 SNR_LIMIT = 15.0
-_IN_A_ROW = 5  # steady cycles that end a start-up
 _STEADY = 0.03  # share by which the cycles of a steady motion may stray
 
 
@@ -175,7 +174,7 @@ def measure_drive(
         raise InputError(
             f"signal: the shaker moves for {span:.1f} cycles of {guess:g} Hz: must be at least 8"
         )
-    rough = _robust_fit(_slice(moving, moving.values.size // 3, None), guess, 3)
+    rough = robust_fit(_slice(moving, moving.values.size // 3, None), guess, 3)
     onset, uncertainty = find_onset(samples, first, rough)
     start = float(samples.time[0]) if onset is None else onset
     period = 1.0 / rough.frequency
@@ -183,16 +182,16 @@ def measure_drive(
     times, cycles = _cycle_phasors(samples, rough, start, stop)
     noise = rough.noise_rms * math.sqrt(2.0 / (period * samples.sampling_freq))
     tol = max(tol, 4.0 * noise / rough.amplitude)
-    settled, stray = _settled(cycles, tol)
+    settled, stray = settled_cycles(cycles, tol)
     margin = 1 if settled == 0 else max(2 * settled, 5)
     begin = start + min(settled + margin, max(settled, cycles.size // 2)) * period
     part = _between(samples, begin, stop - 0.25 * period)
-    steady, flaws, clipping = _steady_fit(part, rough.frequency)
+    steady, flaws, clipping = steady_fit(part, rough.frequency)
     if steady.cycles < 5.0:
         raise InputError(f"signal: only {steady.cycles:.1f} cycles of steady motion: must be at least 5")
     shift = int(np.searchsorted(samples.time, part.time[0] - 0.25 / samples.sampling_freq))
     everywhere = [Flaw(flaw.first + shift, flaw.last + shift) for flaw in flaws]
-    steady, wander = _with_wander(steady, times, cycles, everywhere, samples, begin)
+    steady, wander = with_wander(steady, times, cycles, everywhere, samples, begin)
     startup = None
     amplitudes = np.abs(cycles)
     broken: list[Flaw] = []
@@ -217,87 +216,6 @@ def measure_drive(
         cycle_time=times,
         cycle_amplitude=amplitudes,
     )
-
-
-def _robust_fit(samples: SignalSamples, frequency: float, harmonics: int) -> SineFit:
-    """A sine fitted to what is sound of a record: twice, the second time without its flaws."""
-    fit = fit_sine(samples, frequency, harmonics)
-    flaws = find_flaws(samples, fit)
-    if not flaws:
-        return fit
-    keep = sound_samples(samples.values.size, flaws)
-    return fit if keep.mean() < 0.5 else fit_sine(samples, fit.frequency, harmonics, keep=keep)
-
-
-def _steady_fit(samples: SignalSamples, frequency: float) -> tuple[SineFit, list[Flaw], Clipping]:
-    """The steady sine without dropouts and cut tops, these, and the levels at which tops are cut."""
-    fit = fit_sine(samples, frequency)
-    flaws: list[Flaw] = []
-    for _ in range(3):
-        found = find_flaws(samples, fit)
-        keep = sound_samples(samples.values.size, found)
-        if not found or keep.mean() < 0.5:
-            break
-        flaws, fit = found, fit_sine(samples, fit.frequency, keep=keep)
-    clipping = find_clipping(samples, fit)
-    if not clipping.found:
-        return fit, flaws, clipping
-    # what a sine leaves of cut tops is no flaw of another kind
-    cut = clipping.touches(samples.values)
-    keep = ~cut
-    if keep.mean() < 0.25:
-        return dataclasses.replace(fit, amplitude_se=0.5 * fit.amplitude), [], clipping
-    inner = fit_sine(samples, fit.frequency, 1, keep=keep)
-    whole = SignalSamples(
-        np.where(cut, inner.waveform(samples.time), samples.values), samples.time, samples.sampling_freq
-    )
-    flaws = find_flaws(whole, inner)
-    keep &= sound_samples(keep.size, flaws)
-    if flaws and keep.mean() > 0.25:
-        inner = fit_sine(samples, fit.frequency, 1, keep=keep)
-    doubt = max(inner.amplitude_se, 0.01 * inner.amplitude, 0.15 * abs(inner.amplitude - fit.amplitude))
-    restored = dataclasses.replace(
-        fit, amplitude=inner.amplitude, amplitude_se=doubt,
-        phase=inner.phase, phase_se=max(inner.phase_se, fit.phase_se),
-        offset=inner.offset, offset_se=max(inner.offset_se, 0.5 * abs(inner.offset - fit.offset)),
-        frequency=inner.frequency, frequency_se=max(inner.frequency_se, fit.frequency_se),
-    )  # fmt: skip
-    return restored, flaws, clipping
-
-
-def _settled(cycles: NDArray[np.complex128], tol: float) -> tuple[int, float]:
-    """Cycles of the start-up, and the share of cycles that stray from the steady sine after it."""
-    settled = 0
-    ok = np.ones(cycles.size, dtype=bool)
-    for _ in range(3):
-        late = cycles[max(settled, cycles.size // 3) :]
-        reference = np.median(late.real) + 1j * np.median(late.imag)
-        ok = np.abs(cycles / reference - 1.0) <= tol
-        runs = np.convolve(ok, np.ones(_IN_A_ROW), mode="valid") > _IN_A_ROW - 0.5
-        first = np.flatnonzero(runs[: max(cycles.size // 2, 1)])
-        settled = int(first[0]) if first.size else cycles.size // 2
-    return settled, float(np.mean(~ok[settled:])) if ok[settled:].size else 0.0
-
-
-def _with_wander(
-    steady: SineFit,
-    times: _Array,
-    cycles: NDArray[np.complex128],
-    flaws: list[Flaw],
-    samples: SignalSamples,
-    begin: float,
-) -> tuple[SineFit, float]:
-    """The sine with standard errors that hold its wandering, and by what share its parts stray."""
-    used = (times >= begin) & (times < steady.stop)
-    for flaw in flaws:
-        low, high = samples.time[flaw.first], samples.time[min(flaw.last, samples.time.size - 1)]
-        used &= (times < low - 1.0 / steady.frequency) | (times > high + 1.0 / steady.frequency)
-    if used.sum() < 16:
-        return steady, 0.0
-    parts = [np.abs(part).mean() for part in np.array_split(cycles[used], 8)]
-    spread = float(np.std(parts, ddof=1)) / math.sqrt(8.0)
-    wander = float(np.std(np.abs(cycles[used]))) / steady.amplitude
-    return dataclasses.replace(steady, amplitude_se=max(steady.amplitude_se, spread)), wander
 
 
 def _start_up(

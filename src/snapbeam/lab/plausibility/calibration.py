@@ -17,7 +17,7 @@ KINDS = table(
         "does not depend on the buckling level (above b/r = 6.2, b the buckling level, r the radius of gyration): "
         "say which measured frequencies are symmetric, lower_well_shape (--lower-well 159a,165s), or measure the "
         "symmetric one",
-        ("lower_well_shape", "upper_well_shape"),
+        ("lower_well_shape",),
     ),
     Kind(
         "calibration.crossing", DOUBT,
@@ -25,7 +25,7 @@ KINDS = table(
         "the first two frequencies about a well, {symmetric:.1f} Hz symmetric and {antisymmetric:.1f} Hz "
         "antisymmetric, lie so close that their order may be the other one: "
         "say which measured frequencies are symmetric, lower_well_shape (--lower-well 159a,165s)",
-        ("lower_well_shape", "upper_well_shape"),
+        ("lower_well_shape",),
     ),
     Kind(
         "calibration.undetermined", DOUBT,

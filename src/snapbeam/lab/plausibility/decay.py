@@ -60,7 +60,7 @@ KINDS = table(
     Kind(
         "decay.damping_law", NOTE,
         "the amplitude cycle by cycle, against viscous, dry and quadratic damping",
-        "beside viscous damping there is {told} damping, {strength:.2f} +- {error:.2f} times as strong at the start: "
+        "beside viscous damping there is {told} damping, {strength:.2f} +- {error:.1g} times as strong at the start: "
         "the damping ratio is that of the viscous part, of vanishing amplitude",
     ),
     Kind(

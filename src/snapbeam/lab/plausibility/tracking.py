@@ -37,7 +37,7 @@ KINDS = table(
         "camera.thickness", WRONG,
         "thickness found in the picture, against that measured with a gauge",
         "the beam found is {found_mm:.3f} mm thick, beam_thickness (--beam-thickness) says {known_mm:.3f} mm: "
-        "another object, or a wrong pixel_size (--pixel-size)",
+        "another object (narrow region, --region), or a wrong pixel_size (--pixel-size)",
         ("beam_thickness", "pixel_size", "region"),
     ),
     Kind(
@@ -79,7 +79,7 @@ KINDS = table(
         "camera.edge_shape", DOUBT,
         "what a blurred step leaves of the mean edge, finer than a pixel",
         "edges are no blurred steps (off by {misfit_percent:.1f} % of the contrast): sharpened, doubled or "
-        "structured; switch the camera's edge enhancement off, or choose other columns (--contact-column)",
+        "structured; switch the camera's edge enhancement off, or choose another contact_column (--contact-column)",
         ("contact_column",),
     ),
     Kind(

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.validate import InputError, InputTypeError, positive
+from snapbeam.core.validate import InputError, InputTypeError, positive, shown
 from snapbeam.lab.signals.formats.channel import Channel, Told
 from snapbeam.lab.signals.formats.registry import READERS, WRITERS
 from snapbeam.lab.signals.signal import check_signal, make_signal
@@ -52,7 +52,7 @@ def read_channels(
         If the file is missing, cut short, of no known kind, without sampling rate, or without a channel.
     """
     if not isinstance(path, (str, os.PathLike)):
-        raise InputTypeError(f"path = {path!r}: must be a path, not {type(path).__name__}")
+        raise InputTypeError(f"path = {shown(path)}: must be a path, not {type(path).__name__}")
     source = Path(path)
     reader = READERS.get(source.suffix.lower())
     if reader is None:

@@ -47,14 +47,16 @@ class Clipping(NamedTuple):
         return cut
 
 
-def find_flaws(samples: SignalSamples, fit: SineFit) -> list[Flaw]:
+def find_flaws(samples: SignalSamples, fit: SineFit, measured: NDArray[np.bool_] | None = None) -> list[Flaw]:
     """Stretches in which a record leaves its steady sine by far more than its noise does.
 
     More than eight robust standard deviations and a twentieth of the amplitude; samples less than half a cycle
-    apart belong to one flaw, and a flaw reaches as far as three standard deviations do.
+    apart belong to one flaw, and a flaw reaches as far as three standard deviations do.  Where not all samples
+    were *measured*, the noise is that of those that were.
     """
     rest = samples.values - fit.waveform(samples.time)
-    sigma = 1.4826 * float(np.median(np.abs(rest - np.median(rest))))
+    known = rest if measured is None else rest[measured]
+    sigma = 1.4826 * float(np.median(np.abs(known - np.median(known))))
     far = np.abs(rest) > max(8.0 * sigma, 0.05 * fit.amplitude)
     # one sample in thousands strays by chance where the noise is not normal; a flaw is more, or farther out
     single = (

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError, InputTypeError, finite, finite_array, positive
+from snapbeam.core.validate import InputError, InputTypeError, finite, finite_array, positive, shown
 from snapbeam.lab.signals.units import si_unit
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def check_signal(
     if unit is None:
         raise InputError(f"{label}: has no units; state them in attrs['units']")
     if allowed and unit not in allowed:
-        raise InputError(f"{label} in units {unit!r}: must be in {' or '.join(allowed)}")
+        raise InputError(f"{label} in units {shown(unit)}: must be in {' or '.join(allowed)}")
     if signal.size < MINIMUM_SAMPLES:
         raise InputError(f"{label}: {signal.size} sample(s): must have at least {MINIMUM_SAMPLES}")
     values = finite_array(label, signal.values, 1)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError, integer, positive
+from snapbeam.core.validate import InputError, instance, integer, positive
 from snapbeam.lab.signals.signal import SignalSamples
 
 __all__ = ["SineFit", "fit_sine", "spectral_peak", "white_variance"]
@@ -179,6 +179,7 @@ def fit_sine(
     IEEE Std 1057-2017, Annex B; the standard errors reach the bound of Rife and Boorstyn, IEEE Trans. Inf.
     Theory 20 (1974), 591.
     """
+    instance("samples", samples, SignalSamples, "SignalSamples, as snapbeam.lab.check_signal returns them")
     y, time, rate = samples
     guess = spectral_peak(samples) if frequency is None else positive("frequency", frequency, "Hz")
     n = y.size

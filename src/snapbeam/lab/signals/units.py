@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.core.validate import InputError, InputTypeError, shown
 
 __all__ = ["KNOWN_UNITS", "parse_sensitivity", "si_unit"]
 
@@ -57,15 +57,16 @@ def si_unit(name: str, unit: str) -> tuple[float, str]:
         If the unit is unknown; *name* says whose unit it is.
     """
     if not isinstance(unit, str):
+        where = f"unit of {name}" if isinstance(name, str) else "unit"
         raise InputTypeError(
-            f"unit of {name} = {unit!r}: must be text such as 'mm/s', not {type(unit).__name__}"
+            f"{where} = {shown(unit)}: must be text such as 'mm/s', not {type(unit).__name__}"
         )
     word = unit.strip().replace("\u03bc", "u").replace("\u00b5", "u").replace(" ", "").replace("*", "")
     word = _WORDS.get(word.lower(), word)
     word = word.replace("sec", "s").replace("²", "^2").replace("/s/s", "/s^2").replace("/s2", "/s^2")
     word = re.sub(r"s\^?-1$", "/s", re.sub(r"s\^?-2$", "/s^2", word)).replace("//", "/")
     if word not in _TO_SI:
-        raise InputError(f"unit of {name} = {unit!r}: must be {KNOWN_UNITS}")
+        raise InputError(f"unit of {name} = {shown(unit)}: must be {KNOWN_UNITS}")
     return _TO_SI[word]
 
 

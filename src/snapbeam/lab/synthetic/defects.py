@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from snapbeam.core.validate import InputError, integer, nonnegative, positive, within
+from snapbeam.core.validate import InputError, integer, nonnegative, positive, shown, within
 
 __all__ = ["FRAME_LISTS", "Defects", "Fixture"]
 
@@ -88,7 +88,7 @@ class Defects:
         for name in FRAME_LISTS:
             values = getattr(self, name)
             if isinstance(values, (str, int)):
-                raise InputError(f"{name} = {values!r}: must be a list of frame numbers")
+                raise InputError(f"{name} = {shown(values)}: must be a list of frame numbers")
             chosen[name.removesuffix("_frames")] = frozenset(
                 integer(f"{name}[{i}]", value, 0, count - 1) for i, value in enumerate(values)
             )

@@ -6,6 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.engines.scalar.kept_code import keep_code
 from snapbeam.lab.tracking.edges import edge_profile
 
 __all__ = ["FINE", "expose", "step_table"]
@@ -23,7 +24,7 @@ def step_table(blur: float) -> NDArray[np.float64]:
     return edge_profile(offsets, blur) - edge_profile(offsets - 1.0, blur)
 
 
-@numba.njit(cache=True)
+@numba.njit
 def _add_edge(
     steps: NDArray, column: int, row: float, height: float, table: NDArray
 ) -> None:  # pragma: no cover
@@ -40,8 +41,8 @@ def _add_edge(
             steps[max(r, 0), column] += value
 
 
-@numba.njit(cache=True)
-def expose(
+@numba.njit
+def _expose(
     steps: NDArray,
     beam: NDArray,
     tip: NDArray,
@@ -75,3 +76,6 @@ def expose(
                 if marker_step != 0.0:
                     _add_edge(steps, x, tip[n] + marker_from, weight * cover[x] * marker_step, table)
                     _add_edge(steps, x, tip[n] + marker_to, -weight * cover[x] * marker_step, table)
+
+
+expose = keep_code(_expose, numba.__version__)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError, axis, choice, finite, finite_array, integer
+from snapbeam.core.validate import InputError, axis, choice, finite, finite_array, instance, integer
 from snapbeam.lab.camera.write import write_photron, write_video
 from snapbeam.lab.synthetic.area import AreaPicture
 from snapbeam.lab.synthetic.defects import Defects
@@ -235,6 +235,11 @@ def render_recording(
     InputError
         If arrays disagree or the scene does not fit in the region, with the number of rows it takes.
     """
+    for name, value, kind in (("camera", camera, SyntheticCamera), ("stage", stage, SyntheticStage)):
+        if value is not None:
+            instance(name, value, kind, f"a {kind.__name__}")
+    if defects is not None:
+        instance("defects", defects, Defects, "Defects")
     camera = SyntheticCamera() if camera is None else camera
     stage = SyntheticStage() if stage is None else stage
     known = [field.name for field in dataclasses.fields(Defects)]

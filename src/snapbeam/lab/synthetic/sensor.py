@@ -12,6 +12,8 @@ from snapbeam.lab.synthetic.setup import SyntheticCamera, SyntheticStage
 
 __all__ = ["read_out", "with_fixture"]
 
+_FINE = 8  # rows of light drawn for a row of pixels
+
 
 def with_fixture(
     light: NDArray[np.float32], fixture: Fixture, shift: float, blur: float
@@ -20,10 +22,11 @@ def with_fixture(
 
     Its edges are ramps as wide as a disk of confusion of standard deviation *blur* [px].
     """
-    rows = np.arange(light.shape[0])
+    within_pixel = (np.arange(_FINE) + 0.5) / _FINE - 0.5
+    rows = np.arange(light.shape[0])[:, None] + within_pixel
     ramp = max(1.0, 2.0 * math.sqrt(3.0) * blur)
     inside = 0.5 * fixture.thickness - np.abs(rows - fixture.row - shift)
-    cover = np.clip(0.5 + inside / ramp, 0.0, 1.0).astype(np.float32)[:, None]
+    cover = np.clip(0.5 + inside / ramp, 0.0, 1.0).mean(1).astype(np.float32)[:, None]
     out: NDArray[np.float32] = light * (1.0 - cover) + np.float32(fixture.level) * cover
     return out
 

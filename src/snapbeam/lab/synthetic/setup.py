@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from snapbeam.core.validate import InputError, choice, integer, nonnegative, positive, within
+from snapbeam.core.validate import InputError, choice, integer, nonnegative, positive, shown, within
 from snapbeam.lab.tracking.geometry import SIDES
 
 __all__ = ["SyntheticCamera", "SyntheticStage"]
@@ -48,6 +48,9 @@ class SyntheticCamera:
     def __post_init__(self) -> None:
         rate = positive("frame_rate", self.frame_rate, "Hz")
         positive("pixel_size", self.pixel_size, "m")
+        for name in ("shape", "light"):
+            if not isinstance(getattr(self, name), (tuple, list)) or len(getattr(self, name)) != 2:
+                raise InputError(f"{name} = {shown(getattr(self, name))}: must be a pair of numbers")
         for name, value in zip(("shape[0]", "shape[1]"), self.shape, strict=True):
             integer(name, value, 16, 8192)
         exposure = 0.5 / rate if self.exposure is None else self.exposure

@@ -16,6 +16,7 @@ from snapbeam.lab.tracking.edges import Floats
 __all__ = ["BeamView", "EdgeShape", "Scene", "ShakerView", "Sticker", "TipOutline"]
 
 _OUTLINE = 3.0  # widths of the edge, of its misfit, by which a tip in the beam's light may lie off
+_UNEVEN = 0.02  # px
 
 
 @dataclass(frozen=True)
@@ -161,12 +162,13 @@ class Scene:
     def placed_error(self) -> float:
         """Standard error [px] of where the tip stands against the beam, the same in all frames.
 
-        A tip that is followed by its own outline is seen against the beam through the same lens: what the
-        blurred step leaves of an edge is left there several times over.
+        Never less than a fiftieth of a pixel: the tip is round and uneven.  A tip that is followed by its own
+        outline is seen against the beam through the same lens: what the blurred step leaves of an edge is left
+        there several times over.
         """
         if self.shaker is None:
             return 0.0
-        lens = 0.0
+        lens = _UNEVEN
         if self.shaker.sticker is None and math.isfinite(self.shape.misfit):
-            lens = _OUTLINE * self.shape.misfit * self.beam.edge_width
+            lens = max(_OUTLINE * self.shape.misfit * self.beam.edge_width, _UNEVEN)
         return math.hypot(self.shaker.tip_error, self.beam.thickness_error, lens)

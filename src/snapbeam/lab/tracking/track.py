@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.validate import instance
 from snapbeam.lab.camera.marks import profile_shift
 from snapbeam.lab.camera.recording import Recording
 from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.geometry import Orientation
 from snapbeam.lab.tracking.measure.beam import measure_beam
-from snapbeam.lab.tracking.measure.follower import Follower
+from snapbeam.lab.tracking.measure.follower import Drift, Follower
 from snapbeam.lab.tracking.measure.shaker import measure_shaker
 from snapbeam.lab.tracking.settings import TrackingSettings
 from snapbeam.lab.tracking.survey.levels import pixel_noise, saturation_level
@@ -75,6 +76,9 @@ def track(
     InputError
         For settings out of range, or a recording in which beam or shaker cannot be found.
     """
+    instance("recording", recording, Recording, "a Recording")
+    if settings is not None:
+        instance("settings", settings, TrackingSettings, "TrackingSettings")
     wanted = (settings or TrackingSettings()).changed(**changes)
     wanted = wanted.checked_for(recording.shape, len(recording))
     turn = Orientation(wanted.side, recording.shape)
@@ -163,7 +167,7 @@ class _FixedMarks:
         profile: NDArray[np.float64] = part.mean(-1)
         return profile
 
-    def __call__(self, batch: NDArray[np.integer]) -> Floats | None:
+    def __call__(self, batch: NDArray[np.integer]) -> Drift | None:
         if not self.marks:
             return None
         total, weight = np.zeros(batch.shape[0]), np.zeros(batch.shape[0])
@@ -176,4 +180,4 @@ class _FixedMarks:
         drift: Floats = np.where(weight > 0.0, total / np.maximum(weight, 1e-30), np.nan)
         if np.isfinite(drift).any():
             self.largest = max(self.largest, float(np.nanmax(np.abs(drift))))
-        return drift
+        return Drift(drift, 1.0 / np.sqrt(np.maximum(weight, 1e-30)))

@@ -2,6 +2,21 @@
 
 from snapbeam.model.contact.base import LAWS, ContactLaw, Keeps
 from snapbeam.model.contact.hertz import HertzContact
+from snapbeam.model.contact.hunt_crossley import HuntCrossley
+from snapbeam.model.contact.kelvin_voigt import KelvinVoigt
+from snapbeam.model.contact.power_law import PowerLaw
 from snapbeam.model.contact.restitution import Restitution
+from snapbeam.model.contact.stress import bending_stress, hertz_stress
 
-__all__ = ["LAWS", "ContactLaw", "HertzContact", "Keeps", "Restitution"]
+__all__ = [
+    "LAWS",
+    "ContactLaw",
+    "HertzContact",
+    "HuntCrossley",
+    "Keeps",
+    "KelvinVoigt",
+    "PowerLaw",
+    "Restitution",
+    "bending_stress",
+    "hertz_stress",
+]

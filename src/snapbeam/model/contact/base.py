@@ -25,6 +25,8 @@ class Keeps:
     """Untouched, the beam's energy only falls: what early decision rests on."""
     smooth: bool = True
     """The force is continuous where contact begins and ends, so that the tangent flow is plain."""
+    tangent: bool = True
+    """Small changes of the state can be carried along."""
 
 
 class ContactLaw:
@@ -37,6 +39,9 @@ class ContactLaw:
     - ``energy(law, penetration)``: energy stored in the contact, J, whose derivative is the force;
     - ``slope(law, penetration)``: derivative of the force, N/m, for the tangent flow.
 
+    A law that loses energy (``lossy``) has ``damping(law, penetration)`` besides, N s/m: its force is
+    max(0, force + damping times the rate of penetration).
+
     They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone, and never allocate.
     """
 
@@ -45,6 +50,8 @@ class ContactLaw:
     keeps: ClassVar[Keeps] = Keeps()
     impulsive: ClassVar[bool] = False
     """Whether an impact lasts no time: a jump of the velocity instead of a force."""
+    lossy: ClassVar[bool] = False
+    """Whether the force depends on the rate of penetration too."""
     most_modes: ClassVar[int | None] = None
     """Modes of a model that may be struck under this law."""
 
@@ -56,11 +63,21 @@ class ContactLaw:
     def __post_init__(self) -> None:
         check_fields(self)
 
+    @staticmethod
+    def damping(law: Any, penetration: float) -> float:
+        """Force per rate of penetration, N s/m; none is lost."""
+        return 0.0
+
     @classmethod
     def numbers_type(cls) -> Any:
         """The named tuple of the law's numbers, as kernels see them; an attribute of the class, ``Numbers``."""
         fields = dataclasses.fields(cls)  # type: ignore[arg-type]
         return numbers_type(cls, (item.name for item in fields))
+
+    @property
+    def loses(self) -> bool:
+        """Whether contacts under it may lose energy."""
+        return self.impulsive or self.lossy
 
     def impact_duration(self, mass: float, velocity: float) -> float:
         """Duration, s, of the impact of a free *mass* (kg) that arrives with *velocity* (m/s); 0 if none is known.

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.core.validate import InputError, InputTypeError, nonnegative, positive, within
+from snapbeam.core.validate import InputError, InputTypeError, nonnegative, positive, shown, within
 from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.quantity import RUN, quantity
 
@@ -87,7 +87,15 @@ class HertzContact(ContactLaw):
         """
         mass = positive("mass", mass, "kg")
         velocity = nonnegative("velocity", velocity, "m/s")
-        return float((1.25 * mass * velocity**2 / self.stiffness) ** 0.4)
+        try:
+            found = float((1.25 * mass * velocity**2 / self.stiffness) ** 0.4)
+        except OverflowError:
+            found = math.inf
+        if not math.isfinite(found):
+            raise InputError(
+                f"mass = {mass:g} kg, velocity = {velocity:g} m/s: are beyond what a number holds"
+            )
+        return found
 
     def impact_duration(self, mass: float, velocity: float) -> float:
         """Duration, s, of the impact of a free *mass* (kg) that arrives with a *velocity* (m/s).
@@ -102,7 +110,9 @@ def _pair(name: str, value: tuple[float, float]) -> list[tuple[int, float]]:
     try:
         items = list(value)
     except TypeError:
-        raise InputTypeError(f"{name} = {value!r}: must be two numbers, of the sphere and the flat") from None
+        raise InputTypeError(
+            f"{name} = {shown(value)}: must be two numbers, of the sphere and the flat"
+        ) from None
     if len(items) != 2:
-        raise InputError(f"{name} = {value!r}: must be two numbers, of the sphere and the flat")
+        raise InputError(f"{name} = {shown(value)}: must be two numbers, of the sphere and the flat")
     return list(enumerate(items))

@@ -42,6 +42,10 @@ class Drive:
     """In parameter files and attributes."""
     harmonic: ClassVar[bool] = False
     """Whether it is the sine that engines know by themselves."""
+    repeats: ClassVar[bool] = True
+    """Whether the motion repeats after a turn of its argument; if not, that turn is longer than any run."""
+    marched_as: ClassVar[type[Drive] | None] = None
+    """The drive whose kernels march it, where that is another one."""
     number_names: ClassVar[tuple[str, ...]] = ("omega",)
 
     def __init_subclass__(cls, **options: Any) -> None:

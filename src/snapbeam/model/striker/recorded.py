@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, finite_array
+from snapbeam.core.validate import InputError, finite_array, instance, shown
 from snapbeam.model.drive.recorded import Recorded
 from snapbeam.model.striker.striker import Striker
 
@@ -75,6 +75,9 @@ class RecordedDrive:
         *dataset* has ``displacement`` (m) and ``velocity`` (m/s) over an even ``time`` (s), and the nominal
         ``frequency`` (Hz) among its attributes.
         """
+        import xarray as xr
+
+        instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
         missing = [name for name in ("time", "displacement", "velocity") if name not in dataset.variables]
         if missing or "frequency" not in dataset.attrs:
             raise InputError(
@@ -84,7 +87,7 @@ class RecordedDrive:
         for name, unit in (("time", "s"), ("displacement", "m"), ("velocity", "m/s")):
             given = dataset[name].attrs.get("units", unit)
             if given != unit:
-                raise InputError(f"{name} with units {given!r}: must be in {unit!r}")
+                raise InputError(f"{name} with units {shown(given)}: must be in {unit!r}")
         time = finite_array("time", dataset["time"].values, 1)
         if time.size < 4:
             raise InputError(f"time of {time.size} samples: must hold at least 4")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from snapbeam.core.validate import InputTypeError
+from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.model.drive.base import Drive
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 
@@ -29,6 +30,14 @@ class Striker:
     gap : float, optional
         Distance, m, between the mid-position and the beam at rest in the well that a run begins in; negative
         presses.  By default the tip touches the beam at the start, wherever the beam then is.
+    mass : float, optional
+        Mass of the striker, kg; infinite by default: the tip moves as its drive says, whatever it strikes.  With a
+        mass the drive is the motion that the tip has as long as nothing touches it, and the contact force moves the
+        body from it: m_s x'' + c_s x' + k_s x = -f.
+    spring : float
+        Stiffness k_s of its suspension, N/m; 0 is a free flying mass.
+    damper : float
+        Damper c_s of its suspension, N s/m, below critical; a coil of force factor K on a resistance R adds K^2/R.
     """
 
     drive: Drive
@@ -44,9 +53,41 @@ class Striker:
         scope=RUN, symbol="g", short="striker_gap", plausible=(0.0, 1.0, "mm"),
     )  # fmt: skip
 
+    mass: float | None = quantity(
+        "kg", "mass of the striker", default=None, optional=True, low=0.0, symbol=r"m_\mathrm{s}", short="striker_mass",
+        plausible=(1e-15, 1e4, "g"),
+    )  # fmt: skip
+    spring: float = quantity(
+        "N/m", "stiffness of the striker's suspension", default=0.0, low=0.0, closed="left",
+        symbol=r"k_\mathrm{s}", short="striker_spring",
+    )  # fmt: skip
+    damper: float = quantity(
+        "N s/m", "damper of the striker's suspension", default=0.0, low=0.0, closed="left",
+        symbol=r"c_\mathrm{s}", short="striker_damper",
+    )  # fmt: skip
+
     def __post_init__(self) -> None:
         if not isinstance(self.drive, Drive):
             raise InputTypeError(
-                f"drive = {self.drive!r}: must be a drive, such as Sine(frequency_ratio=1.2, ...)"
+                f"drive = {shown(self.drive)}: must be a drive, such as Sine(frequency_ratio=1.2, ...)"
             )
         check_fields(self)
+        if self.mass is None:
+            for name in ("spring", "damper"):
+                if getattr(self, name) != 0.0:
+                    raise InputError(
+                        f"{name} = {getattr(self, name):g}: a striker without a mass moves as prescribed; give its mass"
+                    )
+        elif self.damping_ratio >= 1.0:
+            critical = 2.0 * math.sqrt(self.spring * self.mass)
+            raise InputError(
+                f"damper = {self.damper:g} N s/m: must be less than {critical:g} N s/m, critical for its mass and "
+                "spring; a stiffer spring lets it be greater"
+            )
+
+    @property
+    def damping_ratio(self) -> float:
+        """Of the suspension, c_s/(2 sqrt(k_s m_s)); infinite for a damper without a spring."""
+        if self.mass is None or self.damper == 0.0:
+            return 0.0
+        return self.damper / (2.0 * math.sqrt(self.spring * self.mass)) if self.spring > 0.0 else math.inf

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snapbeam.core.validate import InputError, integer
+from snapbeam.core.validate import InputError, integer, shown
 from snapbeam.engines.cpu.driver import usable_cores
+from snapbeam.sweeps.errors import StoreError
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -58,7 +59,7 @@ def parse_cluster(text: str) -> Cluster:
         If it is none of these; of a file, with the key that is wrong.
     """
     if not isinstance(text, str) or not text:
-        raise InputError(f"cluster = {text!r}: must be {_FORMS}")
+        raise InputError(f"cluster = {shown(text)}: must be {_FORMS}")
     kind, colon, rest = text.partition(":")
     if kind == "local" and colon:
         if not rest.isdecimal():
@@ -68,7 +69,7 @@ def parse_cluster(text: str) -> Cluster:
         return Cluster("address", address=text)
     if text.endswith(".toml"):
         return Cluster("slurm", slurm=_read_slurm(Path(text)))
-    raise InputError(f"cluster = {text!r}: must be {_FORMS}")
+    raise InputError(f"cluster = {shown(text)}: must be {_FORMS}")
 
 
 def _read_slurm(path: Path) -> dict[str, Any]:
@@ -86,7 +87,7 @@ def _read_slurm(path: Path) -> dict[str, Any]:
             raise InputError(f"{path.name}: [slurm] {name}: unknown key; must be one of {', '.join(_SLURM)}")
         if not isinstance(value, _SLURM[name]) or isinstance(value, bool):
             raise InputError(
-                f"{path.name}: [slurm] {name} = {value!r}: must be of type {_SLURM[name].__name__}"
+                f"{path.name}: [slurm] {name} = {shown(value)}: must be of type {_SLURM[name].__name__}"
             )
     for name in _NEEDED:
         if name not in given:
@@ -109,8 +110,17 @@ def open_client(cluster: Cluster) -> Iterator[Client]:
     except ImportError as error:
         raise InputError("dask is needed for --cluster: install snapbeam[cluster]") from error
     if cluster.kind == "address":
-        with Client(cluster.address, timeout="30s", set_as_default=False) as client:
+        try:
+            client = Client(cluster.address, timeout="30s", set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise StoreError(
+                f"cluster = {cluster.address!r}: no scheduler answers there ({error})"
+            ) from error
+        try:
             yield client
+        finally:
+            with suppress(Exception):  # a scheduler that is gone cannot be taken leave of
+                client.close(timeout=5)
         return
     with dask.config.set({"distributed.comm.timeouts.connect": "60s"}):
         made = _local(cluster.workers) if cluster.kind == "local" else _slurm(cluster.slurm)

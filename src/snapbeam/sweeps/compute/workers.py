@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
+from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from snapbeam.core.provenance import __version__, processor_name
+from snapbeam.core.provenance import __version__, code_hash
+from snapbeam.sweeps.compute.crew import Crew
+from snapbeam.sweeps.compute.maker import Maker, this_maker
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Stage
 from snapbeam.sweeps.errors import StoreError
@@ -23,13 +27,17 @@ __all__ = ["ATTEMPTS", "ClusterWorkers", "Failure", "HereWorkers", "TaskResult",
 ATTEMPTS = 3
 """Times that a task may kill its worker, or raise in it, before it is given up."""
 _POLL = 0.5
+_DELIVERY_POLL = 2.0
+_RECONNECT = 30.0
+_GONE = (OSError, TimeoutError, asyncio.TimeoutError, CancelledError, asyncio.CancelledError, RuntimeError)
+"""What calls to a scheduler that is not there any more raise."""
 
 
 class TaskResult(NamedTuple):
-    """Results of a task, and the type of the processor they come from."""
+    """Results of a task, and what computed them; the maker of this process if none is given."""
 
     columns: ResultTable
-    processor: str
+    maker: Maker | None = None
 
 
 class Failure(NamedTuple):
@@ -58,13 +66,16 @@ class HereWorkers:
         """Compute the tasks in order; *progress* gets the points done of the present one."""
         for task in tasks:
             columns = work.compute(stage.columns(task), self.threads, lambda done, _: progress(done))
-            yield task, TaskResult(columns, processor_name())
+            yield task, TaskResult(columns)
 
 
-def compute_task(work: PointWork, points: Columns, threads: int) -> tuple[Any, Any, str, str]:
-    """What a worker of a cluster does: one task, with all its threads."""
+def compute_task(work: PointWork, points: Columns, threads: int, version: str, code: str) -> tuple[Any, ...]:
+    """What a worker of a cluster does: one task, with all its threads, if its code is that of who asks."""
+    maker = this_maker(work.setup.system)
+    if (maker.version, maker.code) != (version, code):
+        return None, None, astuple(maker)
     columns = work.compute(points, threads)
-    return columns.integers, columns.numbers, processor_name(), __version__
+    return columns.integers, columns.numbers, astuple(maker)
 
 
 @dataclass(frozen=True)
@@ -73,58 +84,66 @@ class ClusterWorkers:
 
     Each worker has one task at a time, so the death of a worker is the doing of a known task, and each
     task uses all the threads its worker was given.  Results come back to this process, the only one that
-    writes.
+    writes.  Nothing is waited for without end but workers that have yet to come.
     """
 
     client: Client
     note: Callable[[str], object] = print
+    delivery: float = 60.0
+    """Seconds that a living worker has to hand over the results of a finished task."""
 
     def run(
         self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
     ) -> Iterator[tuple[int, TaskResult | Failure]]:
         """Compute the tasks as workers come and go."""
+        maker = this_maker(work.setup.system)
         queue = deque(tasks)
         flying: dict[Future, tuple[int, str]] = {}
         trouble: Counter[int] = Counter()
-        succeeded, known = False, -1
+        crew = Crew(self.client, self.note)
         try:
             while queue or flying:
                 there = self._workers()
-                if len(there) != known and 0 in (known, len(there)):
-                    self.note("waiting for workers" if not there else f"workers: {len(there)}")
-                known = len(there)
+                with _answered():
+                    crew.now(there)
                 idle = there.keys() - {address for _, address in flying.values()}
                 for address in sorted(idle)[: len(queue)]:
                     task = queue.popleft()
-                    future = self.client.submit(
-                        compute_task, work, stage.columns(task), there[address],
-                        workers=[address], allow_other_workers=False, pure=False, retries=0,
-                    )  # fmt: skip
+                    with _answered():
+                        future = self.client.submit(
+                            compute_task, work, stage.columns(task), there[address], maker.version, maker.code,
+                            workers=[address], allow_other_workers=False, pure=False, retries=0,
+                        )  # fmt: skip
                     flying[future] = task, address
                 for future, task, address in self._settled(flying, there):
                     del flying[future]
-                    outcome = self._outcome(future, address in there)
+                    with _answered():
+                        outcome = self._outcome(future, address)
                     future.release()
                     if isinstance(outcome, TaskResult):
-                        succeeded = True
+                        crew.finished()
                         yield task, outcome
                         continue
                     trouble[task] += 1
                     if trouble[task] < ATTEMPTS:
                         queue.append(task)
                         continue
-                    if not succeeded and outcome.reason.startswith("raised"):
+                    if not crew.succeeded and outcome.reason.startswith("raised"):
                         raise StoreError(f"the workers cannot compute this map: a task {outcome.reason}")
                     yield task, Failure(f"{outcome.reason}, {ATTEMPTS} times")
         finally:
             if flying:
-                self.client.cancel(list(flying), force=True)
+                with suppress(*_GONE):
+                    self.client.cancel(list(flying), force=True)
 
     def _workers(self) -> dict[str, int]:
-        try:
+        until = time.monotonic() + _RECONNECT
+        while self.client.status == "connecting" and time.monotonic() < until:
+            time.sleep(_POLL)
+        if self.client.status != "running":
+            raise _gone(f"the connection is {self.client.status}")
+        with _answered():
             return dict(self.client.nthreads())
-        except (OSError, TimeoutError) as error:
-            raise _gone(error) from error
 
     def _settled(self, flying: dict[Future, tuple[int, str]], there: dict[str, int]) -> list[Any]:
         """Futures that ended, or whose worker is gone, after waiting a moment for one to."""
@@ -133,31 +152,73 @@ class ClusterWorkers:
         if not flying:
             time.sleep(_POLL)
             return []
-        with self.client.as_current(), suppress(TimeoutError, OSError):
+        with self.client.as_current(), suppress(*_GONE):
             wait(list(flying), timeout=_POLL, return_when="FIRST_COMPLETED")
+        if self.client.status != "running":
+            return []
         return [(f, task, at) for f, (task, at) in flying.items() if f.done() or at not in there]
 
-    def _outcome(self, future: Future, alive: bool) -> TaskResult | Failure:
+    def _outcome(self, future: Future, address: str) -> TaskResult | Failure:
+        """What came of a task that ended; one whose results do not come is as one that killed its worker."""
         from distributed import KilledWorker
 
         if not future.done():
-            future.cancel(force=True)
-            return Failure("killed its worker")
+            return self._dropped(future, "killed its worker")
         if future.status == "finished":
-            integers, numbers, processor, version = future.result()
-            if version != __version__:
-                raise StoreError(f"a worker runs snapbeam {version}, this is {__version__}: install the same")
-            return TaskResult(ResultTable(integers, numbers), processor)
+            return self._delivered(future, address)
         if future.status == "cancelled":
-            return Failure("was cancelled") if alive else Failure("killed its worker")
-        error = future.exception()
+            return Failure("was cancelled") if address in self._workers() else Failure("killed its worker")
+        error = future.exception(timeout=self.delivery)
         if isinstance(error, KilledWorker):
             return Failure("killed its worker")
         return Failure(f"raised {type(error).__name__}: {error}")
 
+    def _delivered(self, future: Future, address: str) -> TaskResult | Failure:
+        """The results of a finished task, as long as the worker that holds them lives.
 
-def _gone(error: Exception) -> StoreError:
+        When it dies before it handed them over, the scheduler would compute them again on the same worker, which
+        never comes back; so the task is dropped and handed out anew.
+        """
+        from distributed import KilledWorker
+
+        until = time.monotonic() + self.delivery
+        while True:
+            try:
+                integers, numbers, by = future.result(timeout=min(_DELIVERY_POLL, self.delivery))
+                break
+            except TimeoutError:
+                if address not in self._workers():
+                    return self._dropped(future, "lost its worker before its results came")
+                if time.monotonic() > until:
+                    return self._dropped(future, f"gave no results within {self.delivery:g} s")
+            except (KilledWorker, CancelledError, asyncio.CancelledError):
+                return self._dropped(future, "lost its worker before its results came")
+        maker = Maker(*by)
+        if integers is None:
+            raise StoreError(
+                f"a worker runs snapbeam {maker.version} with code {maker.code}, this is {__version__} with code "
+                f"{code_hash()}: install the same in both places"
+            )
+        return TaskResult(ResultTable(integers, numbers), maker)
+
+    def _dropped(self, future: Future, reason: str) -> Failure:
+        with suppress(*_GONE):
+            future.cancel(force=True)
+        return Failure(reason)
+
+
+def _gone(why: object) -> StoreError:
     return StoreError(
-        f"the scheduler does not answer any more ({error}); no finished task is lost: "
-        "give the same command again"
+        f"the scheduler does not answer any more ({why}); no finished task is lost: give the same command again"
     )
+
+
+@contextmanager
+def _answered() -> Iterator[None]:
+    """Turn what is raised about a scheduler that is gone into words."""
+    try:
+        yield
+    except StoreError:
+        raise
+    except _GONE as error:
+        raise _gone(str(error) or type(error).__name__) from error

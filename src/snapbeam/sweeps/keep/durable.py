@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import stat
+import time
 import uuid
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from snapbeam.core.files import lives
 from snapbeam.core.validate import InputError
 from snapbeam.sweeps.errors import StoreError
 
-__all__ = ["PARTIAL", "StoreLock", "append_line", "durable_write", "member", "refuse_links"]
+__all__ = ["PARTIAL", "StoreLock", "append_line", "durable_write", "member", "open_own", "refuse_links"]
 
 PARTIAL = ".partial"
 """Suffix of a file that is being written."""
@@ -37,7 +41,7 @@ def durable_write(path: Path, data: bytes | memoryview) -> None:
 
 def append_line(path: Path, line: str) -> None:
     """Append a line to a file and have it on the disk; a line torn by an earlier failure stays apart."""
-    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0), 0o666)
+    handle = open_own(path, os.O_RDWR | os.O_APPEND)
     try:
         size = os.fstat(handle).st_size
         torn = size > 0 and os.pread(handle, 1, size - 1) != b"\n"
@@ -68,10 +72,11 @@ def member(name: str) -> str:
     return name
 
 
-def refuse_links(folder: Path) -> None:
-    """Refuse a store in which anything is neither a plain file nor a plain folder; remove torn files.
+def refuse_links(folder: Path, *, sweep: bool) -> None:
+    """Refuse a store in which anything is neither a plain file nor a plain folder.
 
-    A link could make a resumed map read, or write, outside its store.
+    A link could make a resumed map read, or write, outside its store.  *sweep* removes torn files; only the holder of
+    the store's lock may, for they may be another writer's that is at work.
     """
     pending = [folder]
     while pending:
@@ -81,10 +86,34 @@ def refuse_links(folder: Path) -> None:
                 if stat.S_ISDIR(mode):
                     pending.append(Path(entry.path))
                 elif not stat.S_ISREG(mode):
-                    inside = Path(entry.path).relative_to(folder)
-                    raise InputError(f"store = {str(folder)!r}: {str(inside)!r} is a link or no plain file")
-                elif entry.name.startswith(".") and entry.name.endswith(PARTIAL):
+                    raise _link(Path(entry.path), folder)
+                elif sweep and entry.name.startswith(".") and entry.name.endswith(PARTIAL):
                     os.unlink(entry.path)
+
+
+def _link(path: Path, folder: Path) -> InputError:
+    inside = path.relative_to(folder)
+    return InputError(f"store = {str(folder)!r}: {str(inside)!r} is a link or no plain file")
+
+
+def open_own(path: Path, flags: int) -> int:
+    """Open a file of a store that is written in place; refuse one that is a link or that also has another name.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        handle = os.open(path, flags | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+    except OSError as error:
+        if error.errno in (errno.ELOOP, errno.EISDIR):
+            raise _link(path, path.parent) from None
+        raise
+    found = os.fstat(handle)
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+        os.close(handle)
+        raise _link(path, path.parent)
+    return handle
 
 
 class StoreLock:
@@ -95,27 +124,42 @@ class StoreLock:
         self._handle: int | None = None
 
     def __enter__(self) -> Self:
-        handle = os.open(self.path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
+        handle = open_own(self.path, os.O_RDWR)
         try:
             _lock(handle)
         except OSError:
-            holder = os.pread(handle, 32, 0).decode(errors="replace").strip() or "unknown"
+            holder = _holder(handle)
             os.close(handle)
             raise StoreError(
                 f"store = {str(self.path.parent)!r}: is being written by another process ({holder}); "
                 "wait for it, or stop it"
             ) from None
-        os.ftruncate(handle, 0)
-        os.pwrite(handle, f"process {os.getpid()}\n".encode(), 0)
         self._handle = handle
+        with suppress(OSError):  # a full disk: the lock holds without its holder's name
+            os.ftruncate(handle, 0)
+            os.pwrite(handle, f"process {os.getpid()}\n".encode(), 0)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._handle is not None:
+            with suppress(OSError):
+                os.ftruncate(self._handle, 0)
             os.close(self._handle)
             self._handle = None
+
+
+def _holder(handle: int) -> str:
+    """Who holds a lock: waits a moment for one that has only just taken it, and writes down that it has."""
+    said = ""
+    for _ in range(20):
+        said = os.pread(handle, 32, 0).decode(errors="replace").strip()
+        kind, _, number = said.partition(" ")
+        if kind == "process" and number.isdecimal() and lives(int(number)):
+            return said
+        time.sleep(0.05)
+    return said or "unknown"
 
 
 def _lock(handle: int) -> None:

@@ -32,11 +32,17 @@ class Record:
     content: str
     """Hash of the results; of a failed task, why it failed."""
     engine: str
-    version: str
     step: float
-    processor: str
     model: str
     """Hash of the model's numbers."""
+    version: str
+    code: str
+    """Hash of the package's code, and of what a law or a drive of somebody else's brings along."""
+    libraries: str
+    """NumPy, Numba and Python with their versions."""
+    arithmetic: str
+    """Hash of how products, sums and functions were rounded."""
+    processor: str
     created: str = ""
 
     def line(self) -> str:

@@ -12,28 +12,32 @@ What is done is read from the ledger and the hash of the data, never from the da
 
 from __future__ import annotations
 
+import errno
 import json
 import warnings
 from collections import Counter
+from dataclasses import asdict, fields
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 
-from snapbeam.core.provenance import __version__, canonical_json, parameter_hash, processor_name
-from snapbeam.core.validate import InputError, integer
+from snapbeam.core.provenance import canonical_json, parameter_hash
+from snapbeam.core.validate import InputError, integer, shown
+from snapbeam.sweeps.compute.maker import Maker, differences, this_maker
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Stage, chunk_size
 from snapbeam.sweeps.errors import StoreError
-from snapbeam.sweeps.keep.durable import StoreLock, durable_write, member, refuse_links
+from snapbeam.sweeps.keep.durable import PARTIAL, StoreLock, durable_write, member, refuse_links
 from snapbeam.sweeps.keep.ledger import Ledger, Record
 
 __all__ = ["MapStore", "StoredRows", "read_stored_config"]
 
-_FORMAT = {"format": "snapbeam map", "format_version": 2}
+_FORMAT = {"format": "snapbeam map", "format_version": 3}
 _DATA = "runs.zarr"
 _TABLES = ("integers", "numbers")
+_NOT_HERE = (errno.EROFS, errno.EACCES, errno.EPERM)
 _KNOWN = {"map.json", "ledger.jsonl", "lock", _DATA}
 
 
@@ -71,10 +75,17 @@ class MapStore:
         self.work = work
         if chunk is not None:
             chunk = integer("chunk", chunk, 1, 10**7)
-        self.path.mkdir(exist_ok=True)
-        refuse_links(self.path)
-        self._lock = StoreLock(self.path / "lock").__enter__()
         try:
+            self.path.mkdir(exist_ok=True)
+        except OSError as error:
+            raise self._cannot_write(error) from error
+        _refuse_foreign(self.path)
+        self._lock = StoreLock(self.path / "lock")
+        self.read_only = False
+        """Whether it stands where nothing can be written, so that it can only be read."""
+        try:
+            self._take_lock()
+            refuse_links(self.path, sweep=not self.read_only)
             self.chunk = self._describe(chunk, config)
             self.ledger = Ledger(self.path / "ledger.jsonl")
         except BaseException:
@@ -83,7 +94,8 @@ class MapStore:
         self.damaged: list[tuple[str, int]] = []
         """Tasks whose data did not match the ledger when this store was opened."""
         self._arrays: dict[str, Any] = {}
-        self._processor = processor_name()
+        self.maker = this_maker(work.setup.system)
+        """What computes in this process."""
         self._model = work.model_hash()
         self._warn_of_mixture()
 
@@ -99,6 +111,14 @@ class MapStore:
         """Let another process write the store."""
         self._lock.__exit__(None, None, None)
 
+    def _take_lock(self) -> None:
+        try:
+            self._lock.__enter__()
+        except OSError as error:
+            self.read_only = error.errno in _NOT_HERE and (self.path / "map.json").is_file()
+            if not self.read_only:
+                raise self._cannot_write(error) from error
+
     def _describe(self, chunk: int | None, config: dict[str, Any] | None) -> int:
         file = self.path / "map.json"
         wanted = json.loads(canonical_json(self.work.parameters))
@@ -106,37 +126,38 @@ class MapStore:
             held = _read_description(file)
             _refuse_other(self.path, held["parameters"], wanted)
             return int(held["chunk"])
-        if any(entry.name not in _KNOWN for entry in self.path.iterdir()):
-            raise InputError(f"store = {str(self.path)!r}: is not empty and holds no map")
         setup = self.work.setup
         chunk = chunk_size(setup.points.size, setup.integration.engine) if chunk is None else chunk
         held = _FORMAT | {"parameters": wanted, "parameter_hash": parameter_hash(wanted), "chunk": chunk}
         if config is not None:
             held["config"] = config
-        durable_write(file, (json.dumps(held, indent=1) + "\n").encode())
+        try:
+            durable_write(file, (json.dumps(held, indent=1) + "\n").encode())
+        except OSError as error:
+            raise self._cannot_write(error) from error
         return chunk
 
     def _warn_of_mixture(self) -> None:
-        for record in self.ledger.records.values():
-            if record.state == "done" and (record.version, record.processor, record.model) != (
-                __version__,
-                self._processor,
-                self._model,
-            ):
-                warnings.warn(
-                    f"the store was begun with snapbeam {record.version} on a {record.processor} processor "
-                    f"and goes on with snapbeam {__version__} on {self._processor}: its points are equal to "
-                    "rounding, not bit for bit",
-                    stacklevel=4,
-                )
-                return
+        done = [record for record in self.ledger.records.values() if record.state == "done"]
+        if words := _mixture([*map(_maker_of, done), self.maker], {*(r.model for r in done), self._model}):
+            version, processor = next(
+                (r.version, r.processor) for r in done if _maker_of(r) != self.maker or r.model != self._model
+            )
+            warnings.warn(
+                f"the store was begun with snapbeam {version} on a {processor} processor and goes on with snapbeam "
+                f"{self.maker.version} on {self.maker.processor}: its points are equal {words}",
+                stacklevel=4,
+            )
 
     def open_stage(self, stage: Stage) -> None:
         """Check every finished task of a stage against the ledger, and drop those that are damaged."""
         from snapbeam.sweeps.keep.tables import open_tables
 
         member(stage.name)
-        self._arrays[stage.name] = open_tables(self.path / _DATA, stage, self.work)
+        try:
+            self._arrays[stage.name] = open_tables(self.path / _DATA, stage, self.work, self.read_only)
+        except OSError as error:
+            raise self._cannot_write(error) from error
         for task in range(stage.tasks):
             record = self.ledger.records.get((stage.name, task))
             if record is None or record.state != "done":
@@ -161,7 +182,7 @@ class MapStore:
         """Tasks of a stage that were found damaged when it was opened."""
         return [task for name, task in self.damaged if name == stage.name]
 
-    def commit(self, stage: Stage, task: int, columns: ResultTable, processor: str = "") -> None:
+    def commit(self, stage: Stage, task: int, columns: ResultTable, maker: Maker | None = None) -> None:
         """Write the results of a task, have them on the disk, and then say in the ledger that it is done."""
         start, stop = stage.bounds(task)
         if any(len(table) != stop - start for table in columns):
@@ -171,18 +192,18 @@ class MapStore:
         try:
             for name, table in zip(_TABLES, columns, strict=True):
                 self._arrays[stage.name][name][start:stop] = table
-            self._record(stage, task, "done", columns.content_hash(), processor)
+            self._record(stage, task, "done", columns.content_hash(), maker or self.maker)
         except OSError as error:
             raise self._cannot_write(error) from error
 
     def fail(self, stage: Stage, task: int, reason: str) -> None:
         """Say in the ledger that a task could not be computed, and why."""
         try:
-            self._record(stage, task, "failed", reason, "")
+            self._record(stage, task, "failed", reason, self.maker)
         except OSError as error:
             raise self._cannot_write(error) from error
 
-    def _record(self, stage: Stage, task: int, state: str, content: str, processor: str) -> None:
+    def _record(self, stage: Stage, task: int, state: str, content: str, maker: Maker) -> None:
         setup = self.work.setup
         self.ledger.write(
             Record(
@@ -192,17 +213,17 @@ class MapStore:
                 parameters=self.work.task_hash(stage.columns(task)),
                 content=content,
                 engine=setup.integration.engine,
-                version=__version__,
                 step=setup.plan.step,
-                processor=processor or self._processor,
                 model=self._model,
+                **asdict(maker),
             )
         )
 
     def _cannot_write(self, error: OSError) -> StoreError:
+        what = "make room" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "make it writable"
         return StoreError(
             f"store = {str(self.path)!r}: cannot be written, {error.strerror or error}; no finished task is "
-            "lost: make room and give the same command again"
+            f"lost: {what} and give the same command again"
         )
 
     def _load(self, stage: Stage, task: int) -> ResultTable | None:
@@ -223,21 +244,43 @@ class MapStore:
     def made_with(self) -> dict[str, str]:
         """Attributes that say what computed the finished tasks, and how far their numbers can be trusted."""
         done = [record for record in self.ledger.records.values() if record.state == "done"]
-        kinds = Counter((record.engine, record.version, record.processor, record.model) for record in done)
+        kinds = Counter((record.engine, _maker_of(record)) for record in done)
         made = "; ".join(
-            f"{count} tasks by engine {engine}, snapbeam {version}, processor {processor}"
-            for (engine, version, processor, _), count in kinds.items()
+            f"{count} tasks by engine {engine}, snapbeam {by.version}, processor {by.processor}, {by.libraries}, "
+            f"code {by.code}, arithmetic {by.arithmetic}"
+            for (engine, by), count in kinds.items()
         )
+        words = _mixture([by for _, by in kinds], {record.model for record in done})
         same = (
-            "bit for bit, whatever the tasks, their order, the threads, the workers and the interruptions"
-            if len(kinds) <= 1
-            else "to rounding: more than one engine, version or type of processor took part"
+            words
+            or "bit for bit, whatever the tasks, their order, the threads, the workers and the interruptions"
         )
         failed = [record for record in self.ledger.records.values() if record.state == "failed"]
         attrs = {"computed_by": made, "reproducible": same}
         if failed:
             attrs["failed_tasks"] = "; ".join(f"{r.stage} {r.task}: {r.content}" for r in failed)
         return attrs
+
+
+def _maker_of(record: Record) -> Maker:
+    return Maker(**{field.name: getattr(record, field.name) for field in fields(Maker)})
+
+
+def _mixture(makers: list[Maker], models: set[str]) -> str:
+    """How far numbers agree that several made; nothing where they agree in every bit."""
+    found = differences(makers)
+    if len(models) > 1 and not found:
+        found = ["reduction of the model"]
+    if not found:
+        return ""
+    how = (
+        "as far as the code does" if {"code", "version"} & _apart(makers) else "to rounding, not bit for bit"
+    )
+    return f"{how}: more than one {' and '.join(found)} took part"
+
+
+def _apart(makers: list[Maker]) -> set[str]:
+    return {name for name in ("version", "code") if len({getattr(each, name) for each in makers}) > 1}
 
 
 class StoredRows:
@@ -268,14 +311,21 @@ class StoredRows:
 
 
 def _store_folder(path: str | Path) -> Path:
-    if not isinstance(path, (str, Path)):
-        raise InputError(f"store = {path!r}: must be a folder")
+    if not isinstance(path, (str, Path)) or "\0" in str(path):
+        raise InputError(f"store = {shown(path)}: must be a folder")
     folder = Path(path)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"store = {str(path)!r}: must be a folder, not a file")
     if not folder.parent.is_dir():
         raise InputError(f"store = {str(path)!r}: {str(folder.parent)!r} is not an existing folder")
     return folder
+
+
+def _refuse_foreign(folder: Path) -> None:
+    """Refuse a folder that holds something and no map, before anything is written into it."""
+    names = {entry.name for entry in folder.iterdir() if not entry.name.endswith(PARTIAL)}
+    if "map.json" not in names and names - _KNOWN:
+        raise InputError(f"store = {str(folder)!r}: is not empty and holds no map")
 
 
 def _read_description(file: Path) -> dict[str, Any]:

@@ -19,7 +19,7 @@ __all__ = ["open_tables"]
 _MISSING = "zarr is needed for --store: install snapbeam[cluster]"
 
 
-def open_tables(folder: Path, stage: Stage, work: PointWork) -> dict[str, Any]:
+def open_tables(folder: Path, stage: Stage, work: PointWork, read_only: bool = False) -> dict[str, Any]:
     """The arrays of a stage, made if they are not there; damaged descriptions are written again."""
     try:
         import zarr
@@ -31,6 +31,7 @@ def open_tables(folder: Path, stage: Stage, work: PointWork) -> dict[str, Any]:
     fresh = MemoryStore(held)
     _create(fresh, stage, work)
     folder.mkdir(exist_ok=True)
+    mode: Any = "r" if read_only else "r+"
     for key, value in held.items():
         path, data = folder / key, value.to_bytes()
         if not path.is_file() or path.read_bytes() != data:
@@ -38,7 +39,7 @@ def open_tables(folder: Path, stage: Stage, work: PointWork) -> dict[str, Any]:
             durable_write(path, data)
     store = _durable_store(folder)
     return {
-        name: zarr.open_array(store, path=f"{stage.name}/{name}", mode="r+", config=_CONFIG)
+        name: zarr.open_array(store, path=f"{stage.name}/{name}", mode=mode, config=_CONFIG)
         for name in _tables(work)
     }
 

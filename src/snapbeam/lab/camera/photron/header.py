@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from snapbeam.core.findings import Finding
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, shown
 from snapbeam.lab.camera.photron.fields import Fields, read_fields
 from snapbeam.lab.camera.photron.timing import Timing, read_timing
 from snapbeam.lab.plausibility.recording import KINDS
@@ -126,7 +126,7 @@ def _bits(fields: Fields, images: str) -> tuple[int, int, str]:
         raise fields.error("stored_bits", f"= {stored}: must be 8, 12 or 16")
     side = fields.text("effective_side", "Lower").lower()
     if side not in ("lower", "higher"):
-        raise fields.error("effective_side", f"= {side!r}: must be Lower or Higher")
+        raise fields.error("effective_side", f"= {shown(side)}: must be Lower or Higher")
     depth = fields.integer("effective_bits", 1, 16, default=stored)
     if depth > stored and side == "lower" and not images:
         raise fields.error(

@@ -44,7 +44,7 @@ def read_timing(fields: Fields, frames: int) -> Timing:
     frame_rate = None if rate is None else rate / skip
     if rate is not None and skip > 1 and recorded > 0 and abs(math.ceil(recorded / skip) - frames) > 1:
         question = (
-            f"{fields.path.name} contradicts itself: every {skip}th of {recorded} recorded frames would be "
+            f"the header contradicts itself: every {skip}th of {recorded} recorded frames would be "
             f"{math.ceil(recorded / skip)} frames, but there are {frames}; frame_rate (--frame-rate) is "
             f"{rate:g} Hz if no frame was left out, {rate / skip:g} Hz if every {skip}th was kept"
         )
@@ -54,7 +54,7 @@ def read_timing(fields: Fields, frames: int) -> Timing:
         frame_rate = None
     if rate == 1.0 and "Generated sequence" in fields.text("comment", ""):
         question = (
-            f"{fields.path.name} was made by a program that writes 1 frame per second where it is not told "
+            "the file was made by a program that writes 1 frame per second where it is not told "
             "another rate; give frame_rate (--frame-rate) in Hz"
         )
         frame_rate = None

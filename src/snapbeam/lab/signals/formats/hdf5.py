@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam.core.validate import positive
+from snapbeam.core.netcdf import hdf5_stream
+from snapbeam.core.validate import InputError, positive
 from snapbeam.lab.signals.formats.channel import RATE_NAMES, UNIT_NAMES, Channel, Told, with_time
 from snapbeam.lab.signals.signal import check_signal
 
@@ -26,6 +27,10 @@ def read_hdf5(path: Path, _told: Told) -> list[Channel]:
         def visit(name: str, item: Any) -> None:
             if not isinstance(item, h5py.Dataset) or item.ndim != 1 or item.dtype.kind not in "iuf":
                 return
+            if item.external or item.is_virtual:
+                raise InputError(
+                    f"path = {str(path)!r}: {name!r} has its numbers in another file: copy them into this one"
+                )
             levels = [item.attrs, item.parent.attrs, file.attrs]
             stated = next((item.attrs[key] for key in UNIT_NAMES if key in item.attrs), None)
             rates = [level[key] for level in levels for key in RATE_NAMES if key in level]
@@ -43,7 +48,7 @@ def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> N
     import h5py
 
     values, time, _ = check_signal(signal)
-    with h5py.File(path, "w") as file:
+    with hdf5_stream(path) as stream, h5py.File(stream, "w") as file:
         axis = file.create_dataset("time", data=time)
         axis.attrs["units"] = "s"
         data = file.create_dataset(str(signal.name), data=values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,13 @@ from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.flags import FrameFlag
 from snapbeam.lab.tracking.geometry import HOT
 from snapbeam.lab.tracking.measure.beam import BeamRows
-from snapbeam.lab.tracking.measure.series import distortion, jumps, pooled, wanderings
+from snapbeam.lab.tracking.measure.series import distortion, jumps, pooled, unexplained_blur, wanderings
 from snapbeam.lab.tracking.measure.sticker import ShakerRows
 from snapbeam.lab.tracking.scene import Scene
 
-__all__ = ["Follower", "TrackedRows"]
+__all__ = ["Drift", "Follower", "TrackedRows"]
+
+_SMEARED = 0.25  # error over what edges are wider than explained
 
 BORDER = 14.0  # rows from the border within which a vanished object is taken to have left the region
 KEPT = 0.5  # px by which a beam may look distorted and its row still be kept, with that as its error
@@ -43,6 +46,13 @@ class TrackedRows:
         return int(np.count_nonzero(self.flags & int(flag)))
 
 
+class Drift(NamedTuple):
+    """Rows by which the camera has sunk in each frame [px], NaN where no mark was seen, and their errors."""
+
+    shift: Floats
+    error: Floats
+
+
 class Follower:
     """Collects the measurements of batch after batch and says what is wrong with each frame."""
 
@@ -54,9 +64,9 @@ class Follower:
         self._border = {"beam": False, "shaker": False}
 
     def add(
-        self, frames: NDArray[np.floating], beam: BeamRows, tip: ShakerRows | None, drift: Floats | None
+        self, frames: NDArray[np.floating], beam: BeamRows, tip: ShakerRows | None, drift: Drift | None
     ) -> None:
-        """Add the measurements of a batch of turned frames; *drift* [px] of the camera is taken out."""
+        """Add the measurements of a batch of turned frames; *drift* of the camera is taken out."""
         view, height = self.scene.beam, frames.shape[1]
         leaving = self._leaving("beam", beam.row, height)
         strip = frames[:, :, view.columns[::6]]
@@ -97,17 +107,20 @@ class Follower:
             confidence = np.minimum(confidence, tip.share * np.clip(np.nan_to_num(tip.contrast), 0.0, 1.0))
             row[lost] = np.nan
         flags[lost] = FrameFlag.DROPPED
-        shift = 0.0 if drift is None else np.where(lost, 0.0, drift)
+        shift, shift_error = (0.0, 0.0) if drift is None else drift
+        flags[~lost & ~np.isfinite(shift)] |= np.uint16(FrameFlag.GAP)  # no mark was seen
         self._parts.append(
             {
                 "row": np.where(lost, np.nan, beam.row) - shift,
-                "error": np.where(lost, np.nan, _with_blur(beam, view.edge_width, self.blur_limit)),
+                "error": np.where(
+                    lost, np.nan, np.hypot(_with_blur(beam, view.edge_width, self.blur_limit), shift_error)
+                ),
                 "slope": np.where(lost, np.nan, beam.slope),
                 "width": beam.width,
                 "thickness": np.where(lost, np.nan, beam.thickness),
                 "residual": np.where(lost, np.nan, beam.residual),
                 "shaker": row - shift,
-                "shaker_error": error,
+                "shaker_error": np.hypot(error, shift_error),
                 "confidence": confidence,
                 "flags": flags,
             }
@@ -123,7 +136,11 @@ class Follower:
         )
         odd &= np.isfinite(row)
         flags[odd] |= np.uint16(FrameFlag.DISTORTED)
-        error = np.where(odd, np.hypot(pooled(found["error"]), miss), pooled(found["error"]))
+        blur = unexplained_blur(row, found["width"], self.scene.beam.edge_width)
+        error = np.hypot(
+            pooled(found["error"]), np.where(odd, np.fmax(miss, _SMEARED * blur), _SMEARED * blur)
+        )
+        shaker_error = np.hypot(pooled(found["shaker_error"]), _SMEARED * blur)
         row[odd & (miss > KEPT)] = np.nan
         strays = jumps(row)
         row[strays] = np.nan
@@ -139,7 +156,7 @@ class Follower:
             slope=found["slope"],
             width=found["width"],
             shaker=shaker,
-            shaker_error=np.where(np.isfinite(shaker), pooled(found["shaker_error"]), np.nan),
+            shaker_error=np.where(np.isfinite(shaker), shaker_error, np.nan),
             confidence=np.where(gone, 0.0, found["confidence"]),
             flags=flags,
         )
@@ -166,7 +183,7 @@ def _with_blur(beam: BeamRows, usual: float, limit: float) -> Floats:
     """Standard errors of the beam's row, widened in frames whose edges are too wide for their windows."""
     with np.errstate(invalid="ignore"):
         wide = beam.width > limit
-    return np.where(wide, np.hypot(beam.error, 0.25 * (beam.width - usual)), beam.error)
+    return np.where(wide, np.hypot(beam.error, _SMEARED * (beam.width - usual)), beam.error)
 
 
 def _assign(

@@ -11,8 +11,19 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from snapbeam.lab.tracking.edges import Floats
 
-__all__ = ["Rest", "Touch", "distortion", "find_rest", "jumps", "pooled", "touching", "wanderings"]
+__all__ = [
+    "Rest",
+    "Touch",
+    "distortion",
+    "find_rest",
+    "jumps",
+    "pooled",
+    "touching",
+    "unexplained_blur",
+    "wanderings",
+]
 
+_WIDER = 1.6  # times the width that is explained
 _JUMP = 3.0  # px
 _LONGEST = 3  # frames of a jump
 _STEADY = 0.005  # px; noise less than this is not asked of a rest
@@ -176,6 +187,19 @@ def pooled(error: Floats) -> Floats:
         return np.where(error < usual, np.sqrt(0.5 * (error**2 + usual**2)), error)
 
 
+def unexplained_blur(row: Floats, width: Floats, usual: float) -> Floats:
+    """By how much [px] edges are wider than lens and motion explain, over the frames; 0 where they are not.
+
+    An exposure is no longer than a frame, so motion smears an edge over no more than the step from frame to
+    frame, with a standard deviation of that over the root of 12.
+    """
+    step = np.abs(np.diff(row))
+    with np.errstate(invalid="ignore"):
+        fastest = np.fmax(np.append(step, np.nan), np.append(np.nan, step))
+        explained = np.hypot(usual, fastest / np.sqrt(12.0))
+        return np.where(width > _WIDER * explained + 0.2, width - explained, 0.0)
+
+
 def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int] | None) -> Rest:
     """The frames at rest, given or sought at the start.
 
@@ -193,7 +217,7 @@ def find_rest(row: Floats, error: Floats, shaker: Floats, given: tuple[int, int]
         return Rest(used, float(row[used].mean()), _mean_error(row[used], noise), drift < 8.0, drift)
     if not known.size:
         return Rest(known, math.nan, math.nan, False, math.nan)
-    noise = max(float(np.sqrt(np.nanmean(error[known] ** 2))), _STEADY)
+    noise = max(float(np.median(error[known])), _STEADY)
     values = row[known]
     before = np.cumsum(values)[:-1] / np.arange(1, known.size)
     gone = np.abs(values[1:] - before) > 3.0 * noise + 1e-6

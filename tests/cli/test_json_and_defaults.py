@@ -87,9 +87,19 @@ def test_every_suggestion_runs_and_is_of_the_same_system(name, tmp_path, monkeyp
         assert told["outcome"]["peak_force"] == pytest.approx(float(point.peak_force), rel=1e-6)
 
 
-@pytest.mark.parametrize("command", sorted(typer.main.get_command(app).commands))
+def leaves(group, before=()):
+    """Every command by its words, those of groups of commands too."""
+    for name, command in sorted(group.commands.items()):
+        words = (*before, name)
+        yield from leaves(command, words) if hasattr(command, "commands") else [(" ".join(words), command)]
+
+
+LEAVES = dict(leaves(typer.main.get_command(app)))
+
+
+@pytest.mark.parametrize("command", LEAVES)
 def test_json_and_quiet_everywhere(command):
-    flags = {flag for each in typer.main.get_command(app).commands[command].params for flag in each.opts}
+    flags = {flag for each in LEAVES[command].params for flag in each.opts}
     assert {"--json", "--quiet"} <= flags
 
 

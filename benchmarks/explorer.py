@@ -1,0 +1,138 @@
+"""The explorer in a browser: from the address to the map, and from a click to the waveform.
+
+Both are taken by the browser's own clock, after the frame that shows them has been drawn.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import snapbeam as sb
+from benchmarks.timing import machine
+from snapbeam.config import Config
+
+__all__ = ["measured", "run"]
+
+_STAND = """() => { const d = window.Bokeh && Bokeh.documents[0]; const m = d && d.get_model_by_name('map');
+  const s = m && d.get_model_by_name('map-base');
+  const view = s && s.data.image.length === 1 && Bokeh.index.find_one(m);
+  return view && view.frame.bbox.width > 10; }"""
+_WATCH = """() => {
+  const source = Bokeh.documents[0].get_model_by_name('waveform');
+  window.shown = [];
+  document.addEventListener('pointerdown', () => { window.pressed = performance.now(); }, true);
+  source.properties.data.change.connect(() => {
+    const pressed = window.pressed;
+    requestAnimationFrame(() => setTimeout(() => window.shown.push(performance.now() - pressed), 0));
+  });
+}"""
+_PLACE = """([x, y]) => { const p = Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name('map'));
+  const b = p.el.getBoundingClientRect();
+  return [b.left + p.frame.x_scale.compute(x), b.top + p.frame.y_scale.compute(y)]; }"""
+
+
+def run(folder: Path, quick: bool) -> None:
+    """Measure, print, and write ``explorer.json``."""
+    browser = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
+    try:
+        import panel  # noqa: F401
+        import playwright  # noqa: F401
+    except ImportError as error:
+        print(f"explorer left out: {error}; make explorer-deps")
+        return
+    if browser is None:
+        print("explorer left out: there is no Chromium")
+        return
+    found = measured(browser, modes=8 if quick else 32, clicks=5 if quick else 20, paints=3 if quick else 8)
+    for name, values in found.items():
+        print(f"explorer, {name}: {json.dumps(values)}")
+    folder.mkdir(parents=True, exist_ok=True)
+    text = json.dumps({"machine": machine(), "explorer": found}, indent=1)
+    (folder / "explorer.json").write_text(text + "\n", encoding="utf-8")
+
+
+def measured(browser: str, modes: int, clicks: int, paints: int) -> dict[str, Any]:
+    """Milliseconds of first paints and of clicks, and the load of the machine meanwhile."""
+    from playwright.sync_api import sync_playwright
+
+    system = Config().system.replace(**{"model.modes": modes})
+    axes = {"frequency_ratio": np.linspace(0.4, 2.4, 12), "velocity_amplitude": np.linspace(0.05, 0.45, 8)}
+    dataset = sb.sweep(system, axes, sb.Integration(cycles=200))
+    sb.simulate(system, sb.Integration(cycles=200))  # the compile aside
+    with tempfile.TemporaryDirectory() as where, sync_playwright() as driver:
+        dataset.to_netcdf(Path(where) / "map.nc", engine="h5netcdf")
+        process, url = _served(where)
+        opened = driver.chromium.launch(executable_path=browser, args=["--no-sandbox"])
+        try:
+            first = [_paint(opened, url) for _ in range(paints)]
+            times = _clicks(opened, url, dataset, clicks)
+        finally:
+            opened.close()
+            process.terminate()
+            process.wait()
+    load = list(os.getloadavg()) if hasattr(os, "getloadavg") else []
+    return {
+        "modes": {"modes": modes, "cycles": 200, "load of the machine": load, "cores": os.cpu_count()},
+        "first paint, ms": _summary(first),
+        "click to waveform, ms": _summary(times),
+    }
+
+
+def _summary(values: list[float]) -> dict[str, float]:
+    return {
+        "least": round(min(values), 1), "median": round(float(np.median(values)), 1), "most": round(max(values), 1),
+        "of": len(values),
+    }  # fmt: skip
+
+
+def _served(where: str) -> tuple[subprocess.Popen[str], str]:
+    code = "from snapbeam.cli import main; main()"
+    process = subprocess.Popen(
+        [sys.executable, "-u", "-c", code, "explore", "map.nc", "--no-browser"],
+        cwd=where, stdout=subprocess.PIPE, text=True, env=dict(os.environ, COLUMNS="400"),
+    )  # fmt: skip
+    assert process.stdout is not None
+    for line in process.stdout:
+        if line.startswith("Explorer at"):
+            threading.Thread(target=process.stdout.read, daemon=True).start()
+            return process, line.split()[-1]
+    raise RuntimeError("the explorer did not start")
+
+
+def _paint(browser: Any, url: str) -> float:
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.goto(url)
+    page.wait_for_function(_STAND, polling="raf")
+    spent = float(page.evaluate("() => performance.now()"))
+    page.close()
+    return spent
+
+
+def _clicks(browser: Any, url: str, dataset: Any, clicks: int) -> list[float]:
+    page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.goto(url)
+    page.wait_for_function(_STAND)
+    page.evaluate(_WATCH)
+    rng, times = np.random.default_rng(1), []
+    x, y = dataset["frequency_ratio"].values, dataset["velocity_amplitude"].values
+    for at in range(clicks + 2):  # the first two warm the server up
+        page.evaluate("() => { window.shown = []; }")
+        place = [float(x[rng.integers(x.size)]), float(y[rng.integers(y.size)])]
+        page.mouse.click(*page.evaluate(_PLACE, place))
+        page.wait_for_function("() => window.shown.length > 0")
+        if at > 1:
+            times.append(float(page.evaluate("() => window.shown[0]")))
+        time.sleep(3.0)  # until the samples that follow, and the neighbour, are computed too
+    page.close()
+    return times

@@ -1,0 +1,52 @@
+r"""
+A steel beam of 300 mm
+======================
+
+How much amplitude does it take to snap a beam through, and does it depend on its thickness? The first mode of this
+beam is compared with the exact one before anything is believed, and how sure the answer is stands beside it.
+"""
+
+import numpy as np
+
+import snapbeam as sb
+
+beam = sb.Beam(
+    length=0.300, thickness=0.8e-3, width=20e-3, density=7850.0, young_modulus=205e9, buckling_level=0.9e-3
+)
+contact = sb.HertzContact.from_materials(5e-3, (210e9, 205e9), (0.3, 0.3))
+model = sb.ReducedModel.from_beam(beam, modes=6, damping_ratio=0.004)
+print(model.natural_freq[:3], sb.exact_natural_freq(beam, count=3), "Hz")
+print(
+    f"b/r = {beam.buckling_level / beam.radius_of_gyration:.2f}; above 6.2 the first mode would be antisymmetric"
+)
+
+system = sb.System(model, contact, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2, location=0.47))
+print(system.findings())
+
+# %%
+# The threshold over frequency, for three thicknesses at one buckling level.
+
+found = sb.threshold(
+    system,
+    "velocity_amplitude",
+    np.linspace(0.02, 0.6, 30),
+    {"beam.thickness": [0.7e-3, 0.8e-3, 0.9e-3], "frequency_ratio": np.linspace(0.8, 2.0, 13)},
+    sb.Integration(cycles=60),
+)
+low = found.first_interwell.min("frequency_ratio")
+for thickness, value in zip(found.beam_thickness.values, low.values, strict=True):
+    print(f"h = {1e3 * thickness:.1f} mm: snaps through from V = {value:.2f}")
+
+# %%
+# How sure is a point near it? Repeats from slightly different starts say.
+
+near = {"velocity_amplitude": np.linspace(0.05, 0.35, 7)}
+sure = sb.sweep(system, near, sb.Integration(cycles=60), replicas=sb.Replicas(5, halve_step=True))
+print(sure.class_share.max("response_class").values)
+
+# %%
+# And one run, with everything that it did:
+
+run = sb.simulate(system, sb.Integration(cycles=60))
+print(run.outcome.table())
+ax = run.plot(window=(0.0, 20.0))

@@ -1,0 +1,56 @@
+r"""
+The paper, from the shell
+=========================
+
+A figure of the paper, its numbers, and the run in its notch, by commands alone.
+"""
+
+import json
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+from typer.testing import CliRunner
+
+from snapbeam.cli.app import app
+
+folder = tempfile.TemporaryDirectory()
+files = Path(folder.name)
+
+
+def shell(*words: str) -> str:
+    """What a command prints; an error if it fails."""
+    print("$ snapbeam", *words)
+    done = CliRunner().invoke(app, [word.replace("OUT", str(files)) for word in words])
+    assert done.exit_code == 0, done.output
+    return done.stdout.replace(f"{files}/", "")
+
+
+# %%
+# Its beam has 81.8, 159 and 380 Hz:
+
+found = json.loads(shell("frequencies", "--count", "3", "--json", "-"))
+print([f"{each:.1f} Hz" for each in found["reduced"]])
+
+# %%
+# A figure, as a sketch; ``--full`` takes the size of the paper:
+
+print(shell("paper", "figA9", "-o", "OUT"))
+
+# %%
+# The run of Fig. 5, as numbers for a script and as a picture for the eye:
+
+run = ["simulate", "--frequency-ratio", "1.21", "--velocity-amplitude", "0.18", "--cycles", "40"]
+found = json.loads(
+    shell(*run, "-o", "OUT/run.nc", "--plot", "OUT/run.png", "--window", "0:20", "--json", "-")
+)
+print(found["outcome"]["response"], f"{found['outcome']['peak_force']:.2f} N")
+picture = plt.imread(files / "run.png")
+figure = plt.figure(figsize=(7.5, 7.5 * picture.shape[0] / picture.shape[1]))
+figure.add_axes((0, 0, 1, 1)).imshow(picture)
+figure.axes[0].axis("off")
+
+# %%
+# The file is enough to go on from: here with another striker's location, everything else the same.
+
+print(shell("simulate", "--from", "OUT/run.nc", "--location", "0.3", "--cycles", "40"))

@@ -1,0 +1,343 @@
+"""The attractors of a system: found by marching many states, and certified one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
+
+from snapbeam.core.validate import InputError, finite_array, integer, positive
+from snapbeam.dynamics.bifurcation import least_period
+from snapbeam.dynamics.capture import Ball, Cloud, balls_of, cloud_of
+from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of
+from snapbeam.dynamics.lyapunov import lyapunov
+from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit, shoot
+from snapbeam.model.integration import Integration
+from snapbeam.model.system import System
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["KINDS", "UNDECIDED", "Attractor", "Attractors", "attractors", "spread_states"]
+
+_Array = NDArray[np.float64]
+UNDECIDED = -1
+"""Label of a state of which it is not certain where it goes."""
+KINDS = ("periodic", "chaotic")
+_REPEATS = 2e-3
+"""Greatest coordinate by which states may differ that are taken to repeat before they are shot at."""
+_SAME = 1e-5
+_SIGMAS = 3.0
+_FEW = 8
+"""Irregular runs of a group that exponents are taken of."""
+
+
+@dataclass(frozen=True, eq=False)
+class Attractor:
+    """What states are attracted to."""
+
+    kind: str
+    """One of :data:`KINDS`."""
+    points: _Array
+    """Once a period: all of a periodic orbit, some of a chaotic attractor, shape (points, d)."""
+    orbit: Orbit | None
+    exponent: float
+    """Largest Lyapunov exponent, 1/s (per period of a map)."""
+    exponent_error: float
+
+    @property
+    def period(self) -> int:
+        """Periods of the drive; 0 of a chaotic one."""
+        return self.orbit.period if self.orbit is not None else 0
+
+    @cached_property
+    def captures(self) -> list[Ball] | Cloud:
+        """How a state is told to be on its way there."""
+        return balls_of(self.orbit) if self.orbit is not None else cloud_of(self.points)
+
+    def __repr__(self) -> str:
+        what = f"period {self.period}" if self.orbit is not None else "chaotic"
+        return f"<Attractor: {what}, exponent {self.exponent:.4g} +- {self.exponent_error:.2g}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Attractors:
+    """The attractors that were found, certified, and where every state went."""
+
+    flow: Flow
+    found: list[Attractor]
+    """Periodic ones first, by period, then by the coordinates of their points."""
+    labels: NDArray[np.int64]
+    """Of every state: number of its attractor, or :data:`UNDECIDED`."""
+    lasted: int
+    """Periods over which a chaotic attractor was seen not to end."""
+
+    @property
+    def shares(self) -> _Array:
+        """Of the states that go to each."""
+        return np.array([float((self.labels == i).mean()) for i in range(len(self.found))])
+
+    @property
+    def undecided(self) -> float:
+        """Share of the states that could not be told."""
+        return float((self.labels == UNDECIDED).mean())
+
+    def __repr__(self) -> str:
+        return f"<{len(self.found)} attractors, {100 * self.undecided:.3g} % of {self.labels.size} states undecided>"
+
+    def to_dataset(self) -> xr.Dataset:
+        """Kinds, periods, exponents, shares and points, labelled."""
+        import xarray as xr
+
+        size = max((len(each.points) for each in self.found), default=1)
+        points = np.full((len(self.found), size, self.flow.dimension), np.nan)
+        for i, each in enumerate(self.found):
+            points[i, : len(each.points)] = each.points
+        names = getattr(self.flow, "names", tuple(f"x[{i + 1}]" for i in range(self.flow.dimension)))
+
+        def labels(words: str, unit: str = "1") -> dict[str, str]:
+            return {"units": unit, "long_name": words}
+
+        unit = "1/s" if isinstance(self.flow, Stroboscope) else "1"
+        return xr.Dataset(
+            {
+                "kind": ("attractor", [each.kind for each in self.found], {"long_name": "kind of attractor"}),
+                "period": ("attractor", [each.period for each in self.found], labels("periods; 0: chaotic")),
+                "exponent": ("attractor", [each.exponent for each in self.found], labels("largest exponent", unit)),
+                "exponent_error": (
+                    "attractor", [each.exponent_error for each in self.found], labels("standard error", unit)
+                ),
+                "share": ("attractor", self.shares, labels("share of the states that go there")),
+                "points": (("attractor", "point", "coordinate"), points, labels("the attractor once a period")),
+                "label": ("state", self.labels, labels("attractor that a state goes to; -1: undecided")),
+            },
+            {"coordinate": list(names)},
+            {"title": "attractors", "undecided": self.undecided, "lasted": self.lasted},
+        )  # fmt: skip
+
+
+def spread_states(flow: Stroboscope, count: int, seed: int = 0) -> _Array:
+    """States about both wells and between: the first mode anywhere, the others as far as their equal energy allows.
+
+    State s comes from Philox with the key (seed, s) alone.
+    """
+    model = flow.system.model
+    rest = flow.coordinates(None)[0] * 0.0
+    size = flow.scales[0]
+    rows = np.empty((count, flow.dimension))
+    for s in range(count):
+        draw = np.random.Generator(np.random.Philox(key=[seed, s]))
+        q = draw.uniform(-1.0, 1.0, (2, model.modes))
+        reach = 0.2 * size / np.sqrt((model.linear_modes**2).sum(axis=0))
+        modal = q * reach * np.stack([model.omega[0] / model.omega, np.full(model.modes, model.omega[0])])
+        alpha, velocity = modal @ model.linear_modes.T
+        row = rest + np.concatenate([alpha, velocity]) / flow.scales
+        row[0] += draw.uniform(-1.4, 1.4)
+        row[model.modes] += draw.uniform(-0.6, 0.6)
+        rows[s] = row
+    return rows
+
+
+def attractors(
+    system: System | Flow,
+    states: ArrayLike | int = 200,
+    *,
+    transient: int = 1000,
+    most_periods: int = 8,
+    lasting: int = 1000,
+    seed: int = 0,
+    tolerance: float = 1e-10,
+    integration: Integration | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> Attractors:
+    """The attractors that many states lead to, each certified or else left undecided.
+
+    A periodic attractor is certified when shooting converges from where a state came to and every multiplier is inside
+    the unit circle.  A chaotic one, when its largest exponent is above 0 by three standard errors and none of its
+    states left it in *lasting* more periods: slow transients are so told from attractors as far as that time goes.
+
+    Parameters
+    ----------
+    system : System, or a Flow
+    states : array_like of shape (states, d), or int
+        Where to begin, or how many states to spread over both wells.
+    transient : int
+        Periods to leave out.
+    most_periods : int
+        Longest period, in periods of the drive, that is looked for.
+    lasting : int
+        Periods over which a chaotic attractor must not end.
+    seed : int
+        Of states that are spread.
+    tolerance : float
+        As of :func:`periodic_orbit`.
+    integration : Integration, optional
+    progress : callable, optional
+        Called as ``progress(done, total)`` with parts of the work.
+
+    Returns
+    -------
+    Attractors
+    """
+    flow = flow_of(system, integration)
+    leave = integer("transient", transient, 1, 10**7)
+    most, lasts = integer("most_periods", most_periods, 1, 512), integer("lasting", lasting, 20, 10**7)
+    rows = _states_of(flow, states, seed)
+    allowed = positive("tolerance", tolerance)
+
+    def report(done: int) -> None:
+        if progress is not None:
+            progress(done, 4)
+
+    report(0)
+    there = flow.march(rows, leave)
+    seen = flow.march(there, 2 * most, every=True)
+    report(1)
+    assert seen.every is not None
+    known = np.asarray(np.isfinite(seen.states).all(axis=1))
+    repeats = np.where(known, least_period(np.where(known[:, None, None], seen.every, 0.0), _REPEATS), 0)
+    orbits = _orbits(flow, seen, repeats, allowed)
+    report(2)
+    regular = [_periodic(orbit) for orbit in orbits]
+    labels = np.full(len(rows), UNDECIDED)
+    for s in np.flatnonzero(repeats > 0):
+        labels[s] = _nearest(orbits, seen.states[s])
+    irregular = np.flatnonzero(known & (repeats == 0))
+    chaotic, members = _chaotic(flow, rows, seen, irregular, most, lasts, orbits)
+    report(3)
+    found, order = _ordered([*regular, *chaotic])
+    for number, group in enumerate(members):
+        labels[group] = len(regular) + number
+    labels = np.where(labels >= 0, order[np.maximum(labels, 0)] if len(order) else UNDECIDED, UNDECIDED)
+    report(4)
+    return Attractors(flow, found, labels, lasts)
+
+
+def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
+    if isinstance(states, (int, np.integer)) and not isinstance(states, bool):
+        if not isinstance(flow, Stroboscope):
+            raise InputError(f"states = {states}: must be an array of states for a flow that is no System")
+        return spread_states(flow, integer("states", states, 1, 10**7), integer("seed", seed, 0, 2**63 - 1))
+    rows = finite_array("states", states, 2)
+    if rows.shape[1] != flow.dimension or not len(rows):
+        raise InputError(f"states of shape {rows.shape}: must have the shape (states, {flow.dimension})")
+    return rows
+
+
+def _orbits(flow: Flow, seen: Marched, repeats: NDArray[np.int64], tolerance: float) -> list[Orbit]:
+    """The stable orbits that states which repeat are on, each once."""
+    found: list[Orbit] = []
+    missed: list[_Array] = []
+    for s in np.flatnonzero(repeats > 0):
+        x = seen.states[s]
+        if _nearest(found, x) != UNDECIDED or any(np.abs(x - other).max() < _REPEATS for other in missed):
+            continue
+        try:
+            orbit = shoot(flow, x, int(repeats[s]), tolerance, 40)
+        except NoOrbit:
+            missed.append(x)
+            continue
+        if orbit.least_period != orbit.period:
+            orbit = shoot(flow, orbit.coordinates, orbit.least_period, tolerance, 40)
+        near = np.abs(orbit.points - x).max(axis=1).min() < 10.0 * _REPEATS
+        if not orbit.is_stable or not near:
+            missed.append(x)
+        elif not any(_is_same(orbit, other) for other in found):
+            found.append(orbit)
+    return found
+
+
+def _is_same(one: Orbit, other: Orbit) -> bool:
+    return (
+        one.period == other.period and float(np.abs(other.points - one.coordinates).max(axis=1).min()) < _SAME
+    )
+
+
+def _nearest(orbits: list[Orbit], x: _Array) -> int:
+    """The orbit that a state is on, as nearly as states that repeat are told."""
+    for number, orbit in enumerate(orbits):
+        if float(np.abs(orbit.points - x).max(axis=1).min()) < 10.0 * _REPEATS:
+            return number
+    return UNDECIDED
+
+
+def _periodic(orbit: Orbit) -> Attractor:
+    size = max(float(np.abs(orbit.multipliers[0])), 1e-300)
+    return Attractor(
+        "periodic", orbit.points, orbit, float(np.log(size)) / (orbit.period * orbit.flow.period), 0.0
+    )
+
+
+def _chaotic(
+    flow: Flow,
+    rows: _Array,
+    seen: Marched,
+    which: NDArray[np.int64],
+    most: int,
+    lasts: int,
+    orbits: list[Orbit],
+) -> tuple[list[Attractor], list[NDArray[np.int64]]]:
+    """Groups of runs that never repeat, those of them that last and diverge."""
+    if not which.size or not flow.smooth:
+        return [], []
+    later = flow.march(flow.march(seen.states[which], lasts), 2 * most + 62, every=True)
+    assert later.every is not None
+    rest = least_period(np.nan_to_num(later.every[:, : 2 * most], nan=0.0), _REPEATS)
+    left = (rest > 0) | ~np.isfinite(later.states).all(axis=1)
+    found, members = [], []
+    for group in _groups(later.every):
+        if left[group].any():
+            continue
+        exponents = lyapunov(flow, 1, max(lasts // 2, 100), transient=0, states=later.states[group[:_FEW]])
+        value = float(exponents["exponent"].mean())
+        error = float(exponents["exponent_error"].max())
+        if not value > _SIGMAS * error:
+            continue
+        points = later.every[group].reshape(-1, flow.dimension)
+        found.append(Attractor("chaotic", points, None, value, error))
+        members.append(which[group])
+    return found, members
+
+
+def _groups(every: _Array) -> list[NDArray[np.int64]]:
+    """Runs whose points lie among each other's, shape (runs, periods, d); in the order of their first run."""
+    count = len(every)
+    group = np.full(count, UNDECIDED)
+    trees = [cKDTree(run[np.isfinite(run).all(axis=1)]) for run in every]
+    for i in range(count):
+        for j in range(i):
+            if group[j] == j and trees[i].n and trees[j].n and _mingle(trees[i], trees[j]):
+                group[i] = j
+                break
+        else:
+            group[i] = i
+    return [np.flatnonzero(group == i) for i in range(count) if group[i] == i]
+
+
+def _mingle(tree_one: Any, tree_other: Any) -> bool:
+    """Whether each run comes as near to the other's points as to its own."""
+    own = max(float(np.median(tree.query(tree.data, 2)[0][:, 1])) for tree in (tree_one, tree_other))
+    across = min(
+        float(np.median(tree_one.query(tree_other.data)[0])),
+        float(np.median(tree_other.query(tree_one.data)[0])),
+    )
+    return across < 3.0 * own
+
+
+def _ordered(found: list[Attractor]) -> tuple[list[Attractor], NDArray[np.int64]]:
+    """Attractors in an order of their own, whatever state led to them, and where each stands in it."""
+
+    def key(i: int) -> tuple[Any, ...]:
+        each = found[i]
+        lowest = each.points[np.lexsort(np.round(each.points, 6).T[::-1])[0]]
+        return (KINDS.index(each.kind), each.period, *np.round(lowest, 6).tolist())
+
+    order = sorted(range(len(found)), key=key)
+    place = np.empty(len(found), dtype=np.int64)
+    place[order] = np.arange(len(found))
+    return [found[i] for i in order], place

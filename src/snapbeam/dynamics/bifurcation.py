@@ -1,0 +1,239 @@
+"""Bifurcation diagrams by brute force: what is seen once a period as a parameter goes up, down or from many starts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.config.parameters import lookup
+from snapbeam.core.validate import InputError, InputTypeError, axis, choice, flag, integer
+from snapbeam.dynamics.flow import Stroboscope
+from snapbeam.dynamics.orbits.passage import passage_of
+from snapbeam.dynamics.starts import Starts, starts_of
+from snapbeam.model.integration import Integration
+from snapbeam.model.start import rest_state
+from snapbeam.model.system import System
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["bifurcation_diagram", "least_period"]
+
+_Array = NDArray[np.float64]
+SWEEPS = ("up", "down")
+_SEEN = ("center_displacement", "displacement", "center_velocity", "velocity")
+_PASSAGE = 4
+"""Periods that approaches are looked at in."""
+
+
+def bifurcation_diagram(
+    system: System,
+    name: str,
+    values: ArrayLike,
+    integration: Integration | None = None,
+    *,
+    sweeps: Sequence[str] = SWEEPS,
+    starts: Starts | int = 0,
+    periods: tuple[int, int] = (100, 32),
+    grazing: bool = False,
+    progress: Callable[[int, int], object] | None = None,
+) -> xr.Dataset:
+    """What a system does once a period, over one parameter that is swept with the state carried on.
+
+    Up and down sweeps differ where attractors coexist (hysteresis); many starts show those that neither meets.
+
+    Parameters
+    ----------
+    system : System
+    name : str
+        Parameter, by dotted name or the name in datasets.
+    values : array_like
+        Strictly increasing.
+    integration : Integration, optional
+    sweeps : sequence of {"up", "down"}
+    starts : Starts or int
+        Starts of every value beside the sweeps; none by default.
+    periods : pair of int
+        Periods to leave out at each value, and to keep.
+    grazing : bool
+        Whether to look at every approach within four of the kept periods: ``clearance``, ``least_penetration``.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with values.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``sweep``, the parameter and ``period``: displacements over b and velocities over b omega_1 of the centre
+        and of the contact point at the phase of the start; over ``sweep`` and the parameter: ``impacts_per_period``,
+        ``crossings_per_period`` and ``least_period`` (0: none seen).  Runs that failed are NaN, as are all that follow
+        them in their sweep; ``failed`` says so.
+
+    Raises
+    ------
+    InputError
+        For bad input.
+    """
+    if not isinstance(system, System):
+        raise InputTypeError(f"system = {system!r}: must be a System")
+    row = lookup(name)
+    if row.quantity.kind is not float:
+        raise InputError(f"name = {name!r}: must be a parameter that is a number")
+    points = axis(row.short, values, row.quantity.low, row.quantity.high, closed=row.quantity.closed)
+    kinds = [choice("sweeps", kind, SWEEPS) for kind in sweeps]
+    leave, keep = _periods(periods)
+    flag("grazing", grazing)
+    many = starts_of(starts) if isinstance(starts, Starts) or starts else None
+    if not kinds and many is None:
+        raise InputError("sweeps = (): must be at least one, or starts at least 1")
+    flow = Stroboscope(system, Integration() if integration is None else integration)
+    diagram = _Diagram(flow, row.name, points, leave, keep)
+    total = points.size * (bool(kinds) + (many.count if many is not None else 0))
+    done = 0
+
+    def report(steps: int) -> None:
+        nonlocal done
+        done += steps
+        if progress is not None:
+            progress(done, total)
+
+    if kinds:
+        diagram.carry(kinds, report)
+    for number in range(0 if many is None else many.count):
+        assert many is not None
+        diagram.begin(f"start {number}", many, number, report)
+    return diagram.dataset(grazing)
+
+
+def _periods(periods: tuple[int, int]) -> tuple[int, int]:
+    try:
+        leave, keep = periods
+    except (TypeError, ValueError):
+        raise InputTypeError(
+            f"periods = {periods!r}: must be a pair, periods to leave out and to keep"
+        ) from None
+    return integer("periods[0]", leave, 0, 10**7), integer("periods[1]", keep, 2, 10**6)
+
+
+def least_period(rows: _Array, tolerance: float = 1e-4) -> NDArray[np.int64]:
+    """After how many periods states of shape (..., periods, d) repeat, at most half of them; 0 if they do not."""
+    keep = rows.shape[-2]
+    found = np.zeros(rows.shape[:-2], dtype=np.int64)
+    for m in range(keep // 2, 0, -1):
+        apart = np.abs(rows[..., m:, :] - rows[..., :-m, :]).max(axis=(-1, -2))
+        found = np.where(apart < tolerance, m, found)
+    return found
+
+
+class _Diagram:
+    """A diagram as it grows."""
+
+    def __init__(self, flow: Stroboscope, name: str, values: _Array, leave: int, keep: int) -> None:
+        self.flow, self.name, self.values, self.leave, self.keep = flow, name, values, leave, keep
+        self.sweeps: list[str] = []
+        self.rows: list[_Array] = []
+        self.counts: list[_Array] = []
+
+    def _go(self, x: _Array, at: NDArray[np.int64]) -> tuple[_Array, _Array]:
+        """The states that are kept of some runs, shape (runs, keep, d), and impacts and crossings a period."""
+        values, periods = self.values[at], self.leave + self.keep
+        if lookup(self.name).is_run:
+            marched = [self.flow.march(x, periods, every=True, points={self.name: values})]
+        else:
+            marched = [
+                self.flow.neighbour(self.name, float(value)).march(each[None], periods, every=True)
+                for each, value in zip(x, values, strict=True)
+            ]
+        every = np.concatenate([each.every[:, self.leave :] for each in marched if each.every is not None])
+        counts = np.array(
+            [np.concatenate([each.statistics[name] for each in marched]) for name in ("impacts", "crossings")]
+        )
+        return every, counts.T / periods
+
+    def carry(self, kinds: list[str], report: Callable[[int], None]) -> None:
+        """Sweep up and down side by side."""
+        count = self.values.size
+        x = np.repeat(self.flow.coordinates(), len(kinds), axis=0)
+        rows = np.empty((len(kinds), count, self.keep, self.flow.dimension))
+        counts = np.empty((len(kinds), count, 2))
+        for step in range(count):
+            at = np.array([step if kind == "up" else count - 1 - step for kind in kinds])
+            kept, passed = self._go(x, at)
+            for i, place in enumerate(at):
+                rows[i, place], counts[i, place] = kept[i], passed[i]
+            x = kept[:, -1]
+            report(1)
+        self.sweeps += kinds
+        self.rows += list(rows)
+        self.counts += list(counts)
+
+    def begin(self, label: str, starts: Starts, number: int, report: Callable[[int], None]) -> None:
+        """Every value from one start."""
+        system = self.flow.system
+        state = starts.state(system, number, system.start or rest_state(system.model, system.striker))
+        rows = np.repeat(self.flow.coordinates(state), self.values.size, axis=0)
+        kept, counts = self._go(rows, np.arange(self.values.size))
+        self.sweeps.append(label)
+        self.rows.append(kept)
+        self.counts.append(counts)
+        report(self.values.size)
+
+    def dataset(self, grazing: bool) -> xr.Dataset:
+        """The diagram, labelled."""
+        import xarray as xr
+
+        row, rows, counts = lookup(self.name), np.array(self.rows), np.array(self.counts)
+        system, modes = self.flow.system, self.flow.modes
+        model, scale = system.model, system.scale
+        full = rows * self.flow.scales
+        location = 0.5 if system.striker is None else system.striker.location
+        shapes = {"center": model.center_shape, "": model.shape_at(location)}
+        labels = {"units": row.quantity.unit, "long_name": row.quantity.words, "parameter": row.name}
+        dataset = xr.Dataset(
+            coords={"sweep": self.sweeps, row.short: (row.short, self.values, labels)},
+            attrs={"title": "bifurcation diagram", "along": row.short, "periods_left_out": self.leave}
+            | {"system_hash": system.hash, "modes": modes},
+        )
+        dims = ("sweep", row.short)
+        for part, shape in shapes.items():
+            prefix, words = (f"{part}_", "centre") if part else ("", "contact point's")
+            of = {
+                "displacement": (full[..., :modes], scale.length),
+                "velocity": (full[..., modes:], scale.length * scale.omega),
+            }
+            for what, (values, unit) in of.items():
+                over = "b" if what == "displacement" else "b omega_1"
+                text = {"units": "1", "long_name": f"{words} {what} once a period, over {over}"}
+                dataset[f"{prefix}{what}"] = ((*dims, "period"), values @ shape / unit, text)
+        known = np.asarray(np.isfinite(rows).all(axis=(-1, -2)))
+        periods = least_period(np.where(np.isfinite(rows), rows, 0.0))
+        table: dict[str, tuple[Any, str]] = {
+            "impacts_per_period": (
+                np.where(known, counts[..., 0], np.nan),
+                "impacts per period of the drive",
+            ),
+            "crossings_per_period": (
+                np.where(known, counts[..., 1], np.nan),
+                "crossings of the centre per period",
+            ),
+            "least_period": (np.where(known, periods, 0), "periods after which it repeats; 0: not seen to"),
+            "failed": (~known, "whether a run failed there"),
+        }
+        if grazing and system.striker is not None:
+            near = self._approaches(rows, known)
+            table["clearance"] = near[..., 0], "least gap at which it turns back without touching, over b"
+            table["least_penetration"] = near[..., 1], "penetration of the lightest impact, over b"
+        for name, (values, about) in table.items():
+            dataset[name] = (dims, values, {"units": "1", "long_name": about})
+        return dataset
+
+    def _approaches(self, rows: _Array, known: NDArray[np.bool_]) -> _Array:
+        found = np.full((*known.shape, 2), np.nan)
+        for at in np.ndindex(known.shape):
+            if known[at]:
+                flow = self.flow.neighbour(self.name, float(self.values[at[-1]]))
+                passage = passage_of(flow, rows[at][-1], _PASSAGE)
+                found[at] = passage.clearance, passage.least_penetration
+        return found

@@ -1,0 +1,347 @@
+"""What questions of dynamics are put to: a map that takes states a period on.
+
+Anything that can take batches of states a period on is a :class:`Flow`; :class:`Stroboscope` is that of a system, seen
+once a period of its drive.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.config.parameters import lookup
+from snapbeam.core.codes import RunStatus
+from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.dynamics.starts import held_in_space
+from snapbeam.engines.answer import statistics_of
+from snapbeam.engines.assemble import make_ensemble
+from snapbeam.engines.registry import resolve
+from snapbeam.model.integration import Integration
+from snapbeam.model.start import amplitude_scale, rest_state
+from snapbeam.model.state import State
+from snapbeam.model.system import System
+from snapbeam.runs.request import cycle_of
+from snapbeam.runs.states import states_of
+
+__all__ = ["Flow", "Marched", "Stroboscope", "flow_of"]
+
+_Array = NDArray[np.float64]
+_REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
+_BYTES = 2**27
+"""Of the states that are held on the way at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Marched:
+    """Where states came to."""
+
+    states: _Array
+    """After the last period, shape (runs, d); NaN where a run failed."""
+    every: _Array | None
+    """After each period, shape (runs, periods, d), if they were asked for."""
+    tangents: _Array | None
+    """Small changes that were carried along, shape (runs, k, d)."""
+    statistics: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    """Of the way, by name, shape (runs,)."""
+    hidden: Any = None
+    """What it takes to go on without losing a bit."""
+
+
+@runtime_checkable
+class Flow(Protocol):
+    """A map of states of *dimension* numbers, applied once a period."""
+
+    @property
+    def dimension(self) -> int:
+        """Numbers of a state, d."""
+        ...
+
+    @property
+    def period(self) -> float:
+        """Time that the map takes, s, or 1 for a map without time."""
+        ...
+
+    @property
+    def smooth(self) -> bool:
+        """Whether tangents can be carried along."""
+        ...
+
+    def march(
+        self,
+        states: ArrayLike | Marched,
+        periods: int = 1,
+        *,
+        tangents: _Array | None = None,
+        every: bool = False,
+        points: Mapping[str, _Array] | None = None,
+    ) -> Marched:
+        """Take states of shape (runs, d), or where they came to, some periods on.
+
+        *tangents* has the shape (runs, k, d); *points* are parameters that differ between the runs.
+        """
+        ...
+
+    def neighbour(self, name: str, value: float) -> Flow:
+        """The flow with one parameter changed."""
+        ...
+
+    def value(self, name: str) -> float:
+        """A parameter."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Stroboscope:
+    """The map of a system over a period of its drive, the tip's mid-position fixed in space.
+
+    A state is amplitude over that of the well for each buckling mode, then velocity over the same times omega_1: the
+    coordinates ``amplitude[i]`` and ``velocity[i]``.
+
+    Parameters
+    ----------
+    system : System
+    integration : Integration, optional
+    phase : float, optional
+        Of the drive at which the system is seen, rad; that of the drive at the start by default.
+    """
+
+    system: System
+    integration: Integration = field(default_factory=Integration)
+    phase: float | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.system, System):
+            raise InputTypeError(f"system = {self.system!r}: must be a System")
+        if not isinstance(self.integration, Integration):
+            raise InputTypeError(f"integration = {self.integration!r}: must be an Integration")
+        if self.integration.tolerance is not None:
+            raise InputError(
+                f"tolerance = {self.integration.tolerance:g}: is for one run; give steps, or accuracy = 'reference'"
+            )
+        object.__setattr__(self, "system", held_in_space(self.system))
+
+    @property
+    def modes(self) -> int:
+        """N."""
+        return self.system.model.modes
+
+    @property
+    def dimension(self) -> int:
+        """2 N."""
+        return 2 * self.modes
+
+    @cached_property
+    def period(self) -> float:
+        """Of the drive, s."""
+        return cycle_of(self.system)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether the law of contact has a force without a jump."""
+        contact = self.system.contact
+        return contact is None or self.system.striker is None or contact.keeps.smooth
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the coordinates."""
+        modes = range(1, self.modes + 1)
+        return (*(f"amplitude[{i}]" for i in modes), *(f"velocity[{i}]" for i in modes))
+
+    @cached_property
+    def scales(self) -> _Array:
+        """What the coordinates are counted in, m^0.5 and m^0.5/s, shape (d,)."""
+        size = amplitude_scale(self.system.model)
+        speed = size * 2.0 * math.pi * self.system.model.reference_freq
+        return np.repeat([size, speed], self.modes)
+
+    @property
+    def striker_phase(self) -> float:
+        """Phase of the drive at which the system is seen."""
+        if self.phase is not None:
+            return self.phase
+        drive = None if self.system.striker is None else self.system.striker.drive
+        return float(getattr(drive, "phase", 0.0))
+
+    def neighbour(self, name: str, value: float) -> Stroboscope:
+        """The flow of the system with one parameter changed, by dotted name or the name in datasets."""
+        return Stroboscope(self.system.replace(**{lookup(name).name: value}), self.integration, self.phase)
+
+    def value(self, name: str) -> float:
+        """A parameter of the system."""
+        return float(self.system.get(lookup(name).name))
+
+    def coordinates(self, state: State | None = None) -> _Array:
+        """A state, or a batch of them, in the coordinates of the flow, shape (runs, d); the start by default."""
+        if state is None:
+            state = self.system.start or rest_state(self.system.model, self.system.striker)
+        if state.modes != self.modes:
+            raise InputError(f"state of {state.modes} modes: must have the {self.modes} modes of the model")
+        flat = state.flat()
+        return np.concatenate([flat.amplitude, flat.velocity], axis=1) / self.scales
+
+    def state(self, coordinates: ArrayLike) -> State:
+        """States of coordinates of shape (..., d), at the phase at which the system is seen."""
+        full = np.asarray(coordinates, dtype=np.float64) * self.scales
+        return State(
+            amplitude=full[..., : self.modes],
+            velocity=full[..., self.modes :],
+            phase=np.array(self.striker_phase),
+            striker_position=np.array(self.striker_position),
+        )
+
+    @cached_property
+    def striker_position(self) -> float:
+        """Where the mid-position of the tip is, m; NaN without one."""
+        if self.system.striker is None:
+            return math.nan
+        ensemble = make_ensemble(self.system, self.integration)
+        run, sign = ensemble.runs[0], ensemble.structure.sign
+        return float(sign * (run["rest_contact"] + run["offset"]))
+
+    def march(
+        self,
+        states: ArrayLike | Marched,
+        periods: int = 1,
+        *,
+        tangents: _Array | None = None,
+        every: bool = False,
+        points: Mapping[str, _Array] | None = None,
+    ) -> Marched:
+        """As :meth:`Flow.march`; what a run gives does not depend on what it is marched with."""
+        begun = states.hidden if isinstance(states, Marched) else self._begun(states)
+        count, size = begun.batch[0], 2 * 8 * (self.modes + 16)
+        share = max(1, _BYTES // (size * periods))
+        parts = [slice(at, min(at + share, count)) for at in range(0, count, share)]
+        found = [
+            self._march_part(
+                begun[part] if len(parts) > 1 else begun,
+                periods,
+                None if tangents is None else tangents[part],
+                every,
+                None if points is None else {name: values[part] for name, values in points.items()},
+            )
+            for part in parts
+        ]
+        return found[0] if len(found) == 1 else _joined(found)
+
+    def _begun(self, states: ArrayLike) -> State:
+        rows = np.atleast_2d(np.asarray(states, dtype=np.float64))
+        if rows.ndim != 2 or rows.shape[1] != self.dimension:
+            raise InputError(f"states of shape {rows.shape}: must have the shape (runs, {self.dimension})")
+        # a failed state stands still and stays lost
+        lost = ~np.asarray(np.isfinite(rows).all(axis=1))
+        full = np.where(lost[:, None], 0.0, rows) * self.scales
+        passed: dict[str, Any] = {
+            "status": np.where(lost, int(RunStatus.NOT_FINITE), int(RunStatus.OK)).astype(np.int8)
+        }
+        return State(
+            amplitude=full[:, : self.modes],
+            velocity=full[:, self.modes :],
+            phase=np.array(self.striker_phase),
+            passed=passed,
+        )
+
+    def _march_part(
+        self,
+        begun: State,
+        periods: int,
+        tangents: _Array | None,
+        every: bool,
+        points: Mapping[str, _Array] | None,
+    ) -> Marched:
+        lost = None if begun.passed is None else ~np.isin(begun.passed["status"], _REACHED)
+        own = {lookup(name).name: np.asarray(values) for name, values in (points or {}).items()}
+        ensemble = make_ensemble(
+            self.system,
+            self.integration.replace(early_decision=False),
+            own,
+            start=begun.flat(),
+            periods=periods,
+        )
+        _, engine = resolve("cpu")
+        model = self.system.model
+        moved = None
+        if tangents is None:
+            landings = engine.march_landing(ensemble, self.integration.threads)
+        else:
+            back = model.linear_modes.T @ model.mass
+            given = (tangents * self.scales).reshape(*tangents.shape[:2], 2, self.modes)
+            landings, changed = engine.march_tangents(ensemble, given @ back.T, self.integration.threads)
+            moved = (changed @ model.linear_modes.T).reshape(tangents.shape) / self.scales
+        failed = ~np.isin(landings.books["status"], _REACHED)
+        if lost is not None:
+            failed |= lost
+        last = self._rows(ensemble, landings.q[:, -1:], landings.p[:, -1:], landings.home[:, -1:])[:, 0]
+        whole = self._rows(ensemble, landings.q, landings.p, landings.home) if every else None
+        for array in (last, whole, moved):
+            if array is not None:
+                array[failed] = np.nan
+        q, p = (np.where(failed[:, None], 0.0, each[:, -1]) for each in (landings.q, landings.p))
+        ticks = ensemble.runs["end"]
+        hidden = states_of(ensemble, q, p, landings.home[:, -1], landings.contact_ticks[:, -1], ticks)
+        status = np.where(failed, np.where(landings.books["status"] == 0, 3, landings.books["status"]), 0)
+        hidden = replace(hidden, phase=np.full(failed.size, self.striker_phase), passed={"status": status})
+        return Marched(last, whole, moved, statistics_of(ensemble, landings.books), hidden)
+
+    def _rows(self, ensemble: Any, q: _Array, p: _Array, home: NDArray[np.int64]) -> _Array:
+        """States in coordinates, one by one, so that none depends on the others; shape (runs, periods, d)."""
+        structure = ensemble.structure
+        first = np.where((home < 0)[..., None], q + structure.shift, q)
+        modes = self.system.model.linear_modes.T
+        amplitude = structure.equilibrium + (first[..., None, :] @ modes)[..., 0, :]
+        velocity = (p[..., None, :] @ modes)[..., 0, :]
+        rows: _Array = np.concatenate([amplitude, velocity], axis=-1) / self.scales
+        return rows
+
+
+def _joined(parts: list[Marched]) -> Marched:
+    """Runs that were marched one part after the other."""
+
+    def stacked(arrays: list[Any]) -> Any:
+        return None if arrays[0] is None else np.concatenate(arrays)
+
+    statistics = {name: stacked([part.statistics[name] for part in parts]) for name in parts[0].statistics}
+    return Marched(
+        stacked([part.states for part in parts]),
+        stacked([part.every for part in parts]),
+        stacked([part.tangents for part in parts]),
+        statistics,
+        _joined_states([part.hidden for part in parts]),
+    )
+
+
+def _joined_states(states: list[State]) -> State:
+    from snapbeam.model.state import ModalState
+
+    names = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(each, name) for each in states]) for name in names
+    }
+    modals = [each.modal for each in states]
+    first = modals[0]
+    assert first is not None
+    parts: dict[str, Any] = {
+        name: np.concatenate([getattr(each, name) for each in modals])
+        for name in ("q", "p", "home", "offset")
+    }
+    status = np.concatenate([np.asarray((each.passed or {})["status"]) for each in states])
+    return State(**arrays, passed={"status": status}, modal=ModalState(**parts, structure=first.structure))
+
+
+def flow_of(system: System | Flow, integration: Integration | None = None, accuracy: str = "map") -> Flow:
+    """The flow that a system makes, or one that is one; *accuracy* is meant where no integration is given."""
+    if isinstance(system, System):
+        return Stroboscope(system, Integration(accuracy=accuracy) if integration is None else integration)
+    if not isinstance(system, Flow):
+        raise InputTypeError(
+            f"system = {system!r}: must be a System, or a Flow that takes states a period on"
+        )
+    if integration is not None:
+        raise InputTypeError("integration: is for a System; a Flow brings its own")
+    return system

@@ -1,0 +1,243 @@
+"""Lyapunov exponents: the tangent flow, made orthogonal once a period, and two trajectories as a check."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.config.parameters import lookup
+from snapbeam.core.validate import InputError, InputTypeError, integer, positive
+from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of
+from snapbeam.model.integration import Integration
+from snapbeam.model.state import State
+from snapbeam.model.system import System
+from snapbeam.sweeps.points import Points, points_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["lyapunov", "separation_exponent"]
+
+_Array = NDArray[np.float64]
+_BLOCKS = 20
+"""Means of as many stretches tell the standard error."""
+
+
+def lyapunov(
+    system: System | Flow,
+    k: int = 1,
+    periods: int = 500,
+    *,
+    transient: int = 100,
+    states: State | ArrayLike | None = None,
+    axes: Mapping[str, Any] | None = None,
+    integration: Integration | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> xr.Dataset:
+    """The largest Lyapunov exponents, by the tangent flow with a QR factorisation at every whole period.
+
+    k small changes are carried along by the steps of the run itself and made orthogonal once a period (Benettin,
+    Galgani, Giorgilli and Strelcyn, Meccanica 15 (1980) 9); the logarithms of what each grew by, over the time, are
+    the exponents.  A run that snaps and then settles has two kinds: those of the transient, while it snaps, and those
+    of what it settles on.
+
+    Parameters
+    ----------
+    system : System, or a Flow
+    k : int
+        Exponents, from the largest on, at most the dimension of the state.
+    periods : int
+        Periods of the drive to go over.
+    transient : int
+        Periods before them.
+    states : State or array_like of shape (runs, d), optional
+        Where to begin; the system's start by default.
+    axes : mapping, optional
+        Parameters that may differ between the runs of an ensemble, each with its values: a map of exponents, every
+        point from the first state.
+    integration : Integration, optional
+    progress : callable, optional
+        Called as ``progress(done, total)`` with periods.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``exponent`` (1/s, over ``exponent_number`` and the axes or runs) with ``exponent_error``, one standard error
+        from the means of stretches; ``exponent_snapping`` and ``exponent_settled``, of the periods before and after the
+        last crossing, with ``periods_snapping``; and, without axes, ``running``, the estimate
+        after each period.
+
+    Raises
+    ------
+    InputError
+        For bad input, and for a law of contact whose force jumps: see :func:`separation_exponent`.
+    """
+    flow = flow_of(system, integration)
+    count = integer("k", k, 1, flow.dimension)
+    total, before = integer("periods", periods, _BLOCKS, 10**7), integer("transient", transient, 0, 10**7)
+    if not flow.smooth:
+        raise InputError(
+            "contact: its force jumps, so that the tangent flow does; use separation_exponent for the largest one"
+        )
+    begun, points, columns = _runs(flow, states, axes)
+    marched = flow.march(begun, before, points=columns) if before else flow.march(begun, 1, points=columns)
+    runs = marched.states.shape[0]
+    frame = np.tile(np.eye(flow.dimension)[:count], (runs, 1, 1))
+    growth, crossed = np.empty((total, runs, count)), np.zeros((total, runs), dtype=bool)
+    for period in range(total):
+        marched = flow.march(marched, 1, tangents=frame, points=columns)
+        frame, growth[period] = _orthogonal(marched)
+        if "crossings" in marched.statistics:
+            crossed[period] = marched.statistics["crossings"] > 0
+        if progress is not None:
+            progress(period + 1, total)
+    return _dataset(flow, growth, crossed, points, before)
+
+
+def _runs(
+    flow: Flow, states: State | ArrayLike | None, axes: Mapping[str, Any] | None
+) -> tuple[_Array, Points | None, dict[str, _Array] | None]:
+    """Where runs begin, the points of a map, and its columns."""
+    if states is None or isinstance(states, State):
+        if not isinstance(flow, Stroboscope):
+            raise InputTypeError(f"states = {states!r}: must be an array of shape (runs, {flow.dimension})")
+        begun = flow.coordinates(states)
+    else:
+        begun = np.atleast_2d(np.asarray(states, dtype=np.float64))
+    if axes is None:
+        return begun, None, None
+    points = points_of(axes)
+    for name in points.names:
+        if not lookup(name).is_run:
+            raise InputError(f"axes {name}: needs another structure at each value; ask for each by itself")
+    columns = points.take(np.arange(points.size))
+    return np.repeat(begun[:1], points.size, axis=0), points, columns
+
+
+def _orthogonal(marched: Marched) -> tuple[_Array, _Array]:
+    """An orthonormal frame, and the logarithm of what each of its directions grew by."""
+    assert marched.tangents is not None
+    lost = ~np.asarray(np.isfinite(marched.tangents).all(axis=(1, 2)))
+    vectors = np.where(lost[:, None, None], 1.0, marched.tangents).transpose(0, 2, 1)
+    q, r = np.linalg.qr(vectors)
+    grown = np.abs(np.diagonal(r, axis1=1, axis2=2))
+    with np.errstate(divide="ignore"):
+        logs = np.log(grown)
+    logs[lost] = np.nan
+    return np.ascontiguousarray(q.transpose(0, 2, 1)), logs
+
+
+def _dataset(
+    flow: Flow, growth: _Array, crossed: NDArray[np.bool_], points: Points | None, before: int
+) -> xr.Dataset:
+    import xarray as xr
+
+    total, _, count = growth.shape
+    rate = growth / flow.period if points is None else growth / _periods(flow, points)[None, :, None]
+    unit = "1/s" if isinstance(flow, Stroboscope) else "1"
+    edges = np.linspace(0, total, _BLOCKS + 1).astype(int)
+    means = np.array([rate[a:b].mean(axis=0) for a, b in pairwise(edges)])
+    number = np.arange(total)[:, None]
+    last = np.where(crossed.any(axis=0), total - np.argmax(crossed[::-1], axis=0), 0)
+    snapping = np.where((number < last)[..., None], rate, np.nan)
+    settled = np.where((number >= last)[..., None], rate, np.nan)
+    dims = ("run",) if points is None else points.dims
+
+    def arranged(values: NDArray[Any]) -> NDArray[Any]:
+        return values if points is None else points.arranged(values)
+
+    def mean(values: _Array) -> _Array:
+        known = np.isfinite(values).sum(axis=0)
+        sums = np.nansum(values, axis=0)
+        return np.where(known > 0, sums / np.maximum(known, 1), np.nan)
+
+    table = {
+        "exponent": (rate.mean(axis=0), "Lyapunov exponent"),
+        "exponent_error": (means.std(axis=0, ddof=1) / np.sqrt(_BLOCKS), "standard error of the exponent"),
+        "exponent_snapping": (mean(snapping), "finite-time exponent while it snaps"),
+        "exponent_settled": (mean(settled), "finite-time exponent once it snaps no more"),
+    }
+    coords: dict[str, Any] = {"exponent_number": np.arange(1, count + 1)}
+    coords |= {} if points is None else points.coordinates()
+    dataset = xr.Dataset(
+        coords=coords, attrs={"title": "Lyapunov exponents", "periods": total, "transient": before}
+    )
+    for name, (values, words) in table.items():
+        dataset[name] = ((*dims, "exponent_number"), arranged(values), {"units": unit, "long_name": words})
+    words = "periods from the first to the last with a crossing"
+    dataset["periods_snapping"] = (dims, arranged(last), {"units": "1", "long_name": words})
+    if points is None:
+        running = np.cumsum(rate, axis=0) / np.arange(1, total + 1)[:, None, None]
+        labels = {"units": unit, "long_name": "exponent so far"}
+        dataset["running"] = (("period", *dims, "exponent_number"), running, labels)
+        dataset.attrs["period"] = flow.period
+    return dataset
+
+
+def _periods(flow: Flow, points: Points) -> _Array:
+    """Seconds of a period of the drive at each point."""
+    if not isinstance(flow, Stroboscope) or "drive.frequency_ratio" not in points.names:
+        return np.full(points.size, flow.period)
+    ratio = points.take(np.arange(points.size))["drive.frequency_ratio"]
+    return np.asarray(flow.period * flow.value("drive.frequency_ratio") / ratio)
+
+
+def separation_exponent(
+    system: System | Flow,
+    periods: int = 500,
+    *,
+    transient: int = 100,
+    states: State | ArrayLike | None = None,
+    distance: float = 1e-8,
+    integration: Integration | None = None,
+) -> xr.Dataset:
+    """The largest exponent from two trajectories, brought back to a small distance at every whole period.
+
+    An independent check of :func:`lyapunov`, and the way under a law of contact whose force jumps.
+
+    Parameters
+    ----------
+    system, periods, transient, states, integration
+        As of :func:`lyapunov`.
+    distance : float
+        To which they are brought back, in units of the well's amplitude.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``exponent`` (1/s) and ``exponent_error`` over ``run``.
+    """
+    import xarray as xr
+
+    flow = flow_of(system, integration)
+    total, before = integer("periods", periods, _BLOCKS, 10**7), integer("transient", transient, 1, 10**7)
+    size = positive("distance", distance)
+    begun, _, _ = _runs(flow, states, None)
+    here = flow.march(begun, before).states
+    runs = here.shape[0]
+    along = np.tile(np.ones(flow.dimension) / np.sqrt(flow.dimension), (runs, 1))
+    growth = np.empty((total, runs))
+    for period in range(total):
+        both = flow.march(np.concatenate([here, here + size * along]), 1).states
+        here, apart = both[:runs], both[runs:] - both[:runs]
+        away = np.sqrt((apart * apart).sum(axis=1))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            growth[period] = np.log(away / size)
+            along = np.where((away > 0.0)[:, None], apart / away[:, None], along)
+    rate = growth / flow.period
+    edges = np.linspace(0, total, _BLOCKS + 1).astype(int)
+    means = np.array([rate[a:b].mean(axis=0) for a, b in pairwise(edges)])
+    unit = "1/s" if isinstance(flow, Stroboscope) else "1"
+    return xr.Dataset(
+        {
+            "exponent": ("run", rate.mean(axis=0), {"units": unit, "long_name": "largest Lyapunov exponent"}),
+            "exponent_error": (
+                "run", means.std(axis=0, ddof=1) / np.sqrt(_BLOCKS), {"units": unit, "long_name": "standard error"}
+            ),
+        },
+        attrs={"title": "largest Lyapunov exponent from two trajectories", "periods": total, "period": flow.period},
+    )  # fmt: skip

@@ -1,0 +1,1 @@
+"""Periodic orbits, stable or not: shooting, multipliers, branches along a parameter."""

@@ -1,0 +1,149 @@
+"""A branch of periodic orbits, and the events on it, labelled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.dynamics.flow import Stroboscope
+from snapbeam.dynamics.orbits.orbit import Orbit
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["EVENTS", "Branch", "Event"]
+
+EVENTS = ("fold", "flip", "Neimark-Sacker", "branch point", "grazing")
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """Something that happens on a branch."""
+
+    kind: str
+    """One of :data:`EVENTS`."""
+    orbit: Orbit
+    value: float
+    """Of the parameter."""
+    after: int
+    """Number of the orbit of the branch that it comes after."""
+
+    def __repr__(self) -> str:
+        return f"<{self.kind} at {self.value:.8g}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Orbits that follow each other along a parameter."""
+
+    name: str
+    """The parameter."""
+    orbits: list[Orbit]
+    events: list[Event]
+    end: str
+    """Why it ends."""
+    impacts: list[int]
+    """Of each orbit within its period."""
+    tangents: list[NDArray[np.float64]]
+
+    def __repr__(self) -> str:
+        low, high = self.values.min(), self.values.max()
+        text = f"{len(self.orbits)} orbits of period {self.orbits[0].period}, {self.name} from {low:.6g} to {high:.6g}"
+        return f"<Branch: {text}, {len(self.events)} events, end: {self.end}>"
+
+    @cached_property
+    def values(self) -> NDArray[np.float64]:
+        """Of the parameter along the branch."""
+        return np.array([orbit.flow.value(self.name) for orbit in self.orbits])
+
+    @cached_property
+    def is_stable(self) -> NDArray[np.bool_]:
+        """Of each orbit."""
+        return np.array([orbit.is_stable for orbit in self.orbits])
+
+    def to_dataset(self) -> xr.Dataset:
+        """The branch labelled: over ``orbit`` the parameter, the state, the multipliers, stability and impacts; over
+        ``event`` what happens where."""
+        import xarray as xr
+
+        from snapbeam.config.parameters import lookup
+
+        first = self.orbits[0]
+        names = getattr(first.flow, "names", tuple(f"x[{i + 1}]" for i in range(first.coordinates.size)))
+        values = np.array([orbit.multipliers for orbit in self.orbits])
+        short, unit, words = self.name, "1", self.name
+        if isinstance(first.flow, Stroboscope):
+            row = lookup(self.name)
+            short, unit, words = row.short, row.quantity.unit, row.quantity.words
+        states = np.array([orbit.coordinates for orbit in self.orbits])
+        steps = np.linalg.norm(np.diff(states, axis=0), axis=1)
+        dataset = xr.Dataset(
+            {
+                "state": (
+                    ("orbit", "coordinate"),
+                    states,
+                    _labels("state of the orbit at the phase it is seen at"),
+                ),
+                "multiplier_real": (("orbit", "multiplier"), values.real, _labels("Floquet multiplier")),
+                "multiplier_imag": (("orbit", "multiplier"), values.imag, _labels("its imaginary part")),
+                "stable": (
+                    "orbit",
+                    self.is_stable,
+                    _labels("whether every multiplier is inside the unit circle"),
+                ),
+                "impacts": (
+                    "orbit",
+                    np.array(self.impacts, dtype=np.int32),
+                    _labels("impacts within the period"),
+                ),
+                "arclength": (
+                    "orbit",
+                    np.append(0.0, np.cumsum(steps)),
+                    _labels("length of the branch in states"),
+                ),
+                "residual": ("orbit", [orbit.residual for orbit in self.orbits], _labels("of the return")),
+                "event_kind": ("event", [event.kind for event in self.events], {"long_name": "what happens"}),
+                "event_after": ("event", [event.after for event in self.events], _labels("orbit before it")),
+                "event_value": (
+                    "event",
+                    [event.value for event in self.events],
+                    {"units": unit, "long_name": words},
+                ),
+                "event_state": (
+                    ("event", "coordinate"),
+                    np.array([event.orbit.coordinates for event in self.events]).reshape(-1, states.shape[1]),
+                    _labels("state of the orbit there"),
+                ),
+            },
+            {
+                "coordinate": list(names),
+                short: ("orbit", self.values, {"units": unit, "long_name": words, "parameter": self.name}),
+            },
+            {"title": "branch of periodic orbits", "along": short, "period": first.period, "end": self.end},
+        )
+        if isinstance(first.flow, Stroboscope):
+            dataset[self._center_name] = (
+                "orbit",
+                self._centers(states),
+                _labels("centre displacement there, over b"),
+            )
+        return dataset
+
+    _center_name = "center_displacement"
+
+    def _centers(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
+        rows = []
+        for orbit, x in zip(self.orbits, states, strict=True):
+            flow = orbit.flow
+            assert isinstance(flow, Stroboscope)
+            amplitude = x[: flow.modes] * flow.scales[: flow.modes]
+            rows.append(float(flow.system.model.center_shape @ amplitude) / flow.system.scale.length)
+        return np.array(rows)
+
+
+def _labels(words: str) -> dict[str, str]:
+    return {"units": "1", "long_name": words}

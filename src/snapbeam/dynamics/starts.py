@@ -1,0 +1,119 @@
+"""Many starts of one system, each from its own number alone: a beam that rings faintly, a drive at any phase."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from snapbeam.core.validate import InputError, InputTypeError, flag, integer, nonnegative
+from snapbeam.model.start import rest_state
+from snapbeam.model.state import State
+from snapbeam.model.system import System
+from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicas, perturbed_start
+
+__all__ = ["Starts", "held_in_space", "starts_of"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Starts:
+    """Starts that differ a little, or in the phase of the drive; number s is the same whatever it is run with.
+
+    Parameters
+    ----------
+    count : int
+        Starts, at least 1.
+    displacement : float
+        Root mean square of the change of the centre, m: every linear mode rings with equal mean energy.  0 for none;
+        by default the error of reading a position to a pixel of the paper's camera.
+    phase : bool
+        Whether the drive begins at any phase of the half of its cycle in which the tip is drawn back, so that none
+        presses a beam at rest.
+    seed : int
+        Chooses them: start s comes from Philox with the key (seed, s).
+    """
+
+    count: int = 32
+    displacement: float = MEASURING_ERROR
+    phase: bool = False
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        integer("starts", self.count, 1, 100_000)
+        nonnegative("displacement", self.displacement, "m")
+        flag("phase", self.phase)
+        integer("seed", self.seed, 0, 2**63 - 1)
+        if self.count > 1 and self.displacement == 0.0 and not self.phase:
+            raise InputError(
+                f"starts = {self.count} with displacement = 0 and phase = False: all would be the same"
+            )
+
+    def describe(self) -> dict[str, Any]:
+        """What tells these starts from others."""
+        return {
+            "count": self.count,
+            "displacement": self.displacement,
+            "phase": self.phase,
+            "seed": self.seed,
+        }
+
+    def state(self, system: System, number: int, state: State | None = None) -> State:
+        """Start *number* of a system, or that start added to *state* or a batch of states."""
+        found = state if state is not None else system.start
+        if found is None:
+            found = rest_state(system.model, system.striker)
+        if self.displacement > 0.0:
+            found = perturbed_start(system, Replicas(1, self.displacement, seed=self.seed), number, found)
+        if not self.phase:
+            return found
+        generator = np.random.Generator(np.random.Philox(key=[self.seed, number]).jumped())
+        phase = math.pi * (1.0 + generator.random())
+        return State(
+            amplitude=found.amplitude,
+            velocity=found.velocity,
+            phase=np.array(phase),
+            striker_position=found.striker_position,
+        )
+
+
+def starts_of(given: Starts | int) -> Starts:
+    """Starts, or that many of them.
+
+    Raises
+    ------
+    InputTypeError
+    """
+    if isinstance(given, Starts):
+        return given
+    if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, np.integer)):
+        raise InputTypeError(f"starts = {given!r}: must be a number of starts, or Starts")
+    return Starts(count=int(given))
+
+
+def held_in_space(system: System) -> System:
+    """The system with its tip's mid-position fixed in space, where it is at its own start.
+
+    A tip that touches the beam wherever that is makes another system of every start.
+
+    Raises
+    ------
+    InputError
+        For a recorded drive, whose periods differ.
+    """
+    striker = system.striker
+    if striker is None:
+        return system
+    if not striker.drive.harmonic:
+        raise InputError("striker.drive: is recorded; dynamics need a drive that repeats, such as a Sine")
+    from snapbeam.engines.assemble import make_ensemble
+    from snapbeam.model.integration import Integration
+
+    offset = float(make_ensemble(system, Integration()).runs["offset"][0])
+    held = system.replace(**{"striker.gap": -offset + 0.0})
+    start = system.start
+    if start is None or np.isnan(start.striker_position).all():
+        return held
+    free = State(amplitude=start.amplitude, velocity=start.velocity, phase=start.phase)
+    return System(held.model, held.contact, held.striker, free)

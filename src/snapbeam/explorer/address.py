@@ -1,0 +1,140 @@
+"""What stands behind a page's address: what is shown, so that a link shows it again.
+
+Whatever comes from there is checked like any input, and counts for nothing where it is wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+from urllib.parse import urlencode
+
+from snapbeam import InputError
+from snapbeam.config import lookup
+from snapbeam.explorer.limits import ADDRESS
+
+__all__ = ["Address", "number"]
+
+_KEYS = ("x", "y", "show", "at", "view", "set", "theme", "tab")
+_MOST = 64
+
+
+@dataclass(frozen=True)
+class Address:
+    """The state of a page.
+
+    Attributes
+    ----------
+    x, y, show : str
+        The two axes and the variable; empty for the default.
+    at : dict
+        The point whose run is shown, by dotted name.
+    view : tuple of 4 floats, optional
+        What is seen of the map.
+    changes : dict
+        Parameters that differ from the map's system, by dotted name.
+    words : tuple of str
+        What was wrong in the address.
+    """
+
+    x: str = ""
+    y: str = ""
+    show: str = ""
+    at: Mapping[str, Any] = field(default_factory=dict)
+    view: tuple[float, ...] | None = None
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    theme: str = "default"
+    words: tuple[str, ...] = ()
+
+    @classmethod
+    def read(cls, arguments: Mapping[str, list[bytes]]) -> Address:
+        """The state that an address describes; what is wrong in it is left out and told."""
+        size = sum(len(name) + sum(map(len, values)) for name, values in arguments.items())
+        if size > ADDRESS:
+            return cls(words=(f"the address is longer than {ADDRESS} characters and counts for nothing",))
+        found, wrong = cls(), []
+        for name in _KEYS:
+            values = arguments.get(name)
+            if not values:
+                continue
+            try:
+                found = _with(found, name, values[0].decode("utf-8"))
+            except (InputError, ValueError) as error:
+                wrong.append(f"address, {name}: {str(error)[:200]}")
+        return replace(found, words=tuple(wrong))
+
+    def write(self) -> str:
+        """The part of the address after the question mark."""
+        parts = {"x": self.x, "y": self.y, "show": self.show}
+        parts["at"] = _pairs_text(self.at)
+        parts["set"] = _pairs_text(self.changes)
+        if self.view is not None:
+            parts["view"] = ",".join(repr(float(value)) for value in self.view)
+        if self.theme != "default":
+            parts["theme"] = self.theme
+        return urlencode({name: value for name, value in parts.items() if value}, safe=",:")
+
+
+def _with(found: Address, name: str, text: str) -> Address:
+    if name in ("x", "y", "show"):
+        if not text.isidentifier() or len(text) > _MOST:
+            raise InputError("must be a name")
+        return replace(found, **{name: text})  # type: ignore[arg-type]
+    if name == "theme":
+        if text not in ("default", "dark"):
+            raise InputError("must be default or dark")
+        return replace(found, theme=text)
+    if name == "view":
+        view = tuple(number("view", part) for part in text.split(","))
+        if len(view) != 4 or not (view[0] < view[1] and view[2] < view[3]):
+            raise InputError("must be left,right,low,high")
+        return replace(found, view=view)
+    if name in ("at", "set"):
+        pairs = _pairs(text)
+        return replace(found, at=pairs) if name == "at" else replace(found, changes=pairs)
+    return found
+
+
+def _pairs(text: str) -> dict[str, Any]:
+    pairs: dict[str, Any] = {}
+    for part in text.split(","):
+        name, colon, value = part.partition(":")
+        if not colon:
+            raise InputError("must be name:value,name:value")
+        row = lookup(name)
+        if row.quantity.kind in (str, bool):
+            pairs[row.name] = row.quantity.check(name, value if row.quantity.kind is str else value == "True")
+        else:
+            found = number(name, value)
+            pairs[row.name] = row.quantity.check(
+                name, int(found) if row.quantity.kind is int and found == int(found) else found
+            )
+        if len(pairs) > _MOST:
+            raise InputError(f"at most {_MOST} of them")
+    return pairs
+
+
+def _pairs_text(pairs: Mapping[str, Any]) -> str:
+    return ",".join(
+        f"{name}:{value!r}" if isinstance(value, (int, float)) else f"{name}:{value}"
+        for name, value in pairs.items()
+    )
+
+
+def number(name: str, text: str) -> float:
+    """A finite number that was typed.
+
+    Raises
+    ------
+    InputError
+        If it is none.
+    """
+    try:
+        value = float(text.strip())
+    except (ValueError, AttributeError):
+        raise InputError(f"{name} = {str(text)[:40]!r}: must be a number") from None
+    if not math.isfinite(value):
+        raise InputError(f"{name} = {text!r}: must be a finite number")
+    return value

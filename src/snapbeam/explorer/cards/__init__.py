@@ -1,0 +1,1 @@
+"""The cards of the page: what can be set, asked for and taken away."""

@@ -1,0 +1,125 @@
+"""Work that a page asks for, beside the page: newest first, cancelled when it is asked for anew.
+
+Kernels let go of Python's lock, so that threads are enough.  A job hears that it is cancelled where it reports its
+progress; a window's next batch waits while a run, which a person waits for, is computed.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+from snapbeam import InputError, StoreError
+
+__all__ = ["Cancelled", "Jobs", "Token"]
+
+_LOG = logging.getLogger("snapbeam.explorer")
+
+
+class Cancelled(Exception):
+    """The work is not wanted any more."""
+
+
+@dataclass(eq=False)
+class Token:
+    """By which a job is told to stop, and stops itself when its time is up."""
+
+    seconds: float = float("inf")
+    begun: float = field(default_factory=time.monotonic)
+    event: threading.Event = field(default_factory=threading.Event)
+
+    def cancel(self) -> None:
+        """Stop it at its next report."""
+        self.event.set()
+
+    @property
+    def cancelled(self) -> bool:
+        """Whether it was told to stop."""
+        return self.event.is_set()
+
+    def check(self, *_: Any) -> None:
+        """Go on, or not.
+
+        Raises
+        ------
+        Cancelled
+            If it was told to stop.
+        InputError
+            If it has taken longer than a page may ask for.
+        """
+        if self.event.is_set():
+            raise Cancelled
+        if time.monotonic() - self.begun > self.seconds:
+            raise InputError(f"given up after {self.seconds:g} s, the longest that a page may ask for")
+
+
+class Jobs:
+    """Threads that the pages of one server share."""
+
+    def __init__(self, runs: int = 2, windows: int = 1) -> None:
+        self._runs = ThreadPoolExecutor(runs, "snapbeam-run")
+        self._windows = ThreadPoolExecutor(windows, "snapbeam-window")
+        self._exports = ThreadPoolExecutor(1, "snapbeam-export")
+        self._waiting = 0
+        self._free = threading.Condition()
+
+    def run(self, work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
+        """Do *work* at once; then ``done(result, words)``, one of the two empty, on the thread that did it."""
+        with self._free:
+            self._waiting += 1
+
+        def guarded() -> None:
+            try:
+                _guarded(work, done, token)
+            finally:
+                with self._free:
+                    self._waiting -= 1
+                    self._free.notify_all()
+
+        self._runs.submit(guarded)
+
+    def window(self, work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
+        """Do *work* when nothing more urgent is to be done."""
+        self._windows.submit(_guarded, work, done, token)
+
+    def export(self, work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
+        """Make a file, one at a time."""
+        self._exports.submit(_guarded, work, done, token)
+
+    def give_way(self, token: Token) -> None:
+        """Wait while a run is computed."""
+        with self._free:
+            while self._waiting and not token.cancelled:
+                self._free.wait(0.1)
+        token.check()
+
+    def close(self) -> None:
+        """Take no more work, and drop what has not begun."""
+        self._runs.shutdown(wait=False, cancel_futures=True)
+        self._windows.shutdown(wait=False, cancel_futures=True)
+        self._exports.shutdown(wait=False, cancel_futures=True)
+
+
+def _guarded(work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
+    token.begun = time.monotonic()
+    result, words = None, ""
+    try:
+        token.check()
+        result = work(token)
+    except Cancelled:
+        return
+    except (InputError, StoreError, OSError) as error:
+        words = str(error) or type(error).__name__
+    except MemoryError:
+        words = "there is not enough memory for this"
+    except Exception as error:  # a page says what went wrong and lives on
+        _LOG.error("%s", traceback.format_exc())
+        words = f"this failed, which it should not: {type(error).__name__}: {error}"
+    if not token.cancelled:
+        done(result, words)

@@ -1,0 +1,367 @@
+"""One page: the map, the runs, the system, and what can be taken away; each page has its own."""
+
+from __future__ import annotations
+
+import contextlib
+import html
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import panel as pn
+from bokeh.models import ColumnDataSource
+
+import snapbeam as sb
+from snapbeam import InputError, Integration, Run, RunStatus, System
+from snapbeam.explorer.address import Address, number
+from snapbeam.explorer.cards.map import MapCard
+from snapbeam.explorer.cards.system import SystemCard, changed_parameters
+from snapbeam.explorer.cards.take import TakeCard
+from snapbeam.explorer.downloads import Downloads
+from snapbeam.explorer.frame import framed
+from snapbeam.explorer.jobs import Token
+from snapbeam.explorer.limits import RUN_SECONDS, check_run, samples_of
+from snapbeam.explorer.look import Look, look_of
+from snapbeam.explorer.maps.points import Point, compared
+from snapbeam.explorer.shared import Shared
+from snapbeam.explorer.views.run import RunView
+
+__all__ = ["Page"]
+
+_GROWTH = 1500
+"""Milliseconds between two looks at a store that may be growing."""
+_QUICK = 4000
+"""Samples of a run that is shown at once; all others follow."""
+
+
+class Page:
+    """What one tab of a browser shows.
+
+    Parameters
+    ----------
+    shared : Shared
+        What all pages of the server share.
+    arguments : mapping
+        What stands behind the page's address.
+    """
+
+    def __init__(self, shared: Shared, arguments: dict[str, list[bytes]]) -> None:
+        self.shared = shared
+        self.doc = pn.state.curdoc
+        self.closed = False
+        self.address = Address.read(arguments)
+        self.look: Look = look_of(self.address.theme)
+        self.card = MapCard(self.look, shared, self.address, self.post, self.later)
+        self.card.asked = self.ask
+        self.card.moved = self._write_address
+        self.runs = [RunView(self.look, "A", self.post, self.later)]
+        self.points: list[Point | None] = [None, None]
+        self._tokens: list[Token | None] = [None, None]
+        self.add_run: Callable[[RunView], None] = lambda view: None
+        self.compare = pn.widgets.Toggle(name="Two points", width=100, align="center")
+        self.target = pn.widgets.RadioButtonGroup(
+            options=["A", "B"], value="A", visible=False, align="center"
+        )
+        self.compare.param.watch(lambda _: self.post(self._compared), "value")
+        self.downloads = Downloads()
+        self.fields: dict[str, Any] = {}
+        self.typed = pn.FlexBox(margin=0)
+        self.old = pn.pane.HTML("", sizing_mode="stretch_width", margin=0, css_classes=["old-words"])
+        self.go = pn.widgets.Button(name="Run", button_type="primary", width=70, align="end")
+        self.go.on_click(lambda _: self.post(self._ask_typed))
+        self._make_fields()
+        self.bar = ColumnDataSource({"search": [""]}, name="address")
+        self.keys = ColumnDataSource({"key": [""], "count": [0]}, name="keys")
+        self.keys.on_change("data", lambda _, __, data: self._key(str(data["key"][0])))
+        self.changes: dict[str, Any] = {}
+        self._take: TakeCard | None = None
+        self._system: SystemCard | None = None
+        self.layout = framed(self)
+        self._version = shared.source.version
+        if shared.source.growing and self.doc is not None:
+            self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
+        self._begin()
+
+    def system_card(self) -> SystemCard:
+        """The card of the system, made when it is first needed."""
+        if self._system is None:
+            assert self.shared.system is not None
+            self._system = SystemCard(
+                self.shared.system, self.shared.integration, self.post, self.downloads, self.look
+            )
+            self._system.used = self._use
+        return self._system
+
+    def take_card(self) -> TakeCard:
+        """The card of what can be taken away, made when it is first needed."""
+        if self._take is None:
+            self._take = TakeCard(self)
+            self._take.refresh()
+        return self._take
+
+    # ------------------------------------------------------------------ the page's own thread
+
+    def post(self, work: Callable[[], None]) -> None:
+        """Do something on the page's own thread, unless the page is closed."""
+        if self.closed or self.doc is None:
+            return
+
+        def guarded() -> None:
+            if not self.closed:
+                work()
+
+        with contextlib.suppress(Exception):  # the page was closed between the two lines
+            self.doc.add_next_tick_callback(guarded)
+
+    def later(self, work: Callable[[], None], milliseconds: int) -> None:
+        """Do something a little later."""
+        if not self.closed and self.doc is not None:
+            self.doc.add_timeout_callback(lambda: None if self.closed else work(), milliseconds)
+
+    def close(self) -> None:
+        """The tab is closed: compute nothing for it any more."""
+        self.closed = True
+        self.card.control.cancel("")
+        for token in self._tokens:
+            if token is not None:
+                token.cancel()
+
+    def _make_fields(self) -> None:
+        names = [*self.card.plane.names, *self.card.plane.fixed_values()]
+        from snapbeam.config import lookup
+
+        self.fields = {
+            name: pn.widgets.TextInput(name=lookup(name).short.replace("_", " "), value="", width=150)
+            for name in dict.fromkeys(names)
+        }
+        self.typed.objects = [*self.fields.values(), self.go]
+
+    def _begin(self) -> None:
+        """Show what the address names, once the page stands."""
+        if self.address.changes and self.shared.system is not None:
+            try:
+                of_run = {
+                    key[4:]: item for key, item in self.address.changes.items() if key.startswith("run.")
+                }
+                own = {key: item for key, item in self.address.changes.items() if not key.startswith("run.")}
+                first, how = self.shared.system, self.shared.integration
+                check_run(first.replace(**own), how.replace(**of_run))
+                self.system_card().take(first.replace(**own), how.replace(**of_run))
+            except InputError as error:
+                self.card.say(f"address, set: {error}")
+        at = dict(self.address.at)
+        names = set(self.card.plane.names) | set(self.card.plane.fixed_values())
+        if at and names <= at.keys():
+            self.post(lambda: self.ask(Point({name: at[name] for name in at if name in names})))
+
+    def _look_for_more(self) -> None:
+        """Show what was added to a store since the last look."""
+        source = self.shared.source
+
+        def done(_: Any, error: str) -> None:
+            def tell() -> None:
+                if error:
+                    self.card.tell(error)
+                elif source.version != self._version:
+                    self._version = source.version
+                    self.card.redraw()
+                    attrs = source.attrs
+                    self.card.tell(f"store: {attrs.get('points_done')} of {attrs.get('points_total')} points")
+
+            self.post(tell)
+
+        self.shared.jobs.export(lambda _: source.refresh(), done, Token())
+
+    # ------------------------------------------------------------------ runs
+
+    @property
+    def which(self) -> int:
+        """Which of the two runs is asked for."""
+        return 1 if self.compare.value and self.target.value == "B" else 0
+
+    def ask(self, point: Point) -> None:
+        """Compute the run of a point; what was asked for before is not wanted any more."""
+        which = self.which
+        view, words = self.runs[which], point.words()
+        self._fill_fields(point)
+        if self.card.system is None:
+            view.fail(self.shared.why_not)
+            return
+        before = self._tokens[which]
+        if before is not None:
+            before.cancel()
+        self._tokens[which] = token = Token(RUN_SECONDS)
+        self.points[which] = point
+        self._mark()
+        view.begin(words)
+        base, how = self.card.system, self.card.integration
+
+        def work(token: Token) -> tuple[Run, str, bool]:
+            return self._computed(which, point, base, how, token)
+
+        def done(found: tuple[Run, str, bool] | None, error: str) -> None:
+            self.post(lambda: self._done(which, point, token, found, error))
+
+        self.shared.jobs.run(work, done, token)
+        self._write_address()
+
+    def _computed(self, which: int, point: Point, base: Any, how: Any, token: Token) -> tuple[Run, str, bool]:
+        """A run, on a thread of the server; a first look at it is shown before it is recorded whole."""
+        system, integration = point.system(base, how.replace(engine="auto", threads=None))
+        check_run(system, integration)
+        quick = self._quick(system, integration, token)
+        if quick is not None:
+            self.post(lambda: self._look(which, point, token, quick))
+        count = samples_of(system, integration)
+        times = None if count is None else _even_times(system, integration, count)
+        run = sb.simulate(system, integration, sample_times=times, progress=token.check)
+        try:
+            held = self.card.expected(point)
+            same, words = compared(held, run.outcome, str(self.shared.source.attrs.get("engine", "cpu")))
+        except InputError as error:  # the run stands, although its map cannot be read any more
+            same, words = False, str(error)
+        if times is not None:
+            words += f"; recorded at {times.size} instants, the most that a page may ask for"
+        return run, words, same
+
+    def _quick(self, system: Any, integration: Any, token: Token) -> Run | None:
+        if system.striker is None or not system.striker.drive.harmonic or integration.early_decision:
+            return None
+        run = sb.simulate(
+            system, integration, sample_times=_even_times(system, integration, _QUICK), progress=token.check
+        )
+        return run if run.outcome.status is RunStatus.OK else None
+
+    def _look(self, which: int, point: Point, token: Token, run: Run) -> None:
+        if not token.cancelled and self.points[which] is point:
+            self.runs[which].show(run, point.words(), fresh=True)
+
+    def _done(
+        self, which: int, point: Point, token: Token, found: tuple[Run, str, bool] | None, error: str
+    ) -> None:
+        if token.cancelled or self.points[which] is not point:
+            return
+        view = self.runs[which]
+        if found is None:
+            view.fail(f"{point.words()}: {error}")
+            return
+        run, words, same = found
+        shown = view.run
+        fresh = shown is None or shown.system.hash != run.system.hash
+        view.show(run, point.words(), fresh=fresh)
+        view.say("map", words, bad=not same)
+        view.say("conditioning", "")
+        if self._take is not None:
+            self._take.refresh()
+        self._condition(which, point, run, token)
+
+    def _condition(self, which: int, point: Point, run: Run, token: Token) -> None:
+        from snapbeam.explorer.conditioning import conditioned
+
+        def done(words: str | None, error: str) -> None:
+            def tell() -> None:
+                if not token.cancelled and self.points[which] is point:
+                    self.runs[which].say("conditioning", words or error)
+
+            self.post(tell)
+
+        self.shared.jobs.run(lambda t: conditioned(run, t), done, token)
+
+    def _use(self, system: System, integration: Integration) -> None:
+        """Compute with another system from now on, and say what is old."""
+        assert self.shared.system is not None
+        self.changes = changed_parameters(
+            (self.shared.system, self.shared.integration), (system, integration)
+        )
+        self.card.use(system, integration, bool(self.changes))
+        names = ", ".join(f"{name} = {_brief(value)}" for name, value in list(self.changes.items())[:6])
+        old = f"The map is old: it is of the system before. Changed: {names}" if self.changes else ""
+        if not self.shared.source.skeleton.data_vars:
+            old = f"Changed: {names}" if self.changes else ""
+        self.old.object = f'<p class="old" role="status">{html.escape(old)}</p>' if old else ""
+        for view, point in zip(self.runs, self.points, strict=False):
+            if view.run is not None and point is not None:
+                view.say("old", "old: of the system before; run it again to see the changed one", bad=True)
+        self._write_address()
+
+    def _mark(self) -> None:
+        names = ("A", "B") if self.compare.value else ("",)
+        self.card.marks = [
+            (point.values, name) for point, name in zip(self.points, names, strict=False) if point is not None
+        ]
+        self.card._draw_marks()
+
+    def _compared(self) -> None:
+        self.target.visible = self.compare.value
+        if self.compare.value and len(self.runs) == 1:
+            self.runs.append(RunView(self.look, "B", self.post, self.later))
+            self.add_run(self.runs[1])
+        if len(self.runs) > 1:
+            self.runs[1].layout.visible = self.compare.value
+        if self.compare.value:
+            self.target.value = "B"
+        self._mark()
+
+    # ------------------------------------------------------------------ typed and keyed
+
+    def _fill_fields(self, point: Point) -> None:
+        if set(point.values) - set(self.fields):
+            self._make_fields()
+        for name, value in point.values.items():
+            if name in self.fields:
+                self.fields[name].value = repr(value) if isinstance(value, float) else str(value)
+
+    def _ask_typed(self) -> None:
+        from snapbeam.config import lookup
+
+        values: dict[str, Any] = {}
+        try:
+            for name, field in self.fields.items():
+                item = lookup(name).quantity
+                text = str(field.value_input or field.value).strip()
+                value: Any = text if item.kind in (str, bool) else number(lookup(name).short, text)
+                if item.kind is int and isinstance(value, float) and value == int(value):
+                    value = int(value)
+                if item.kind is bool:
+                    value = {"True": True, "False": False}.get(text, text)
+                values[name] = item.check(lookup(name).short, value)
+        except InputError as error:
+            self.runs[self.which].fail(str(error))
+            return
+        self.ask(Point(values))
+
+    def _key(self, key: str) -> None:
+        point = self.points[self.which]
+        steps = {"ArrowLeft": (-1, 0), "ArrowRight": (1, 0), "ArrowUp": (0, 1), "ArrowDown": (0, -1)}
+        if key not in steps:
+            return
+        if point is None:
+            left, right, low, high = self.card.view.view
+            self.ask(self.card.point(0.5 * (left + right), 0.5 * (low + high)))
+            return
+        neighbour = self.card.step(point.values, *steps[key])
+        if neighbour is not None and neighbour.values != point.values:
+            self.ask(neighbour)
+
+    # ------------------------------------------------------------------ address
+
+    def _write_address(self) -> None:
+        if not hasattr(self, "changes"):  # it is still being made
+            return
+        card, point = self.card, self.points[self.which]
+        view = None if card.view.is_whole else card.view.view
+        address = Address(
+            card.x.value, card.y.value, card.show.value, {} if point is None else point.values, view,
+            self.changes, self.address.theme,
+        )  # fmt: skip
+        self.bar.data = {"search": [address.write()]}
+
+
+def _even_times(system: Any, integration: Any, count: int) -> np.ndarray:
+    """Instants evenly over a run with a sinusoidal drive."""
+    frequency = system.striker.drive.frequency_ratio * system.model.reference_freq
+    return np.linspace(0.0, integration.cycles_or_default / frequency, count)
+
+
+def _brief(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

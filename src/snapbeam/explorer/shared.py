@@ -1,0 +1,71 @@
+"""What the pages of one server share: the map, the threads, the windows that were computed."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from pathlib import Path
+from typing import Any
+
+from snapbeam import InputError, Integration, System
+from snapbeam.explorer.jobs import Jobs
+from snapbeam.explorer.maps.points import integration_of, system_of
+from snapbeam.explorer.maps.source import Source
+from snapbeam.explorer.maps.windows import Window
+
+__all__ = ["Shared"]
+
+_WINDOWS = 48
+"""Windows that are kept; of more the one that was looked at longest ago is dropped."""
+
+
+class Shared:
+    """One map and its server.
+
+    Parameters
+    ----------
+    source : Source
+        What is explored.
+    command : str
+        What begins it again: its file's or store's name, empty if it has none.
+    """
+
+    def __init__(self, source: Source, file: Path | None = None) -> None:
+        self.source = source
+        self.file = file
+        self.jobs = Jobs()
+        self.pages = 0
+        self._lock = threading.Lock()
+        self._windows: OrderedDict[Any, Window] = OrderedDict()
+        self.system: System | None = None
+        self.integration = Integration()
+        self.why_not = ""
+        try:
+            self.system = system_of(source.attrs, source.name)
+            self.integration = integration_of(source.attrs)
+        except (InputError, ValueError) as error:
+            self.why_not = str(error)
+
+    def window(self, made: Window) -> Window:
+        """The window that was computed for the same question, or *made*, kept from now on."""
+        with self._lock:
+            found = self._windows.setdefault(made.key, made)
+            self._windows.move_to_end(made.key)
+            while len(self._windows) > _WINDOWS:
+                self._windows.popitem(last=False)
+            return found
+
+    def windows(self, plane: Any) -> list[Window]:
+        """The windows over one plane, the widest first; *plane* is the first part of their keys."""
+        with self._lock:
+            found = [window for key, window in self._windows.items() if key[0] == plane]
+        return sorted(found, key=_area, reverse=True)
+
+    def close(self) -> None:
+        """Compute no more."""
+        self.jobs.close()
+
+
+def _area(window: Window) -> float:
+    left, right, low, high = window.bounds
+    return (right - left) * (high - low)

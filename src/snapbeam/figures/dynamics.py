@@ -1,0 +1,343 @@
+"""Pictures of dynamics: lifetimes, bifurcation diagrams with branches, exponents, sections, basins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from cmcrameri import cm
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+
+from snapbeam.core.validate import InputError
+from snapbeam.figures.axes import dress, edges_of, positions
+from snapbeam.figures.style import fix_ticks, house_style, new_figure
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["plot_basins", "plot_diagram", "plot_exponents", "plot_lifetimes", "plot_section", "plot_survival"]
+
+_UP, _DOWN, _LINE = "#16245E", "#B03A27", "#000000"
+_STARTS = "#8A8A8A"
+_UNDECIDED = "#858585"
+_EVENTS = {"fold": "s", "flip": "D", "Neimark-Sacker": "o", "branch point": "^", "grazing": "x"}
+
+
+def _axes(ax: Axes | None, width: str = "single", height: float = 72.0) -> Axes:
+    return new_figure(width, height).add_subplot() if ax is None else ax
+
+
+def plot_lifetimes(
+    dataset: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    limits: tuple[float, float] | None = None,
+    legend: bool = True,
+) -> Axes:
+    """Draw the lifetime of snapping: along one parameter with its interval, or over two in colours.
+
+    Points without a lifetime are white where nothing snapped and hatched where runs snap on with no end seen.  *limits*
+    are those of the colours, in cycles.
+
+    Raises
+    ------
+    InputError
+        If the dataset holds no lifetimes over one or two parameters.
+    """
+    if "lifetime" not in dataset:
+        raise InputError(f"no lifetimes among {list(map(str, dataset.variables))}")
+    dims = [str(name) for name in dataset["lifetime"].dims]
+    if not 1 <= len(dims) <= 2 or "point" in dims:
+        raise InputError(f"lifetime over {dims}: is drawn over one or two parameters")
+    with house_style():
+        ax = _axes(ax)
+        if len(dims) == 1:
+            x, _ = positions(dataset, dims[0])
+            low, high = dataset["lifetime_low"].values, dataset["lifetime_high"].values
+            top = np.where(np.isfinite(high), high, np.nan)
+            ax.fill_between(x, low, top, color=_UP, alpha=0.25, linewidth=0.0, label="interval")
+            ax.plot(x, dataset["lifetime"].values, color=_UP, label="lifetime")
+            ax.set_yscale("log")
+            ax.set_ylabel("Lifetime of snapping (cycles)")
+            ax.legend(loc="best")
+            dress(ax.xaxis, dataset, dims[0])
+        else:
+            _lifetime_cells(dataset, ax, dims, limits, legend)
+        fix_ticks(ax)
+    return ax
+
+
+def _lifetime_cells(
+    dataset: xr.Dataset, ax: Axes, dims: list[str], limits: tuple[float, float] | None, legend: bool
+) -> None:
+    values = dataset["lifetime"].values.T
+    known = values[np.isfinite(values) & (values > 0.0)]
+    edges = [edges_of(dataset, name) for name in dims]
+    if known.size:
+        low, high = (float(np.quantile(known, share)) for share in (0.02, 0.98))
+        norm = LogNorm(*((max(low, 1.0), max(high, low) * 1.001) if limits is None else limits))
+        cells = ax.pcolormesh(*edges, values, cmap=cm.batlow, norm=norm, rasterized=True)
+        figure = ax.get_figure()
+        assert figure is not None
+        figure.colorbar(cells, ax=ax, label="Lifetime of snapping (cycles)", extend="both")
+    endless = np.isnan(values) & (dataset["runs_snapping"].values.T > 0)
+    hatched: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.4", "hatch": "//////", "linewidth": 0.0}
+    for row, column in np.argwhere(endless):
+        low, left = edges[1][row], edges[0][column]
+        size = edges[0][column + 1] - left, edges[1][row + 1] - low
+        ax.add_patch(Rectangle((left, low), *size, **hatched))
+    if endless.any() and legend:
+        ax.legend(
+            handles=[Patch(**hatched, label="snaps on, no end seen")],
+            loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
+        )  # fmt: skip
+    dress(ax.xaxis, dataset, dims[0])
+    dress(ax.yaxis, dataset, dims[1])
+
+
+def plot_survival(
+    dataset: xr.Dataset, ax: Axes | None = None, *, labels: Sequence[str] | None = None
+) -> Axes:
+    """Draw the share of runs that still snap over cycles, and the fitted exponential, for up to five points."""
+    if "last_snap" not in dataset:
+        raise InputError("dataset: holds no lifetimes of starts")
+    runs = dataset.transpose(..., "start")
+    rows = np.atleast_2d(runs["last_snap"].values).reshape(-1, runs.sizes["start"])
+    if len(rows) > 5:
+        raise InputError(f"dataset: has {len(rows)} points; choose at most 5 of them")
+    tau, delay = (np.atleast_1d(runs[name].values).ravel() for name in ("lifetime", "delay"))
+    with house_style():
+        ax = _axes(ax)
+        for i, row in enumerate(rows):
+            color = cm.batlow(0.05 + 0.85 * i / max(len(rows) - 1, 1))
+            times = np.sort(row[np.isfinite(row)])
+            share = 1.0 - np.arange(1, times.size + 1) / row.size
+            alone = f"{row.size} runs" if len(rows) == 1 else f"point {i + 1}"
+            name = labels[i] if labels is not None else alone
+            ax.step(np.append(0.0, times), np.append(1.0, share), where="post", color=color, label=name)
+            if np.isfinite(tau[i]) and np.isfinite(delay[i]):
+                begun = float((row > delay[i]).mean())
+                t = np.linspace(delay[i], times[-1], 200)
+                ax.plot(
+                    t, begun * np.exp(-(t - delay[i]) / tau[i]), color=color, dashes=(4, 2), linewidth=0.7
+                )
+        ax.set(
+            xlabel="Cycles",
+            ylabel="Share of runs still snapping",
+            yscale="log",
+            ylim=(0.6 / rows.shape[1], 1.3),
+        )
+        ax.set_xlim(left=0.0)
+        handles, _ = ax.get_legend_handles_labels()
+        handles.append(Line2D([], [], color="0.3", dashes=(4, 2), linewidth=0.7, label="fitted"))
+        ax.legend(handles=handles, loc="upper right", handlelength=1.0, fontsize=6)
+        fix_ticks(ax)
+    return ax
+
+
+def plot_diagram(
+    dataset: xr.Dataset | None,
+    ax: Axes | None = None,
+    *,
+    branches: Sequence[xr.Dataset] = (),
+    variable: str = "center_displacement",
+) -> Axes:
+    """Draw a bifurcation diagram, swept up and down, with branches of orbits over it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset, optional
+        Of :func:`snapbeam.bifurcation_diagram`.
+    branches : sequence of xarray.Dataset
+        Of :meth:`snapbeam.Branch.to_dataset`: stable solid, unstable dashed, events as marks.
+    variable : str
+        What is drawn; branches have ``center_displacement``.
+    """
+    if dataset is None and not branches:
+        raise InputError("dataset: give a diagram or at least one branch")
+    first = dataset if dataset is not None else branches[0]
+    along = str(first.attrs.get("along", ""))
+    with house_style():
+        ax = _axes(ax, "double", 84.0)
+        handles: list[Line2D] = []
+        if dataset is not None:
+            if variable not in dataset:
+                raise InputError(f"no {variable} among {list(map(str, dataset.variables))}")
+            handles += _points(dataset, ax, along, variable)
+            dress(ax.xaxis, dataset, along)
+        for branch in branches:
+            handles += _branch(branch, ax, along)
+        if dataset is None:
+            dress(ax.xaxis, branches[0].swap_dims(orbit=along).drop_duplicates(along), along)
+        words = {"center_displacement": "Centre displacement once a period, over $b$"}
+        ax.set_ylabel(words.get(variable, variable.replace("_", " ")))
+        unique = {handle.get_label(): handle for handle in handles}
+        ax.legend(handles=list(unique.values()), loc="best", ncols=2)
+        fix_ticks(ax)
+    return ax
+
+
+def _points(dataset: xr.Dataset, ax: Axes, along: str, variable: str) -> list[Line2D]:
+    handles = []
+    colors = {"up": _UP, "down": _DOWN}
+    sweeps = [str(name) for name in dataset["sweep"].values]
+    for name in sorted(sweeps, key=lambda each: each in colors):
+        part = dataset[variable].isel(sweep=sweeps.index(name)).transpose(along, "period")
+        x = np.repeat(dataset[along].values, part.sizes["period"])
+        size = 1.1 if name == "down" else 2.0
+        color = colors.get(name, _STARTS)
+        ax.plot(x, part.values.ravel(), ",", color=color, alpha=0.9, rasterized=True)
+        ax.plot(
+            x, part.values.ravel(), ".", color=color, markersize=size, markeredgewidth=0.0, rasterized=True
+        )
+        text = {"up": "swept up", "down": "swept down"}.get(name, "from many starts")
+        handles.append(Line2D([], [], marker=".", linestyle="", color=color, label=text))
+    return handles
+
+
+def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
+    x, y = branch[along].values, branch["center_displacement"].values
+    stable = branch["stable"].values
+    ax.plot(x, np.where(stable, y, np.nan), color=_LINE, linewidth=1.1)
+    # up to the stable orbits beside them, so that no gap is left
+    beside = ~stable | np.append(~stable[1:], False) | np.append(False, ~stable[:-1])
+    ax.plot(x, np.where(beside, y, np.nan), color=_LINE, linewidth=0.9, dashes=(3, 2))
+    handles = [
+        Line2D([], [], color=_LINE, linewidth=1.1, label="stable orbit"),
+        Line2D([], [], color=_LINE, linewidth=0.9, dashes=(3, 2), label="unstable orbit"),
+    ]
+    for kind, value, after in zip(
+        branch["event_kind"].values, branch["event_value"].values, branch["event_after"].values, strict=True
+    ):
+        at = int(after)
+        near = y[at] if at + 1 >= y.size else 0.5 * (y[at] + y[at + 1])
+        mark = _EVENTS[str(kind)]
+        ax.plot(value, near, mark, color=_LINE, markersize=3.5, markerfacecolor="white")
+        handles.append(
+            Line2D(
+                [],
+                [],
+                marker=mark,
+                linestyle="",
+                color=_LINE,
+                markersize=3.5,
+                markerfacecolor="white",
+                label=str(kind),
+            )
+        )
+    return handles
+
+
+def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw Lyapunov exponents: how they converge over periods, or the largest over one or two parameters."""
+    if "exponent" not in dataset:
+        raise InputError(f"no exponents among {list(map(str, dataset.variables))}")
+    dims = [str(name) for name in dataset["exponent"].dims if name != "exponent_number"]
+    with house_style():
+        ax = _axes(ax)
+        if "running" in dataset:
+            period = np.arange(1, dataset.sizes["period"] + 1)
+            ax.axhline(0.0, color="0.6", linewidth=0.5)
+            shown = min(dataset.sizes["exponent_number"], 10)
+            for number in range(shown):
+                color = cm.batlow(0.85 * number / max(shown - 1, 1))
+                label = rf"$\lambda_{{{number + 1}}}$"
+                ax.plot(period, dataset["running"].values[:, 0, number], color=color, label=label)
+            ax.legend(loc="best", ncols=2)
+            ax.set(xlabel="Periods of the drive", ylabel=r"Lyapunov exponent so far (s$^{-1}$)", xscale="log")
+        elif len(dims) == 1:
+            x, _ = positions(dataset, dims[0])
+            value = dataset["exponent"].isel(exponent_number=0).values
+            error = dataset["exponent_error"].isel(exponent_number=0).values
+            ax.axhline(0.0, color="0.6", linewidth=0.5)
+            ax.fill_between(x, value - 2 * error, value + 2 * error, color=_UP, alpha=0.25, linewidth=0.0)
+            ax.plot(x, value, color=_UP)
+            ax.set_ylabel(r"Largest Lyapunov exponent (s$^{-1}$)")
+            dress(ax.xaxis, dataset, dims[0])
+        elif len(dims) == 2:
+            value = dataset["exponent"].isel(exponent_number=0).values.T
+            most = float(np.nanmax(np.abs(value))) or 1.0
+            edges = [edges_of(dataset, name) for name in dims]
+            cells = ax.pcolormesh(*edges, value, cmap=cm.vik, vmin=-most, vmax=most, rasterized=True)
+            figure = ax.get_figure()
+            assert figure is not None
+            figure.colorbar(cells, ax=ax, label=r"Largest Lyapunov exponent (s$^{-1}$)")
+            dress(ax.xaxis, dataset, dims[0])
+            dress(ax.yaxis, dataset, dims[1])
+        else:
+            raise InputError(f"exponent over {dims}: is drawn over one or two parameters")
+        fix_ticks(ax)
+    return ax
+
+
+def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "center_displacement") -> Axes:
+    """Draw a Poincare section: a displacement against its velocity."""
+    y = x.replace("displacement", "velocity")
+    if x not in dataset or y not in dataset:
+        raise InputError(f"no {x} and {y} among {list(map(str, dataset.variables))}")
+    with house_style():
+        ax = _axes(ax)
+        ax.plot(
+            dataset[x].values,
+            dataset[y].values,
+            ".",
+            color=_UP,
+            markersize=2.0,
+            markeredgewidth=0.0,
+            rasterized=True,
+        )
+        where = "Centre" if x.startswith("center") else "Contact point's"
+        ax.set(xlabel=f"{where} displacement, over $b$", ylabel=rf"{where} velocity, over $b\,\omega_1$")
+        fix_ticks(ax)
+    return ax
+
+
+def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw basins of attraction: a colour an attractor, grey where it is undecided, attractors as rings."""
+    if "basin" not in dataset:
+        raise InputError(f"no basins among {list(map(str, dataset.variables))}")
+    names = [str(name) for name in dataset["basin"].dims]
+    labels = dataset["basin"].values
+    count = int(dataset["basin"].attrs["flag_values"].max()) + 1
+    colors = [_UNDECIDED, *(cm.batlow(0.08 + 0.84 * i / max(count - 1, 1)) for i in range(count))]
+    meanings = str(dataset["basin"].attrs["flag_meanings"]).split()
+    with house_style():
+        ax = _axes(ax, height=84.0)
+        edges = [edges_of(dataset, name) for name in names]
+        norm = BoundaryNorm(np.arange(-1.5, count), count + 1)
+        ax.pcolormesh(*edges, labels.T, cmap=ListedColormap(colors), norm=norm, rasterized=True)
+        for points in dataset["attractor_points"].values:
+            ax.plot(
+                *points.T, "o", color="black", markerfacecolor="white", markersize=3.0, markeredgewidth=0.8
+            )
+        for axis, name in ((ax.xaxis, names[0]), (ax.yaxis, names[1])):
+            axis.set_label_text(_coordinate(name))
+        ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+        handles = [
+            Patch(
+                facecolor=colors[i],
+                edgecolor="black",
+                linewidth=0.4,
+                label=(f"{i - 1}: " if i else "") + meanings[i].replace("_", " "),
+            )
+            for i in range(count + 1)
+            if i > 0 or (labels == -1).any()
+        ]
+        figure = ax.get_figure(root=True)
+        assert figure is not None
+        figure.legend(handles=handles, loc="outside lower center", ncols=3)
+        fix_ticks(ax)
+    return ax
+
+
+def _coordinate(name: str) -> str:
+    """Symbol of a coordinate of a state."""
+    if name.startswith("amplitude["):
+        return rf"Amplitude $\alpha_{{{name[10:-1]}}}$ over that of the well"
+    if name.startswith("velocity["):
+        return rf"Velocity $\dot\alpha_{{{name[9:-1]}}}$ over $\omega_1$ times that amplitude"
+    return name

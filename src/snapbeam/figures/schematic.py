@@ -1,0 +1,212 @@
+"""The schematic of a system, drawn from the system itself: beam, wells, striker, suspension, contact and drive."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
+from numpy.typing import NDArray
+
+from snapbeam.core.validate import InputError, instance
+from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
+from snapbeam.model.drive import Flight
+from snapbeam.model.modes import BucklingModes
+from snapbeam.model.striker import Striker
+from snapbeam.model.system import System
+
+__all__ = ["plot_system"]
+
+_Array = NDArray[np.float64]
+_POINTS = 201
+_RADIUS = 0.10
+"""Of the tip, in units of the picture: b upwards, L/7 sideways."""
+_WIDE = 7.0
+"""Length of the beam in those units."""
+_LAWS = {
+    "hertz": "Hertz",
+    "hunt_crossley": "Hunt–Crossley",
+    "kelvin_voigt": "Kelvin–Voigt",
+    "power": "power law",
+    "restitution": "restitution",
+}
+_CYCLES = 8.0
+
+
+def plot_system(system: System, title: str = "") -> Figure:
+    """Draw a system: the beam in the well that it rests in and, dashed, in the other, what strikes it, and its drive.
+
+    Heights are to the scale of the buckling level, and so is the gap; lengths along the beam are to the scale of its
+    length.  Masses, springs and dampers are signs.
+
+    Parameters
+    ----------
+    system : System
+        Of a beam; a structure given by matrices has no shape to draw.
+    title : str
+
+    Raises
+    ------
+    InputError
+        For a structure given by matrices.
+    """
+    instance("system", system, System, "a System")
+    instance("title", title, str, "text")
+    if system.model.beam is None:
+        raise InputError("system: a structure given by matrices has no shape; give a model made from a beam")
+    figure = new_figure("double", 52.0)
+    with house_style():
+        striker = system.striker
+        widths = [2.4, 1.0] if striker is not None else [1.0]
+        axes = figure.subplots(1, len(widths), squeeze=False, width_ratios=widths)[0]
+        _draw_beam(axes[0], system)
+        if striker is not None:
+            _draw_striker(axes[0], system, striker)
+            _draw_drive(axes[1], system, striker)
+        if title:
+            axes[0].set_title(title, loc="left")
+        outward, inward = 2.55, 1.25
+        axes[0].set_xlim(-0.85, _WIDE + 0.85)
+        axes[0].set_ylim(*((-outward, inward) if _sign(striker) > 0.0 else (-inward, outward)))
+        axes[0].set_aspect("equal")
+        axes[0].set_axis_off()
+    return figure
+
+
+def _shape(system: System, amplitude: _Array) -> tuple[_Array, _Array]:
+    """Places in units of the picture and displacements over b."""
+    beam = system.model.beam
+    assert beam is not None
+    x = np.linspace(0.0, beam.length, _POINTS)
+    shapes = BucklingModes(beam.length, system.model.modes).shape(x)
+    return _WIDE * x / beam.length, amplitude @ shapes / system.scale.length
+
+
+def _sign(striker: Striker | None) -> float:
+    return -1.0 if striker is not None and striker.side == "above" else 1.0
+
+
+def _draw_beam(ax: Axes, system: System) -> None:
+    sign = _sign(system.striker)
+    rest = sign * system.model.equilibrium
+    ax.plot([0.0, _WIDE], [0.0, 0.0], color="0.75", linewidth=0.5, linestyle=(0, (6, 4)))
+    ax.plot(*_shape(system, -rest), color=BEAM_COLOR, linewidth=0.8, linestyle="--")
+    ax.plot(*_shape(system, rest), color=BEAM_COLOR, linewidth=1.8, solid_capstyle="butt")
+    clamp: Any = {"facecolor": "0.85", "edgecolor": BEAM_COLOR, "linewidth": 0.6, "hatch": "////"}
+    for x in (-0.3, _WIDE):
+        ax.add_patch(Rectangle((x, -0.35), 0.3, 0.7, **clamp))
+    arrow: Any = {"arrowstyle": "-|>", "lw": 0.8, "color": BEAM_COLOR}
+    for x, toward in ((-0.85, 0.5), (_WIDE + 0.85, -0.5)):
+        ax.annotate("", (x + toward, 0.0), (x, 0.0), arrowprops=arrow)
+    ax.text(-0.62, 0.14, "$P$", ha="center", va="bottom")
+
+
+def _draw_striker(ax: Axes, system: System, striker: Striker) -> None:
+    """The tip under (or above) the beam, the rod, and what holds it."""
+    sign = _sign(striker)
+    x, w = _shape(system, sign * system.model.equilibrium)
+    at = striker.location * _WIDE
+    beam_there = float(np.interp(at, x, w))
+    gap = 0.0 if striker.gap is None else striker.gap / system.scale.length
+    center = beam_there - sign * (float(np.clip(gap, -0.6, 0.6)) + _RADIUS)
+    ax.add_patch(Circle((at, center), _RADIUS, facecolor=SHAKER_COLOR, edgecolor="none", zorder=4))
+    _caption(ax, at, sign, system, striker, gap)
+    below = center - sign * _RADIUS
+    if striker.mass is None:
+        _rod(ax, at, below, below - sign * 0.45)
+        _block(ax, at, below - sign * 0.45, sign, "drive")
+        return
+    if striker.spring == 0.0:
+        if isinstance(striker.drive, Flight):
+            arrow: Any = {"arrowstyle": "-|>", "lw": 1.0, "color": SHAKER_COLOR}
+            ax.annotate("", (at, below - sign * 0.08), (at, below - sign * 0.75), arrowprops=arrow)
+            ax.text(at - 0.15, below - sign * 0.45, "$v$", ha="right", va="center", color=SHAKER_COLOR)
+        return
+    _rod(ax, at, below, below - sign * 0.12)
+    edge = below - sign * 0.12
+    corner = (at - 0.28, min(edge, edge - sign * 0.26))
+    ax.add_patch(Rectangle(corner, 0.56, 0.26, facecolor="0.9", edgecolor=BEAM_COLOR, lw=0.7))
+    under = edge - sign * 0.26
+    foot = under - sign * 0.5
+    if striker.damper > 0.0:
+        _spring(ax, at - 0.15, under, foot)
+        _damper(ax, at + 0.15, under, foot)
+    else:
+        _spring(ax, at, under, foot)
+    _block(ax, at, foot, sign, "")
+
+
+def _caption(ax: Axes, at: float, sign: float, system: System, striker: Striker, gap: float) -> None:
+    """What the signs do not say, beside the striker and clear of the beam."""
+    law = "" if system.contact is None else system.contact.name
+    lines = [f"contact: {_LAWS.get(law, law)}"]
+    if gap != 0.0:
+        lines.append(f"gap {gap:.3g} $b$" if gap > 0.0 else f"preload {-gap:.3g} $b$")
+    if striker.mass is not None:
+        lines.append(r"$m_\mathrm{s}$ = " + _grams(striker.mass))
+    right = at < 0.6 * _WIDE
+    x = at + 0.75 if right else at - 0.75
+    for i, line in enumerate(lines):
+        y = -sign * (1.35 + 0.42 * i)
+        ax.text(x, y, line, ha="left" if right else "right", va="center", color=SHAKER_COLOR)
+
+
+def _grams(mass: float) -> str:
+    return f"{1e3 * mass:.3g} g" if mass < 1.0 else f"{mass:.3g} kg"
+
+
+def _rod(ax: Axes, x: float, one: float, other: float) -> None:
+    ax.plot([x, x], [one, other], color=SHAKER_COLOR, linewidth=1.4)
+
+
+def _block(ax: Axes, x: float, edge: float, sign: float, words: str) -> None:
+    """What moves as the drive says."""
+    corner = (x - 0.34, min(edge, edge - sign * 0.22))
+    ax.add_patch(Rectangle(corner, 0.68, 0.22, facecolor=SHAKER_COLOR, alpha=0.25, lw=0))
+    ax.annotate(
+        "", (x + 0.5, edge - sign * 0.30), (x + 0.5, edge + sign * 0.18),
+        arrowprops={"arrowstyle": "<|-|>", "lw": 0.8, "color": SHAKER_COLOR, "mutation_scale": 6},
+    )  # fmt: skip
+    if words:
+        ax.text(x, edge - sign * 0.11, words, ha="center", va="center", fontsize=6)
+
+
+def _spring(ax: Axes, x: float, one: float, other: float) -> None:
+    share = np.array([0.0, 0.15, 0.22, 0.36, 0.5, 0.64, 0.78, 0.85, 1.0])
+    swing = np.array([0.0, 0.0, 1.0, -1.0, 1.0, -1.0, 1.0, 0.0, 0.0])
+    ax.plot(x + 0.07 * swing, one + share * (other - one), color=BEAM_COLOR, linewidth=0.8)
+
+
+def _damper(ax: Axes, x: float, one: float, other: float) -> None:
+    middle = 0.5 * (one + other)
+    ax.plot([x, x], [one, middle], color=BEAM_COLOR, linewidth=0.8)
+    ax.plot([x - 0.06, x + 0.06], [middle, middle], color=BEAM_COLOR, linewidth=0.8)
+    low = other + 0.25 * (one - other)
+    top = middle + 0.2 * (one - other)
+    ax.plot([x - 0.09, x - 0.09, x + 0.09, x + 0.09], [top, low, low, top], color=BEAM_COLOR, linewidth=0.8)
+    ax.plot([x, x], [low, other], color=BEAM_COLOR, linewidth=0.8)
+
+
+def _draw_drive(ax: Axes, system: System, striker: Striker) -> None:
+    """Displacement of the tip from its mid-position over the first cycles, as long as nothing touches it."""
+    drive, scale = striker.drive, system.scale
+    columns = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
+    period = float(drive.cycle(columns, scale)[0])
+    cycles = np.linspace(0.0, 2.0 if isinstance(drive, Flight) else _CYCLES, 1601)
+    phase = float(columns.get("phase", np.zeros(1))[0])
+    ax.plot(cycles, _motion(drive, columns, scale, cycles * period, phase) / scale.length, color=SHAKER_COLOR)
+    ax.set_xlabel("Cycles of the drive")
+    ax.set_ylabel("Tip / $b$")
+    ax.set_xlim(0.0, cycles[-1])
+    ax.set_title(drive.name.replace("_", " "), loc="left")
+
+
+def _motion(drive: Any, columns: dict[str, _Array], scale: Any, times: _Array, phase: float) -> _Array:
+    found = drive.numbers(columns, scale)
+    if drive.harmonic:
+        return np.asarray(found["amplitude"][0] * np.sin(found["omega"][0] * times + phase))
+    numbers = drive.numbers_type()(*(float(found[name][0]) for name in drive.number_names))
+    samples = drive.samples()
+    return np.array([drive.motion(numbers, samples, numbers.omega * t)[0] for t in times])

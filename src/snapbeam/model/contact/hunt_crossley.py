@@ -1,0 +1,99 @@
+"""Hertz's law with a loss that grows with the penetration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from snapbeam.core.validate import positive
+from snapbeam.model.contact.base import ContactLaw, Keeps
+from snapbeam.model.contact.hertz import HertzContact
+from snapbeam.model.contact.loss import loss_number, preset_loss, restitution_of_loss
+from snapbeam.model.quantity import RUN, quantity
+
+__all__ = ["HuntCrossley"]
+
+
+@dataclass(frozen=True)
+class HuntCrossley(ContactLaw):
+    """A sphere on a flat that loses energy, f = k_c d^(3/2) (1 + chi d') for a penetration d > 0, never pulling.
+
+    A free mass that arrives with v leaves with e v, where D = chi v and
+
+        (1 + e) D = ln[(1 + D)/(1 - e D)]
+
+    exactly: the faster it arrives, the more it loses.  Hunt and Crossley, J. Appl. Mech. 42 (1975) 440-445.
+
+    Parameters
+    ----------
+    stiffness : float
+        Contact stiffness k_c, N/m^1.5.
+    loss : float
+        chi, s/m; 0 is Hertz's law.
+    """
+
+    stiffness: float = quantity(
+        "N/m^1.5", "contact stiffness", low=0.0, scope=RUN, symbol="k_c", short="contact_stiffness",
+        plausible=(1.0, 1e15, "N/mm^1.5"),
+    )  # fmt: skip
+    loss: float = quantity(
+        "s/m", "loss of the contact per speed of penetration", low=0.0, closed="left", scope=RUN, symbol=r"\chi",
+        short="contact_loss_factor",
+    )  # fmt: skip
+
+    name = "hunt_crossley"
+    lossy = True
+    keeps = Keeps(tangent=False)
+
+    @staticmethod
+    def force(law: Any, penetration: float) -> float:
+        """The part that is stored, k_c d^(3/2)."""
+        return law.stiffness * penetration * math.sqrt(penetration)
+
+    @staticmethod
+    def damping(law: Any, penetration: float) -> float:
+        """The part that is lost, per speed: chi k_c d^(3/2)."""
+        return law.loss * law.stiffness * penetration * math.sqrt(penetration)
+
+    @staticmethod
+    def energy(law: Any, penetration: float) -> float:
+        """(2/5) k_c d^(5/2)."""
+        return 0.4 * law.stiffness * penetration * penetration * math.sqrt(penetration)
+
+    @staticmethod
+    def slope(law: Any, penetration: float) -> float:
+        """(3/2) k_c d^(1/2)."""
+        return 1.5 * law.stiffness * math.sqrt(penetration)
+
+    @classmethod
+    def from_restitution(
+        cls, stiffness: float, restitution: float, speed: float, preset: str = "exact"
+    ) -> HuntCrossley:
+        """The law under which a free mass that arrives with *speed* (m/s) leaves with *restitution* times it.
+
+        Parameters
+        ----------
+        stiffness : float
+            k_c, N/m^1.5.
+        restitution : float
+            e, in (0, 1].
+        speed : float
+            m/s.
+        preset : {"exact", "hunt-crossley", "lankarani-nikravesh", "gonthier", "flores"}
+            A published shortcut in place of the exact relation; :meth:`restitution` of what it returns says what it
+            really gives (for e = 0.5: 0.663, 0.725, 0.488 and 0.470).
+        """
+        return cls(stiffness, preset_loss(restitution, speed, preset))
+
+    def restitution(self, speed: float) -> float:
+        """Share of its speed that a free mass keeps when it arrives with *speed* (m/s)."""
+        return restitution_of_loss(self.loss * positive("speed", speed, "m/s"))
+
+    def speed_for(self, restitution: float) -> float:
+        """The speed, m/s, at which a free mass keeps the share *restitution* of it; infinite without loss."""
+        return math.inf if self.loss == 0.0 else loss_number(restitution) / self.loss
+
+    def impact_duration(self, mass: float, velocity: float) -> float:
+        """As of Hertz's law, s: a loss shortens the approach and lengthens the departure."""
+        return HertzContact(self.stiffness).impact_duration(mass, velocity)

@@ -1,0 +1,115 @@
+"""A linear spring and damper between tip and beam."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from snapbeam.core.validate import positive, within
+from snapbeam.model.contact.base import ContactLaw, Keeps
+from snapbeam.model.quantity import RUN, quantity
+
+__all__ = ["KelvinVoigt"]
+
+
+@dataclass(frozen=True)
+class KelvinVoigt(ContactLaw):
+    """A spring and a damper side by side, f = k d + c d' for a penetration d > 0, never pulling.
+
+    With zeta = c/(2 sqrt(k m)), a free mass m leaves with the share e of its speed, at any speed, where
+
+        e = exp(-2 zeta arccos(zeta)/sqrt(1 - zeta^2)),
+
+    and the continuation of the same to zeta >= 1; it leaves when the force has gone, before the spring is slack.
+    What the spring still holds then is lost.  The force begins with a jump, c v.
+
+    Parameters
+    ----------
+    spring : float
+        k, N/m.
+    damper : float
+        c, N s/m; 0 is a spring alone.
+    """
+
+    spring: float = quantity(
+        "N/m",
+        "stiffness of the spring in the contact",
+        low=0.0,
+        scope=RUN,
+        symbol="k",
+        short="contact_spring",
+    )
+    damper: float = quantity(
+        "N s/m",
+        "damper in the contact",
+        low=0.0,
+        closed="left",
+        scope=RUN,
+        symbol="c",
+        short="contact_damper",
+    )
+
+    name = "kelvin_voigt"
+    lossy = True
+    keeps = Keeps(smooth=False, tangent=False)
+
+    @staticmethod
+    def force(law: Any, penetration: float) -> float:
+        """The spring's part, k d."""
+        return law.spring * penetration
+
+    @staticmethod
+    def damping(law: Any, penetration: float) -> float:
+        """The damper, c."""
+        return law.damper
+
+    @staticmethod
+    def energy(law: Any, penetration: float) -> float:
+        """k d^2 / 2."""
+        return 0.5 * law.spring * penetration * penetration
+
+    @staticmethod
+    def slope(law: Any, penetration: float) -> float:
+        """k."""
+        return law.spring
+
+    @classmethod
+    def from_restitution(cls, spring: float, restitution: float, mass: float) -> KelvinVoigt:
+        """The law under which a free *mass* (kg) keeps the share *restitution* (in (0, 1]) of its speed.
+
+        Of a beam the mass that counts is the one met at the contact, ``model.contact_mass(location)``.
+        """
+        from scipy.optimize import brentq
+
+        e = within("restitution", restitution, 0.0, 1.0, closed="right")
+        spring, mass = positive("spring", spring, "N/m"), positive("mass", mass, "kg")
+        if e == 1.0:
+            return cls(spring, 0.0)
+        # it falls with zeta, without an end
+        high = 2.0
+        while _restitution(high) > e:
+            high *= 2.0
+        zeta = brentq(lambda z: _restitution(z) - e, 0.0, high, xtol=1e-300, rtol=1e-15)
+        return cls(spring, 2.0 * float(zeta) * math.sqrt(spring * mass))
+
+    def restitution(self, mass: float) -> float:
+        """Share of its speed that a free *mass* (kg) keeps, at any speed."""
+        mass = positive("mass", mass, "kg")
+        return _restitution(self.damper / (2.0 * math.sqrt(self.spring * mass)))
+
+    def impact_duration(self, mass: float, velocity: float) -> float:
+        """Half a period of the undamped mass on its spring, s, shorter where the damper is what stops it."""
+        half = math.pi * math.sqrt(mass / self.spring)
+        if self.damper == 0.0:
+            return half
+        return min(half, 4.0 * math.pi * mass / self.damper)
+
+
+def _restitution(zeta: float) -> float:
+    """e of a damping ratio: exp(-2 zeta theta / sin theta) with cos theta = zeta."""
+    if abs(zeta - 1.0) < 1e-7:
+        return math.exp(-2.0 * zeta * (1.0 - (zeta - 1.0) / 3.0))
+    if zeta < 1.0:
+        return math.exp(-2.0 * zeta * math.acos(zeta) / math.sqrt(1.0 - zeta * zeta))
+    return math.exp(-2.0 * zeta * math.acosh(zeta) / math.sqrt(zeta * zeta - 1.0))

@@ -1,0 +1,143 @@
+"""A sine that comes smoothly and goes smoothly."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.core.validate import InputError
+from snapbeam.model.drive.base import Scale
+from snapbeam.model.drive.timed import Timed
+from snapbeam.model.quantity import RUN, check_fields, quantity
+
+__all__ = ["Burst"]
+
+_Array = NDArray[np.float64]
+_STEEPEST = 1.875
+"""Greatest slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Burst(Timed):
+    """A sine under an envelope that rises from nothing, stays, and falls to nothing,
+
+        w_s(t) = w_0 + E(t) (V b omega_1/omega) sin(omega t),
+
+    with E = x^3 (10 - 15 x + 6 x^2) of the share x of the rise or of the fall: displacement, velocity and
+    acceleration have no jump.  Afterwards the tip stays at its mid-position or, with *retreat*, leaves the beam.
+    A burst longer than the run is a start-up.
+
+    Parameters
+    ----------
+    frequency_ratio, velocity_amplitude : float
+        Omega and V, as of a :class:`~snapbeam.Sine`.
+    length : float
+        Cycles from the beginning of the rise to the end of the fall.
+    rise, fall : float
+        Cycles that they take, each greater than 0, together at most *length*.
+    retreat : float
+        How far the tip withdraws in the cycle after the burst, over b: a beam released after so many cycles.
+    """
+
+    frequency_ratio: float = quantity(
+        "1", "excitation frequency over the first natural frequency", low=0.0, scope=RUN, symbol=r"\Omega"
+    )
+    velocity_amplitude: float = quantity(
+        "1", "velocity amplitude over b omega_1", low=0.0, closed="left", scope=RUN, symbol="V"
+    )
+    length: float = quantity("1", "cycles of the burst", low=0.0, scope=RUN, short="burst_length")
+    rise: float = quantity(
+        "1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN, short="drive_rise"
+    )
+    fall: float = quantity(
+        "1", "cycles in which the drive falls", default=1.0, low=0.0, scope=RUN, short="drive_fall"
+    )
+    retreat: float = quantity(
+        "1", "distance that the tip withdraws after the burst, over b", default=0.0, low=0.0, closed="left", scope=RUN,
+        short="drive_retreat",
+    )  # fmt: skip
+
+    name = "burst"
+    number_names = ("omega", "fastest", "rate", "amplitude", "length", "rise", "fall", "retreat")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.rise + self.fall > self.length * (1.0 + 1e-12):
+            raise InputError(
+                f"rise = {self.rise:g}, fall = {self.fall:g} with length = {self.length:g}: together at most the length"
+            )
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """One period of the sine."""
+        return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """Rates in rad/s, lengths in m, times in cycles."""
+        rate = columns["frequency_ratio"] * scale.omega
+        amplitude = columns["velocity_amplitude"] * scale.length * scale.omega / rate
+        shape = {name: columns[name] for name in ("length", "rise", "fall")}
+        retreat = columns["retreat"] * scale.length
+        return {"fastest": rate, "rate": rate, "amplitude": amplitude, "retreat": retreat} | shape
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """The amplitude, and the speed with the steepest envelope."""
+        found = self.shape_numbers(columns, scale)
+        steep = _STEEPEST * found["rate"] / (2.0 * math.pi)
+        shortest = np.minimum(found["rise"], found["fall"])
+        speed = found["amplitude"] * (found["rate"] + steep / shortest) + found["retreat"] * steep
+        return found["amplitude"], speed
+
+    @staticmethod
+    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """E w and its derivative."""
+        per = drive.rate / 6.283185307179586
+        cycles = argument / drive.omega * per
+        e, slope = 1.0, 0.0
+        if cycles < drive.rise:
+            x = cycles / drive.rise
+            e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
+            slope = 30.0 * x * x * (1.0 - x) * (1.0 - x) * per / drive.rise
+        elif cycles >= drive.length:
+            e = 0.0
+        elif cycles > drive.length - drive.fall:
+            x = (drive.length - cycles) / drive.fall
+            e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
+            slope = -30.0 * x * x * (1.0 - x) * (1.0 - x) * per / drive.fall
+        turn = 6.283185307179586 * (cycles - math.floor(cycles))
+        sine, cosine = math.sin(turn), math.cos(turn)
+        a, away, speed = drive.amplitude, 0.0, 0.0
+        if cycles > drive.length:
+            x = min(cycles - drive.length, 1.0)
+            away = drive.retreat * x * x * x * (10.0 + x * (6.0 * x - 15.0))
+            speed = drive.retreat * 30.0 * x * x * (1.0 - x) * (1.0 - x) * per
+        return a * e * sine - away, a * (slope * sine + e * drive.rate * cosine) - speed
+
+    @staticmethod
+    def acceleration(drive: Any, memory: Any, argument: float) -> float:
+        """The second derivative."""
+        per = drive.rate / 6.283185307179586
+        cycles = argument / drive.omega * per
+        e, slope, bend = 1.0, 0.0, 0.0
+        x, over, turned = -1.0, 1.0, 1.0
+        if cycles < drive.rise:
+            x, over = cycles / drive.rise, drive.rise
+        elif cycles >= drive.length:
+            e = 0.0
+        elif cycles > drive.length - drive.fall:
+            x, over, turned = (drive.length - cycles) / drive.fall, drive.fall, -1.0
+        if x >= 0.0:
+            e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
+            slope = turned * 30.0 * x * x * (1.0 - x) * (1.0 - x) * per / over
+            bend = 60.0 * x * (1.0 - x) * (1.0 - 2.0 * x) * per * per / (over * over)
+        turn = 6.283185307179586 * (cycles - math.floor(cycles))
+        sine, cosine, rate = math.sin(turn), math.cos(turn), drive.rate
+        away = 0.0
+        if drive.length < cycles < drive.length + 1.0:
+            y = cycles - drive.length
+            away = drive.retreat * 60.0 * y * (1.0 - y) * (1.0 - 2.0 * y) * per * per
+        return drive.amplitude * ((bend - e * rate * rate) * sine + 2.0 * slope * rate * cosine) - away

@@ -1,0 +1,122 @@
+"""A sine whose frequency wanders from one value to another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.drive.base import Scale
+from snapbeam.model.drive.timed import Timed
+from snapbeam.model.quantity import RUN, STRUCTURE, quantity
+
+__all__ = ["Chirp"]
+
+_Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chirp(Timed):
+    """A sweep of the excitation frequency from one ratio to another at one velocity amplitude,
+
+        w_s(t) = w_0 + (V b omega_1/omega(t)) sin(integral of omega),
+
+    linear in time or in its logarithm; afterwards the frequency stays where it came to (the velocity, not the
+    displacement, has a small jump there).
+
+    Parameters
+    ----------
+    start_ratio, stop_ratio : float
+        Omega at the beginning and at the end, either may be the greater.
+    velocity_amplitude : float
+        V.
+    sweep_length : float
+        Duration over the first period 2 pi/(start_ratio omega_1): the cycles of the run are counted in these.
+    spacing : {"linear", "log"}
+    """
+
+    start_ratio: float = quantity("1", "frequency ratio at the start of the sweep", low=0.0, scope=RUN)
+    stop_ratio: float = quantity("1", "frequency ratio at the end of the sweep", low=0.0, scope=RUN)
+    velocity_amplitude: float = quantity(
+        "1", "velocity amplitude over b omega_1", low=0.0, closed="left", scope=RUN, symbol="V"
+    )
+    sweep_length: float = quantity("1", "duration of the sweep, in its first period", low=0.0, scope=RUN)
+    spacing: str = quantity(
+        "1", "how the frequency wanders", default="linear", kind=str, choices=("linear", "log"), scope=STRUCTURE,
+        short="sweep_spacing",
+    )  # fmt: skip
+
+    name = "chirp"
+    number_names = ("omega", "fastest", "first", "last", "speed", "duration", "logarithmic")
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """The first period."""
+        return np.asarray(2.0 * math.pi / (columns["start_ratio"] * scale.omega))
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """Frequencies in rad/s, the velocity amplitude in m/s, the duration in s."""
+        first, last = columns["start_ratio"] * scale.omega, columns["stop_ratio"] * scale.omega
+        return {
+            "fastest": np.maximum(first, last),
+            "first": first,
+            "last": last,
+            "speed": columns["velocity_amplitude"] * scale.length * scale.omega,
+            "duration": columns["sweep_length"] * self.cycle(columns, scale),
+            "logarithmic": np.full(first.size, float(self.spacing == "log")),
+        }
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """The amplitude of the slowest sine, and the velocity amplitude with what its change adds."""
+        found = self.shape_numbers(columns, scale)
+        slowest = np.minimum(found["first"], found["last"])
+        highest = found["speed"] / slowest
+        linear = np.abs(found["last"] - found["first"]) / found["duration"] / slowest
+        relative = np.abs(np.log(found["last"] / found["first"])) / found["duration"]
+        return highest, found["speed"] + highest * np.maximum(linear, relative)
+
+    @staticmethod
+    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """The sine of the turned angle over the present frequency, and its derivative."""
+        t, length = argument / drive.omega, drive.duration
+        s = min(t, length)
+        if drive.logarithmic > 0.5 and drive.last != drive.first:
+            grows = math.log(drive.last / drive.first) / length
+            now = drive.first * math.exp(grows * s)
+            angle, change = (now - drive.first) / grows, grows * now
+        else:
+            change = (drive.last - drive.first) / length
+            now = drive.first + change * s
+            angle = s * (drive.first + 0.5 * change * s)
+        angle += drive.last * (t - s)
+        if t >= length:
+            now, change = drive.last, 0.0
+        a = drive.speed / now
+        sine, cosine = math.sin(angle), math.cos(angle)
+        return a * sine, drive.speed * cosine - a * change / now * sine
+
+    @staticmethod
+    def acceleration(drive: Any, memory: Any, argument: float) -> float:
+        """The second derivative."""
+        t, length = argument / drive.omega, drive.duration
+        s = min(t, length)
+        bend = 0.0
+        if drive.logarithmic > 0.5 and drive.last != drive.first:
+            grows = math.log(drive.last / drive.first) / length
+            now = drive.first * math.exp(grows * s)
+            angle, change, bend = (now - drive.first) / grows, grows * now, grows * grows * now
+        else:
+            change = (drive.last - drive.first) / length
+            now = drive.first + change * s
+            angle = s * (drive.first + 0.5 * change * s)
+        angle += drive.last * (t - s)
+        if t >= length:
+            now, change, bend = drive.last, 0.0, 0.0
+        a = drive.speed / now
+        falls = -a * change / now
+        curves = a * (2.0 * change * change / (now * now) - bend / now)
+        sine, cosine = math.sin(angle), math.cos(angle)
+        return curves * sine + 2.0 * falls * now * cosine + a * change * cosine - a * now * now * sine

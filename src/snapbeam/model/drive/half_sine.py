@@ -1,0 +1,83 @@
+"""One knock of the tip."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.drive.base import Scale
+from snapbeam.model.drive.timed import Timed
+from snapbeam.model.quantity import RUN, quantity
+
+__all__ = ["HalfSine"]
+
+_Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HalfSine(Timed):
+    """A shock: the tip goes out and back once, half a sine, and stays at its mid-position,
+
+        w_s(t) = w_0 + A sin(pi t/T)  for t < T.
+
+    A cycle is a period of the first mode.
+
+    Parameters
+    ----------
+    displacement_amplitude : float
+        A over the buckling level b.
+    duration : float
+        T over the period of the first mode.
+    """
+
+    displacement_amplitude: float = quantity(
+        "1", "displacement amplitude over b", low=0.0, closed="left", scope=RUN, symbol="A/b"
+    )
+    duration: float = quantity(
+        "1",
+        "duration of the shock over the period of the first mode",
+        low=0.0,
+        scope=RUN,
+        short="shock_duration",
+    )
+
+    name = "half_sine"
+    number_names = ("omega", "fastest", "amplitude", "duration")
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A period of the first mode."""
+        return np.full(columns["duration"].size, 2.0 * math.pi / scale.omega)
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """The amplitude in m, the duration in s."""
+        duration = columns["duration"] * self.cycle(columns, scale)
+        amplitude = columns["displacement_amplitude"] * scale.length
+        return {"fastest": math.pi / duration, "amplitude": amplitude, "duration": duration}
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """Its amplitudes."""
+        found = self.shape_numbers(columns, scale)
+        return found["amplitude"], found["amplitude"] * found["fastest"]
+
+    @staticmethod
+    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """Half a sine, then nothing."""
+        t = argument / drive.omega
+        if t >= drive.duration:
+            return 0.0, 0.0
+        return drive.amplitude * math.sin(drive.fastest * t), drive.amplitude * drive.fastest * math.cos(
+            drive.fastest * t
+        )
+
+    @staticmethod
+    def acceleration(drive: Any, memory: Any, argument: float) -> float:
+        """Of half a sine, then none."""
+        t = argument / drive.omega
+        if t >= drive.duration:
+            return 0.0
+        return -drive.amplitude * drive.fastest * drive.fastest * math.sin(drive.fastest * t)

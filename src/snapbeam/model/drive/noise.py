@@ -1,0 +1,161 @@
+"""Noise within a band of frequencies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.core.validate import InputError
+from snapbeam.model.drive.base import Scale
+from snapbeam.model.drive.timed import Timed
+from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
+
+__all__ = ["Noise"]
+
+_Array = NDArray[np.float64]
+LINES = 32
+"""Sines that the noise is made of, one in each equal part of the band, at a random place in it."""
+_STEEPEST = 1.875
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise(Timed):
+    """A tip whose velocity is band-limited noise, the sum of 32 sines of equal strength and random phases,
+
+        w_s(t) = w_0 + E(t) sum_j (a/omega_j) sin(omega_j t + phase_j),    a = V_rms b omega_1 sqrt(2/32),
+
+    one in each equal part of the band.  Places and phases come from a counter and the seed alone, so that a seed
+    is the same noise on every machine; after some 32 times the reciprocal of the band width it is no longer new.
+    E rises smoothly.
+
+    Parameters
+    ----------
+    low_ratio, high_ratio : float
+        The band, over the first natural frequency.
+    velocity_rms : float
+        Root mean square velocity over b omega_1.
+    seed : int
+        0 to 2^31 - 1.
+    rise : float
+        Cycles of the middle of the band in which the noise rises.
+    """
+
+    low_ratio: float = quantity(
+        "1", "lower end of the band over the first natural frequency", low=0.0, scope=RUN
+    )
+    high_ratio: float = quantity(
+        "1", "upper end of the band over the first natural frequency", low=0.0, scope=RUN
+    )
+    velocity_rms: float = quantity(
+        "1",
+        "root mean square velocity over b omega_1",
+        low=0.0,
+        closed="left",
+        scope=RUN,
+        symbol=r"V_\mathrm{rms}",
+    )
+    seed: int = quantity(
+        "1",
+        "seed of the noise",
+        default=0,
+        kind=int,
+        low=0,
+        high=2**31 - 1,
+        scope=STRUCTURE,
+        short="noise_seed",
+    )
+    rise: float = quantity(
+        "1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN, short="drive_rise"
+    )
+
+    name = "noise"
+    number_names = ("omega", "fastest", "low", "high", "strength", "rise", "seed")
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.low_ratio >= self.high_ratio:
+            raise InputError(
+                f"low_ratio = {self.low_ratio:g}: must be less than high_ratio = {self.high_ratio:g}"
+            )
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A period of the middle of the band."""
+        return np.asarray(4.0 * math.pi / ((columns["low_ratio"] + columns["high_ratio"]) * scale.omega))
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """The band in rad/s, the velocity amplitude of each sine in m/s, the rise in s."""
+        low, high = columns["low_ratio"] * scale.omega, columns["high_ratio"] * scale.omega
+        return {
+            "fastest": high,
+            "low": low,
+            "high": high,
+            "strength": columns["velocity_rms"] * scale.length * scale.omega * math.sqrt(2.0 / LINES),
+            "rise": columns["rise"] * self.cycle(columns, scale),
+            "seed": np.full(low.size, float(self.seed)),
+        }
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """All sines at their heights at once."""
+        found = self.shape_numbers(columns, scale)
+        parts = (np.arange(LINES) / LINES)[:, None]
+        lowest = found["low"] + parts * (found["high"] - found["low"])
+        highest = found["strength"] * np.sum(1.0 / lowest, axis=0)
+        return highest, LINES * found["strength"] + highest * _STEEPEST / found["rise"]
+
+    @staticmethod
+    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """The sum under the envelope, and its derivative."""
+        t = argument / drive.omega
+        moved, speed, width, seed = 0.0, 0.0, (drive.high - drive.low) / LINES, int(drive.seed)
+        for j in range(2 * LINES):
+            # a 32-bit integer mixed with its neighbours: every bit of seed and counter touches every bit of it
+            x = (seed * 2654435769 + j * 2246822519 + 374761393) & 0xFFFFFFFF
+            x = ((x ^ (x >> 16)) * 2146121005) & 0xFFFFFFFF
+            x = ((x ^ (x >> 15)) * 2221713035) & 0xFFFFFFFF
+            x = x ^ (x >> 16)
+            share = x / 4294967296.0
+            if j % 2 == 0:
+                rate = drive.low + (j // 2 + share) * width
+            else:
+                angle = rate * t + 6.283185307179586 * share
+                moved += math.sin(angle) / rate
+                speed += math.cos(angle)
+        moved, speed = moved * drive.strength, speed * drive.strength
+        if t >= drive.rise:
+            return moved, speed
+        s = t / drive.rise
+        e = s * s * s * (10.0 + s * (6.0 * s - 15.0))
+        return e * moved, e * speed + 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.rise * moved
+
+    @staticmethod
+    def acceleration(drive: Any, memory: Any, argument: float) -> float:
+        """The second derivative."""
+        t = argument / drive.omega
+        moved, speed, bent = 0.0, 0.0, 0.0
+        width, seed = (drive.high - drive.low) / LINES, int(drive.seed)
+        for j in range(2 * LINES):
+            x = (seed * 2654435769 + j * 2246822519 + 374761393) & 0xFFFFFFFF
+            x = ((x ^ (x >> 16)) * 2146121005) & 0xFFFFFFFF
+            x = ((x ^ (x >> 15)) * 2221713035) & 0xFFFFFFFF
+            x = x ^ (x >> 16)
+            share = x / 4294967296.0
+            if j % 2 == 0:
+                rate = drive.low + (j // 2 + share) * width
+            else:
+                angle = rate * t + 6.283185307179586 * share
+                moved += math.sin(angle) / rate
+                speed += math.cos(angle)
+                bent -= math.sin(angle) * rate
+        moved, speed, bent = moved * drive.strength, speed * drive.strength, bent * drive.strength
+        if t >= drive.rise:
+            return bent
+        s = t / drive.rise
+        e = s * s * s * (10.0 + s * (6.0 * s - 15.0))
+        first = 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.rise
+        second = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (drive.rise * drive.rise)
+        return e * bent + 2.0 * first * speed + second * moved

@@ -1,0 +1,149 @@
+"""A store read as it stands, also while another process writes it: nothing is locked and nothing is written."""
+
+from __future__ import annotations
+
+import itertools
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.engines.outcomes import STATISTICS
+from snapbeam.model.integration import Integration
+from snapbeam.model.system import System
+from snapbeam.sweeps.compute.task import PointWork, ResultTable
+from snapbeam.sweeps.compute.tasks import Stage
+from snapbeam.sweeps.export import to_dataset
+from snapbeam.sweeps.keep.ledger import Ledger, Record
+from snapbeam.sweeps.keep.store import _read_description
+from snapbeam.sweeps.points import Grid
+from snapbeam.sweeps.replicas import Replicas
+from snapbeam.sweeps.setup import SweepSetup
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["read_store"]
+
+_STAGE = "base"
+_TABLES = ("integers", "numbers")
+
+
+def read_store(store: str | os.PathLike[str]) -> xr.Dataset:
+    """The map of a store as far as it is computed; it may be growing meanwhile.
+
+    Points that are not done, or whose task is just being written, are unknown, with the status NOT_RUN.  Of a sweep
+    that refines itself, the points of its first grid are read.
+
+    Parameters
+    ----------
+    store : path
+        The folder of a sweep over a grid.
+
+    Returns
+    -------
+    xarray.Dataset
+        As :func:`snapbeam.sweep` returns it, with the attributes ``points_done`` and ``points_total``.
+
+    Raises
+    ------
+    InputError
+        If the folder is no store, or holds what cannot be told from its description: a list of points, a recorded
+        drive, other statistics.
+    StoreError
+        If its description is damaged.
+    """
+    if not isinstance(store, (str, os.PathLike)):
+        raise InputTypeError(f"store = {store!r}: must be a folder")
+    folder = Path(store)
+    file = folder / "map.json"
+    if file.is_symlink() or not file.is_file():
+        raise InputError(f"store = {str(store)!r}: holds no map")
+    held = _read_description(file)
+    ledger = Ledger(folder / "ledger.jsonl")
+    done = {
+        task: record
+        for (stage, task), record in ledger.records.items()
+        if stage == _STAGE and record.state == "done"
+    }
+    work = _work(held["parameters"], str(store), int(held["chunk"]), done)
+    stage = Stage(_STAGE, work.setup.points, int(held["chunk"]))
+    table, points = _rows(folder, work, stage, done)
+    attrs = work.setup.attributes(more={"points_done": points, "points_total": stage.size})
+    return to_dataset(work, work.setup.points, _Table(table), attrs)
+
+
+class _Table:
+    """Rows in memory."""
+
+    def __init__(self, table: ResultTable) -> None:
+        self._table = table
+
+    def read(self, start: int, stop: int) -> ResultTable:
+        return ResultTable(self._table.integers[start:stop], self._table.numbers[start:stop])
+
+
+def _work(held: dict[str, Any], name: str, chunk: int, done: dict[int, Record]) -> PointWork:
+    """What is computed, from its description.
+
+    The description does not say in which order the axes were given, in which points are counted; the hash of a
+    finished task does.
+    """
+    if held.get("statistics") != list(STATISTICS):
+        raise InputError(f"store = {name!r}: was written with other statistics than this version has")
+    axes = {axis: values for axis, values in held["points"].items() if isinstance(values, list)}
+    if len(axes) < len(held["points"]) or not axes:
+        raise InputError(
+            f"store = {name!r}: holds a list of points, which is read once the sweep has returned it"
+        )
+    sections = held["system"]
+    if any(isinstance(value, dict) for values in sections.values() for value in values.values()):
+        raise InputError(f"store = {name!r}: was driven by a record, which is too long to be kept in it")
+    system = System.from_mapping({
+        section: {key: np.array(value) if isinstance(value, list) else value for key, value in values.items()}
+        for section, values in sections.items()
+    })  # fmt: skip
+    integration = Integration(**held["integration"])
+    repeats = Replicas(**held["replicas"]) if "replicas" in held else None
+    number, record = next(iter(done.items()), (0, None))
+    for order in itertools.permutations(axes):
+        points = Grid({axis: np.array(axes[axis]) for axis in order})
+        work = PointWork(SweepSetup(system, integration, points), repeats)
+        if (
+            record is None
+            or work.task_hash(Stage(_STAGE, points, chunk).columns(number)) == record.parameters
+        ):
+            return work
+    raise InputError(f"store = {name!r}: its tasks are not those of its description, or of another version")
+
+
+def _rows(folder: Path, work: PointWork, stage: Stage, done: dict[int, Record]) -> tuple[ResultTable, int]:
+    """The rows of every point, unknown where they are not done, and how many are done."""
+    found = work.unfinished(stage.size)
+    points = 0
+    if not done:
+        return found, points
+    try:
+        import zarr
+    except ImportError as error:
+        raise InputError("zarr is needed to read a store: install snapbeam[cluster]") from error
+    try:
+        arrays = [
+            zarr.open_array(folder / "runs.zarr", path=f"{_STAGE}/{name}", mode="r") for name in _TABLES
+        ]
+    except (OSError, ValueError, KeyError):  # it is just being made
+        return found, points
+    for task, record in done.items():
+        if not 0 <= task < stage.tasks:
+            continue
+        start, stop = stage.bounds(task)
+        try:
+            part = ResultTable(*(np.asarray(array[start:stop]) for array in arrays))
+        except Exception:  # whatever a codec makes of bytes that are just being written
+            continue
+        if part.content_hash() == record.content:
+            found.integers[start:stop], found.numbers[start:stop] = part
+            points += stop - start
+    return found, points

@@ -1,0 +1,53 @@
+"""``snapbeam draw``, and other worlds from the command line."""
+
+from __future__ import annotations
+
+import pytest
+from typer.testing import CliRunner
+
+from snapbeam.cli.app import app
+from snapbeam.config import config_from_mapping, load_config
+from snapbeam.core.validate import InputError
+
+
+def run(*arguments: object):
+    return CliRunner().invoke(app, [str(each) for each in arguments])
+
+
+def test_draws_what_was_asked_for(tmp_path) -> None:
+    picture = tmp_path / "system.png"
+    answer = run(
+        "draw", "-o", picture, "--modes", 3, "--contact-restitution", 0.6, "--restitution-speed", 0.05,
+        "--striker-mass", 0.02, "--striker-spring", 700, "--striker-damper", 0.7,
+    )  # fmt: skip
+    assert answer.exit_code == 0, answer.output
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+    assert "hunt_crossley" in answer.output
+    assert "mass = 0.02" in answer.output
+
+
+def test_refused_by_name(tmp_path) -> None:
+    answer = run("draw", "-o", tmp_path / "a.png", "--striker-spring", 700)
+    assert answer.exit_code != 0
+    assert "give its mass" in " ".join(answer.output.split())
+
+
+def test_worlds_in_a_parameter_file(tmp_path) -> None:
+    file = tmp_path / "world.toml"
+    file.write_text(
+        '[contact]\nlaw = "kelvin_voigt"\nspring = 2e6\ndamper = 20.0\n[drive]\nkind = "burst"\n'
+        "frequency_ratio = 1.2\nvelocity_amplitude = 0.2\nlength = 5.0\n[striker]\nmass = 0.02\n"
+    )
+    system = load_config(file).system
+    assert system.get("contact.damper") == 20.0
+    assert system.get("drive.length") == 5.0
+    assert system.replace(**{"drive.rise": 2.0}).get("drive.rise") == 2.0
+    lossy = config_from_mapping({"contact": {"restitution": 0.5, "speed": 0.05}}).system
+    assert lossy.contact.restitution(0.05) == pytest.approx(0.5, abs=1e-12)
+    assert lossy.contact.stiffness == 4e8
+    for wrong, words in (
+        ({"restitution": 0.5}, "restitution and speed belong together"),
+        ({"restitution": 0.5, "speed": 0.05, "loss": 1.0}, "give no other"),
+    ):
+        with pytest.raises(InputError, match=words):
+            config_from_mapping({"contact": wrong})

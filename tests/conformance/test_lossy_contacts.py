@@ -1,0 +1,167 @@
+"""Contacts that lose energy: a free mass that bounces, beams against an independent solution, the ledger."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from oracle import LEVEL, PaperBeam
+from scipy.integrate import solve_ivp
+from world_oracle import Tip, follow
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.core.validate import InputError
+from snapbeam.engines.registry import resolve
+from snapbeam.engines.scalar.composition import COMPOSITIONS, GENERAL
+from snapbeam.engines.scalar.losses import lossy_kick
+
+MASS, SPEED = 2e-3, 0.05
+
+
+def thrown(law: sb.ContactLaw) -> sb.System:
+    """A free mass that meets a tip at rest."""
+    model = sb.ReducedModel.from_matrices(
+        [[MASS]], [0.0], contact_shape=[1.0], length_scale=LEVEL, reference_freq=80.0
+    )
+    return sb.System(
+        model, law, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0),
+        sb.State(amplitude=[0.0], velocity=[-SPEED]),
+    )  # fmt: skip
+
+
+def ledger(run: sb.Run) -> np.ndarray:
+    data = run.dataset
+    return (data.energy_beam + data.energy_contact + data.energy_dissipated - data.work_shaker).values
+
+
+LAWS = [(name, e) for name in ("hunt_crossley", "kelvin_voigt") for e in (0.9, 0.5, 0.05)]
+
+
+@pytest.mark.parametrize(("name", "e"), LAWS)
+def test_restitution_of_a_free_mass(name, e) -> None:
+    law = (
+        sb.HuntCrossley.from_restitution(4e8, e, SPEED)
+        if name == "hunt_crossley"
+        else sb.KelvinVoigt.from_restitution(1e6, e, MASS)
+    )
+    run = sb.simulate(thrown(law), sb.Integration(cycles=1, accuracy="reference"))
+    share = run.dataset.modal_velocity.values[-1, 0] / SPEED
+    assert share == pytest.approx(e, abs=1e-8)
+    energy = 0.5 * MASS * SPEED**2
+    assert run.outcome.contact_loss == pytest.approx((1.0 - e * e) * energy, abs=1e-8 * energy)
+    assert np.ptp(ledger(run)) < 1e-8 * energy
+    assert run.dataset.energy_lost_contact.values[-1] == run.outcome.contact_loss
+
+
+def test_no_loss_is_hertz() -> None:
+    """chi -> 0: Hertz's law, but for the rounding of its kicks."""
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+    shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
+    runs = [
+        sb.simulate(sb.System(model, law, shaker), sb.Integration(cycles=1, accuracy="reference"))
+        for law in (sb.HertzContact(4e8), sb.HuntCrossley(4e8, 0.0), sb.HuntCrossley(4e8, 1e-9))
+    ]
+    ends = [run.end.amplitude / abs(model.equilibrium[0]) for run in runs]
+    np.testing.assert_allclose(ends[1], ends[0], rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(ends[2], ends[0], rtol=0.0, atol=1e-8)
+
+
+LOSSY = {
+    "hunt-crossley": (
+        sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05),
+        lambda law: lambda d, v: law.stiffness * d**1.5 * (1.0 + law.loss * v),
+        lambda law: lambda d, v: 1.0 + law.loss * v,
+    ),
+    "kelvin-voigt": (
+        sb.KelvinVoigt(2e6, 20.0),
+        lambda law: lambda d, v: law.spring * d + law.damper * v,
+        lambda law: lambda d, v: law.spring * d + law.damper * v,
+    ),
+}
+# error of w in b, measured: level map and reference
+CASES = [
+    ("hunt-crossley", 1, 5, 6e-5, 2e-11),
+    ("hunt-crossley", 3, 2, 1e-5, 3e-11),
+    ("hunt-crossley", 8, 1, 3e-8, 6e-12),
+    # the onset of its force is a jump, which four impacts of one mode that snaps magnify
+    pytest.param("kelvin-voigt", 1, 5, 3e-6, 6e-7, marks=pytest.mark.slow),
+    ("kelvin-voigt", 3, 2, 3e-7, 6e-8),
+    pytest.param("kelvin-voigt", 8, 1, 4e-9, 7e-10, marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize(("name", "modes", "cycles", "at_map", "at_reference"), CASES)
+def test_trajectory(name, modes, cycles, at_map, at_reference) -> None:
+    law, force, edge = LOSSY[name]
+    beam, ratio, velocity = PaperBeam(modes), 1.21, 0.18
+    omega = ratio * float(beam.omega[0])
+    stroke = velocity * LEVEL * float(beam.omega[0]) / omega
+    times = np.linspace(0.0, 2.0 * math.pi * cycles / omega, 1501) * (1.0 - 1e-13)
+    tip = Tip(
+        lambda t, _: (stroke * math.sin(omega * t), stroke * omega * math.cos(omega * t)),
+        force(law),
+        edge(law),
+    )
+    truth = follow(beam, tip, times)
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+    shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
+    for accuracy, measured in (("map", at_map), ("reference", at_reference)):
+        run = sb.simulate(model, shaker, law, cycles, sample_times=times, accuracy=accuracy)
+        bound = max(3.0 * measured, 1e-10)
+        np.testing.assert_allclose(run.dataset.displacement, truth.displacement, rtol=0.0, atol=bound)
+        np.testing.assert_allclose(
+            run.dataset.center_displacement, truth.center_displacement, rtol=0.0, atol=bound
+        )
+        assert np.ptp(ledger(run)) < 1e-4 * run.dataset.attrs["gross_work"]
+        assert run.outcome.contact_loss > 0.1 * run.outcome.gross_work
+        # the force is what the law says, sampled between the kicks
+        np.testing.assert_allclose(
+            run.dataset.contact_force, truth.force, rtol=0.0, atol=2e-2 * truth.force.max() + 1e-3
+        )
+
+
+@pytest.mark.parametrize(("composition", "order"), [(COMPOSITIONS[4], 4), (GENERAL[6], 6)])
+def test_order_with_kicks_that_depend_on_velocity(composition, order) -> None:
+    """An oscillator pressed against a rough wall all the time: the exact kick keeps the order, both at its own cost."""
+    omega, stiffness, loss, deep = 1.0, 0.6, 0.3, 1.0
+
+    def rate(t, y):
+        d = deep - y[0]
+        return [y[1], -(omega**2) * y[0] + stiffness * d**1.5 * (1.0 - loss * y[1])]
+
+    start, end = [0.3, 0.2], 4.0
+    truth = solve_ivp(rate, (0.0, end), start, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+
+    def kicked(q, p, weight):
+        force = stiffness * (deep - q) ** 1.5
+        return p + lossy_kick(force, loss * force, 1.0, 0.0, -p, weight).impulse
+
+    errors = []
+    for count in (8, 16, 32):
+        q, p = start
+        h = end / count
+        for _ in range(count):
+            p = kicked(q, p, composition.kick[0] * h)
+            for flow, kick in zip(composition.flow, composition.kick[1:], strict=True):
+                c, s = math.cos(omega * flow * h), math.sin(omega * flow * h)
+                q, p = c * q + s * p / omega, c * p - s * omega * q
+                p = kicked(q, p, kick * h)
+        errors.append(float(np.hypot(q - truth[0], p - truth[1])))
+    orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
+    assert np.abs(orders - order).max() < 0.5, orders
+
+
+def test_refusals() -> None:
+    law = sb.HuntCrossley(4e8, 1.0)
+    with pytest.raises(
+        InputError, match="'hunt_crossley', which loses energy, is marched by the CPU engine alone"
+    ):
+        resolve("cuda", law=type(law))
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=2)
+    system = sb.System(model, law, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))
+    with pytest.raises(
+        InputError, match="the tangent flow is known for laws whose force depends on the penetration alone"
+    ):
+        sb.advance(system, periods=1, tangent=np.zeros((1, 2, 2)))

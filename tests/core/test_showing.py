@@ -1,0 +1,68 @@
+"""How results show themselves: datasets, notebooks, progress."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.core.reporting import counting, sharing
+
+
+@pytest.mark.parametrize("lines", ["import xarray, snapbeam", "import snapbeam, xarray"])
+def test_datasets_have_the_accessor_whichever_is_loaded_first(lines):
+    script = f"{lines}; print(xarray.Dataset().snapbeam.plot.__name__); import sys; print('matplotlib' in sys.modules)"
+    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+    assert said.split() == ["plot", "False"]
+
+
+@pytest.fixture(scope="module")
+def system():
+    striker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
+    return sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=1), paper.CONTACT, striker)
+
+
+def test_short_words_and_tables(system):
+    run = sb.simulate(system, sb.Integration(cycles=3))
+    for value in (run, run.outcome, system, system.model):
+        assert len(repr(value)) < 400
+    html = run._repr_html_() + system._repr_html_() + run.outcome._repr_html_()
+    assert "<table>" in html and "thickness = 0.0004" in html and "peak contact force" in html
+
+
+def test_progress_in_words(system, capsys):
+    axes = {"velocity_amplitude": [0.1, 0.2, 0.3]}
+    plain = sb.sweep(system, axes, sb.Integration(cycles=3))
+    capsys.readouterr()
+    told = sb.sweep(system, axes, sb.Integration(cycles=3), progress=True)
+    assert "sweep: 3 of 3 points" in capsys.readouterr().err
+    assert told.response.equals(plain.response)
+    sb.simulate(system, sb.Integration(cycles=3), progress=True)
+    assert "run: 100 %" in capsys.readouterr().err
+    assert counting(None, "a") is counting(False, "a") is sharing(None, "a") is None
+    for check in (counting, sharing):
+        with pytest.raises(sb.InputTypeError, match="progress = 3: must be True or callable"):
+            check(3, "a")
+
+
+def test_several_systems_at_once(system):
+    others = [
+        system,
+        system.replace(**{"drive.velocity_amplitude": 0.3}),
+        system.replace(**{"model.modes": 2}),
+    ]
+    seen = []
+    runs = sb.simulate(
+        others, sb.Integration(cycles=5), progress=lambda done, total: seen.append((done, total))
+    )
+    assert seen == [(1, 3), (2, 3), (3, 3)]
+    for one, run in zip(others, runs, strict=True):
+        alone = sb.simulate(one, sb.Integration(cycles=5))
+        assert run.system == one and dict(run.outcome) == pytest.approx(dict(alone.outcome), nan_ok=True)
+        assert run.dataset.center_displacement.equals(alone.dataset.center_displacement)
+    with pytest.raises(sb.InputTypeError, match=r"system\[1\] = 3: must be a System"):
+        sb.simulate([system, 3])
+    assert sb.simulate([]) == []

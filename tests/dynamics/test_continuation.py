@@ -1,0 +1,95 @@
+"""Branches: exact orbits along them up to their grazing end, flips and folds where they are known to be."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from doubles import henon, logistic
+from scipy.optimize import brentq
+from test_orbits import exact_orbit, oscillator, system_of
+
+import snapbeam as sb
+
+
+def test_flips_of_the_logistic_map() -> None:
+    orbit = sb.periodic_orbit(logistic(2.5), [0.6])
+    branch = sb.continue_orbit(orbit, "r", (2.2, 3.7))
+    assert branch.end == "limit of the parameter"
+    flip = next(event for event in branch.events if event.kind == "flip")
+    assert flip.value == pytest.approx(3.0, abs=1e-7)
+    doubled = sb.switch_branch(flip, "r", (2.2, 3.7))
+    assert doubled.period == 2 and doubled.least_period == 2 and doubled.is_stable
+    second = sb.continue_orbit(doubled, "r", (2.2, 3.7))
+    flips = [event.value for event in second.events if event.kind == "flip"]
+    assert flips[0] == pytest.approx(1.0 + math.sqrt(6.0), abs=1e-7)
+    np.testing.assert_allclose(branch.orbits[-1].coordinates, 1.0 - 1.0 / 3.7, atol=1e-9)
+
+
+def test_a_fold_is_passed() -> None:
+    """Henon's fixed points meet at a = -(1 - b)^2/4; the branch turns there and goes on along the other."""
+    orbit = sb.periodic_orbit(henon(0.1), [0.8, 0.2])
+    branch = sb.continue_orbit(orbit, "a", (-0.2, 0.3), direction="down")
+    fold = next(event for event in branch.events if event.kind == "fold")
+    assert fold.value == pytest.approx(-0.1225, abs=1e-8)
+    assert branch.values[-1] > branch.values.min()
+    stable = branch.is_stable
+    assert stable[0] and not stable[-1]
+
+
+def room(ratio: float, restitution: float, periods: int) -> float:
+    """Least gap between the flight of the exact (1, n) orbit and the wall, away from its ends."""
+    speed, _ = exact_orbit(ratio, restitution, periods)
+    w = 0.5 * (1.0 + restitution) / math.tan(math.pi * periods / ratio) * speed
+    up, wall = 0.5 * (1.0 + restitution) * speed, 0.5 * (1.0 - restitution) * speed
+    time = np.linspace(0.0, 2.0 * math.pi * periods / ratio, 40_001)
+    gap = w * np.cos(time) + up * np.sin(time) - np.sin(ratio * time + math.atan2(w, wall / ratio))
+    before, here, after = gap[:-2], gap[1:-1], gap[2:]
+    turns = (here <= before) & (here < after)
+    bend = (before - 2.0 * here + after)[turns]
+    return float((here[turns] - (after - before)[turns] ** 2 / (8.0 * bend)).min())
+
+
+def test_restitution_orbits_are_followed_to_grazing() -> None:
+    """Every orbit is the exact one, and the branch ends where its flight touches the wall a second time."""
+    restitution = 0.8
+    _, state = exact_orbit(3.6, restitution, 2)
+    orbit = sb.periodic_orbit(oscillator(3.6, restitution), state, 2, phase=math.pi)
+    branch = sb.continue_orbit(orbit, "frequency_ratio", (2.1, 3.8), direction="down")
+    assert branch.end == "grazing"
+    for each, ratio in zip(branch.orbits, branch.values, strict=True):
+        # at the same velocity the wall's amplitude goes with 1/omega
+        exact = exact_orbit(float(ratio), restitution, 2)[1] * 3.6 / ratio
+        np.testing.assert_allclose(each.coordinates, exact, rtol=0.0, atol=1e-8)
+    grazing = branch.events[-1]
+    assert grazing.kind == "grazing" and grazing.orbit.passage.clearance < 1e-4
+    assert grazing.value == pytest.approx(brentq(room, 3.0, 3.2, args=(restitution, 2)), abs=1e-5)
+    ds = branch.to_dataset()
+    assert set(ds["event_kind"].values) <= {"fold", "flip", "Neimark-Sacker", "branch point", "grazing"}
+
+
+def test_a_branch_of_the_beam() -> None:
+    """One mode, from intrawell tapping up: stable first, then a flip; product of multipliers all the way."""
+    system = system_of(1, 1.6, 0.03)
+    orbit = sb.periodic_orbit(system, transient=1000)
+    branch = sb.continue_orbit(orbit, "velocity_amplitude", (0.005, 0.2), longest=0.1)
+    model = system.model
+    exact = -2.0 * float((model.damping_ratio * model.omega).sum()) / (model.reference_freq * 1.6)
+    for each in branch.orbits:
+        assert each.log_determinant == pytest.approx(exact, abs=1e-8)
+    flip = next(event for event in branch.events if event.kind == "flip")
+    nearest = flip.orbit.multipliers[np.argmin(np.abs(flip.orbit.multipliers + 1.0))]
+    assert abs(nearest + 1.0) < 1e-6
+    doubled = sb.switch_branch(flip, "velocity_amplitude", (0.005, 0.2))
+    assert doubled.least_period == 2
+
+
+def test_refusals() -> None:
+    orbit = sb.periodic_orbit(logistic(2.5), [0.6])
+    with pytest.raises(sb.InputError, match="must hold the orbit's own"):
+        sb.continue_orbit(orbit, "r", (3.0, 4.0))
+    with pytest.raises(sb.InputError, match="must be increasing"):
+        sb.continue_orbit(orbit, "r", (4.0, 3.0))
+    with pytest.raises(sb.InputError, match="direction"):
+        sb.continue_orbit(orbit, "r", (2.0, 4.0), direction="sideways")

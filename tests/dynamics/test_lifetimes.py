@@ -1,0 +1,129 @@
+"""Lifetimes of snapping: the four points that were measured, nothing that depends on how it is computed, stores."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.dynamics.lifetimes.lifetime_map import refit
+
+MEASURED = {(1.21, 0.25): 32.0, (1.625, 0.3): 46.0, (2.5, 0.55): 89.0, (3.5, 0.6): 99.0}
+"""Lifetimes in cycles, N = 32, from some 210 runs each: to 7 %."""
+
+
+def system_of(modes: int, ratio: float = 1.625, velocity: float = 0.3) -> sb.System:
+    shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
+    return sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes), paper.CONTACT, shaker)
+
+
+AXES = {"frequency_ratio": [1.2, 1.625], "velocity_amplitude": [0.01, 0.2, 0.3]}
+SHORT = sb.Integration(cycles=120)
+TELL = {"survival": sb.Survival(quiet=20.0), "starts": 6}
+
+
+def test_nothing_depends_on_threads_order_or_the_other_points(tmp_path) -> None:
+    system = system_of(2)
+    whole = sb.lifetime_map(system, AXES, SHORT, **TELL)
+    one = sb.lifetime_map(system, AXES, SHORT.replace(threads=1), **TELL)
+    kept = sb.lifetime_map(system, AXES, SHORT, store=sb.Keeping(tmp_path / "kept", chunk=2), **TELL)
+    for other in (one, kept):
+        for name in whole.data_vars:
+            np.testing.assert_array_equal(whole[name].values, other[name].values, err_msg=str(name))
+    points = xr.Dataset(
+        {"frequency_ratio": ("point", [1.625, 1.2]), "velocity_amplitude": ("point", [0.3, 0.2])}
+    )
+    some = sb.lifetime_map(system, points, SHORT, **TELL)
+    np.testing.assert_array_equal(
+        some.last_snap[0], whole.last_snap.sel(frequency_ratio=1.625, velocity_amplitude=0.3)
+    )
+    np.testing.assert_array_equal(
+        some.last_snap[1], whole.last_snap.sel(frequency_ratio=1.2, velocity_amplitude=0.2)
+    )
+
+
+def test_a_store_is_resumed_and_refuses_other_starts(tmp_path) -> None:
+    system, tally = system_of(1), sb.Tally()
+    first = sb.lifetime_map(system, AXES, SHORT, store=sb.Keeping(tmp_path / "s", chunk=2), **TELL)
+    again = sb.lifetime_map(system, AXES, SHORT, store=sb.Keeping(tmp_path / "s", tally=tally), **TELL)
+    assert tally.computed == 0 and tally.kept == 3
+    assert first.drop_attrs().equals(again.drop_attrs())
+    with pytest.raises(sb.InputError, match="starts"):
+        sb.lifetime_map(
+            system, AXES, SHORT, store=tmp_path / "s", **(TELL | {"starts": sb.Starts(count=6, seed=1)})
+        )
+
+
+def test_counts_add_up() -> None:
+    ds = sb.lifetime_map(system_of(2), AXES, SHORT, **TELL)
+    settled = (ds.last_snap.notnull() & (ds.runs_snapping < 6)).any()
+    assert bool(settled)
+    runs = 6 - ds.runs_failed
+    assert ((ds.end_probability.sum("well") * runs).round() == runs - ds.runs_snapping).all()
+    assert (ds.runs_never.sel(velocity_amplitude=0.01) == 6).all(), "a weak drive never snaps it"
+    assert (ds.end_probability.sel(velocity_amplitude=0.01, well="first") == 1.0).all()
+    assert ds.lifetime.sel(velocity_amplitude=0.01).isnull().all()
+    falling = ds.snapping_probability.diff("after")
+    assert (falling <= 0.0).all()
+    assert (ds.lifetime_low <= ds.lifetime_high).all()
+    wider = refit(ds, sb.Survival(quiet=20.0, confidence=0.99))
+    known = ds.lifetime.notnull()
+    assert (wider.lifetime_low <= ds.lifetime_low).where(known, True).all()
+
+
+def test_the_tip_stands_still_in_space() -> None:
+    """A start with the phase drawn differs from one without; none presses the beam before the drive moves."""
+    system = system_of(2)
+    starts = sb.Starts(count=8, phase=True, displacement=0.0)
+    phases = [float(starts.state(system, s).phase) for s in range(8)]
+    assert len(set(phases)) == 8 and all(np.pi <= phase <= 2.0 * np.pi for phase in phases)
+    ds = sb.lifetime_map(system, None, SHORT, starts=starts, survival=sb.Survival(quiet=20.0))
+    assert ds.last_snap.dims == ("start",)
+    assert len(np.unique(ds.last_snap)) > 1
+
+
+def test_runs_that_snap_on_are_followed_to_the_end() -> None:
+    """One mode at a point where many runs go on: none is stopped because it is sure to be called continuous."""
+    ds = sb.lifetime_map(system_of(1), None, sb.Integration(cycles=400), starts=24, after=[200, 350])
+    lasting = ds.last_snap.values[ds.last_snap.values > 350.0]
+    assert lasting.size == int(ds.runs_snapping) >= 8
+    assert (lasting > 390.0).all(), "they still cross in the last cycles"
+    assert float(ds.snapping_probability.sel(after=350)) == pytest.approx(lasting.size / 24)
+    assert (ds.status.values[ds.last_snap.values > 350.0] == sb.RunStatus.OK).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("point", MEASURED)
+def test_measured_lifetimes_come_again(point) -> None:
+    """Measured twice, once with some 210 runs and here with 400: within both errors, and all of them end in well 2."""
+    ds = sb.lifetime_map(system_of(32, *point), None, sb.Integration(cycles=1000), starts=400)
+    assert int(ds.runs_snapping) == 0
+    assert float(ds.end_probability.sel(well="other")) == 1.0
+    relative = float(ds.lifetime) / MEASURED[point] - 1.0
+    # three standard errors of a count of 210 and of one of 400
+    assert abs(relative) < 3.0 * np.hypot(1.0 / np.sqrt(210.0), 1.0 / np.sqrt(400.0))
+    assert float(ds.goodness) > 0.01
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"starts": 0}, "starts = 0"),
+        ({"starts": 2.5}, "starts = 2.5"),
+        ({"survival": sb.Survival(quiet=500.0)}, "must be more than the quiet cycles"),
+        ({"after": [50, 20]}, "after = [50, 20]"),
+        ({"after": [1000]}, "after[0]"),
+        ({"axes": {"velocity_amplitde": [0.1, 0.2]}}, "did you mean"),
+    ],
+)
+def test_refusals(given, words: str) -> None:
+    with pytest.raises(sb.InputError) as error:
+        sb.lifetime_map(system_of(1), integration=SHORT, **given)
+    assert words in str(error.value)
+
+
+def test_a_free_beam_is_refused() -> None:
+    with pytest.raises(sb.InputError, match="striker = None"):
+        sb.lifetime_map(sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), paper.CONTACT))

@@ -1,0 +1,95 @@
+"""Measures of borders: known maps, smooth and fractal borders, shapes whose integrity is known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from doubles import grebogi
+
+import snapbeam as sb
+
+
+@pytest.fixture(scope="module")
+def grebogi_basins():
+    """The window and resolution that Attractors.jl tests with: 251 x 251 starts."""
+    flow = grebogi()
+    states = np.array([[0.1, -0.3], [math.pi - 0.1, 0.3], [0.3, 0.2], [2.0, -0.1]])
+    found = sb.attractors(flow, states, transient=400)
+    plane = {"x[1]": np.linspace(0.0, 2.0 * math.pi, 251), "x[2]": np.linspace(-0.5, 0.5, 251)}
+    return found, sb.basins(found, plane, periods=2000)
+
+
+def test_grebogis_map(grebogi_basins) -> None:
+    found, ds = grebogi_basins
+    assert [each.kind for each in found.found] == ["periodic", "periodic"]
+    assert ds.attrs["undecided"] == 0.0
+    labels = ds["basin"].values
+    entropy = sb.basin_entropy(labels, 6)
+    assert 0.40 <= entropy.basin <= 0.42
+    assert 0.595 <= entropy.boundary <= 0.61
+    assert 0.2 <= sb.uncertainty_exponent(labels).exponent <= 0.3
+
+
+def test_a_smooth_border_has_dimension_one() -> None:
+    x, y = np.meshgrid(*[np.linspace(-1.0, 1.0, 601)] * 2)
+    disc = (x * x + y * y < 0.4).astype(int)
+    found = sb.uncertainty_exponent(disc, [1, 2, 4, 8])
+    assert found.exponent == pytest.approx(1.0, abs=0.03)
+    assert not sb.basin_entropy(disc).is_fractal
+
+
+def test_random_labels_have_all_the_entropy() -> None:
+    labels = np.random.default_rng(0).integers(0, 3, (300, 300))
+    entropy = sb.basin_entropy(labels, 10)
+    assert entropy.boundary == pytest.approx(math.log(3.0), abs=0.02) and entropy.is_fractal
+    assert entropy.boxes == entropy.boundary_boxes == 900
+    assert sb.uncertainty_exponent(labels).exponent == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_cantor_border_has_its_dimension() -> None:
+    """Gaps of the middle-thirds Cantor set, in two labels by turns: alpha = 1 - ln 2/ln 3."""
+    number = np.arange(3**13)
+    grid = np.zeros(number.size, dtype=int)
+    for level in range(13):
+        digit = number // 3 ** (12 - level) % 3
+        grid = np.where((digit == 1) & (grid == 0), 1 + level % 2, grid)
+    found = sb.uncertainty_exponent(grid, [3**k for k in range(4, 9)])
+    assert found.exponent == pytest.approx(1.0 - math.log(2.0) / math.log(3.0), abs=0.05)
+
+
+def test_integrity_of_known_shapes() -> None:
+    x, y = np.meshgrid(np.arange(201), np.arange(201), indexing="ij")
+    disc = ((x - 100) ** 2 + (y - 100) ** 2 < 60**2).astype(int)
+    found = sb.integrity(disc, 1, attractor=(110, 100))
+    assert found.global_measure == pytest.approx(math.pi * 60**2 / 201**2, rel=5e-3)
+    assert found.factor == pytest.approx(60.0, abs=1.0) and found.center == (100, 100)
+    assert found.local_measure == pytest.approx(50.0, abs=1.0)
+    stretched = sb.integrity(disc, 1, spacing=[0.5, 0.5])
+    assert stretched.factor == pytest.approx(0.5 * found.factor)
+    rim = sb.integrity(np.ones((11, 11), dtype=int), 1)
+    assert rim.factor == pytest.approx(6.0), "the rim of the window is a border"
+
+
+def test_classes_of_a_map_are_labels_too() -> None:
+    kinds = np.zeros((40, 40), dtype=np.int8)
+    kinds[:, 20:] = 3
+    assert sb.basin_entropy(kinds, 5).boundary_boxes == 0
+    assert sb.basin_entropy(kinds, 8).boundary_boxes == 5
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: sb.basin_entropy(np.zeros((4, 4))), "must be whole numbers"),
+        (lambda: sb.basin_entropy(np.zeros((4, 4), dtype=int), 5), "box = 5"),
+        (lambda: sb.uncertainty_exponent(np.zeros((40, 40), dtype=int)), "no border is met"),
+        (lambda: sb.integrity(np.zeros((4, 4), dtype=int), 0, attractor=(9, 0)), "attractor = (9, 0)"),
+        (lambda: sb.integrity(np.zeros((4, 4), dtype=int), 0, spacing=[0.0, 1.0]), "spacing"),
+    ],
+)
+def test_refusals(call, words: str) -> None:
+    with pytest.raises(sb.InputError) as error:
+        call()
+    assert words in str(error.value)

@@ -1,0 +1,106 @@
+"""Periodic orbits: exact ones under restitution, products of multipliers, reciprocal pairs, refusals."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from doubles import henon, logistic
+
+import snapbeam as sb
+from snapbeam import paper
+
+
+def system_of(modes: int, ratio: float, velocity: float, damping: float = 0.005) -> sb.System:
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes, damping_ratio=damping)
+    return sb.System(model, paper.CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity))
+
+
+def oscillator(ratio: float, restitution: float, amplitude: float = 1.0) -> sb.System:
+    """Of natural frequency 1 rad/s and mass 1, struck by a wall amplitude sin(ratio t) about its rest position."""
+    model = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], length_scale=1.0)
+    drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=amplitude * ratio)
+    return sb.System(model, sb.Restitution(restitution), sb.Striker(drive=drive, gap=0.0))
+
+
+def exact_orbit(ratio: float, restitution: float, periods: int) -> tuple[float, np.ndarray]:
+    """Approach speed of the (1, n) orbit, and its state at the phase pi.
+
+    It flies n periods from w with (1 + r) v/2 upward back to w with as much downward, so that w = kappa v with
+    kappa = (1 + r) cot(pi n/omega)/2, and the wall's velocity there is (1 - r) v/2.
+    """
+    kappa = 0.5 * (1.0 + restitution) / math.tan(math.pi * periods / ratio)
+    speed = 1.0 / math.hypot(kappa, 0.5 * (1.0 - restitution) / ratio)
+    w, up, wall = kappa * speed, 0.5 * (1.0 + restitution) * speed, 0.5 * (1.0 - restitution) * speed
+    after = ((math.pi - math.atan2(w, wall / ratio)) % (2.0 * math.pi)) / ratio
+    cosine, sine = math.cos(after), math.sin(after)
+    return speed, np.array([w * cosine + up * sine, -w * sine + up * cosine])
+
+
+EXACT = [
+    *((ratio, r, 1) for ratio in (1.3, 1.4, 1.6, 1.8, 1.9) for r in (0.3, 0.9)),
+    *((2.0 * ratio, r, 2) for ratio in (1.7, 1.75, 1.8, 1.85, 1.9) for r in (0.3, 0.9)),
+]
+
+
+@pytest.mark.parametrize(("ratio", "restitution", "periods"), EXACT)
+def test_orbits_with_one_impact_in_n_periods(ratio: float, restitution: float, periods: int) -> None:
+    """State and impulse to 1e-8, and det = r^2."""
+    speed, state = exact_orbit(ratio, restitution, periods)
+    orbit = sb.periodic_orbit(oscillator(ratio, restitution), state * 1.003, periods, phase=math.pi)
+    np.testing.assert_allclose(orbit.coordinates, state, rtol=0.0, atol=1e-8)
+    assert orbit.passage.impacts == 1
+    assert orbit.passage.least_impulse == pytest.approx((1.0 + restitution) * speed, rel=1e-8)
+    assert math.exp(orbit.log_determinant) == pytest.approx(restitution**2, abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("modes", "ratio", "velocity", "periods"), [(1, 1.6, 0.03, 1), (8, 1.4, 0.03, 2), (32, 3.5, 0.06, 2)]
+)
+def test_products_of_multipliers(modes: int, ratio: float, velocity: float, periods: int) -> None:
+    """exp(-2 T sum zeta omega), impacts or none; the orbit closes by the plain march too."""
+    system = system_of(modes, ratio, velocity)
+    orbit = sb.periodic_orbit(system, period=periods, transient=2000)
+    model = system.model
+    exact = -2.0 * periods * float((model.damping_ratio * model.omega).sum()) / (model.reference_freq * ratio)
+    assert orbit.log_determinant == pytest.approx(exact, abs=1e-8)
+    assert np.log(np.abs(orbit.multipliers)).sum() == pytest.approx(exact, abs=1e-8)
+    assert orbit.is_stable and orbit.least_period == periods
+    assert orbit.passage.impacts >= 1
+    again = sb.advance(orbit.system, orbit.state, periods, integration=sb.Integration(accuracy="reference"))
+    size = abs(orbit.state.amplitude[0])
+    np.testing.assert_allclose(again.amplitude, orbit.state.amplitude, rtol=0.0, atol=1e-9 * size)
+
+
+def test_multipliers_come_in_reciprocal_pairs_without_damping() -> None:
+    orbit = sb.periodic_orbit(system_of(1, 1.6, 0.03), transient=1500)
+    for damping in (0.002, 0.0005, 0.0):
+        orbit = sb.periodic_orbit(system_of(1, 1.6, 0.03, damping), orbit)
+    values = orbit.multipliers
+    assert orbit.passage.impacts == 1
+    np.testing.assert_allclose(values[0] * values[1], 1.0, atol=1e-8)
+
+
+def test_known_maps() -> None:
+    """Fixed points of Henon's map; the second fixed point by leaving out the first."""
+    root = math.sqrt(0.49 + 4.0 * 1.4)
+    first = sb.periodic_orbit(henon(), [0.5, 0.2])
+    np.testing.assert_allclose(first.coordinates[0], (-0.7 + root) / 2.8, rtol=1e-10)
+    second = sb.periodic_orbit(henon(), [0.5, 0.2], deflate=[first], iterations=200)
+    np.testing.assert_allclose(second.coordinates[0], (-0.7 - root) / 2.8, rtol=1e-9)
+    assert not first.is_stable and first.unstable == 1
+    twice = sb.periodic_orbit(logistic(3.2), [0.5], 4, transient=400)
+    assert twice.least_period == 2
+
+
+def test_what_does_not_converge_says_why() -> None:
+    with pytest.raises(sb.NoOrbit, match="try another period"):
+        sb.periodic_orbit(logistic(3.9), [0.3], 7, iterations=2)
+    free = sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), paper.CONTACT)
+    with pytest.raises(sb.InputError, match="striker = None"):
+        sb.periodic_orbit(free)
+    with pytest.raises(sb.InputError, match="guess of 3 numbers"):
+        sb.periodic_orbit(system_of(1, 1.6, 0.03), [0.1, 0.2, 0.3])
+    with pytest.raises(sb.InputError, match="period = 0"):
+        sb.periodic_orbit(system_of(1, 1.6, 0.03), period=0)

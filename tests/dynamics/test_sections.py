@@ -1,0 +1,117 @@
+"""Poincare sections and bifurcation diagrams: on the section to rounding, the same as by other ways."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from test_orbits import system_of
+
+import snapbeam as sb
+
+
+def test_a_stroboscopic_section_is_that_of_advance() -> None:
+    system = system_of(2, 1.4, 0.02)
+    ds = sb.poincare(system, periods=12, transient=0, integration=sb.Integration(accuracy="reference"))
+    how = sb.Integration(accuracy="reference")
+    every = sb.advance(system, periods=12, every=True, integration=how)
+    size = abs(every.amplitude[0, 0])
+    np.testing.assert_allclose(ds["modal_amplitude"].values[1:], every.amplitude, rtol=0.0, atol=1e-6 * size)
+    assert (
+        ds["drive_phase"].values == pytest.approx(0.0, abs=1e-9)
+        or np.cos(ds["drive_phase"]).min() > 1.0 - 1e-9
+    )
+
+
+def test_an_impact_section_is_on_the_contact() -> None:
+    ds = sb.poincare(system_of(1, 1.6, 0.03), "impact", 40, transient=2000)
+    assert ds.sizes["point"] == 40
+    tip = ds["displacement"].values
+    assert tip.std() < 1e-3 * abs(tip.mean()), "the response is of period 1: every impact is alike"
+    assert ds["drive_phase"].values.std() < 1e-3
+
+
+def test_a_section_at_a_level_is_on_it() -> None:
+    ds = sb.poincare(system_of(1, 1.6, 0.3), ("center_displacement", 0.0, "up"), 60, transient=0)
+    assert ds.sizes["point"] >= 2
+    np.testing.assert_allclose(ds["center_displacement"].values, 0.0, atol=1e-7)
+    assert (ds["center_velocity"].values > 0.0).all()
+
+
+def test_sweeps_meet_the_branch() -> None:
+    """Both sweeps come back after a period, and one of them is on the orbit that is found from rest."""
+    system = system_of(1, 1.6, 0.03, 0.02)
+    values = np.linspace(0.02, 0.06, 5)
+    ds = sb.bifurcation_diagram(system, "velocity_amplitude", values, periods=(400, 16))
+    assert ds["center_displacement"].dims == ("sweep", "velocity_amplitude", "period")
+    assert (ds["least_period"] == 1).all() and not ds["failed"].any()
+    orbit = sb.periodic_orbit(system.replace(**{"drive.velocity_amplitude": 0.04}), transient=300)
+    model = orbit.flow.system.model
+    center = float(model.center_shape @ orbit.state.amplitude) / orbit.flow.system.scale.length
+    swept = ds["center_displacement"].sel(velocity_amplitude=0.04, method="nearest")
+    assert np.abs(swept.values - center).max(axis=-1).min() < 1e-3
+    np.testing.assert_allclose(ds["impacts_per_period"], 1.0, atol=0.02)
+
+
+def test_sweeps_show_hysteresis_and_starts_what_they_miss() -> None:
+    """Snapped through on the way up, the beam stays in the far well on the way down."""
+    system = system_of(1, 1.6, 0.03, 0.05)
+    ds = sb.bifurcation_diagram(system, "velocity_amplitude", [0.03, 0.4], periods=(150, 16), starts=2)
+    assert list(ds["sweep"].values) == ["up", "down", "start 0", "start 1"]
+    weak = ds["center_displacement"].sel(velocity_amplitude=0.03).isel(period=-1)
+    assert float(weak.sel(sweep="up")) < 0.0 and float(weak.sel(sweep="start 0")) < 0.0
+    again = sb.bifurcation_diagram(
+        system, "velocity_amplitude", [0.03, 0.4], sb.Integration(threads=1), periods=(150, 16), starts=2
+    )
+    for name in ds.data_vars:
+        np.testing.assert_array_equal(ds[name].values, again[name].values, err_msg=str(name))
+
+
+def test_approaches_are_told() -> None:
+    ds = sb.bifurcation_diagram(
+        system_of(8, 1.4, 0.03),
+        "velocity_amplitude",
+        [0.03, 0.031],
+        sweeps=["up"],
+        periods=(600, 8),
+        grazing=True,
+    )
+    assert (ds["clearance"] > 0.0).any() and (ds["least_penetration"] > 0.0).all()
+
+
+def test_a_parameter_of_the_structure_may_be_swept() -> None:
+    system = system_of(1, 1.6, 0.03, 0.05)
+    ds = sb.bifurcation_diagram(
+        system, "model.damping_ratio", [0.04, 0.05], sweeps=["down"], periods=(200, 4)
+    )
+    plain = sb.bifurcation_diagram(system, "velocity_amplitude", [0.03], sweeps=["up"], periods=(200, 4))
+    one = ds["center_displacement"].sel(damping_ratio=0.05).values.ravel()
+    np.testing.assert_allclose(one, plain["center_displacement"].values.ravel(), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda s: sb.poincare(s, "nowhere"), "section"),
+        (lambda s: sb.poincare(s, ("center_displacement", 5.0, "up"), 3, transient=0), "is never met"),
+        (lambda s: sb.poincare(s, ("contact_force", 0.0, "up")), "section[0]"),
+        (lambda s: sb.bifurcation_diagram(s, "contact.law", [1.0, 2.0]), "contact.law"),
+        (lambda s: sb.bifurcation_diagram(s, "velocity_amplitude", [0.2, 0.1]), "strictly increasing"),
+        (lambda s: sb.bifurcation_diagram(s, "velocity_amplitude", [0.1, 0.2], sweeps=[]), "sweeps"),
+        (lambda s: sb.bifurcation_diagram(s, "velocity_amplitude", [0.1, 0.2], periods=3), "periods = 3"),
+    ],
+)
+def test_refusals(call, words: str) -> None:
+    with pytest.raises(sb.InputError) as error:
+        call(system_of(1, 1.6, 0.03))
+    assert words in str(error.value)
+
+
+def test_points_of_a_period() -> None:
+    from snapbeam.dynamics.bifurcation import least_period
+
+    turn = np.arange(24) * 2.0 * math.pi
+    for m in (1, 2, 3, 5):
+        assert int(least_period(np.cos(turn / m)[:, None])) == m
+    assert int(least_period(np.random.default_rng(0).normal(size=(24, 1)))) == 0

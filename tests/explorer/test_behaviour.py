@@ -1,0 +1,327 @@
+"""What else happens to a page: a changed system, two tabs, files that go, stores that grow, and bad guests."""
+
+from __future__ import annotations
+
+import http.client
+import os
+import re
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from urllib.parse import quote, urlparse
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import snapbeam as sb
+
+
+def _turn(page, title):
+    page.page.locator(f'.bk-tab:has-text("{title}")').first.click()
+
+
+def test_a_changed_system_says_what_is_old(tab, served, small_map, system):
+    page = tab(served.url)
+    x, y = float(small_map["frequency_ratio"][9]), float(small_map["velocity_amplitude"][12])
+    page.click(x, y)
+    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    _turn(page, "System")
+    page.page.get_by_label("thickness (m)").fill("-1")
+    page.page.get_by_role("button", name="Use this system").click()
+    page.wait(lambda: "thickness" in page.text("system-words"), "a refusal in words")
+    page.page.get_by_label("thickness (m)").fill("0.0005")
+    page.page.get_by_role("button", name="Use this system").click()
+    page.wait(lambda: "map is old" in page.text("old-words"), "what is old")
+    assert "beam.thickness = 0.0005" in page.text("old-words")
+    assert "old" in page.notes()
+    _turn(page, "Map")
+    page.click(x, float(small_map["velocity_amplitude"][11]))
+    changed = system.replace(**{
+        "beam.thickness": 0.0005, "drive.frequency_ratio": x,
+        "drive.velocity_amplitude": float(small_map["velocity_amplitude"][11]),
+    })  # fmt: skip
+    outcome = sb.simulate(changed, sb.Integration(cycles=30)).outcome
+    page.wait(
+        lambda: f"{outcome.crossings} crossings, {outcome.impacts} impacts" in page.head(), "the changed run"
+    )
+    assert outcome.response.label in page.head()
+    assert "set=beam.thickness" in page.page.url
+
+
+def test_a_link_shows_the_same_again(tab, served, small_map):
+    page = tab(served.url)
+    x, y = float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][13])
+    page.click(x, y)
+    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    page.wait(lambda: f"drive.frequency_ratio:{x!r}" in page.page.url, "the address")
+    head = page.head()
+    other = tab(page.page.url)
+    other.wait(lambda: "bit for bit" in other.notes(), "the same run")
+    assert other.head() == head
+
+
+@pytest.mark.slow
+def test_two_tabs_do_not_disturb_each_other(tab, served, small_map):
+    first, second = tab(served.url), tab(served.url)
+    ratio, velocity = small_map["frequency_ratio"].values, small_map["velocity_amplitude"].values
+    first.click(float(ratio[3]), float(velocity[3]))
+    second.click(float(ratio[18]), float(velocity[14]))
+    for page, at in ((first, (3, 3)), (second, (18, 14))):
+        words = f"frequency ratio {ratio[at[0]]:.6g}, velocity amplitude {velocity[at[1]]:.6g}"
+        page.wait(
+            lambda page=page, words=words: words in page.head() and "bit for bit" in page.notes(), words
+        )
+    second.close()
+    first.click(float(ratio[4]), float(velocity[3]))
+    first.wait(
+        lambda: f"{ratio[4]:.6g}" in first.head() and "bit for bit" in first.notes(),
+        "a run after a tab was closed",
+    )
+
+
+@pytest.mark.slow
+def test_two_points_side_by_side(tab, served, small_map):
+    page = tab(served.url)
+    ratio, velocity = small_map["frequency_ratio"].values, small_map["velocity_amplitude"].values
+    page.click(float(ratio[3]), float(velocity[3]))
+    page.wait(lambda: "bit for bit" in page.notes(), "A")
+    page.page.get_by_role("button", name="Two points").click()
+    page.wait(
+        lambda: (
+            page.text("run-head", 1) != ""
+            or page.js("() => !!Bokeh.documents[0].get_model_by_name('waveform-B')")
+        ),
+        "B",
+    )
+    page.click(float(ratio[18]), float(velocity[14]))
+    page.wait(lambda: "crossings" in page.head(1), "the run of B")
+    assert f"{ratio[3]:.6g}" in page.head(0) and f"{ratio[18]:.6g}" in page.head(1)
+    assert page.data("map-mark", "text") == ["A", "B"]
+
+
+@pytest.mark.slow
+def test_the_server_ends_and_the_page_says_so(tab, serve):
+    server = serve("map.nc")
+    page = tab(server.url)
+    server.stop()
+    page.wait(lambda: page.page.locator("#gone").count() == 1, "words")
+    assert "has stopped" in page.page.locator("#gone").inner_text()
+    page.errors.clear()  # the browser itself says that it cannot connect
+
+
+@pytest.mark.slow
+def test_a_file_that_goes_is_told_and_runs_go_on(tab, serve, small_map, tmp_path):
+    path = tmp_path / "gone.nc"
+    small_map.to_netcdf(path, engine="h5netcdf")
+    page = tab(serve("gone.nc", where=tmp_path).url)
+    path.unlink()
+    page.click(float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][4]))
+    page.wait(lambda: "no such file any more" in page.notes(), "words")
+    assert "crossings" in page.head()
+
+
+def test_a_store_fills_in_as_it_grows(tab, serve, system, tmp_path):
+    pytest.importorskip("zarr")
+    few = system.replace(**{"model.modes": 1})
+    axes = {"frequency_ratio": np.linspace(0.5, 2.0, 20), "velocity_amplitude": np.linspace(0.05, 0.4, 10)}
+    path = tmp_path / "growing.store"
+
+    class Enough(Exception):
+        pass
+
+    def stop(done, total):
+        if done >= 50:
+            raise Enough
+
+    keeping = sb.Keeping(path, chunk=16)
+    with pytest.raises(Enough):
+        sb.sweep(few, axes, sb.Integration(cycles=5), store=keeping, progress=stop)
+    page = tab(serve("growing.store", where=tmp_path).url)
+    clear = "() => { const m = Bokeh.documents[0].get_model_by_name('map-base'); return Array.from(m.data.image[0]); }"
+    before = page.js(clear)
+    unknown = 0xFF858585
+    assert before.count(unknown) > 100
+    sb.sweep(few, axes, sb.Integration(cycles=5), store=sb.Keeping(path, chunk=16))
+    page.wait(lambda: "200 of 200 points" in page.state(), "all of it")
+    assert page.js(clear).count(unknown) == 0
+
+
+@pytest.mark.slow
+def test_a_map_of_a_million_points(tab, serve, system, tmp_path):
+    x, y = np.linspace(0.4, 2.3, 1000), np.linspace(0.03, 0.5, 1000)
+    seed = sb.sweep(
+        system, {"frequency_ratio": x[:2], "velocity_amplitude": y[:2]}, sb.Integration(cycles=30)
+    )
+    rng = np.random.default_rng(3)
+    labels = {
+        name: {"units": "1", "long_name": name, "parameter": f"drive.{name}"}
+        for name in ("frequency_ratio", "velocity_amplitude")
+    }
+    dims = ("frequency_ratio", "velocity_amplitude")
+    force = (dims, rng.random((1000, 1000)), {"units": "N"})
+    large = xr.Dataset(
+        {"response": (dims, rng.integers(0, 4, (1000, 1000)).astype(np.int8)), "peak_force": force},
+        {name: (name, values, labels[name]) for name, values in zip(dims, (x, y), strict=True)},
+        seed.attrs,
+    )
+    large.to_netcdf(tmp_path / "large.nc", engine="h5netcdf")
+    page = tab(serve("large.nc", where=tmp_path).url)
+    page.wait(lambda: len(page.data("map-base", "image")) == 1, "the map")
+    page.click(float(x[500]), float(y[500]))
+    page.wait(lambda: "crossings" in page.head() and ("map" in page.notes()), "a run of it")
+
+
+# ---------------------------------------------------------------------- taking away
+
+
+_COMMAND = """
+import shlex, sys
+from snapbeam.cli import app
+app(shlex.split(sys.argv[1])[1:])
+"""
+
+
+def _saved(page, button, tmp_path):
+    with page.page.expect_download() as waiting:
+        page.page.get_by_role("button", name=button, exact=True).click()
+    path = tmp_path / waiting.value.suggested_filename
+    waiting.value.save_as(path)
+    return path
+
+
+def test_what_is_taken_away_is_what_is_shown(tab, served, small_map, folder, tmp_path):
+    page = tab(served.url)
+    x, y = float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][13])
+    page.click(x, y)
+    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    _turn(page, "Take away")
+    page.wait(lambda: "snapbeam simulate" in page.text("take-text"), "the command")
+    assert _saved(page, "Map", tmp_path).read_bytes().startswith(b"\x89PNG")
+    assert _saved(page, "Run", tmp_path).read_bytes().startswith(b"\x89PNG")
+    run = sb.load_run(_saved(page, "Run as NetCDF", tmp_path))
+    for name in sb.STATISTICS:
+        held, found = small_map[name].values[4, 13].item(), run.outcome[name]
+        assert held == found or (held != held and found != found), name
+    with xr.open_dataset(_saved(page, "Map as NetCDF", tmp_path)) as whole:
+        np.testing.assert_array_equal(whole["response"], small_map["response"])
+    command = page.page.locator("pre.command").inner_text()
+    lines = page.page.locator("pre.python").inner_text()
+    # the command and the lines, as a person would run them
+    made = subprocess.run(
+        [sys.executable, "-c", _COMMAND, command],
+        cwd=folder, capture_output=True, text=True, env=dict(os.environ), check=False,
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    again = sb.load_run(folder / "run.nc")
+    np.testing.assert_array_equal(again.dataset["displacement"], run.dataset["displacement"])
+    subprocess.run([sys.executable, "-c", lines], cwd=tmp_path, check=True, env=dict(os.environ))
+    np.testing.assert_array_equal(
+        sb.load_run(tmp_path / "run.nc").dataset["displacement"], run.dataset["displacement"]
+    )
+
+
+@pytest.mark.slow
+def test_the_beam_moving_is_exported(tab, served, small_map, tmp_path):
+    pytest.importorskip("imageio_ffmpeg")
+    page = tab(served.url)
+    page.click(float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][13]))
+    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    _turn(page, "Take away")
+    page.page.get_by_label("length of the animation (s)").fill("1")
+    page.page.get_by_label("slow motion at the hardest impact (s)").fill("1")
+    assert _saved(page, "GIF", tmp_path).read_bytes().startswith(b"GIF89a")
+    assert _saved(page, "MP4", tmp_path).read_bytes()[4:8] == b"ftyp"
+
+
+# ---------------------------------------------------------------------- bad guests
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        "x=__class__&y=../../etc/passwd&show=<script>alert(1)</script>",
+        "at=drive.frequency_ratio:nan,drive.velocity_amplitude:1e999",
+        "set=model.modes:100000000&at=beam.thickness:-1",
+        "view=1,0,0,0&theme=%00",
+        "at=" + "drive.frequency_ratio:1," * 400,
+        "set=" + quote("__import__('os').system('true'):1"),
+    ],
+)
+def test_a_hostile_address_counts_for_nothing_and_is_told(tab, served, state):
+    page = tab(f"{served.url}?{state}")
+    page.wait(lambda: "address" in page.state(), "words")
+    assert page.page.locator("script:has-text('alert(1)')").count() == 0
+    page.click(1.2, 0.3)
+    page.wait(lambda: "bit for bit" in page.notes(), "a run none the less")
+
+
+def _status(url, host=None, path="/"):
+    where = urlparse(url)
+    connection = http.client.HTTPConnection(where.hostname, where.port, timeout=60)
+    connection.request("GET", path, headers={"Host": host} if host else {})
+    response = connection.getresponse()
+    body = response.read().decode(errors="replace")
+    connection.close()
+    return response.status, body, dict(response.getheaders())
+
+
+def test_pages_of_other_names_and_origins_are_refused(served):
+    assert _status(served.url)[0] == 200
+    assert _status(served.url, host="evil.example")[0] in (302, 403)
+    import asyncio
+
+    from tornado.httpclient import HTTPClientError, HTTPRequest
+    from tornado.websocket import websocket_connect
+
+    body = _status(served.url)[1]
+    token = re.search(r'"token":"([^"]+)"', body)[1]
+
+    async def knock(origin):
+        request = HTTPRequest(
+            served.url.replace("http", "ws") + "ws",
+            headers={"Origin": origin, "Sec-WebSocket-Protocol": f"bokeh, {token}"},
+        )
+        try:
+            connection = await websocket_connect(request, subprotocols=["bokeh", token])
+        except HTTPClientError as error:
+            return error.code
+        connection.close()
+        return 101
+
+    with ThreadPoolExecutor(1) as other:  # this thread has the browser's own loop
+        assert other.submit(asyncio.run, knock("http://evil.example")).result() == 403
+        assert other.submit(asyncio.run, knock(served.url.rstrip("/"))).result() == 101
+
+
+def test_a_token_is_asked_for(serve):
+    server = serve("map.nc", "--token", "a-token-of-many-letters")
+    assert server.url.endswith("?token=a-token-of-many-letters")
+    assert _status(server.url)[0] in (302, 403)
+    assert _status(server.url, path="/?token=wrong")[0] in (302, 403)
+    status, _, headers = _status(server.url, path="/?token=a-token-of-many-letters")
+    assert status == 200
+    assert "HttpOnly" in headers["Set-Cookie"] and "SameSite=Strict" in headers["Set-Cookie"]
+
+
+@pytest.mark.slow
+def test_other_addresses_need_a_flag(folder):
+    code = "from snapbeam.cli import main; main()"
+    found = subprocess.run(
+        [sys.executable, "-c", code, "explore", "map.nc", "--no-browser", "--address", "0.0.0.0"],
+        cwd=folder, capture_output=True, text=True, env=dict(os.environ), check=False,
+    )  # fmt: skip
+    assert found.returncode == 2
+    assert "--allow-remote" in found.stderr
+
+
+@pytest.mark.slow
+def test_the_same_in_a_notebook(tab, small_map):
+    shown = sb.explore(small_map)
+    try:
+        assert shown.url in shown._repr_html_()
+        page = tab(shown.url)
+        page.click(float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][4]))
+        page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    finally:
+        shown.stop()

@@ -1,0 +1,85 @@
+"""The page in a real browser: its map, its runs, its keys."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from snapbeam import ResponseClass
+
+
+def _label(small_map, row, column):
+    return ResponseClass(int(small_map["response"].values[column, row])).label
+
+
+def test_twenty_points_are_the_maps_bit_for_bit(tab, served, small_map):
+    page = tab(served.url)
+    ratio, velocity = small_map["frequency_ratio"].values, small_map["velocity_amplitude"].values
+    rng = np.random.default_rng(7)
+    chosen = {(int(rng.integers(ratio.size)), int(rng.integers(velocity.size))) for _ in range(40)}
+    seen = set()
+    for column, row in sorted(chosen)[:20]:
+        x, y = float(ratio[column]), float(velocity[row])
+        page.click(x, y)
+        words = f"frequency ratio {x:.6g}, velocity amplitude {y:.6g}"
+        page.wait(lambda words=words: words in page.head() and "crossings" in page.head(), words)
+        page.wait(lambda: "bit for bit" in page.notes(), "the comparison")
+        assert _label(small_map, row, column) in page.head()
+        seen.add(_label(small_map, row, column))
+        crossings = int(small_map["crossings"].values[column, row])
+        assert f"{crossings} crossings" in page.head()
+        waveform = np.array(page.data("waveform", "y"))
+        assert waveform.max() == pytest.approx(
+            float(small_map["max_center_displacement"].values[column, row]), abs=0.01
+        )
+    assert len(seen) >= 3, "the map of the test should hold several classes"
+
+
+def test_keys_go_from_point_to_point(tab, served, small_map):
+    page = tab(served.url)
+    ratio, velocity = small_map["frequency_ratio"].values, small_map["velocity_amplitude"].values
+    page.click(float(ratio[5]), float(velocity[5]))
+    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    for key, column, row in (
+        ("ArrowRight", 6, 5),
+        ("ArrowUp", 6, 6),
+        ("ArrowLeft", 5, 6),
+        ("ArrowDown", 5, 5),
+    ):
+        page.page.keyboard.press(key)
+        words = f"frequency ratio {ratio[column]:.6g}, velocity amplitude {velocity[row]:.6g}"
+        page.wait(
+            lambda words=words: words in page.head() and "crossings" in page.head(), f"{key} to {words}"
+        )
+        assert _label(small_map, row, column) in page.head()
+
+
+def test_numbers_are_typed_in_full(tab, served, system):
+    import snapbeam as sb
+
+    page = tab(served.url)
+    page.page.get_by_label("frequency ratio").fill("1.2345678901234567")
+    page.page.get_by_label("velocity amplitude").fill("0.31415926535897931")
+    page.page.get_by_role("button", name="Run").click()
+    page.wait(lambda: "crossings" in page.head(), "the run")
+    exact = system.replace(
+        **{"drive.frequency_ratio": 1.2345678901234567, "drive.velocity_amplitude": 0.31415926535897931}
+    )
+    run = sb.simulate(exact, sb.Integration(cycles=30))
+    assert run.outcome.response.label in page.head()
+    assert f"{run.outcome.crossings} crossings, {run.outcome.impacts} impacts" in page.head()
+    page.page.get_by_label("frequency ratio").fill("one")
+    page.page.get_by_role("button", name="Run").click()
+    page.wait(lambda: "must be a number" in page.head(), "a refusal in words")
+
+
+def test_the_pointer_is_told_what_it_is_over(tab, served, small_map):
+    page = tab(served.url)
+    x, y = float(small_map["frequency_ratio"][10]), float(small_map["velocity_amplitude"][12])
+    where = page.place(x, y)
+    page.page.mouse.move(where[0] - 40, where[1])
+    page.page.wait_for_timeout(100)
+    page.page.mouse.move(*where)
+    page.wait(lambda: f"{x:.6g}" in page.text("hover"), "the hover")
+    assert _label(small_map, 12, 10) in page.text("hover")
+    assert f"crossings {int(small_map['crossings'].values[10, 12])}" in page.text("hover")

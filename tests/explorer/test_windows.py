@@ -1,0 +1,107 @@
+"""Parts of the map computed anew: their order, their numbers, and that they can be stopped."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+
+pytest.importorskip("panel")
+
+from snapbeam.explorer.jobs import Cancelled, Jobs, Token
+from snapbeam.explorer.maps.windows import compute, planned
+
+NAMES = ("drive.frequency_ratio", "drive.velocity_amplitude")
+
+
+@pytest.fixture
+def jobs():
+    made = Jobs()
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def one_mode(system):
+    return system.replace(**{"model.modes": 1})
+
+
+def _window(system, pixels=(60, 36), cell=3, log=(False, False)):
+    return planned(system, sb.Integration(cycles=4), NAMES, (0.9, 1.4, 0.1, 0.4), log, pixels, cell)
+
+
+def test_a_window_ends_as_the_sweep_of_its_points(one_mode, jobs):
+    window = _window(one_mode)
+    assert (window.x.size, window.y.size) == (27, 27)
+    told = []
+    compute(
+        window,
+        jobs,
+        Token(),
+        lambda w: told.append((w.done, int(w.stride.max()), int((w.stride == 0).sum()))),
+    )
+    assert window.finished and window.done == 729 and (window.stride == 1).all()
+    assert told[0][1] == 27, "it begins coarse"
+    assert window.own().all()
+    axes = {"drive.velocity_amplitude": window.y, "drive.frequency_ratio": window.x}
+    whole = sb.sweep(one_mode, axes, sb.Integration(cycles=4))
+    for name in ("response", "crossings", "peak_force", "shaker_work"):
+        np.testing.assert_array_equal(window.values[name], whole[name].values, name)
+
+
+def test_every_cell_of_a_coarse_window_holds_a_run_that_was_made(one_mode, jobs):
+    window, token = _window(one_mode, (150, 90)), Token()
+
+    def tell(w):
+        if w.done >= 60:
+            token.cancel()
+
+    with pytest.raises(Cancelled):
+        compute(window, jobs, token, tell)
+    assert not window.finished and 60 <= window.done < window.size
+    own = window.own()
+    rows, columns = np.nonzero(window.stride)
+    for row, column in list(zip(rows, columns, strict=True))[::97]:
+        at = window.computed_at(float(window.x[column]), float(window.y[row]))
+        assert own[at], "the cell that is clicked stands for a run"
+        assert window.values["peak_force"][row, column] == window.values["peak_force"][at]
+    before = window.done
+    compute(window, jobs, Token(), lambda _: None)  # what was computed is kept
+    assert window.finished and window.done == window.size
+    assert before < window.done
+
+
+def test_a_window_of_too_many_points_has_wider_cells(one_mode):
+    window = planned(one_mode, sb.Integration(), NAMES, (0.9, 1.4, 0.1, 0.4), (False, False), (3000, 2000), 1)
+    assert window.size <= 60_000
+
+
+def test_cells_of_axes_of_powers_are_even_in_powers(one_mode):
+    window = _window(one_mode, log=(True, False))
+    np.testing.assert_allclose(np.diff(np.log(window.x)), np.diff(np.log(window.x))[0])
+    assert window.cell(float(window.x[7]), float(window.y[3])) == (3, 7)
+
+
+def test_zooming_computes_what_is_seen_and_a_click_runs_its_points(tab, served):
+    page = tab(served.url)
+    page.js("""() => { const p = Bokeh.documents[0].get_model_by_name('map');
+      p.x_range.setv({start: 1.0, end: 1.3}); p.y_range.setv({start: 0.1, end: 0.2}); }""")
+    page.page.get_by_role("button", name="Compute view").click()
+    page.wait(lambda: "points" in page.state() and len(page.data("map-windows", "image")) == 1, "a window")
+    page.wait(lambda: "blocks of 9" in page.state() or "blocks of 3" in page.state(), "finer cells")
+    page.page.get_by_role("button", name="Stop").click()
+    page.wait(lambda: "stopped" in page.state(), "the end of it")
+    page.click(1.151, 0.152)
+    page.wait(lambda: "bit for bit" in page.notes(), "the run of a point between those of the map")
+
+
+@pytest.mark.slow
+def test_the_papers_beam_is_mapped_while_one_looks(tab, serve, folder):
+    (folder / "quick.toml").write_text("[model]\nmodes = 1\n[run]\ncycles = 5\n")
+    page = tab(serve("--config", "quick.toml").url)
+    page.wait(lambda: len(page.data("map-windows", "image")) == 1, "a map out of nothing")
+    finer = ("blocks of 9", "blocks of 3", "blocks of 1 ", "all ")
+    page.wait(lambda: any(words in page.state() for words in finer), "the coarsest level")
+    page.click(1.2, 0.3)
+    page.wait(lambda: "crossings" in page.head() and "bit for bit" in page.notes(), "a run")

@@ -1,0 +1,58 @@
+"""The schematic shows what the system holds."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import pytest
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.core.validate import InputError
+from snapbeam.figures import plot_system
+
+LEVEL = paper.BEAM.buckling_level
+
+
+@pytest.fixture
+def model():
+    return sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+
+
+def words(figure) -> str:
+    found = " ".join(text.get_text() for ax in figure.axes for text in ax.texts)
+    plt.close(figure)
+    return found
+
+
+def test_says_what_signs_do_not(model) -> None:
+    drive = sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.2, length=4.0)
+    striker = sb.Striker(drive=drive, mass=0.02, spring=700.0, damper=0.7, gap=0.1 * LEVEL)
+    said = words(plot_system(sb.System(model, sb.HuntCrossley(4e8, 2.0), striker)))
+    assert "Hunt–Crossley" in said
+    assert "gap 0.1 $b$" in said
+    assert "= 20 g" in said
+    pressed = sb.Striker(drive=sb.Still(), gap=-0.2 * LEVEL)
+    assert "preload 0.2 $b$" in words(plot_system(sb.System(model, paper.CONTACT, pressed)))
+
+
+def test_beam_and_tip_are_where_they_are(model) -> None:
+    striker = sb.Striker(drive=sb.Flight(speed=0.4), mass=2e-3, gap=0.5 * LEVEL, side="above", location=0.5)
+    figure = plot_system(sb.System(model, paper.CONTACT, striker))
+    solid = next(line for line in figure.axes[0].lines if line.get_linewidth() == 1.8)
+    assert solid.get_ydata().max() == pytest.approx(1.0, abs=1e-3)
+    tip = next(patch for patch in figure.axes[0].patches if hasattr(patch, "radius"))
+    assert tip.center[0] == pytest.approx(3.5)
+    assert tip.center[1] - tip.radius == pytest.approx(1.5, abs=1e-3)
+    drive = figure.axes[1].lines[0].get_ydata()
+    assert drive[0] == 0.0
+    assert drive[-1] == pytest.approx(2.0 * 2.0 * 3.141592653589793 * 0.4, rel=1e-9)
+    plt.close(figure)
+
+
+def test_free_beam_and_refusal(model) -> None:
+    figure = plot_system(sb.System(model))
+    assert len(figure.axes) == 1
+    plt.close(figure)
+    given = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0])
+    with pytest.raises(InputError, match="given by matrices has no shape"):
+        plot_system(sb.System(given))

@@ -1,0 +1,115 @@
+"""Pictures of what else runs and maps show: amplitudes, energies, spectra, portraits, statistics, lines."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.axes import Axes
+
+import snapbeam as sb
+from snapbeam import figures, paper
+from snapbeam.core.validate import InputError
+from snapbeam.figures.captions import caption, prefixed, prefixed_range, scale_of
+
+
+@pytest.fixture(autouse=True)
+def _close():
+    yield
+    plt.close("all")
+
+
+@pytest.fixture(scope="module")
+def run():
+    system = sb.System(
+        sb.ReducedModel.from_beam(paper.BEAM, modes=3),
+        contact=paper.CONTACT,
+        striker=sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
+    )
+    return sb.simulate(system, sb.Integration(cycles=12))
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [(0.161, "m", "161 mm"), (3.35e-4, "m", "335 µm"), (2e-6, "m", "2 µm"), (1.0, "m", "1 m"), (0.0, "N", "0 N"),
+     (81853.0, "Hz", "81.9 kHz"), (-4e-9, "J", "-4 nJ"), (999.9, "N", "1e+03 N")],
+)  # fmt: skip
+def test_prefixes(value, unit, text):
+    assert prefixed(value, unit) == text
+
+
+def test_one_prefix_for_many():
+    assert scale_of([1e-5, 0.0, -2e-4], "N") == (pytest.approx(1e-6), "µN")
+    assert scale_of([0.0], "N") == (1.0, "N") and scale_of([], "N") == (1.0, "N")
+    assert prefixed_range(1e-5, 2e-4, "N") == "10 to 200 µN"
+
+
+def test_captions(run):
+    text = caption(run.dataset)
+    for part in ("161 mm × 400 µm", "335 µm", "$N$ = 3", "= 1.21 (", "$V$ = 0.18 (", "mm/s", "= 0.476"):
+        assert part in text
+    assert text.endswith(f": {run.outcome.response.label}")
+    assert caption(run.dataset, 2).count("\n") == 1
+    assert caption(xr.Dataset()) == ""
+
+
+@pytest.mark.parametrize("kind", ["run", "modal_amplitudes", "energies", "spectrum", "phase_portrait"])
+def test_every_plotter_takes_axes_and_returns_them(run, kind):
+    plotter = getattr(figures, f"plot_{kind}")
+    assert isinstance(plotter(run), Axes)
+    ax = plt.figure().add_subplot()
+    assert plotter(run.dataset, ax=ax) is ax and ax.has_data() and ax.get_xlabel() and ax.get_ylabel()
+    assert isinstance(run.plot(kind), Axes)
+    assert isinstance(run.dataset.snapbeam.plot(None if kind == "run" else kind), Axes)
+
+
+def test_what_is_drawn(run):
+    energy = run.dataset.energy_beam.values
+    lines = {line.get_label(): line for line in run.plot("energies").lines}
+    np.testing.assert_allclose(lines["in the beam"].get_ydata() * 1e-6, energy, rtol=1e-12)
+    alpha = run.plot("modal_amplitudes", modes=2).lines
+    assert len(alpha) == 2 and alpha[0].get_ydata()[0] == pytest.approx(-1.0)
+    portrait = run.plot("phase_portrait")
+    np.testing.assert_array_equal(portrait.lines[0].get_xdata(), run.dataset.center_displacement)
+    assert portrait.lines[1].get_xdata().size == 13, "whole cycles, both ends"
+
+
+def test_spectrum_of_a_sine():
+    cycle = np.linspace(0.0, 40.0, 8001)
+    attrs = {"units": "1", "long_name": "beam displacement at the striker, over b"}
+    run = xr.Dataset(
+        {"displacement": ("time", 0.3 * np.sin(2 * np.pi * 3.0 * cycle), attrs)},
+        {"time": ("time", cycle * 0.01, {"units": "s"}), "cycle": ("time", cycle, {"units": "1"})},
+    )
+    line = figures.plot_spectrum(run, variable="displacement").lines[0]
+    at = int(np.argmax(line.get_ydata()))
+    assert line.get_xdata()[at] == pytest.approx(3.0, abs=0.03)
+    assert line.get_ydata()[at] == pytest.approx(0.3, rel=0.02)
+    with pytest.raises(InputError, match="at least 16 samples"):
+        figures.plot_spectrum(run, variable="displacement", window=(0.0, 0.01))
+
+
+def test_statistics_of_a_map(synthetic_map):
+    force = xr.DataArray(
+        np.geomspace(1e-5, 1e-1, synthetic_map.response.size).reshape(synthetic_map.response.shape),
+        dims=synthetic_map.response.dims, attrs={"units": "N", "long_name": "peak contact force"},
+    )  # fmt: skip
+    ds = synthetic_map.assign(peak_force=force)
+    ax = ds.snapbeam.plot("peak_force")
+    mesh = ax.collections[0]
+    assert mesh.norm.vmin == pytest.approx(1e-2) and mesh.norm.vmax == pytest.approx(100.0), (
+        "mN, by powers of ten"
+    )
+    assert "(mN)" in ax.figure.axes[1].get_ylabel()
+    line = ds.isel(frequency_ratio=3).snapbeam.plot("peak_force", ax=plt.figure().add_subplot())
+    assert line.lines[0].get_ydata().size == ds.sizes["velocity_amplitude"]
+    with pytest.raises(InputError, match="nosuch"):
+        ds.snapbeam.plot("nosuch")
+
+
+def test_a_map_over_one_axis(synthetic_map):
+    ax = synthetic_map.isel(frequency_ratio=3).snapbeam.plot()
+    assert ax.get_xlabel() == "Velocity amplitude $V$" and "Centre displacement" in ax.get_ylabel()
+    with pytest.raises(InputError, match="are drawn over two axes"):
+        figures.plot_response_map(synthetic_map.isel(frequency_ratio=3), threshold_line=True)

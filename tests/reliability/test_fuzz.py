@@ -1,0 +1,101 @@
+"""Calls that nobody should make, of every public function and command: refused, finite, or with a status."""
+
+from __future__ import annotations
+
+import random
+
+import fuzz
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import snapbeam as sb
+from snapbeam.core import validate
+from snapbeam.core.validate import InputError
+
+CALLS = 2000
+_MOST_LOOSE = 0.06
+"""Share of calls that may end in an error of Python's own, where an argument is of another kind altogether; it may only
+fall."""
+
+
+def test_new_functions_and_commands_are_included():
+    """The list is made from what the package says is public, and from the program itself."""
+    found = fuzz.public()
+    for name in sb.__all__:
+        value = getattr(sb, name)
+        if callable(value) and not isinstance(value, type):
+            assert f"snapbeam.{name}" in found
+    assert {"map", "simulate", "threshold", "info", "plot"} <= set(fuzz.commands())
+
+
+@pytest.mark.slow
+def test_two_thousand_calls(tried):
+    """None takes long or ends the process; what is raised is a refusal, but for a counted rest that may only fall."""
+    calls, wrong = fuzz.campaign(CALLS, 1)
+    count = sum(map(len, wrong.values()))
+    tried("fuzzed calls", calls)
+    tried("fuzzed calls with a raw error", count)
+    assert calls == CALLS
+    assert count <= _MOST_LOOSE * calls, wrong
+    assert [name for name in wrong if "MemoryError" in name or "RecursionError" in name] == []
+
+
+NUMBERS = st.one_of(
+    st.integers(), st.floats(), st.complex_numbers(), st.fractions(), st.booleans(), st.none(), st.text(max_size=5),
+    st.binary(max_size=5), st.timedeltas(), st.decimals(), st.lists(st.floats(), max_size=3),
+)  # fmt: skip
+CHECKS = {
+    "finite": lambda value: validate.finite("x", value),
+    "positive": lambda value: validate.positive("x", value, "m"),
+    "nonnegative": lambda value: validate.nonnegative("x", value),
+    "within": lambda value: validate.within("x", value, 0.0, 1.0),
+    "integer": lambda value: validate.integer("x", value, -5, 5),
+    "flag": lambda value: validate.flag("x", value),
+    "choice": lambda value: validate.choice("x", value, ("a", "b")),
+    "finite_array": lambda value: validate.finite_array("x", value),
+    "axis": lambda value: validate.axis("x", value, 0.0, 1.0),
+    "file_path": lambda value: validate.file_path("x", value),
+    "mapping": lambda value: validate.mapping("x", value),
+}
+
+
+@pytest.mark.parametrize("check", list(CHECKS))
+def test_every_check_refuses_or_returns(check):
+    """Whatever is given: a value as promised, or a refusal that names the parameter."""
+
+    @settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+    @given(value=NUMBERS)
+    def refused_or_not(value):
+        try:
+            CHECKS[check](value)
+        except InputError as error:
+            assert str(error).startswith("x")
+
+    refused_or_not()
+
+
+PARTS = (
+    "Beam",
+    "HertzContact",
+    "Restitution",
+    "Shaker",
+    "Sine",
+    "Integration",
+    "Replicas",
+    "State",
+    "Keeping",
+)
+
+
+@pytest.mark.parametrize("name", PARTS)
+def test_what_is_written_down_is_checked(name, tried):
+    """The values that a system is made of, each with hostile values in turn: no raw error at all."""
+    kind, draw = getattr(sb, name), random.Random(name)
+    wrong = []
+    for _ in range(120):
+        given_ = fuzz.arguments(kind, draw)
+        if said := fuzz.judged(kind, *given_):
+            wrong.append((said, fuzz._short(given_)))
+    tried("fuzzed calls", 120)
+    assert wrong == []

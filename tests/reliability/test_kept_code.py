@@ -1,0 +1,155 @@
+"""Compiled code on disks that are read-only, full or damaged: checked, rewritten, done without, never fatal."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import random
+
+import pytest
+
+from snapbeam.engines.scalar.kept_code import private_folder
+
+RUN = """
+import snapbeam as sb
+import snapbeam.lab.synthetic.exposure
+from snapbeam import paper
+system = sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=1), contact=paper.CONTACT,
+                   striker=sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))
+run = sb.simulate(system, sb.Integration(cycles=1))
+print(run.outcome.status.name, float(run.dataset.displacement[-1]).hex())
+"""
+"""A run, whose kernel is compiled."""
+SMALL = """
+from numba import njit
+from snapbeam.engines.scalar.kept_code import keep_code
+
+@njit
+def twice(x):
+    return 2.0 * x
+
+keep_code(twice, "mark")
+print(twice(21.0), "loaded" if twice.stats.cache_hits else "compiled")
+"""
+"""A function that compiles in no time, kept as kernels are."""
+
+
+@pytest.fixture
+def small(python):
+    """Run the small function from a folder of its own, in a fresh process."""
+
+    def run(folder, **environment):
+        file = folder / "small.py"
+        if not file.exists():
+            file.write_text(SMALL)
+        path = f"{folder}{os.pathsep}{python.package}"
+        done = python("import small", path, timeout=60, **environment)
+        assert done.returncode == 0, done.stderr
+        assert "Traceback" not in done.stderr
+        return done.stdout.strip(), done.stderr
+
+    return run
+
+
+def started(folder):
+    """The same in this process, in a module made anew."""
+    file = folder / "small.py"
+    if not file.exists():
+        file.write_text(SMALL.replace("print", "answer = "))
+    spec = importlib.util.spec_from_file_location("small", file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.answer
+
+
+def kept_files(folder):
+    return sorted(folder.rglob("*.nb?"))
+
+
+def test_kept_and_loaded(tmp_path):
+    assert started(tmp_path) == (42.0, "compiled")
+    assert len(kept_files(tmp_path)) == 2
+    assert started(tmp_path) == (42.0, "loaded")
+
+
+@pytest.mark.parametrize("harm", ["flipped", "cut", "emptied", "foreign", "folder"])
+def test_damaged_code_is_compiled_again(tmp_path, tried, harm):
+    """Any damage: the function is compiled again, and the file is good from then on."""
+    started(tmp_path)
+    draw = random.Random(harm)
+    for which in (0, 1):
+        for _ in range(20 if harm in ("flipped", "cut") else 1):
+            file = kept_files(tmp_path)[which]
+            data = bytearray(file.read_bytes())
+            if harm == "flipped":
+                data[draw.randrange(len(data))] ^= 1 << draw.randrange(8)
+            file.unlink()
+            if harm == "folder":
+                file.mkdir()
+            else:
+                kept = {"cut": data[: draw.randrange(1, len(data))], "emptied": b"", "foreign": b"MZ" * 400}
+                file.write_bytes(kept.get(harm, data))
+            assert started(tmp_path) == (42.0, "compiled")
+            if harm == "folder":
+                file.rmdir()
+                started(tmp_path)
+            assert started(tmp_path) == (42.0, "loaded")
+            tried("damaged files of compiled code")
+
+
+def test_a_full_disk_keeps_no_code(small, mounted, tried):
+    """Said once; the answer is the same."""
+    disk = mounted("disk", "size=16k")
+    (disk / "small.py").write_text(SMALL)
+    (disk / "filler").write_bytes(b"0" * 4096)
+    answer, said = small(disk, TMPDIR=str(disk), HOME=str(disk))
+    assert answer == "42.0 compiled"
+    assert said.count("compiled code is not kept") == 1
+    tried("starts with a full disk for compiled code")
+
+
+def test_read_only_package_and_home(small, mounted, read_only, tmp_path, tried):
+    """Kept in a private folder of the temporary ones; with none to write to, not at all."""
+    disk, other = mounted("disk", "size=64k"), tmp_path / "temporary"
+    other.mkdir()
+    (disk / "small.py").write_text(SMALL)
+    read_only(disk)
+    places = {"HOME": str(disk), "XDG_CACHE_HOME": str(disk)}
+    answer, said = small(disk, TMPDIR=str(other), **places)
+    assert answer == "42.0 compiled" and said.count("compiled code is kept in") == 1
+    assert kept_files(other) and all(f.parent.stat().st_mode & 0o077 == 0 for f in kept_files(other))
+    assert small(disk, TMPDIR=str(other), **places)[0] == "42.0 loaded"
+    tried("starts with package and HOME read-only", 2)
+
+
+def test_a_private_folder_that_is_somebody_elses_is_not_used(tmp_path, monkeypatch):
+    """Code is loaded from no folder that others may write."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    folder = private_folder()
+    assert os.stat(folder).st_mode & 0o777 == 0o700
+    os.chmod(folder, 0o777)
+    with pytest.raises(PermissionError):
+        private_folder()
+    os.rmdir(folder)
+    os.symlink(tmp_path, folder)
+    with pytest.raises(PermissionError):
+        private_folder()
+
+
+@pytest.mark.slow
+def test_a_run_from_read_only_package_and_home(python, copied, mounted, read_only, tried):
+    """The whole package where nothing can be written: the same numbers, nothing but a line on the log."""
+    site = copied(mounted("site", "size=64m"))
+    nowhere = mounted("nowhere", "size=64k")
+    free = python(RUN, site, HOME=str(nowhere), NUMBA_NUM_THREADS="1")
+    assert free.returncode == 0, free.stderr
+    for cache in site.rglob("*.nb?"):
+        cache.unlink()
+    for place in (site, nowhere):
+        read_only(place)
+    places = {name: str(nowhere) for name in ("HOME", "TMPDIR", "XDG_CACHE_HOME", "MPLCONFIGDIR")}
+    done = python(RUN, site, **places)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == free.stdout and done.stdout.startswith("OK")
+    assert "Traceback" not in done.stderr
+    tried("starts with package and HOME read-only")

@@ -1,0 +1,32 @@
+"""The bounds of the dependencies are stated so that they can be installed and tested (make test-oldest)."""
+
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+from oldest import PYPROJECT, oldest
+
+EXTRAS = ["lab", "cluster", "video", "dev"]
+
+
+def test_every_dependency_has_a_lower_bound_that_can_be_installed():
+    project = tomllib.loads(PYPROJECT.read_text())["project"]
+    count = len(project["dependencies"]) + sum(len(project["optional-dependencies"][each]) for each in EXTRAS)
+    assert len(oldest(EXTRAS)) == count
+    assert "typer==0.17.5" in oldest([])
+
+
+@pytest.mark.parametrize(
+    "text", ["numpy", "numpy>=2,<3", "numpy~=2.0", "numpy>=2.0; python_version < '3.12'"]
+)
+def test_other_bounds_are_refused(tmp_path, text):
+    file = tmp_path / "pyproject.toml"
+    file.write_text(f'[project]\ndependencies = ["{text}"]\n')
+    with pytest.raises(ValueError, match="must be name>=version"):
+        oldest([], file)
+
+
+def test_the_source_distribution_holds_what_builds_and_tests_it():
+    held = tomllib.loads(PYPROJECT.read_text())["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
+    assert {"/Makefile", "/src", "/tests", "/constraints.txt"} <= set(held)

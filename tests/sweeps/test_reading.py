@@ -1,0 +1,76 @@
+"""A store is read as it stands: whole, half done, and while it is written."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam.config import Config
+
+pytest.importorskip("zarr")
+
+
+@pytest.fixture(scope="module")
+def system():
+    return Config().system.replace(**{"model.modes": 2})
+
+
+AXES = {"velocity_amplitude": np.linspace(0.05, 0.4, 10), "frequency_ratio": np.linspace(0.5, 2.0, 12)}
+
+
+@pytest.fixture(scope="module")
+def whole(system, tmp_path_factory):
+    path = tmp_path_factory.mktemp("store") / "map.store"
+    dataset = sb.sweep(system, AXES, sb.Integration(cycles=5), store=sb.Keeping(path, chunk=16))
+    return path, dataset
+
+
+def test_a_finished_store_is_the_map_that_was_returned(whole):
+    path, dataset = whole
+    read = sb.read_store(path)
+    assert read.attrs["points_done"] == read.attrs["points_total"] == 120
+    for name in sb.STATISTICS:
+        np.testing.assert_array_equal(
+            read[name].transpose(*dataset[name].dims).values, dataset[name].values, name
+        )
+    np.testing.assert_array_equal(read["frequency_ratio"], dataset["frequency_ratio"])
+    assert json.loads(read.attrs["system"]) == json.loads(dataset.attrs["system"])
+
+
+def test_what_is_not_done_is_unknown_and_says_so(whole, tmp_path):
+    import shutil
+
+    path, dataset = whole
+    half = tmp_path / "half.store"
+    shutil.copytree(path, half)
+    lines = (half / "ledger.jsonl").read_text().splitlines()
+    (half / "ledger.jsonl").write_text("\n".join([*lines[:3], lines[3][:40]]))  # the last line is torn
+    read = sb.read_store(half)
+    assert read.attrs["points_done"] == 48
+    known = read["response"].transpose(*dataset["response"].dims).values >= 0
+    assert known.sum() == 48
+    assert (read["status"].values[read["response"].values < 0] == sb.RunStatus.NOT_RUN).all()
+    np.testing.assert_array_equal(
+        read["response"].transpose(*dataset["response"].dims).values[known], dataset["response"].values[known]
+    )
+
+
+def test_damaged_rows_are_not_read(whole, tmp_path):
+    import shutil
+
+    path, _ = whole
+    spoilt = tmp_path / "spoilt.store"
+    shutil.copytree(path, spoilt)
+    chunk = next(item for item in (spoilt / "runs.zarr" / "base" / "numbers").rglob("c*") if item.is_file())
+    chunk.write_bytes(chunk.read_bytes()[:-5] + b"12345")
+    assert sb.read_store(spoilt).attrs["points_done"] == 104
+
+
+def test_what_is_no_store_is_refused(tmp_path):
+    with pytest.raises(sb.InputError, match="holds no map"):
+        sb.read_store(tmp_path)
+    with pytest.raises(sb.InputTypeError, match="must be a folder"):
+        sb.read_store(3)
