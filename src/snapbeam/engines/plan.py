@@ -9,8 +9,8 @@ import numpy as np
 
 from snapbeam.core.validate import choice, positive
 from snapbeam.model.contact import ContactLaw
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import ACCURACIES
-from snapbeam.model.reduction import ReducedModel
 
 __all__ = ["Plan", "plan_steps"]
 
