@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from snapbeam.engines.scalar.compile import kernel
 from snapbeam.engines.scalar.composition import COMPOSITIONS
 from snapbeam.engines.structure import Structure, structure_of
-from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.galerkin.reduction import ReducedModel
 
 __all__ = ["flight_step"]
 
