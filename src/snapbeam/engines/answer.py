@@ -16,6 +16,11 @@ from snapbeam.model.decision import decidable_energy
 
 __all__ = ["Reading", "statistics_of"]
 
+_MADE = 0.01
+"""Of the gross work: energy out of nothing from which a run is not believed."""
+_ROUNDED = 1e-6
+"""Of the energies themselves, the same."""
+
 
 @dataclass(frozen=True)
 class Reading:
@@ -46,9 +51,22 @@ class Reading:
         return self.ensemble.first_side
 
     @cached_property
+    def status(self) -> NDArray[np.int64]:
+        """How each run ended; what ended with more energy than it was given is unbalanced.
+
+        Damping, and a contact with losses, only take energy.
+        """
+        book, status = self.book, self.book["status"]
+        done = (status == RunStatus.OK) | (status == RunStatus.DECIDED)
+        made = book["energy"] - book["first_energy"] - book["work"]
+        allowed = _MADE * book["gross_work"]
+        allowed = allowed + _ROUNDED * (np.abs(book["energy"]) + np.abs(book["first_energy"]))
+        return np.where(done & (made > allowed), RunStatus.UNBALANCED, status)
+
+    @cached_property
     def good(self) -> NDArray[np.bool_]:
         """Runs whose class is known."""
-        status = self.book["status"]
+        status = self.status
         return np.asarray((status == RunStatus.OK) | (status == RunStatus.DECIDED))
 
     @cached_property
