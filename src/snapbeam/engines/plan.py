@@ -14,7 +14,7 @@ from snapbeam.model.integration import ACCURACIES
 __all__ = ["Plan", "plan_steps"]
 
 # Free flight: the error allowed a step, as it is measured on the structure, by level of accuracy.
-_LIMIT = {"map": 1.5e-7, "reference": 2e-11}
+_LIMIT = {"map": 2.5e-7, "reference": 2e-11}
 _LIMIT_OF_HITS = {"map": 1e-9, "reference": 1e-13}
 """Where impacts last no time: no contact steps share the error, and there is one mode only."""
 _ORDER = {"map": 4, "reference": 6}
