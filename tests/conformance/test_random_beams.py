@@ -75,7 +75,7 @@ def solved(rng: np.random.Generator) -> Drawn | None:
 
 
 def judge(tried: list[Drawn | None]) -> None:
-    """Of the well-conditioned runs 97 in 100 are within the limits of both levels, and all near them; figures are printed."""
+    """Of the well-conditioned runs 97 in 100 are within the limits of both levels, and all near them."""
     draws = [draw for draw in tried if draw is not None]
     assert len(draws) >= 0.98 * len(tried)
     well = [draw for draw in draws if draw.separation <= WELL]
