@@ -21,20 +21,20 @@ CASES = [
     (1, (1.21, 0.05), 4, 2e-7),
     (1, (1.625, 0.3), 6, 4e-6),
     (1, (1.4, 0.02), 4, 3e-9),
-    (2, (1.21, 0.18), 6, 3e-6),
-    (2, (1.21, 0.05), 4, 7e-9),
-    (2, (2.5, 0.2), 6, 3e-7),
-    (2, (1.4, 0.02), 4, 5e-10),
+    (2, (1.21, 0.18), 6, 6e-6),
+    (2, (1.21, 0.05), 4, 1.6e-8),
+    (2, (2.5, 0.2), 6, 5e-7),
+    (2, (1.4, 0.02), 4, 8e-10),
     (8, (1.21, 0.18), 1, 4e-7),
-    (8, (1.21, 0.05), 1, 2e-7),
-    (8, (1.625, 0.3), 1, 5e-8),
-    (8, (1.4, 0.02), 1, 2.4e-8),
+    (8, (1.21, 0.05), 1, 4e-7),
+    (8, (1.625, 0.3), 1, 1.4e-7),
+    (8, (1.4, 0.02), 1, 4e-8),
 ]
 DEAR = [
-    (32, (1.21, 0.18), 2, 2e-8),
-    (32, (1.21, 0.05), 2, 5e-8),
-    (32, (1.625, 0.3), 2, 5e-8),
-    (32, (1.4, 0.02), 2, 7e-9),
+    (32, (1.21, 0.18), 2, 2.2e-7),
+    (32, (1.21, 0.05), 2, 3e-7),
+    (32, (1.625, 0.3), 2, 2.1e-7),
+    (32, (1.4, 0.02), 2, 4.4e-8),
 ]
 SAMPLES = 3000
 
@@ -89,7 +89,7 @@ def test_statistics(march, model_of, modes, pair, cycles, measured) -> None:
         model_of(modes), frequency_ratio=pair[0], velocity_amplitude=pair[1], cycles=cycles
     ).statistics
     # of b: what a cubic through the flight steps may miss, and what may lie between two samples
-    cubic, grid = 2e-5 + measured, 2e-3
+    cubic, grid = 5e-5 + measured, 2e-3
     for name, values in (
         ("displacement", truth.displacement),
         ("center_displacement", truth.center_displacement),
