@@ -109,16 +109,3 @@ def test_an_interrupt_while_it_loads_is_no_traceback():
 def test_no_such_file(tmp_path):
     with pytest.raises(sb.InputError, match=r"drive = .*no such file"):
         read_netcdf(tmp_path / "none.nc", "drive")
-
-
-def test_a_file_of_somebody_else_is_not_replaced(written, tmp_path):
-    mine, own = tmp_path / "thesis.nc", tmp_path / "map.nc"
-    xr.Dataset({"years": ("chapter", [3.0, 4.0])}).to_netcdf(mine, engine="h5netcdf")
-    before = mine.read_bytes()
-    run = sb.load_run(written / "run.nc")
-    with pytest.raises(sb.InputError, match="did not write"):
-        run.save(mine)
-    assert mine.read_bytes() == before
-    run.save(own)
-    run.save(own)
-    assert repr(dict(sb.load_run(own).outcome)) == repr(dict(run.outcome))
