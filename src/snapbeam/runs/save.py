@@ -73,11 +73,11 @@ def load_run(path: str | os.PathLike[str]) -> Run:
         If the file cannot be read or holds no run.
     """
     path = file_path("path", path)
-    parts = {name: read_netcdf(path, group=name) for name in (None, *_GROUPS)}
-    dataset = parts[None]
+    dataset = read_netcdf(path)
     attrs = dict(dataset.attrs)
     if attrs.pop("snapbeam_format", None) != _FORMAT:
         raise InputError(f"path = {str(path)!r}: is no file of a run that Run.save wrote")
+    parts = {name: read_netcdf(path, group=name) for name in _GROUPS}
     try:
         system = System.from_mapping(_arrays(json.loads(attrs.pop("snapbeam_system"))))
         integration = Integration(**json.loads(attrs.pop("snapbeam_integration")))
