@@ -226,7 +226,8 @@ def _energy_error(books: Any) -> float:
     The striker's work less what the beam and the contact gained and what was dissipated, as it was integrated.
     """
     book = books[0]
-    missed = book["work"] - (book["energy"] - book["first_energy"]) - book["dissipated"]
+    with np.errstate(invalid="ignore"):  # a run that failed has no numbers
+        missed = book["work"] - (book["energy"] - book["first_energy"]) - book["dissipated"]
     scale = float(book["gross_work"]) or float(abs(book["first_energy"]) + abs(book["energy"])) or 1.0
     return float(missed) / scale
 
