@@ -51,10 +51,10 @@ from snapbeam.model.drive import (
     Still,
     TwoSines,
 )
-from snapbeam.model.frequencies import exact_natural_freq
+from snapbeam.model.galerkin.frequencies import exact_natural_freq
+from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import Integration
-from snapbeam.model.quasi_static import quasi_static_threshold
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.model.striker import RecordedDrive, Shaker, Striker
 from snapbeam.model.system import System

@@ -15,8 +15,8 @@ from snapbeam.config.parameters import Parameter, short_names
 from snapbeam.core.validate import InputError
 from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
+from snapbeam.model.galerkin.reduction import MODEL_QUANTITIES
 from snapbeam.model.quantity import RUN, STRUCTURE, quantities
-from snapbeam.model.reduction import MODEL_QUANTITIES
 
 TABLE = parameters()
 CLASSES = {

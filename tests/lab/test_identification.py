@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 import snapbeam as sb
 from snapbeam.core.codes import ResponseClass, classify
 from snapbeam.core.validate import InputError
-from snapbeam.figures.identification import plot_decay
+from snapbeam.figures.lab.identification import plot_decay
 from snapbeam.lab.compare.response import measure_response
 from snapbeam.lab.decay.identify import METHODS, identify_decay
 from snapbeam.lab.decay.wells import compare_wells

@@ -6,22 +6,22 @@ from typing import Annotated
 
 import typer
 
-from snapbeam.cli.calibrate import calibrate
-from snapbeam.cli.campaign import campaign
-from snapbeam.cli.compare import compare
 from snapbeam.cli.draw import draw
 from snapbeam.cli.dynamics import dynamics
 from snapbeam.cli.explore import explore
 from snapbeam.cli.frequencies import frequencies
-from snapbeam.cli.identify import identify
 from snapbeam.cli.info import info
+from snapbeam.cli.lab.calibrate import calibrate
+from snapbeam.cli.lab.campaign import campaign
+from snapbeam.cli.lab.compare import compare
+from snapbeam.cli.lab.identify import identify
+from snapbeam.cli.lab.track import track
+from snapbeam.cli.lab.vibrometer import vibrometer
 from snapbeam.cli.map import compute_map
 from snapbeam.cli.paper import paper
 from snapbeam.cli.plot import plot
 from snapbeam.cli.simulate import simulate
 from snapbeam.cli.threshold import threshold
-from snapbeam.cli.track import track
-from snapbeam.cli.vibrometer import vibrometer
 from snapbeam.core.provenance import __version__
 
 __all__ = ["app", "main"]

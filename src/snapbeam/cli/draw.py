@@ -7,8 +7,16 @@ from typing import Annotated, Any
 
 import typer
 
-from snapbeam.cli.console import door, file_line, out
-from snapbeam.cli.parameter_options import BEAM, CONTACT, DRIVE, MODEL, STRIKER, configured, with_parameters
+from snapbeam.cli.common.console import door, file_line, out
+from snapbeam.cli.common.parameter_options import (
+    BEAM,
+    CONTACT,
+    DRIVE,
+    MODEL,
+    STRIKER,
+    configured,
+    with_parameters,
+)
 
 __all__ = ["draw"]
 
@@ -22,7 +30,7 @@ def draw(
     ],
 ) -> None:
     """Draw what is studied: beam and wells, what strikes it, how it is held, and how it moves."""
-    from snapbeam.cli.results import check_pictures
+    from snapbeam.cli.common.results import check_pictures
 
     check_pictures(("output", output))
     from snapbeam.figures.schematic import plot_system

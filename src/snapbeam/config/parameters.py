@@ -18,9 +18,9 @@ from snapbeam.core.validate import InputError, shown
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
+from snapbeam.model.galerkin.reduction import MODEL_QUANTITIES
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN, Quantity, quantities
-from snapbeam.model.reduction import MODEL_QUANTITIES
 from snapbeam.model.start import START_NAME
 from snapbeam.model.striker import Striker
 

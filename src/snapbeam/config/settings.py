@@ -15,11 +15,11 @@ from snapbeam.config.contact import MATERIALS, contact_of, contact_rivals, law_o
 from snapbeam.config.parameters import lookup
 from snapbeam.config.physical import PHYSICAL, checked_physical, physical_name, unit_of
 from snapbeam.core.validate import InputError, instance, mapping
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import parts_from_mapping
 from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
 from snapbeam.model.quantity import quantities
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.system import System
 
 __all__ = ["DEFAULT_AXES", "DEFAULT_DRIVE", "Config", "config_from_mapping", "override", "same_axis"]

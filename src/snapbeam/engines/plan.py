@@ -8,8 +8,8 @@ from typing import NamedTuple
 from snapbeam.core.validate import choice, positive
 from snapbeam.engines.measure import flight_step
 from snapbeam.model.contact import ContactLaw
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import ACCURACIES
-from snapbeam.model.reduction import ReducedModel
 
 __all__ = ["Plan", "plan_steps"]
 

@@ -16,7 +16,7 @@ from snapbeam.core.files import atomic_path, check_writable
 from snapbeam.core.validate import InputError, integer, nonnegative, positive
 from snapbeam.figures.captions import caption
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.bent import displacement_along
+from snapbeam.model.galerkin.bent import displacement_along
 from snapbeam.runs.schema import check_trajectory
 
 if TYPE_CHECKING:

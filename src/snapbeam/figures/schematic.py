@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from snapbeam.core.validate import InputError, instance
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
 from snapbeam.model.drive import Flight
-from snapbeam.model.modes import BucklingModes
+from snapbeam.model.galerkin.modes import BucklingModes
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
 

@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 from snapbeam.core.validate import InputError, finite
-from snapbeam.model.modes import wavenumbers
+from snapbeam.model.galerkin.modes import wavenumbers
 from snapbeam.model.quantity import quantities, quantity
 
 __all__ = ["Beam"]

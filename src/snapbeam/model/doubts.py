@@ -5,8 +5,8 @@ from __future__ import annotations
 from snapbeam.core.findings import Finding
 from snapbeam.model.beam import Beam
 from snapbeam.model.drive import Sine
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.quantity import quantities
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.striker import Striker
 
 __all__ = ["doubts_of"]

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from snapbeam.core.validate import InputError
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.mapping import SECTIONS
 from snapbeam.model.quantity import quantities
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.start import started
 from snapbeam.model.state import State
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from snapbeam.core.validate import InputError, finite_array, integer
-from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.model.striker import Striker
 

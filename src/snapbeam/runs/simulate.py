@@ -22,8 +22,8 @@ from snapbeam.engines.outputs import Recorded
 from snapbeam.engines.registry import resolve
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.drive import Recorded as RecordedMotion
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import Integration
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.model.striker import RecordedDrive, Shaker, Striker
 from snapbeam.model.system import System

@@ -24,8 +24,8 @@ from snapbeam.lab.calibration.measurements import ContactTest, Measurements, loa
 from snapbeam.lab.calibration.parity import either_well, shape_findings
 from snapbeam.lab.plausibility.calibration import KINDS
 from snapbeam.model.beam import Beam
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.paper_values import BEAM, MODES
-from snapbeam.model.reduction import ReducedModel
 
 __all__ = ["Calibration", "ContactTest", "Measurements", "Residual", "calibrate", "load_measurements"]
 

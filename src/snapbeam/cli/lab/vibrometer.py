@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from snapbeam.cli import lab
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import door, file_line, out
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import door, file_line, out
+from snapbeam.cli.lab import options as lab
 
 __all__ = ["vibrometer"]
 
@@ -107,7 +107,7 @@ def vibrometer(
     findings = drive.findings
     alignment = None
     if camera is not None:
-        from snapbeam.cli.results import open_result
+        from snapbeam.cli.common.results import open_result
         from snapbeam.lab.drive.align import align
         from snapbeam.lab.drive.seen import shaker_signal
 
@@ -122,7 +122,7 @@ def vibrometer(
         console.print(f"  alignment    {alignment.description}")
     lab.tell_findings(console, findings)
     if plot is not None:
-        from snapbeam.figures.vibrometer import plot_drive
+        from snapbeam.figures.lab.vibrometer import plot_drive
 
         save_figure(plot_drive(data, drive), plot)
         console.print(f"Written: {file_line(plot)}")

@@ -26,7 +26,7 @@ def config_of_file(path: Path, point: str | None) -> Config:
     point : str, optional
         ``name=value,name=value``: the point nearest to these coordinates, its values exact.
     """
-    from snapbeam.cli.results import open_result
+    from snapbeam.cli.common.results import open_result
     from snapbeam.config import config_from_mapping
     from snapbeam.core.validate import InputError
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from snapbeam.cli import lab
-from snapbeam.cli.console import door, duration, file_line, out, progress
+from snapbeam.cli.common.console import door, duration, file_line, out, progress
+from snapbeam.cli.lab import options as lab
 
 if TYPE_CHECKING:
     from snapbeam.lab.camera.recording import Recording
@@ -217,8 +217,8 @@ def track(
             import matplotlib
 
             matplotlib.use("Agg")
+            from snapbeam.figures.lab.tracking import plot_frame, plot_tracking_quality
             from snapbeam.figures.style import save_figure
-            from snapbeam.figures.tracking import plot_frame, plot_tracking_quality
 
             if picture is not None:
                 files.append(save_figure(plot_frame(opened, dataset, frame), picture))
@@ -229,7 +229,7 @@ def track(
         write_netcdf(dataset, output)
         files.insert(0, output)
         if video is not None:
-            from snapbeam.figures.tracking_video import annotated_video
+            from snapbeam.figures.lab.tracking_video import annotated_video
 
             with progress(len(opened), "video", "frames") as tell:
                 files.append(annotated_video(opened, dataset, video, every=video_every, progress=tell))

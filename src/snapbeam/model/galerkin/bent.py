@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.validate import InputError, finite_array
-from snapbeam.model.modes import BucklingModes
+from snapbeam.model.galerkin.modes import BucklingModes
 
 __all__ = ["displacement_along"]
 

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from snapbeam.cli import lab
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import door, file_line, out
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import door, file_line, out
+from snapbeam.cli.lab import options as lab
 
 __all__ = ["identify"]
 
@@ -130,12 +130,12 @@ def identify(
     findings = tuple({one.code: one for fit in fits.values() for one in fit.findings}.values())
     lab.tell_findings(console, findings)
     if plot is not None:
-        from snapbeam.figures.identification import plot_decay
+        from snapbeam.figures.lab.identification import plot_decay
 
         save_figure(plot_decay(data, first), plot)
         console.print(f"Written: {file_line(plot)}")
     if stabilisation is not None:
-        from snapbeam.figures.identification import plot_stabilisation
+        from snapbeam.figures.lab.identification import plot_stabilisation
 
         save_figure(plot_stabilisation(data, first), stabilisation)
         console.print(f"Written: {file_line(stabilisation)}")

@@ -10,8 +10,8 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import write_json
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import write_json
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from snapbeam.cli import lab
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import door, file_line, out
-from snapbeam.cli.results import open_result
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import door, file_line, out
+from snapbeam.cli.common.results import open_result
+from snapbeam.cli.lab import options as lab
 from snapbeam.core.codes import ResponseClass
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def _dots(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | N
         console.print(f"[yellow]note[/] {note}")
     figure = None
     if draw:
-        from snapbeam.figures.dot_comparison import plot_dot_comparison
+        from snapbeam.figures.lab.dot_comparison import plot_dot_comparison
 
         figure = plot_dot_comparison(dataset, dots, result)
     return result.summary(), figure
@@ -185,7 +185,7 @@ def _run(
     }
     figure = None
     if draw:
-        from snapbeam.figures.waveform_comparison import plot_waveform_comparison, plot_waveform_overlay
+        from snapbeam.figures.lab.waveform_comparison import plot_waveform_comparison, plot_waveform_overlay
 
         figure = (plot_waveform_overlay if draw == "overlay" else plot_waveform_comparison)(result, window)
     return summary, figure, findings

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from snapbeam.cli import lab
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import FAILED, door, file_line, out
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import FAILED, door, file_line, out
+from snapbeam.cli.lab import options as lab
 
 __all__ = ["campaign"]
 
@@ -99,7 +99,7 @@ def campaign(
     import matplotlib
 
     matplotlib.use("Agg")
-    from snapbeam.figures.campaign import plot_campaign
+    from snapbeam.figures.lab.campaign import plot_campaign
     from snapbeam.figures.style import save_figure
 
     files = [
@@ -135,8 +135,8 @@ def _tell(done: int, total: int, result: Any) -> None:
 
 def _on_map(target: Path, simulated: Path) -> Path:
     """The responses on a map; the share that agrees is printed."""
-    from snapbeam.cli.results import open_result
-    from snapbeam.figures.dot_comparison import plot_dot_comparison
+    from snapbeam.cli.common.results import open_result
+    from snapbeam.figures.lab.dot_comparison import plot_dot_comparison
     from snapbeam.figures.style import save_figure
     from snapbeam.lab.compare.dots import read_dots
     from snapbeam.lab.compare.maps import compare_dots

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from snapbeam.cli.parameter_options import parse_count, parse_number
+from snapbeam.cli.common.parameter_options import parse_count, parse_number
 
 __all__ = ["count_option", "number_option", "parse_window"]
 

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive, shown, within
 from snapbeam.model.beam import Beam
-from snapbeam.model.linear import LinearModes, linear_modes_of_beam, linear_modes_of_structure
-from snapbeam.model.matrices import Structure, checked_structure, damping_ratios
-from snapbeam.model.modes import MAX_MODES, BucklingModes
+from snapbeam.model.galerkin.linear import LinearModes, linear_modes_of_beam, linear_modes_of_structure
+from snapbeam.model.galerkin.matrices import Structure, checked_structure, damping_ratios
+from snapbeam.model.galerkin.modes import MAX_MODES, BucklingModes
 from snapbeam.model.quantity import Quantity
 
 __all__ = ["MODEL_QUANTITIES", "ReducedModel"]

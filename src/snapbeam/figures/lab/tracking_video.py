@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from snapbeam.core.files import atomic_path, check_writable
 from snapbeam.core.validate import InputError, integer, positive
-from snapbeam.figures.tracking import flag_words, found_edges
+from snapbeam.figures.lab.tracking import flag_words, found_edges
 from snapbeam.lab.tracking.quality import check_tracked
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from rich.console import Group, RenderableType
 from rich.markup import escape
 from rich.table import Table
 
-from snapbeam.cli.console import duration, file_line
-from snapbeam.cli.source import point_text
+from snapbeam.cli.common.console import duration, file_line
+from snapbeam.cli.common.source import point_text
 from snapbeam.core.codes import ResponseClass, RunStatus
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError
 from snapbeam.model.beam import Beam
-from snapbeam.model.modes import BucklingModes
-from snapbeam.model.rank_one import rank_one_eigenpairs
+from snapbeam.model.galerkin.modes import BucklingModes
+from snapbeam.model.galerkin.rank_one import rank_one_eigenpairs
 
 __all__ = ["LinearModes", "linear_modes_of_beam", "linear_modes_of_structure"]
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from snapbeam.cli import lab
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import door, file_line, out
-from snapbeam.cli.parameter_options import configured
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import door, file_line, out
+from snapbeam.cli.common.parameter_options import configured
+from snapbeam.cli.lab import options as lab
 
 if TYPE_CHECKING:
     from snapbeam.core.findings import Finding
@@ -168,7 +168,7 @@ def calibrate(
         result.write_config(output)
         console.print(f"Written: {file_line(output)}")
     if plot is not None:
-        from snapbeam.figures.calibration import plot_calibration
+        from snapbeam.figures.lab.calibration import plot_calibration
 
         save_figure(plot_calibration(result), plot)
         console.print(f"Written: {file_line(plot)}")
@@ -190,7 +190,7 @@ def _shapes(text: str) -> tuple[str, tuple[str, ...]]:
 
 def _contact_tests(path: Path, effective_mass: float) -> tuple[tuple[ContactTest, ...], tuple[Finding, ...]]:
     """The contact stiffness of tracked impacts as one test, and what is to be said of it."""
-    from snapbeam.cli.results import open_result
+    from snapbeam.cli.common.results import open_result
     from snapbeam.core.validate import InputError
     from snapbeam.lab.calibration.impacts import stiffness_from_impacts
     from snapbeam.lab.calibration.measurements import HERTZ_TIME, ContactTest

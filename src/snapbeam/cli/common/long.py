@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import duration, notes, pace, progress
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import duration, notes, pace, progress
 
 if TYPE_CHECKING:
     from snapbeam.config import Config

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from snapbeam.cli.console import answer, notes, out
+from snapbeam.cli.common.console import answer, notes, out
 
 if TYPE_CHECKING:
     from snapbeam.config import Config
@@ -236,7 +236,7 @@ def configured(
 
     config = load_config(given["config"]) if given.get("config") is not None else Config()
     if given.get("from_") is not None:
-        from snapbeam.cli.source import config_of_file
+        from snapbeam.cli.common.source import config_of_file
 
         if given.get("config") is not None:
             raise InputError("from, config: give one of the two")
