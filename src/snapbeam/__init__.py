@@ -54,6 +54,7 @@ from snapbeam.model.drive import (
 from snapbeam.model.galerkin.frequencies import exact_natural_freq
 from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
 from snapbeam.model.galerkin.reduction import ReducedModel
+from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.striker import RecordedDrive, Shaker, Striker
@@ -96,6 +97,7 @@ __all__ = [
     "HalfSine",
     "HertzContact",
     "HuntCrossley",
+    "Imperfection",
     "InputError",
     "InputTypeError",
     "Integration",

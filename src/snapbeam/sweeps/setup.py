@@ -105,6 +105,7 @@ class SweepSetup:
                     law=ensemble.law,
                     drive=ensemble.drive,
                     body=ensemble.structure.body_mass is not None,
+                    uneven=ensemble.structure.model.side_force is not None,
                 )[1]
                 books = engine.run_ensemble(ensemble, threads, report)
                 for name, values in statistics_of(ensemble, books).items():
@@ -293,6 +294,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         modes=system.model.modes,
         law=law,
         body=system.striker is not None and system.striker.mass is not None,
+        uneven=system.model.side_force is not None,
         **({} if system.striker is None else {"drive": type(system.striker.drive)}),
     )[0]
     setup = SweepSetup(system, integration.replace(engine=resolved), points)
