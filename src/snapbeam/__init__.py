@@ -55,6 +55,7 @@ from snapbeam.model.galerkin.frequencies import exact_natural_freq
 from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.imperfection import Imperfection
+from snapbeam.model.imperfection.fitted import fit_wells
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.striker import RecordedDrive, Shaker, Striker
@@ -142,6 +143,7 @@ __all__ = [
     "continue_orbit",
     "edge_state",
     "exact_natural_freq",
+    "fit_wells",
     "explore",
     "hertz_stress",
     "integrity",

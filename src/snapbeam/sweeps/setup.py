@@ -170,7 +170,7 @@ class SweepSetup:
         return [
             name
             for name in self.points.names
-            if name.startswith(("beam.", "model.", "run.step", "run.accuracy"))
+            if name.startswith(("beam.", "model.", "imperfection.", "run.step", "run.accuracy"))
         ]
 
     def identity(self) -> dict[str, Any]:

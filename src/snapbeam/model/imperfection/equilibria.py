@@ -44,7 +44,7 @@ class Equilibrium:
         return f"<Equilibrium: {kind} at {self.energy:.6g} J>"
 
 
-def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[_Array]:
+def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[tuple[_Array, int]]:
     """All solutions alpha of K0 alpha + gamma (alpha . alpha) alpha = B.
 
     With the eigenvalues kappa_i of K0 and B in its eigenvectors, alpha_i = B_i/(kappa_i + gamma s), where
@@ -55,6 +55,9 @@ def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[_Array
     Between two of its poles h is convex and has no root or two; beyond the last it falls, with one root, the well of
     least energy.  So all roots are found: the least value between two poles decides.  Where B_i = 0 and kappa_i < 0 a
     pair with alpha_i of either sign may branch off at kappa_i + gamma s = 0.
+
+    The tangent stiffness is K0 + gamma s and 2 gamma alpha alpha^T, of rank one: it has as many negative
+    eigenvalues as there are kappa_i + gamma s < 0, less one where h rises.
 
     Parameters
     ----------
@@ -67,7 +70,8 @@ def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[_Array
 
     Returns
     -------
-    list of arrays of shape (N,)
+    list of pairs
+        alpha, shape (N,), and the number of negative eigenvalues there.
     """
     if stiffness.ndim == 1:
         kappa, turned, axes = stiffness, force, None
@@ -75,19 +79,21 @@ def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[_Array
         kappa, axes = np.linalg.eigh(stiffness)
         turned = axes.T @ force
     if gamma == 0.0:
-        found = [turned / kappa]
+        found = [(turned / kappa, int((kappa < 0.0).sum()))]
     else:
         found = [_amplitude(kappa, turned, gamma, *root) for root in _roots(kappa, turned, gamma)]
         found += _branches(kappa, turned, gamma)
-    return found if axes is None else [axes @ each for each in found]
+    return found if axes is None else [(axes @ each, index) for each, index in found]
 
 
-def _amplitude(kappa: _Array, force: _Array, gamma: float, origin: int, shift: float) -> _Array:
-    """alpha at s = s_origin + shift, the pole of mode *origin*, or 0 for -1."""
+def _amplitude(
+    kappa: _Array, force: _Array, gamma: float, origin: int, shift: float, rises: bool
+) -> tuple[_Array, int]:
+    """alpha at s = s_origin + shift, the pole of mode *origin*, or 0 for -1; and how unstable it is."""
     alpha = np.zeros_like(force)
-    pushed = force != 0.0
-    alpha[pushed] = (force / _gap(kappa, gamma, origin, shift))[pushed]
-    return alpha
+    pushed, gap = force != 0.0, _gap(kappa, gamma, origin, shift)
+    alpha[pushed] = (force / gap)[pushed]
+    return alpha, int((gap < 0.0).sum()) - int(rises)
 
 
 def _gap(kappa: _Array, gamma: float, origin: int, shift: float) -> _Array:
@@ -97,8 +103,8 @@ def _gap(kappa: _Array, gamma: float, origin: int, shift: float) -> _Array:
     return at
 
 
-def _roots(kappa: _Array, force: _Array, gamma: float) -> list[tuple[int, float]]:
-    """The roots of the secular equation, each as a pole and the distance from it."""
+def _roots(kappa: _Array, force: _Array, gamma: float) -> list[tuple[int, float, bool]]:
+    """The roots of the secular equation, each as a pole and the distance from it, and whether h rises there."""
     pushed = np.flatnonzero(force != 0.0)
     squares = force * force
     poles = [int(i) for i in pushed[np.argsort(-kappa[pushed], kind="stable")] if kappa[i] <= 0.0]
@@ -115,7 +121,7 @@ def _roots(kappa: _Array, force: _Array, gamma: float) -> list[tuple[int, float]
         with np.errstate(divide="ignore"):
             return -2.0 * gamma * float(np.sum(squares[pushed] / gap**3)) - 1.0
 
-    found: list[tuple[int, float]] = []
+    found: list[tuple[int, float, bool]] = []
     for left, right in pairwise(edges):
         width = place[right] - place[left]
         if width <= 0.0:
@@ -152,7 +158,7 @@ def _bracketed(
     origin: int,
     reach: float,
     sign: float,
-) -> tuple[int, float]:
+) -> tuple[int, float, bool]:
     """The root between a pole, or 0, and a place at the distance *reach* where the function is negative."""
     shift = sign * _distance(lambda t: -value(origin, sign * t), reach, pole=origin >= 0)
     for _ in range(_POLISHINGS):
@@ -160,7 +166,7 @@ def _bracketed(
         if not abs(change) < _SMALL * abs(shift):
             break
         shift -= change
-    return origin, shift
+    return origin, shift, sign < 0.0
 
 
 def _distance(function: Callable[[float], float], reach: float, pole: bool) -> float:
@@ -188,7 +194,7 @@ _POLISHINGS = 2
 _SMALL = 1e-6
 
 
-def _branches(kappa: _Array, force: _Array, gamma: float) -> list[_Array]:
+def _branches(kappa: _Array, force: _Array, gamma: float) -> list[tuple[_Array, int]]:
     """The pairs that branch off in a mode without a side force of its own."""
     found = []
     for i in np.flatnonzero((force == 0.0) & (kappa < 0.0)):
@@ -203,5 +209,5 @@ def _branches(kappa: _Array, force: _Array, gamma: float) -> list[_Array]:
             for sign in (-1.0, 1.0):
                 one = alpha.copy()
                 one[i] = sign * math.sqrt(square)
-                found.append(one)
+                found.append((one, int((gap < 0.0).sum())))
     return found

@@ -57,29 +57,22 @@ def landscape_of(stiffness: _Array, gamma: float, force: _Array, center_shape: _
         If no equilibrium is stable, or two wells cannot be told apart by the centre.
     """
     found = []
-    for alpha in equilibria_of(stiffness, gamma, force):
+    for alpha, unstable in equilibria_of(stiffness, gamma, force):
         alpha.setflags(write=False)
         bent = stiffness * alpha if stiffness.ndim == 1 else stiffness @ alpha
         square = float(alpha @ alpha)
         energy = 0.5 * float(alpha @ bent) + 0.25 * gamma * square * square - float(force @ alpha)
-        values = np.linalg.eigvalsh(tangent_stiffness(stiffness, gamma, alpha))
-        rounding = _ROUNDING * float(np.abs(values).max())
-        found.append(
-            Equilibrium(amplitude=alpha, energy=energy, unstable_directions=int((values < -rounding).sum()))
-        )
+        found.append(Equilibrium(amplitude=alpha, energy=energy, unstable_directions=unstable))
     found.sort(key=lambda each: each.energy)
     wells = [each for each in found if each.is_stable]
     if not wells:
         raise InputError("side_force: no equilibrium is stable; must push a structure that stiffens")
+    saddles = [each for each in found if each.unstable_directions == 1] or [
+        each for each in found if not each.is_stable
+    ]
     if len(wells) < 2:
         return Landscape(tuple(found), wells[0], wells[0], None)
     lower, upper = sorted(wells[:2], key=lambda each: float(center_shape @ each.amplitude))
     if not float(center_shape @ lower.amplitude) < float(center_shape @ upper.amplitude):
         raise InputError("center_shape: must tell the two wells apart, but both lie at the same height")
-    saddles = [each for each in found if each.unstable_directions == 1] or [
-        each for each in found if not each.is_stable
-    ]
     return Landscape(tuple(found), lower, upper, saddles[0])
-
-
-_ROUNDING = 1e-13

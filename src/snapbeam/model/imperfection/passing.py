@@ -9,6 +9,7 @@ __all__ = ["least_energy_through", "pinned_load"]
 
 _Array = NDArray[np.float64]
 _HALVINGS = 120
+_BESIDE = 1e-9
 
 
 def least_energy_through(
@@ -48,7 +49,9 @@ def least_energy_through(
     scale = float(np.abs(stiffness).max()) + float(np.abs(force).max()) ** (2.0 / 3.0) * gamma ** (1.0 / 3.0)
 
     def shape(mu: _Array) -> _Array:
+        # at a pole the shape is a limit: beside it is near enough to say which way the bound rises
         gap = stiffness - mu[:, None]
+        gap = np.where((gap == 0.0).any(axis=1)[:, None], gap - _BESIDE * scale, gap)
         first = np.sum(squares / gap, axis=1)
         held = (heights - np.sum(shapes * force / gap, axis=1)) / first
         found: _Array = (force + held[:, None] * shapes) / gap
@@ -70,6 +73,7 @@ def least_energy_through(
             middle = 0.5 * (low + high)
             up = rises(middle)
             low, high = np.where(up, middle, low), np.where(up, high, middle)
+        low = np.where((stiffness == low[:, None]).any(axis=1), low - _BESIDE * scale, low)
         gap = stiffness - low[:, None]
         first = np.sum(squares / gap, axis=1)
         off = heights - np.sum(shapes * force / gap, axis=1)
