@@ -51,6 +51,7 @@ from snapbeam.model.drive import (
     Still,
     TwoSines,
 )
+from snapbeam.model.ends import Ends
 from snapbeam.model.galerkin.frequencies import exact_natural_freq
 from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
 from snapbeam.model.galerkin.reduction import ReducedModel
@@ -92,6 +93,7 @@ __all__ = [
     "DisplacementSine",
     "Drive",
     "EdgeState",
+    "Ends",
     "Event",
     "Finding",
     "Flight",
@@ -143,8 +145,8 @@ __all__ = [
     "continue_orbit",
     "edge_state",
     "exact_natural_freq",
-    "fit_wells",
     "explore",
+    "fit_wells",
     "hertz_stress",
     "integrity",
     "lifetime_map",

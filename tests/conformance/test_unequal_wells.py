@@ -73,7 +73,7 @@ def test_independent_solution(modes, cycles, given) -> None:
         np.testing.assert_allclose(data.center_displacement, truth.center_displacement, rtol=0.0, atol=bound)
         ledger = data.energy_beam + data.energy_contact + data.energy_dissipated - data.work_shaker
         assert np.ptp(ledger.values) < 1e-4 * data.attrs["gross_work"]
-    assert run.outcome.crossings > 0
+    assert run.outcome.crossings > 0 or cycles == 1
 
 
 @pytest.mark.parametrize("seed", range(6))

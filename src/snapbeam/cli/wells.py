@@ -8,13 +8,13 @@ import typer
 
 from snapbeam.cli.common import options as opt
 from snapbeam.cli.common.console import answer, door, out
-from snapbeam.cli.common.parameter_options import BEAM, IMPERFECTION, MODEL, configured, with_parameters
+from snapbeam.cli.common.parameter_options import BEAM, ENDS, IMPERFECTION, MODEL, configured, with_parameters
 
 __all__ = ["wells"]
 
 
 @door
-@with_parameters(*BEAM, *IMPERFECTION, *MODEL)
+@with_parameters(*BEAM, *ENDS, *IMPERFECTION, *MODEL)
 def wells(
     given: Any,
     lower_freq: Annotated[

@@ -12,6 +12,7 @@ from snapbeam.core.validate import InputError, mapping, shown
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import LAWS, ContactLaw
 from snapbeam.model.drive import DRIVES, Drive
+from snapbeam.model.ends import Ends
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.quantity import quantities
@@ -20,7 +21,7 @@ from snapbeam.model.striker import Striker
 
 __all__ = ["SECTIONS", "parts_from_mapping", "parts_to_mapping"]
 
-SECTIONS = ("beam", "model", "imperfection", "contact", "striker", "drive", "start")
+SECTIONS = ("beam", "model", "ends", "imperfection", "contact", "striker", "drive", "start")
 """Sections of a system, in their order."""
 
 _MATRICES = (
@@ -50,6 +51,8 @@ def parts_to_mapping(
         names = ("length", "thickness", "width", "density", "young_modulus", beam.given)
         sections["beam"] = {name: float(getattr(beam, name)) for name in names}
         section["modes"] = model.modes
+        if not beam.ends.is_ideal:
+            sections["ends"] = _fields(beam.ends)
         if model.imperfection is not None:
             own = {name: getattr(model.imperfection, name) for name in quantities(Imperfection)}
             sections["imperfection"] = {name: value for name, value in own.items() if value is not None}
@@ -113,12 +116,18 @@ def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
     own = dict(sections.get("model", {}))
     if "beam" in sections:
         values = dict(sections["beam"])
-        _only(values, "beam", [item.name for item in dataclasses.fields(Beam) if item.init])
+        _only(values, "beam", list(quantities(Beam)))
         _only(own, "model", ["modes", "damping_ratio", "reference_freq"])
         _needed(values, "beam", Beam)
         uneven = dict(sections.get("imperfection", {}))
         _only(uneven, "imperfection", list(quantities(Imperfection)))
-        return ReducedModel.from_beam(Beam(**values), **own, imperfection=Imperfection(**uneven))
+        held = dict(sections.get("ends", {}))
+        _only(held, "ends", list(quantities(Ends)))
+        return ReducedModel.from_beam(
+            Beam(**values, ends=Ends(**held)), **own, imperfection=Imperfection(**uneven)
+        )
+    if "ends" in sections:
+        raise InputError("[ends]: belong to a beam; a structure given by matrices has them in its matrices")
     if "imperfection" in sections:
         raise InputError(
             "[imperfection]: belongs to a beam; give the side_force of a structure given by matrices"

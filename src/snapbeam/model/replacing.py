@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from snapbeam.core.validate import InputError
+from snapbeam.model.ends import CLAMPED
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.mapping import SECTIONS
@@ -37,9 +38,10 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     for name in ("model", "contact", "striker", "start"):
         if name in whole:
             found[name] = whole[name]
-    found["model"] = _model(
-        found["model"], whole.get("beam"), inside.get("beam", {}), inside.get("model", {})
-    )
+    of_beam = inside.get("beam", {})
+    if "ends" in whole or "ends" in inside:
+        of_beam = of_beam | {"ends": _ends(found["model"], whole, inside.get("ends", {}))}
+    found["model"] = _model(found["model"], whole.get("beam"), of_beam, inside.get("model", {}))
     if "imperfection" in whole or "imperfection" in inside:
         given = whole.get("imperfection", found["model"].imperfection)
         found["model"] = _with_imperfection(found["model"], given, inside.get("imperfection", {}))
@@ -76,6 +78,14 @@ def _changed(part: Any, section: str, values: Mapping[str, Any]) -> Any:
                 f"{section}.{name}: no parameter of this system; must be one of {', '.join(known)}"
             )
     return dataclasses.replace(part, **values)
+
+
+def _ends(model: ReducedModel, whole: Mapping[str, Any], values: Mapping[str, Any]) -> Any:
+    if model.beam is None:
+        raise InputError("ends: this model was given by matrices, it has no beam")
+    ends = whole.get("ends", whole.get("beam", model.beam).ends)
+    ends = CLAMPED if ends is None else ends
+    return _changed(ends, "ends", values) if values else ends
 
 
 def _with_imperfection(

@@ -170,7 +170,7 @@ class SweepSetup:
         return [
             name
             for name in self.points.names
-            if name.startswith(("beam.", "model.", "imperfection.", "run.step", "run.accuracy"))
+            if name.startswith(("beam.", "model.", "ends.", "imperfection.", "run.step", "run.accuracy"))
         ]
 
     def identity(self) -> dict[str, Any]:
@@ -207,7 +207,7 @@ class SweepSetup:
                 "length_scale",
             }
         beam = self.system.model.beam
-        if beam is not None and any(name.startswith("beam.") for name in self.points.names):
+        if beam is not None and any(name.startswith(("beam.", "ends.")) for name in self.points.names):
             # the one of the two that follows from the other follows anew at every point
             pair = {"beam.buckling_level", "beam.axial_load"}
             given = pair & set(self.points.names) or {f"beam.{beam.given}"}

@@ -155,13 +155,19 @@ class ReducedModel(Wells):
         if not isinstance(beam, Beam):
             raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
         count = integer("modes", modes, 1, MAX_MODES)
-        shapes = BucklingModes(beam.length, count)
+        shapes = beam.buckling_modes(count)
         k = shapes.wavenumber
-        mass = beam.mass_per_length * (np.eye(count) + _coupling(shapes.parity)) / np.outer(k, k)
+        if isinstance(shapes, BucklingModes):
+            mass = beam.mass_per_length * (np.eye(count) + _coupling(shapes.parity)) / np.outer(k, k)
+        else:
+            mass = beam.mass_per_length * shapes.overlap
         gamma = beam.tension_stiffness
         equilibrium = np.zeros(count)
         # alpha_1 = -b/phi_1(1/2); K0 from E I (k_i^2 - k_1^2) - (P - P_cr), free of cancellation
-        equilibrium[0] = -math.pi * beam.buckling_level / math.sqrt(2.0 * beam.length)
+        if isinstance(shapes, BucklingModes):
+            equilibrium[0] = -math.pi * beam.buckling_level / math.sqrt(2.0 * beam.length)
+        else:
+            equilibrium[0] = -beam.buckling_level / float(shapes.shape(0.5 * beam.length)[0])
         if beam.is_buckled:
             stiffness = beam.bending_stiffness * (k**2 - k[0] ** 2) - gamma * equilibrium[0] ** 2
         else:
@@ -288,7 +294,7 @@ class ReducedModel(Wells):
                 if several
                 else self.contact_shape
             )
-        return np.moveaxis(BucklingModes(self.beam.length, self.modes).shape(at * self.beam.length), 0, -1)
+        return np.moveaxis(self.beam.buckling_modes(self.modes).shape(at * self.beam.length), 0, -1)
 
     @cached_property
     def lightest_contact_mass(self) -> float:
@@ -296,7 +302,8 @@ class ReducedModel(Wells):
 
         The other half of a beam is the mirror image of the first.
         """
-        return min(self.contact_mass(location) for location in np.linspace(0.02, 0.5, 25).tolist())
+        last = 0.5 if self.beam is None or self.beam.ends.are_alike else 0.98
+        return min(self.contact_mass(location) for location in np.linspace(0.02, last, 25).tolist())
 
     def contact_mass(self, location: float) -> float:
         """Mass met by an impulse at *location*, kg: 1/(phi . m^-1 phi).
@@ -312,9 +319,9 @@ class ReducedModel(Wells):
     # ------------------------------------------------------------------ linear modes about a well
 
     def _linear_modes(self) -> LinearModes:
-        if self.side_force is not None:
+        if self.side_force is not None or (self.beam is not None and self.beam.ends.turn):
             tangent = tangent_stiffness(self.stiffness, self.tension_stiffness, self.equilibrium)
-            parity = None if self.beam is None else BucklingModes(self.beam.length, self.modes).parity
+            parity = None if self.beam is None else self.beam.buckling_modes(self.modes).parity
             return linear_modes_about(self.mass, tangent, parity)
         if self.beam is not None:
             return linear_modes_of_beam(self.beam, self.modes)
@@ -375,30 +382,6 @@ class ReducedModel(Wells):
                 "give reference_freq in Hz, greater than 0"
             )
         return first
-
-    # ------------------------------------------------------------------ energy and wells
-
-    def potential_energy(self, alpha: ArrayLike) -> _Array:
-        """Potential energy, J, of amplitudes of shape (..., N); 0 for the straight structure."""
-        a = self._amplitudes("alpha", alpha)
-        bent = a * self.stiffness if self.stiffness.ndim == 1 else a @ self.stiffness
-        square = np.sum(a * a, axis=-1)
-        energy: _Array = 0.5 * np.sum(a * bent, axis=-1) + 0.25 * self.tension_stiffness * square**2
-        return energy if self.side_force is None else energy - a @ self.side_force
-
-    def kinetic_energy(self, alpha_velocity: ArrayLike) -> _Array:
-        """Kinetic energy, J, of amplitude velocities of shape (..., N)."""
-        v = self._amplitudes("alpha_velocity", alpha_velocity)
-        energy: _Array = 0.5 * np.sum(v * (v @ self.mass), axis=-1)
-        return energy
-
-    def _amplitudes(self, name: str, value: ArrayLike) -> _Array:
-        array = finite_array(name, value)
-        if array.ndim == 0 or array.shape[-1] != self.modes:
-            raise InputError(
-                f"{name} of shape {array.shape}: must have the shape (..., {self.modes}), a number a mode"
-            )
-        return array
 
 
 def _symmetric(matrix: _Array) -> _Array:

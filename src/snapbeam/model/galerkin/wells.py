@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError
+from snapbeam.core.validate import InputError, finite_array
 from snapbeam.model.beam import Beam
 from snapbeam.model.imperfection.equilibria import Equilibrium
 from snapbeam.model.imperfection.imperfection import Imperfection
@@ -33,7 +32,29 @@ class Wells:
     imperfection: Imperfection | None
     beam: Beam | None
     natural_freq: Any
-    potential_energy: Callable[[ArrayLike], _Array]
+    mass: _Array
+
+    def potential_energy(self, alpha: ArrayLike) -> _Array:
+        """Potential energy, J, of amplitudes of shape (..., N); 0 for the straight structure."""
+        a = self._amplitudes("alpha", alpha)
+        bent = a * self.stiffness if self.stiffness.ndim == 1 else a @ self.stiffness
+        square = np.sum(a * a, axis=-1)
+        energy: _Array = 0.5 * np.sum(a * bent, axis=-1) + 0.25 * self.tension_stiffness * square**2
+        return energy if self.side_force is None else energy - a @ self.side_force
+
+    def kinetic_energy(self, alpha_velocity: ArrayLike) -> _Array:
+        """Kinetic energy, J, of amplitude velocities of shape (..., N)."""
+        v = self._amplitudes("alpha_velocity", alpha_velocity)
+        energy: _Array = 0.5 * np.sum(v * (v @ self.mass), axis=-1)
+        return energy
+
+    def _amplitudes(self, name: str, value: ArrayLike) -> _Array:
+        array = finite_array(name, value)
+        if array.ndim == 0 or array.shape[-1] != self.equilibrium.size:
+            raise InputError(
+                f"{name} of shape {array.shape}: must have the shape (..., {self.equilibrium.size}), a number a mode"
+            )
+        return array
 
     @cached_property
     def landscape(self) -> Landscape | None:

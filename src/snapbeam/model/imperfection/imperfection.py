@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError, finite_array
 from snapbeam.model.beam import Beam
-from snapbeam.model.galerkin.modes import BucklingModes
+from snapbeam.model.ends.of_beam import Modes
 from snapbeam.model.imperfection.projected import projected
 from snapbeam.model.quantity import check_fields, quantity
 
@@ -109,7 +109,7 @@ class Imperfection:
             negated["profile"] = self.profile * np.array([[1.0], [-1.0]])
         return dataclasses.replace(self, **negated)
 
-    def initial_shape(self, modes: BucklingModes) -> _Array:
+    def initial_shape(self, modes: Modes) -> _Array:
         """alpha0_i, the integrals of w0' phi_i', m^0.5, shape (N,)."""
         found = np.zeros(modes.count)
         if self.rise != 0.0 and self.form == "mode":
@@ -127,7 +127,7 @@ class Imperfection:
             found += projected(modes, self.profile)
         return found
 
-    def side_load(self, modes: BucklingModes, beam: Beam) -> _Array:
+    def side_load(self, modes: Modes, beam: Beam) -> _Array:
         """F_i, the integrals of the side load times phi_i, N m^0.5, shape (N,)."""
         found = np.zeros(modes.count)
         if self.point_load != 0.0:

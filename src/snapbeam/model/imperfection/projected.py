@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.galerkin.modes import BucklingModes
+from snapbeam.model.ends.of_beam import Modes
 
 __all__ = ["projected"]
 
@@ -14,7 +14,7 @@ _POINTS = 16
 """Of Gauss and Legendre, in each of the panels that a half wave of the last mode has two of."""
 
 
-def projected(modes: BucklingModes, profile: _Array, symmetric: bool = False) -> _Array:
+def projected(modes: Modes, profile: _Array, symmetric: bool = False) -> _Array:
     """The integrals of w0' phi_i', m^0.5, of a shape through points.
 
     The slopes of the modes are orthonormal, so that sum alpha0_i phi_i is the shape among those of the modes whose
@@ -22,7 +22,7 @@ def projected(modes: BucklingModes, profile: _Array, symmetric: bool = False) ->
 
     Parameters
     ----------
-    modes : BucklingModes
+    modes : BucklingModes or SpringModes
     profile : array of shape (2, points)
         Places over the length from 0 to 1, and heights, m, zero at the ends.
     symmetric : bool
