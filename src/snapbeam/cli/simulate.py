@@ -160,16 +160,9 @@ class _share_done:
 
 
 def _recorded(path: Path) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.core.netcdf import read_netcdf
 
-    from snapbeam.core.validate import InputError
-
-    try:
-        return xr.load_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"drive = {path.name!r}: must be a NetCDF file of a recorded drive ({error})"
-        ) from None
+    return read_netcdf(path, "drive")
 
 
 def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | None) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import mmap
 import os
 import platform
 import tempfile
@@ -24,7 +25,7 @@ def check_writable(
     Parameters
     ----------
     path : path
-        The file to be written.  One that exists will be replaced.
+        The file to be written.  One that exists will be replaced, unless it is a NetCDF file of somebody else's.
     name : str
         The parameter to name in a refusal.
     suffixes : tuple of str
@@ -33,7 +34,8 @@ def check_writable(
     Raises
     ------
     InputError
-        If the folder is missing or cannot be written to, *path* is a folder, or its suffix is not allowed.
+        If the folder is missing or cannot be written to, *path* is a folder, its suffix is not allowed, or it is a
+        NetCDF file that snapbeam did not write.
     """
     target = file_path(name, path)
     if suffixes and target.suffix.lower() not in suffixes:
@@ -45,15 +47,29 @@ def check_writable(
         raise InputError(
             f"{name} = {str(path)!r}: cannot be written, {str(folder)!r} is not an existing folder"
         )
+    foreign = False
     try:
         with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{target.name}."):
             pass
         if target.exists():
             with target.open("ab"):
                 pass
+            foreign = target.suffix.lower() == ".nc" and not _is_own(target)
     except OSError as error:
         raise InputError(f"{name} = {str(path)!r}: cannot be written, {error.strerror or error}") from error
+    if foreign:
+        raise InputError(
+            f"{name} = {str(path)!r}: is a file that snapbeam did not write: give another name, or delete it first"
+        )
     return target
+
+
+def _is_own(path: Path) -> bool:
+    """Whether a NetCDF file names snapbeam in its attributes; one that is empty may be replaced as well."""
+    if path.stat().st_size == 0:
+        return True
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        return content.find(b"snapbeam") >= 0
 
 
 class NoRoomError(OSError):

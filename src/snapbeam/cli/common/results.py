@@ -22,16 +22,9 @@ __all__ = [
 
 def open_result(file: Path) -> xr.Dataset:
     """Return the dataset in a file, read into memory; refuse what is no NetCDF file of results."""
-    import xarray as xr
+    from snapbeam.core.netcdf import read_netcdf
 
-    from snapbeam.core.validate import InputError
-
-    if not file.is_file():
-        raise InputError(f"file = {str(file)!r}: no such file")
-    try:
-        return xr.load_dataset(file, engine="h5netcdf")
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"file = {str(file)!r}: is no NetCDF file of results") from error
+    return read_netcdf(file, "file")
 
 
 def check_pictures(*pictures: tuple[str, Path | None]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,20 +27,22 @@ def config_of_file(path: Path, point: str | None) -> Config:
     """
     from snapbeam.cli.common.results import open_result
     from snapbeam.config import config_from_mapping
-    from snapbeam.core.validate import InputError
+    from snapbeam.core.validate import InputError, parsed_json
 
     dataset = open_result(path)
     text = dataset.attrs.get("system")
     if not isinstance(text, str):
         raise InputError(f"from = {str(path)!r}: does not hold the parameters it was computed from")
-    sections: dict[str, dict[str, Any]] = json.loads(text)
+    sections: dict[str, dict[str, Any]] = parsed_json(text, f"from = {str(path)!r}")
     if any(isinstance(value, dict) for values in sections.values() for value in values.values()):
         raise InputError(f"from = {str(path)!r}: was driven by a record, which is too long to be kept in it")
     if "mass" in sections.get("model", {}):
         raise InputError(f"from = {str(path)!r}: is of a structure given by matrices; use it from Python")
     run = {
         name: value
-        for name, value in json.loads(dataset.attrs.get("integration", "{}")).items()
+        for name, value in parsed_json(
+            dataset.attrs.get("integration", "{}"), f"from = {str(path)!r}"
+        ).items()
         if value is not None and name != "engine"
     }
     start = sections.pop("start", None)

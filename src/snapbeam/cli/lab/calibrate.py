@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from snapbeam.cli.common import options as opt
 from snapbeam.cli.common.console import door, file_line, out
 from snapbeam.cli.common.parameter_options import configured
+from snapbeam.cli.lab import calibrate_options as asked
 from snapbeam.cli.lab import options as lab
 
 if TYPE_CHECKING:
@@ -19,70 +18,28 @@ if TYPE_CHECKING:
 __all__ = ["calibrate"]
 
 _MEASURED = "Measured (instead of, or beside, the file)"
-_FIT = "Fit"
-
-
-def _list_option(about: str) -> Any:
-    return typer.Option(help=about, metavar="F,F", rich_help_panel=_MEASURED)
 
 
 @door
 def calibrate(
-    measurements: Annotated[
-        Path | None,
-        typer.Argument(help="TOML file with a section named measured.", metavar="[MEASUREMENTS]"),
-    ] = None,
-    straight: Annotated[
-        str | None, _list_option("Natural frequencies without load, Hz.")
-    ] = None,
-    lower_well: Annotated[
-        str | None, _list_option("About the lower well, Hz; 81.3s or 159a says symmetric or antisymmetric.")
-    ] = None,
-    upper_well: Annotated[str | None, _list_option("About the upper well, Hz, likewise.")] = None,
-    damping: Annotated[str | None, _list_option("Damping ratios from free decays.")] = None,
-    frequency_se: Annotated[
-        float | None, opt.number_option("Standard error of these frequencies, Hz (0.5 %).", _MEASURED)
-    ] = None,
-    measured_thickness: Annotated[
-        float | None, opt.number_option("Thickness by gauge, m, to compare with.", _MEASURED)
-    ] = None,
-    measured_buckling_level: Annotated[
-        float | None, opt.number_option("Buckling level by gauge, m, to compare with.", _MEASURED)
-    ] = None,
-    impacts: Annotated[
-        Path | None,
-        typer.Option(
-            help="NetCDF file of tracked impacts on a heavy body, for the contact stiffness.", metavar="FILE",
-            rich_help_panel=_MEASURED,
-        ),
-    ] = None,
-    effective_mass: Annotated[
-        float | None, opt.number_option("1/(1/m1 + 1/m2) of the two bodies of --impacts, kg.", _MEASURED)
-    ] = None,
-    config: Annotated[
-        Path | None,
-        typer.Option("--config", "-c", help="TOML file of parameters of the beam and the model.", metavar="FILE"),
-    ] = None,
-    fit: Annotated[
-        str | None,
-        typer.Option(
-            help="What to fit, among thickness, young_modulus, density, length, buckling_level; by default "
-            "what the measurements ask for.",
-            metavar="NAME,NAME", rich_help_panel=_FIT,
-        ),
-    ] = None,
-    modes: Annotated[int | None, opt.count_option("Number N of buckling modes, 1 to 256.", _FIT)] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "--output", "-o", help="TOML file for snapbeam map --config to write.",
-            metavar="FILE", rich_help_panel="Output",
-        ),
-    ] = None,
+    measurements: asked.Measurements = None,
+    straight: asked.Straight = None,
+    lower_well: asked.LowerWell = None,
+    upper_well: asked.UpperWell = None,
+    damping: asked.Damping = None,
+    frequency_se: asked.FrequencySe = None,
+    measured_thickness: asked.MeasuredThickness = None,
+    measured_buckling_level: asked.MeasuredBucklingLevel = None,
+    impacts: asked.Impacts = None,
+    effective_mass: asked.EffectiveMass = None,
+    config: asked.Config = None,
+    fit: asked.Fit = None,
+    modes: asked.Modes = None,
+    output: asked.Output = None,
     plot: opt.Plot = None,
     report: lab.JsonFile = None,
     strict: lab.Strict = False,
-) -> None:  # fmt: skip
+) -> None:
     """Fit thickness and buckling level to measured natural frequencies, and say what the data leave open.
 
     Parameters that are not fitted come from --config, or from the measurements' own section beam, or are the

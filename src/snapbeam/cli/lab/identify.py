@@ -2,67 +2,32 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
 from snapbeam.cli.common import options as opt
 from snapbeam.cli.common.console import door, file_line, out
+from snapbeam.cli.lab import identify_options as asked
 from snapbeam.cli.lab import options as lab
 
 __all__ = ["identify"]
-
-_DECAY = "Decay"
 
 
 @door
 def identify(
     signal: lab.SignalFile,
-    modes: Annotated[int, opt.count_option("How many modes to look for (1).", _DECAY)] = 1,
-    frequencies: Annotated[
-        str | None,
-        typer.Option(
-            help="Rough frequencies of the modes, Hz, instead of --modes.",
-            metavar="F,F",
-            rich_help_panel=_DECAY,
-        ),
-    ] = None,
-    method: Annotated[
-        str, typer.Option(help="fit, hilbert, log_decrement, or all.", rich_help_panel=_DECAY)
-    ] = "fit",
-    start: Annotated[float | None, opt.number_option("Start of the free decay, s.", _DECAY)] = None,
-    stop: Annotated[float | None, opt.number_option("End of the free decay, s.", _DECAY)] = None,
-    soften: Annotated[
-        bool,
-        typer.Option("--soften/--linear", help="Let frequency depend on amplitude.", rich_help_panel=_DECAY),
-    ] = True,
-    buckling_level: Annotated[
-        float | None,
-        opt.number_option("b, m: hold the softening near that of one mode, 0.75 (a/b)^2.", _DECAY),
-    ] = None,
-    mirror_channel: Annotated[
-        str | None,
-        typer.Option(
-            help="Channel of a second sensor at the mirror place: tells symmetric modes from antisymmetric ones.",
-            metavar="NAME",
-            rich_help_panel=_DECAY,
-        ),
-    ] = None,
+    modes: asked.Modes = 1,
+    frequencies: asked.Frequencies = None,
+    method: asked.Method = "fit",
+    start: asked.Start = None,
+    stop: asked.Stop = None,
+    soften: asked.Soften = True,
+    buckling_level: asked.BucklingLevel = None,
+    mirror_channel: asked.MirrorChannel = None,
     channel: lab.Channel = None,
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
     sampling_freq: lab.SamplingFreq = None,
     columns: lab.Columns = None,
     plot: opt.Plot = None,
-    stabilisation: Annotated[
-        Path | None,
-        typer.Option(
-            help="Picture of the stabilisation diagram from which modes were read.",
-            metavar="FILE",
-            rich_help_panel="Output",
-        ),
-    ] = None,
+    stabilisation: asked.Stabilisation = None,
     report: lab.JsonFile = None,
     strict: lab.Strict = False,
 ) -> None:

@@ -4,166 +4,48 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from snapbeam.cli.common.console import door, duration, file_line, out, progress
 from snapbeam.cli.lab import options as lab
+from snapbeam.cli.lab import track_options as asked
 
 if TYPE_CHECKING:
     from snapbeam.lab.camera.recording import Recording
 
 __all__ = ["track"]
 
-_CAMERA = "Camera"
-_SCENE = "Scene"
-_OUTPUT = "Output"
-
 
 @door
 def track(
-    recording: Annotated[
-        Path,
-        typer.Argument(
-            help="Photron .cih/.cihx, .cine, .avi, .mp4, .mov, TIFF, .npy, .h5, or a folder of numbered images.",
-            metavar="RECORDING",
-        ),
-    ],
-    frame_rate: Annotated[
-        float | None,
-        typer.Option(help="Frames per second, Hz; needed for videos and images.", rich_help_panel=_CAMERA),
-    ] = None,
-    pixel_size: Annotated[
-        float | None,
-        typer.Option(
-            help="Metres per pixel, such as 12e-6; needed unless in the file.", rich_help_panel=_CAMERA
-        ),
-    ] = None,
-    region: Annotated[
-        str | None,
-        typer.Option(
-            help="Part of the frame to use.", metavar="ROW:ROW,COLUMN:COLUMN", rich_help_panel=_CAMERA
-        ),
-    ] = None,
-    side: Annotated[
-        str,
-        typer.Option(
-            help="Side of the beam the shaker stands on: below, above, left or right.",
-            rich_help_panel=_SCENE,
-        ),
-    ] = "below",
-    objects: Annotated[
-        str,
-        typer.Option(help="bright or dark against the background, or auto.", rich_help_panel=_SCENE),
-    ] = "auto",
-    threshold: Annotated[
-        float | None,
-        typer.Option(help="Grey level to binarise at; Otsu's by default.", rich_help_panel=_SCENE),
-    ] = None,
-    contact_column: Annotated[
-        float | None,
-        typer.Option(help="Column of the contact; found from the tip by default.", rich_help_panel=_SCENE),
-    ] = None,
-    shaker: Annotated[
-        bool, typer.Option("--shaker/--no-shaker", help="Follow the shaker too.", rich_help_panel=_SCENE)
-    ] = True,
-    marker: Annotated[
-        bool,
-        typer.Option(
-            "--marker/--no-marker", help="Look for a sticker on the shaker.", rich_help_panel=_SCENE
-        ),
-    ] = True,
-    tip_distance: Annotated[
-        float | None,
-        typer.Option(help="From the shaker's tip to the sticker's nearer edge, m.", rich_help_panel=_SCENE),
-    ] = None,
-    beam_thickness: Annotated[
-        float | None,
-        typer.Option(help="Thickness of the beam by gauge, m, to check by.", rich_help_panel=_SCENE),
-    ] = None,
-    columns: Annotated[
-        int, typer.Option(help="Columns to fit the beam's edge in.", rich_help_panel=_SCENE)
-    ] = 24,
-    blur_limit: Annotated[
-        float | None,
-        typer.Option(
-            help="Edge width, px, from which a frame is flagged as blurred.", rich_help_panel=_SCENE
-        ),
-    ] = None,
-    gamma: Annotated[
-        float,
-        typer.Option(help="Exponent of grey level over light, to undo.", rich_help_panel=_CAMERA),
-    ] = 1.0,
-    background: Annotated[
-        Path | None,
-        typer.Option(
-            help="Image of the scene without beam and shaker, to subtract.",
-            metavar="FILE",
-            rich_help_panel=_CAMERA,
-        ),
-    ] = None,
-    fixed_mark: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Part of the region that shows something that stands still; the camera's drift against it is "
-            "taken out. May be repeated.",
-            metavar="ROW:ROW,COLUMN:COLUMN",
-            rich_help_panel=_CAMERA,
-        ),
-    ] = None,
-    scale_marks: Annotated[
-        str | None,
-        typer.Option(
-            help="Pixel size from two marks a known distance apart, m: ROW,COLUMN:ROW,COLUMN=0.010.",
-            metavar="MARKS",
-            rich_help_panel=_CAMERA,
-        ),
-    ] = None,
-    rest_frames: Annotated[
-        str | None,
-        typer.Option(
-            help="Frames at rest: how many at the start, or FIRST:LAST+1; negative from the end.",
-            metavar="N or A:B",
-            rich_help_panel=_SCENE,
-        ),
-    ] = None,
-    buckling_level: Annotated[
-        float | None,
-        typer.Option(help="b, m, to normalise by; millimetres only by default.", rich_help_panel=_SCENE),
-    ] = None,
-    location: Annotated[
-        float, typer.Option(help="x_s, location of the contact over length.", rich_help_panel=_SCENE)
-    ] = 1 / 2.1,
-    rest_displacement: Annotated[
-        float | None,
-        typer.Option(
-            help="Displacement of the beam at rest, m; the well facing the shaker by default.",
-            rich_help_panel=_SCENE,
-        ),
-    ] = None,
-    output: Annotated[
-        Path,
-        typer.Option("--output", "-o", help="NetCDF file to write.", metavar="FILE", rich_help_panel=_OUTPUT),
-    ] = Path("track.nc"),
-    picture: Annotated[
-        Path | None,
-        typer.Option(help="Picture of a frame with its edges.", metavar="FILE", rich_help_panel=_OUTPUT),
-    ] = None,
-    frame: Annotated[
-        int, typer.Option(help="Number of the frame in --picture.", rich_help_panel=_OUTPUT)
-    ] = 0,
-    report: Annotated[
-        Path | None,
-        typer.Option(help="Picture of the quality over time.", metavar="FILE", rich_help_panel=_OUTPUT),
-    ] = None,
-    video: Annotated[
-        Path | None,
-        typer.Option(help="Annotated video, .mp4, .mov or .avi.", metavar="FILE", rich_help_panel=_OUTPUT),
-    ] = None,
-    video_every: Annotated[
-        int, typer.Option(help="Show every so many-th frame in --video.", rich_help_panel=_OUTPUT)
-    ] = 1,
+    recording: asked.Recording,
+    frame_rate: asked.FrameRate = None,
+    pixel_size: asked.PixelSize = None,
+    region: asked.Region = None,
+    side: asked.Side = "below",
+    objects: asked.Objects = "auto",
+    threshold: asked.Threshold = None,
+    contact_column: asked.ContactColumn = None,
+    shaker: asked.Shaker = True,
+    marker: asked.Marker = True,
+    tip_distance: asked.TipDistance = None,
+    beam_thickness: asked.BeamThickness = None,
+    columns: asked.Columns = 24,
+    blur_limit: asked.BlurLimit = None,
+    gamma: asked.Gamma = 1.0,
+    background: asked.Background = None,
+    fixed_mark: asked.FixedMark = None,
+    scale_marks: asked.ScaleMarks = None,
+    rest_frames: asked.RestFrames = None,
+    buckling_level: asked.BucklingLevel = None,
+    location: asked.Location = 1 / 2.1,
+    rest_displacement: asked.RestDisplacement = None,
+    output: asked.Output = Path("track.nc"),
+    picture: asked.Picture = None,
+    frame: asked.Frame = 0,
+    report: asked.Report = None,
+    video: asked.Video = None,
+    video_every: asked.VideoEvery = 1,
     strict: lab.Strict = False,
 ) -> None:
     """Measure the displacement of beam and shaker in every frame of a high-speed recording.

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
-
 from snapbeam.cli.common import options as opt
 from snapbeam.cli.common.console import door, file_line, out
 from snapbeam.cli.lab import options as lab
+from snapbeam.cli.lab import vibrometer_options as asked
 
 __all__ = ["vibrometer"]
 
@@ -17,55 +13,24 @@ __all__ = ["vibrometer"]
 @door
 def vibrometer(
     signal: lab.SignalFile,
-    frequency: Annotated[
-        float | None, opt.number_option("Excitation frequency as set, Hz, as a guess.", "Drive")
-    ] = None,
-    snr_limit: Annotated[
-        float | None, opt.number_option("Least ratio of sine to all else, dB, to accept (15).", "Drive")
-    ] = None,
+    frequency: asked.Frequency = None,
+    snr_limit: asked.SnrLimit = None,
     channel: lab.Channel = None,
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
     sampling_freq: lab.SamplingFreq = None,
     columns: lab.Columns = None,
-    camera: Annotated[
-        Path | None,
-        typer.Option(
-            help="NetCDF file of the tracked recording of the same test, to align with.",
-            metavar="FILE", rich_help_panel="Drive",
-        ),
-    ] = None,
-    polarity: Annotated[
-        int | None,
-        typer.Option(
-            help="1 or -1: whether vibrometer and camera count the same direction as positive; found from the start.",
-            rich_help_panel="Drive",
-        ),
-    ] = None,
-    near: Annotated[
-        float | None,
-        opt.number_option("Delay of the camera's clock, s, known to half a cycle, as from a trigger.", "Drive"),
-    ] = None,
-    amplitude: Annotated[
-        float | None, opt.number_option("Amplitude as set, m/s (or m), to check by.", "Drive")
-    ] = None,
-    amplitude_from: Annotated[
-        str, typer.Option(help="vibrometer or camera: whose amplitude the drive has.", rich_help_panel="Drive")
-    ] = "vibrometer",
-    drive_output: Annotated[
-        Path | None,
-        typer.Option(
-            help="NetCDF file of the drive, drift-free and resampled, to write.",
-            metavar="FILE", rich_help_panel="Output",
-        ),
-    ] = None,
-    drive_sampling_freq: Annotated[
-        float | None, opt.number_option("Samples per second of --drive-output, Hz (100000).", "Output")
-    ] = None,
+    camera: asked.Camera = None,
+    polarity: asked.Polarity = None,
+    near: asked.Near = None,
+    amplitude: asked.Amplitude = None,
+    amplitude_from: asked.AmplitudeFrom = "vibrometer",
+    drive_output: asked.DriveOutput = None,
+    drive_sampling_freq: asked.DriveSamplingFreq = None,
     plot: opt.Plot = None,
     report: lab.JsonFile = None,
     strict: lab.Strict = False,
-) -> None:  # fmt: skip
+) -> None:
     """Measure the shaker's motion in a vibrometer record and say whether the test is acceptable.
 
     Fits the steady sine with standard errors, tells noise from distortion, finds and describes the start-up
