@@ -51,9 +51,12 @@ from snapbeam.model.drive import (
     Still,
     TwoSines,
 )
+from snapbeam.model.ends import Ends
 from snapbeam.model.galerkin.frequencies import exact_natural_freq
 from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
 from snapbeam.model.galerkin.reduction import ReducedModel
+from snapbeam.model.imperfection import Imperfection
+from snapbeam.model.imperfection.fitted import fit_wells
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.striker import RecordedDrive, Shaker, Striker
@@ -90,12 +93,14 @@ __all__ = [
     "DisplacementSine",
     "Drive",
     "EdgeState",
+    "Ends",
     "Event",
     "Finding",
     "Flight",
     "HalfSine",
     "HertzContact",
     "HuntCrossley",
+    "Imperfection",
     "InputError",
     "InputTypeError",
     "Integration",
@@ -141,6 +146,7 @@ __all__ = [
     "edge_state",
     "exact_natural_freq",
     "explore",
+    "fit_wells",
     "hertz_stress",
     "integrity",
     "lifetime_map",

@@ -22,6 +22,7 @@ from snapbeam.cli.paper import paper
 from snapbeam.cli.plot import plot
 from snapbeam.cli.simulate import simulate
 from snapbeam.cli.threshold import threshold
+from snapbeam.cli.wells import wells
 from snapbeam.core.provenance import __version__
 
 __all__ = ["app", "main"]
@@ -40,6 +41,7 @@ app.command("threshold")(threshold)
 app.command("simulate")(simulate)
 app.add_typer(dynamics, name="dynamics")
 app.command("frequencies")(frequencies)
+app.command("wells")(wells)
 app.command("plot")(plot)
 app.command("explore")(explore)
 app.command("draw")(draw)

@@ -12,6 +12,8 @@ from snapbeam.cli.common.parameter_options import (
     BEAM,
     CONTACT,
     DRIVE,
+    ENDS,
+    IMPERFECTION,
     MODEL,
     STRIKER,
     configured,
@@ -22,7 +24,7 @@ __all__ = ["draw"]
 
 
 @door
-@with_parameters(*BEAM, *MODEL, *CONTACT, *STRIKER, *DRIVE)
+@with_parameters(*BEAM, *ENDS, *IMPERFECTION, *MODEL, *CONTACT, *STRIKER, *DRIVE)
 def draw(
     given: Any,
     output: Annotated[

@@ -6,13 +6,13 @@ from typing import Annotated, Any
 
 from snapbeam.cli.common import options as opt
 from snapbeam.cli.common.console import answer, door, out
-from snapbeam.cli.common.parameter_options import BEAM, MODEL, configured, with_parameters
+from snapbeam.cli.common.parameter_options import BEAM, ENDS, MODEL, configured, with_parameters
 
 __all__ = ["frequencies"]
 
 
 @door
-@with_parameters(*BEAM, *MODEL)
+@with_parameters(*BEAM, *ENDS, *MODEL)
 def frequencies(
     given: Any,
     count: Annotated[int, opt.count_option("How many to print (10).", "Output")] = 10,

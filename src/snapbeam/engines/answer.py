@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from snapbeam.core.codes import RunStatus
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.outcomes import STATISTICS
-from snapbeam.model.decision import decidable_energy
+from snapbeam.model.decision import crossing_energy, decidable_energy, passed_heights
 
 __all__ = ["Reading", "statistics_of"]
 
@@ -98,11 +98,15 @@ class Reading:
         found = np.zeros(book.size, dtype=bool)
         if not model.is_bistable:
             return found
-        settled = self.good & (book["energy"] < model.barrier_energy - model.well_energy)
+        settled = self.good & (book["energy"] < crossing_energy(model) - model.well_energy)
         if not (ensemble.highest > -np.inf).any():
             return np.asarray(settled)
-        away = settled & (book["side"] > 0) & (book["displacement"] > np.maximum(ensemble.highest, 0.0))
-        away &= book["center"] > 0.0
+        reach, level = np.maximum(ensemble.highest, 0.0), 0.0
+        if ensemble.structure.uneven is not None:
+            level = ensemble.structure.uneven.level
+            reach = passed_heights(model, ensemble.location, ensemble.highest)
+        away = settled & (book["side"] > 0) & (book["displacement"] > reach)
+        away &= book["center"] > level
         which = np.flatnonzero(away)
         if which.size:
             bound = decidable_energy(model, ensemble.location[which], ensemble.highest[which])

@@ -15,10 +15,24 @@ from snapbeam.cli.common.console import answer, notes, out
 if TYPE_CHECKING:
     from snapbeam.config import Config
 
-__all__ = ["BEAM", "CONTACT", "DRIVE", "MODEL", "RUN", "STRIKER", "configured", "with_parameters"]
+__all__ = [
+    "BEAM",
+    "CONTACT",
+    "DRIVE",
+    "ENDS",
+    "IMPERFECTION",
+    "MODEL",
+    "RUN",
+    "STRIKER",
+    "configured",
+    "with_parameters",
+]
 
 BEAM = ("beam.length", "beam.thickness", "beam.width", "beam.density", "beam.young_modulus", "beam.buckling_level",
         "beam.axial_load")  # fmt: skip
+ENDS = ("ends.left", "ends.right", "ends.axial")
+IMPERFECTION = ("imperfection.rise", "imperfection.skew", "imperfection.point_load", "imperfection.point_location",
+                "imperfection.uniform_load", "imperfection.gravity")  # fmt: skip
 MODEL = ("model.modes", "model.damping_ratio", "model.reference_freq")
 CONTACT = ("contact.stiffness", "contact.radius", "contact.young_modulus", "contact.poisson_ratio",
            "contact.coefficient", "contact.loss", "contact.restitution", "contact.speed")  # fmt: skip
@@ -35,6 +49,8 @@ RUN = ("run.cycles", "run.step", "run.accuracy", "run.engine", "run.early_decisi
 
 _PANELS = {
     "beam": "Beam (default: the paper's)",
+    "ends": "Ends (default: clamped)",
+    "imperfection": "Imperfection (default: none)",
     "model": "Reduced model and contact",
     "contact": "Reduced model and contact",
     "striker": "Striker and drive",
@@ -52,6 +68,9 @@ _OPTIONS = {
     "contact.restitution": "--contact-restitution",
     "contact.speed": "--restitution-speed",
     "drive.phase": "--drive-phase",
+    "ends.left": "--ends-left",
+    "ends.right": "--ends-right",
+    "ends.axial": "--ends-axial",
     "drive.velocity_m_s": "--velocity",
     "striker.location_m": "--location-m",
     "striker.mass": "--striker-mass",

@@ -159,7 +159,9 @@ def _ends(functions: Functions) -> tuple[Any, Any]:
         touching = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
         if lane == 0:
             book.status, book.touching, book.onset = _RUNNING, int(touching), 0
-            _open_book(book, seen, fixed.struck.law, energy + contact_energy(fixed.struck.law, seen.d))
+            _open_book(
+                book, seen.c, seen, fixed.struck.law, energy + contact_energy(fixed.struck.law, seen.d)
+            )
         return Held(0, home, own, seen, touching, quiet, 0, 0, 0, max(seen.d, 0.0), 0, 0, _RUNNING)
 
     @device

@@ -13,7 +13,7 @@ from snapbeam.model.beam import Beam
 from snapbeam.model.galerkin.modes import BucklingModes
 from snapbeam.model.galerkin.rank_one import rank_one_eigenpairs
 
-__all__ = ["LinearModes", "linear_modes_of_beam", "linear_modes_of_structure"]
+__all__ = ["LinearModes", "linear_modes_about", "linear_modes_of_beam", "linear_modes_of_structure"]
 
 _Array = NDArray[np.float64]
 
@@ -83,6 +83,34 @@ def linear_modes_of_structure(
         )
     eigenvalue[np.abs(eigenvalue) <= rounding] = 0.0
     return _read_only(np.sqrt(eigenvalue), vectors, np.zeros(a.size, dtype=np.int_))
+
+
+def linear_modes_about(mass: _Array, tangent: _Array, parity: NDArray[np.int_] | None = None) -> LinearModes:
+    """Linear modes of any tangent stiffness; each parity by itself where the tangent does not couple the two.
+
+    Raises
+    ------
+    InputError
+        If an eigenvalue is negative.
+    """
+    import scipy.linalg
+
+    count = mass.shape[0]
+    odd = np.zeros(count, dtype=bool) if parity is None else parity < 0
+    apart = parity is not None and not tangent[np.ix_(odd, ~odd)].any()
+    groups = [np.flatnonzero(~odd), np.flatnonzero(odd)] if apart else [np.arange(count)]
+    eigenvalue, vectors = np.empty(count), np.zeros((count, count))
+    for index in groups:
+        if index.size:
+            block = np.ix_(index, index)
+            eigenvalue[index], vectors[block] = scipy.linalg.eigh(tangent[block], mass[block])
+    rounding = 8.0 * count * np.finfo(np.float64).eps * np.abs(eigenvalue).max()
+    if eigenvalue.min() < -rounding:
+        raise InputError(f"equilibrium: must be stable, but has the eigenvalue {eigenvalue.min():g} 1/s^2")
+    eigenvalue[np.abs(eigenvalue) <= rounding] = 0.0
+    order = np.argsort(eigenvalue, kind="stable")
+    own = parity[order] if parity is not None and apart else np.zeros(count, dtype=np.int_)
+    return _read_only(np.sqrt(eigenvalue[order]), vectors[:, order], own)
 
 
 def _read_only(omega: _Array, vectors: _Array, parity: NDArray[np.int_]) -> LinearModes:

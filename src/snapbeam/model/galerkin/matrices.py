@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.validate import InputError, finite_array, nonnegative, positive, within
+from snapbeam.model.imperfection.landscape import landscape_of
 
 __all__ = ["Structure", "checked_structure", "damping_ratios"]
 
@@ -30,6 +31,7 @@ class Structure:
     length_scale: float
     damping_ratio: ArrayLike
     reference_freq: float | None
+    side_force: ArrayLike | None = None
 
 
 def damping_ratios(value: ArrayLike, count: int) -> _Array:
@@ -72,11 +74,24 @@ def checked_structure(given: Structure) -> dict[str, Any]:
         center_shape = _shape("center_shape", given.center_shape, count)
     gamma = nonnegative("tension_stiffness", given.tension_stiffness)
     reference = given.reference_freq
+    force = None
+    if given.side_force is not None:
+        force = finite_array("side_force", given.side_force)
+        _require_shape("side_force", force, (count,), "one number for each coordinate")
+        if not force.any():
+            force = None
+    if force is not None and given.equilibrium is not None:
+        raise InputError("equilibrium beside side_force: leave it out, the equilibria follow from the force")
+    if force is None:
+        equilibrium = _equilibrium(given.equilibrium, stiffness, gamma, center_shape)
+    else:
+        equilibrium = landscape_of(stiffness, gamma, force, center_shape).lower.amplitude
     return {
         "mass": mass,
         "stiffness": stiffness,
         "tension_stiffness": gamma,
-        "equilibrium": _equilibrium(given.equilibrium, stiffness, gamma, center_shape),
+        "equilibrium": equilibrium,
+        "side_force": force,
         "length_scale": positive("length_scale", given.length_scale, "m"),
         "damping_ratio": damping_ratios(given.damping_ratio, count),
         "center_shape": center_shape,

@@ -98,6 +98,11 @@ class BucklingModes:
         self._factor = np.where((index // 2) % 2 == 0, 1.0, -1.0)
         self._factor[1::2] = 1.0 / np.sin(0.5 * self.wavenumber[1::2] * self.length)
 
+    @property
+    def integral(self) -> _Array:
+        """Integrals of phi_i over the length, m^1.5, shape (N,); exactly 0 for the antisymmetric modes."""
+        return np.where(self.parity > 0, self._amplitude * self.length, 0.0)
+
     def shape(self, x: ArrayLike) -> _Array:
         """Mode shapes phi_i at the positions *x* (m, 0 to L); shape (N, *x.shape), in m^0.5."""
         at = self._at(x)

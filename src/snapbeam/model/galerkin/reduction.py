@@ -12,9 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive, shown, within
 from snapbeam.model.beam import Beam
-from snapbeam.model.galerkin.linear import LinearModes, linear_modes_of_beam, linear_modes_of_structure
+from snapbeam.model.galerkin.linear import (
+    LinearModes,
+    linear_modes_about,
+    linear_modes_of_beam,
+    linear_modes_of_structure,
+)
 from snapbeam.model.galerkin.matrices import Structure, checked_structure, damping_ratios
 from snapbeam.model.galerkin.modes import MAX_MODES, BucklingModes
+from snapbeam.model.galerkin.wells import Wells
+from snapbeam.model.imperfection.imperfection import Imperfection
+from snapbeam.model.imperfection.landscape import landscape_of, tangent_stiffness
 from snapbeam.model.quantity import Quantity
 
 __all__ = ["MODEL_QUANTITIES", "ReducedModel"]
@@ -46,13 +54,14 @@ _LEAST_COMPLIANCE = 1e-300
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
-class ReducedModel:
+class ReducedModel(Wells):
     """N modal amplitudes alpha with a mass, a stiffness and one tension term: the left side of Eq. (11),
 
         m alpha'' + K0 alpha + gamma (alpha . alpha) alpha = phi(x_s) f,
 
-    whose potential energy is U = alpha . K0 alpha / 2 + gamma (alpha . alpha)^2 / 4.  Made by
-    :meth:`from_beam` or :meth:`from_matrices`; arrays are read-only.
+    whose potential energy is U = alpha . K0 alpha / 2 + gamma (alpha . alpha)^2 / 4, and less B . alpha, with B on
+    the right, where a constant side force B makes the wells unequal.  Made by :meth:`from_beam` or
+    :meth:`from_matrices`; arrays are read-only.
 
     Attributes
     ----------
@@ -64,9 +73,11 @@ class ReducedModel:
     tension_stiffness : float
         gamma, N/m for a beam.
     equilibrium : array of shape (N,)
-        Amplitudes at rest in the lower well, (-sqrt((P - P_cr)/gamma), 0, ...); zeros if monostable.
+        Amplitudes at rest in the lower well, (-sqrt((P - P_cr)/gamma), 0, ...); of a structure with one equilibrium
+        that one, zeros if it is perfect.
     length_scale : float or None
-        Length that normalises displacements, m: the buckling level b; None for a straight beam.
+        Length that normalises displacements, m: the buckling level b; of a beam that the load alone would not buckle
+        the height of the centre in the well of least energy; None for a straight beam.
     damping_ratio : array of shape (N,)
         Damping ratio of each linear mode about a well, by ascending frequency.
     center_shape : array of shape (N,)
@@ -77,6 +88,10 @@ class ReducedModel:
         What the model was reduced from.
     given_reference_freq : float or None
         Frequency to normalise with, Hz, if it is not the first natural frequency.
+    side_force : array of shape (N,) or None
+        B, of a structure whose wells are unequal.
+    imperfection : Imperfection or None
+        What B follows from.
     """
 
     mass: _Array
@@ -89,6 +104,8 @@ class ReducedModel:
     contact_shape: _Array | None = None
     beam: Beam | None = None
     given_reference_freq: float | None = None
+    side_force: _Array | None = None
+    imperfection: Imperfection | None = None
 
     def __post_init__(self) -> None:
         for value in vars(self).values():
@@ -107,6 +124,7 @@ class ReducedModel:
         modes: int = 32,
         damping_ratio: ArrayLike = 0.005,
         reference_freq: float | None = None,
+        imperfection: Imperfection | None = None,
     ) -> ReducedModel:
         """Galerkin reduction of a beam on its first buckling modes (Eqs. 10-15).
 
@@ -123,7 +141,11 @@ class ReducedModel:
         damping_ratio : float or array of shape (N,)
             Damping ratio of the linear modes about a well, each in [0, 1).
         reference_freq : float, optional
-            Frequency that normalises the excitation, Hz; the first natural frequency by default.
+            Frequency that normalises the excitation, Hz; the first natural frequency by default, of unequal wells about
+            the one of least energy.
+        imperfection : Imperfection, optional
+            What makes the wells unequal; one that is nothing is left out.  Damping is that of the linear modes about
+            the well that the striker pushes away from, and the same matrix everywhere.
 
         Raises
         ------
@@ -133,29 +155,52 @@ class ReducedModel:
         if not isinstance(beam, Beam):
             raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
         count = integer("modes", modes, 1, MAX_MODES)
-        shapes = BucklingModes(beam.length, count)
+        shapes = beam.buckling_modes(count)
         k = shapes.wavenumber
-        mass = beam.mass_per_length * (np.eye(count) + _coupling(shapes.parity)) / np.outer(k, k)
+        if isinstance(shapes, BucklingModes):
+            mass = beam.mass_per_length * (np.eye(count) + _coupling(shapes.parity)) / np.outer(k, k)
+        else:
+            mass = beam.mass_per_length * shapes.overlap
         gamma = beam.tension_stiffness
         equilibrium = np.zeros(count)
         # alpha_1 = -b/phi_1(1/2); K0 from E I (k_i^2 - k_1^2) - (P - P_cr), free of cancellation
-        equilibrium[0] = -math.pi * beam.buckling_level / math.sqrt(2.0 * beam.length)
+        if isinstance(shapes, BucklingModes):
+            equilibrium[0] = -math.pi * beam.buckling_level / math.sqrt(2.0 * beam.length)
+        else:
+            equilibrium[0] = -beam.buckling_level / float(shapes.shape(0.5 * beam.length)[0])
         if beam.is_buckled:
             stiffness = beam.bending_stiffness * (k**2 - k[0] ** 2) - gamma * equilibrium[0] ** 2
         else:
             stiffness = beam.bending_stiffness * k**2 - beam.axial_load
+        length_scale, force = (beam.buckling_level if beam.is_buckled else None), None
+        if imperfection is not None and not isinstance(imperfection, Imperfection):
+            raise InputTypeError(f"imperfection = {shown(imperfection)}: must be an Imperfection")
+        if imperfection is not None and imperfection.is_none:
+            imperfection = None
+        if imperfection is not None:
+            initial = imperfection.initial_shape(shapes)
+            force = beam.bending_stiffness * k**2 * initial + imperfection.side_load(shapes, beam)
+            # an initial shape acts as a side force, and as a load of gamma s0 more
+            stiffness = stiffness - gamma * float(initial @ initial)
+            found = landscape_of(stiffness, gamma, force, shapes.shape(0.5 * beam.length))
+            equilibrium = found.lower.amplitude
+            if length_scale is None:
+                height = abs(float(shapes.shape(0.5 * beam.length) @ found.deepest.amplitude))
+                length_scale = height if height > 0.0 else None
         return cls(
             mass=mass,
             stiffness=stiffness,
             tension_stiffness=gamma,
             equilibrium=equilibrium,
-            length_scale=beam.buckling_level if beam.is_buckled else None,
+            length_scale=length_scale,
             damping_ratio=damping_ratios(damping_ratio, count),
             center_shape=shapes.shape(0.5 * beam.length),
             beam=beam,
             given_reference_freq=None
             if reference_freq is None
             else positive("reference_freq", reference_freq, "Hz"),
+            side_force=force,
+            imperfection=imperfection,
         )
 
     @classmethod
@@ -171,6 +216,7 @@ class ReducedModel:
         length_scale: float = 1.0,
         damping_ratio: ArrayLike = 0.0,
         reference_freq: float | None = None,
+        side_force: ArrayLike | None = None,
     ) -> ReducedModel:
         """A model of any structure, given by its matrices; a free mass (stiffness 0) is one.
 
@@ -195,6 +241,8 @@ class ReducedModel:
             Damping ratio of each linear mode about the equilibrium, each in [0, 1).
         reference_freq : float, optional
             Frequency that normalises the excitation, Hz; needed if the first natural frequency is 0.
+        side_force : array of shape (N,), optional
+            Constant force B that makes the wells unequal; the equilibria then follow from it and are not given.
 
         Raises
         ------
@@ -213,6 +261,7 @@ class ReducedModel:
                 length_scale=length_scale,
                 damping_ratio=damping_ratio,
                 reference_freq=reference_freq,
+                side_force=side_force,
             )
         )
         model = cls(**given)
@@ -245,7 +294,7 @@ class ReducedModel:
                 if several
                 else self.contact_shape
             )
-        return np.moveaxis(BucklingModes(self.beam.length, self.modes).shape(at * self.beam.length), 0, -1)
+        return np.moveaxis(self.beam.buckling_modes(self.modes).shape(at * self.beam.length), 0, -1)
 
     @cached_property
     def lightest_contact_mass(self) -> float:
@@ -253,7 +302,8 @@ class ReducedModel:
 
         The other half of a beam is the mirror image of the first.
         """
-        return min(self.contact_mass(location) for location in np.linspace(0.02, 0.5, 25).tolist())
+        last = 0.5 if self.beam is None or self.beam.ends.are_alike else 0.98
+        return min(self.contact_mass(location) for location in np.linspace(0.02, last, 25).tolist())
 
     def contact_mass(self, location: float) -> float:
         """Mass met by an impulse at *location*, kg: 1/(phi . m^-1 phi).
@@ -269,6 +319,10 @@ class ReducedModel:
     # ------------------------------------------------------------------ linear modes about a well
 
     def _linear_modes(self) -> LinearModes:
+        if self.side_force is not None or (self.beam is not None and self.beam.ends.turn):
+            tangent = tangent_stiffness(self.stiffness, self.tension_stiffness, self.equilibrium)
+            parity = None if self.beam is None else self.beam.buckling_modes(self.modes).parity
+            return linear_modes_about(self.mass, tangent, parity)
         if self.beam is not None:
             return linear_modes_of_beam(self.beam, self.modes)
         return linear_modes_of_structure(self.mass, self.stiffness, self.tension_stiffness, self.equilibrium)
@@ -321,81 +375,13 @@ class ReducedModel:
         """
         if self.given_reference_freq is not None:
             return self.given_reference_freq
-        first = float(self.natural_freq[0])
+        first = float(self._about_deepest.natural_freq[0])
         if first == 0.0:
             raise InputError(
                 "reference_freq is not given and the first natural frequency is 0: "
                 "give reference_freq in Hz, greater than 0"
             )
         return first
-
-    # ------------------------------------------------------------------ energy and wells
-
-    def potential_energy(self, alpha: ArrayLike) -> _Array:
-        """Potential energy, J, of amplitudes of shape (..., N); 0 for the straight structure."""
-        a = self._amplitudes("alpha", alpha)
-        bent = a * self.stiffness if self.stiffness.ndim == 1 else a @ self.stiffness
-        square = np.sum(a * a, axis=-1)
-        energy: _Array = 0.5 * np.sum(a * bent, axis=-1) + 0.25 * self.tension_stiffness * square**2
-        return energy
-
-    def kinetic_energy(self, alpha_velocity: ArrayLike) -> _Array:
-        """Kinetic energy, J, of amplitude velocities of shape (..., N)."""
-        v = self._amplitudes("alpha_velocity", alpha_velocity)
-        energy: _Array = 0.5 * np.sum(v * (v @ self.mass), axis=-1)
-        return energy
-
-    def _amplitudes(self, name: str, value: ArrayLike) -> _Array:
-        array = finite_array(name, value)
-        if array.ndim == 0 or array.shape[-1] != self.modes:
-            raise InputError(
-                f"{name} of shape {array.shape}: must have the shape (..., {self.modes}), a number a mode"
-            )
-        return array
-
-    @property
-    def wells(self) -> _Array:
-        """Amplitudes at the two wells, lower first, shape (2, N); both are 0 if monostable."""
-        return np.stack((self.equilibrium, -self.equilibrium))
-
-    @property
-    def is_bistable(self) -> bool:
-        """Whether the structure has two wells."""
-        return bool(np.any(self.equilibrium != 0.0))
-
-    def require_bistable(self, what: str) -> None:
-        """Refuse a structure with a single equilibrium, naming *what* needs two wells."""
-        if self.is_bistable:
-            return
-        if self.beam is None:
-            raise InputError(f"{what} needs a bistable structure: give an equilibrium other than zero")
-        raise InputError(
-            f"{what} needs a buckled beam: axial_load = {self.beam.axial_load:g} N must exceed the critical "
-            f"load of {self.beam.critical_load:g} N"
-        )
-
-    @property
-    def well_energy(self) -> float:
-        """Potential energy of either well, J: -(P - P_cr)^2/(4 gamma) for a buckled beam, 0 if straight."""
-        return float(self.potential_energy(self.equilibrium))
-
-    @cached_property
-    def barrier_energy(self) -> float:
-        """Energy of the lowest saddle between the wells, J.
-
-        Every equilibrium lies along an eigenvector of K0 with an eigenvalue kappa < 0, at the energy
-        -kappa^2/(4 gamma), or at 0.  The wells belong to the lowest eigenvalue and the lowest saddle
-        to the second, E I k_2^2 - P, if it is negative; otherwise it is the straight state, at 0.
-
-        Raises
-        ------
-        InputError
-            If the structure has no second well.
-        """
-        self.require_bistable("barrier_energy")
-        kappa = np.sort(self.stiffness if self.stiffness.ndim == 1 else np.linalg.eigvalsh(self.stiffness))
-        second = min(float(kappa[1]), 0.0) if kappa.size > 1 else 0.0
-        return -(second**2) / (4.0 * self.tension_stiffness) + 0.0
 
 
 def _symmetric(matrix: _Array) -> _Array:
