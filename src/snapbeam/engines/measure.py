@@ -88,7 +88,7 @@ class _Bench:
             shapes.append(model.contact_shape)
         kept = slice(0, _MOST_MODES)
         self.omega, self.damping = structure.omega[kept], (structure.damping_ratio * structure.omega)[kept]
-        self.coupling = np.ascontiguousarray(structure.coupling[kept, kept])
+        self.columns = np.array(structure.coupling[kept, kept].T, order="C")
         self.well = structure.well[kept]
         self.rows = (np.array(shapes) @ model.linear_modes)[:, kept] / length
         if model.beam is not None:
@@ -133,7 +133,7 @@ class _Bench:
         kicks = np.multiply.outer(steps, composition.kick)
         out, work = np.empty((counts.size, self.omega.size)), np.empty((3, self.omega.size))
         whole, gamma = counts.astype(np.int64), self.structure.tension_stiffness
-        kernel(_march, ())(whole, flows, kicks, self.coupling, self.well, gamma, velocity, work, out)
+        kernel(_march, ())(whole, flows, kicks, self.columns, self.well, gamma, velocity, work, out)
         return out @ self.rows.T
 
     def fewest(self, limit: float) -> float:
@@ -163,7 +163,8 @@ class _Bench:
         return worst
 
 
-def _march(counts, flows, kicks, coupling, well, gamma, start, work, out):
+def _march(counts, flows, kicks, columns, well, gamma, start, work, out):
+    # r = G q column by column: every sum keeps its order, and nothing waits for the sum before
     modes = well.size
     last = kicks.shape[1] - 1
     q, p, r = work[0], work[1], work[2]
@@ -178,11 +179,13 @@ def _march(counts, flows, kicks, coupling, well, gamma, start, work, out):
                 if stage > 0 or step == 0:
                     along_well, along = 0.0, 0.0
                     for i in range(modes):
-                        total = 0.0
-                        for j in range(modes):
-                            total += coupling[i, j] * q[j]
-                        r[i] = total
-                        along += total * q[i]
+                        r[i] = 0.0
+                    for j in range(modes):
+                        along_mode = q[j]
+                        for i in range(modes):
+                            r[i] += columns[j, i] * along_mode
+                    for i in range(modes):
+                        along += r[i] * q[i]
                         along_well += well[i] * q[i]
                     toward, back = -gamma * along * weight, -gamma * (2.0 * along_well + along) * weight
                     for i in range(modes):
