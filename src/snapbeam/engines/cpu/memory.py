@@ -35,6 +35,8 @@ class Packed(NamedTuple):
     layout: Layout
     rows: NDArray[np.int64]
     """Row of each linear mode, shape (N,)."""
+    members: tuple[int, ...]
+    """Modes of each block."""
 
     def spread(self, values: _Array) -> _Array:
         """Numbers of modes, shape (..., N), as padded rows, shape (..., rows)."""
@@ -69,8 +71,10 @@ def pack(structure: Structure, high_omega: float = np.inf) -> Packed:
     blocks: list[int] = []
     rows = np.empty(omega.size, dtype=np.int64)
     size = 0
+    held: list[int] = []
     for b in range(label.max() + 1):
         members = np.flatnonzero(label == b)
+        held.append(members.size)
         rows[members] = size + np.arange(members.size)
         stop = size + -(-members.size // WIDTH) * WIDTH
         unroll = 4 if stop - size > WIDTH else 2
@@ -114,7 +118,7 @@ def pack(structure: Structure, high_omega: float = np.inf) -> Packed:
         stretch=structure.stretch,
         gentle=gentle,
     )
-    return Packed(np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows)
+    return Packed(np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows, tuple(held))
 
 
 class Memory(NamedTuple):

@@ -1,0 +1,86 @@
+"""Where in memory things stand: a row is eight numbers, one of each of the eight runs that are marched side by side.
+
+Addresses are the same for every number of modes, so that compiled code has them as constants.
+"""
+
+from __future__ import annotations
+
+from snapbeam.engines.scalar.composition import TURNS
+from snapbeam.engines.scalar.lanes import WIDTH
+
+__all__ = ["LEVELS", "MODE", "MODE_ROWS", "MOST"]
+
+MOST = 16
+"""Modes, at most."""
+LEVELS = 24
+"""Lengths of step that are prepared for each run, at most."""
+FLOWS = 6
+"""Distinct flows of a composition, at most."""
+
+# Of each run: a row a name.
+_NAMES = (
+    "T", "WITHIN", "PERIOD", "TICK", "LANDING", "LIMIT", "END", "TICKS", "LENGTH", "KEY", "WHOLE", "LEVEL", "PHASE0", "PHASE",
+    "HOME", "STRETCH", "OFFSET", "OMEGA", "AMPLITUDE", "REST_CONTACT", "REST_CENTER", "TIP_SPEED", "STEP_TIME",
+    "STEP", "COARSEST", "COARSE_TICKS", "FINEST", "PIECES", "LOOK_KEY", "FINEST_LOOK", "LOOK_PIECES", "LOOK_PIECE", "SAFE_GAP", "SAFE_CENTER",
+    "WEIGHED", "BEAT", "ONSET", "SIDE", "DECIDE_REACH", "DECIDE_ENERGY", "DECIDE_CROSSINGS", "LATE", "STEPS", "MAX_STEPS",
+    "W", "WV", "D", "DV", "C", "CV", "MIN_W", "MAX_W", "MIN_C", "MAX_C", "PEAK_WV", "PEAK_CV", "SQUARE_W", "SQUARE_C",
+    "SQUARE_WV", "SQUARE_CV", "ENERGY_TIME", "HIGH_TIME", "IMPULSE", "WORK", "GROSS", "DEEPEST", "LANDED",
+    "TEMP", "TEMP1", "TEMP2", "TEMP3", "GQ", "QR",
+)  # fmt: skip
+ROW = {name: i * WIDTH for i, name in enumerate(_NAMES)}
+(
+    T, WITHIN, PERIOD, TICK, LANDING, LIMIT, END, TICKS, LENGTH, KEY, WHOLE, LEVEL, PHASE0, PHASE,
+    HOME, STRETCH, OFFSET, OMEGA, AMPLITUDE, REST_CONTACT, REST_CENTER, TIP_SPEED, STEP_TIME,
+    STEP, COARSEST, COARSE_TICKS, FINEST, PIECES, LOOK_KEY, FINEST_LOOK, LOOK_PIECES, LOOK_PIECE, SAFE_GAP, SAFE_CENTER,
+    WEIGHED, BEAT, ONSET, SIDE, DECIDE_REACH, DECIDE_ENERGY, DECIDE_CROSSINGS, LATE, STEPS, MAX_STEPS,
+    W, WV, D, DV, C, CV, MIN_W, MAX_W, MIN_C, MAX_C, PEAK_WV, PEAK_CV, SQUARE_W, SQUARE_C,
+    SQUARE_WV, SQUARE_CV, ENERGY_TIME, HIGH_TIME, IMPULSE, WORK, GROSS, DEEPEST, LANDED,
+    TEMP, TEMP1, TEMP2, TEMP3, GQ, QR,
+) = ROW.values()  # fmt: skip
+
+LAW = len(_NAMES) * WIDTH
+"""Numbers of the law of contact, a row each, eight at most."""
+TURN = LAW + 8 * WIDTH
+"""Sine and then cosine of the drive's turn at each kick of the step at hand."""
+STAGES = TURN + 2 * TURNS * WIDTH
+"""Weights of the composition, plain numbers."""
+COUPLING = STAGES + 3 * TURNS
+"""G, row by row of MOST plain numbers."""
+MODE = COUPLING + MOST * MOST
+"""The modes, one after the other."""
+# Of each mode, plain numbers:
+OMEGA_I, OMEGA_SQUARED, OMEGA_DAMPED, DAMPING, CENTER, SHIFT, HIGH, WELL = range(8)
+# and rows.
+Q, P, K, Q1, P1, K1, SEEN_WELL, CONTACT, LOOK = (WIDTH * i for i in range(1, 10))
+FLOW = LOOK + 4 * WIDTH
+"""a11 - 1, a12, a21, a22 - 1 of each distinct flow of the step at hand."""
+MODE_ROWS = FLOW + FLOWS * 4 * WIDTH
+TABLES = MODE + MOST * MODE_ROWS
+"""Of each run, for every level the flows mode by mode and the turns of the drive."""
+
+
+def slot_size(modes: int, distinct: int) -> int:
+    """Plain numbers of one level in a table."""
+    return distinct * 4 * modes + 2 * TURNS
+
+
+def sizes(modes: int, distinct: int, pieces: int) -> tuple[int, int]:
+    """Where the rows of a look begin, and the length of the memory, for so many *pieces* of a step."""
+    look = TABLES + WIDTH * LEVELS * slot_size(modes, distinct)
+    return look, look + 4 * WIDTH * (pieces + 1)
+
+
+# Whole numbers: which of the eight lanes, a bit a lane.
+(
+    LIVE,  # hold a run
+    TOUCHING,
+    QUIET,
+    CUTTING,  # take a step that was cut where the contact begins or ends
+    EVENT,  # and do so at the end of the step at hand
+    LOOKS,  # look once more where they enter
+    ASIDE,  # look for the deepest point of a contact, inside the step at hand
+    PROBED,  # have done so
+    ODD,  # take a step of a length that is not prepared
+) = range(9)
+RUNS = 16
+"""The run of each lane."""
