@@ -118,7 +118,9 @@ def pack(structure: Structure, high_omega: float = np.inf) -> Packed:
         stretch=structure.stretch,
         gentle=gentle,
     )
-    return Packed(np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows, tuple(held))
+    return Packed(
+        np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows, tuple(held)
+    )
 
 
 class Memory(NamedTuple):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import mark_of, peak_force
-from snapbeam.engines.scalar.lanes import select_less, vabs
+from snapbeam.engines.scalar.lanes import select_less
 from snapbeam.engines.scalar.signals import count_crossings, first_rise, sign_of, widened
 
 __all__ = [
@@ -159,7 +159,7 @@ def leave_contact_open(book, law, end, tick):
 def safe_for(distance, bound, tip_speed, acceleration, step):
     """For how long a signal at *distance* from zero cannot reach it, at most a few steps."""
     horizon = _TRUST * step
-    speed = _MARGIN * bound + tip_speed + vabs(acceleration) * horizon
+    speed = _MARGIN * bound + tip_speed + abs(acceleration) * horizon
     return select_less(distance, speed * horizon, distance / speed, horizon)
 
 

@@ -197,6 +197,13 @@ vtrunc = _unary("trunc")
 _vsqrt = _unary("sqrt")
 
 
+@overload(abs)
+def _abs(value):
+    if _is_lanes(value):
+        return lambda value: vabs(value)
+    return None
+
+
 @overload(math.sqrt)
 def _sqrt(value):
     if _is_lanes(value):

@@ -13,9 +13,22 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_model
 
-from snapbeam.engines.scalar.lanes import LANES, WIDTH, spread
+from snapbeam.engines.scalar.lanes import LANES, WIDTH, splat, spread
 
-__all__ = ["ALL", "bits", "both", "lanes_tuple", "less", "lowest", "mask_of", "pick", "vmax", "vmin"]
+__all__ = [
+    "ALL",
+    "bits",
+    "both",
+    "halvings",
+    "lanes_tuple",
+    "less",
+    "lowest",
+    "mask_of",
+    "pick",
+    "power_of_two",
+    "vmax",
+    "vmin",
+]
 
 ALL = (1 << WIDTH) - 1
 """Every lane, as a whole number."""
@@ -138,6 +151,72 @@ def both(typingctx: Any, a: Any, b: Any) -> Any:
     return MASK(MASK, MASK), codegen
 
 
+_WHOLE = ir.VectorType(_I64, WIDTH)
+_MANTISSA = (1 << 52) - 1
+_EXPONENT_OF_ONE = 1023
+
+
+def _all_of(value: int) -> Any:
+    return ir.Constant(_WHOLE, [value] * WIDTH)
+
+
+@intrinsic
+def _exponent(typingctx: Any, value: Any) -> Any:
+    """The exponent of positive numbers, biased, as numbers."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        whole = builder.bitcast(args[0], _WHOLE)
+        return builder.sitofp(builder.lshr(whole, _all_of(52)), context.get_value_type(LANES))
+
+    return LANES(LANES), codegen
+
+
+@intrinsic
+def _mantissa(typingctx: Any, value: Any) -> Any:
+    """Positive numbers over the powers of two below them, in [1, 2)."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        whole = builder.and_(builder.bitcast(args[0], _WHOLE), _all_of(_MANTISSA))
+        whole = builder.or_(whole, _all_of(_EXPONENT_OF_ONE << 52))
+        return builder.bitcast(whole, context.get_value_type(LANES))
+
+    return LANES(LANES), codegen
+
+
+@intrinsic
+def _power(typingctx: Any, value: Any) -> Any:
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        whole = builder.fptosi(args[0], _WHOLE)
+        whole = builder.shl(builder.add(whole, _all_of(_EXPONENT_OF_ONE)), _all_of(52))
+        return builder.bitcast(whole, context.get_value_type(LANES))
+
+    return LANES(LANES), codegen
+
+
+def power_of_two(exponent: Any) -> Any:
+    """Two to the power of whole numbers between -1022 and 1023, exactly."""
+    raise TypeError("power_of_two runs in compiled code only")
+
+
+@overload(power_of_two)
+def _power_of_two(exponent):
+    return lambda exponent: _power(exponent)
+
+
+def halvings(much: Any, little: Any) -> Any:
+    """How often *much* > 0 must be halved until it is at most *little* >= 0; negative: so often it may be doubled."""
+    raise TypeError("halvings runs in compiled code only")
+
+
+@overload(halvings)
+def _halvings(much, little):
+    def implementation(much, little):
+        once = pick(less(_mantissa(little), _mantissa(much)), splat(1.0), splat(0.0))
+        return _exponent(much) - _exponent(little) + once
+
+    return implementation
+
+
 @intrinsic
 def lanes_tuple(typingctx: Any, template: Any, array: Any, index: Any) -> Any:
     """The named tuple that *template* is one of, its fields registers that follow each other from *index* on."""
@@ -153,4 +232,3 @@ def lanes_tuple(typingctx: Any, template: Any, array: Any, index: Any) -> Any:
         return context.make_tuple(builder, signature.return_type, values)
 
     return types.NamedUniTuple(LANES, count, template.instance_class)(template, array, types.intp), codegen
-

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 
 from snapbeam.engines.scalar.compile import inlined
-from snapbeam.engines.scalar.lanes import vabs
 
 __all__ = ["bulge", "count_crossings", "first_fall", "first_rise", "sign_of", "turning_point", "widened"]
 
@@ -22,7 +21,7 @@ _BULGE = 0.15
 @inlined
 def bulge(v0, v1, h):
     """How far the cubic can at most pass the greater and the lesser of its end values."""
-    return _BULGE * h * (vabs(v0) + vabs(v1))
+    return _BULGE * h * (abs(v0) + abs(v1))
 
 
 @inlined

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from snapbeam.engines.cpu.few import places as at
 from snapbeam.engines.cpu.few.meet import look_at
-from snapbeam.engines.cpu.few.text import modal_energy, modes_of
+from snapbeam.engines.cpu.few.modes import modal_energy, modes_of
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.decisions import Seen, clock_of, count_in_step, finish_impact, quiet_energy
 from snapbeam.engines.scalar.lanes import WIDTH, load, splat, store, vabs, vfloor
@@ -18,7 +18,7 @@ __all__ = ["accept", "end_contact"]
 
 @compiled
 def _widen(m, low, high, u0, v0, which):
-    """Widen the extremes of some lanes by a cubic that passes its ends; what is seen at the end of the step is in TEMP."""
+    """Widen the extremes of some lanes by cubics that pass their ends; those are at the end of the step in TEMP."""
     while which:
         lane = lowest(which)
         which &= which - 1

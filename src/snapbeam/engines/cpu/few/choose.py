@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from snapbeam.engines.cpu.few import places as at
-from snapbeam.engines.cpu.few.seat import TWO_PI, flows_over
-from snapbeam.engines.cpu.few.text import modes_of, tension
+from snapbeam.engines.cpu.few.modes import at_hand, modes_of, tension
+from snapbeam.engines.cpu.few.seat import TWO_PI, prepare, slot_of
 from snapbeam.engines.scalar.compile import compiled, inlined
-from snapbeam.engines.scalar.composition import TURNS
 from snapbeam.engines.scalar.decisions import GRADING, RELEASE, STRETCHED
-from snapbeam.engines.scalar.lanes import WIDTH, load, splat, spread_at, store, vabs
-from snapbeam.engines.scalar.masks import bits, less, lowest, mask_of, pick, vmax, vmin
-from snapbeam.engines.scalar.physics import sincos
+from snapbeam.engines.scalar.lanes import load, splat, spread_at, store, vabs
+from snapbeam.engines.scalar.masks import (
+    bits,
+    halvings,
+    less,
+    lowest,
+    mask_of,
+    pick,
+    power_of_two,
+    vmax,
+    vmin,
+)
 
 __all__ = ["choose", "fetch"]
 
@@ -33,39 +41,24 @@ def _change_wells(m, shape, world, which):
 
 
 @inlined
-def _flight(m, n, world, fresh):
-    """Level and ticks of a step in free flight."""
-    quiet = n[at.QUIET]
-    step = load(m, at.STEP)
-    level = pick(mask_of(quiet), splat(-1.0), splat(0.0))
-    ticks = pick(mask_of(quiet), 2.0 * step, step)
+def _flight(m, n, world):
+    """Halvings of the flight step in free flight, or -1."""
+    level = splat(0.0)
     if world.stretch > 0.0:
-        reach = STRETCHED * world.stretch
-        stretched, finest = vabs(load(m, at.STRETCH)), load(m, at.FINEST)
-        more = bits(less(reach, stretched)) & bits(less(level, finest)) & fresh & ~quiet
-        while more:
-            mask = mask_of(more)
-            level, ticks = pick(mask, level + 1.0, level), pick(mask, 0.5 * ticks, ticks)
-            reach *= 2.0
-            more &= bits(less(reach, stretched)) & bits(less(level, finest))
-    return level, ticks
+        far = halvings(vabs(load(m, at.STRETCH)), splat(STRETCHED * world.stretch))
+        level = vmin(vmax(far, level), load(m, at.FINEST))
+    return pick(mask_of(n[at.QUIET]), splat(-1.0), level)
 
 
 @inlined
-def _in_contact(m, level, ticks, touching):
+def _in_contact(m, level, touching):
     """The same of the lanes in contact: graded from the onset and towards the release."""
-    tick, dv = load(m, at.TICK), load(m, at.DV)
-    want = GRADING * ((load(m, at.T) - load(m, at.ONSET)) * tick)
+    dv = load(m, at.DV)
+    want = GRADING * ((load(m, at.T) - load(m, at.ONSET)) * load(m, at.TICK))
     left = -RELEASE * load(m, at.D) / dv
-    want = pick(less(dv, 0.0), vmin(want, left), want)
-    own, own_ticks, finest = load(m, at.COARSEST), load(m, at.COARSE_TICKS), load(m, at.FINEST)
-    more = bits(less(want, own_ticks * tick)) & bits(less(own, finest)) & touching
-    while more:
-        mask = mask_of(more)
-        own, own_ticks = pick(mask, own + 1.0, own), pick(mask, 0.5 * own_ticks, own_ticks)
-        more &= bits(less(want, own_ticks * tick)) & bits(less(own, finest))
-    mask = mask_of(touching)
-    return pick(mask, vmax(level, own), level), pick(mask, vmin(ticks, own_ticks), ticks)
+    want = vmax(pick(less(dv, 0.0), vmin(want, left), want), splat(0.0))
+    graded = vmax(halvings(load(m, at.STEP_TIME), want), load(m, at.COARSEST))
+    return pick(mask_of(touching), vmax(level, vmin(graded, load(m, at.FINEST))), level)
 
 
 @inlined
@@ -81,9 +74,10 @@ def choose(m, n, shape, world):
     one = pick(which, splat(1.0), splat(0.0))
     store(m, at.STEPS, load(m, at.STEPS) + one)
     store(m, at.BEAT, load(m, at.BEAT) + one)
-    level, ticks = _flight(m, n, world, fresh)
+    level = _flight(m, n, world)
     if n[at.TOUCHING] & fresh:
-        level, ticks = _in_contact(m, level, ticks, n[at.TOUCHING] & fresh)
+        level = _in_contact(m, level, n[at.TOUCHING] & fresh)
+    ticks = load(m, at.STEP) * power_of_two(0.0 - level)
     t, limit = load(m, at.T), load(m, at.LIMIT)
     over = bits(less(limit, t + ticks)) & fresh
     ticks = pick(mask_of(over), limit - t, ticks)
@@ -96,38 +90,16 @@ def choose(m, n, shape, world):
     return fresh
 
 
-@inlined
-def _fetch_prepared(m, shape, world, lane):
-    """The flows of a prepared step into a lane."""
-    level = int(m[at.LEVEL + lane])
-    m[at.KEY + lane] = m[at.LEVEL + lane]
-    place = at.TABLES + lane * at.LEVELS * world.slot + (level + 1) * world.slot
-    flows = world.stages.flows
-    distinct = (flows + 1) // 2
-    for i in range(modes_of(shape)):
-        row = at.MODE + i * at.MODE_ROWS + at.FLOW + lane
-        for j in range(4 * distinct):
-            m[row + j * WIDTH] = m[place + j]
-        place += 4 * distinct
-    for j in range(flows + 1):
-        m[at.TURN + j * WIDTH + lane] = m[place + j]
-        m[at.TURN + (TURNS + j) * WIDTH + lane] = m[place + TURNS + j]
-
-
 @compiled
 def _make(m, shape, world, odd):
-    """The flows of steps of any length, and the drive's turns in them, for some lanes."""
-    stages, which = world.stages, mask_of(odd)
-    length, omega = load(m, at.LENGTH), load(m, at.OMEGA)
-    for flow in range((stages.flows + 1) // 2):
-        flows_over(m, shape, m[stages.flow + flow] * length, at.FLOW + 4 * WIDTH * flow, which)
-    for stage in range(stages.flows + 1):
-        sine, cosine = sincos(m[stages.elapsed + stage] * (length * omega))
-        row = at.TURN + stage * WIDTH
-        store(m, row, pick(which, sine, load(m, row)))
-        row += TURNS * WIDTH
-        store(m, row, pick(which, cosine, load(m, row)))
-    store(m, at.KEY, pick(which, splat(_CUSTOM), load(m, at.KEY)))
+    """Prepare steps of any length, and have them at hand."""
+    while odd:
+        lane = lowest(odd)
+        odd &= odd - 1
+        place = slot_of(world, lane, at.LEVELS - 1)
+        prepare(m, shape, world, place, m[at.LENGTH + lane], m[at.OMEGA + lane])
+        at_hand(m, shape, place, lane)
+        m[at.KEY + lane] = _CUSTOM
 
 
 @inlined
@@ -139,6 +111,7 @@ def fetch(m, n, shape, world):
     while other:
         lane = lowest(other)
         other &= other - 1
-        _fetch_prepared(m, shape, world, lane)
+        at_hand(m, shape, slot_of(world, lane, int(m[at.LEVEL + lane])), lane)
+        m[at.KEY + lane] = m[at.LEVEL + lane]
     if odd:
         _make(m, shape, world, odd)

@@ -15,8 +15,8 @@ from snapbeam.engines.cpu.few import places as at
 from snapbeam.engines.cpu.few.accept import accept, end_contact
 from snapbeam.engines.cpu.few.choose import choose, fetch
 from snapbeam.engines.cpu.few.meet import About, cut_again, meet, probe
+from snapbeam.engines.cpu.few.modes import modal_energy, signals, take, tension
 from snapbeam.engines.cpu.few.seat import seat
-from snapbeam.engines.cpu.few.text import modal_energy, signals, take, tension
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import contact_energy
 from snapbeam.engines.scalar.decisions import leave_contact_open
@@ -106,7 +106,6 @@ def _pass(m, n, shape, world, asked, books, looked):
     failed = going & ~bits(less(vabs(about.d + about.dv), math.inf))
     going &= ~failed
     looks = n[at.LOOKS] & n[at.CUTTING] & going
-    cutting = n[at.CUTTING]
     ends, at_once = meet(m, n, shape, world, about, fresh & going, looked)
     going = (going & ~fresh) | ends
     if looks:
@@ -128,7 +127,7 @@ def _pass(m, n, shape, world, asked, books, looked):
 
 @compiled
 def march_few(m, n, shape, world, asked, which, room, kept, spare):
-    """March the runs *which*, eight at a time; *m* and *n* belong to the caller's thread, *spare* is a book of nobody."""
+    """March the runs *which*, eight at a time; *m* and *n* are the calling thread's own, *spare* is nobody's book."""
     books, looked, following, goes_on = kept.books, room.looked, 0, False
     n[at.LIVE] = 0
     for lane in range(WIDTH):

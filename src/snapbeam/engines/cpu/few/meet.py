@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from snapbeam.engines.cpu.few import places as at
+from snapbeam.engines.cpu.few.modes import bounds, glide
 from snapbeam.engines.cpu.few.seat import flows_over
-from snapbeam.engines.cpu.few.text import bounds, glide
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.decisions import Seen, clock_of, entry_again, first_entry, safe_for
 from snapbeam.engines.scalar.lanes import WIDTH, load, splat, store, vabs, vfloor, vtrunc
@@ -46,9 +46,7 @@ def _safe(m, shape, late, early_center):
     gap = safe_for(zero - load(m, at.D), bound, load(m, at.TIP_SPEED), push, step_time)
     store(m, at.SAFE_GAP, pick(mask_of(late), t + vtrunc(gap / tick), load(m, at.SAFE_GAP)))
     center = safe_for(vabs(load(m, at.C)), center_bound, zero, center_push, step_time)
-    store(
-        m, at.SAFE_CENTER, pick(mask_of(early_center), t + vtrunc(center / tick), load(m, at.SAFE_CENTER))
-    )
+    store(m, at.SAFE_CENTER, pick(mask_of(early_center), t + vtrunc(center / tick), load(m, at.SAFE_CENTER)))
 
 
 @inlined
@@ -110,10 +108,7 @@ def _leave(m, n, about_d, about_dv, leaving):
 
 @compiled
 def _enter(m, n, look, rising, looked):
-    """Cut the steps in which the gap closes; returns the lanes that go on in free flight, and those that begin touching.
-
-    Of the first are those whose step ends as the gap closes.
-    """
+    """Cut the steps in which the gap closes; returns those that end as they are, and those that touch at once."""
     on, at_once = 0, 0
     while rising:
         lane = lowest(rising)
@@ -140,7 +135,7 @@ def _enter(m, n, look, rising, looked):
 
 @inlined
 def meet(m, n, shape, world, about, whole, looked):
-    """What the steps of the lanes *whole* meet; returns those that end as they are, and those that touch from the start."""
+    """What the steps of the lanes *whole* meet; returns those that end as they are, and those that touch at once."""
     if whole == 0:
         return 0, 0
     touching = whole & n[at.TOUCHING]

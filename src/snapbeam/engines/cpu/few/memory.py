@@ -14,6 +14,7 @@ from snapbeam.engines.cpu.memory import Packed
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.scalar.composition import COMPOSITIONS, in_memory
 from snapbeam.engines.scalar.extras import extras_of_table
+from snapbeam.engines.scalar.lanes import WIDTH
 
 __all__ = ["FewMemory", "lay_out_few", "suits"]
 
@@ -83,7 +84,24 @@ def lay_out_few(ensemble: Ensemble, packed: Packed, pieces: int) -> FewMemory:
         m[at.COUPLING + i * at.MOST : at.COUPLING + i * at.MOST + modes] = coupling[i]
         for place, values in numbers.items():
             m[at.MODE + i * at.MODE_ROWS + place] = values[mode]
+    _enter_pairs(
+        m,
+        [numbers[place][order] for place in (at.OMEGA_DAMPED, at.DAMPING, at.OMEGA_SQUARED)],
+        stages.flow,
+        distinct,
+    )
     blocks = tuple(int(size) for size in packed.members)
     world = World(stages, structure.tension_stiffness, structure.stretch, slot, look)
-    return FewMemory(m, np.zeros(at.RUNS + 8, dtype=np.int64), shape_of(blocks), world)
+    return FewMemory(m, np.zeros(at.RUNS + 8, dtype=np.int64), shape_of(blocks, stages.flows), world)
 
+
+def _enter_pairs(m: _Array, of_modes: list[_Array], flow: int, distinct: int) -> None:
+    """What the flows follow from, for each pair of a mode and a distinct flow; those that fill a group stand still."""
+    modes = of_modes[0].size
+    pairs = np.zeros((at.groups(modes, distinct) * WIDTH, 4))
+    pairs[:, 0] = 1.0
+    for column, values in enumerate(of_modes):
+        pairs[: modes * distinct, column] = np.repeat(values, distinct)
+    pairs[: modes * distinct, 3] = np.tile(m[flow : flow + distinct], modes)
+    grouped = pairs.reshape(-1, WIDTH, 4).transpose(0, 2, 1).ravel()
+    m[at.PAIRS : at.PAIRS + grouped.size] = grouped

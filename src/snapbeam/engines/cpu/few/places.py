@@ -8,8 +8,6 @@ from __future__ import annotations
 from snapbeam.engines.scalar.composition import TURNS
 from snapbeam.engines.scalar.lanes import WIDTH
 
-__all__ = ["LEVELS", "MODE", "MODE_ROWS", "MOST"]
-
 MOST = 16
 """Modes, at most."""
 LEVELS = 24
@@ -17,28 +15,17 @@ LEVELS = 24
 FLOWS = 6
 """Distinct flows of a composition, at most."""
 
-# Of each run: a row a name.
-_NAMES = (
-    "T", "WITHIN", "PERIOD", "TICK", "LANDING", "LIMIT", "END", "TICKS", "LENGTH", "KEY", "WHOLE", "LEVEL", "PHASE0", "PHASE",
-    "HOME", "STRETCH", "OFFSET", "OMEGA", "AMPLITUDE", "REST_CONTACT", "REST_CENTER", "TIP_SPEED", "STEP_TIME",
-    "STEP", "COARSEST", "COARSE_TICKS", "FINEST", "PIECES", "LOOK_KEY", "FINEST_LOOK", "LOOK_PIECES", "LOOK_PIECE", "SAFE_GAP", "SAFE_CENTER",
-    "WEIGHED", "BEAT", "ONSET", "SIDE", "DECIDE_REACH", "DECIDE_ENERGY", "DECIDE_CROSSINGS", "LATE", "STEPS", "MAX_STEPS",
-    "W", "WV", "D", "DV", "C", "CV", "MIN_W", "MAX_W", "MIN_C", "MAX_C", "PEAK_WV", "PEAK_CV", "SQUARE_W", "SQUARE_C",
-    "SQUARE_WV", "SQUARE_CV", "ENERGY_TIME", "HIGH_TIME", "IMPULSE", "WORK", "GROSS", "DEEPEST", "LANDED",
-    "TEMP", "TEMP1", "TEMP2", "TEMP3", "GQ", "QR",
-)  # fmt: skip
-ROW = {name: i * WIDTH for i, name in enumerate(_NAMES)}
+# Of each run:
 (
-    T, WITHIN, PERIOD, TICK, LANDING, LIMIT, END, TICKS, LENGTH, KEY, WHOLE, LEVEL, PHASE0, PHASE,
-    HOME, STRETCH, OFFSET, OMEGA, AMPLITUDE, REST_CONTACT, REST_CENTER, TIP_SPEED, STEP_TIME,
-    STEP, COARSEST, COARSE_TICKS, FINEST, PIECES, LOOK_KEY, FINEST_LOOK, LOOK_PIECES, LOOK_PIECE, SAFE_GAP, SAFE_CENTER,
-    WEIGHED, BEAT, ONSET, SIDE, DECIDE_REACH, DECIDE_ENERGY, DECIDE_CROSSINGS, LATE, STEPS, MAX_STEPS,
-    W, WV, D, DV, C, CV, MIN_W, MAX_W, MIN_C, MAX_C, PEAK_WV, PEAK_CV, SQUARE_W, SQUARE_C,
-    SQUARE_WV, SQUARE_CV, ENERGY_TIME, HIGH_TIME, IMPULSE, WORK, GROSS, DEEPEST, LANDED,
-    TEMP, TEMP1, TEMP2, TEMP3, GQ, QR,
-) = ROW.values()  # fmt: skip
+    T, WITHIN, PERIOD, TICK, LANDING, LIMIT, END, TICKS, LENGTH, KEY, WHOLE, LEVEL, PHASE0, PHASE, HOME,
+    STRETCH, OFFSET, OMEGA, AMPLITUDE, REST_CONTACT, REST_CENTER, TIP_SPEED, STEP_TIME, STEP, COARSEST,
+    COARSE_TICKS, FINEST, PIECES, LOOK_KEY, FINEST_LOOK, LOOK_PIECES, LOOK_PIECE, SAFE_GAP, SAFE_CENTER,
+    WEIGHED, BEAT, ONSET, SIDE, DECIDE_REACH, DECIDE_ENERGY, DECIDE_CROSSINGS, LATE, STEPS, MAX_STEPS, W, WV, D,
+    DV, C, CV, MIN_W, MAX_W, MIN_C, MAX_C, PEAK_WV, PEAK_CV, SQUARE_W, SQUARE_C, SQUARE_WV, SQUARE_CV,
+    ENERGY_TIME, HIGH_TIME, IMPULSE, WORK, GROSS, DEEPEST, TEMP, TEMP1, TEMP2, TEMP3, GQ, QR,
+) = range(0, 72 * WIDTH, WIDTH)  # fmt: skip
 
-LAW = len(_NAMES) * WIDTH
+LAW = QR + WIDTH
 """Numbers of the law of contact, a row each, eight at most."""
 TURN = LAW + 8 * WIDTH
 """Sine and then cosine of the drive's turn at each kick of the step at hand."""
@@ -46,7 +33,9 @@ STAGES = TURN + 2 * TURNS * WIDTH
 """Weights of the composition, plain numbers."""
 COUPLING = STAGES + 3 * TURNS
 """G, row by row of MOST plain numbers."""
-MODE = COUPLING + MOST * MOST
+PAIRS = COUPLING + MOST * MOST
+"""For each pair of a mode and a distinct flow, eight pairs a group: damped frequency, its damping, omega^2, weight."""
+MODE = PAIRS + MOST * FLOWS * 4
 """The modes, one after the other."""
 # Of each mode, plain numbers:
 OMEGA_I, OMEGA_SQUARED, OMEGA_DAMPED, DAMPING, CENTER, SHIFT, HIGH, WELL = range(8)
@@ -56,17 +45,22 @@ FLOW = LOOK + 4 * WIDTH
 """a11 - 1, a12, a21, a22 - 1 of each distinct flow of the step at hand."""
 MODE_ROWS = FLOW + FLOWS * 4 * WIDTH
 TABLES = MODE + MOST * MODE_ROWS
-"""Of each run, for every level the flows mode by mode and the turns of the drive."""
+"""Of each run the prepared steps: one a level, and one of any length."""
+
+
+def groups(modes: int, distinct: int) -> int:
+    """Groups of eight pairs of a mode and a distinct flow."""
+    return -(-modes * distinct // WIDTH)
 
 
 def slot_size(modes: int, distinct: int) -> int:
-    """Plain numbers of one level in a table."""
-    return distinct * 4 * modes + 2 * TURNS
+    """Plain numbers of a prepared step: the flows of the pairs, group by group, and the turns of the drive."""
+    return groups(modes, distinct) * 4 * WIDTH + 2 * TURNS
 
 
 def sizes(modes: int, distinct: int, pieces: int) -> tuple[int, int]:
     """Where the rows of a look begin, and the length of the memory, for so many *pieces* of a step."""
-    look = TABLES + WIDTH * LEVELS * slot_size(modes, distinct)
+    look = TABLES + WIDTH * (LEVELS + 1) * slot_size(modes, distinct)
     return look, look + 4 * WIDTH * (pieces + 1)
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from snapbeam.core.codes import RunStatus
 from snapbeam.engines.cpu.few import places as at
-from snapbeam.engines.cpu.few.text import modal_energy, modes_of, signals, tension
+from snapbeam.engines.cpu.few.modes import groups_of, modal_energy, modes_of, signals, tension
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS, Stages
 from snapbeam.engines.scalar.contact import contact_energy, is_impulsive
@@ -24,7 +24,7 @@ from snapbeam.engines.scalar.physics import (
 )
 from snapbeam.engines.scalar.tip import drive_rate, numbers_of
 
-__all__ = ["TWO_PI", "World", "flows_over", "seat", "stand"]
+__all__ = ["TWO_PI", "World", "flows_over", "prepare", "seat", "slot_of", "stand"]
 
 TWO_PI = 2.0 * math.pi
 _OK, _RUNNING = int(RunStatus.OK), int(RunStatus.RUNNING)
@@ -45,7 +45,7 @@ class World(NamedTuple):
 
 @inlined
 def flows_over(m, shape, length, place, which):
-    """The exact flow of every mode over *length*, a time a lane, into four rows from *place* on, of the lanes *which*."""
+    """The exact flow of every mode over *length*, a time a lane, into the rows from *place* on of the lanes *which*."""
     for i in range(modes_of(shape)):
         mode = at.MODE + i * at.MODE_ROWS
         damped, sigma = spread_at(m, mode + at.OMEGA_DAMPED), spread_at(m, mode + at.DAMPING)
@@ -60,42 +60,38 @@ def flows_over(m, shape, length, place, which):
         store(m, row + 3 * WIDTH, pick(which, a22, load(m, row + 3 * WIDTH)))
 
 
+@inlined
+def prepare(m, shape, world, place, length, omega):
+    """What a step of *length* needs, from *place* on: all modes' flows, and the turns of a drive of rate *omega*."""
+    for group in range(groups_of(shape)):
+        pairs = at.PAIRS + 4 * WIDTH * group
+        damped, sigma, squared = load(m, pairs), load(m, pairs + WIDTH), load(m, pairs + 2 * WIDTH)
+        part = load(m, pairs + 3 * WIDTH) * length
+        sine, _, less_one = circle(damped * part)
+        a11, a12, a21, a22 = rotation(sigma, squared, sine / damped, less_one, decay_less_one(sigma * part))
+        store(m, place, a11)
+        store(m, place + WIDTH, a12)
+        store(m, place + 2 * WIDTH, a21)
+        store(m, place + 3 * WIDTH, a22)
+        place += 4 * WIDTH
+    for i in range(0, TURNS, WIDTH):
+        sine, cosine = sincos(load(m, world.stages.elapsed + i) * (length * omega))
+        store(m, place + i, sine)
+        store(m, place + TURNS + i, cosine)
+
+
+@inlined
+def slot_of(world, lane, level):
+    """Where the prepared step of a level stands."""
+    return at.TABLES + (lane * (at.LEVELS + 1) + level + 1) * world.slot
+
+
 @compiled
-def _prepare(m, shape, world, lane, levels):
-    """The steps of a lane at every level, eight levels at a time, into its table."""
-    stages, modes = world.stages, modes_of(shape)
-    distinct = (stages.flows + 1) // 2
-    table = at.TABLES + lane * at.LEVELS * world.slot
-    omega = m[at.OMEGA + lane]
-    for first in range(0, levels, WIDTH):
-        for j in range(WIDTH):
-            m[at.TEMP + j] = 2.0 * m[at.STEP_TIME + lane] / (1 << (first + j))
-        length = load(m, at.TEMP)
-        for i in range(modes):
-            mode = at.MODE + i * at.MODE_ROWS
-            damped, sigma = spread_at(m, mode + at.OMEGA_DAMPED), spread_at(m, mode + at.DAMPING)
-            squared = spread_at(m, mode + at.OMEGA_SQUARED)
-            for flow in range(distinct):
-                part = m[stages.flow + flow] * length
-                sine, _, less_one = circle(damped * part)
-                lost = decay_less_one(sigma * part)
-                a11, a12, a21, a22 = rotation(sigma, squared, sine / damped, less_one, lost)
-                store(m, at.TEMP, a11)
-                store(m, at.TEMP1, a12)
-                store(m, at.TEMP2, a21)
-                store(m, at.TEMP3, a22)
-                place = table + first * world.slot + (i * distinct + flow) * 4
-                for j in range(WIDTH):
-                    for c in range(4):
-                        m[place + j * world.slot + c] = m[at.TEMP + c * WIDTH + j]
-        for stage in range(stages.flows + 1):
-            sine, cosine = sincos(m[stages.elapsed + stage] * (length * omega))
-            store(m, at.TEMP, sine)
-            store(m, at.TEMP1, cosine)
-            place = table + first * world.slot + 4 * distinct * modes + stage
-            for j in range(WIDTH):
-                m[place + j * world.slot] = m[at.TEMP + j]
-                m[place + j * world.slot + TURNS] = m[at.TEMP1 + j]
+def _prepare_all(m, shape, world, lane, levels):
+    """The steps of a lane at every level."""
+    step_time, omega = m[at.STEP_TIME + lane], m[at.OMEGA + lane]
+    for level in range(levels):
+        prepare(m, shape, world, slot_of(world, lane, level - 1), 2.0 * step_time / (1 << level), omega)
 
 
 @compiled
@@ -159,7 +155,7 @@ def seat(m, n, shape, world, asked, lane, i, book):
     record, bit = asked.runs[i], 1 << lane
     n[at.RUNS + lane] = i
     _constants(m, shape, asked, lane, i)
-    _prepare(m, shape, world, lane, record.finest + 2)
+    _prepare_all(m, shape, world, lane, record.finest + 2)
     m[at.KEY + lane], m[at.LOOK_KEY + lane], m[at.LOOK_PIECES + lane] = -99.0, -1.0, 0.0
     m[at.T + lane] = m[at.WITHIN + lane] = 0.0
     energy = stand(m, shape, world, lane)
@@ -181,7 +177,7 @@ def seat(m, n, shape, world, asked, lane, i, book):
     m[at.MIN_C + lane], m[at.MAX_C + lane] = book.min_center, book.max_center
     for row in range(at.PEAK_WV, at.DEEPEST, WIDTH):
         m[row + lane] = 0.0
-    for row in (at.SAFE_GAP, at.SAFE_CENTER, at.WEIGHED, at.BEAT, at.STEPS, at.LATE, at.LANDED):
+    for row in (at.SAFE_GAP, at.SAFE_CENTER, at.WEIGHED, at.BEAT, at.STEPS, at.LATE):
         m[row + lane] = 0.0
     for j in range(at.TOUCHING, at.ODD + 1):
         n[j] &= ~bit

@@ -12,11 +12,11 @@ _named_tuple: Any = namedtuple
 
 
 @cache
-def shape_of(blocks: tuple[int, ...]) -> Any:
-    """An empty named tuple whose type stands for blocks of so many coupled modes."""
-    name = "Modes_" + "_".join(map(str, blocks))
+def shape_of(blocks: tuple[int, ...], flows: int) -> Any:
+    """An empty named tuple whose type stands for blocks of so many coupled modes and for so many flows of a step."""
+    name = "_".join(map(str, ("Modes", *blocks, "flows", flows)))
     made: Any = _named_tuple(name, ())
-    made.__module__, made.blocks = __name__, blocks
+    made.__module__, made.blocks, made.flows = __name__, blocks, flows
     globals()[name] = made
     return made()
 
@@ -24,5 +24,6 @@ def shape_of(blocks: tuple[int, ...]) -> Any:
 def __getattr__(name: str) -> Any:
     """The type of a shape by its name, for compiled code that is read from the disk."""
     if name.startswith("Modes_"):
-        return type(shape_of(tuple(map(int, name.split("_")[1:]))))
+        *blocks, _, flows = name.split("_")[1:]
+        return type(shape_of(tuple(map(int, blocks)), int(flows)))
     raise AttributeError(name)

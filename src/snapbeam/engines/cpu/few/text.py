@@ -7,16 +7,12 @@ both give the same bits.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any
 
-from numba.extending import overload
-
 from snapbeam.engines.cpu.few import places as at
-from snapbeam.engines.scalar.compile import INLINE_HERE, inlined
 from snapbeam.engines.scalar.composition import TURNS
 from snapbeam.engines.scalar.contact import contact_force
-from snapbeam.engines.scalar.lanes import WIDTH, fma, load, select_less, splat, spread_at, store, vabs
+from snapbeam.engines.scalar.lanes import WIDTH, fma, load, splat, spread_at, store, vabs
 from snapbeam.engines.scalar.masks import both, less, pick, vmax
 from snapbeam.engines.scalar.physics import (
     mode_energy,
@@ -28,21 +24,21 @@ from snapbeam.engines.scalar.physics import (
 )
 from snapbeam.engines.scalar.signals import bulge
 
-__all__ = ["bounds", "glide", "modal_energy", "signals", "take", "tension"]
+__all__ = ["TEXTS", "Modes", "made"]
 
 _KNOWN = {
-    "contact_force": contact_force, "fma": fma, "load": load, "mode_energy": mode_energy, "pick": pick,
-    "select_less": select_less, "shaker_motion": shaker_motion, "sincos": sincos, "splat": splat, "spread_at": spread_at,
-    "store": store, "tension_acceleration": tension_acceleration, "tension_factors": tension_factors, "turned": turned,
-    "vabs": vabs, "both": both, "less": less, "vmax": vmax, "bulge": bulge, "__name__": __name__,
+    "__name__": __name__, "both": both, "bulge": bulge, "contact_force": contact_force, "fma": fma, "less": less,
+    "load": load, "mode_energy": mode_energy, "pick": pick, "shaker_motion": shaker_motion, "sincos": sincos,
+    "splat": splat, "spread_at": spread_at, "store": store, "tension_acceleration": tension_acceleration,
+    "tension_factors": tension_factors, "turned": turned, "vabs": vabs, "vmax": vmax,
 }  # fmt: skip
 
 
-class _Modes:
+class Modes:
     """The modes of a shape, in the order of their rows in the other layout."""
 
-    def __init__(self, blocks: tuple[int, ...]) -> None:
-        self.count = sum(blocks)
+    def __init__(self, blocks: tuple[int, ...], flows: int) -> None:
+        self.count, self.flows, self.distinct = sum(blocks), flows, (flows + 1) // 2
         self.rows: list[int] = []
         """Padded row of each mode."""
         self.blocks: list[range] = []
@@ -60,7 +56,11 @@ class _Modes:
 
     def row(self, i: int, field: int | str) -> str:
         """A row of a mode; *field* may be the name of an argument."""
-        return f"load(m, {self.place(i, 0)} + {field})" if isinstance(field, str) else f"load(m, {self.place(i, field)})"
+        return (
+            f"load(m, {self.place(i, 0)} + {field})"
+            if isinstance(field, str)
+            else f"load(m, {self.place(i, field)})"
+        )
 
     def number(self, i: int, which: int) -> str:
         return f"spread_at(m, {self.place(i, which)})"
@@ -114,13 +114,13 @@ def _tree(columns: list[str | None]) -> str:
     return columns[0] or "splat(0.0)"
 
 
-def _made(name: str, lines: list[str]) -> Any:
+def made(name: str, lines: list[str]) -> Any:
     found: dict[str, Any] = dict(_KNOWN)
     exec(compile("\n".join(lines), f"<{name}>", "exec"), found)
     return found[name]
 
 
-def _tension(modes: _Modes) -> list[str]:
+def _tension(modes: Modes) -> list[str]:
     """g.q, q.Gq and the products r0, r1, ... of q0, q1, ... ; the well's numbers are g0, g1, ..."""
     lines = [f"r{i} = {modes.product(i)}" for i in modes.each()]
     lines += [f"gq = {modes.total(lambda i: (f'g{i}', f'q{i}'))}"]
@@ -128,7 +128,7 @@ def _tension(modes: _Modes) -> list[str]:
     return lines
 
 
-def _take(modes: _Modes) -> list[str]:
+def _take(modes: Modes) -> list[str]:
     head = ["def take(m, shape, stages, gamma, any_touching, touching, law):"]
     body = [f"length = load(m, {at.LENGTH})", "gq, qr = splat(0.0), splat(0.0)"]
     body += ["impulse, work, gross, force = splat(0.0), splat(0.0), splat(0.0), splat(0.0)"]
@@ -137,9 +137,11 @@ def _take(modes: _Modes) -> list[str]:
     body += ["sine0, cosine0 = splat(0.0), splat(1.0)", "if any_touching:"]
     body += [f"    sine0, cosine0 = sincos(load(m, {at.PHASE}))"]
     for i in modes.each():
-        body += [f"q{i}, p{i}, g{i} = {modes.row(i, at.Q)}, {modes.row(i, at.P)}, {modes.row(i, at.SEEN_WELL)}"]
+        body += [
+            f"q{i}, p{i}, g{i} = {modes.row(i, at.Q)}, {modes.row(i, at.P)}, {modes.row(i, at.SEEN_WELL)}"
+        ]
         body += [f"k{i} = {modes.row(i, at.K)}"]
-    body += ["for stage in range(stages.flows + 1):"]
+    body += [f"for stage in range({modes.flows + 1}):"]
     stage = ["weight = spread_at(m, stages.kick + stage) * length", "if any_touching:"]
     stage += [f"    sine = load(m, {at.TURN} + {WIDTH} * stage)"]
     stage += [f"    cosine = load(m, {at.TURN + TURNS * WIDTH} + {WIDTH} * stage)"]
@@ -155,8 +157,8 @@ def _take(modes: _Modes) -> list[str]:
     stage += ["    along_g, along_r = tension_factors(gamma, gq, qr)"]
     stage += [f"    k{i} = tension_acceleration(along_g, along_r, g{i}, r{i})" for i in modes.each()]
     stage += [f"p{i} = fma(weight, fma(force, {modes.row(i, at.CONTACT)}, k{i}), p{i})" for i in modes.each()]
-    stage += ["if stage < stages.flows:"]
-    stage += [f"    flow = {4 * WIDTH} * min(stage, stages.flows - 1 - stage)"]
+    stage += [f"if stage < {modes.flows}:"]
+    stage += [f"    flow = {4 * WIDTH} * min(stage, {modes.flows - 1} - stage)"]
     for i in modes.each():
         a11, a12, a21, a22 = (f"load(m, {modes.place(i, at.FLOW + c * WIDTH)} + flow)" for c in range(4))
         stage += [f"    q{i}, p{i} = turned(q{i}, {a11}, {a12}, p{i}), turned(p{i}, {a22}, {a21}, q{i})"]
@@ -168,7 +170,7 @@ def _take(modes: _Modes) -> list[str]:
     return head + [f"    {line}" for line in body]
 
 
-def _signals(modes: _Modes) -> list[str]:
+def _signals(modes: Modes) -> list[str]:
     lines = ["def signals(m, shape, q, p):"]
     for i in modes.each():
         lines += [f"    q{i}, p{i} = {modes.row(i, 'q')}, {modes.row(i, 'p')}"]
@@ -180,7 +182,7 @@ def _signals(modes: _Modes) -> list[str]:
     return [*lines, f"    return {', '.join(found)}"]
 
 
-def _tension_at(modes: _Modes) -> list[str]:
+def _tension_at(modes: Modes) -> list[str]:
     """g.q and q.Gq of a state, and the tension's acceleration, into K where the mask is true."""
     lines = ["def tension(m, shape, gamma, which, q):"]
     for i in modes.each():
@@ -195,7 +197,7 @@ def _tension_at(modes: _Modes) -> list[str]:
     return [*lines, "    return gq, qr"]
 
 
-def _bounds(modes: _Modes) -> list[str]:
+def _bounds(modes: Modes) -> list[str]:
     """Bounds of the speeds of contact point and centre by the linear flow, and what the tension pushes them with."""
     lines = ["def bounds(m, shape):"]
     for i in modes.each():
@@ -212,7 +214,7 @@ def _bounds(modes: _Modes) -> list[str]:
     return [*lines, f"    return {', '.join(found)}"]
 
 
-def _energies(modes: _Modes) -> list[str]:
+def _energies(modes: Modes) -> list[str]:
     """Quadratic part of the energy, and the part of it in modes that count as high."""
     lines = ["def modal_energy(m, shape, q, p):"]
     for i in modes.each():
@@ -223,7 +225,7 @@ def _energies(modes: _Modes) -> list[str]:
     return [*lines, f"    return {total}, {high}"]
 
 
-def _glide(modes: _Modes) -> list[str]:
+def _glide(modes: Modes) -> list[str]:
     """A free step in short pieces, as the other layout's :func:`~snapbeam.engines.cpu.look.look_inside`.
 
     Row i of a look is the penetration, its rate, the displacement of the centre and its rate; only lanes of *which*
@@ -239,8 +241,14 @@ def _glide(modes: _Modes) -> list[str]:
         body += [f"k{i}, l{i} = {modes.row(i, at.K)}, {modes.row(i, at.K1)}"]
         body += [f"c{i}, e{i} = {modes.row(i, at.CONTACT)}, {modes.number(i, at.CENTER)}"]
     total = modes.total
-    body += [f"contact0 = {total(lambda i: (f'c{i}', f'k{i}'))}", f"contact1 = {total(lambda i: (f'c{i}', f'l{i}'))}"]
-    body += [f"center0 = {total(lambda i: (f'e{i}', f'k{i}'))}", f"center1 = {total(lambda i: (f'e{i}', f'l{i}'))}"]
+    body += [
+        f"contact0 = {total(lambda i: (f'c{i}', f'k{i}'))}",
+        f"contact1 = {total(lambda i: (f'c{i}', f'l{i}'))}",
+    ]
+    body += [
+        f"center0 = {total(lambda i: (f'e{i}', f'k{i}'))}",
+        f"center1 = {total(lambda i: (f'e{i}', f'l{i}'))}",
+    ]
     body += ["turn_sine, turn_cosine = sincos(omega * piece)", f"sine, cosine = sincos(load(m, {at.PHASE}))"]
     cq, cp = total(lambda i: (f"c{i}", f"q{i}")), total(lambda i: (f"c{i}", f"p{i}"))
     eq, ep = total(lambda i: (f"e{i}", f"q{i}")), total(lambda i: (f"e{i}", f"p{i}"))
@@ -248,7 +256,12 @@ def _glide(modes: _Modes) -> list[str]:
     body += ["for i in range(most + 1):"]
     step = ["done = i / pieces", "if i > 0:"]
     # the piece that ends here, after the kick at its beginning
-    step += ["    begun = (i - 1) / pieces", "    kick = piece", "    if i == 1:", "        kick = 0.5 * piece"]
+    step += [
+        "    begun = (i - 1) / pieces",
+        "    kick = piece",
+        "    if i == 1:",
+        "        kick = 0.5 * piece",
+    ]
     for i in modes.each():
         a11, a12, a21, a22 = (modes.row(i, at.LOOK + c * WIDTH) for c in range(4))
         step += [f"    kicked = fma(kick * begun, l{i}, p{i})"]
@@ -271,99 +284,31 @@ def _glide(modes: _Modes) -> list[str]:
     step += ["    reach = vmax(before, d) + bulge(before_rate, dv, piece)"]
     step += ["    greatest = pick(written, vmax(greatest, reach), greatest)"]
     step += ["before, before_rate = d, dv"]
-    step += ["sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine"]
+    step += [
+        "sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine"
+    ]
     body += [f"    {line}" for line in step]
     return head + [f"    {line}" for line in [*body, "return greatest"]]
 
 
-_TEXTS = {
-    "take": _take, "signals": _signals, "tension": _tension_at, "bounds": _bounds, "modal_energy": _energies,
-    "glide": _glide,
+def _at_hand(modes: Modes) -> list[str]:
+    """The flows and turns of a prepared step, from where they stand into one lane."""
+    lines = ["def at_hand(m, shape, place, lane):"]
+    for i in modes.each():
+        for flow in range(modes.distinct):
+            group, j = divmod(i * modes.distinct + flow, WIDTH)
+            for c in range(4):
+                to = modes.place(i, at.FLOW + (4 * flow + c) * WIDTH)
+                lines += [f"    m[{to} + lane] = m[place + {(4 * group + c) * WIDTH + j}]"]
+    turns = at.groups(modes.count, modes.distinct) * 4 * WIDTH
+    for stage in range(modes.flows + 1):
+        for part in (0, TURNS):
+            to = at.TURN + (part + stage) * WIDTH
+            lines += [f"    m[{to} + lane] = m[place + {turns + part + stage}]"]
+    return lines
+
+
+TEXTS = {
+    "at_hand": _at_hand, "take": _take, "signals": _signals, "tension": _tension_at, "bounds": _bounds,
+    "modal_energy": _energies,    "glide": _glide,
 }  # fmt: skip
-
-
-@cache
-def _function(name: str, blocks: tuple[int, ...]) -> Any:
-    return inlined(_made(name, _TEXTS[name](_Modes(blocks))))
-
-
-def take(m: Any, shape: Any, stages: Any, gamma: float, any_touching: bool, touching: Any, law: Any) -> Any:
-    """A step of every lane, from Q, P and K to Q1, P1 and K1; returns impulse, work and gross work of the contact.
-
-    *touching* is the mask of those in contact.
-    """
-    raise TypeError("take runs in compiled code only")
-
-
-@overload(take, jit_options=INLINE_HERE)
-def _take_of(m, shape, stages, gamma, any_touching, touching, law):
-    written = _function("take", shape.instance_class.blocks)
-    return lambda m, shape, stages, gamma, any_touching, touching, law: written(
-        m, shape, stages, gamma, any_touching, touching, law
-    )
-
-
-def signals(m: Any, shape: Any, q: int, p: int) -> Any:
-    """Displacement of the contact point and of the centre from rest and their rates: c.q, c.p, e.q, e.p."""
-    raise TypeError("signals runs in compiled code only")
-
-
-@overload(signals, jit_options=INLINE_HERE)
-def _signals_of(m, shape, q, p):
-    written = _function("signals", shape.instance_class.blocks)
-    return lambda m, shape, q, p: written(m, shape, q, p)
-
-
-def tension(m: Any, shape: Any, gamma: float, which: Any, q: int) -> Any:
-    """g.q and q.Gq; the tension's acceleration goes to K where the mask *which* is true."""
-    raise TypeError("tension runs in compiled code only")
-
-
-@overload(tension, jit_options=INLINE_HERE)
-def _tension_of(m, shape, gamma, which, q):
-    written = _function("tension", shape.instance_class.blocks)
-    return lambda m, shape, gamma, which, q: written(m, shape, gamma, which, q)
-
-
-def bounds(m: Any, shape: Any) -> Any:
-    """Of contact point and centre: a speed that the linear flow cannot exceed, and what the tension accelerates by."""
-    raise TypeError("bounds runs in compiled code only")
-
-
-@overload(bounds, jit_options=INLINE_HERE)
-def _bounds_of(m, shape):
-    written = _function("bounds", shape.instance_class.blocks)
-    return lambda m, shape: written(m, shape)
-
-
-def modal_energy(m: Any, shape: Any, q: int, p: int) -> Any:
-    """Quadratic part of the energy, and the part of it in modes that count as high."""
-    raise TypeError("modal_energy runs in compiled code only")
-
-
-@overload(modal_energy, jit_options=INLINE_HERE)
-def _energy_of(m, shape, q, p):
-    written = _function("modal_energy", shape.instance_class.blocks)
-    return lambda m, shape, q, p: written(m, shape, q, p)
-
-
-def glide(m: Any, shape: Any, look: int, which: Any, with_center: bool, most: int) -> Any:
-    """A free step in pieces, noted from *look* on; returns what the penetration cannot have exceeded after the start."""
-    raise TypeError("glide runs in compiled code only")
-
-
-@overload(glide, jit_options=INLINE_HERE)
-def _glide_of(m, shape, look, which, with_center, most):
-    written = _function("glide", shape.instance_class.blocks)
-    return lambda m, shape, look, which, with_center, most: written(m, shape, look, which, with_center, most)
-
-
-def modes_of(shape: Any) -> int:
-    """How many modes there are."""
-    return sum(type(shape).blocks)
-
-
-@overload(modes_of, jit_options=INLINE_HERE)
-def _modes_of(shape):
-    count = sum(shape.instance_class.blocks)
-    return lambda shape: count
