@@ -2,8 +2,7 @@
 
 Numba optimises each function and makes machine code of it by itself before it is linked into its callers, where it is
 optimised again.  A kernel has more than a hundred parts that nothing but the kernel calls; done once, with the kernel,
-the same machine code takes half the time to compile.  Of Numba's passes over a function those are left out that have
-nothing to do in one of ours: closures, ``with``, loops over literals, array expressions, annotations for people.
+the same machine code takes half the time to compile.
 """
 
 from __future__ import annotations
@@ -18,34 +17,6 @@ class _Nobody:
 
     def set_env(self, name: str, env: Any) -> None:
         """Nowhere to put it."""
-
-
-def _lean_passes() -> Any:
-    """Numba's passes that a part needs, in their order, each with its words; None if one of them is not found."""
-    try:
-        from numba.core import typed_passes, untyped_passes
-    except ImportError:
-        return None
-    untyped = (
-        "TranslateByteCode", "FixupArgs", "IRProcessing", "RewriteSemanticConstants", "DeadBranchPrune",
-        "GenericRewrites", "ReconstructSSA", "DeadBranchPrune",
-    )  # fmt: skip
-    typed = (
-        "NopythonTypeInference", "PreLowerStripPhis", "IRLegalization", "NativeLowering", "NoPythonBackend",
-    )  # fmt: skip
-    found = [getattr(untyped_passes, name, None) for name in untyped]
-    found += [getattr(typed_passes, name, None) for name in typed]
-    return None if None in found else found
-
-
-def _manager(passes: Any, state: Any) -> Any:
-    from numba.core.compiler_machinery import PassManager
-
-    manager = PassManager("part")
-    for each in passes:
-        manager.add_pass(each, each.name())
-    manager.finalize()
-    return manager
 
 
 def pipeline() -> dict[str, Any]:
@@ -80,13 +51,8 @@ def pipeline() -> dict[str, Any]:
             self._ensure_finalized()
             return 0
 
-    lean = _lean_passes()
-
     class PartCompiler(Compiler):
-        """Numba's own, with the library above and fewer passes."""
-
-        def define_pipelines(self) -> Any:
-            return super().define_pipelines() if lean is None else [_manager(lean, self.state)]
+        """Numba's own, with the library above."""
 
         def _compile_core(self) -> Any:
             state = self.state
