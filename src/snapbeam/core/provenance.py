@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from snapbeam.core.validate import InputError, InputTypeError, shown
+from snapbeam.core.version import __version__
 
 __all__ = [
     "__version__",
@@ -36,8 +37,6 @@ __all__ = [
     "platform_name",
     "processor_name",
 ]
-
-__version__ = "0.1.0"
 
 
 def platform_name() -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -58,6 +59,30 @@ class Run:
     integration: Integration
     accuracy: Accuracy | None = None
     end: State | None = None
+
+    @classmethod
+    def of(cls, tables: Callable[[], tuple[xr.Dataset, xr.Dataset]], **parts: Any) -> Run:
+        """A run whose dataset and impacts are made by *tables* when one of them is first asked for.
+
+        Who wants the outcome alone, as ``snapbeam simulate`` without a file does, waits for neither; *parts* are the
+        other attributes.
+        """
+        run = cls.__new__(cls)
+        vars(run).update({"accuracy": None, "end": None} | parts | {"_tables": tables})
+        return run
+
+    def __getattr__(self, name: str) -> Any:
+        tables = vars(self).get("_tables")
+        if name in ("dataset", "impacts") and tables is not None:
+            dataset, impacts = tables()
+            vars(self).update(dataset=dataset, impacts=impacts)
+            vars(self).pop("_tables", None)
+        if name in vars(self):
+            return vars(self)[name]
+        raise AttributeError(f"{type(self).__name__} has no {name!r}")
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
     @property
     def response(self) -> Outcome:

@@ -165,10 +165,12 @@ def simulate(
     tell(_unbalanced(attrs["energy_error"]))
     if reached is not None:
         attrs |= reached.attributes()
-    return Run(
-        dataset=run_dataset(ensemble, system, recorded, times, period, attrs),
+    return Run.of(
+        lambda: (
+            run_dataset(ensemble, system, recorded, times, period, attrs),
+            impact_table(recorded.impacts, attrs),
+        ),
         outcome=outcome,
-        impacts=impact_table(recorded.impacts, attrs),
         system=system,
         integration=integration,
         accuracy=reached,
@@ -267,7 +269,7 @@ def _check_memory(system: System, samples: int, with_contacts: bool) -> None:
 
 
 def _checked_times(sample_times: ArrayLike, end: float) -> _Array:
-    times = finite_array("sample_times", sample_times, 1)
+    times = finite_array("sample_times", sample_times, 1).copy()
     if times.size == 0:
         raise InputError("sample_times = []: must hold at least one instant")
     if (np.diff(times) <= 0.0).any():

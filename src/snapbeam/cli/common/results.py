@@ -30,10 +30,11 @@ def open_result(file: Path) -> xr.Dataset:
 def check_pictures(*pictures: tuple[str, Path | None]) -> None:
     """Refuse, before any work, pictures that cannot be written."""
     from snapbeam.core.files import check_writable
-    from snapbeam.figures.style import FIGURE_SUFFIXES
 
     for name, path in pictures:
         if path is not None:
+            from snapbeam.figures.style import FIGURE_SUFFIXES
+
             check_writable(path, name, FIGURE_SUFFIXES)
 
 

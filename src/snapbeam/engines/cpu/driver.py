@@ -6,12 +6,15 @@ import math
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import RunStatus
+from snapbeam.engines.cpu.few.march import march_few
+from snapbeam.engines.cpu.few.memory import lay_out_few, suits
 from snapbeam.engines.cpu.march import Kept, march_many
 from snapbeam.engines.cpu.march_one import march_one
 from snapbeam.engines.cpu.memory import Memory, Packed, lay_out, pack
@@ -35,6 +38,12 @@ _CHUNK_STEPS = 3_000_000
 _CHUNKS = 4
 """Tasks per thread at least, of _FEW runs each at least, so that the threads end together."""
 _FEW = 4
+FEW_MODES = 8
+"""Modes up to which eight runs in a register are faster than eight modes of one: measured, see benchmarks/README.md."""
+FEWEST_STEPS = 5e6
+"""Flight steps asked for, of one kind of ensembles, from which on what they save pays for another kernel."""
+_WORK: dict[tuple[Any, ...], float] = {}
+_ASKING = Lock()
 _POLL = 0.2
 """Seconds after which an interrupt is heard."""
 _SLICE_STEPS = 200_000
@@ -51,13 +60,13 @@ def usable_cores() -> int:
         return os.cpu_count() or 1
 
 
-def _asked(ensemble: Ensemble, packed: Packed, memory: Memory) -> Asked:
-    """The ensemble in this engine's layout."""
+def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> Asked:
+    """The ensemble in this engine's layout; without *memory*, of a drive that looks nothing up."""
     law, drive = ensemble.law.numbers_type(), ensemble.drive.numbers_type()
     return Asked(
         runs=ensemble.runs,
         law_numbers=ensemble.law_numbers,
-        drive_numbers=memory.drive_numbers,
+        drive_numbers=ensemble.drive_numbers if memory is None else memory.drive_numbers,
         contact_rows=packed.spread(ensemble.contact_rows),
         starts=packed.spread(ensemble.starts),
         law=law(*[0.0] * len(law._fields)),
@@ -159,6 +168,8 @@ def _march(
     landings: int,
 ) -> Landings:
     packed = pack(ensemble.structure, ensemble.high_omega)
+    if landings == 0 and _few_modes_pay(ensemble, packed):
+        return _spread_over(ensemble, packed, *_side_by_side(ensemble, packed), threads, progress, landings)
     march = _kernel(march_many, ensemble)
 
     def arguments(which: _Integers, kept: Kept) -> tuple[Any, ...]:
@@ -167,6 +178,37 @@ def _march(
         return memory.memory, memory.blocks, memory.layouts, memory.stages, asked, which, room, kept
 
     return _spread_over(ensemble, packed, march, arguments, threads, progress, landings)
+
+
+def _few_modes_pay(ensemble: Ensemble, packed: Packed) -> bool:
+    """Whether to march eight runs in a register: where that is faster and, once compiled, worth it.
+
+    Both layouts give the same bits, so that how much was asked for before may decide.
+    """
+    if ensemble.size < WIDTH or not suits(ensemble, packed, FEW_MODES):
+        return False
+    kind = (packed.members, ensemble.order, ensemble.law, ensemble.drive)
+    with _ASKING:
+        _WORK[kind] = _WORK.get(kind, 0.0) + float(ensemble.work.sum())
+        return _WORK[kind] >= FEWEST_STEPS
+
+
+def _side_by_side(
+    ensemble: Ensemble, packed: Packed
+) -> tuple[Callable[..., None], Callable[[_Integers, Kept], tuple[Any, ...]]]:
+    """The march of eight runs in a register, and its arguments."""
+    order = np.argsort(packed.rows)
+    asked = _asked(ensemble, packed, None)._replace(
+        contact_rows=np.ascontiguousarray(ensemble.contact_rows[:, order]),
+        starts=np.ascontiguousarray(ensemble.starts[..., order]),
+    )
+
+    def arguments(which: _Integers, kept: Kept) -> tuple[Any, ...]:
+        room = _room(ensemble)
+        memory = lay_out_few(ensemble, packed, room.looked.shape[0] - 1)
+        return memory.m, memory.n, memory.shape, memory.world, asked, which, room, kept, empty_books(1)
+
+    return _kernel(march_few, ensemble), arguments
 
 
 def _spread_over(

@@ -6,8 +6,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from snapbeam.engines.cpu.rows import Layout
 from snapbeam.engines.cpu.uneven import Uneven
@@ -38,6 +36,8 @@ class Packed(NamedTuple):
     layout: Layout
     rows: NDArray[np.int64]
     """Row of each linear mode, shape (N,)."""
+    members: tuple[int, ...]
+    """Modes of each block."""
 
     def spread(self, values: _Array) -> _Array:
         """Numbers of modes, shape (..., N), as padded rows, shape (..., rows)."""
@@ -46,19 +46,36 @@ class Packed(NamedTuple):
         return out
 
 
+def _blocks_of(coupled: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Number of the block of each mode, in the order of their first modes: every mode takes the least of those that
+    it is coupled to, until none changes.
+
+    It is five lines of scipy.sparse.csgraph, which takes longer to load than many a run to march.
+    """
+    among = coupled | coupled.T | np.eye(len(coupled), dtype=bool)
+    label = np.arange(len(coupled))
+    while True:
+        least = np.where(among, label, len(label)).min(axis=1)
+        if (least == label).all():
+            return np.unique(label, return_inverse=True)[1]
+        label = least
+
+
 def pack(structure: Structure, high_omega: float = np.inf) -> Packed:
     """Arrange a structure in rows.
 
     Linear modes that the tension does not couple (the symmetric and the antisymmetric ones) become
     separate blocks, each padded to a multiple of eight rows.
     """
-    _, label = connected_components(csr_array(structure.coupling != 0.0), directed=False)
+    label = _blocks_of(structure.coupling != 0.0)
     omega, zeta = structure.omega, structure.damping_ratio
     blocks: list[int] = []
     rows = np.empty(omega.size, dtype=np.int64)
     size = 0
+    held: list[int] = []
     for b in range(label.max() + 1):
         members = np.flatnonzero(label == b)
+        held.append(members.size)
         rows[members] = size + np.arange(members.size)
         stop = size + -(-members.size // WIDTH) * WIDTH
         unroll = 4 if stop - size > WIDTH else 2
@@ -111,7 +128,9 @@ def pack(structure: Structure, high_omega: float = np.inf) -> Packed:
         gentle=gentle,
         uneven=uneven,
     )
-    return Packed(np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows)
+    return Packed(
+        np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows, tuple(held)
+    )
 
 
 class Memory(NamedTuple):

@@ -12,6 +12,7 @@ from typing import Any
 from numba.extending import overload
 
 from snapbeam.engines.scalar.compile import INLINE, inlined
+from snapbeam.engines.scalar.lanes import Lanes, select_less
 from snapbeam.engines.scalar.losses import Loss, lossy_kick
 from snapbeam.engines.scalar.signals import cubic
 
@@ -66,6 +67,9 @@ def _when_touching(kind: type, name: str) -> Any:
 
 @overload(contact_force, jit_options=INLINE)
 def _contact_force(law, penetration):
+    if isinstance(penetration, Lanes):
+        force = scalar_function(law.instance_class.owner, "force")
+        return lambda law, penetration: select_less(0.0, penetration, force(law, penetration), 0.0)
     return _when_touching(law.instance_class.owner, "force")
 
 

@@ -6,10 +6,14 @@ from typing import NamedTuple
 
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import mark_of, peak_force
+from snapbeam.engines.scalar.lanes import select_less
 from snapbeam.engines.scalar.signals import count_crossings, first_rise, sign_of, widened
 
 __all__ = [
+    "GRADING",
     "PIECES",
+    "RELEASE",
+    "STRETCHED",
     "Clock",
     "Seen",
     "clock_of",
@@ -22,6 +26,7 @@ __all__ = [
     "is_quiet",
     "leave_contact_open",
     "open_book",
+    "quiet_energy",
     "safe_for",
     "ticks_of",
     "track",
@@ -71,14 +76,14 @@ class Seen(NamedTuple):
 
 # How contact steps are graded: a step is at most this share of the time since the onset, and of the time to
 # the release at the present rate.
-_GRADING = 0.5
-_RELEASE = 0.5
+GRADING = 0.5
+RELEASE = 0.5
 # Safety of the bound on the speed of a signal, and for how many steps it is trusted.
 _MARGIN = 1.25
 _TRUST = 8
 # Flight steps are halved where the squared slopes differ from those of the well by more than this many times
 # the well's own, and again at every doubling.
-_STRETCH = 4.0
+STRETCHED = 4.0
 # Below this share of the energy of the barrier, free flight takes steps of twice the length: what the steps
 # must resolve is how far the tension swings, and that goes with the root of the energy.
 _QUIET = 0.2
@@ -158,17 +163,15 @@ def safe_for(distance, bound, tip_speed, acceleration, step):
     """For how long a signal at *distance* from zero cannot reach it, at most a few steps."""
     horizon = _TRUST * step
     speed = _MARGIN * bound + tip_speed + abs(acceleration) * horizon
-    if speed * horizon <= distance:
-        return horizon
-    return distance / speed
+    return select_less(distance, speed * horizon, distance / speed, horizon)
 
 
 @compiled
 def contact_level(clock, elapsed, d, dv):
     """Halvings of the flight step for a step in contact: graded from the onset and towards the release."""
-    want = _GRADING * elapsed
+    want = GRADING * elapsed
     if dv < 0.0:
-        want = min(want, -_RELEASE * d / dv)
+        want = min(want, -RELEASE * d / dv)
     level = clock.coarsest
     while level < clock.finest and (clock.step >> level) * clock.tick > want:
         level += 1
@@ -181,7 +184,13 @@ def is_quiet(energy, gamma, stretch_at_rest):
 
     Without impact and damping the energy is constant, so that the length of the steps is.
     """
-    return energy < _QUIET * 0.25 * gamma * stretch_at_rest * stretch_at_rest
+    return energy < quiet_energy(gamma, stretch_at_rest)
+
+
+@inlined
+def quiet_energy(gamma, stretch_at_rest):
+    """The energy below which a beam is quiet."""
+    return _QUIET * 0.25 * gamma * stretch_at_rest * stretch_at_rest
 
 
 @compiled
@@ -196,7 +205,7 @@ def flight_level(clock, quiet, stretch, stretch_at_rest):
     if quiet:
         return -1
     level = 0
-    reach = _STRETCH * stretch_at_rest
+    reach = STRETCHED * stretch_at_rest
     while level < clock.finest and stretch_at_rest > 0.0 and abs(stretch) > reach:
         reach *= 2.0
         level += 1

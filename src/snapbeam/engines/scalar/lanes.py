@@ -13,6 +13,7 @@ Functions written with ``+``, ``-`` and ``*`` alone take lanes and plain floats 
 
 from __future__ import annotations
 
+import math
 import operator
 from typing import Any
 
@@ -32,6 +33,7 @@ __all__ = [
     "store",
     "vabs",
     "vfloor",
+    "vtrunc",
 ]
 
 WIDTH = 8
@@ -191,6 +193,22 @@ def _unary(llvm_name: str) -> Any:
 
 vfloor = _unary("floor")
 vabs = _unary("fabs")
+vtrunc = _unary("trunc")
+_vsqrt = _unary("sqrt")
+
+
+@overload(abs)
+def _abs(value):
+    if _is_lanes(value):
+        return lambda value: vabs(value)
+    return None
+
+
+@overload(math.sqrt)
+def _sqrt(value):
+    if _is_lanes(value):
+        return lambda value: _vsqrt(value)
+    return None
 
 
 @intrinsic

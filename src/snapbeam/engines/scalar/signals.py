@@ -12,14 +12,14 @@ import math
 
 from snapbeam.engines.scalar.compile import inlined
 
-__all__ = ["count_crossings", "first_fall", "first_rise", "sign_of", "turning_point", "widened"]
+__all__ = ["bulge", "count_crossings", "first_fall", "first_rise", "sign_of", "turning_point", "widened"]
 
 _BULGE = 0.15
 """Times h and the sum of both slopes: a Hermite cubic stays that close to its ends (4/27, rounded up)."""
 
 
 @inlined
-def _bulge(v0, v1, h):
+def bulge(v0, v1, h):
     """How far the cubic can at most pass the greater and the lesser of its end values."""
     return _BULGE * h * (abs(v0) + abs(v1))
 
@@ -89,7 +89,7 @@ def root(c0, c1, c2, c3, low, high):
 @inlined
 def first_rise(u0, v0, u1, v1, h):
     """Where in [0, 1] the cubic first rises through zero, starting at or below it; -1 if nowhere."""
-    if max(u0, u1) + _bulge(v0, v1, h) <= 0.0:
+    if max(u0, u1) + bulge(v0, v1, h) <= 0.0:
         return -1.0
     c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
     c0 = min(c0, 0.0)
@@ -132,7 +132,7 @@ def count_crossings(side, u0, v0, u1, v1, h):
     of exactly zero is on the side that the signal was on before.
     """
     count, last = 0, -1.0
-    if min(side * u0, side * u1) > _bulge(v0, v1, h):
+    if min(side * u0, side * u1) > bulge(v0, v1, h):
         return count, last, side
     turn = turning_point(u0, v0, u1, v1, h)
     c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
@@ -154,8 +154,8 @@ def count_crossings(side, u0, v0, u1, v1, h):
 @inlined
 def widened(low, high, u0, v0, u1, v1, h):
     """The range [low, high], widened to hold the cubic on [0, 1]."""
-    lesser, greater, bulge = min(u0, u1), max(u0, u1), _bulge(v0, v1, h)
-    if greater + bulge > high or lesser - bulge < low:
+    lesser, greater, swell = min(u0, u1), max(u0, u1), bulge(v0, v1, h)
+    if greater + swell > high or lesser - swell < low:
         turn = turning_point(u0, v0, u1, v1, h)
         if turn > 0.0:
             c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)

@@ -52,6 +52,8 @@ class ContactLaw:
     """Whether an impact lasts no time: a jump of the velocity instead of a force."""
     lossy: ClassVar[bool] = False
     """Whether the force depends on the rate of penetration too."""
+    side_by_side: ClassVar[bool] = False
+    """Whether its force is plain arithmetic and square roots, without branches, so that eight are computed at once."""
     most_modes: ClassVar[int | None] = None
     """Modes of a model that may be struck under this law."""
 

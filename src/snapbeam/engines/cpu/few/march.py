@@ -1,0 +1,169 @@
+"""The march of few modes: eight runs in a register, each with its own time, step, contact and well.
+
+In every pass each lane takes a step of its own.  One that is to be cut where the contact begins or ends takes that
+step in the next pass, while the others go on; so does one that has to be looked into for the deepest point of a
+contact.  A lane whose run has ended takes the next one.  Nothing passes from lane to lane, and every sum is taken in
+the order in which the other layout takes it: results are the same to the bit, whatever a run is marched with.
+"""
+
+from __future__ import annotations
+
+import math
+
+from snapbeam.core.codes import RunStatus
+from snapbeam.engines.cpu.few import places as at
+from snapbeam.engines.cpu.few.accept import accept, end_contact
+from snapbeam.engines.cpu.few.choose import choose, fetch
+from snapbeam.engines.cpu.few.meet import About, cut_again, meet, probe
+from snapbeam.engines.cpu.few.modes import modal_energy, signals, take, tension
+from snapbeam.engines.cpu.few.seat import seat
+from snapbeam.engines.scalar.compile import compiled, inlined
+from snapbeam.engines.scalar.contact import contact_energy
+from snapbeam.engines.scalar.decisions import leave_contact_open
+from snapbeam.engines.scalar.lanes import WIDTH, load, store, vabs
+from snapbeam.engines.scalar.masks import bits, lanes_tuple, less, lowest, mask_of, pick, vmax
+from snapbeam.engines.scalar.physics import shaker_motion, sincos, tension_energy
+from snapbeam.engines.scalar.tip import numbers_of
+
+__all__ = ["march_few"]
+
+_OK, _DECIDED, _RUNNING = int(RunStatus.OK), int(RunStatus.DECIDED), int(RunStatus.RUNNING)
+_NOT_FINITE, _STEP_LIMIT = int(RunStatus.NOT_FINITE), int(RunStatus.STEP_LIMIT)
+
+
+@inlined
+def _observe(m, shape):
+    """What is seen at the ends of the steps."""
+    home = load(m, at.HOME)
+    offset = load(m, at.OFFSET) + (1.0 - home) * load(m, at.REST_CONTACT)
+    omega = load(m, at.OMEGA)
+    sine, cosine = sincos(load(m, at.PHASE) + omega * load(m, at.LENGTH))
+    motion, velocity = shaker_motion(load(m, at.AMPLITUDE), omega, sine, cosine)
+    w, wv, c, cv = signals(m, shape, at.Q1, at.P1)
+    return About(w, wv, offset + motion - w, velocity - wv, c, cv)
+
+
+@compiled
+def _finish(m, n, shape, world, asked, lane, book, status, goes_on):
+    """Close the book of a lane; its last contact too, unless the run is to go on from here."""
+    i, t, tick = n[at.RUNS + lane], int(m[at.T + lane]), m[at.TICK + lane]
+    law = numbers_of(asked.law, asked.law_numbers, i)
+    book.deepest, book.impulse = m[at.DEEPEST + lane], m[at.IMPULSE + lane]
+    if n[at.TOUCHING] & (1 << lane):
+        if goes_on:
+            leave_contact_open(book, law, t, tick)
+        else:
+            end_contact(m, asked, i, lane, book, t)
+    if status == _DECIDED:
+        book.decided_at = t * tick
+    gq, qr = tension(m, shape, world.gamma, mask_of(0), at.Q)
+    linear, _ = modal_energy(m, shape, at.Q, at.P)
+    store(m, at.TEMP, linear + tension_energy(world.gamma, gq, qr))
+    book.energy = m[at.TEMP + lane] + contact_energy(law, m[at.D + lane])
+    book.displacement, book.center = m[at.W + lane], m[at.C + lane]
+    book.min_displacement, book.max_displacement = m[at.MIN_W + lane], m[at.MAX_W + lane]
+    book.min_center, book.max_center = m[at.MIN_C + lane], m[at.MAX_C + lane]
+    book.peak_velocity, book.peak_center_velocity = m[at.PEAK_WV + lane], m[at.PEAK_CV + lane]
+    book.square_displacement, book.square_center = m[at.SQUARE_W + lane], m[at.SQUARE_C + lane]
+    book.square_velocity, book.square_center_velocity = m[at.SQUARE_WV + lane], m[at.SQUARE_CV + lane]
+    book.energy_time, book.high_energy_time = m[at.ENERGY_TIME + lane], m[at.HIGH_TIME + lane]
+    book.work, book.gross_work = m[at.WORK + lane], m[at.GROSS + lane]
+    book.steps = int(m[at.STEPS + lane])
+    book.time, book.status = t, status
+    n[at.LIVE] &= ~(1 << lane)
+
+
+@inlined
+def _begin_at_once(m, n, books, which):
+    """Contacts that begin with the step: it is taken again, in contact."""
+    n[at.TOUCHING] |= which
+    while which:
+        lane = lowest(which)
+        which &= which - 1
+        book = books[n[at.RUNS + lane]]
+        book.touching, book.onset = 1, int(m[at.T + lane])
+        m[at.ONSET + lane] = m[at.T + lane]
+
+
+@inlined
+def _pass(m, n, shape, world, asked, books, looked):
+    """A step of every lane; returns the lanes that are not finite, decided, over, and at their limit of steps."""
+    fresh = choose(m, n, shape, world)
+    fetch(m, n, shape, world)
+    live = n[at.LIVE]
+    touching = n[at.TOUCHING] & live
+    law = lanes_tuple(asked.law, m, at.LAW)
+    given = take(m, shape, world.stages, world.gamma, touching != 0, mask_of(touching), law)
+    about = _observe(m, shape)
+    going = live
+    aside = n[at.ASIDE] & live
+    if aside:
+        deepest = load(m, at.DEEPEST)
+        store(m, at.DEEPEST, pick(mask_of(aside), vmax(deepest, about.d), deepest))
+        n[at.ASIDE] &= ~aside
+        n[at.PROBED] |= aside
+        going &= ~aside
+    failed = going & ~bits(less(vabs(about.d + about.dv), math.inf))
+    going &= ~failed
+    looks = n[at.LOOKS] & n[at.CUTTING] & going
+    ends, at_once = meet(m, n, shape, world, about, fresh & going, looked)
+    going = (going & ~fresh) | ends
+    if looks:
+        going &= ~cut_again(m, n, asked, about.d, about.dv, looks)
+    if at_once:
+        _begin_at_once(m, n, books, at_once)
+    pressed = going & n[at.TOUCHING] & ~n[at.PROBED]
+    if pressed:
+        turning = bits(less(load(m, at.DV) * about.dv, 0.0)) & bits(less(0.0, load(m, at.DV))) & pressed
+        if turning:
+            going &= ~probe(m, n, about.d, about.dv, turning)
+    sure, over = 0, 0
+    if going:
+        sure = accept(m, n, shape, world, asked, books, about, given, going, looked)
+        over = going & ~bits(less(load(m, at.T), load(m, at.END)))
+    spent = (going | at_once) & ~bits(less(load(m, at.STEPS), load(m, at.MAX_STEPS)))
+    return failed, sure, over, spent
+
+
+@compiled
+def march_few(m, n, shape, world, asked, which, room, kept, spare):
+    """March the runs *which*, eight at a time; *m* and *n* are the calling thread's own, *spare* is nobody's book."""
+    books, looked, following, goes_on = kept.books, room.looked, 0, False
+    n[at.LIVE] = 0
+    for lane in range(WIDTH):
+        # lanes that stay empty march what the first run begins with, unseen
+        i = which[min(lane, which.size - 1)]
+        if lane < which.size:
+            seat(m, n, shape, world, asked, lane, i, books[i])
+            following += 1
+        else:
+            seat(m, n, shape, world, asked, lane, i, spare[0])
+            n[at.LIVE] &= ~(1 << lane)
+    while n[at.LIVE]:
+        if kept.pulse[0] != 0:
+            break
+        failed, sure, over, spent = _pass(m, n, shape, world, asked, books, looked)
+        ended = failed | sure | over | spent
+        while ended:
+            lane = lowest(ended)
+            ended &= ended - 1
+            bit = 1 << lane
+            status = _STEP_LIMIT
+            if failed & bit:
+                status = _NOT_FINITE
+            elif sure & bit:
+                status = _DECIDED
+            elif over & bit:
+                status = _OK
+            book = books[n[at.RUNS + lane]]
+            _finish(m, n, shape, world, asked, lane, book, status, goes_on)
+            if following < which.size:
+                i = which[following]
+                following += 1
+                seat(m, n, shape, world, asked, lane, i, books[i])
+    live = n[at.LIVE]
+    while live:
+        lane = lowest(live)
+        live &= live - 1
+        book = books[n[at.RUNS + lane]]
+        book.time, book.status = int(m[at.T + lane]), _RUNNING

@@ -1,0 +1,189 @@
+"""A run takes a lane: what stays the same in it, the steps that are prepared for it, how it begins."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from snapbeam.core.codes import RunStatus
+from snapbeam.engines.cpu.few import places as at
+from snapbeam.engines.cpu.few.modes import groups_of, modal_energy, modes_of, signals, tension
+from snapbeam.engines.scalar.compile import compiled, inlined
+from snapbeam.engines.scalar.composition import TURNS, Stages
+from snapbeam.engines.scalar.contact import contact_energy, is_impulsive
+from snapbeam.engines.scalar.decisions import PIECES, Seen, is_quiet, open_book
+from snapbeam.engines.scalar.lanes import WIDTH, load, spread_at, store
+from snapbeam.engines.scalar.masks import mask_of, pick
+from snapbeam.engines.scalar.physics import (
+    circle,
+    decay_less_one,
+    rotation,
+    shaker_motion,
+    sincos,
+    tension_energy,
+)
+from snapbeam.engines.scalar.tip import drive_rate, numbers_of
+
+__all__ = ["TWO_PI", "World", "flows_over", "prepare", "seat", "slot_of", "stand"]
+
+TWO_PI = 2.0 * math.pi
+_OK, _RUNNING = int(RunStatus.OK), int(RunStatus.RUNNING)
+
+
+class World(NamedTuple):
+    """What all runs share beside the modes."""
+
+    stages: Stages
+    gamma: float
+    stretch: float
+    """Squared slopes in a well; 0 if there is one well only."""
+    slot: int
+    """Plain numbers of a prepared step."""
+    look: int
+    """Where in memory what a look inside a step sees begins."""
+
+
+@inlined
+def flows_over(m, shape, length, place, which):
+    """The exact flow of every mode over *length*, a time a lane, into the rows from *place* on of the lanes *which*."""
+    for i in range(modes_of(shape)):
+        mode = at.MODE + i * at.MODE_ROWS
+        damped, sigma = spread_at(m, mode + at.OMEGA_DAMPED), spread_at(m, mode + at.DAMPING)
+        sine, _, less_one = circle(damped * length)
+        lost = decay_less_one(sigma * length)
+        squared = spread_at(m, mode + at.OMEGA_SQUARED)
+        a11, a12, a21, a22 = rotation(sigma, squared, sine / damped, less_one, lost)
+        row = mode + place
+        store(m, row, pick(which, a11, load(m, row)))
+        store(m, row + WIDTH, pick(which, a12, load(m, row + WIDTH)))
+        store(m, row + 2 * WIDTH, pick(which, a21, load(m, row + 2 * WIDTH)))
+        store(m, row + 3 * WIDTH, pick(which, a22, load(m, row + 3 * WIDTH)))
+
+
+@inlined
+def prepare(m, shape, world, place, length, omega):
+    """What a step of *length* needs, from *place* on: all modes' flows, and the turns of a drive of rate *omega*."""
+    for group in range(groups_of(shape)):
+        pairs = at.PAIRS + 4 * WIDTH * group
+        damped, sigma, squared = load(m, pairs), load(m, pairs + WIDTH), load(m, pairs + 2 * WIDTH)
+        part = load(m, pairs + 3 * WIDTH) * length
+        sine, _, less_one = circle(damped * part)
+        a11, a12, a21, a22 = rotation(sigma, squared, sine / damped, less_one, decay_less_one(sigma * part))
+        store(m, place, a11)
+        store(m, place + WIDTH, a12)
+        store(m, place + 2 * WIDTH, a21)
+        store(m, place + 3 * WIDTH, a22)
+        place += 4 * WIDTH
+    for i in range(0, TURNS, WIDTH):
+        sine, cosine = sincos(load(m, world.stages.elapsed + i) * (length * omega))
+        store(m, place + i, sine)
+        store(m, place + TURNS + i, cosine)
+
+
+@inlined
+def slot_of(world, lane, level):
+    """Where the prepared step of a level stands."""
+    return at.TABLES + (lane * (at.LEVELS + 1) + level + 1) * world.slot
+
+
+@compiled
+def _prepare_all(m, shape, world, lane, levels):
+    """The steps of a lane at every level."""
+    step_time, omega = m[at.STEP_TIME + lane], m[at.OMEGA + lane]
+    for level in range(levels):
+        prepare(m, shape, world, slot_of(world, lane, level - 1), 2.0 * step_time / (1 << level), omega)
+
+
+@compiled
+def stand(m, shape, world, lane):
+    """What is seen of a lane that stands where Q and P say, and its tension; returns its energy without the contact."""
+    which = mask_of(1 << lane)
+    gq, qr = tension(m, shape, world.gamma, which, at.Q)
+    w, wv, c, cv = signals(m, shape, at.Q, at.P)
+    linear, _ = modal_energy(m, shape, at.Q, at.P)
+    phase = load(m, at.PHASE0) + TWO_PI * (load(m, at.WITHIN) / load(m, at.PERIOD))
+    sine, cosine = sincos(phase)
+    motion, velocity = shaker_motion(load(m, at.AMPLITUDE), load(m, at.OMEGA), sine, cosine)
+    home, rest = load(m, at.HOME), load(m, at.REST_CONTACT)
+    offset = load(m, at.OFFSET) + (1.0 - home) * rest
+    store(m, at.W, pick(which, w + home * rest, load(m, at.W)))
+    store(m, at.WV, pick(which, wv, load(m, at.WV)))
+    store(m, at.D, pick(which, offset + motion - w, load(m, at.D)))
+    store(m, at.DV, pick(which, velocity - wv, load(m, at.DV)))
+    store(m, at.C, pick(which, c + home * load(m, at.REST_CENTER), load(m, at.C)))
+    store(m, at.CV, pick(which, cv, load(m, at.CV)))
+    store(m, at.STRETCH, pick(which, 2.0 * gq + qr, load(m, at.STRETCH)))
+    store(m, at.TEMP, linear + tension_energy(world.gamma, gq, qr))
+    return m[at.TEMP + lane]
+
+
+@compiled
+def _constants(m, shape, asked, lane, i):
+    """What stays the same in run *i*."""
+    record = asked.runs[i]
+    drive = numbers_of(asked.drive, asked.drive_numbers, i)
+    m[at.OMEGA + lane], m[at.AMPLITUDE + lane] = drive.omega, drive.amplitude
+    for f in range(asked.law_numbers.shape[1]):
+        m[at.LAW + f * WIDTH + lane] = asked.law_numbers[i, f]
+    step_time = record.step * record.tick
+    m[at.TICK + lane], m[at.STEP + lane], m[at.STEP_TIME + lane] = record.tick, record.step, step_time
+    m[at.PERIOD + lane], m[at.LANDING + lane] = record.period, record.landing
+    m[at.END + lane] = record.end
+    m[at.LIMIT + lane] = min(record.landing, record.end)
+    m[at.COARSEST + lane], m[at.FINEST + lane] = record.coarsest, record.finest
+    m[at.COARSE_TICKS + lane] = record.step >> record.coarsest
+    m[at.PHASE0 + lane], m[at.OFFSET + lane], m[at.HOME + lane] = record.phase, record.offset, record.home
+    m[at.REST_CONTACT + lane], m[at.REST_CENTER + lane] = record.rest_contact, record.rest_center
+    m[at.TIP_SPEED + lane] = record.tip_speed
+    m[at.DECIDE_REACH + lane], m[at.DECIDE_ENERGY + lane] = record.decide_reach, record.decide_energy
+    m[at.DECIDE_CROSSINGS + lane], m[at.MAX_STEPS + lane] = record.decide_crossings, asked.max_steps
+    fastest = drive_rate(drive)
+    for j in range(modes_of(shape)):
+        mode = at.MODE + j * at.MODE_ROWS
+        fastest = max(fastest, m[mode + at.OMEGA_I])
+        m[mode + at.CONTACT + lane] = asked.contact_rows[record.contact_row, j]
+        m[mode + at.Q + lane] = asked.starts[record.start_row, 0, j]
+        m[mode + at.P + lane] = asked.starts[record.start_row, 1, j]
+        m[mode + at.SEEN_WELL + lane] = record.home * m[mode + at.WELL]
+    finest_look = TWO_PI / (PIECES * fastest)
+    m[at.FINEST_LOOK + lane], m[at.PIECES + lane] = finest_look, max(4, math.ceil(step_time / finest_look))
+
+
+@compiled
+def seat(m, n, shape, world, asked, lane, i, book):
+    """Put run *i* into a lane; its status."""
+    record, bit = asked.runs[i], 1 << lane
+    n[at.RUNS + lane] = i
+    _constants(m, shape, asked, lane, i)
+    _prepare_all(m, shape, world, lane, record.finest + 2)
+    m[at.KEY + lane], m[at.LOOK_KEY + lane], m[at.LOOK_PIECES + lane] = -99.0, -1.0, 0.0
+    m[at.T + lane] = m[at.WITHIN + lane] = 0.0
+    energy = stand(m, shape, world, lane)
+    seen = Seen(
+        m[at.W + lane], m[at.WV + lane], m[at.D + lane], m[at.DV + lane], m[at.C + lane], m[at.CV + lane]
+    )
+    law = numbers_of(asked.law, asked.law_numbers, i)
+    since = record.contact_time
+    touching = since >= 0.0
+    if not math.isfinite(since):
+        pressed = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
+        touching = pressed and not is_impulsive(law)
+    book.touching, book.onset = int(touching), 0
+    if math.isfinite(since) and since > 0.0:
+        book.onset = -int(since / record.tick + 0.5)
+    open_book(book, seen.c, seen, law, energy + contact_energy(law, seen.d))
+    m[at.ONSET + lane], m[at.SIDE + lane], m[at.DEEPEST + lane] = book.onset, book.side, book.deepest
+    m[at.MIN_W + lane], m[at.MAX_W + lane] = book.min_displacement, book.max_displacement
+    m[at.MIN_C + lane], m[at.MAX_C + lane] = book.min_center, book.max_center
+    for row in range(at.PEAK_WV, at.DEEPEST, WIDTH):
+        m[row + lane] = 0.0
+    for row in (at.SAFE_GAP, at.SAFE_CENTER, at.WEIGHED, at.BEAT, at.STEPS, at.LATE):
+        m[row + lane] = 0.0
+    for j in range(at.TOUCHING, at.ODD + 1):
+        n[j] &= ~bit
+    n[at.LIVE] |= bit
+    if touching:
+        n[at.TOUCHING] |= bit
+    if is_quiet(energy, world.gamma, world.stretch):
+        n[at.QUIET] |= bit
+    return _RUNNING if record.end > 0 else _OK

@@ -1,0 +1,141 @@
+"""Eight runs in a register give what eight modes in one give, to the bit, whatever a run is marched with."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam.core.codes import RunStatus
+from snapbeam.engines.assemble import make_ensemble
+from snapbeam.engines.cpu import driver
+from snapbeam.engines.cpu.few.memory import suits
+from snapbeam.engines.cpu.memory import pack
+from snapbeam.engines.outcomes import Statistic, register, withdraw
+from snapbeam.model.paper_values import BEAM, CONTACT
+
+
+def ensemble(modes, runs=40, cycles=12, seed=0, contact=CONTACT, drive=None, striker=None, **how):
+    """Runs over the plane of Fig. 6, at three locations."""
+    generator = np.random.default_rng(seed)
+    system = sb.System(
+        sb.ReducedModel.from_beam(BEAM, modes=modes, damping_ratio=0.005),
+        contact,
+        sb.Striker(drive=drive or sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.2), **(striker or {})),
+    )
+    points = {}
+    if drive is None:
+        points = {
+            "drive.frequency_ratio": generator.uniform(0.1, 4.0, runs),
+            "drive.velocity_amplitude": generator.uniform(0.02, 1.0, runs),
+            "striker.location": generator.choice([0.3, 0.42, 1.0 / 2.1], runs),
+        }
+    else:
+        points = {"striker.location": np.full(runs, 0.4)}
+    return make_ensemble(system, sb.Integration(cycles=cycles, **how), points)
+
+
+def marched(monkeypatch, few, made, threads=1):
+    monkeypatch.setattr(driver, "FEWEST_STEPS", 0.0)
+    monkeypatch.setattr(driver, "FEW_MODES", 16 if few else 0)
+    return driver.run_ensemble(made, threads)
+
+
+def assert_same(monkeypatch, made):
+    expected, found = marched(monkeypatch, False, made), marched(monkeypatch, True, made)
+    assert_equal(found, expected)
+    return found
+
+
+def assert_equal(found, expected):
+    for name in expected.dtype.names:
+        np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
+
+
+def test_one_mode_is_the_same_to_the_bit(monkeypatch):
+    books = assert_same(monkeypatch, ensemble(1, cycles=40))
+    assert books["impacts"].min() > 0
+    assert np.unique(books["crossings"]).size > 5
+    assert (books["status"] == RunStatus.OK).all()
+
+
+def test_decided_and_given_up_runs_are_the_same(monkeypatch):
+    books = assert_same(monkeypatch, ensemble(1, cycles=120, early_decision=True))
+    assert 3 < (books["status"] == RunStatus.DECIDED).sum() < 40
+    # a limit that is met on the way; one that cannot but be met is refused before
+    books = assert_same(monkeypatch, dataclasses.replace(ensemble(1, cycles=20), max_steps=2000))
+    limited = books["status"] == RunStatus.STEP_LIMIT
+    assert limited.any()
+    assert (books["steps"][limited] == 2000).all()
+
+
+def test_a_gap_and_a_striker_above(monkeypatch):
+    assert_same(monkeypatch, ensemble(1, striker={"side": "above", "gap": 2e-5}))
+
+
+def test_neighbours_order_and_threads_do_not_matter(monkeypatch):
+    made = ensemble(1, runs=37, cycles=20, seed=3)
+    whole = marched(monkeypatch, True, made)
+    again = marched(monkeypatch, True, made, threads=2)
+    assert_equal(again, whole)
+    for which in (np.arange(37)[::-1], np.array([5, 3, 30, 7, 7, 7, 7, 7, 12])):
+        part = dataclasses.replace(
+            made,
+            runs=made.runs[which],
+            law_numbers=made.law_numbers[which],
+            drive_numbers=made.drive_numbers[which],
+            location=made.location[which],
+            highest=made.highest[which],
+        )
+        assert_equal(marched(monkeypatch, True, part), whole[which])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("modes", "how"),
+    [
+        (2, {}),
+        (3, {}),
+        (4, {"early_decision": True}),
+        (8, {}),
+        (13, {}),
+        (16, {"cycles": 5}),
+        (1, {"accuracy": "reference"}),
+        (5, {"accuracy": "reference", "cycles": 4}),
+        (4, {"high_frequency_ratio": 3.0}),
+    ],
+)
+def test_more_modes_and_finer_steps_are_the_same_to_the_bit(monkeypatch, modes, how):
+    assert_same(monkeypatch, ensemble(modes, seed=modes, **how))
+
+
+def test_what_it_does_not_serve_goes_to_the_other_layout():
+    def serves(made, most=8):
+        return suits(made, pack(made.structure, made.high_omega), most)
+
+    assert serves(ensemble(2, cycles=2))
+    assert serves(ensemble(8, cycles=2))
+    assert not serves(ensemble(9, cycles=2))
+    assert not serves(ensemble(1, runs=1, cycles=2))
+    assert not serves(ensemble(1, cycles=2, contact=sb.Restitution(coefficient=0.6)))
+    assert not serves(ensemble(1, cycles=2, contact=sb.HuntCrossley(stiffness=2e8, loss=0.5)))
+    assert not serves(ensemble(1, cycles=2, contact=sb.PowerLaw(force_at_micrometre=1.0, exponent=1.4)))
+    drive = sb.HalfSine(displacement_amplitude=0.5, duration=0.5)
+    assert not serves(ensemble(1, cycles=2, drive=drive))
+    register(
+        Statistic("twice", "float64", "1", "a number", lambda reading, held: held, lambda held, step: held)
+    )
+    try:
+        assert not serves(ensemble(1, cycles=2))
+    finally:
+        withdraw("twice")
+
+
+def test_small_work_is_not_worth_another_kernel(monkeypatch):
+    made = ensemble(2, cycles=2)
+    packed = pack(made.structure, made.high_omega)
+    monkeypatch.setattr(driver, "_WORK", {})
+    monkeypatch.setattr(driver, "FEWEST_STEPS", 2.5 * made.work.sum())
+    assert [driver._few_modes_pay(made, packed) for _ in range(4)] == [False, False, True, True]
