@@ -12,6 +12,11 @@ from snapbeam.core.netcdf import write_netcdf
 from snapbeam.core.provenance import __version__
 from snapbeam.core.showing import register_accessor
 from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.design.distributions import Between, LogNormal, Normal, Uniform
+from snapbeam.design.probability.allocation import Allocation
+from snapbeam.design.probability.dots import judge_dots
+from snapbeam.design.probability.probability_map import probability_map
+from snapbeam.design.spread import Spread
 from snapbeam.dynamics.attractors import Attractor, Attractors, attractors
 from snapbeam.dynamics.basins import basins
 from snapbeam.dynamics.bifurcation import bifurcation_diagram
@@ -80,9 +85,11 @@ __all__ = [
     "STATISTICS",
     "AccelerationSine",
     "Accuracy",
+    "Allocation",
     "Attractor",
     "Attractors",
     "Beam",
+    "Between",
     "Branch",
     "Burst",
     "Chirp",
@@ -101,8 +108,10 @@ __all__ = [
     "Integration",
     "Keeping",
     "KelvinVoigt",
+    "LogNormal",
     "NoOrbit",
     "Noise",
+    "Normal",
     "Orbit",
     "Outcome",
     "PlausibilityWarning",
@@ -118,6 +127,7 @@ __all__ = [
     "RunStatus",
     "Shaker",
     "Sine",
+    "Spread",
     "Starts",
     "State",
     "Statistic",
@@ -128,6 +138,7 @@ __all__ = [
     "System",
     "Tally",
     "TwoSines",
+    "Uniform",
     "__version__",
     "advance",
     "attractors",
@@ -143,12 +154,14 @@ __all__ = [
     "explore",
     "hertz_stress",
     "integrity",
+    "judge_dots",
     "lifetime_map",
     "load_run",
     "long_map",
     "lyapunov",
     "periodic_orbit",
     "poincare",
+    "probability_map",
     "quasi_static_threshold",
     "read_store",
     "response_map",

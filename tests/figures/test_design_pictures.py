@@ -1,0 +1,57 @@
+"""Pictures of design: what they say of their numbers, and what they refuse."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+import xarray as xr
+
+from snapbeam.core.validate import InputError
+from snapbeam.figures.design import plot_probability
+
+
+@pytest.fixture(autouse=True)
+def _close():
+    yield
+    plt.close("all")
+
+
+@pytest.fixture
+def probabilities():
+    ratio, v = np.linspace(0.5, 2.0, 9), np.linspace(0.05, 0.4, 8)
+    share = 1.0 / (1.0 + np.exp(-40.0 * (v[None, :] - 0.1 - 0.05 * ratio[:, None])))
+    dims = ("frequency_ratio", "velocity_amplitude", "outcome")
+    table = np.stack([share, 1.0 - share], axis=-1)
+    low, high = np.clip(table - 0.05, 0.0, 1.0), np.clip(table + 0.05, 0.0, 1.0)
+    reached = np.ones(share.shape, dtype=bool)
+    reached[2, 3] = False
+    return xr.Dataset(
+        {
+            "probability": (dims, table),
+            "probability_low": (dims, low),
+            "probability_high": (dims, high),
+            "reached": (dims[:2], reached),
+        },
+        {"frequency_ratio": ratio, "velocity_amplitude": v, "outcome": ["snap", "first_well"]},
+        {"confidence": 0.95},
+    )
+
+
+def test_probabilities_over_two_parameters(probabilities) -> None:
+    ax = plot_probability(probabilities)
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert words == ["P = 0.05", "P = 0.5", "P = 0.95", "wider than asked"]
+    assert "V" in ax.get_ylabel()
+    cells = ax.collections[0].get_array().reshape(8, 9)
+    np.testing.assert_array_equal(cells, probabilities["probability"].sel(outcome="snap").T)
+
+
+def test_probabilities_over_one_parameter(probabilities) -> None:
+    ax = plot_probability(probabilities.isel(frequency_ratio=1))
+    line = next(line for line in ax.lines if line.get_label() == "share of the runs")
+    np.testing.assert_array_equal(line.get_ydata(), probabilities["probability"][1, :, 0])
+    with pytest.raises(InputError, match="must be one of snap, first_well"):
+        plot_probability(probabilities, "continuous")
+    with pytest.raises(InputError, match="no probabilities"):
+        plot_probability(xr.Dataset())
