@@ -16,6 +16,8 @@ from snapbeam.design.distributions import Between, LogNormal, Normal, Uniform
 from snapbeam.design.probability.allocation import Allocation
 from snapbeam.design.probability.dots import judge_dots
 from snapbeam.design.probability.probability_map import probability_map
+from snapbeam.design.quantiles.quantile_threshold import quantile_threshold
+from snapbeam.design.quantiles.search import Search
 from snapbeam.design.spread import Spread
 from snapbeam.dynamics.attractors import Attractor, Attractors, attractors
 from snapbeam.dynamics.basins import basins
@@ -125,6 +127,7 @@ __all__ = [
     "Restitution",
     "Run",
     "RunStatus",
+    "Search",
     "Shaker",
     "Sine",
     "Spread",
@@ -162,6 +165,7 @@ __all__ = [
     "periodic_orbit",
     "poincare",
     "probability_map",
+    "quantile_threshold",
     "quasi_static_threshold",
     "read_store",
     "response_map",

@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from snapbeam.core.validate import InputError
-from snapbeam.figures.design import plot_probability
+from snapbeam.figures.design import plot_probability, plot_quantiles
 
 
 @pytest.fixture(autouse=True)
@@ -55,3 +55,29 @@ def test_probabilities_over_one_parameter(probabilities) -> None:
         plot_probability(probabilities, "continuous")
     with pytest.raises(InputError, match="no probabilities"):
         plot_probability(xr.Dataset())
+
+
+def test_quantiles() -> None:
+    ratio = np.linspace(0.5, 2.0, 7)
+    middle = 0.1 + 0.05 * np.cos(ratio)
+    table = np.stack([middle - 0.02, middle, middle + 0.02], axis=-1)
+    dims = ("frequency_ratio", "quantile")
+    high = table + 0.01
+    high[0, 2] = np.inf
+    monotone = np.ones(7, dtype=bool)
+    monotone[3] = False
+    dataset = xr.Dataset(
+        {"threshold": (dims, table), "threshold_low": (dims, table - 0.01), "threshold_high": (dims, high),
+         "monotone": (dims[:1], monotone), "runs": (dims[:1], np.full(7, 200))},
+        {"frequency_ratio": ratio, "quantile": [0.05, 0.5, 0.95], "location": 0.4},
+        {"along": "velocity_amplitude", "between": [0.0, 0.5], "confidence": 0.95},
+    )  # fmt: skip
+    ax = plot_quantiles(dataset, quasi_static=True)
+    lines = {line.get_label(): line for line in ax.lines}
+    np.testing.assert_array_equal(lines["P = 0.5"].get_ydata(), middle)
+    assert lines["not monotone"].get_xdata().tolist() == [ratio[3]]
+    np.testing.assert_allclose(
+        lines[r"quasi-static, $V_\mathrm{QS1}$"].get_ydata(), ratio * np.sin(np.pi * 0.4) ** 2
+    )
+    with pytest.raises(InputError, match="no quantile thresholds"):
+        plot_quantiles(xr.Dataset())
