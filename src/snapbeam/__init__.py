@@ -13,11 +13,21 @@ from snapbeam.core.provenance import __version__
 from snapbeam.core.showing import register_accessor
 from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.design.distributions import Between, LogNormal, Normal, Uniform
+from snapbeam.design.optimum.design import Effort, design, design_problem
+from snapbeam.design.optimum.evolution import Evolution
+from snapbeam.design.optimum.measures import Goal, Limit
+from snapbeam.design.plan import Cost, plan
+from snapbeam.design.posterior.classes import class_likelihood
+from snapbeam.design.posterior.posterior import Posterior, posterior
 from snapbeam.design.probability.allocation import Allocation
 from snapbeam.design.probability.dots import judge_dots
 from snapbeam.design.probability.probability_map import probability_map
 from snapbeam.design.quantiles.quantile_threshold import quantile_threshold
 from snapbeam.design.quantiles.search import Search
+from snapbeam.design.sensitivity.answers import LifetimeOf, NotchOf, StatisticOf, ThresholdOf
+from snapbeam.design.sensitivity.given_data import given_data_indices
+from snapbeam.design.sensitivity.sensitivity import sensitivity
+from snapbeam.design.sensitivity.variance import sobol
 from snapbeam.design.spread import Spread
 from snapbeam.dynamics.attractors import Attractor, Attractors, attractors
 from snapbeam.dynamics.basins import basins
@@ -96,12 +106,16 @@ __all__ = [
     "Burst",
     "Chirp",
     "ContactLaw",
+    "Cost",
     "DisplacementSine",
     "Drive",
     "EdgeState",
+    "Effort",
     "Event",
+    "Evolution",
     "Finding",
     "Flight",
+    "Goal",
     "HalfSine",
     "HertzContact",
     "HuntCrossley",
@@ -110,13 +124,17 @@ __all__ = [
     "Integration",
     "Keeping",
     "KelvinVoigt",
+    "LifetimeOf",
+    "Limit",
     "LogNormal",
     "NoOrbit",
     "Noise",
     "Normal",
+    "NotchOf",
     "Orbit",
     "Outcome",
     "PlausibilityWarning",
+    "Posterior",
     "PowerLaw",
     "Recorded",
     "RecordedDrive",
@@ -134,12 +152,14 @@ __all__ = [
     "Starts",
     "State",
     "Statistic",
+    "StatisticOf",
     "Still",
     "StoreError",
     "Striker",
     "Survival",
     "System",
     "Tally",
+    "ThresholdOf",
     "TwoSines",
     "Uniform",
     "__version__",
@@ -149,12 +169,16 @@ __all__ = [
     "basins",
     "bending_stress",
     "bifurcation_diagram",
+    "class_likelihood",
     "classify",
     "conditioning",
     "continue_orbit",
+    "design",
+    "design_problem",
     "edge_state",
     "exact_natural_freq",
     "explore",
+    "given_data_indices",
     "hertz_stress",
     "integrity",
     "judge_dots",
@@ -163,14 +187,18 @@ __all__ = [
     "long_map",
     "lyapunov",
     "periodic_orbit",
+    "plan",
     "poincare",
+    "posterior",
     "probability_map",
     "quantile_threshold",
     "quasi_static_threshold",
     "read_store",
     "response_map",
+    "sensitivity",
     "separation_exponent",
     "simulate",
+    "sobol",
     "sweep",
     "switch_branch",
     "threshold",

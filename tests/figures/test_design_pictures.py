@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 from snapbeam.core.validate import InputError
-from snapbeam.figures.design import plot_probability, plot_quantiles
+from snapbeam.figures.design import plot_designs, plot_probability, plot_quantiles, plot_tornado
 
 
 @pytest.fixture(autouse=True)
@@ -81,3 +81,37 @@ def test_quantiles() -> None:
     )
     with pytest.raises(InputError, match="no quantile thresholds"):
         plot_quantiles(xr.Dataset())
+
+
+def test_tornado() -> None:
+    names = ["contact.stiffness", "striker.location"]
+    half = np.array([0.01, -0.03])
+    dataset = xr.Dataset(
+        {"effect": ("parameter", half), "effect_low": ("parameter", half - 0.002),
+         "effect_high": ("parameter", half + 0.002), "step": ("parameter", [1e7, 0.01])},
+        {"parameter": names},
+        {"answer_mean": 0.2, "answer": "threshold", "answer_units": "1", "confidence": 0.95},
+    )  # fmt: skip
+    ax = plot_tornado(dataset)
+    assert [text.get_text().split("\n")[0] for text in ax.get_yticklabels()] == ["contact stiffness", "location"]
+    widths = sorted(round(abs(patch.get_width()), 6) for patch in ax.patches)
+    assert widths == [0.01, 0.01, 0.03, 0.03]
+    with pytest.raises(InputError, match="no sensitivities"):
+        plot_tornado(xr.Dataset())
+
+
+def test_designs() -> None:
+    draw = np.random.default_rng(1)
+    x, goal = draw.random(50), draw.random(50)
+    dataset = xr.Dataset(
+        {"location": ("design", [0.3]), "tried_location": ("tried", x), "goal_speed": ("design", [0.5]),
+         "goal_speed_low": ("design", [0.4]), "goal_speed_high": ("design", [0.7]),
+         "tried_goal_speed": ("tried", goal), "violation": ("tried", np.where(goal < 0.4, 0.1, 0.0)),
+         "holds": ("design", [2])}
+    )  # fmt: skip
+    ax = plot_designs(dataset)
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert words == ["tried, limits kept", "limits: holds"]
+    assert ax.collections[0].get_offsets().shape == (int((goal >= 0.4).sum()), 2)
+    with pytest.raises(InputError, match="must be one of location"):
+        plot_designs(dataset, "gap")

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-from snapbeam.core.validate import InputError, finite, flag, positive
+from snapbeam.core.validate import InputError, finite, finite_array, flag, positive
 
-__all__ = ["KINDS", "Between", "Distribution", "LogNormal", "Normal", "Uniform"]
+__all__ = ["KINDS", "Between", "Distribution", "Empirical", "LogNormal", "Normal", "Uniform"]
 
 _Array = NDArray[np.float64]
 
@@ -129,6 +129,31 @@ class Between(Distribution):
     def at(self, nominal: _Array, normal: _Array) -> _Array:
         """Between the two by the rank."""
         return np.asarray(self.low + (self.high - self.low) * ndtr(normal) + 0.0 * nominal)
+
+
+@dataclass(frozen=True)
+class Empirical(Distribution):
+    """As something was seen to be distributed, whatever the nominal value.
+
+    Parameters
+    ----------
+    quantiles : tuple of float
+        At evenly spaced ranks from 0 to 1, at least two, not falling.
+    """
+
+    quantiles: tuple[float, ...]
+    kind: ClassVar[str] = "empirical"
+
+    def __post_init__(self) -> None:
+        table = finite_array("quantiles", self.quantiles, 1)
+        if table.size < 2 or (np.diff(table) < 0.0).any():
+            raise InputError("quantiles: must be at least two that do not fall")
+        object.__setattr__(self, "quantiles", tuple(table.tolist()))
+
+    def at(self, nominal: _Array, normal: _Array) -> _Array:
+        """Between the quantiles by the rank."""
+        ranks = np.linspace(0.0, 1.0, len(self.quantiles))
+        return np.asarray(np.interp(ndtr(normal), ranks, self.quantiles) + 0.0 * nominal)
 
 
 KINDS: dict[str, type[Distribution]] = {each.kind: each for each in (Normal, Uniform, LogNormal, Between)}

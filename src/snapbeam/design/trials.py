@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -22,12 +23,40 @@ from snapbeam.model.start import amplitude_scale, rest_state
 from snapbeam.model.system import System
 from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.points import Columns, PointList
-from snapbeam.sweeps.setup import Progress, sweep_setup
+from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
 from snapbeam.sweeps.stored import Keeping, compute_table
 
 __all__ = ["Trials", "trials_of"]
 
 _Numbers = NDArray[np.int64]
+
+
+_Made = dict[tuple[Any, ...], System]
+_KEPT = 4096
+"""Systems that are kept at most."""
+
+
+def _made(made: _Made, system: System, changes: dict[str, Any]) -> System:
+    """A neighbour of a system, made once."""
+    key = tuple(sorted(changes.items()))
+    if key not in made:
+        if len(made) >= _KEPT:
+            made.clear()
+        made[key] = system.replace(**changes)
+    return made[key]
+
+
+@dataclass(frozen=True, eq=False)
+class _DrawnSetup(SweepSetup):
+    """Runs of which many share a structure that was made before."""
+
+    made: _Made = field(default_factory=dict)
+
+    def neighbour(self, changes: dict[str, Any]) -> tuple[System, Integration]:
+        """As of any sweep."""
+        if any(name.startswith("run.") for name in changes):
+            return super().neighbour(changes)
+        return _made(self.made, self.system, changes), self.integration
 
 
 @dataclass
@@ -47,8 +76,12 @@ class Trials:
     runs: int = 0
     """Runs asked for so far."""
     rounds: int = 0
+    made: dict[tuple[Any, ...], System] = field(default_factory=dict, repr=False)
+    """Systems of the structures that were drawn so far."""
 
-    def columns(self, points: Columns, numbers: _Numbers) -> Columns:
+    def columns(
+        self, points: Columns, numbers: _Numbers, scores: NDArray[np.float64] | None = None
+    ) -> Columns:
         """The parameters of the draws: those of the points, and those that are drawn about them.
 
         Parameters
@@ -57,9 +90,12 @@ class Trials:
             Nominal values by dotted name.
         numbers : int array of shape (runs,)
             Which draw each is.
+        scores : array of shape (runs, parameters), optional
+            Standard normal scores of the parameters, in place of those of the draws; the start is that of the draw.
         """
         spread, found = self.spread, dict(points)
-        scores = spread.normals(numbers)
+        if scores is None:
+            scores = spread.normals(numbers)
         for j, (name, each) in enumerate(spread.of.items()):
             nominal = points[name] if name in points else np.full(numbers.size, self._nominal(name))
             found[name] = each.at(nominal, scores[:, j])
@@ -71,19 +107,24 @@ class Trials:
         return found
 
     def statistics(
-        self, points: Columns, numbers: _Numbers, progress: Progress | None = None
+        self,
+        points: Columns,
+        numbers: _Numbers,
+        progress: Progress | None = None,
+        scores: NDArray[np.float64] | None = None,
     ) -> dict[str, NDArray[Any]]:
         """Run the draws and return every statistic of the table, arrays of shape (runs,)."""
-        return self.of_columns(self.columns(points, numbers), progress)
+        columns = self.columns(points, numbers, scores)
+        if not columns:  # nothing is drawn and nothing varies: the system as it stands
+            columns = {name: np.full(numbers.size, self._nominal(name)) for name in self._any_parameter()}
+        return self.of_columns(columns, progress)
+
+    def _any_parameter(self) -> tuple[str, ...]:
+        return ("striker.location",)
 
     def of_columns(self, columns: Columns, progress: Progress | None = None) -> dict[str, NDArray[Any]]:
         """Run points as they are, without a draw."""
-        import warnings
-
-        with warnings.catch_warnings():
-            if self.rounds:  # what is doubtful of the system was told in the first round
-                warnings.simplefilter("ignore", PlausibilityWarning)
-            setup = sweep_setup(self.system, PointList(columns), self.integration)
+        setup = self._setup(columns)
         keeping = self.keeping
         if keeping.path is not None:
             keeping = replace(keeping, path=_folder(Path(keeping.path)) / f"round_{self.rounds:04d}")
@@ -92,6 +133,20 @@ class Trials:
         self.rounds += 1
         self.runs += setup.points.size
         return {name: work.values(name, table) for name in (*work.integers, *work.numbers)}
+
+    def _setup(self, columns: Columns) -> SweepSetup:
+        """The runs as a sweep; every structure among them is made before any run, and once."""
+        structural = [name for name in columns if not lookup(name).is_run]
+        first = {name: values[:1] for name, values in columns.items()} if structural else columns
+        with warnings.catch_warnings():
+            if self.rounds:  # what is doubtful of the system was told in the first round
+                warnings.simplefilter("ignore", PlausibilityWarning)
+            setup = sweep_setup(self.system, PointList(first), self.integration)
+        if not structural:
+            return setup
+        for _ in self._structures(columns, next(iter(columns.values())).size):
+            pass
+        return _DrawnSetup(setup.system, setup.integration, PointList(columns), self.made)
 
     def _nominal(self, name: str) -> float:
         value = self.system.parameters.get(name)
@@ -114,6 +169,24 @@ class Trials:
             return "beam.length" in self.spread.of and self.system.striker is not None
         return ratio in self.system.parameters
 
+    def in_hz(self, points: Columns) -> Columns:
+        """Points whose Omega and V are those of the nominal system, in the ratios of their own structure."""
+        size = next(iter(points.values())).size
+        names = ["drive.frequency_hz", "drive.velocity_m_s"]
+        nominal, own = self._units({}, names, size), self._units(points, names, size)
+        found = dict(points)
+        for j, ratio in enumerate(("drive.frequency_ratio", "drive.velocity_amplitude")):
+            found[ratio] = points[ratio] * (nominal[:, j] / own[:, j])
+        return found
+
+    def cycles(self, columns: Columns) -> NDArray[np.float64]:
+        """Seconds of a cycle of every run of a sine."""
+        size = next(iter(columns.values())).size
+        ratio = columns.get("drive.frequency_ratio")
+        if ratio is None:
+            ratio = np.full(size, self._nominal("drive.frequency_ratio"))
+        return np.asarray(1.0 / (ratio * self._units(columns, ["drive.frequency_hz"], size)[:, 0]))
+
     def _units(self, columns: Columns, names: list[str], size: int) -> NDArray[np.float64]:
         """What a ratio of 1 is in physical units, for every run, of shape (runs, names)."""
         units = np.empty((size, len(names)))
@@ -131,7 +204,7 @@ class Trials:
         for i, key in enumerate(zip(*(columns[name].tolist() for name in names), strict=True)):
             keys.setdefault(key, []).append(i)
         for key, which in keys.items():
-            yield self.system.replace(**dict(zip(names, key, strict=True))), which
+            yield _made(self.made, self.system, dict(zip(names, key, strict=True))), which
 
     def _ringing(self, columns: Columns, numbers: _Numbers) -> Columns:
         """The start of every draw, as columns; one that would press the tip is turned about, so that it leaves it."""
