@@ -9,6 +9,7 @@ import typer
 from snapbeam.cli.calibrate import calibrate
 from snapbeam.cli.campaign import campaign
 from snapbeam.cli.compare import compare
+from snapbeam.cli.design import design, probability
 from snapbeam.cli.draw import draw
 from snapbeam.cli.dynamics import dynamics
 from snapbeam.cli.explore import explore
@@ -38,6 +39,8 @@ app = typer.Typer(
 app.command("map")(compute_map)
 app.command("threshold")(threshold)
 app.command("simulate")(simulate)
+app.command("probability")(probability)
+app.command("design")(design)
 app.add_typer(dynamics, name="dynamics")
 app.command("frequencies")(frequencies)
 app.command("plot")(plot)
