@@ -15,6 +15,8 @@ __all__ = ["app", "main"]
 _COMMANDS = {
     "map": "map.compute_map",
     "threshold": "threshold.threshold",
+    "probability": "design.probability.probability",
+    "design": "design.optimum.design",
     "simulate": "simulate.simulate",
     "dynamics": "dynamics.dynamics",
     "frequencies": "frequencies.frequencies",

@@ -37,8 +37,8 @@ class FewMemory(NamedTuple):
 def suits(ensemble: Ensemble, packed: Packed, most: int = at.MOST) -> bool:
     """Whether the layout for few modes serves an ensemble, of *most* modes at most.
 
-    It knows equal wells, sinusoidal drives, laws that store energy and are plain arithmetic, modes whose flows polynomials serve,
-    and the package's own statistics.
+    It knows equal wells, sinusoidal drives, laws that store energy and are plain arithmetic, modes whose flows
+    polynomials serve, and the package's own statistics.
     """
     law, longest = ensemble.law, float(ensemble.step_times.max())
     flow = float(np.abs(COMPOSITIONS[ensemble.order].flow).max())
