@@ -121,21 +121,30 @@ class Beam:
             )
         for name in ("length", "thickness", "width", "density", "young_modulus"):
             self._set(name, _beam_quantities()[name].check(name, getattr(self, name)))
-        # tension per square of the buckling level: P - P_cr = stretch b^2
-        if self.ends.is_ideal:
-            stretch = math.pi**2 * self.young_modulus * self.area / (4.0 * self.length**2)
-        else:
-            stretch = self.tension_stiffness / float(self.buckling_modes(1).shape(0.5 * self.length)[0]) ** 2
+        try:
+            level, load = self._completed(level, load)
+        except OverflowError:
+            raise InputError(
+                f"length = {self.length:g} m, buckling_level = {level!r}: the square of one is more than a number holds"
+            ) from None
+        self._set("axial_load", load)
+        self._set("buckling_level", level)
+
+    def _completed(self, level: float | None, load: float | None) -> tuple[float, float]:
+        """Buckling level and axial load, of which one is given: P - P_cr = stretch b^2."""
+        stretch = self._stretch()
         if load is None:
             level = _beam_quantities()["buckling_level"].check("buckling_level", level)
             self._set("_given", "buckling_level")
-            load = _Derived(self.critical_load + stretch * level**2)
-        else:
-            load = finite("axial_load", load, "a finite number of N, compression positive")
-            level = _Derived(math.sqrt(max(load - self.critical_load, 0.0) / stretch))
-            self._set("_given", "axial_load")
-        self._set("axial_load", load)
-        self._set("buckling_level", level)
+            return level, _Derived(self.critical_load + stretch * level**2)
+        load = finite("axial_load", load, "a finite number of N, compression positive")
+        self._set("_given", "axial_load")
+        return _Derived(math.sqrt(max(load - self.critical_load, 0.0) / stretch)), load
+
+    def _stretch(self) -> float:
+        if self.ends.is_ideal:
+            return math.pi**2 * self.young_modulus * self.area / (4.0 * self.length**2)
+        return self.tension_stiffness / float(self.buckling_modes(1).shape(0.5 * self.length)[0]) ** 2
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
