@@ -154,7 +154,8 @@ class Goal:
         if quantity.kind == "outcome":
             return f"probability that {quantity.words}"
         if self.quantile is not None:
-            return f"{self.quantile:g} quantile of the {quantity.words}"
+            share = "median" if self.quantile == 0.5 else f"{self.quantile:g} quantile"
+            return f"{share} of the {quantity.words}"
         return quantity.words if quantity.kind == "design" else f"mean {quantity.words}"
 
     def estimate(self, values: NDArray[Any], failed: int, confidence: float) -> tuple[float, float, float]:

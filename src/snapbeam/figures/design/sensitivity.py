@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -69,7 +70,8 @@ def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
     ax.axvline(middle, color="black", linewidth=0.6)
     unit = str(data.attrs["answer_units"])
     words = str(data.attrs["answer"]).replace("omega_1", r"$\omega_1$")
-    ax.set_xlabel(f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}")
+    text = f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}"
+    ax.set_xlabel(textwrap.fill(text, 40))
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2, columnspacing=0.9)
 
 
@@ -104,4 +106,4 @@ def _name(data: xr.Dataset, at: int, local: bool) -> str:
     if row.quantity.unit == "1":
         return f"{text}\n± {step:.2g}"
     unit = re.sub(r"\^([\d.]+)", r"$^{\1}$", row.quantity.unit)
-    return f"{text}\n± {EngFormatter(unit, places=1).format_eng(step)}{unit}"
+    return f"{text}\n± {EngFormatter(unit, places=1)(step)}"
