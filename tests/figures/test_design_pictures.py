@@ -93,7 +93,10 @@ def test_tornado() -> None:
         {"answer_mean": 0.2, "answer": "threshold", "answer_units": "1", "confidence": 0.95},
     )  # fmt: skip
     ax = plot_tornado(dataset)
-    assert [text.get_text().split("\n")[0] for text in ax.get_yticklabels()] == ["contact stiffness", "location"]
+    assert [text.get_text().split("\n")[0] for text in ax.get_yticklabels()] == [
+        "contact stiffness",
+        "location",
+    ]
     widths = sorted(round(abs(patch.get_width()), 6) for patch in ax.patches)
     assert widths == [0.01, 0.01, 0.03, 0.03]
     with pytest.raises(InputError, match="no sensitivities"):
