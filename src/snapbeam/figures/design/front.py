@@ -18,6 +18,8 @@ __all__ = ["plot_designs"]
 _TRIED, _BROKEN = "#4C97C8", "0.8"
 _STATES = (("fails", "X", "#B03A27"), ("undecided", "D", "#C3DD8A"), ("holds", "o", "#16245E"))
 _GOAL = "tried_goal_"
+_DECADE = 10.0
+"""Greatest over least value from which an axis is one of powers."""
 
 
 def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None = None) -> Axes:
@@ -64,6 +66,9 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
             if own.any():
                 _reported(dataset, ax, across, up, own, marker, color, f"limits: {word}")
         ax.set(xlabel=_label(dataset, across), ylabel=_label(dataset, up))
+        for values, scale in ((x[kept], ax.set_xscale), (y[kept], ax.set_yscale)):
+            if values.size and values.min() > 0.0 and values.max() > _DECADE * values.min():
+                scale("log")
         ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
         fix_ticks(ax)
     return ax
