@@ -1,8 +1,10 @@
 """An independent solution of one mode under Newton's law of impact: every hit an event, chatter that ends in sticking.
 
-The paper's beam on its first buckling mode, its numbers written out from the closed forms; flights by DOP853 with the
-closing of the gap as an event, hits by the law, and once what is left of a chatter would be over within a millionth of
-a period the beam is carried by the tip, until the force that this takes would have to pull.
+The paper's beam on its first buckling mode, its numbers written out from the closed forms.  A flight is a Taylor series
+of the mode, as long as its last terms are below rounding, and the gap to the tip another, divided by the time since the
+bodies parted, so that a hop of a billionth of a period has digits as a long flight has.  Hits follow the law, and once
+what is left of a chatter would be over within a millionth of a period the beam is carried by the tip, until the force
+that this takes would have to pull.
 """
 
 from __future__ import annotations
@@ -11,18 +13,18 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from oracle import LEVEL, PaperBeam
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 Array = NDArray[np.float64]
 _SOON = 1e-6
 """Of the period of the first mode: what is left of a chatter that has ended."""
-
-
 _STILL = 1e-12
 """Of the tip's greatest speed: relative velocities that are rounding."""
+_TERMS = 26
+_PARTS = 24
+"""Pieces of a series that are searched for a first closing, or for a largest value above zero, each."""
 
 
 class Bounced(NamedTuple):
@@ -37,105 +39,211 @@ class Bounced(NamedTuple):
     """Seconds for which the beam was carried by the tip."""
 
 
+class Mode(NamedTuple):
+    """The first mode, its shape at the tip, and the tip's motion ``start + stroke sin(omega t)``."""
+
+    e: float
+    phi: float
+    mass: float
+    stiffness: float
+    gamma: float
+    damping: float
+    omega: float
+    stroke: float
+    start: float
+    period: float
+
+
+@njit(cache=True)
+def _horner(c, s, low):
+    total = 0.0
+    for i in range(c.size - 1, low - 1, -1):
+        total = total * s + c[i]
+    return total
+
+
+@njit(cache=True)
+def _slope(c, s, low):
+    total = 0.0
+    for i in range(c.size - 1, low, -1):
+        total = total * s + (i - low) * c[i]
+    return total
+
+
+@njit(cache=True)
+def _series(mode, t, a, v):
+    """Coefficients in time of the mode and of the gap (positive: pressed in) from time *t* on."""
+    q, square, gap = np.zeros(_TERMS), np.zeros(_TERMS), np.zeros(_TERMS)
+    q[0], q[1] = a, v
+    for n in range(_TERMS - 2):
+        cube = 0.0
+        for i in range(n + 1):
+            square[n] += q[i] * q[n - i]
+        for i in range(n + 1):
+            cube += square[i] * q[n - i]
+        pull = -(mode.stiffness * q[n] + mode.gamma * cube) / mode.mass - mode.damping * (n + 1) * q[n + 1]
+        q[n + 2] = pull / ((n + 1) * (n + 2))
+    sine, cosine, scale = math.sin(mode.omega * t), math.cos(mode.omega * t), mode.stroke
+    for n in range(_TERMS):
+        turn = (sine, cosine, -sine, -cosine)[n % 4]
+        gap[n] = scale * turn - mode.phi * q[n]
+        scale *= mode.omega / (n + 1)
+    gap[0] += mode.start
+    return q, gap
+
+
+@njit(cache=True)
+def _reach(mode, q, scale):
+    """How long the series of the mode, and that of the tip, hold to rounding."""
+    reach = 4.0 / mode.omega
+    for n in (_TERMS - 2, _TERMS - 1):
+        if q[n] != 0.0:
+            reach = min(reach, (1e-18 * scale / abs(q[n])) ** (1.0 / n))
+    return reach
+
+
+@njit(cache=True)
+def _between(c, low, left, right, of_slope):
+    """A zero of a series, or of its slope, between two times where it has two signs."""
+    f = _slope(c, left, low) if of_slope else _horner(c, left, low)
+    for _ in range(200):
+        middle = 0.5 * (left + right)
+        if middle == left or middle == right:
+            break
+        g = _slope(c, middle, low) if of_slope else _horner(c, middle, low)
+        if (g > 0.0) == (f > 0.0):
+            left = middle
+        else:
+            right = middle
+    return right
+
+
+@njit(cache=True)
+def _closing(gap, low, begin, end):
+    """First time at which a gap that is open closes, or -1."""
+    for part in range(_PARTS):
+        left = begin + (end - begin) * part / _PARTS
+        right = begin + (end - begin) * (part + 1) / _PARTS
+        if _slope(gap, left, low) > 0.0 and _slope(gap, right, low) < 0.0:
+            top = _between(gap, low, left, right, True)
+            if _horner(gap, top, low) > 0.0:
+                right = top
+        if _horner(gap, left, low) <= 0.0 and _horner(gap, right, low) > 0.0:
+            return _between(gap, low, left, right, False)
+    return -1.0
+
+
+@njit(cache=True)
+def _tip(mode, t):
+    turn = mode.omega * t
+    return mode.start + mode.stroke * math.sin(turn), mode.stroke * mode.omega * math.cos(turn)
+
+
+@njit(cache=True)
+def _pressed(mode, t):
+    """Relative acceleration that closes the gap, of a beam in touch at the tip's own velocity, m/s^2."""
+    place, rate = _tip(mode, t)
+    a, v = place / mode.phi, rate / mode.phi
+    own = -(mode.stiffness * a + mode.gamma * a**3) / mode.mass - mode.damping * v
+    return -mode.stroke * mode.omega**2 * math.sin(mode.omega * t) - mode.phi * own
+
+
+@njit(cache=True)
+def _released(mode, t, end):
+    """When the force of a tip that carries the beam would have to pull."""
+    step = 2e-3 * min(mode.period, 2.0 * math.pi / mode.omega)
+    if _pressed(mode, t) <= 0.0:
+        return t
+    while t < end:
+        if _pressed(mode, t + step) < 0.0:
+            left, right = t, t + step
+            for _ in range(200):
+                middle = 0.5 * (left + right)
+                if middle == left or middle == right:
+                    break
+                if _pressed(mode, middle) < 0.0:
+                    right = middle
+                else:
+                    left = middle
+            return min(end, right)
+        t += step
+    return end
+
+
+@njit(cache=True)
+def _bounce(mode, rest, times, found, impulses):
+    """Fills in *found* and *impulses*; hits, seconds carried, and whether the impulses found room."""
+    end, t, a, v, hits, carried, k = times[-1], 0.0, rest, 0.0, 0, 0.0, 0
+    rounding = _STILL * mode.stroke * mode.omega
+    while t < end:
+        # in touch: a hit, or carried on
+        place, rate = _tip(mode, t)
+        closing = rate - mode.phi * v
+        if closing > rounding:
+            if hits == impulses.size:
+                return hits, carried, False
+            impulses[hits] = (1.0 + mode.e) * closing * mode.mass / mode.phi**2
+            hits += 1
+            a, v = place / mode.phi, v + (1.0 + mode.e) * closing / mode.phi
+        away, pressed = mode.phi * v - rate, _pressed(mode, t)
+        if mode.e < 1.0 and pressed > 0.0 and 2.0 * away / (pressed * (1.0 - mode.e)) < _SOON * mode.period:
+            until = _released(mode, t, end)
+            while k < times.size and times[k] <= until:
+                found[k] = _tip(mode, times[k])[0]
+                k += 1
+            carried, t = carried + until - t, until
+            place, rate = _tip(mode, t)
+            a, v = place / mode.phi, rate / mode.phi
+            if t >= end:
+                break
+        # a flight; bodies that part from rest are apart by less than rounding at first
+        touching, still = True, abs(_tip(mode, t)[1] - mode.phi * v) <= rounding
+        blind = t + (1e-3 * mode.period if still else 0.0)
+        while t < end:
+            q, gap = _series(mode, t, a, v)
+            length = min(_reach(mode, q, abs(rest)), end - t)
+            low = 1 if touching and not still else 0
+            begin = min(max(blind - t, 0.0), length)
+            hit = _closing(gap, low, begin, length)
+            stop = hit if hit >= 0.0 else length
+            while k < times.size and times[k] <= t + stop:
+                found[k] = mode.phi * _horner(q, times[k] - t, 0)
+                k += 1
+            a, v = _horner(q, stop, 0), _slope(q, stop, 0)
+            t, touching = t + stop, False
+            if hit >= 0.0:
+                break
+    while k < times.size:
+        found[k] = mode.phi * a
+        k += 1
+    return hits, carried, True
+
+
 class Bouncer:
     """The first mode, and a tip that moves as it is told."""
 
     def __init__(self, ratio: float, velocity: float, coefficient: float, location: float) -> None:
         beam = PaperBeam(1)
-        self.e, self.phi = coefficient, float(beam.shape(location * 0.161)[0])
-        self.mass, self.stiffness = float(beam.mass[0, 0]), float(beam.stiffness[0])
-        self.gamma, self.damping = float(beam.gamma), float(beam.damping[0, 0])
-        self.omega = ratio * float(beam.omega[0])
-        self.stroke = velocity * LEVEL * float(beam.omega[0]) / self.omega
-        self.rest, self.start = float(beam.rest[0]), self.phi * float(beam.rest[0])
-        self.period = 2.0 * math.pi / float(beam.omega[0])
-
-    def pull_back(self, a: float, rate: float) -> float:
-        """What the mode does by itself: its acceleration."""
-        return -(self.stiffness * a + self.gamma * a**3) / self.mass - self.damping * rate
-
-    def tip(self, t: float) -> tuple[float, float, float]:
-        """Where the tip is, its velocity and acceleration."""
-        turn = self.omega * t
-        sine, cosine = math.sin(turn), math.cos(turn)
-        return (
-            self.start + self.stroke * sine,
-            self.stroke * self.omega * cosine,
-            -self.stroke * self.omega**2 * sine,
+        phi, rest, own = float(beam.shape(location * 0.161)[0]), float(beam.rest[0]), float(beam.omega[0])
+        self.omega, self.rest = ratio * own, rest
+        self.mode = Mode(
+            e=coefficient,
+            phi=phi,
+            mass=float(beam.mass[0, 0]),
+            stiffness=float(beam.stiffness[0]),
+            gamma=float(beam.gamma),
+            damping=float(beam.damping[0, 0]),
+            omega=self.omega,
+            stroke=velocity * LEVEL * own / self.omega,
+            start=phi * rest,
+            period=2.0 * math.pi / own,
         )
-
-    def force(self, t: float) -> float:
-        """What the tip pushes with if it carries the beam, over the modal mass and the shape."""
-        place, rate, acceleration = self.tip(t)
-        return acceleration / self.phi - self.pull_back(place / self.phi, rate / self.phi)
-
-    def pressed(self, t: float) -> float:
-        """Relative acceleration that closes the gap, of a beam in touch at the tip's own velocity, m/s^2."""
-        return self.phi * self.force(t)
 
     def run(self, times: Array) -> Bounced:
         """From rest in touch to the last of *times*."""
-        end, t, y = float(times[-1]), 0.0, np.array([self.rest, 0.0])
-        found, impulses, carried = np.empty(times.size), [], 0.0
-        while t < end:
-            # in touch: a hit, or carried on
-            closing = self.tip(t)[1] - self.phi * y[1]
-            if closing > _STILL * self.stroke * self.omega:
-                impulses.append((1.0 + self.e) * closing * self.mass / self.phi**2)
-                y = np.array([self.tip(t)[0] / self.phi, y[1] + (1.0 + self.e) * closing / self.phi])
-            away = self.phi * y[1] - self.tip(t)[1]
-            pressed = self.pressed(t)
-            over = (
-                self.e < 1.0
-                and pressed > 0.0
-                and 2.0 * away / (pressed * (1.0 - self.e)) < _SOON * self.period
-            )
-            if over:
-                until = self.released(t, end)
-                inside = (times >= t) & (times <= until)
-                found[inside] = [self.tip(s)[0] for s in times[inside]]
-                carried, t = carried + until - t, until
-                place, rate, _ = self.tip(t)
-                y = np.array([place, rate]) / self.phi
-                if t >= end:
-                    break
-            t, y = self.flown(t, y, end, times, found)
-        return Bounced(found / LEVEL, len(impulses), np.array(impulses), carried)
-
-    def released(self, t: float, end: float) -> float:
-        """When the force of a tip that carries the beam would have to pull."""
-        grid = np.arange(t, end + 1e-3 * self.period, 2e-3 * min(self.period, 2.0 * math.pi / self.omega))
-        force = np.array([self.force(s) for s in grid])
-        below = np.flatnonzero(force[1:] < 0.0)
-        if not below.size:
-            return end
-        low, high = grid[below[0]], grid[below[0] + 1]
-        return min(end, float(brentq(self.force, low, high, xtol=1e-17)) if force[below[0]] > 0.0 else low)
-
-    def flown(self, t: float, y: Array, end: float, times: Array, found: Array) -> tuple[float, Array]:
-        """A flight until the gap closes; fills in what is asked for on the way."""
-
-        def flight(_: float, z: Array) -> Array:
-            return np.array([z[1], self.pull_back(z[0], z[1])])
-
-        # bodies that part from rest are apart by less than rounding at first
-        still = abs(self.tip(t)[1] - self.phi * float(y[1])) <= _STILL * self.stroke * self.omega
-        blind = t + (1e-3 * self.period if still else 0.0)
-
-        def gap(s: float, z: Array) -> float:
-            if s < blind:
-                return -LEVEL
-            return self.tip(s)[0] - self.phi * float(z[0])
-
-        gap.terminal, gap.direction = True, 1.0  # type: ignore[attr-defined]
-        scale = abs(self.rest) * np.array([1.0, 2.0 * math.pi / self.period])
-        part = solve_ivp(
-            flight, (t, end), y, "DOP853", rtol=1e-12, atol=1e-14 * scale, max_step=self.period / 200.0,
-            first_step=min(1e-7 * self.period, 0.5 * (end - t)), events=gap, dense_output=True,
-        )  # fmt: skip
-        assert part.success, part.message
-        stop = float(part.t[-1])
-        inside = (times >= t) & (times <= stop)
-        if inside.any():
-            found[inside] = self.phi * part.sol(times[inside])[0]
-        return stop, part.y[:, -1]
+        room, done = 1000, False
+        while not done:
+            found, impulses = np.empty(times.size), np.empty(room)
+            hits, carried, done = _bounce(self.mode, self.rest, times, found, impulses)
+            room *= 10
+        return Bounced(found / LEVEL, hits, impulses[:hits], carried)

@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.cpu.after import after_step
+from snapbeam.engines.cpu.settling.after import after_step
 from snapbeam.engines.cpu.state import (
     Now,
     Place,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.cpu.after import after_step
 from snapbeam.engines.cpu.march import choose
 from snapbeam.engines.cpu.recording import has_room, lay_aside, take_up
+from snapbeam.engines.cpu.settling.after import after_step
 from snapbeam.engines.cpu.state import Place, begin, finish, run_of
 from snapbeam.engines.cpu.step import take_step
 from snapbeam.engines.scalar.compile import compiled

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from snapbeam.engines.cpu.hold import held_for, hold
 from snapbeam.engines.cpu.rows import modal_energy
+from snapbeam.engines.cpu.settling.hold import held_for, hold
 from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.cpu.uneven import lifted

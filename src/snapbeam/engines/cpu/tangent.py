@@ -13,9 +13,9 @@ contact that are let in here have a force without a jump, so that nothing else h
 from __future__ import annotations
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.cpu.after import after_step
 from snapbeam.engines.cpu.march import choose, hand_out
 from snapbeam.engines.cpu.rows import acceleration_rows, dot, flow_rows, kick_rows, tension_rows
+from snapbeam.engines.cpu.settling.after import after_step
 from snapbeam.engines.cpu.state import Place, begin, cut_slot, finish
 from snapbeam.engines.cpu.step import prepare, take_step
 from snapbeam.engines.scalar.compile import compiled

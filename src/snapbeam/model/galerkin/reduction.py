@@ -48,7 +48,6 @@ MODEL_QUANTITIES: dict[str, tuple[Quantity, Any]] = {
 }  # fmt: skip
 """What a reduction takes beside the beam, and its default."""
 
-
 _LEAST_COMPLIANCE = 1e-300
 """1/kg, below which the inverse is no number."""
 

@@ -226,7 +226,7 @@ def _energies(modes: Modes) -> list[str]:
 
 
 def _glide(modes: Modes) -> list[str]:
-    """A free step in short pieces, as the other layout's :func:`~snapbeam.engines.cpu.look.look_inside`.
+    """A free step in short pieces, as the other layout's :func:`~snapbeam.engines.cpu.settling.look.look_inside`.
 
     Row i of a look is the penetration, its rate, the displacement of the centre and its rate; only lanes of *which*
     that have so many pieces are written.  Returns, for each lane, the greatest value that the penetration may have

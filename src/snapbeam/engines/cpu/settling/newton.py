@@ -14,10 +14,10 @@ from __future__ import annotations
 import math
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.cpu.carried import carry
-from snapbeam.engines.cpu.hold import hold
 from snapbeam.engines.cpu.recording import record_instants
-from snapbeam.engines.cpu.settle import cut_to, meets, swapped, weighed
+from snapbeam.engines.cpu.settling.carried import carry
+from snapbeam.engines.cpu.settling.elastic import cut_to, meets, swapped, weighed
+from snapbeam.engines.cpu.settling.hold import hold
 from snapbeam.engines.cpu.state import Now, Watch, cut_slot, phase_at
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.cpu.uneven import about_level, at_center
@@ -162,7 +162,7 @@ def _moved_on(memory, blocks, place, run, tip, step, q, p, k, after, phase, toge
 
 @inlined
 def settle_newton(memory, blocks, place, run, now, step, done, room, book, asked, outputs):
-    """As :func:`snapbeam.engines.cpu.settle.settle`, of a run whose impacts last no time."""
+    """As :func:`snapbeam.engines.cpu.settling.elastic.settle`, of a run whose impacts last no time."""
     layout, clock, tick = place.layout, run.clock, run.clock.tick
     tip = seen_from(run.struck, now.home, run.rest_contact)
     rest_contact, rest_center = now.home * run.rest_contact, now.home * run.rest_center

@@ -6,8 +6,8 @@ from typing import Any
 
 from numba.extending import overload
 
-from snapbeam.engines.cpu.newton import settle_newton
-from snapbeam.engines.cpu.settle import settle
+from snapbeam.engines.cpu.settling.elastic import settle
+from snapbeam.engines.cpu.settling.newton import settle_newton
 from snapbeam.engines.scalar.compile import INLINE_HERE
 
 __all__ = ["after_step"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.cpu.hold import PANELS, held_for, hold, hold_force
 from snapbeam.engines.cpu.recording import record_held
-from snapbeam.engines.cpu.settle import swapped, weighed
+from snapbeam.engines.cpu.settling.elastic import swapped, weighed
+from snapbeam.engines.cpu.settling.hold import PANELS, held_for, hold, hold_force
 from snapbeam.engines.cpu.state import Now, Watch, cut_slot, phase_at
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.cpu.uneven import about_level, at_center

@@ -6,10 +6,10 @@ import math
 from typing import NamedTuple
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.cpu.hardest import hardest_point
-from snapbeam.engines.cpu.look import look_inside
 from snapbeam.engines.cpu.recording import record_contact, record_instants
 from snapbeam.engines.cpu.rows import dot, flow_coefficients, modal_energies, modal_energy, speed_bound
+from snapbeam.engines.cpu.settling.hardest import hardest_point
+from snapbeam.engines.cpu.settling.look import look_inside
 from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot, look_slot
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.cpu.uneven import about_level, above_own_well, at_center, lifted, second_well
