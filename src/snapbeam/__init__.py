@@ -86,6 +86,7 @@ if TYPE_CHECKING:
     from snapbeam.runs.run import Run
     from snapbeam.runs.save import load_run
     from snapbeam.runs.simulate import simulate
+    from snapbeam.runs.stream import simulate_to_file
     from snapbeam.runs.tolerance import Accuracy, conditioning
     from snapbeam.sweeps.doors import long_map, response_map, threshold_curve
     from snapbeam.sweeps.errors import StoreError
@@ -205,6 +206,7 @@ __all__ = [
     "sensitivity",
     "separation_exponent",
     "simulate",
+    "simulate_to_file",
     "sobol",
     "sweep",
     "switch_branch",
@@ -272,6 +274,7 @@ _NAMES = {
     "runs.run": "Run",
     "runs.save": "load_run",
     "runs.simulate": "simulate",
+    "runs.stream": "simulate_to_file",
     "runs.tolerance": "Accuracy conditioning",
     "sweeps.doors": "long_map response_map threshold_curve",
     "sweeps.errors": "StoreError",

@@ -61,6 +61,15 @@ def simulate(
         int | None,
         opt.count_option("Samples per cycle, evenly spaced (200, and the steps of each contact).", "Output"),
     ] = None,
+    stream: Annotated[
+        bool,
+        typer.Option(
+            "--stream",
+            help="Write the file while the run goes on, so that its samples need not fit in memory; for runs of very "
+            "many cycles, which are not drawn.",
+            rich_help_panel="Output",
+        ),
+    ] = False,
 ) -> None:
     """Compute one run and say how the beam responds.
 
@@ -82,6 +91,11 @@ def simulate(
 
     import snapbeam as sb
 
+    if stream and (output is None or plot is not None or animate is not None):
+        raise sb.InputError(
+            "--stream: writes one file, name it with --output; draw it later with snapbeam plot"
+        )
+
     system, integration = settings.system, settings.integration
     if drive is not None:
         named = [
@@ -95,22 +109,29 @@ def simulate(
         )
         system = system.replace(striker=recorded)
     start = time.monotonic()
+    run = None
     with compiling_told(errors()), _share_done() as progress:
-        run = sb.simulate(
-            system, integration, sample_times=_even(system, integration, samples), progress=progress
-        )
+        times = _even(system, integration, samples)
+        if stream and output is not None:
+            outcome = sb.simulate_to_file(
+                system, integration, path=output, sample_times=times, progress=progress
+            )
+        else:
+            run = sb.simulate(system, integration, sample_times=times, progress=progress)
+            outcome = run.outcome
     console = out()
-    console.print(_told(run, time.monotonic() - start))
+    console.print(_told(outcome, time.monotonic() - start))
     if output is not None:
-        run.save(output)
+        if run is not None:
+            run.save(output)
         console.print(f"Written: {file_line(output)}")
-    if plot is not None:
+    if run is not None and plot is not None:
         console.print(f"Written: {file_line(draw_run(run.dataset, plot, part))}")
-    if animate is not None:
+    if run is not None and animate is not None:
         console.print(f"Written: {file_line(_animated(run.dataset, animate, part))}")
     files = [path for path in (output, plot, animate) if path is not None]
-    answer(outcome=run.outcome, seconds=time.monotonic() - start, system=run.system.hash, files=files)
-    if run.outcome.status not in (sb.RunStatus.OK, sb.RunStatus.DECIDED):
+    answer(outcome=outcome, seconds=time.monotonic() - start, system=system.hash, files=files)
+    if outcome.status not in (sb.RunStatus.OK, sb.RunStatus.DECIDED):
         raise typer.Exit(FAILED)
 
 
@@ -174,10 +195,9 @@ def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | Non
     return animate_run(dataset, path, window)
 
 
-def _told(run: Any, elapsed: float) -> str:
+def _told(answer: Any, elapsed: float) -> str:
     from snapbeam.core.codes import RunStatus
 
-    answer = run.outcome
     kind, status = answer.response, answer.status
     if status not in (RunStatus.OK, RunStatus.DECIDED):
         return f"[bold red]failed[/] ({status.name}): {status.advice}"

@@ -58,7 +58,8 @@ class Reading:
         """
         book, status = self.book, self.book["status"]
         done = (status == RunStatus.OK) | (status == RunStatus.DECIDED)
-        made = book["energy"] - book["first_energy"] - book["work"]
+        with np.errstate(invalid="ignore"):  # runs that failed have no numbers
+            made = book["energy"] - book["first_energy"] - book["work"]
         allowed = _MADE * book["gross_work"]
         allowed = allowed + _ROUNDED * (np.abs(book["energy"]) + np.abs(book["first_energy"]))
         return np.where(done & (made > allowed), RunStatus.UNBALANCED, status)

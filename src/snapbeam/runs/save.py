@@ -25,10 +25,11 @@ from snapbeam.runs.tolerance import Accuracy
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["load_run", "save_run"]
+__all__ = ["compressed", "description", "load_run", "outcome_dataset", "save_run"]
 
 _FORMAT = "snapbeam run 2"
 _GROUPS = ("impacts", "outcome")
+_END = ("amplitude", "velocity", "phase", "striker_position", "contact_time", "striker_shift", "striker_rate")
 _COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 
 
@@ -39,29 +40,25 @@ def save_run(run: Run, path: str | os.PathLike[str]) -> None:
     integration, the accuracy and the end are JSON in attributes of the root.
     """
     target = check_writable(path, "path", (".nc",))
+    root = run.dataset.assign_attrs(description(run.system, run.integration, run.accuracy, run.end))
+    groups = {None: root, "impacts": run.impacts.assign_attrs({}), "outcome": outcome_dataset(run.outcome)}
+    write_netcdf(groups, target, {name: compressed(dataset) for name, dataset in groups.items()})
+
+
+def description(
+    system: System, integration: Integration, accuracy: Accuracy | None, end: State | None
+) -> dict[str, str]:
+    """The attributes of a file from which a run is read again."""
     described = {
         "snapbeam_format": _FORMAT,
-        "snapbeam_system": _json(run.system.to_mapping()),
-        "snapbeam_integration": _json(
-            {name: getattr(run.integration, name) for name in quantities(Integration)}
-        ),
+        "snapbeam_system": _json(system.to_mapping()),
+        "snapbeam_integration": _json({name: getattr(integration, name) for name in quantities(Integration)}),
     }
-    if run.accuracy is not None:
-        described["snapbeam_accuracy"] = _json(vars(run.accuracy))
-    if run.end is not None:
-        names = (
-            "amplitude",
-            "velocity",
-            "phase",
-            "striker_position",
-            "contact_time",
-            "striker_shift",
-            "striker_rate",
-        )
-        described["snapbeam_end"] = _json({name: getattr(run.end, name) for name in names})
-    root = run.dataset.assign_attrs(described)
-    groups = {None: root, "impacts": run.impacts.assign_attrs({}), "outcome": outcome_dataset(run.outcome)}
-    write_netcdf(groups, target, {name: _encoding(dataset) for name, dataset in groups.items()})
+    if accuracy is not None:
+        described["snapbeam_accuracy"] = _json(vars(accuracy))
+    if end is not None:
+        described["snapbeam_end"] = _json({name: getattr(end, name) for name in _END})
+    return described
 
 
 def load_run(path: str | os.PathLike[str]) -> Run:
@@ -119,7 +116,8 @@ def code_flags(kinds: type[ResponseClass] | type[RunStatus]) -> dict[str, Any]:
     }
 
 
-def _encoding(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
+def compressed(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
+    """How the variables of a dataset are encoded."""
     return {name: _COMPRESSION for name, variable in dataset.variables.items() if variable.ndim}
 
 
