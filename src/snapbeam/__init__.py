@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from snapbeam.design.plan import Cost, plan
     from snapbeam.design.posterior.classes import class_likelihood
     from snapbeam.design.posterior.posterior import Posterior, posterior
+    from snapbeam.design.posterior.waveforms import Waveform
     from snapbeam.design.probability.allocation import Allocation
     from snapbeam.design.probability.dots import judge_dots
     from snapbeam.design.probability.probability_map import probability_map
@@ -169,6 +170,7 @@ __all__ = [
     "ThresholdOf",
     "TwoSines",
     "Uniform",
+    "Waveform",
     "__version__",
     "advance",
     "attractors",
@@ -230,6 +232,7 @@ _NAMES = {
     "design.plan": "Cost plan",
     "design.posterior.classes": "class_likelihood",
     "design.posterior.posterior": "Posterior posterior",
+    "design.posterior.waveforms": "Waveform",
     "design.probability.allocation": "Allocation",
     "design.probability.dots": "judge_dots",
     "design.probability.probability_map": "probability_map",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from snapbeam.config.parameters import lookup
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive, shown, within
 from snapbeam.design.distributions import Distribution, Empirical
 from snapbeam.design.posterior.forward import Forward
+from snapbeam.design.posterior.waveforms import Waveform
 from snapbeam.design.spread import Spread
 from snapbeam.lab.calibration.measurements import Measurements
 from snapbeam.model.beam import Beam
@@ -31,6 +32,10 @@ _STAGES = 3
 _FEWEST = 100.0
 """Samples that weighted ones must be worth."""
 _BEAM = ("thickness", "young_modulus", "density", "length", "buckling_level")
+_STEP = 2e-5
+"""Relative step of the logarithms by which runs are compared: beyond what steps in time make of them."""
+_BESIDE = {"damping_ratio": "model.damping_ratio", "contact_stiffness": "contact.stiffness"}
+"""What a waveform says of beside the beam."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,26 +145,32 @@ class Posterior:
 
 
 def posterior(
-    measured: Measurements,
+    measured: Measurements | None,
     beam: Beam,
     prior: Mapping[str, float],
     *,
+    waveforms: Sequence[Waveform] | Waveform = (),
     modes: int = 8,
     draws: int = 2000,
     seed: int = 0,
 ) -> Posterior:
-    """What measured frequencies, decays and collisions say of a beam, beside what was known before.
+    """What measured frequencies, decays, collisions and waveforms say of a beam, beside what was known before.
 
     Parameters
     ----------
-    measured : Measurements
+    measured : Measurements or None
         Frequencies with their standard errors; damping ratios and contact tests, if any, are known by themselves.
     beam : Beam
         The middle of what was known before.
     prior : mapping of str to float
         What is sought, among thickness, young_modulus, density, length and buckling_level, and how well it was known:
-        the standard deviation of its logarithm.  A parameter that the data say nothing of stays as it was.
+        the standard deviation of its logarithm.  A parameter that the data say nothing of stays as it was.  With
+        waveforms also damping_ratio and contact_stiffness, about those of the first waveform's system, unless
+        *measured* knows them.
+    waveforms : Waveform or sequence of them
+        Tracked motions of the beam under a striker; each counts as far as its conditioning lets it.
     modes : int
+        For the frequencies; a waveform has those of its system.
     draws : int
         Samples, at least 200.
     seed : int
@@ -178,46 +189,100 @@ def posterior(
     Population Monte Carlo (Cappe et al., J. Comput. Graph. Stat. 13 (2004) 907): samples of a Student's t about the
     most likely beam, weighed by likelihood times prior over their density, twice fitted anew to what they say.
     """
-    if not isinstance(measured, Measurements):
+    if measured is not None and not isinstance(measured, Measurements):
         raise InputTypeError(f"measured = {shown(measured)}: must be Measurements")
     if not isinstance(beam, Beam):
         raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
+    tracked = _checked_waveforms(waveforms)
+    if measured is None and not tracked:
+        raise InputError("measured = None: give measurements, waveforms, or both")
+    names = _checked_prior(prior, measured, tracked)
+    known = np.array([positive(f"prior[{name}]", prior[name]) for name in names])
+    integer("draws", draws, 200, 10**6)
+    integer("seed", seed, 0, 2**63 - 1)
+    forward = None
+    if measured is not None and (not tracked or _has_frequencies(measured)):
+        forward = Forward(measured, integer("modes", modes, 1, 256))
+    begin = np.log([_nominal(name, beam, tracked) for name in names])
+
+    def terms(logs: _Array) -> _Array:
+        values = {name: math.exp(log) for name, log in zip(names, logs, strict=True)}
+        found = [(logs - begin) / known]
+        if forward is not None:
+            found.append(forward.misfit(beam.replace(**{n: v for n, v in values.items() if n in _BEAM})))
+        dotted = {_dotted(name): value for name, value in values.items()}
+        found += [waveform.misfit(dotted) for waveform in tracked]
+        return np.concatenate(found)
+
+    logs, weights = _population(terms, begin, draws, seed, _STEP if tracked else None)
+    values, listed = np.exp(logs), [_dotted(name) for name in names]
+    if measured is not None:
+        for column, (name, given, errors) in enumerate(_known_by_themselves(measured)):
+            if given:
+                generator = np.random.Generator(np.random.Philox(key=[seed, 10**6 + column]))
+                values = np.column_stack([values, _positive(name, given, errors, draws, generator)])
+                listed.append(name)
+    return Posterior(tuple(listed), values, weights)
+
+
+def _known_by_themselves(measured: Measurements) -> list[tuple[str, Any, Any]]:
+    tests = [test.stiffness() for test in measured.contact]
+    return [
+        ("model.damping_ratio", measured.damping_ratio, measured.damping_ratio_se),
+        ("contact.stiffness", tuple(k for k, _ in tests), tuple(error for _, error in tests)),
+    ]
+
+
+def _has_frequencies(measured: Measurements) -> bool:
+    return bool(measured.straight_freq or measured.lower_well_freq or measured.upper_well_freq)
+
+
+def _dotted(name: str) -> str:
+    return _BESIDE.get(name, f"beam.{name}")
+
+
+def _nominal(name: str, beam: Beam, tracked: Sequence[Waveform]) -> float:
+    if name in _BEAM:
+        return float(getattr(beam, name))
+    system = tracked[0].system
+    if name == "damping_ratio":
+        return float(np.mean(system.model.damping_ratio))
+    return float(getattr(system.contact, "stiffness"))  # noqa: B009
+
+
+def _checked_waveforms(given: Sequence[Waveform] | Waveform) -> tuple[Waveform, ...]:
+    listed = (given,) if isinstance(given, Waveform) else given
+    if not isinstance(listed, Sequence) or not all(isinstance(each, Waveform) for each in listed):
+        raise InputTypeError(f"waveforms = {shown(given)}: must be a Waveform, or a list of them")
+    return tuple(listed)
+
+
+def _checked_prior(
+    prior: Mapping[str, float], measured: Measurements | None, tracked: Sequence[Waveform]
+) -> list[str]:
     if not isinstance(prior, Mapping) or not prior:
         raise InputTypeError(
             f"prior = {shown(prior)}: must map at least one parameter to how well it was known"
         )
-    names = list(prior)
-    for name in names:
-        if name not in _BEAM:
-            raise InputError(f"prior: {name} must be one of {', '.join(_BEAM)}")
-    known = np.array([positive(f"prior[{name}]", prior[name]) for name in names])
-    integer("draws", draws, 200, 10**6)
-    integer("seed", seed, 0, 2**63 - 1)
-    forward = Forward(measured, integer("modes", modes, 1, 256))
-    begin = np.log([getattr(beam, name) for name in names])
-
-    def terms(logs: _Array) -> _Array:
-        changed = beam.replace(**{name: math.exp(log) for name, log in zip(names, logs, strict=True)})
-        return np.concatenate([forward.misfit(changed), (logs - begin) / known])
-
-    logs, weights = _population(terms, begin, draws, seed)
-    values, listed = np.exp(logs), [f"beam.{name}" for name in names]
-    beside = [("model.damping_ratio", measured.damping_ratio, measured.damping_ratio_se)]
-    tests = [test.stiffness() for test in measured.contact]
-    beside.append(("contact.stiffness", tuple(k for k, _ in tests), tuple(error for _, error in tests)))
-    for column, (name, given, errors) in enumerate(beside):
-        if given:
-            generator = np.random.Generator(np.random.Philox(key=[seed, 10**6 + column]))
-            values = np.column_stack([values, _positive(name, given, errors, draws, generator)])
-            listed.append(name)
-    return Posterior(tuple(listed), values, weights)
+    allowed = (*_BEAM, *_BESIDE) if tracked else _BEAM
+    for name in prior:
+        if name not in allowed:
+            raise InputError(f"prior: {name} must be one of {', '.join(allowed)}")
+    alone = {} if measured is None else {n: values for n, values, _ in _known_by_themselves(measured)}
+    for name, dotted in _BESIDE.items():
+        if name in prior and alone.get(dotted):
+            raise InputError(f"prior: {name} is measured by itself; leave out one of the two")
+        if name == "contact_stiffness" and name in prior:
+            if not all(hasattr(each.system.contact, "stiffness") for each in tracked):
+                raise InputError("prior: contact_stiffness, of a contact that has none")
+    return list(prior)
 
 
 def _population(
-    terms: Callable[[_Array], _Array], begin: _Array, draws: int, seed: int
+    terms: Callable[[_Array], _Array], begin: _Array, draws: int, seed: int, step: float | None = None
 ) -> tuple[_Array, _Array]:
-    """Samples and weights of exp(-|terms|^2/2)."""
-    found = optimize.least_squares(terms, begin, x_scale="jac")
+    """Samples and weights of exp(-|terms|^2/2); *step* is the relative one of differences."""
+    found = optimize.least_squares(terms, begin, x_scale="jac", diff_step=step)
     middle, cover = found.x, np.linalg.inv(found.jac.T @ found.jac)
     logs, weights = np.empty((0, begin.size)), np.empty(0)
     for stage in range(_STAGES):
