@@ -12,7 +12,14 @@ from snapbeam.engines.cpu.state import Now, Watch, cut_slot, phase_at
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.cpu.uneven import about_level, at_center
 from snapbeam.engines.scalar.compile import compiled, inlined
-from snapbeam.engines.scalar.decisions import Seen, count_in_step, finish_impact, track
+from snapbeam.engines.scalar.decisions import (
+    Seen,
+    contact_level,
+    count_in_step,
+    finish_impact,
+    ticks_of,
+    track,
+)
 from snapbeam.engines.scalar.extras import observe as observe_extras
 
 __all__ = ["carry"]
@@ -70,7 +77,10 @@ def carry(memory, blocks, place, run, tip, now, step, room, book, asked, outputs
     layout, clock, tick = place.layout, run.clock, run.clock.tick
     rest_contact, rest_center = now.home * run.rest_contact, now.home * run.rest_center
     t, seen, watch = now.t, now.seen, now.watch
-    ticks = max(1, step.ticks // 4)
+    # however strongly it is stretched, a beam that is carried moves no faster than the tip
+    left = min((now.landed + 1) * clock.landing, clock.end) - t
+    ticks = min(ticks_of(clock, contact_level(clock, (t - book.onset) * tick, 0.0, 0.0)), left)
+    ticks = max(1, ticks // 4)
     length = ticks * tick
     release = _release(memory, blocks, layout, run, tip, step.phase, length)
     released = release >= 0.0

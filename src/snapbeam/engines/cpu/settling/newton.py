@@ -31,7 +31,7 @@ __all__ = ["settle_newton"]
 
 _OK, _RUNNING, _NOT_FINITE = int(RunStatus.OK), int(RunStatus.RUNNING), int(RunStatus.NOT_FINITE)
 _STEP_LIMIT = int(RunStatus.STEP_LIMIT)
-_LOCATIONS = 8
+_LOCATIONS = 24
 """Newton steps in which a hit is located, at most."""
 _NOISE = 1e-12
 """Of the tip's speed: relative velocities that are rounding."""
@@ -121,14 +121,15 @@ def _rises(looked, pieces, piece, still, still_speed):
 
 
 @inlined
-def _located(memory, blocks, place, run, tip, step, entry, still_speed):
+def _located(memory, blocks, place, run, tip, step, entry, at_end, still_speed):
     """The step cut at the hit itself, by Newton's method on the trajectory; what it gave, and what is seen there.
 
-    The last value says whether there is a hit at all: whether the bodies meet and do not merely graze.
+    *at_end* is the penetration at the end of the whole step.  The last value says whether there is a hit at all:
+    whether the bodies meet within the step, and do not merely graze.
     """
     layout, stages = place.layout, place.stages
     cut = cut_to(step, run, 0, entry)
-    before = math.inf
+    before, low, high = math.inf, 0.0, step.length
     prepare(memory, layout, stages, run.struck.drive, cut.length, cut.at)
     done = take_step(memory, blocks, layout, stages, tip, cut, True)
     about = observe(memory, layout, tip, step.phase + tip.drive.omega * cut.length, step.q1, step.p1)
@@ -136,10 +137,22 @@ def _located(memory, blocks, place, run, tip, step, entry, still_speed):
         if about.dv <= still_speed:
             break
         change = -about.d / about.dv
-        if abs(change) >= 0.5 * before or cut.length + change > step.length or cut.length + change < 0.0:
+        if abs(change) >= 0.5 * before:
             break
+        wanted = cut.length + change
+        if about.d < 0.0:
+            low = cut.length
+        else:
+            high = cut.length
+        if wanted >= step.length and at_end < 0.0 and high == step.length:
+            return cut, done, about, False  # they meet in the next step
+        if wanted < low or wanted > high:
+            # the way is bent: halve what is known to hold the hit
+            if high - low <= 4e-16 * step.length:
+                break
+            wanted, change = 0.5 * (low + high), math.inf
         before = abs(change)
-        cut = cut_to(step, run, 0, cut.length + change)
+        cut = cut_to(step, run, 0, wanted)
         prepare(memory, layout, stages, run.struck.drive, cut.length, cut.at)
         done = take_step(memory, blocks, layout, stages, tip, cut, True)
         about = observe(memory, layout, tip, step.phase + tip.drive.omega * cut.length, step.q1, step.p1)
@@ -196,9 +209,14 @@ def settle_newton(memory, blocks, place, run, now, step, done, room, book, asked
     if seen.d > -still_speed * run.step_time and met.pieces > 0:
         still = still_speed * run.step_time
         entry = _rises(room.looked, met.pieces, met.piece, still, still_speed)
+    if entry < 0.0 and seen.d < 0.0 and about.d > 0.0 and about.dv > still_speed:
+        # what was looked into is the modes' own way: they met at the very end of the step
+        entry = max(0.0, step.length - about.d / about.dv)
     hit, ticks = False, step.ticks
     if entry >= 0.0:
-        located, done, about, hit = _located(memory, blocks, place, run, tip, step, entry, still_speed)
+        located, done, about, hit = _located(
+            memory, blocks, place, run, tip, step, entry, about.d, still_speed
+        )
         ticks = min(max(1, math.ceil(located.length / tick)), step.ticks)
         if hit:
             step = Step(
