@@ -17,6 +17,7 @@ _PARTS = {
     "levels": "levels",
     "tried": "tried",
     "explorer": "explorer",
+    "dynamics": "dynamics",
 }
 
 

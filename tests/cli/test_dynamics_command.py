@@ -16,6 +16,7 @@ CASES = {
     "section": (["--at", "impact", "--periods", "20"], "drive_phase"),
     "branch": (["--between", "0.02:0.05", "--most", "6"], "multiplier_real"),
     "basins": (["--amplitudes=-1.4:1.4:6", "--velocities=-0.6:0.6:5", "--states", "12"], "basin"),
+    "edge": (["--periods", "25", "--horizon", "30"], "orbit_state"),
 }
 
 

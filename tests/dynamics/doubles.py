@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -145,6 +146,53 @@ def pendulum(interval: float = 1.0, pieces: int = 40) -> KnownMap:
         return carry(x, np.tile(np.eye(2), (len(x), 1, 1)))[1]
 
     return KnownMap(step, slope, 2, interval)
+
+
+def turning_pendulum(longest: float = 8.0, step: float = 0.1) -> KnownMap:
+    """The pendulum from a state to where its angle next comes upward through that of rest + pi, or *longest* after.
+
+    Both of its attractors are fixed points of this map: rest, and the rotation where it comes round.
+    """
+    rest = math.asin(0.5)
+    end = rest + math.pi
+
+    def rate(x):
+        return np.stack([x[:, 1], -0.1 * x[:, 1] + 0.5 - np.sin(x[:, 0])], axis=1)
+
+    def moved(x, h):
+        h = np.broadcast_to(h, len(x))[:, None]
+        k1 = rate(x)
+        k2 = rate(x + 0.5 * h * k1)
+        k3 = rate(x + 0.5 * h * k2)
+        k4 = rate(x + h * k3)
+        return x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+
+    def step_of(x, of):
+        x = np.array(x, dtype=float)
+        # an angle at the end is one at the beginning
+        x[:, 0] = (x[:, 0] - rest + math.pi) % (2.0 * math.pi) - math.pi + rest
+        flying = np.ones(len(x), dtype=bool)
+        for _ in range(round(longest / step)):
+            here = x[flying]
+            there = moved(here, step)
+            passed = (here[:, 0] < end) & (there[:, 0] >= end)
+            part = np.full(passed.sum(), 0.5)
+            for _ in range(6):
+                at = moved(here[passed], part * step)
+                part = part - (at[:, 0] - end) / (at[:, 1] * step)
+            there[passed] = moved(here[passed], part * step)
+            x[flying] = there
+            flying[np.flatnonzero(flying)[passed]] = False
+        x[:, 0] = (x[:, 0] - rest + math.pi - 1e-9) % (2.0 * math.pi) - math.pi + rest + 1e-9
+        return x
+
+    def slope(x, of):
+        small = 1e-6
+        x = np.asarray(x, dtype=float)
+        columns = [(step_of(x + e, of) - step_of(x - e, of)) / (2.0 * small) for e in small * np.eye(2)]
+        return np.stack(columns, axis=2)
+
+    return KnownMap(step_of, slope, 2, longest)
 
 
 def logistic(r: float = 3.2) -> KnownMap:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from doubles import grebogi, henon, logistic, pendulum
+from doubles import grebogi, henon, logistic, pendulum, turning_pendulum
 from test_orbits import system_of
 
 import snapbeam as sb
@@ -25,19 +25,37 @@ def test_known_attractors() -> None:
     assert three.undecided > 0.0, "after three steps some have not arrived, and none is called chaotic"
 
 
+def shares_of_the_pendulum(found: sb.Attractors, periods: int) -> list[float]:
+    plane = {
+        "x[1]": math.asin(0.5) + np.linspace(-math.pi, math.pi, 48, endpoint=False),
+        "x[2]": np.linspace(-10.0, 10.0, 48),
+    }
+    ds = sb.basins(found, plane, periods=periods)
+    return [float((ds["basin"] == label).mean()) for label in (0, 1, -1)]
+
+
 @pytest.mark.slow
 def test_the_pendulum_of_bstab() -> None:
-    """15 % go to the fixed point; those that rotate are no state that comes back, and are left undecided."""
-    flow = pendulum()
-    found = sb.attractors(flow, np.array([[math.asin(0.5), 0.01], [math.asin(0.5), 0.02]]), transient=600)
+    """15 % go to the fixed point, 85 % rotate: a fixed point too where the angle is seen whenever it has come round."""
+    starts = np.array([[math.asin(0.5), 0.01], [math.asin(0.5), 0.02], [2.0, 3.0], [1.0, 6.0]])
+    found = sb.attractors(turning_pendulum(), starts, transient=200)
+    assert [each.period for each in found.found] == [1, 1]
+    rest = int(np.argmin([abs(each.points[0, 1]) for each in found.found]))
+    shares = shares_of_the_pendulum(found, 60)
+    assert shares[rest] == pytest.approx(0.15, abs=0.02)
+    assert shares[1 - rest] == pytest.approx(0.85, abs=0.02)
+    assert shares[2] == 0.0
+
+
+@pytest.mark.slow
+def test_what_is_no_attractor_of_the_map_is_undecided() -> None:
+    """Seen at a fixed interval the rotation never repeats and does not diverge: neither periodic nor chaotic."""
+    found = sb.attractors(
+        pendulum(), np.array([[math.asin(0.5), 0.01], [math.asin(0.5), 0.02]]), transient=600
+    )
     assert [each.period for each in found.found] == [1]
-    plane = {
-        "x[1]": math.asin(0.5) + np.linspace(-math.pi, math.pi, 80, endpoint=False),
-        "x[2]": np.linspace(-10.0, 10.0, 80),
-    }
-    ds = sb.basins(found, plane, periods=60)
-    assert float((ds["basin"] == 0).mean()) == pytest.approx(0.15, abs=0.02)
-    assert ds.attrs["undecided"] == pytest.approx(0.85, abs=0.02)
+    rest, _, undecided = shares_of_the_pendulum(found, 60)
+    assert rest == pytest.approx(0.15, abs=0.02) and undecided == pytest.approx(0.85, abs=0.02)
 
 
 def test_labels_do_not_depend_on_order() -> None:
@@ -56,6 +74,11 @@ def test_a_beam_between_two_wells() -> None:
     system = system_of(1, 1.6, 0.03, 0.05)
     found = sb.attractors(system, 40, transient=300)
     assert all(each.kind == "periodic" and each.orbit.is_stable for each in found.found)
+    for each in found.found:
+        fine = each.certificate
+        assert fine.flow.integration.accuracy == "reference" and fine.is_stable
+        assert np.abs(fine.coordinates - each.points[0]).max() < 1e-3
+        assert each.exponent == pytest.approx(math.log(abs(fine.multipliers[0])) / fine.flow.period)
     sides = {math.copysign(1.0, each.points[0, 0]) for each in found.found}
     assert sides == {-1.0, 1.0} and found.undecided == 0.0
     plane = {"amplitude[1]": np.linspace(-1.6, 1.6, 24), "velocity[1]": np.linspace(-1.0, 1.0, 20)}

@@ -38,6 +38,29 @@ def test_a_fold_is_passed() -> None:
     assert stable[0] and not stable[-1]
 
 
+def test_an_isola_is_closed_from_a_seed_on_it() -> None:
+    """Fixed points of x -> x - 0.4 (x^2 + (r - 2)^2 - 1/4) are a circle, which no branch from elsewhere meets."""
+    from doubles import KnownMap, table
+
+    ring = KnownMap(
+        lambda x, of: np.stack(
+            [x[:, 0] - 0.4 * (x[:, 0] ** 2 + (of["r"] - 2.0) ** 2 - 0.25), 0.1 * x[:, 0] + 0.3 * x[:, 1]], 1
+        ),
+        lambda x, of: table([1.0 - 0.8 * x[:, 0], 0.0], [0.1, 0.3]),
+        2,
+        r=2.1,
+    )
+    (seed,) = sb.attractors(ring, np.random.default_rng(0).uniform(-0.3, 0.8, (20, 2)), transient=200).found
+    branch = sb.continue_orbit(seed.orbit, "r", (0.0, 4.0), most=2000)
+    assert branch.end == "closed"
+    assert sorted(event.value for event in branch.events) == pytest.approx([1.5, 2.5], abs=1e-8)
+    assert {event.kind for event in branch.events} == {"fold"}
+    radius = np.hypot([orbit.coordinates[0] for orbit in branch.orbits], branch.values - 2.0)
+    np.testing.assert_allclose(radius, 0.5, atol=1e-8)
+    other = sb.periodic_orbit(ring, [0.1, 0.0], deflate=[seed.orbit], iterations=200)
+    assert other.coordinates[0] == pytest.approx(-seed.orbit.coordinates[0], abs=1e-9) and other.unstable == 1
+
+
 def room(ratio: float, restitution: float, periods: int) -> float:
     """Least gap between the flight of the exact (1, n) orbit and the wall, away from its ends."""
     speed, _ = exact_orbit(ratio, restitution, periods)

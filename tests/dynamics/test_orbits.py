@@ -94,6 +94,22 @@ def test_known_maps() -> None:
     assert twice.least_period == 2
 
 
+def test_coarse_derivatives_are_told(monkeypatch) -> None:
+    """At level "map" multipliers are off by more than rounding and less than what is said."""
+    from snapbeam.core import findings
+
+    monkeypatch.setattr(findings, "_told", set())
+    system = system_of(1, 1.6, 0.03)
+    with pytest.warns(sb.PlausibilityWarning, match="--accuracy reference"):
+        coarse = sb.periodic_orbit(system, transient=1500, integration=sb.Integration(accuracy="map"))
+    fine = sb.periodic_orbit(system, coarse.coordinates)
+    (told,) = coarse.findings
+    apart = np.abs(coarse.multipliers - fine.multipliers).max()
+    assert 1e-4 < apart < told.numbers["relative_error"]
+    assert findings.findings_of(coarse.to_dataset()) == coarse.findings
+    assert fine.findings == () == findings.findings_of(fine.to_dataset())
+
+
 def test_what_does_not_converge_says_why() -> None:
     with pytest.raises(sb.NoOrbit, match="try another period"):
         sb.periodic_orbit(logistic(3.9), [0.3], 7, iterations=2)

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 import typer
+import xarray as xr
 from typer.testing import CliRunner
 
 from snapbeam.cli.lab.calibrate import calibrate
@@ -16,7 +17,7 @@ from snapbeam.cli.lab.vibrometer import vibrometer
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
 from snapbeam.figures.lab.dot_comparison import plot_dot_comparison
-from snapbeam.figures.lab.waveform_comparison import plot_waveform_comparison
+from snapbeam.figures.lab.waveform_comparison import plot_waveform_comparison, plot_waveform_overlay
 from snapbeam.lab.compare.dots import Dots
 from snapbeam.lab.compare.maps import compare_dots
 from snapbeam.lab.compare.waveforms import compare_waveforms
@@ -147,6 +148,42 @@ def test_pictures(synthetic_map, synthetic_run):
     plt.close("all")
 
 
+def parting(run, cycle: float, freq: float = 100.0):
+    """The run as it is seen if its beam goes another way from a cycle on."""
+    seen = run.copy(deep=True)
+    late = run["time"].values * freq > cycle
+    seen["displacement"].values[late] += 0.5
+    return seen
+
+
+def test_an_overlay_shows_where_runs_part(synthetic_run):
+    """Both beams on one axis, the difference below, a line where they part: the data of the picture, not its looks."""
+    import matplotlib.pyplot as plt
+
+    found = compare_waveforms(parting(synthetic_run, 6.0), synthetic_run, 100.0)
+    assert found.parted == pytest.approx(6.0, abs=0.5)
+    figure = plot_waveform_overlay(found)
+    top, shakers, bottom = figure.axes
+    lines = {line.get_label(): line for line in top.lines}
+    for name in ("measured", "simulated"):
+        drawn = lines[name]
+        np.testing.assert_array_equal(drawn.get_xdata(), found.waveforms["cycle"])
+        np.testing.assert_array_equal(drawn.get_ydata(), found.waveforms[f"{name}_displacement"])
+    difference = bottom.lines[0].get_ydata()
+    late = found.waveforms["cycle"].values > 6.2
+    np.testing.assert_allclose(difference[late], 0.5, atol=0.02)
+    np.testing.assert_allclose(difference[found.waveforms["cycle"].values < 5.8], 0.0, atol=0.02)
+    for ax in (top, shakers, bottom):
+        assert [found.parted] * 2 in [list(line.get_xdata()) for line in ax.lines], "the parting is marked"
+    assert f"part at cycle {found.parted:.1f}" in top.get_title(loc="left")
+    same = plot_waveform_overlay(compare_waveforms(synthetic_run, synthetic_run, 100.0), (0.0, 5.0))
+    assert "never part" in same.axes[0].get_title(loc="left")
+    assert same.axes[0].get_xlim()[1] <= 5.0
+    with pytest.raises(InputError, match="window"):
+        plot_waveform_overlay(found, (50.0, 60.0))
+    plt.close("all")
+
+
 # --- the commands -------------------------------------------------------------------------------------
 
 
@@ -183,6 +220,57 @@ def test_commands_of_signals(program, tmp_path):
     assert program("identify", tmp_path / "none.csv").exit_code == 2
 
 
+@pytest.mark.parametrize(("polarity", "source"), [(1, "vibrometer"), (1, "camera"), (-1, "camera")])
+def test_a_drive_takes_amplitude_and_sign_from_the_camera(program, tmp_path, polarity, source):
+    """A sensitivity set 8 % too low: the drive is the vibrometer's, or, if asked, as large as the camera sees it."""
+    freq, speed, gain = 100.0, 0.03, 1.08
+    size = speed / (2.0 * np.pi * freq)
+
+    def shaker(time):
+        since = np.maximum(time - 0.0503, 0.0)
+        return size * np.sin(2.0 * np.pi * freq * since) * (1.0 + 0.3 * np.exp(-since / 0.012))
+
+    time = np.arange(16_000) / 2e4
+    rng = np.random.default_rng(3)
+    noise = 1e-4 * rng.standard_normal(time.size)
+    signal = make_signal(np.gradient(shaker(time), time) + noise, "m/s", 2e4, name="velocity")
+    path = write_signal(tmp_path / "v.csv", signal)
+    frames = np.arange(3500) / 5e3
+    seen = polarity * gain * shaker(frames + 0.02) + 2e-7 * rng.standard_normal(frames.size)
+    tracked = xr.Dataset(
+        {"shaker_displacement_mm": ("time", 1e3 * seen, {"units": "mm"})},
+        {"time": ("time", frames, {"units": "s"})},
+    )
+    tracked.to_netcdf(tmp_path / "tracked.nc", engine="h5netcdf")
+    told = program("vibrometer", path, "--frequency", freq, "--camera", tmp_path / "tracked.nc", "--drive-output",
+                   tmp_path / "drive.nc", "--amplitude-from", source, "--json", tmp_path / "v.json")  # fmt: skip
+    assert told.exit_code == 0, told.output
+    report = json.loads((tmp_path / "v.json").read_text())["alignment"]
+    assert report["polarity"] == polarity
+    assert abs(report["gain"] - gain) < 5.0 * report["gain_se"] < 0.02
+    codes = [one["code"] for one in report["findings"]]
+    assert "alignment.amplitude" in codes and ("alignment.polarity" in codes) == (polarity < 0)
+    assert "--amplitude-from" in told.output.replace("\n", " ")
+    with xr.open_dataset(tmp_path / "drive.nc", engine="h5netcdf") as drive:
+        assert drive.attrs["amplitude_from"] == source
+        steady = drive["displacement"].values[drive["time"].values > 0.3]
+        expected = size * (gain if source == "camera" else 1.0)
+        assert 0.5 * np.ptp(steady) == pytest.approx(expected, rel=5e-3)
+        first = drive["displacement"].values[drive["time"].values < drive["time"].values[0] + 0.06]
+        rise = first - first[0]
+        assert np.sign(rise[np.argmax(np.abs(rise) > 0.5 * size)]) == polarity
+
+
+def test_the_camera_s_amplitude_needs_a_camera(program, tmp_path):
+    time = np.arange(8000) / 1e4
+    drive = np.where(time > 0.05, 0.03 * np.cos(2.0 * np.pi * 100.0 * (time - 0.05)), 0.0)
+    noisy = drive + 1e-4 * np.random.default_rng(0).standard_normal(8000)
+    path = write_signal(tmp_path / "v.csv", make_signal(noisy, "m/s", 1e4))
+    told = program("vibrometer", path, "--drive-output", tmp_path / "d.nc", "--amplitude-from", "camera")
+    assert told.exit_code == 2 and "--camera" in told.output
+    assert not (tmp_path / "d.nc").exists()
+
+
 def test_command_of_calibration(program, tmp_path):
     told = program("calibrate", "--straight", "80,221", "--lower-well", "81.3", "--upper-well", "80.5",
                    "-o", tmp_path / "beam.toml", "--json", tmp_path / "c.json")  # fmt: skip
@@ -207,5 +295,13 @@ def test_command_of_comparison(program, tmp_path, synthetic_map, synthetic_run):
     assert told.exit_code == 0, told.output
     report = json.loads((tmp_path / "r.json").read_text())
     assert report["rms_difference_b"] == 0.0
+    for option in ("", "--overlay"):
+        picture = tmp_path / f"runs{option}.png"
+        told = program(
+            "compare", tmp_path / "run.nc", tmp_path / "run.nc", "--plot", picture, *option.split()
+        )
+        assert told.exit_code == 0, told.output
+        assert picture.stat().st_size > 20_000
+    assert (tmp_path / "runs.png").read_bytes() != (tmp_path / "runs--overlay.png").read_bytes()
     assert "too short to tell" in report["reasons"][0] and report["measured_response"] == "unknown"
     assert program("compare", tmp_path / "t.csv", tmp_path / "t.csv").exit_code == 2

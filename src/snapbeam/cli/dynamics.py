@@ -336,5 +336,53 @@ def basins(
         lines.append(f"{number}: {repr(each).strip('<>')}, {share:.3g} % of the plane")
     lines.append(f"undecided: {100 * dataset.attrs['undecided']:.3g} %")
     entropy = basin_entropy(dataset["basin"].values, 5)
-    lines.append(f"basin entropy {entropy.basin:.3g}, at borders {entropy.boundary:.3g}")
+    lines.append(
+        f"basin entropy {entropy.basin:.3f} +- {entropy.basin_error:.1g}, at borders {entropy.boundary:.3f} +- "
+        f"{entropy.boundary_error:.1g}{': fractal' if entropy.is_fractal else ''}"
+    )
     _finish(dataset, output, plot, "basins", lines)
+
+
+@dynamics.command("edge")
+@door
+@with_parameters(*_ALL)
+def edge(
+    given: Any,
+    kick: Annotated[
+        float | None,
+        opt.number_option(
+            "Velocity of the first mode, over omega_1 times the well's amplitude, that makes the beam snap from its "
+            "start (doubled from 0.1 until it does).",
+            _OWN,
+        ),
+    ] = None,
+    periods: Annotated[int | None, opt.count_option("Periods to follow the border for (60).", _OWN)] = None,
+    horizon: Annotated[
+        int | None, opt.count_option("Periods after which snapping or not is told (40).", _OWN)
+    ] = None,
+    output: Output = Path("edge.nc"),
+    plot: opt.Plot = None,
+) -> None:
+    """The motion on the border between snapping and not, and the unstable orbit that it settles on.
+
+    Example: snapbeam dynamics edge --modes 1 --damping-ratio 0.05 --frequency-ratio 1.6 --velocity-amplitude 0.03
+    --plot edge.png
+    """
+    from snapbeam.dynamics.edge import edge_state, kicked
+    from snapbeam.dynamics.flow import Stroboscope
+
+    settings = configured(given)
+    _checked(output, plot)
+    ahead = 40 if horizon is None else horizon
+    how = settings.integration
+    flow = Stroboscope(
+        settings.system, how if given.get("run.accuracy") is not None else how.replace(accuracy="reference")
+    )
+    begun = time.monotonic()
+    found = edge_state(
+        flow, *kicked(flow, kick, ahead), periods=60 if periods is None else periods, horizon=ahead
+    )
+    lines = [f"{found!r}".strip("<>") + f", in {duration(time.monotonic() - begun)}"]
+    if found.orbit is None:
+        lines.append("it settles on no orbit within these periods: follow it for longer (--periods)")
+    _finish(found.to_dataset(), output, plot, "edge", lines)

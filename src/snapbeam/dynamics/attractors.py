@@ -49,6 +49,8 @@ class Attractor:
     exponent: float
     """Largest Lyapunov exponent, 1/s (per period of a map)."""
     exponent_error: float
+    certificate: Orbit | None = None
+    """The orbit at accuracy level "reference", whose multipliers say that it is stable."""
 
     @property
     def period(self) -> int:
@@ -158,8 +160,9 @@ def attractors(
     """The attractors that many states lead to, each certified or else left undecided.
 
     A periodic attractor is certified when shooting converges from where a state came to and every multiplier is inside
-    the unit circle.  A chaotic one, when its largest exponent is above 0 by three standard errors and none of its
-    states left it in *lasting* more periods: slow transients are so told from attractors as far as that time goes.
+    the unit circle, at accuracy level "reference" too.  A chaotic one, when its largest exponent is above 0 by three
+    standard errors and none of its states left it in *lasting* more periods: slow transients are so told from
+    attractors as far as that time goes.
 
     Parameters
     ----------
@@ -201,9 +204,10 @@ def attractors(
     assert seen.every is not None
     known = np.asarray(np.isfinite(seen.states).all(axis=1))
     repeats = np.where(known, least_period(np.where(known[:, None, None], seen.every, 0.0), _REPEATS), 0)
-    orbits = _orbits(flow, seen, repeats, allowed)
+    certified = _orbits(flow, seen, repeats, allowed)
+    orbits = [orbit for orbit, _ in certified]
     report(2)
-    regular = [_periodic(orbit) for orbit in orbits]
+    regular = [_periodic(orbit, certificate) for orbit, certificate in certified]
     labels = np.full(len(rows), UNDECIDED)
     for s in np.flatnonzero(repeats > 0):
         labels[s] = _nearest(orbits, seen.states[s])
@@ -229,9 +233,12 @@ def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
     return rows
 
 
-def _orbits(flow: Flow, seen: Marched, repeats: NDArray[np.int64], tolerance: float) -> list[Orbit]:
-    """The stable orbits that states which repeat are on, each once."""
+def _orbits(
+    flow: Flow, seen: Marched, repeats: NDArray[np.int64], tolerance: float
+) -> list[tuple[Orbit, Orbit]]:
+    """The stable orbits that states which repeat are on, each once and with its certificate."""
     found: list[Orbit] = []
+    certificates: list[Orbit] = []
     missed: list[_Array] = []
     for s in np.flatnonzero(repeats > 0):
         x = seen.states[s]
@@ -245,11 +252,25 @@ def _orbits(flow: Flow, seen: Marched, repeats: NDArray[np.int64], tolerance: fl
         if orbit.least_period != orbit.period:
             orbit = shoot(flow, orbit.coordinates, orbit.least_period, tolerance, 40)
         near = np.abs(orbit.points - x).max(axis=1).min() < 10.0 * _REPEATS
-        if not orbit.is_stable or not near:
+        certificate = _certificate(orbit, tolerance) if near and orbit.is_stable else None
+        if certificate is None:
             missed.append(x)
         elif not any(_is_same(orbit, other) for other in found):
             found.append(orbit)
-    return found
+            certificates.append(certificate)
+    return list(zip(found, certificates, strict=True))
+
+
+def _certificate(orbit: Orbit, tolerance: float) -> Orbit | None:
+    """The same orbit by fine steps, if it is there and stable: tangents of coarse ones are a per cent off."""
+    if not isinstance(orbit.flow, Stroboscope) or orbit.flow.integration.accuracy == "reference":
+        return orbit
+    try:
+        fine = shoot(orbit.flow.refined, orbit.coordinates, orbit.period, tolerance, 40)
+    except NoOrbit:
+        return None
+    near = float(np.abs(fine.coordinates - orbit.coordinates).max()) < 10.0 * _REPEATS
+    return fine if near and fine.is_stable else None
 
 
 def _is_same(one: Orbit, other: Orbit) -> bool:
@@ -266,11 +287,10 @@ def _nearest(orbits: list[Orbit], x: _Array) -> int:
     return UNDECIDED
 
 
-def _periodic(orbit: Orbit) -> Attractor:
-    size = max(float(np.abs(orbit.multipliers[0])), 1e-300)
-    return Attractor(
-        "periodic", orbit.points, orbit, float(np.log(size)) / (orbit.period * orbit.flow.period), 0.0
-    )
+def _periodic(orbit: Orbit, certificate: Orbit) -> Attractor:
+    size = max(float(np.abs(certificate.multipliers[0])), 1e-300)
+    exponent = float(np.log(size)) / (orbit.period * orbit.flow.period)
+    return Attractor("periodic", orbit.points, orbit, exponent, 0.0, certificate)
 
 
 def _chaotic(

@@ -20,7 +20,7 @@ from snapbeam.model.system import System
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["EdgeState", "edge_state"]
+__all__ = ["EdgeState", "edge_state", "kicked"]
 
 _Array = NDArray[np.float64]
 _PIECES = 16
@@ -45,6 +45,8 @@ class EdgeState:
 
         names = getattr(self.flow, "names", tuple(f"x[{i + 1}]" for i in range(self.flow.dimension)))
         labels = {"units": "1", "long_name": "state on the border once a period"}
+        settled = np.empty((0, self.flow.dimension)) if self.orbit is None else self.orbit.points
+        values = np.empty(0, dtype=complex) if self.orbit is None else self.orbit.multipliers
         return xr.Dataset(
             {
                 "state": (("period", "coordinate"), self.states, labels),
@@ -53,10 +55,25 @@ class EdgeState:
                     self.distance,
                     {"units": "1", "long_name": "distance of the two that hold it"},
                 ),
+                "orbit_state": (
+                    ("orbit_period", "coordinate"),
+                    settled,
+                    {"units": "1", "long_name": "unstable orbit that it settles on, once a period"},
+                ),
+                "multiplier_real": (
+                    "multiplier",
+                    values.real,
+                    {"units": "1", "long_name": "its multipliers"},
+                ),
+                "multiplier_imag": ("multiplier", values.imag, {"units": "1", "long_name": "imaginary part"}),
             },
             {"coordinate": list(names)},
             {"title": "edge state", "period": 0 if self.orbit is None else self.orbit.period},
         )
+
+    def __repr__(self) -> str:
+        end = "on no orbit" if self.orbit is None else f"on {self.orbit!r}".replace("<", "").replace(">", "")
+        return f"<EdgeState over {len(self.states)} periods, {end}>"
 
 
 def edge_state(
@@ -128,6 +145,26 @@ def edge_state(
             low, high = _bisect(flow, low, high, near, ahead, decide)
     path = np.array(states)
     return EdgeState(flow, path, np.array(distances), _settled(flow, path))
+
+
+def kicked(flow: Stroboscope, size: float | None, horizon: int) -> tuple[_Array, _Array]:
+    """The start of a system, and the same with a velocity of the first mode that makes it snap.
+
+    *size* is that velocity over omega_1 times the well's amplitude; without one it is doubled until the beam snaps.
+    """
+    quiet = flow.coordinates()[0]
+    towards = -np.sign(quiet[0]) or 1.0
+    sizes = [0.1 * 2.0**k for k in range(8)] if size is None else [positive("kick", size)]
+    rows = np.repeat(quiet[None], len(sizes) + 1, axis=0)
+    rows[1:, flow.modes] += towards * np.array(sizes)
+    told = _snaps(flow, rows, horizon)
+    if told[0]:
+        raise InputError(f"the start: it snaps within {horizon} periods by itself; take a weaker drive")
+    if not told.any():
+        raise InputError(
+            f"kick (--kick) = {sizes[-1]:g}: does not snap within {horizon} periods; take a harder one"
+        )
+    return quiet, rows[int(np.argmax(told))]
 
 
 def _row(flow: Flow, state: State | ArrayLike, name: str) -> _Array:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.parameters import lookup
 from snapbeam.core.codes import RunStatus
+from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.dynamics.starts import held_in_space
 from snapbeam.engines.answer import statistics_of
@@ -146,6 +147,25 @@ class Stroboscope:
         """Whether the law of contact has a force without a jump."""
         contact = self.system.contact
         return contact is None or self.system.striker is None or contact.keeps.smooth
+
+    @property
+    def refined(self) -> Stroboscope:
+        """The flow at accuracy level "reference"."""
+        return Stroboscope(self.system, self.integration.replace(accuracy="reference", step=None), self.phase)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is doubtful about derivatives of this flow."""
+        if not self.smooth or self.integration.accuracy == "reference":
+            return ()
+        return (
+            Finding(
+                "dynamics.coarse_tangent",
+                "accuracy = 'map': derivatives, and so multipliers and where a branch has its events, are off by up to "
+                "2 %, since the steps in contact are long; take accuracy = 'reference' (--accuracy reference)",
+                {"relative_error": 0.02},
+            ),
+        )
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -140,7 +140,7 @@ def _dataset(
     rate = growth / flow.period if points is None else growth / _periods(flow, points)[None, :, None]
     unit = "1/s" if isinstance(flow, Stroboscope) else "1"
     edges = np.linspace(0, total, _BLOCKS + 1).astype(int)
-    means = np.array([rate[a:b].mean(axis=0) for a, b in pairwise(edges)])
+    means = np.array([_sums(rate[a:b]) / (b - a) for a, b in pairwise(edges)])
     number = np.arange(total)[:, None]
     last = np.where(crossed.any(axis=0), total - np.argmax(crossed[::-1], axis=0), 0)
     snapping = np.where((number < last)[..., None], rate, np.nan)
@@ -152,12 +152,12 @@ def _dataset(
 
     def mean(values: _Array) -> _Array:
         known = np.isfinite(values).sum(axis=0)
-        sums = np.nansum(values, axis=0)
+        sums = _sums(np.where(np.isfinite(values), values, 0.0))
         return np.where(known > 0, sums / np.maximum(known, 1), np.nan)
 
     table = {
-        "exponent": (rate.mean(axis=0), "Lyapunov exponent"),
-        "exponent_error": (means.std(axis=0, ddof=1) / np.sqrt(_BLOCKS), "standard error of the exponent"),
+        "exponent": (_sums(rate) / total, "Lyapunov exponent"),
+        "exponent_error": (_error(means), "standard error of the exponent"),
         "exponent_snapping": (mean(snapping), "finite-time exponent while it snaps"),
         "exponent_settled": (mean(settled), "finite-time exponent once it snaps no more"),
     }
@@ -178,12 +178,24 @@ def _dataset(
     return dataset
 
 
+def _sums(values: _Array) -> _Array:
+    """Over the first axis, each run by itself: numpy's order of adding depends on the shape of the whole."""
+    return np.ascontiguousarray(np.moveaxis(values, 0, -1)).sum(axis=-1)
+
+
+def _error(means: _Array) -> _Array:
+    """Standard error of the mean of stretches, shape (stretches, ...)."""
+    off = means - _sums(means) / len(means)
+    return np.sqrt(_sums(off * off) / (len(means) * (len(means) - 1)))
+
+
 def _periods(flow: Flow, points: Points) -> _Array:
     """Seconds of a period of the drive at each point."""
-    if not isinstance(flow, Stroboscope) or "drive.frequency_ratio" not in points.names:
+    name = "drive.frequency_ratio"
+    if not isinstance(flow, Stroboscope) or name not in points.names:
         return np.full(points.size, flow.period)
-    ratio = points.take(np.arange(points.size))["drive.frequency_ratio"]
-    return np.asarray(flow.period * flow.value("drive.frequency_ratio") / ratio)
+    ratios, which = np.unique(points.take(np.arange(points.size))[name], return_inverse=True)
+    return np.array([flow.neighbour(name, float(ratio)).period for ratio in ratios])[which]
 
 
 def separation_exponent(
@@ -230,14 +242,12 @@ def separation_exponent(
             along = np.where((away > 0.0)[:, None], apart / away[:, None], along)
     rate = growth / flow.period
     edges = np.linspace(0, total, _BLOCKS + 1).astype(int)
-    means = np.array([rate[a:b].mean(axis=0) for a, b in pairwise(edges)])
+    means = np.array([_sums(rate[a:b]) / (b - a) for a, b in pairwise(edges)])
     unit = "1/s" if isinstance(flow, Stroboscope) else "1"
     return xr.Dataset(
         {
-            "exponent": ("run", rate.mean(axis=0), {"units": unit, "long_name": "largest Lyapunov exponent"}),
-            "exponent_error": (
-                "run", means.std(axis=0, ddof=1) / np.sqrt(_BLOCKS), {"units": unit, "long_name": "standard error"}
-            ),
+            "exponent": ("run", _sums(rate) / total, {"units": unit, "long_name": "largest Lyapunov exponent"}),
+            "exponent_error": ("run", _error(means), {"units": unit, "long_name": "standard error"}),
         },
         attrs={"title": "largest Lyapunov exponent from two trajectories", "periods": total, "period": flow.period},
     )  # fmt: skip

@@ -20,6 +20,7 @@ __all__ = [
 ]
 
 _Array = NDArray[np.float64]
+_SIGMAS = 3.0
 
 
 class BasinEntropy(NamedTuple):
@@ -31,11 +32,15 @@ class BasinEntropy(NamedTuple):
     """Mean over the boxes that hold more than one label, S_bb; NaN where none does."""
     boxes: int
     boundary_boxes: int
+    basin_error: float
+    """Standard error of S_b from counting, as if boxes were independent; moving or refining the grid moves it too."""
+    boundary_error: float
+    """The same of S_bb; NaN with fewer than two boxes."""
 
     @property
     def is_fractal(self) -> bool:
-        """Whether S_bb > ln 2: enough, and not needed, for a fractal border."""
-        return bool(self.boundary > np.log(2.0))
+        """Whether S_bb > ln 2 by three standard errors: enough, and not needed, for a fractal border."""
+        return bool(self.boundary - _SIGMAS * self.boundary_error > np.log(2.0))
 
 
 def _labels(labels: ArrayLike) -> NDArray[np.int64]:
@@ -72,8 +77,15 @@ def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
         kinds += share > 0.0
         entropy -= np.where(share > 0.0, share * np.log(np.where(share > 0.0, share, 1.0)), 0.0)
     mixed = kinds > 1
-    boundary = float(entropy[mixed].mean()) if mixed.any() else float("nan")
-    return BasinEntropy(float(entropy.mean()), boundary, len(boxes), int(mixed.sum()))
+    (basin, basin_error), (boundary, boundary_error) = _mean(entropy), _mean(entropy[mixed])
+    return BasinEntropy(basin, boundary, len(boxes), int(mixed.sum()), basin_error, boundary_error)
+
+
+def _mean(values: _Array) -> tuple[float, float]:
+    """Mean and its standard error; NaN where there is none."""
+    if values.size < 2:
+        return (float(values[0]) if values.size else float("nan")), float("nan")
+    return float(values.mean()), float(values.std(ddof=1) / np.sqrt(values.size))
 
 
 class UncertaintyExponent(NamedTuple):

@@ -19,7 +19,15 @@ from snapbeam.figures.style import fix_ticks, house_style, new_figure
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["plot_basins", "plot_diagram", "plot_exponents", "plot_lifetimes", "plot_section", "plot_survival"]
+__all__ = [
+    "plot_basins",
+    "plot_diagram",
+    "plot_edge",
+    "plot_exponents",
+    "plot_lifetimes",
+    "plot_section",
+    "plot_survival",
+]
 
 _UP, _DOWN, _LINE = "#16245E", "#B03A27", "#000000"
 _STARTS = "#8A8A8A"
@@ -330,6 +338,38 @@ def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
         figure = ax.get_figure(root=True)
         assert figure is not None
         figure.legend(handles=handles, loc="outside lower center", ncols=3)
+        fix_ticks(ax)
+    return ax
+
+
+def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw an edge state: the first coordinate once a period, and the unstable orbit that it settles on."""
+    if "orbit_state" not in dataset or "state" not in dataset:
+        raise InputError(f"no edge state among {list(map(str, dataset.variables))}")
+    name = str(dataset["coordinate"].values[0])
+    values = dataset["state"].values[:, 0]
+    with house_style():
+        ax = _axes(ax)
+        for at, words in ((-1.0, "well"), (0.0, "straight")):
+            if name == "amplitude[1]" and values.min() - 0.3 < at < values.max() + 0.3:
+                ax.axhline(at, color="0.75", linewidth=0.5, zorder=0)
+                ax.annotate(
+                    words, (1.0, at), (2.0, 0.0), xycoords=("axes fraction", "data"), textcoords="offset points",
+                    va="center", fontsize=6, color="0.4",
+                )  # fmt: skip
+        period = np.arange(1, values.size + 1)
+        ax.plot(
+            period, values, ".-", color=_UP, linewidth=0.7, markersize=3.5, label="between the two outcomes"
+        )
+        points = dataset["orbit_state"].values[:, 0]
+        out = int((np.hypot(dataset["multiplier_real"], dataset["multiplier_imag"]) > 1.0).sum())
+        for i, point in enumerate(points):
+            words = f"orbit of period {points.size}, {out} multiplier{'s' if out != 1 else ''} outside"
+            ax.axhline(point, color=_DOWN, linewidth=0.9, dashes=(4, 2), label=words if i == 0 else None)
+        figure = ax.get_figure(root=True)
+        assert figure is not None
+        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=1)
+        ax.set(xlabel="Period of the drive", ylabel=_coordinate(name))
         fix_ticks(ax)
     return ax
 

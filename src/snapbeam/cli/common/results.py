@@ -103,5 +103,6 @@ def draw_dynamics(dataset: xr.Dataset, path: Path, picture: str) -> Path:
     plots: dict[str, Any] = {
         "lifetimes": figures.plot_lifetimes, "survival": figures.plot_survival, "diagram": figures.plot_diagram,
         "exponents": figures.plot_exponents, "section": figures.plot_section, "basins": figures.plot_basins,
+        "edge": figures.plot_edge,
     }  # fmt: skip
     return _save(plots[picture](dataset), path)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import to_json
 from snapbeam.dynamics.flow import Stroboscope
 from snapbeam.dynamics.orbits.orbit import Orbit
 
@@ -123,7 +124,13 @@ class Branch:
                 "coordinate": list(names),
                 short: ("orbit", self.values, {"units": unit, "long_name": words, "parameter": self.name}),
             },
-            {"title": "branch of periodic orbits", "along": short, "period": first.period, "end": self.end},
+            {
+                "title": "branch of periodic orbits",
+                "along": short,
+                "period": first.period,
+                "end": self.end,
+                "findings": to_json(first.findings),
+            },
         )
         if isinstance(first.flow, Stroboscope):
             dataset[self._center_name] = (

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.findings import tell
 from snapbeam.core.validate import InputError, InputTypeError, choice, integer, positive
 from snapbeam.dynamics.flow import Flow, Stroboscope
 from snapbeam.dynamics.orbits.branch import Branch, Event
@@ -168,6 +169,7 @@ def continue_orbit(
     choice("direction", direction, ("up", "down"))
     count = integer("most", most, 2, 10**6)
     length, longest = positive("step", step), positive("longest", longest)
+    tell(orbit.findings)
     corrector = Corrector(
         Family(orbit.flow, name), orbit.period, high - low, positive("tolerance", tolerance)
     )

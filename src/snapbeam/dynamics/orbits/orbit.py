@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.core.findings import Finding, tell, to_json
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive
 from snapbeam.dynamics.flow import Flow, Stroboscope, flow_of
 from snapbeam.dynamics.orbits.passage import Passage, passage_of
@@ -103,6 +104,11 @@ class Orbit:
         return passage_of(self._stroboscope, self.coordinates, self.period)
 
     @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What is doubtful about the multipliers."""
+        return getattr(self.flow, "findings", ())
+
+    @property
     def _stroboscope(self) -> Stroboscope:
         if not isinstance(self.flow, Stroboscope):
             raise InputTypeError("orbit: is of a flow that is no System")
@@ -133,7 +139,12 @@ class Orbit:
                 ),
             },
             {"coordinate": list(names)},
-            {"period": self.period, "residual": self.residual, "stable": int(self.is_stable)},
+            {
+                "period": self.period,
+                "residual": self.residual,
+                "stable": int(self.is_stable),
+                "findings": to_json(self.findings),
+            },
         )
 
     def __repr__(self) -> str:
@@ -167,7 +178,8 @@ def periodic_orbit(
     period : int
         Periods of the drive after which it closes, m.
     integration : Integration, optional
-        ``accuracy="reference"`` by default: a derivative is no better than the steps it is taken of.
+        ``accuracy="reference"`` by default: a derivative is no better than the steps it is taken of.  At level
+        ``"map"`` it is off by up to 2 %, which is warned of.
     phase : float, optional
         Of the drive at which the orbit is seen, rad; where no contact begins, ends or lasts no time.
     transient : int
@@ -205,6 +217,7 @@ def periodic_orbit(
         x = flow.march(x[None], before).states[0]
         if not np.isfinite(x).all():
             raise NoOrbit("the run from the guess failed; see its status with sb.advance")
+    tell(getattr(flow, "findings", ()))
     known = tuple(point for orbit in deflate for point in orbit.points)
     return shoot(flow, x, periods, allowed, integer("iterations", iterations, 1, 10_000), deflate=known)
 

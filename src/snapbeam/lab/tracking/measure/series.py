@@ -24,6 +24,9 @@ __all__ = [
 ]
 
 _WIDER = 1.6  # times the width that is explained
+_FAR = 5.0  # standard deviations of the thickness that are no chance
+_STRETCH = 32  # frames that faint light must last to be told
+_FAINT = 0.04  # px by which the thickness must then be off on average
 _JUMP = 3.0  # px
 _LONGEST = 3  # frames of a jump
 _STEADY = 0.005  # px; noise less than this is not asked of a rest
@@ -155,8 +158,9 @@ def distortion(
 ) -> tuple[Floats, NDArray[np.bool_]]:
     """By how much the beam looks thicker or thinner than usual [px], and which frames are distorted.
 
-    A frame is distorted if that exceeds five robust standard deviations and 0.06 px, or if its edges are no
-    steps: fits that leave three times as much as usual without being blurred.
+    A frame is distorted if that exceeds five robust standard deviations and 0.06 px, if the mean over 32 frames about
+    it is as far off (faint light that lasts), or if its edges are no steps: fits that leave three times as much as
+    usual without being blurred.
     """
     known = np.isfinite(thickness)
     miss = np.zeros(thickness.shape)
@@ -165,13 +169,28 @@ def distortion(
         usual = float(np.median(thickness[known]))
         spread = 1.4826 * float(np.median(np.abs(thickness[known] - usual)))
         miss[known] = np.abs(thickness[known] - usual)
-        odd = miss > max(5.0 * spread, 0.06)
+        odd = miss > max(_FAR * spread, 0.06)
+        faint = _lasting(thickness[known] - usual, spread)
+        miss[known] = np.maximum(miss[known], faint)
+        odd[known] |= faint > 0.0
     sound = np.isfinite(residual)
     if sound.any():
         with np.errstate(invalid="ignore"):
             rough = residual > 3.0 * float(np.median(residual[sound])) + 0.03
             odd |= rough & ~(width > 1.5 * usual_width + 0.3)
     return miss, odd
+
+
+def _lasting(miss: Floats, spread: float) -> Floats:
+    """How far off the thickness is on average over any stretch that a frame is in, where that is no chance; else 0."""
+    out = np.zeros(miss.size)
+    if miss.size < 4 * _STRETCH:
+        return out
+    mean = np.convolve(miss, np.full(_STRETCH, 1.0 / _STRETCH), "valid")
+    for first in np.flatnonzero(np.abs(mean) > max(_FAR * spread / math.sqrt(_STRETCH), _FAINT)):
+        inside = slice(int(first), int(first) + _STRETCH)
+        out[inside] = np.maximum(out[inside], abs(mean[first]))
+    return out
 
 
 def pooled(error: Floats) -> Floats:
