@@ -58,7 +58,7 @@ class Reading:
         """
         book, status = self.book, self.book["status"]
         done = (status == RunStatus.OK) | (status == RunStatus.DECIDED)
-        made = book["energy"] - book["first_energy"] - book["work"]
+        made = book["energy"] - book["first_energy"] - book["work"] - book["base_work"] - book["load_work"]
         allowed = _MADE * book["gross_work"]
         allowed = allowed + _ROUNDED * (np.abs(book["energy"]) + np.abs(book["first_energy"]))
         return np.where(done & (made > allowed), RunStatus.UNBALANCED, status)
