@@ -1,7 +1,7 @@
 """An independent solution of what surrounds a beam: a base that moves, a load that changes, a circuit, a stop.
 
-The paper's coordinates, the circuit as an equation of its own, work and delivered energy as integrals of theirs; DOP853 of
-SciPy, contacts as events.  Nothing is taken from the package.
+The paper's coordinates, the circuit as an equation of its own, work and delivered energy as integrals of theirs; DOP853
+of SciPy, contacts as events.  Nothing is taken from the package.
 """
 
 from __future__ import annotations

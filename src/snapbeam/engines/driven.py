@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.scalar.tip import tip_motion
 from snapbeam.model.drive import Drive, Sine
 from snapbeam.model.drive.joined import HORIZON, joined
@@ -122,19 +123,22 @@ def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
     return found
 
 
-def motions_of(system: System, times: _Array) -> dict[str, tuple[_Array, _Array]]:
+def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, tuple[_Array, _Array]]:
     """Displacement (m) and velocity (m/s) of the base in space, and change (N) and rate of the load, at instants.
 
-    Of a run that begins where the drives do.
+    *ensemble* is that of the one run, which may begin in the middle of its drives.
     """
     found = {}
+    begun, alone = float(ensemble.runs["phase"][0]), getattr(ensemble.drive, "alone", True)
+    if not alone:
+        times = times + begun / float(ensemble.drive_numbers[0, ensemble.drive.number_names.index("omega")])
     for section, drive in system.moving:
         if section == "drive":
             continue
         own = {name: np.array([value]) for name, value in drive.values().items()}
         numbers, kind = drive.numbers(own, system.scale), drive.marched_as or type(drive)
         table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
-        arguments = numbers["omega"][0] * times + float(getattr(drive, "phase", 0.0))
+        arguments = numbers["omega"][0] * times + (begun if alone else float(getattr(drive, "phase", 0.0)))
         pairs = np.array([tip_motion(table, np.empty(0), at) for at in arguments.tolist()]).reshape(-1, 2)
         sign = (
             -1.0 if section == "base" and system.base is not None and system.base.direction == "down" else 1.0

@@ -7,6 +7,7 @@ import hashlib
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -239,7 +240,7 @@ def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
     count = structure.omega.size + 1
     tension = np.zeros((count, count))
     tension[:-1, :-1] = structure.coupling
-    longer = {name: np.append(getattr(structure, name), 0.0) for name in _ROWS}
+    longer: dict[str, Any] = {name: np.append(getattr(structure, name), 0.0) for name in _ROWS}
     return dataclasses.replace(
         structure,
         **longer,

@@ -58,8 +58,8 @@ def run_dataset(
     alpha, rate = structure.amplitudes(recorded.q), structure.velocities(recorded.p)
     own = np.zeros(recorded.q.shape[0])
     if structure.body_mass is not None:
-        at = model.modes
-        own = 0.5 * (recorded.p[:, at] ** 2 + (structure.omega[at] * recorded.q[:, at]) ** 2)
+        body = model.modes
+        own = 0.5 * (recorded.p[:, body] ** 2 + (structure.omega[body] * recorded.q[:, body]) ** 2)
         values[:, 2] -= own
     if structure.circuit:
         values[:, 2] -= 0.5 * recorded.p[:, -1] ** 2
@@ -88,7 +88,7 @@ def run_dataset(
     if structure.body_mass is not None:
         variables["energy_striker"] = own
     variables["energy_dissipated"] = values[:, 5]
-    variables |= _around(system, recorded, values)
+    variables |= _around(ensemble, system, recorded, values)
     if ensemble.tapped is not None:
         variables |= _harvested(ensemble, ensemble.tapped, recorded, values)
     if struck and system.contact is not None and system.contact.loses:
@@ -130,12 +130,12 @@ def _harvested(ensemble: Ensemble, tapped: Tapped, recorded: Recorded, values: _
     return found
 
 
-def _around(system: System, recorded: Recorded, values: _Array) -> dict[str, _Array]:
+def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Array) -> dict[str, _Array]:
     """What a run says of a moving base and of a changing axial load."""
     found: dict[str, _Array] = {}
     if system.base is None and system.axial is None:
         return found
-    motions = motions_of(system, recorded.times)
+    motions = motions_of(ensemble, system, recorded.times)
     if system.base is not None:
         found["base_displacement"] = motions["base"][0] / system.scale.length
         found["base_velocity"] = motions["base"][1] / (system.scale.length * system.scale.omega)

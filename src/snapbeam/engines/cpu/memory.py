@@ -127,8 +127,8 @@ def pack(structure: Structure, high_omega: float = np.inf, forced: bool = False)
     if forced:
         forces = Forced(placed.pop("shaken"), placed.pop("now"), kick)
     if structure.tapped is not None:
-        own = int(rows[-1]) if structure.circuit else None
-        circuit = Circuit(placed.pop("tapped"), placed.pop("rate"), kick, own)
+        element = int(rows[-1]) if structure.circuit else None
+        circuit = Circuit(placed.pop("tapped"), placed.pop("rate"), kick, element)
     if away is not None:
         own = placed.pop("far"), placed.pop("second"), placed.pop("here")
         uneven = Uneven(*own, away.lift, away.depth, away.level)

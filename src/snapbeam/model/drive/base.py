@@ -87,10 +87,10 @@ class Drive:
         """As the first of :meth:`bounds`, of the mirror image of the motion; the same unless it is lopsided."""
         return self.bounds(columns, scale)[0]
 
-    @property
-    def shakes(self) -> bool:
+    @classmethod
+    def shakes(cls) -> bool:
         """Whether a base may move so: its acceleration has a known bound."""
-        return type(self).hardest is not Drive.hardest
+        return cls.hardest is not Drive.hardest
 
     def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Greatest acceleration (m/s^2) ever, shape (runs,): of a motion that a base may have."""

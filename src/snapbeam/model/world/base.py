@@ -62,8 +62,8 @@ class Base:
                 f"motion = {shown(self.motion)}: must be a drive, such as AccelerationSine(frequency_ratio=1.2, ...)"
             )
         check_fields(self)
-        if not self.motion.shakes:
-            known = ", ".join(repr(name) for name, kind in _shaking().items() if kind.shakes)
+        if not self.motion.shakes():
+            known = ", ".join(repr(name) for name, kind in _shaking().items() if kind.shakes())
             raise InputError(
                 f"motion = {self.motion.name!r}: a base needs a motion with a known bound on its acceleration; must be "
                 f"one of {known}"

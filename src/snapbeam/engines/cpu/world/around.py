@@ -39,8 +39,8 @@ def around_kick(
     """Work given in the step with a kick that is about to be made, and what the circuit then has done.
 
     *along* is what the tension pulls along g and r with, and the contact force; *given* is the work so far and the tap
-    so far.  The circuit's impulse is given to p here, the kick itself is left to the caller; of the first kick of a step
-    p1 then holds p with that impulse.
+    so far.  The circuit's impulse is given to p here, the kick itself is left to the caller; of the first kick of a
+    step p1 then holds p with that impulse.
     """
     raise TypeError("around_kick runs in compiled code only")
 
