@@ -25,7 +25,7 @@ SECTIONS = (
     "beam", "model", "ends", "imperfection", "contact", "striker", "drive", "base", "axial", "harvester", "start",
     "axes", "run",
 )  # fmt: skip
-_KINDS = {
+_KINDS: dict[str, Mapping[str, type]] = {
     "drive": DRIVES,
     "base": {name: kind for name, kind in DRIVES.items() if kind.shakes()},
     "axial": LOADS,

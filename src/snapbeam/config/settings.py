@@ -144,8 +144,8 @@ class Config:
         sections: dict[str, Any] = {
             name: values | self.section(name) for name, values in self._defaults().items()
         }
-        own = ("ends", "imperfection", *_AROUND)
-        sections |= {name: self.section(name) for name in own if self.section(name)}
+        optional = ("ends", "imperfection", *_AROUND)
+        sections |= {name: self.section(name) for name in optional if self.section(name)}
         if self._is_unstruck:
             for name in _STRIKING:
                 del sections[name]
