@@ -22,6 +22,9 @@ _SECTIONS = {
     "striker": "The striker's tip. `location_m` (m) may stand for `location`.",
     "drive": "How the tip moves, by `kind`: `sine`, or, from Python, `recorded`. `frequency_hz` (Hz) and "
     "`velocity_m_s` (m/s) may stand for the ratios.",
+    "base": "The motion of what both ends are mounted on, by `kind`; a section that is left out is a base at rest.",
+    "axial": "How the axial load changes, by `kind`: `sine` or `ramp`; a section that is left out is a constant load.",
+    "harvester": "A circuit that taps the beam, by `kind`: `piezo` or `coil`.",
     "run": "How runs are integrated.",
 }
 

@@ -82,6 +82,7 @@ if TYPE_CHECKING:
     from snapbeam.model.state import State
     from snapbeam.model.striker import RecordedDrive, Shaker, Striker
     from snapbeam.model.system import System
+    from snapbeam.model.world import AxialLoad, Base, Coil, LoadRamp, LoadSine, Piezo
     from snapbeam.runs.advance import advance
     from snapbeam.runs.outcome import Outcome
     from snapbeam.runs.run import Run
@@ -106,11 +107,14 @@ __all__ = [
     "Allocation",
     "Attractor",
     "Attractors",
+    "AxialLoad",
+    "Base",
     "Beam",
     "Between",
     "Branch",
     "Burst",
     "Chirp",
+    "Coil",
     "ContactLaw",
     "Cost",
     "DisplacementSine",
@@ -134,6 +138,8 @@ __all__ = [
     "KelvinVoigt",
     "LifetimeOf",
     "Limit",
+    "LoadRamp",
+    "LoadSine",
     "LogNormal",
     "NoOrbit",
     "Noise",
@@ -141,6 +147,7 @@ __all__ = [
     "NotchOf",
     "Orbit",
     "Outcome",
+    "Piezo",
     "PlausibilityWarning",
     "Posterior",
     "PowerLaw",
@@ -272,6 +279,7 @@ _NAMES = {
     "model.state": "State",
     "model.striker": "RecordedDrive Shaker Striker",
     "model.system": "System",
+    "model.world": "AxialLoad Base Coil LoadRamp LoadSine Piezo",
     "runs.advance": "advance",
     "runs.outcome": "Outcome",
     "runs.run": "Run",

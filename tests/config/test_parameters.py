@@ -17,6 +17,7 @@ from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
 from snapbeam.model.galerkin.reduction import MODEL_QUANTITIES
 from snapbeam.model.quantity import RUN, STRUCTURE, quantities
+from snapbeam.model.world import HARVESTERS, LOADS
 
 TABLE = parameters()
 CLASSES = {
@@ -27,6 +28,9 @@ CLASSES = {
     "run": [sb.Integration],
     "contact": list(LAWS.values()),
     "drive": list(DRIVES.values()),
+    "base": [sb.Base, *(kind for kind in DRIVES.values() if kind.shakes())],
+    "axial": list(LOADS.values()),
+    "harvester": list(HARVESTERS.values()),
 }
 
 
@@ -36,8 +40,12 @@ def test_every_quantity_of_every_class_is_in_it(section: str) -> None:
     assert found == {f"{section}.{name}" for kind in CLASSES[section] for name in quantities(kind)}
     for kind in CLASSES[section]:
         for name, item in quantities(kind).items():
-            assert TABLE[f"{section}.{name}"].quantity == item
-            if section in ("contact", "drive"):
+            own = TABLE[f"{section}.{name}"].quantity
+            if section == "base" and kind is not sb.Base:
+                assert own.words == f"{item.words}, of the base"
+                own = dataclasses.replace(own, words=item.words)
+            assert own == item
+            if section in ("contact", "drive", "axial", "harvester"):
                 assert kind.name in TABLE[f"{section}.{name}"].kinds
 
 
@@ -46,7 +54,7 @@ def test_every_field_of_every_class_is_a_quantity(section: str) -> None:
     """What a person can give to a class is in the table; but for the one of two that the other follows from."""
     for kind in CLASSES[section]:
         fields = {item.name for item in dataclasses.fields(kind) if item.init}
-        parts = {sb.Striker: {"drive"}, sb.Beam: {"ends"}}.get(kind, set())
+        parts = {sb.Striker: {"drive"}, sb.Beam: {"ends"}, sb.Base: {"motion"}}.get(kind, set())
         assert fields - parts == set(quantities(kind)), kind
 
 
@@ -181,6 +189,15 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
         "displacement_sine": sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=0.1),
         "acceleration_sine": sb.AccelerationSine(frequency_ratio=1.0, acceleration_amplitude=0.1),
     }
+    loads = {
+        "ramp": sb.LoadRamp(change=1.0, duration=1.0),
+        "sine": sb.LoadSine(frequency_ratio=2.0, amplitude=1.0),
+    }
+    around = {
+        "base": lambda kind: sb.Base(motion=drives.get(kind, sb.Sine(**pair))),
+        "axial": lambda kind: sb.AxialLoad(motion=loads[kind]),
+        "harvester": lambda kind: sb.Piezo(coupling=1e-3, capacitance=1e-8, resistance=1e4),
+    }
     for name, row in TABLE.items():
         if not row.is_run:
             continue
@@ -191,6 +208,7 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
             sb.ReducedModel.from_beam(paper.BEAM, modes=1),
             laws.get(kind, paper.CONTACT),
             sb.Striker(drive=drives.get(kind, sb.Sine(**pair))),
+            **({row.section: around[row.section](kind)} if row.section in around else {}),
         )
         columns = run_columns(system, {name: np.array([0.1, 0.2, 0.3])})
         assert columns[name].tolist() == [0.1, 0.2, 0.3]

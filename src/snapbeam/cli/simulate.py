@@ -145,9 +145,9 @@ def _even(system: Any, integration: Any, samples: int | None) -> Any:
     from snapbeam.runs.request import cycle_of
 
     integer("samples", samples, 1, 100_000)
-    drive = system.striker.drive
+    drive = system.leads[1]
     cycles = integration.cycles_or_default
-    if not drive.harmonic and integration.cycles is None:
+    if integration.cycles is None and hasattr(drive, "frequency"):
         cycles = int(round(drive.duration * drive.frequency, 9))
     return np.linspace(0.0, cycles * cycle_of(system), cycles * samples + 1)
 

@@ -17,10 +17,21 @@ from snapbeam.core.validate import InputError, finite, mapping, shown
 from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
 from snapbeam.model.paper_values import BEAM
+from snapbeam.model.world import HARVESTERS, LOADS
 
 __all__ = ["SECTIONS", "checked_sections", "contradictions", "parsed_axis", "with_section"]
 
-SECTIONS = ("beam", "model", "ends", "imperfection", "contact", "striker", "drive", "start", "axes", "run")
+SECTIONS = (
+    "beam", "model", "ends", "imperfection", "contact", "striker", "drive", "base", "axial", "harvester", "start",
+    "axes", "run",
+)  # fmt: skip
+_KINDS: dict[str, Mapping[str, type]] = {
+    "drive": DRIVES,
+    "base": {name: kind for name, kind in DRIVES.items() if kind.shakes()},
+    "axial": LOADS,
+    "harvester": HARVESTERS,
+}
+"""What a section may be of, where its ``kind`` says so."""
 _OF_MAP = {"frequency_ratio": "drive", "velocity_amplitude": "drive", "location": "striker"}
 """Names that a section [map] of version 0.1 may hold, and the sections they belong to."""
 _SYMBOLS = {
@@ -87,7 +98,8 @@ def _known(section: str, found: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Names that a section may hold."""
     names = [row.name.partition(".")[2] for row in parameters().values() if row.section == section]
     names += [name.partition(".")[2] for name in PHYSICAL if name.startswith(f"{section}.")]
-    return names + {"contact": ["law", *MATERIALS, *WANTED], "drive": ["kind"]}.get(section, [])
+    names += ["kind"] if section in _KINDS else []
+    return names + (["law", *MATERIALS, *WANTED] if section == "contact" else [])
 
 
 def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any]]) -> str:
@@ -159,7 +171,7 @@ def _array(name: str, value: Any) -> tuple[str, Any]:
 def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
     """What is in no row: the law, the drive's kind, materials, and physical units."""
     if name in ("law", "kind"):
-        known = LAWS if name == "law" else DRIVES
+        known = LAWS if name == "law" else _KINDS[section]
         if value not in known:
             return f"{name} = {value!r}: must be one of {', '.join(map(repr, known))}", None
         return "", value

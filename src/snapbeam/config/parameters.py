@@ -25,6 +25,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN, Quantity, quantities
 from snapbeam.model.start import START_NAME
 from snapbeam.model.striker import Striker
+from snapbeam.model.world import HARVESTERS, LOADS, Base
 
 __all__ = ["Parameter", "lookup", "parameters", "short_names"]
 
@@ -104,13 +105,39 @@ def _rows() -> Iterable[Parameter]:
     )
     for section, part in own:
         yield from _of_class(section, part)
+    for row in _of_class("base", Base):
+        yield dataclasses.replace(row, short=f"base_{row.short}")
     for name, (item, default) in MODEL_QUANTITIES.items():
         yield Parameter(f"model.{name}", item.short or name, item, default)
-    several: tuple[tuple[str, Mapping[str, type]], ...] = (("contact", LAWS), ("drive", DRIVES))
+    shaking = {name: kind for name, kind in DRIVES.items() if kind.shakes()}
+    several: tuple[tuple[str, Mapping[str, type]], ...] = (
+        ("contact", LAWS),
+        ("drive", DRIVES),
+        ("base", shaking),
+        ("axial", LOADS),
+        ("harvester", HARVESTERS),
+    )
     for section, known in several:
         for kind_name, kind in known.items():
             for row in _of_class(section, kind):
+                row = _around(row) if section in _AROUND else row
                 yield dataclasses.replace(row, kinds=(kind_name,))
+
+
+_AROUND = {"base": "the base", "axial": "", "harvester": ""}
+"""Sections of what surrounds a beam, whose names in datasets say so, and what words of a drive are said of."""
+
+
+def _around(row: Parameter) -> Parameter:
+    """A parameter of what surrounds the beam, told from the striker's of the same name."""
+    section, _, name = row.name.partition(".")
+    of = _AROUND[section]
+    words = f"{row.quantity.words}, of {of}" if of else row.quantity.words
+    plain = name if row.short == name or section == "base" else row.short
+    plain = plain.removeprefix("load_")
+    return dataclasses.replace(
+        row, short=f"{section}_{plain}", quantity=dataclasses.replace(row.quantity, words=words)
+    )
 
 
 def _of_class(section: str, kind: type) -> Iterable[Parameter]:
@@ -127,7 +154,10 @@ def parameters() -> dict[str, Parameter]:
         if row.name in table:
             row = dataclasses.replace(row, kinds=(*table[row.name].kinds, *row.kinds))
         table[row.name] = row
-    order = ("beam", "model", "ends", "imperfection", "contact", "striker", "drive", "start", "run")
+    order = (
+        "beam", "model", "ends", "imperfection", "contact", "striker", "drive", "base", "axial", "harvester", "start",
+        "run",
+    )  # fmt: skip
     return dict(sorted(table.items(), key=lambda item: order.index(item[1].section)))
 
 
@@ -164,7 +194,7 @@ def lookup(name: str) -> Parameter:
     if name in shorts:
         return table[shorts[name]]
     tails: dict[str, list[str]] = {}
-    for full in table:
+    for full in (each for each in table if each.partition(".")[0] not in _AROUND):
         tails.setdefault(full.partition(".")[2], []).append(full)
     if len(tails.get(name, [])) == 1:
         return table[tails[name][0]]

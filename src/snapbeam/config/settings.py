@@ -30,6 +30,7 @@ Sections = Mapping[str, Mapping[str, Any]]
 DEFAULT_DRIVE = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18}
 DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude": "0.01:0.65:40"}
 """Of a map for which no axis is named."""
+_AROUND, _STRIKING = ("base", "axial", "harvester"), ("contact", "striker", "drive")
 # What stands for the same thing in a section: giving one set takes the other away.
 _RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
     "beam": [({"buckling_level"}, {"axial_load"})],
@@ -143,8 +144,15 @@ class Config:
         sections: dict[str, Any] = {
             name: values | self.section(name) for name, values in self._defaults().items()
         }
-        sections |= {name: self.section(name) for name in ("ends", "imperfection") if self.section(name)}
+        optional = ("ends", "imperfection", *_AROUND)
+        sections |= {name: self.section(name) for name in optional if self.section(name)}
+        if self._is_unstruck:
+            for name in _STRIKING:
+                del sections[name]
+            return self._started(System.from_mapping(sections))
         sections["contact"] = contact_of(sections["contact"])
+        if self._stands_still:
+            sections["drive"] = {"kind": "still"}
         sections["drive"].setdefault("kind", "sine")
         later = {
             f"{section}.{name}": sections[section].pop(name)
@@ -160,6 +168,21 @@ class Config:
                 PHYSICAL[name].parameter: checked_physical(system, name, value, name.partition(".")[2])
                 for name, value in later.items()
             })  # fmt: skip
+        return self._started(system)
+
+    @property
+    def _is_unstruck(self) -> bool:
+        """Whether a base or an axial load moves the beam, and nothing was said of a striker."""
+        moved = self.section("base") or self.section("axial")
+        return bool(moved) and not any(self.section(name) for name in _STRIKING)
+
+    @property
+    def _stands_still(self) -> bool:
+        """Whether there is a striker beside a base or an axial load, of whose motion nothing was said."""
+        return bool(self.section("base") or self.section("axial")) and not self.section("drive")
+
+    def _started(self, system: System) -> System:
+        """The system with the start that was given."""
         start = self.section("start")
         return (
             system.replace(**{f"start.{name}": value for name, value in start.items()}) if start else system

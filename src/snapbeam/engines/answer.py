@@ -59,7 +59,8 @@ class Reading:
         book, status = self.book, self.book["status"]
         done = (status == RunStatus.OK) | (status == RunStatus.DECIDED)
         with np.errstate(invalid="ignore"):  # runs that failed have no numbers
-            made = book["energy"] - book["first_energy"] - book["work"]
+            given = book["work"] + book["base_work"] + book["load_work"]
+            made = book["energy"] - book["first_energy"] - given
         allowed = _MADE * book["gross_work"]
         allowed = allowed + _ROUNDED * (np.abs(book["energy"]) + np.abs(book["first_energy"]))
         return np.where(done & (made > allowed), RunStatus.UNBALANCED, status)

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from snapbeam.core.validate import InputError
 from snapbeam.engines.clock import Clocked, clocked, most_steps
 from snapbeam.engines.columns import RUN
-from snapbeam.engines.ensemble import Ensemble
+from snapbeam.engines.driven import Driven, begun_at, cycles_of, driven_of, fastest_of, phases_of
+from snapbeam.engines.ensemble import Ensemble, Tapped
 from snapbeam.engines.plan import Plan, plan_steps
 from snapbeam.engines.structure import Structure, structure_of
 from snapbeam.model.contact import ContactLaw, HertzContact
 from snapbeam.model.decision import decidable_energy, passed_heights
-from snapbeam.model.drive import Drive, Sine
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN as RUN_SCOPE
@@ -27,14 +27,16 @@ from snapbeam.model.start import rest_state
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 
-__all__ = ["cycles_of", "make_ensemble", "plans_of", "run_columns"]
+__all__ = ["FAR_AWAY", "cycles_of", "make_ensemble", "plans_of", "run_columns"]
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
 
 _LOWEST = {"map": 1e-9, "reference": 1e-13}
 """Height of a flight after an impact that lasts no time, over b, below which chatter ends in sticking."""
-_FAR_AWAY = -1e30
+_RESOLVED = 24.0
+"""Flight steps, at least, in a period of a base's or an axial load's fastest part."""
+FAR_AWAY = -1e30
 """Penetration, m, of a tip that is not there."""
 
 
@@ -76,20 +78,24 @@ def make_ensemble(
     if state.batch and runs in (1, state.batch[0]):
         runs = state.batch[0]
     columns = {name: np.array(np.broadcast_to(values, (runs,))) for name, values in columns.items()}
-    structure = structure_of(system.model, _side(system, state, goes_on=periods is not None), system.striker)
+    side = _side(system, state, goes_on=periods is not None)
+    structure = structure_of(system.model, side, system.striker, system.base, system.harvester)
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
     if step_factor != 1.0:
         plans = [each._replace(step=step_factor * each.step) for each in plans]
-    driven = _drive_of(system, columns, runs)
+    driven = driven_of(system, columns, runs)
     table = np.zeros(runs, dtype=RUN)
     places = _places(structure, table, columns.get("striker.location", np.full(runs, 0.5)))
-    starts = _starts(structure, table, state)
-    table["phase"] = np.where(np.isnan(state.phase), columns.get("drive.phase", np.zeros(runs)), state.phase)
+    starts = _starts(structure, table, state, 1.0 if system.harvester is None else system.harvester.unit)
+    table["phase"] = np.where(np.isnan(state.phase), phases_of(system, columns, runs), state.phase)
     table["offset"] = _offsets(system, structure, state, columns, table, places.rows, starts, driven)
     table["tip_speed"] = driven.speed
+    tapped = _tapped(system, columns, runs)
+    if tapped is not None:
+        table["circuit_rate"] = tapped.rate
     highest = table["rest_contact"] + table["offset"] + driven.highest
-    if structure.body_mass is not None:
-        highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown
+    if structure.body_mass is not None or driven.kind.parts:
+        highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown, and a shaken beam too
     time = clocked(table, system, integration, driven.period, plans, periods)
     _decisions(table, system, structure, integration, time, places.location, highest)
     table["lowest"] = system.scale.length * _LOWEST[integration.accuracy]
@@ -111,6 +117,8 @@ def make_ensemble(
         max_steps=most_steps(integration, system.model.modes),
         high_omega=integration.high_frequency_ratio * system.scale.omega,
         cycles=time.cycles,
+        tapped=tapped,
+        harvester=system.harvester,
     )
 
 
@@ -130,6 +138,11 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
             }
     if system.striker is not None:
         own |= {f"drive.{name}": value for name, value in system.striker.drive.values().items()}
+    if system.harvester is not None:
+        own["harvester.resistance"] = float(system.harvester.resistance)
+    for section, around in (("base", system.base), ("axial", system.axial)):
+        if around is not None:
+            own |= {f"{section}.{name}": value for name, value in around.motion.values().items()}
     columns = {name: np.full(size, value) for name, value in own.items()}
     for name, values in points.items():
         if name not in columns and not (name == "striker.gap" and system.striker is not None):
@@ -144,6 +157,19 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     A striker with a mass meets the beam for a shorter time, as the two masses together do: m_s m/(m_s + m).
     """
     plans, striker = _plans_of(system, integration, columns), system.striker
+    if integration.step is None and (system.base is not None or system.axial is not None):
+        fastest = fastest_of(system, columns, len(plans))
+        plans = [
+            each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate)))
+            for each, rate in zip(plans, fastest.tolist(), strict=True)
+        ]
+    if integration.step is None and system.harvester is not None and system.harvester.inertia > 0.0:
+        tapped = _tapped(system, columns, len(plans))
+        assert tapped is not None
+        plans = [
+            each._replace(step=min(each.step, 1.0 / rate))
+            for each, rate in zip(plans, tapped.rate.tolist(), strict=True)
+        ]
     if striker is None or striker.mass is None:
         return plans
     mass = _struck(system).lightest_contact_mass
@@ -178,15 +204,6 @@ def _plans_of(system: System, integration: Integration, columns: Mapping[str, _A
     return [plans[i] for i in which.ravel()]
 
 
-def cycles_of(system: System, columns: Mapping[str, _Array]) -> _Array:
-    """Seconds of one cycle of excitation of each run, or of the first mode where nothing strikes, shape (runs,)."""
-    runs = next(iter(columns.values())).size if columns else 1
-    if system.striker is None:
-        return 2.0 * math.pi / (np.ones(runs) * system.scale.omega)
-    own = {name[6:]: values for name, values in columns.items() if name.startswith("drive.")}
-    return system.striker.drive.cycle(own or {"": np.zeros(runs)}, system.scale)
-
-
 def _side(system: System, state: State, goes_on: bool) -> str:
     if system.striker is not None:
         return system.striker.side
@@ -196,40 +213,6 @@ def _side(system: System, state: State, goes_on: bool) -> str:
     # seen from the well the beam starts in, so that mirror images are mirrored to the bit
     first = state.flat()[0]
     return "above" if float(first.amplitude @ system.model.center_shape) > 0.0 else "below"
-
-
-class _Driven(NamedTuple):
-    """What the drive is, for every run."""
-
-    kind: type[Drive]
-    numbers: _Array
-    period: _Array
-    """Of one cycle, s."""
-    highest: _Array
-    """From the mid-position, m."""
-    speed: _Array
-    samples: _Array
-
-
-def _drive_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Driven:
-    scale, striker = system.scale, system.striker
-    if striker is None:
-        numbers = np.tile([1.0 * scale.omega, 0.0], (runs, 1))
-        return _Driven(
-            Sine, numbers, cycles_of(system, columns), np.full(runs, -np.inf), np.zeros(runs), np.empty(0)
-        )
-    drive = striker.drive
-    own = {name[6:]: values for name, values in columns.items() if name.startswith("drive.")}
-    own = own or {"": np.zeros(runs)}
-    found = drive.numbers(own, scale)
-    highest, speed = drive.bounds(own, scale)
-    samples = drive.samples() * (1.0 if striker.side == "below" else -1.0)
-    if striker.side == "above":
-        highest = drive.mirrored_bounds(own, scale)
-    table = np.stack([found[name] for name in drive.number_names], axis=1)
-    return _Driven(
-        drive.marched_as or type(drive), table, cycles_of(system, columns), highest, speed, samples
-    )
 
 
 class _Places(NamedTuple):
@@ -246,7 +229,7 @@ def _places(structure: Structure, table: NDArray[Any], location: _Array) -> _Pla
     return _Places(location, np.array([structure.row(shape) for shape in shapes]))
 
 
-def _starts(structure: Structure, table: NDArray[Any], state: State) -> _Array:
+def _starts(structure: Structure, table: NDArray[Any], state: State, unit: float) -> _Array:
     """q and p of every start; which start and home each run has is entered in the table."""
     flat, modal = state.flat(), state.flat().modal
     count = flat.batch[0]
@@ -255,7 +238,7 @@ def _starts(structure: Structure, table: NDArray[Any], state: State) -> _Array:
     if modal is not None and modal.structure == structure.hash:
         table["home"] = modal.home
         return np.stack((modal.q, modal.p), axis=1)
-    parts = (flat.amplitude, flat.velocity, flat.striker_shift, flat.striker_rate)
+    parts = (flat.amplitude, flat.velocity, flat.striker_shift, flat.striker_rate, flat.circuit / unit)
     pairs = [structure.to_modal(*each) for each in zip(*parts, strict=True)]
     return np.array(pairs)
 
@@ -268,11 +251,11 @@ def _offsets(
     table: NDArray[Any],
     rows: _Array,
     starts: _Array,
-    driven: _Driven,
+    driven: Driven,
 ) -> _Array:
     """Penetration of the tip at mid-stroke into the beam at rest in the first well."""
     if system.striker is None:
-        return np.full(table.size, _FAR_AWAY)
+        return np.full(table.size, FAR_AWAY)
     flat, modal = state.flat(), state.flat().modal
     position = structure.sign * flat.striker_position - table["rest_contact"]
     if modal is not None and modal.structure == structure.hash:
@@ -282,23 +265,23 @@ def _offsets(
     pairs = {(int(run["contact_row"]), int(run["start_row"])) for run in table}
     reach = {(place, at): float(rows[place] @ starts[at, 0]) for place, at in pairs}
     touching = np.array([reach[int(run["contact_row"]), int(run["start_row"])] for run in table])
-    begun = _begun(driven, table["phase"])
+    begun = begun_at(driven, table["phase"])
     offset = touching - begun
     if "striker.gap" in columns:
         offset = np.where(np.isnan(columns["striker.gap"]), offset, -columns["striker.gap"])
     return np.asarray(np.where(np.isnan(flat.striker_position), offset, position))
 
 
-def _begun(driven: _Driven, phase: _Array) -> _Array:
-    """How far the tip is from its mid-position at the start, m."""
-    if driven.kind.harmonic:
-        amplitude = driven.numbers[:, driven.kind.number_names.index("amplitude")]
-        return np.where(phase == 0.0, 0.0, amplitude * np.sin(phase))
-    motion, numbers = driven.kind.motion, driven.kind.numbers_type()  # type: ignore[attr-defined]
-    begun = [
-        motion(numbers(*row), driven.samples, at)[0] for row, at in zip(driven.numbers, phase, strict=True)
-    ]
-    return np.array(begun)
+def _tapped(system: System, columns: Mapping[str, _Array], runs: int) -> Tapped | None:
+    """The circuit of a harvester, for every run."""
+    harvester = system.harvester
+    if harvester is None:
+        return None
+    resistance = columns.get("harvester.resistance", np.zeros(runs))
+    loss, inertia = harvester.loss(resistance), harvester.inertia
+    rate = loss / inertia if inertia > 0.0 else 1.0 / loss
+    unit = 1.0 / math.sqrt(inertia) if inertia > 0.0 else 1.0
+    return Tapped(rate, harvester.share(resistance), harvester.volts(resistance) * unit)
 
 
 def _law_numbers(law: type[ContactLaw], system: System, columns: Mapping[str, _Array], runs: int) -> _Array:

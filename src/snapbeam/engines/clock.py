@@ -53,7 +53,8 @@ def clocked(
     """
     require_resolved(system, integration, cycle)
     lengths = np.array([plan.step for plan in plans])
-    drive = system.striker.drive if system.striker is not None else None
+    drive = system.leads[1] if system.leads is not None else None
+    repeats = drive is None or (drive.repeats and len(system.moving) < 2)
     table["step"] = SUBDIVISION
     table["coarsest"] = [plan.coarsest for plan in plans]
     table["finest"] = [plan.finest for plan in plans]
@@ -79,7 +80,7 @@ def clocked(
         if not cycles.is_integer():
             table["end"] = np.rint(table["period"] * cycles).astype(np.int64)
         table["landing"] = table["period"]
-        if drive is not None and not drive.repeats:
+        if not repeats:
             _whole_steps(cycle, lengths, float(HORIZON))  # refused if that cannot be counted
             table["period"] *= HORIZON
     require_affordable(integration, system.model.modes, lengths, table["end"] / SUBDIVISION)

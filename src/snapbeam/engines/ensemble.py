@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +11,23 @@ from numpy.typing import NDArray
 from snapbeam.engines.structure import Structure
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.drive import Drive, Scale
+from snapbeam.model.world import Harvester
 
-__all__ = ["Ensemble"]
+__all__ = ["Ensemble", "Tapped"]
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
+
+
+class Tapped(NamedTuple):
+    """A harvester's circuit, for every run, arrays of shape (runs,)."""
+
+    rate: _Array
+    """Of loss, 1/s; without inertia what the coordinate is of the coupling's velocity."""
+    share: _Array
+    """Of the loss, that ends in the load."""
+    volts: _Array
+    """Across the load, V, per unit of the circuit's coordinate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +61,8 @@ class Ensemble:
     """Angular frequency above which a mode counts as high, rad/s."""
     cycles: float
     """Cycles of excitation of each run."""
+    tapped: Tapped | None = None
+    harvester: Harvester | None = None
 
     @property
     def size(self) -> int:

@@ -83,6 +83,10 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("gross_work", np.float64, 0.0),
     ("dissipated", np.float64, 0.0),  # integrated, where a ledger is kept
     ("lost", np.float64, 0.0),  # in contact
+    ("base_work", np.float64, 0.0),  # of a moving base, on the beam in its frame
+    ("circuit_energy", np.float64, 0.0),  # lost in a harvester's circuit, load included
+    ("peak_circuit", np.float64, 0.0),  # greatest voltage or current, as the circuit's coordinate
+    ("load_work", np.float64, 0.0),  # of what an axial load has beyond its mean
     ("first_energy", np.float64, 0.0),
     ("energy", np.float64, 0.0),  # at the end, contact included
     ("displacement", np.float64, 0.0),  # of contact point and centre, at the end
@@ -177,7 +181,23 @@ def _high_share(reading: Reading) -> Values:
 
 
 def _dissipated(reading: Reading) -> Values:
-    return reading.seen("work") - (reading.seen("energy") - reading.seen("first_energy"))
+    given = reading.seen("work") + reading.seen("base_work") + reading.seen("load_work")
+    return given - (reading.seen("energy") - reading.seen("first_energy")) - _harvested(reading)
+
+
+def _harvested(reading: Reading) -> Values:
+    tapped = reading.ensemble.tapped
+    return reading.seen("circuit_energy") * (0.0 if tapped is None else tapped.share)
+
+
+def _harvested_power(reading: Reading) -> Values:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(reading.duration > 0.0, _harvested(reading) / reading.duration, np.nan)
+
+
+def _peak_voltage(reading: Reading) -> Values:
+    tapped = reading.ensemble.tapped
+    return reading.seen("peak_circuit") * (0.0 if tapped is None else np.abs(tapped.volts))
 
 
 def _mean_power(reading: Reading) -> Values:
@@ -252,10 +272,13 @@ _ROWS = (
     ),
     Statistic("impulse", "float64", "N s", "impulse on the beam, all impacts", _seen("total_impulse")),
     Statistic("shaker_work", "float64", "J", "work done by the striker", _seen("work")),
-    Statistic("gross_work", "float64", "J", "work done by the striker, taken as positive", _seen("gross_work")),
+    Statistic(
+        "gross_work", "float64", "J", "work done by the striker, the base and the axial load, taken as positive",
+        _seen("gross_work"),
+    ),
     Statistic("mean_power", "float64", "W", "work done by the striker over the time of the run", _mean_power),
     Statistic(
-        "dissipated_energy", "float64", "J", "energy dissipated: the striker's work less what the beam gained",
+        "dissipated_energy", "float64", "J", "energy dissipated: all work less what the beam gained",
         _dissipated,
     ),
     Statistic("contact_loss", "float64", "J", "energy lost in contact", _seen("lost")),
@@ -263,6 +286,13 @@ _ROWS = (
         "high_frequency_share", "float64", "1", "share of the modal energy above a multiple of omega_1, over time",
         _high_share,
     ),
+    Statistic("base_work", "float64", "J", "work done by the base, in its frame", _seen("base_work")),
+    Statistic("load_work", "float64", "J", "work done by the change of the axial load", _seen("load_work")),
+    Statistic("harvested_energy", "float64", "J", "energy that ended in the harvester's load", _harvested),
+    Statistic(
+        "harvested_power", "float64", "W", "energy in the harvester's load over the time of the run", _harvested_power
+    ),
+    Statistic("peak_voltage", "float64", "V", "greatest voltage across the load at the end of a step", _peak_voltage),
 )  # fmt: skip
 
 STATISTICS: dict[str, Statistic] = {row.name: row for row in _ROWS}

@@ -73,6 +73,7 @@ def resolve(
     drive: type[Drive] = Sine,
     body: bool = False,
     uneven: bool = False,
+    around: bool = False,
 ) -> tuple[str, Engine]:
     """The engine that *name* stands for, and its own name.
 
@@ -94,6 +95,8 @@ def resolve(
         Whether the striker is a body with a mass.
     uneven : bool
         Whether the wells are unequal.
+    around : bool
+        Whether a base moves, the axial load changes, or a harvester taps the beam.
 
     Raises
     ------
@@ -110,6 +113,10 @@ def resolve(
             reason = "a striker with a mass is marched by the CPU engine alone"
         if uneven:
             reason = "a beam with unequal wells is marched by the CPU engine alone"
+        if around:
+            reason = (
+                "a moving base, a changing axial load and a harvester are marched by the CPU engine alone"
+            )
         if reason is None and (name == "cuda" or not cuda.simulated()):
             return "cuda", cuda
         if name == "cuda":

@@ -7,12 +7,15 @@ import hashlib
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.striker import Striker
+from snapbeam.model.world.base import Base, rigid_mass
+from snapbeam.model.world.harvester import Harvester
 
 __all__ = ["Structure", "Uneven", "structure_of"]
 
@@ -72,32 +75,55 @@ class Structure:
     model: ReducedModel
     uneven: Uneven | None = None
     """Of unequal wells."""
+    shaken: _Array | None = None
+    """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi)."""
+    tapped: _Array | None = None
+    """Of a harvester: its coupling, scaled so that half the square of the circuit's coordinate is its energy."""
+    circuit: bool = False
+    """Whether the circuit's coordinate is the velocity of a mode of its own, the last one."""
     body_mass: float | None = None
     """Of a striker that is a body, whose own mode is then the last one; kg."""
 
     def row(self, shape: _Array) -> _Array:
         """V^T shape, seen from the striker's side."""
         row: _Array = self.sign * (self.model.linear_modes.T @ shape)
-        return row if self.body_mass is None else np.append(row, -1.0 / math.sqrt(self.body_mass))
+        if self.body_mass is not None:
+            row = np.append(row, -1.0 / math.sqrt(self.body_mass))
+        return np.append(row, 0.0) if self.circuit else row
 
     def body_of(self, values: _Array) -> _Array:
         """The striker's own part of q or p of shape (..., N), in space and SI units; NaN if it is no body."""
         if self.body_mass is None:
             return np.full(values.shape[:-1], np.nan)
-        own: _Array = self.sign * values[..., -1] / math.sqrt(self.body_mass)
+        own: _Array = self.sign * values[..., self.equilibrium.size] / math.sqrt(self.body_mass)
         return own
 
+    def circuit_of(self, p: _Array) -> _Array:
+        """The circuit's coordinate in p of shape (..., N): its own, or none."""
+        found: _Array = p[..., -1] if self.circuit else np.full(p.shape[:-1], np.nan)
+        return found
+
     def to_modal(
-        self, alpha: _Array, velocity: _Array, shift: float = np.nan, rate: float = np.nan
+        self,
+        alpha: _Array,
+        velocity: _Array,
+        shift: float = np.nan,
+        rate: float = np.nan,
+        circuit: float = np.nan,
     ) -> tuple[_Array, _Array]:
-        """Amplitudes of shape (N,) and their velocities as q and p about the well, and those of the striker's body."""
+        """Amplitudes of shape (N,) and their velocities as q and p about the well, and those of the striker's body.
+
+        *circuit* is the coordinate of a harvester's circuit.
+        """
         back = self.model.linear_modes.T @ self.model.mass
         q, p = back @ (alpha - self.equilibrium), back @ velocity
-        if self.body_mass is None:
-            return q, p
-        scale = self.sign * math.sqrt(self.body_mass)
-        own = [0.0 if np.isnan(value) else scale * float(value) for value in (shift, rate)]
-        return np.append(q, own[0]), np.append(p, own[1])
+        if self.body_mass is not None:
+            scale = self.sign * math.sqrt(self.body_mass)
+            own = [0.0 if np.isnan(value) else scale * float(value) for value in (shift, rate)]
+            q, p = np.append(q, own[0]), np.append(p, own[1])
+        if self.circuit:
+            q, p = np.append(q, 0.0), np.append(p, 0.0 if np.isnan(circuit) else circuit)
+        return q, p
 
     def amplitudes(self, q: _Array) -> _Array:
         """alpha of q of shape (..., N) about the well."""
@@ -118,12 +144,22 @@ class Structure:
         digest.update(np.array([self.tension_stiffness, self.sign]).tobytes())
         if self.uneven is not None:
             digest.update(np.ascontiguousarray(self.uneven.force).tobytes())
+        if self.tapped is not None:
+            digest.update(np.ascontiguousarray(self.tapped).tobytes())
+        if self.shaken is not None:
+            digest.update(np.ascontiguousarray(self.shaken).tobytes())
         if self.body_mass is not None:
             digest.update(np.array([self.body_mass]).tobytes())
         return digest.hexdigest()
 
 
-def structure_of(model: ReducedModel, side: str, striker: Striker | None = None) -> Structure:
+def structure_of(
+    model: ReducedModel,
+    side: str,
+    striker: Striker | None = None,
+    base: Base | None = None,
+    harvester: Harvester | None = None,
+) -> Structure:
     """The structure of a reduced model, about the well that a striker from *side* pushes away from.
 
     A striker that is a body of mass m_s on a spring k_s is one more linear mode, q_s = sqrt(m_s) times its displacement
@@ -147,8 +183,11 @@ def structure_of(model: ReducedModel, side: str, striker: Striker | None = None)
         equilibrium=equilibrium,
         model=model,
         uneven=_uneven(model, sign),
+        shaken=None if base is None else -(modes.T @ rigid_mass(model)),
     )
-    return struck if striker is None or striker.mass is None else _with_body(struck, striker)
+    if striker is not None and striker.mass is not None:
+        struck = _with_body(struck, striker, carried=base is not None and base.carries_striker)
+    return struck if harvester is None else _with_circuit(struck, harvester)
 
 
 def _uneven(model: ReducedModel, sign: float) -> Uneven | None:
@@ -166,9 +205,10 @@ def _uneven(model: ReducedModel, sign: float) -> Uneven | None:
     )
 
 
-def _with_body(structure: Structure, striker: Striker) -> Structure:
-    """The structure with the mode of a striker that is a body."""
+def _with_body(structure: Structure, striker: Striker, carried: bool = False) -> Structure:
+    """The structure with the mode of a striker that is a body, which a base shakes too if it carries it."""
     assert striker.mass is not None
+    own = -structure.sign * math.sqrt(striker.mass) if carried else 0.0
     count = structure.omega.size + 1
     coupling = np.zeros((count, count))
     coupling[:-1, :-1] = structure.coupling
@@ -181,8 +221,38 @@ def _with_body(structure: Structure, striker: Striker) -> Structure:
         center=np.append(structure.center, 0.0),
         shift=np.append(structure.shift, 0.0),
         uneven=None if structure.uneven is None else _with_rest(structure.uneven),
+        shaken=None if structure.shaken is None else np.append(structure.shaken, own),
         body_mass=striker.mass,
     )
+
+
+def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
+    """The structure with a harvester, and with the mode of its circuit if that has inertia.
+
+    That mode has no frequency, no tension and no row: its velocity is the circuit's coordinate.
+    """
+    modes = structure.model.linear_modes.shape[1]
+    coupling = np.zeros(structure.omega.size)
+    coupling[:modes] = structure.model.linear_modes.T @ harvester.row(structure.model)
+    if harvester.inertia == 0.0:
+        return dataclasses.replace(structure, tapped=coupling)
+    coupling = coupling / math.sqrt(harvester.inertia)
+    count = structure.omega.size + 1
+    tension = np.zeros((count, count))
+    tension[:-1, :-1] = structure.coupling
+    longer: dict[str, Any] = {name: np.append(getattr(structure, name), 0.0) for name in _ROWS}
+    return dataclasses.replace(
+        structure,
+        **longer,
+        coupling=tension,
+        uneven=None if structure.uneven is None else _with_rest(structure.uneven),
+        shaken=None if structure.shaken is None else np.append(structure.shaken, 0.0),
+        tapped=np.append(coupling, 0.0),
+        circuit=True,
+    )
+
+
+_ROWS = ("omega", "damping_ratio", "well", "center", "shift")
 
 
 def _with_rest(uneven: Uneven) -> Uneven:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError, instance
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, house_style, new_figure
-from snapbeam.model.drive import Flight
+from snapbeam.figures.surroundings import FRAME, draw_surroundings
+from snapbeam.model.drive import Flight, Still
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
@@ -60,12 +61,13 @@ def plot_system(system: System, title: str = "") -> Figure:
     figure = new_figure("double", 52.0)
     with house_style():
         striker = system.striker
-        widths = [2.4, 1.0] if striker is not None else [1.0]
+        widths = [2.4, 1.0] if striker is not None or system.leads is not None else [1.0]
         axes = figure.subplots(1, len(widths), squeeze=False, width_ratios=widths)[0]
         _draw_beam(axes[0], system)
         if striker is not None:
             _draw_striker(axes[0], system, striker)
-            _draw_drive(axes[1], system, striker)
+        if system.leads is not None:
+            _draw_drive(axes[1], system, *system.leads)
         if title:
             axes[0].set_title(title, loc="left")
         outward, inward = 2.55, 1.25
@@ -97,6 +99,7 @@ def _draw_beam(ax: Axes, system: System) -> None:
     if system.model.is_bistable:
         ax.plot(*_shape(system, other), color=BEAM_COLOR, linewidth=0.8, linestyle="--")
     ax.plot(*_shape(system, rest), color=BEAM_COLOR, linewidth=1.8, solid_capstyle="butt")
+    draw_surroundings(ax, system, *_shape(system, rest), sign, _WIDE)
     if system.model.imperfection is not None:
         _draw_imperfection(ax, system, system.model.imperfection, rest)
     clamp: Any = {"facecolor": "0.85", "edgecolor": BEAM_COLOR, "linewidth": 0.6, "hatch": "////"}
@@ -110,7 +113,11 @@ def _draw_beam(ax: Axes, system: System) -> None:
     arrow: Any = {"arrowstyle": "-|>", "lw": 0.8, "color": BEAM_COLOR}
     for x, toward in ((-0.85, 0.5), (_WIDE + 0.85, -0.5)):
         ax.annotate("", (x + toward, 0.0), (x, 0.0), arrowprops=arrow)
-    ax.text(-0.62, 0.14, "$P$", ha="center", va="bottom")
+    changes = system.axial is not None
+    ax.text(
+        -0.62, 0.14, "$P(t)$" if changes else "$P$", ha="center", va="bottom",
+        color=_LOAD_COLOR if changes else BEAM_COLOR,
+    )  # fmt: skip
 
 
 def _draw_hinge(ax: Axes, at: float, outward: float, stiffness: float, sign: float, block: Any) -> None:
@@ -172,7 +179,10 @@ def _draw_striker(ax: Axes, system: System, striker: Striker) -> None:
     below = center - sign * _RADIUS
     if striker.mass is None:
         _rod(ax, at, below, below - sign * 0.45)
-        _block(ax, at, below - sign * 0.45, sign, "drive")
+        stands = isinstance(striker.drive, Still)
+        _block(ax, at, below - sign * 0.45, sign, "stop" if stands else "drive", moves=not stands)
+        if stands and system.base is not None and system.base.carries_striker:
+            _rod(ax, at, below - sign * 0.67, -sign * FRAME)
         return
     if striker.spring == 0.0:
         if isinstance(striker.drive, Flight):
@@ -217,16 +227,21 @@ def _rod(ax: Axes, x: float, one: float, other: float) -> None:
     ax.plot([x, x], [one, other], color=SHAKER_COLOR, linewidth=1.4)
 
 
-def _block(ax: Axes, x: float, edge: float, sign: float, words: str) -> None:
+def _block(ax: Axes, x: float, edge: float, sign: float, words: str, moves: bool = True) -> None:
     """What moves as the drive says."""
     corner = (x - 0.34, min(edge, edge - sign * 0.22))
     ax.add_patch(Rectangle(corner, 0.68, 0.22, facecolor=SHAKER_COLOR, alpha=0.25, lw=0))
+    if moves:
+        _moves(ax, x, edge, sign)
+    if words:
+        ax.text(x, edge - sign * 0.11, words, ha="center", va="center", fontsize=6)
+
+
+def _moves(ax: Axes, x: float, edge: float, sign: float) -> None:
     ax.annotate(
         "", (x + 0.5, edge - sign * 0.30), (x + 0.5, edge + sign * 0.18),
         arrowprops={"arrowstyle": "<|-|>", "lw": 0.8, "color": SHAKER_COLOR, "mutation_scale": 6},
     )  # fmt: skip
-    if words:
-        ax.text(x, edge - sign * 0.11, words, ha="center", va="center", fontsize=6)
 
 
 def _spring(ax: Axes, x: float, one: float, other: float) -> None:
@@ -245,16 +260,21 @@ def _damper(ax: Axes, x: float, one: float, other: float) -> None:
     ax.plot([x, x], [low, other], color=BEAM_COLOR, linewidth=0.8)
 
 
-def _draw_drive(ax: Axes, system: System, striker: Striker) -> None:
-    """Displacement of the tip from its mid-position over the first cycles, as long as nothing touches it."""
-    drive, scale = striker.drive, system.scale
+def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
+    """Displacement of the tip from its mid-position over the first cycles, as long as nothing touches it, of the base,
+    or the change of the axial load."""
+    scale = system.scale
     columns = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
     period = float(drive.cycle(columns, scale)[0])
     cycles = np.linspace(0.0, 2.0 if isinstance(drive, Flight) else _CYCLES, 1601)
     phase = float(columns.get("phase", np.zeros(1))[0])
-    ax.plot(cycles, _motion(drive, columns, scale, cycles * period, phase) / scale.length, color=SHAKER_COLOR)
-    ax.set_xlabel("Cycles of the drive")
-    ax.set_ylabel("Tip / $b$")
+    moved = _motion(drive, columns, scale, cycles * period, phase)
+    per = 1.0 if section == "axial" else scale.length
+    down = section == "base" and system.base is not None and system.base.direction == "down"
+    color = SHAKER_COLOR if section == "drive" else _LOAD_COLOR
+    ax.plot(cycles, (-moved if down else moved) / per, color=color)
+    ax.set_xlabel("Cycles of the drive" if section == "drive" else "Cycles")
+    ax.set_ylabel({"drive": "Tip / $b$", "base": "Base $y/b$", "axial": r"$P(t) - P$ (N)"}[section])
     ax.set_xlim(0.0, cycles[-1])
     ax.set_title(drive.name.replace("_", " "), loc="left")
 

@@ -18,10 +18,23 @@ from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.quantity import quantities
 from snapbeam.model.state import State
 from snapbeam.model.striker import Striker
+from snapbeam.model.world import HARVESTERS, LOADS, AxialLoad, Base
 
 __all__ = ["SECTIONS", "parts_from_mapping", "parts_to_mapping"]
 
-SECTIONS = ("beam", "model", "ends", "imperfection", "contact", "striker", "drive", "start")
+SECTIONS = (
+    "beam",
+    "model",
+    "ends",
+    "imperfection",
+    "contact",
+    "striker",
+    "drive",
+    "base",
+    "axial",
+    "harvester",
+    "start",
+)
 """Sections of a system, in their order."""
 
 _MATRICES = (
@@ -35,13 +48,16 @@ _START = (
     "contact_time",
     "striker_shift",
     "striker_rate",
+    "circuit",
 )
 
 
-def parts_to_mapping(
-    model: ReducedModel, contact: ContactLaw | None, striker: Striker | None, start: State | None
-) -> dict[str, dict[str, Any]]:
-    """The parts as sections; what is None is left out."""
+def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
+    """The parts of a :class:`~snapbeam.System` as sections; what is None is left out."""
+    model: ReducedModel = system.model
+    contact: ContactLaw | None = system.contact
+    striker: Striker | None = system.striker
+    start: State | None = system.start
     sections: dict[str, dict[str, Any]] = {}
     section: dict[str, Any] = {}
     damping = model.damping_ratio
@@ -73,6 +89,13 @@ def parts_to_mapping(
         own = {name: getattr(striker, name) for name in quantities(Striker) if name not in left_out}
         sections["striker"] = {name: value for name, value in own.items() if value is not None}
         sections["drive"] = {"kind": striker.drive.name} | _fields(striker.drive)
+    if system.base is not None:
+        own = {name: getattr(system.base, name) for name in quantities(Base)}
+        sections["base"] = {"kind": system.base.motion.name} | own | _fields(system.base.motion)
+    if system.axial is not None:
+        sections["axial"] = {"kind": system.axial.motion.name} | _fields(system.axial.motion)
+    if system.harvester is not None:
+        sections["harvester"] = {"kind": system.harvester.name} | _fields(system.harvester)
     if start is not None:
         values = {name: getattr(start, name) for name in _START}
         sections["start"] = {
@@ -104,6 +127,14 @@ def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, A
         own = dict(sections.get("striker", {}))
         _only(own, "striker", list(quantities(Striker)))
         parts["striker"] = Striker(drive=drive, **own)
+    if "base" in sections:
+        own = dict(sections["base"])
+        around = {name: own.pop(name) for name in quantities(Base) if name in own}
+        parts["base"] = Base(motion=_chosen(own, "base", "kind", DRIVES), **around)
+    if "axial" in sections:
+        parts["axial"] = AxialLoad(motion=_chosen(sections["axial"], "axial", "kind", LOADS))
+    if "harvester" in sections:
+        parts["harvester"] = _chosen(sections["harvester"], "harvester", "kind", HARVESTERS)
     if "start" in sections:
         values = dict(sections["start"])
         _only(values, "start", list(_START))

@@ -35,7 +35,7 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         else:
             whole[section] = value
     found = dict(parts)
-    for name in ("model", "contact", "striker", "start"):
+    for name in ("model", "contact", "striker", "base", "axial", "harvester", "start"):
         if name in whole:
             found[name] = whole[name]
     of_beam = inside.get("beam", {})
@@ -55,6 +55,11 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         found["striker"] = dataclasses.replace(striker, drive=drive)
     if "striker" in inside:
         found["striker"] = _changed(found["striker"], "striker", inside["striker"])
+    for name in ("base", "axial"):
+        if name in inside:
+            found[name] = _around(found.get(name), name, inside[name])
+    if "harvester" in inside:
+        found["harvester"] = _changed(found.get("harvester"), "harvester", inside["harvester"])
     start, model = found["start"], found["model"]
     if isinstance(start, State) and "start" not in whole and start.modes != model.modes:
         found["start"] = start.with_modes(model.modes)
@@ -78,6 +83,15 @@ def _changed(part: Any, section: str, values: Mapping[str, Any]) -> Any:
                 f"{section}.{name}: no parameter of this system; must be one of {', '.join(known)}"
             )
     return dataclasses.replace(part, **values)
+
+
+def _around(part: Any, section: str, values: Mapping[str, Any]) -> Any:
+    """A base or a load with some of its own quantities changed, or of its motion's."""
+    own = quantities(type(_there(part, section)))
+    of_motion = {name: value for name, value in values.items() if name not in own}
+    if of_motion:
+        part = dataclasses.replace(part, motion=_changed(part.motion, section, of_motion))
+    return dataclasses.replace(part, **{name: value for name, value in values.items() if name in own})
 
 
 def _ends(model: ReducedModel, whole: Mapping[str, Any], values: Mapping[str, Any]) -> Any:

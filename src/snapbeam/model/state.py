@@ -52,6 +52,9 @@ class State:
     striker_shift, striker_rate : array_like of shape (...)
         Of a striker that is a body: displacement (m) and velocity (m/s) of its tip beyond the motion of its
         drive, positive towards the upper well; NaN where there is none.
+    circuit : array_like of shape (...)
+        Of a harvester's circuit: voltage (V) of piezoelectric layers, current (A) of a coil with an inductance; NaN
+        where there is none, or where it is at rest.
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitude and velocity that were carried along, k of them.
     passed : mapping, optional
@@ -73,6 +76,7 @@ class State:
     contact_time: _Array = np.nan  # type: ignore[assignment]
     striker_shift: _Array = np.nan  # type: ignore[assignment]
     striker_rate: _Array = np.nan  # type: ignore[assignment]
+    circuit: _Array = np.nan  # type: ignore[assignment]
     tangent: _Array | None = None
     passed: Mapping[str, _Array] | None = field(default=None, repr=False)
     modal: ModalState | None = field(default=None, repr=False)
@@ -96,7 +100,7 @@ class State:
         position = np.nan if self.striker_position is None else self.striker_position
         found["striker_position"] = _maybe("state striker_position", position, batch)
         found["contact_time"] = _maybe("state contact_time", self.contact_time, batch)
-        for name in ("striker_shift", "striker_rate"):
+        for name in ("striker_shift", "striker_rate", "circuit"):
             found[name] = _maybe(f"state {name}", getattr(self, name), batch)
         for name, array in found.items():
             array.setflags(write=False)
@@ -139,6 +143,7 @@ class State:
             contact_time=self.contact_time[index],
             striker_shift=self.striker_shift[index],
             striker_rate=self.striker_rate[index],
+            circuit=self.circuit[index],
             tangent=tangent,
             passed=passed,
             modal=modal,
@@ -160,6 +165,7 @@ class State:
             contact_time=self.contact_time.ravel(),
             striker_shift=self.striker_shift.ravel(),
             striker_rate=self.striker_rate.ravel(),
+            circuit=self.circuit.ravel(),
             modal=modal,
         )
 
@@ -183,6 +189,7 @@ class State:
         return State(
             amplitude=amplitude, velocity=velocity, phase=self.phase, striker_position=self.striker_position,
             contact_time=self.contact_time, striker_shift=self.striker_shift, striker_rate=self.striker_rate,
+            circuit=self.circuit,
         )  # fmt: skip
 
 

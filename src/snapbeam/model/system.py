@@ -19,12 +19,14 @@ from snapbeam.core.provenance import canonical_json
 from snapbeam.core.validate import InputError, InputTypeError, file_path, instance, shown
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.doubts import doubts_of
-from snapbeam.model.drive import Scale
+from snapbeam.model.drive import Drive, Scale, Still
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.mapping import parts_from_mapping, parts_to_mapping
 from snapbeam.model.replacing import replaced
 from snapbeam.model.state import State
 from snapbeam.model.striker import RecordedDrive, Shaker, Striker
+from snapbeam.model.world import AxialLoad, Base, Harvester
+from snapbeam.model.world.check import check_world
 
 __all__ = ["System"]
 
@@ -40,6 +42,12 @@ class System:
         Needed with a striker.
     striker : Striker, Shaker or RecordedDrive, optional
         Without one the structure vibrates freely from *start*.
+    base : Base, optional
+        The motion of what both ends of the beam are mounted on.
+    axial : AxialLoad, optional
+        How the axial load changes in time.
+    harvester : Piezo or Coil, optional
+        A circuit that turns motion into power in a resistor.
     start : State, optional
         Where runs begin, one state; by default at rest in the well that the striker pushes away from, touched by it.
 
@@ -64,6 +72,9 @@ class System:
     contact: ContactLaw | None = None
     striker: Striker | None = None
     start: State | None = None
+    base: Base | None = None
+    axial: AxialLoad | None = None
+    harvester: Harvester | None = None
 
     def __post_init__(self) -> None:
         model, contact, striker, start = self.model, self.contact, self.striker, self.start
@@ -94,6 +105,7 @@ class System:
             raise InputError(
                 "contact = None: a striker needs a law of contact, such as HertzContact(stiffness)"
             )
+        check_world(self)
         if model.length_scale is None:
             model.require_bistable("a run")
         if start is not None:
@@ -117,7 +129,8 @@ class System:
 
         Names are those of the table of parameters (:data:`snapbeam.config.PARAMETERS`), such as
         ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``striker.location`` and
-        ``drive.frequency_ratio``, or whole parts: ``beam``, ``model``, ``contact``, ``striker``, ``drive``, ``start``.
+        ``drive.frequency_ratio``, or whole parts: ``beam``, ``model``, ``contact``, ``striker``, ``drive``, ``start``,
+        ``base``, ``axial``, ``harvester``.
 
         Raises
         ------
@@ -155,6 +168,32 @@ class System:
         assert self.model.length_scale is not None
         return Scale(self.model.length_scale, 2.0 * np.pi * self.model.reference_freq)
 
+    @property
+    def moving(self) -> tuple[tuple[str, Drive], ...]:
+        """What moves as prescribed, by the section that its parameters stand in; the first one's cycle counts.
+
+        A striker that stands still moves nothing where a base or an axial load does.
+        """
+        found: list[tuple[str, Drive]] = []
+        alone = self.base is None and self.axial is None
+        if self.striker is not None and (alone or not isinstance(self.striker.drive, Still)):
+            found.append(("drive", self.striker.drive))
+        if self.base is not None:
+            found.append(("base", self.base.motion))
+        if self.axial is not None:
+            found.append(("axial", self.axial.motion))
+        return tuple(found)
+
+    @property
+    def has_surroundings(self) -> bool:
+        """Whether a base moves, the axial load changes or a harvester taps the beam."""
+        return self.base is not None or self.axial is not None or self.harvester is not None
+
+    @property
+    def leads(self) -> tuple[str, Drive] | None:
+        """That of which one cycle is a cycle of excitation, with its section; None where nothing moves."""
+        return self.moving[0] if self.moving else None
+
     def findings(self) -> tuple[Finding, ...]:
         """What is doubtful about it: sizes that look like another unit, assumptions of the model left behind."""
         return doubts_of(self.model, self.striker)
@@ -163,7 +202,7 @@ class System:
 
     def to_mapping(self) -> dict[str, dict[str, Any]]:
         """The system as sections of plain values, as a parameter file holds them."""
-        return parts_to_mapping(self.model, self.contact, self.striker, self.start)
+        return parts_to_mapping(self)
 
     @classmethod
     def from_mapping(cls, sections: Mapping[str, Mapping[str, Any]]) -> System:

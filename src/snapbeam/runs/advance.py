@@ -140,6 +140,10 @@ def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
             f"tangent with striker mass = {system.striker.mass:g} kg: the tangent flow is that of the beam alone; give "
             "none, or leave the mass out"
         )
+    if system.harvester is not None:
+        raise InputError(
+            "tangent with a harvester: the tangent flow is that of the beam alone; give none, or leave it out"
+        )
     if system.contact is not None and not system.contact.keeps.tangent:
         raise InputError(
             f"tangent with contact = {system.contact!r}: the tangent flow is known for laws whose force depends on the "
@@ -193,6 +197,7 @@ def _shaped(
         "contact_time",
         "striker_shift",
         "striker_rate",
+        "circuit",
     )
     shape = (len(found), *batch) if every else batch
     arrays = {}

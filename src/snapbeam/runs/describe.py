@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from snapbeam.config.parameters import lookup
 from snapbeam.core.provenance import array_hash, made_by
 from snapbeam.engines.plan import Plan
 from snapbeam.model.integration import Integration
@@ -42,6 +43,11 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
         attrs |= _short(model.beam.ends)
     if model.imperfection is not None:
         attrs |= _short(model.imperfection)
+    sections = system.to_mapping() if system.has_surroundings else {}
+    for section in ("base", "axial", "harvester"):
+        for name, value in sections.get(section, {}).items():
+            short = f"{section}_kind" if name == "kind" else lookup(f"{section}.{name}").short
+            attrs[short] = int(value) if isinstance(value, bool) else value
     return attrs
 
 

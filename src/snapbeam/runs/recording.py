@@ -125,7 +125,8 @@ def _energy_error(books: Any) -> float:
     """
     book = books[0]
     with np.errstate(invalid="ignore"):  # a run that failed has no numbers
-        missed = book["work"] - (book["energy"] - book["first_energy"]) - book["dissipated"]
+        given = book["work"] + book["base_work"] + book["load_work"]
+        missed = given - (book["energy"] - book["first_energy"]) - book["dissipated"] - book["circuit_energy"]
     scale = float(book["gross_work"]) or float(abs(book["first_energy"]) + abs(book["energy"])) or 1.0
     return float(missed) / scale
 
@@ -136,7 +137,7 @@ def _unbalanced(error: float) -> list[Finding]:
     return [
         Finding(
             "ledger-missed",
-            f"the run misses its energy ledger by {abs(error):.2g} of the gross work of the striker: its steps are too "
+            f"the run misses its energy ledger by {abs(error):.2g} of the gross work: its steps are too "
             "long for what the beam does; use accuracy = 'reference', a tolerance, or a smaller step",
             {"energy_error": error},
         )

@@ -40,7 +40,7 @@ def asked(model: Any, parts: tuple[Any, ...], options: dict[str, Any]) -> tuple[
 
 def require_motion(system: System) -> None:
     """Refuse a system in which nothing could move."""
-    if system.striker is None and system.start is None:
+    if system.striker is None and system.start is None and not system.moving:
         raise InputError(
             "striker = None: a beam that nothing strikes needs a start to move from (initial_state)"
         )
@@ -101,9 +101,9 @@ def _start_of(model: ReducedModel, initial_state: tuple[ArrayLike, ArrayLike]) -
 def cycle_of(system: System) -> float:
     """Seconds of one cycle of excitation, or of the first mode where nothing strikes."""
     freq = system.model.reference_freq
-    if system.striker is None:
+    if system.leads is None:
         return 1.0 / freq
-    drive = system.striker.drive
+    drive = system.leads[1]
     if isinstance(drive, Sine):
         return 1.0 / (freq * drive.frequency_ratio)
     columns = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}

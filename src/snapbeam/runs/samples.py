@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.engines.ensemble import Ensemble
+from snapbeam.engines.driven import motions_of
+from snapbeam.engines.ensemble import Ensemble, Tapped
 from snapbeam.engines.outputs import Recorded
 from snapbeam.model.system import System
 from snapbeam.runs.schema import trajectory_dataset
@@ -57,8 +58,13 @@ def run_dataset(
     alpha, rate = structure.amplitudes(recorded.q), structure.velocities(recorded.p)
     own = np.zeros(recorded.q.shape[0])
     if structure.body_mass is not None:
-        own = 0.5 * (recorded.p[:, -1] ** 2 + (structure.omega[-1] * recorded.q[:, -1]) ** 2)
+        body = model.modes
+        own = 0.5 * (recorded.p[:, body] ** 2 + (structure.omega[body] * recorded.q[:, body]) ** 2)
         values[:, 2] -= own
+    if structure.circuit:
+        values[:, 2] -= 0.5 * recorded.p[:, -1] ** 2
+    if ensemble.tapped is not None:  # what the coil's own resistance takes
+        values[:, 5] += (1.0 - ensemble.tapped.share[0]) * values[:, 9]
     location = 0.5 if system.striker is None else system.striker.location
     shape = model.shape_at(location)
     displacement = alpha @ shape / scale
@@ -82,6 +88,9 @@ def run_dataset(
     if structure.body_mass is not None:
         variables["energy_striker"] = own
     variables["energy_dissipated"] = values[:, 5]
+    variables |= _around(ensemble, system, recorded, values)
+    if ensemble.tapped is not None:
+        variables |= _harvested(ensemble, ensemble.tapped, recorded, values)
     if struck and system.contact is not None and system.contact.loses:
         variables["energy_lost_contact"] = values[:, 6]
     at = recorded.times
@@ -100,6 +109,41 @@ def run_dataset(
         }
         variables["valid"] = np.asarray(valid, dtype=np.int8)
     return trajectory_dataset(at, at / period, attrs=attrs, **variables)
+
+
+def _harvested(ensemble: Ensemble, tapped: Tapped, recorded: Recorded, values: _Array) -> dict[str, _Array]:
+    """What a run says of a harvester."""
+    structure = ensemble.structure
+    assert structure.tapped is not None
+    if structure.circuit:
+        y = structure.circuit_of(recorded.p)
+    else:
+        y = -tapped.rate[0] * (recorded.p @ structure.tapped)
+    lost = (tapped.rate[0] if structure.circuit else 1.0 / tapped.rate[0]) * y * y
+    found = {
+        "voltage": tapped.volts[0] * y,
+        "power_load": tapped.share[0] * lost,
+        "energy_harvested": tapped.share[0] * values[:, 9],
+    }
+    if structure.circuit:
+        found["energy_circuit"] = 0.5 * y * y
+    return found
+
+
+def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Array) -> dict[str, _Array]:
+    """What a run says of a moving base and of a changing axial load."""
+    found: dict[str, _Array] = {}
+    if system.base is None and system.axial is None:
+        return found
+    motions = motions_of(ensemble, system, recorded.times)
+    if system.base is not None:
+        found["base_displacement"] = motions["base"][0] / system.scale.length
+        found["base_velocity"] = motions["base"][1] / (system.scale.length * system.scale.omega)
+        found["work_base"] = values[:, 7]
+    if system.axial is not None:
+        found["load_change"] = motions["axial"][0]
+        found["work_load"] = values[:, 8]
+    return found
 
 
 def impact_table(table: _Array, attrs: dict[str, Any]) -> xr.Dataset:

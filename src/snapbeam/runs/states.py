@@ -7,13 +7,22 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.engines.assemble import FAR_AWAY
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.model.state import ModalState, State
 
-__all__ = ["states_of"]
+__all__ = ["circuit_unit", "states_of"]
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
+
+
+def circuit_unit(ensemble: Ensemble) -> float:
+    """What a circuit's coordinate is multiplied by to give volts or amperes."""
+    harvester = ensemble.harvester
+    if harvester is None or harvester.inertia == 0.0:
+        return 1.0
+    return harvester.unit
 
 
 def states_of(
@@ -27,17 +36,19 @@ def states_of(
     far = (home < 0)[:, None]
     first = np.where(far, q + structure.shift, q)
     # a sine comes round after each turn; a record has an end
-    turned = (ticks % runs["period"] if ensemble.drive.harmonic else ticks) / runs["period"]
+    comes_round = ensemble.drive.harmonic or (ensemble.drive.parts and ensemble.drive.repeats)
+    turned = (ticks % runs["period"] if comes_round else ticks) / runs["period"]
     tick = runs["tick"]
     return State(
         amplitude=structure.amplitudes(first),
         velocity=structure.velocities(p),
         phase=runs["phase"] + 2.0 * math.pi * turned,
         striker_position=np.where(
-            ensemble.highest > -np.inf, structure.sign * (runs["rest_contact"] + runs["offset"]), np.nan
+            runs["offset"] > FAR_AWAY, structure.sign * (runs["rest_contact"] + runs["offset"]), np.nan
         ),
         contact_time=np.where(contact_ticks >= 0, contact_ticks * tick, -1.0),
         striker_shift=structure.body_of(q),
         striker_rate=structure.body_of(p),
+        circuit=structure.circuit_of(p) * circuit_unit(ensemble),
         modal=ModalState(q, p, home.astype(np.float64), np.array(runs["offset"]), structure.hash),
     )

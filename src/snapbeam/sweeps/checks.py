@@ -32,6 +32,7 @@ def require_parameters(system: System, points: Points) -> None:
     if (
         system.striker is None
         and system.start is None
+        and not system.moving
         and not any(name.startswith("start.") for name in first)
     ):
         raise InputError("striker = None: a beam that nothing strikes needs a start to move from")

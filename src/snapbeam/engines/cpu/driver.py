@@ -84,7 +84,9 @@ def _room(ensemble: Ensemble) -> Room:
 
 
 def _kernel(march: Callable[..., Any], ensemble: Ensemble) -> Any:
-    return kernel(march.py_func, (ensemble.law, ensemble.drive, type(extras_of_table()).owner))  # type: ignore[attr-defined]
+    parts = (kind for _, kind in ensemble.drive.parts)
+    kinds = (ensemble.law, ensemble.drive, *parts, type(extras_of_table()).owner)
+    return kernel(march.py_func, kinds)  # type: ignore[attr-defined]
 
 
 def _chunks(work: _Array, threads: int) -> list[_Integers]:
@@ -134,7 +136,7 @@ def march_tangents(
     tangents : array of shape (runs, k, 2, N)
     """
     landings = int(-(-ensemble.runs["end"][0] // ensemble.runs["landing"][0]))
-    packed = pack(ensemble.structure, ensemble.high_omega)
+    packed = pack(ensemble.structure, ensemble.high_omega, forced=bool(ensemble.drive.parts))
     size = packed.layout.size
     spread = packed.spread(tangents).reshape(*tangents.shape[:2], 2 * size)
     march = _kernel(march_tangent, ensemble)
@@ -167,7 +169,7 @@ def _march(
     progress: Callable[[int, int], object] | None,
     landings: int,
 ) -> Landings:
-    packed = pack(ensemble.structure, ensemble.high_omega)
+    packed = pack(ensemble.structure, ensemble.high_omega, forced=bool(ensemble.drive.parts))
     if landings == 0 and _few_modes_pay(ensemble, packed):
         return _spread_over(ensemble, packed, *_side_by_side(ensemble, packed), threads, progress, landings)
     march = _kernel(march_many, ensemble)
@@ -298,7 +300,7 @@ def record(
     progress : callable, optional
         Called with the share of the run that is done, several times a second.
     """
-    packed = pack(ensemble.structure, ensemble.high_omega)
+    packed = pack(ensemble.structure, ensemble.high_omega, forced=bool(ensemble.drive.parts))
     size, march = packed.layout.size, _kernel(march_one, ensemble)
     memory, books = lay_out(ensemble, packed), empty_books(1)
     asked, room = _asked(ensemble, packed, memory), _room(ensemble)

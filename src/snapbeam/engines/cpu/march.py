@@ -30,6 +30,8 @@ from snapbeam.engines.cpu.state import (
 )
 from snapbeam.engines.cpu.step import Done, Step, prepare, take_step, take_two
 from snapbeam.engines.cpu.uneven import turn_over
+from snapbeam.engines.cpu.world.circuit import Tap
+from snapbeam.engines.cpu.world.forced import Given, enter_forces
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import released_at
 from snapbeam.engines.scalar.decisions import contact_level, flight_level, ticks_of
@@ -39,7 +41,7 @@ __all__ = ["Kept", "choose", "march_many"]
 
 _RUNNING = int(RunStatus.RUNNING)
 _NO_STEP = Step(0, 0, 0.0, 0.0, False, 0, 0, 0, 0, 0, 0, 0)
-_NOTHING_DONE = Done(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_NOTHING_DONE = Done(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, Given(0.0, 0.0, 0.0), Tap(0.0, 0.0, 0.0, 0.0))
 
 
 class Kept(NamedTuple):
@@ -62,6 +64,7 @@ def choose(memory, blocks, place, run, now, book):
     rows, seen, watch = now.rows, now.seen, now.watch
     r = layout.work + 9 * layout.size
     if layout.stretch > 0.0 and turn_over(layout.uneven, seen.c, home, run.rest_center):
+        enter_forces(layout.forced, memory, run.struck.drive, phase_at(run, t))
         stretch = change_well(memory, blocks, layout, home, rows.q, rows.k, r)
         home = -home
     book.steps += 1

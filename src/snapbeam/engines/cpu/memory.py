@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from snapbeam.engines.cpu.rows import Layout
 from snapbeam.engines.cpu.uneven import Uneven
+from snapbeam.engines.cpu.world.circuit import Circuit
+from snapbeam.engines.cpu.world.forced import Forced
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.scalar.composition import Stages, in_memory, slot_length
 from snapbeam.engines.scalar.lanes import WIDTH
@@ -61,11 +63,11 @@ def _blocks_of(coupled: NDArray[np.bool_]) -> NDArray[np.int64]:
         label = least
 
 
-def pack(structure: Structure, high_omega: float = np.inf) -> Packed:
+def pack(structure: Structure, high_omega: float = np.inf, forced: bool = False) -> Packed:
     """Arrange a structure in rows.
 
     Linear modes that the tension does not couple (the symmetric and the antisymmetric ones) become
-    separate blocks, each padded to a multiple of eight rows.
+    separate blocks, each padded to a multiple of eight rows.  *forced*: with room for a moving base or a changing load.
     """
     label = _blocks_of(structure.coupling != 0.0)
     omega, zeta = structure.omega, structure.damping_ratio
@@ -111,9 +113,22 @@ def pack(structure: Structure, high_omega: float = np.inf) -> Packed:
     away = structure.uneven
     if away is not None:
         pieces |= {"far": padded(away.force), "second": padded(away.second), "here": np.zeros(size + WIDTH)}
+    if forced:
+        pieces["shaken"] = padded(np.zeros(omega.size) if structure.shaken is None else structure.shaken)
+        pieces["now"] = np.zeros(WIDTH)
+    if structure.tapped is not None:
+        pieces |= {"tapped": padded(structure.tapped), "rate": np.zeros(WIDTH)}
+    if forced or structure.tapped is not None:
+        pieces["kick"] = np.zeros(size)
     starts = np.concatenate(([0], np.cumsum([piece.size for piece in pieces.values()])))
     placed = dict(zip(pieces, map(int, starts), strict=False))
-    uneven = None
+    uneven, forces, circuit = None, None, None
+    kick = placed.pop("kick", 0)
+    if forced:
+        forces = Forced(placed.pop("shaken"), placed.pop("now"), kick)
+    if structure.tapped is not None:
+        element = int(rows[-1]) if structure.circuit else None
+        circuit = Circuit(placed.pop("tapped"), placed.pop("rate"), kick, element)
     if away is not None:
         own = placed.pop("far"), placed.pop("second"), placed.pop("here")
         uneven = Uneven(*own, away.lift, away.depth, away.level)
@@ -127,6 +142,8 @@ def pack(structure: Structure, high_omega: float = np.inf) -> Packed:
         stretch=structure.stretch,
         gentle=gentle,
         uneven=uneven,
+        forced=forces,
+        circuit=circuit,
     )
     return Packed(
         np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows, tuple(held)
@@ -160,8 +177,16 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
         second = second._replace(
             work=second.work + size + WIDTH, uneven=first.uneven._replace(here=second.work)
         )
+    if first.forced is not None or first.circuit is not None:
+        now = second.work
+        rate, kick = now + WIDTH, now + 2 * WIDTH
+        second = second._replace(
+            work=kick + size,
+            forced=None if first.forced is None else first.forced._replace(now=now, kick=kick),
+            circuit=None if first.circuit is None else first.circuit._replace(rate=rate, kick=kick),
+        )
     at = second.work + WORK_ROWS * size + slots
-    stages, weights = in_memory(ensemble.order, at, general=ensemble.law.lossy)
+    stages, weights = in_memory(ensemble.order, at, general=ensemble.law.lossy or first.circuit is not None)
     table = stages.flow + weights.size
     length = table + ensemble.samples.size
     raw = np.zeros(length + _ALIGNMENT // 8)

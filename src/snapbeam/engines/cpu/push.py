@@ -8,6 +8,7 @@ from numba.extending import overload
 
 from snapbeam.engines.cpu.rows import dot
 from snapbeam.engines.cpu.uneven import pushed_along
+from snapbeam.engines.cpu.world.forced import shaken_along
 from snapbeam.engines.scalar.compile import INLINE_HERE, inlined
 from snapbeam.engines.scalar.contact import kick_force
 
@@ -62,6 +63,7 @@ def _damped(memory, layout, tip, step, stage, weight, along_g, along_r, push):
         rate = dot(memory, size, contact, step.p1)
         along = along_g * dot(memory, size, contact, layout.g) + along_r * dot(memory, size, contact, step.r)
         along = pushed_along(memory, size, layout.uneven, contact, along)
+        along = shaken_along(memory, size, layout.forced, contact, along)
     mobility = dot(memory, size, contact, contact)
     given = kick_force(tip.law, push.penetration, push.velocity - rate, mobility, along, weight)
     force, velocity = given.impulse, push.velocity

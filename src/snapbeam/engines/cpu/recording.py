@@ -28,8 +28,9 @@ __all__ = [
     "take_up",
 ]
 
-VALUES = 7
-"""Penetration, contact force, beam energy, contact energy, work, dissipation and loss in contact of a sample."""
+VALUES = 10
+"""Penetration, contact force, beam energy, contact energy, work, dissipation, loss in contact, work of the base and of
+the axial load, and energy lost in the circuit, of a sample."""
 MARKS, REALS = 24, 10
 """Integers and floats of a run that was laid aside."""
 _TOGETHER = Seen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -66,7 +67,25 @@ def has_room(now, book, outputs):
 
 
 @inlined
-def _write(memory, layout, home, q, p, outputs, sample, when, tip, seen, energy, work, dissipated, lost):
+def _write(
+    memory,
+    layout,
+    home,
+    q,
+    p,
+    outputs,
+    sample,
+    when,
+    tip,
+    seen,
+    energy,
+    work,
+    dissipated,
+    lost,
+    base,
+    load,
+    tapped,
+):
     """One sample, about the first well."""
     size = layout.size
     for row in range(size):
@@ -82,6 +101,9 @@ def _write(memory, layout, home, q, p, outputs, sample, when, tip, seen, energy,
     outputs.values[sample, 4] = work
     outputs.values[sample, 5] = dissipated
     outputs.values[sample, 6] = lost
+    outputs.values[sample, 7] = base
+    outputs.values[sample, 8] = load
+    outputs.values[sample, 9] = tapped
 
 
 @compiled
@@ -106,6 +128,8 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, book, o
         _write(
             memory, layout, now.home, q2, p2, outputs, sample, times[done], tip, about, energy,
             book.work + here.work, book.dissipated + here.dissipated + here.lost, book.lost + here.lost,
+            book.base_work + here.given.base, book.load_work + here.given.load,
+            book.circuit_energy + here.tap.energy,
         )  # fmt: skip
         sample, done = sample + 1, done + 1
     outputs.marks[0] = done
@@ -131,7 +155,8 @@ def record_held(memory, blocks, layout, run, tip, now, step, book, outputs):
         energy = lifted(memory, size, layout.uneven, q2, energy)
         _write(
             memory, layout, now.home, q2, p2, outputs, sample, times[done], tip, _TOGETHER, energy,
-            book.work + work, book.dissipated + dissipated, book.lost,
+            book.work + work, book.dissipated + dissipated, book.lost, book.base_work, book.load_work,
+            book.circuit_energy,
         )  # fmt: skip
         outputs.values[sample, 1] = force
         sample, done = sample + 1, done + 1
@@ -149,6 +174,8 @@ def record_aside(memory, layout, tip, now, short, here, when, about, sample, boo
     _write(
         memory, layout, now.home, short.q1, short.p1, outputs, sample, when, tip, about, energy,
         book.work + here.work, book.dissipated + here.dissipated + here.lost, book.lost + here.lost,
+        book.base_work + here.given.base, book.load_work + here.given.load,
+        book.circuit_energy + here.tap.energy,
     )  # fmt: skip
     return sample + 1
 
@@ -168,7 +195,7 @@ def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, boo
     energy = lifted(memory, layout.size, layout.uneven, step.q1, energy)
     _write(
         memory, layout, now.home, step.q1, step.p1, outputs, sample, when, tip, seen1, energy, book.work,
-        book.dissipated, book.lost,
+        book.dissipated, book.lost, book.base_work, book.load_work, book.circuit_energy,
     )  # fmt: skip
     return sample + 1
 

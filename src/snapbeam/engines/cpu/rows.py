@@ -12,6 +12,7 @@ import math
 from typing import Any, NamedTuple
 
 from snapbeam.engines.cpu.uneven import pushed
+from snapbeam.engines.cpu.world.forced import shaken
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.lanes import (
     WIDTH,
@@ -82,6 +83,10 @@ class Layout(NamedTuple):
     """Longest flow, s, that polynomials serve; 0 if there is an overdamped or a still mode."""
     uneven: Any
     """Of unequal wells, an :class:`~snapbeam.engines.cpu.uneven.Uneven`; else None."""
+    forced: Any
+    """Of a moving base or a changing load, a :class:`~snapbeam.engines.cpu.world.forced.Forced`; else None."""
+    circuit: Any
+    """Of a harvester, a :class:`~snapbeam.engines.cpu.world.circuit.Circuit`; else None."""
 
 
 @inlined
@@ -224,7 +229,8 @@ def acceleration_rows(memory, layout, along_g, along_r, r, k):
     for row in range(0, layout.size, WIDTH):
         g_row = load(memory, layout.g + row)
         tension = tension_acceleration(along_g, along_r, g_row, load(memory, r + row))
-        store(memory, k + row, pushed(memory, layout.uneven, row, tension))
+        tension = pushed(memory, layout.uneven, row, tension)
+        store(memory, k + row, shaken(memory, layout.forced, row, tension))
 
 
 @inlined
@@ -242,6 +248,7 @@ def kick_and_flow(memory, layout, flow, weight, along_g, along_r, r, force, q, p
     for row in range(0, size, WIDTH):
         k = tension_acceleration(along_g, along_r, load(memory, layout.g + row), load(memory, r + row))
         k = pushed(memory, layout.uneven, row, k)
+        k = shaken(memory, layout.forced, row, k)
         k = fma(force, load(memory, layout.contact + row), k)
         kicked = fma(weight, k, load(memory, p + row))
         q_row, at = load(memory, q + row), flow + row

@@ -15,6 +15,8 @@ from snapbeam.engines.cpu.rows import (
 )
 from snapbeam.engines.cpu.step import observe, prepare
 from snapbeam.engines.cpu.uneven import about_level, above_own_well, lifted, put
+from snapbeam.engines.cpu.world.circuit import put_rate
+from snapbeam.engines.cpu.world.forced import changed_load, enter_forces
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS, Stages
 from snapbeam.engines.scalar.contact import contact_energy, is_impulsive
@@ -205,8 +207,10 @@ def run_of(memory, layout, stages, asked, i):
 def land(memory, blocks, layout, run, t, home, rows, touching, landed, sample):
     """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from a landing."""
     q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size
+    enter_forces(layout.forced, memory, run.struck.drive, phase_at(run, t))
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
+    along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
     acceleration_rows(memory, layout, along_g, along_r, r, k)
     tip = seen_from(run.struck, home, run.rest_contact)
     about = observe(memory, layout, tip, phase_at(run, t), q, p)
@@ -235,6 +239,7 @@ def begin(memory, blocks, place, asked, i, book):
         for row in range(size):
             memory[layout.g + row] = -memory[layout.g + row]
     put(memory, size, layout.uneven, record.home)
+    put_rate(memory, layout.circuit, record.circuit_rate)
     now, energy = land(memory, blocks, layout, run, 0, record.home, rows, False, 0, 0)
     seen, since = now.seen, record.contact_time
     touching = since >= 0.0
@@ -270,6 +275,7 @@ def change_well(memory, blocks, layout, home, q, k, r):
     put(memory, layout.size, layout.uneven, -home)
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
+    along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
     acceleration_rows(memory, layout, along_g, along_r, r, k)
     return 2.0 * gq + qr
 

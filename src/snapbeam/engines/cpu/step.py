@@ -17,6 +17,9 @@ from snapbeam.engines.cpu.rows import (
     tension_rows,
     tension_rows_twice,
 )
+from snapbeam.engines.cpu.world.around import around_kick
+from snapbeam.engines.cpu.world.circuit import Tap, kick_source, no_tap
+from snapbeam.engines.cpu.world.forced import Given, changed_load, enter_forces, no_given
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS
 from snapbeam.engines.scalar.contact import contact_force, is_lossy
@@ -60,6 +63,10 @@ class Done(NamedTuple):
     lost: float
     """In the contact."""
     dissipated: float
+    given: Given
+    """By a moving base and a changing axial load."""
+    tap: Tap
+    """What a circuit did."""
 
 
 @compiled
@@ -124,7 +131,7 @@ def _push(memory, layout, stages, tip, step, drive0, stage, weight, push):
 @inlined
 def _first(memory, layout, step, weight, force, ledger):
     """The kick that begins a step, with the acceleration known from the last one, and the flow after it."""
-    kick_rows(memory, layout, weight, step.k, force, step.p, step.p1)
+    kick_rows(memory, layout, weight, step.k, force, kick_source(layout.circuit, step), step.p1)
     if ledger is None:
         flow_rows(memory, layout.size, step.at, step.q, step.p1, step.q1, step.p1)
         return 0.0
@@ -153,6 +160,13 @@ def _kick(memory, layout, stages, step, stage, weight, along_g, along_r, force, 
     return before - modal_energy(memory, layout, q1, p1)
 
 
+@inlined
+def _forces(memory, layout, stages, tip, step, stage):
+    """Put the forces that follow from time at hand for a kick."""
+    now = step.phase + memory[stages.elapsed + stage] * step.length * tip.drive.omega
+    enter_forces(layout.forced, memory, tip.drive, now)
+
+
 @compiled
 def take_step(memory, blocks, layout, stages, tip, step, ledger):
     """Advance (q, p) with tension acceleration k by a step into (q1, p1, k1).
@@ -160,19 +174,27 @@ def take_step(memory, blocks, layout, stages, tip, step, ledger):
     Dissipation is added up unless *ledger* is None; nothing else depends on it, to the last bit.
     """
     drive0 = _begin_push(step, stages, layout.size)
-    push, gq, qr, dissipated = no_push(), 0.0, 0.0, 0.0
+    push, gq, qr, dissipated, given = no_push(), 0.0, 0.0, 0.0, (no_given(), no_tap())
     for stage in range(stages.flows + 1):
         weight = memory[stages.kick + stage] * step.length
         push = _push(memory, layout, stages, tip, step, drive0, stage, weight, push)
+        _forces(memory, layout, stages, tip, step, stage)
         if stage == 0:
             push = damped(memory, layout, tip, step, stage, weight, 0.0, 0.0, push)
+            given = around_kick(
+                memory, blocks, layout, tip, step, stage, weight, (0.0, 0.0, push.force), given
+            )
             dissipated += _first(memory, layout, step, weight, push.force, ledger)
             continue
         gq, qr = tension_rows(memory, blocks, layout, step.q1, step.r)
         along_g, along_r = tension_factors(layout.gamma, gq, qr)
+        along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
         push = damped(memory, layout, tip, step, stage, weight, along_g, along_r, push)
+        given = around_kick(
+            memory, blocks, layout, tip, step, stage, weight, (along_g, along_r, push.force), given
+        )
         dissipated += _kick(memory, layout, stages, step, stage, weight, along_g, along_r, push.force, ledger)
-    return Done(gq, qr, push.impulse, push.work, push.gross, push.lost, dissipated)
+    return Done(gq, qr, push.impulse, push.work, push.gross, push.lost, dissipated, given[0], given[1])
 
 
 @compiled
@@ -184,24 +206,42 @@ def take_two(memory, blocks, stages, layout_a, tip_a, a, layout_b, tip_b, b):
     drive_a, drive_b = _begin_push(a, stages, layout_a.size), _begin_push(b, stages, layout_b.size)
     push_a, gq_a, qr_a = no_push(), 0.0, 0.0
     push_b, gq_b, qr_b = push_a, 0.0, 0.0
+    given_a = (no_given(), no_tap())
+    given_b = given_a
     for stage in range(stages.flows + 1):
         weight_a, weight_b = memory[stages.kick + stage] * a.length, memory[stages.kick + stage] * b.length
         push_a = _push(memory, layout_a, stages, tip_a, a, drive_a, stage, weight_a, push_a)
         push_b = _push(memory, layout_b, stages, tip_b, b, drive_b, stage, weight_b, push_b)
+        _forces(memory, layout_a, stages, tip_a, a, stage)
+        _forces(memory, layout_b, stages, tip_b, b, stage)
         if stage == 0:
             push_a = damped(memory, layout_a, tip_a, a, stage, weight_a, 0.0, 0.0, push_a)
             push_b = damped(memory, layout_b, tip_b, b, stage, weight_b, 0.0, 0.0, push_b)
+            given_a = around_kick(
+                memory, blocks, layout_a, tip_a, a, stage, weight_a, (0.0, 0.0, push_a.force), given_a
+            )
+            given_b = around_kick(
+                memory, blocks, layout_b, tip_b, b, stage, weight_b, (0.0, 0.0, push_b.force), given_b
+            )
             _first(memory, layout_a, a, weight_a, push_a.force, None)
             _first(memory, layout_b, b, weight_b, push_b.force, None)
             continue
         gq_a, qr_a, gq_b, qr_b = tension_rows_twice(memory, blocks, layout_a, a.q1, a.r, layout_b, b.q1, b.r)
         g_a, r_a = tension_factors(layout_a.gamma, gq_a, qr_a)
         g_b, r_b = tension_factors(layout_b.gamma, gq_b, qr_b)
+        g_a, r_a = changed_load(memory, layout_a.forced, g_a, r_a)
+        g_b, r_b = changed_load(memory, layout_b.forced, g_b, r_b)
         push_a = damped(memory, layout_a, tip_a, a, stage, weight_a, g_a, r_a, push_a)
         push_b = damped(memory, layout_b, tip_b, b, stage, weight_b, g_b, r_b, push_b)
+        given_a = around_kick(
+            memory, blocks, layout_a, tip_a, a, stage, weight_a, (g_a, r_a, push_a.force), given_a
+        )
+        given_b = around_kick(
+            memory, blocks, layout_b, tip_b, b, stage, weight_b, (g_b, r_b, push_b.force), given_b
+        )
         _kick(memory, layout_a, stages, a, stage, weight_a, g_a, r_a, push_a.force, None)
         _kick(memory, layout_b, stages, b, stage, weight_b, g_b, r_b, push_b.force, None)
     return (
-        Done(gq_a, qr_a, push_a.impulse, push_a.work, push_a.gross, push_a.lost, 0.0),
-        Done(gq_b, qr_b, push_b.impulse, push_b.work, push_b.gross, push_b.lost, 0.0),
+        Done(gq_a, qr_a, push_a.impulse, push_a.work, push_a.gross, push_a.lost, 0.0, given_a[0], given_a[1]),
+        Done(gq_b, qr_b, push_b.impulse, push_b.work, push_b.gross, push_b.lost, 0.0, given_b[0], given_b[1]),
     )

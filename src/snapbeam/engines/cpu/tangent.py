@@ -18,6 +18,7 @@ from snapbeam.engines.cpu.rows import acceleration_rows, dot, flow_rows, kick_ro
 from snapbeam.engines.cpu.settling.after import after_step
 from snapbeam.engines.cpu.state import Place, begin, cut_slot, finish
 from snapbeam.engines.cpu.step import prepare, take_step
+from snapbeam.engines.cpu.world.forced import changed_load, enter_forces
 from snapbeam.engines.scalar.compile import compiled
 from snapbeam.engines.scalar.contact import contact_force, contact_slope
 from snapbeam.engines.scalar.lanes import WIDTH, fma, load, store
@@ -58,6 +59,9 @@ def carry_tangents(memory, blocks, place, run, tip, step, first, count):
         weight = memory[stages.kick + stage] * step.length
         gq, qr = tension_rows(memory, blocks, layout, q, r)
         along_g, along_r = tension_factors(layout.gamma, gq, qr)
+        at = step.phase + memory[stages.elapsed + stage] * step.length * tip.drive.omega
+        enter_forces(layout.forced, memory, tip.drive, at)
+        along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
         force, slope = 0.0, 0.0
         if step.touching:
             now = step.phase + memory[stages.elapsed + stage] * step.length * tip.drive.omega

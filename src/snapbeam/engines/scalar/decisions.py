@@ -14,6 +14,7 @@ __all__ = [
     "PIECES",
     "RELEASE",
     "STRETCHED",
+    "TRUST",
     "Clock",
     "Seen",
     "clock_of",
@@ -80,7 +81,7 @@ GRADING = 0.5
 RELEASE = 0.5
 # Safety of the bound on the speed of a signal, and for how many steps it is trusted.
 _MARGIN = 1.25
-_TRUST = 8
+TRUST = 8
 # Flight steps are halved where the squared slopes differ from those of the well by more than this many times
 # the well's own, and again at every doubling.
 STRETCHED = 4.0
@@ -161,7 +162,7 @@ def leave_contact_open(book, law, end, tick):
 @compiled
 def safe_for(distance, bound, tip_speed, acceleration, step):
     """For how long a signal at *distance* from zero cannot reach it, at most a few steps."""
-    horizon = _TRUST * step
+    horizon = TRUST * step
     speed = _MARGIN * bound + tip_speed + abs(acceleration) * horizon
     return select_less(distance, speed * horizon, distance / speed, horizon)
 

@@ -10,6 +10,7 @@ from numba.extending import intrinsic, overload
 
 from snapbeam.engines.scalar.compile import INLINE, inlined
 from snapbeam.engines.scalar.contact import scalar_function
+from snapbeam.engines.scalar.joined import joined_motion
 from snapbeam.engines.scalar.physics import shaker_motion, sincos
 
 __all__ = ["Tip", "drive_rate", "numbers_of", "seen_from", "tip_acceleration", "tip_motion", "turned_motion"]
@@ -42,6 +43,8 @@ def tip_motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
         motion: tuple[float, float] = shaker_motion.py_func(drive.amplitude, drive.omega, sine, cosine)
         return motion
     owner: Any = type(drive).owner
+    if owner.parts:
+        return joined_motion(drive, memory, argument)
     moved: tuple[float, float] = owner.motion(drive, memory, argument)
     return moved
 
@@ -56,6 +59,8 @@ def _tip_motion(drive, memory, argument):
             return shaker_motion(drive.amplitude, drive.omega, sine, cosine)
 
         return harmonic
+    if owner.parts:
+        return lambda drive, memory, argument: joined_motion(drive, memory, argument)
     motion = scalar_function(owner, "motion")
     return lambda drive, memory, argument: motion(drive, memory, argument)
 
@@ -79,6 +84,8 @@ def _tip_acceleration(drive, memory, argument):
             return -drive.omega * drive.omega * drive.amplitude * sine
 
         return harmonic
+    if owner.parts:  # under Newton's law alone, which is refused beside what else moves
+        return lambda drive, memory, argument: 0.0
     acceleration = scalar_function(owner, "acceleration")
     return lambda drive, memory, argument: acceleration(drive, memory, argument)
 
@@ -99,6 +106,8 @@ def _turned_motion(drive, memory, argument, sine, cosine):
         return lambda drive, memory, argument, sine, cosine: shaker_motion(
             drive.amplitude, drive.omega, sine, cosine
         )
+    if drive.instance_class.owner.parts:
+        return lambda drive, memory, argument, sine, cosine: joined_motion(drive, memory, argument)
     motion = scalar_function(drive.instance_class.owner, "motion")
     return lambda drive, memory, argument, sine, cosine: motion(drive, memory, argument)
 

@@ -47,11 +47,15 @@ class Drive:
     marched_as: ClassVar[type[Drive] | None] = None
     """The drive whose kernels march it, where that is another one."""
     number_names: ClassVar[tuple[str, ...]] = ("omega",)
+    parts: ClassVar[tuple[tuple[str, type[Drive]], ...]] = ()
+    """What moves, by name, of several motions that are marched as one: :mod:`snapbeam.model.drive.joined`."""
+    registry: ClassVar[dict[str, type[Drive]]] = DRIVES
+    """Where it is entered by its name."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         if cls.name:
-            DRIVES[cls.name] = cls
+            cls.registry[cls.name] = cls
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -82,6 +86,15 @@ class Drive:
     def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """As the first of :meth:`bounds`, of the mirror image of the motion; the same unless it is lopsided."""
         return self.bounds(columns, scale)[0]
+
+    @classmethod
+    def shakes(cls) -> bool:
+        """Whether a base may move so: its acceleration has a known bound."""
+        return cls.hardest is not Drive.hardest
+
+    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """Greatest acceleration (m/s^2) ever, shape (runs,): of a motion that a base may have."""
+        raise NotImplementedError
 
     def samples(self) -> _Array:
         """What kernels look up, as one row; empty for a formula."""

@@ -20,6 +20,8 @@ __all__ = ["Burst"]
 _Array = NDArray[np.float64]
 _STEEPEST = 1.875
 """Greatest slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
+_SHARPEST = 5.7736
+"""Its greatest curvature, 10/sqrt(3)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,6 +93,14 @@ class Burst(Timed):
         shortest = np.minimum(found["rise"], found["fall"])
         speed = found["amplitude"] * (found["rate"] + steep / shortest) + found["retreat"] * steep
         return found["amplitude"], speed
+
+    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """That of the sine with the steepest and the sharpest envelope, and that of the retreat."""
+        found = self.shape_numbers(columns, scale)
+        per, rate = found["rate"] / (2.0 * math.pi), found["rate"]
+        shortest = np.minimum(found["rise"], found["fall"])
+        shape = rate**2 + 2.0 * rate * _STEEPEST * per / shortest + _SHARPEST * (per / shortest) ** 2
+        return np.asarray(found["amplitude"] * shape + found["retreat"] * _SHARPEST * per**2)
 
     @staticmethod
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:

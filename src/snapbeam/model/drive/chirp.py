@@ -78,6 +78,15 @@ class Chirp(Timed):
         relative = np.abs(np.log(found["last"] / found["first"])) / found["duration"]
         return highest, found["speed"] + highest * np.maximum(linear, relative)
 
+    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """That of the fastest sine, with what the change of the frequency adds."""
+        found = self.shape_numbers(columns, scale)
+        slowest, fastest = np.minimum(found["first"], found["last"]), found["fastest"]
+        linear = np.abs(found["last"] - found["first"]) / found["duration"]
+        logarithmic = np.abs(np.log(found["last"] / found["first"])) / found["duration"] * fastest
+        change = np.maximum(linear, logarithmic) / slowest
+        return np.asarray(found["speed"] * (fastest + 3.0 * change + 3.0 * change**2 / slowest))
+
     @staticmethod
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
         """The sine of the turned angle over the present frequency, and its derivative."""

@@ -21,6 +21,8 @@ _Array = NDArray[np.float64]
 LINES = 32
 """Sines that the noise is made of, one in each equal part of the band, at a random place in it."""
 _STEEPEST = 1.875
+_SHARPEST = 5.7736
+"""Greatest curvature of x^3 (10 - 15 x + 6 x^2) on [0, 1], 10/sqrt(3)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +108,15 @@ class Noise(Timed):
         lowest = found["low"] + parts * (found["high"] - found["low"])
         highest = found["strength"] * np.sum(1.0 / lowest, axis=0)
         return highest, LINES * found["strength"] + highest * _STEEPEST / found["rise"]
+
+    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """All sines at their hardest at once, with what the envelope adds."""
+        found = self.shape_numbers(columns, scale)
+        parts = ((np.arange(LINES) + 1) / LINES)[:, None]
+        fastest = found["low"] + parts * (found["high"] - found["low"])
+        own = found["strength"] * np.sum(fastest, axis=0)
+        rising = 2.0 * _STEEPEST * LINES * found["strength"] / found["rise"]
+        return np.asarray(own + rising + _SHARPEST * self.bounds(columns, scale)[0] / found["rise"] ** 2)
 
     @staticmethod
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:

@@ -93,6 +93,12 @@ class TwoSines(Timed):
         a, b = found["amplitude"], found["second_amplitude"]
         return a + b * (1.0 - np.sin(found["second_phase"])), a * found["rate"] + b * found["second_rate"]
 
+    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """Both at their hardest at once."""
+        found = self.shape_numbers(columns, scale)
+        first = found["amplitude"] * found["rate"] ** 2
+        return np.asarray(first + found["second_amplitude"] * found["second_rate"] ** 2)
+
     @staticmethod
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
         """The sum, and its derivative."""

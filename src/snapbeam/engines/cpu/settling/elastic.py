@@ -13,9 +13,13 @@ from snapbeam.engines.cpu.settling.look import look_inside
 from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot, look_slot
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.cpu.uneven import about_level, above_own_well, at_center, lifted, second_well
+from snapbeam.engines.cpu.world.around import count_given
+from snapbeam.engines.cpu.world.circuit import count_circuit
+from snapbeam.engines.cpu.world.forced import extra_speed
 from snapbeam.engines.scalar.compile import inlined
 from snapbeam.engines.scalar.contact import jumps, slack_at
 from snapbeam.engines.scalar.decisions import (
+    TRUST,
     Seen,
     count_in_step,
     entry_again,
@@ -83,10 +87,12 @@ def meets(memory, layout, run, now, tip, step, seen1, room):
     size = layout.size
     if after > safe_gap:
         bound = speed_bound(memory, layout, layout.contact, step.q, step.p)
+        bound += extra_speed(layout.forced, memory, size, tip.drive, layout.contact, TRUST * run.step_time)
         push = dot(memory, size, layout.contact, step.k)
         safe_gap = now.t + int(safe_for(-seen.d, bound, run.tip_speed, push, run.step_time) / tick)
     if after > safe_center:
         bound = speed_bound(memory, layout, layout.center, step.q, step.p)
+        bound += extra_speed(layout.forced, memory, size, tip.drive, layout.center, TRUST * run.step_time)
         push = dot(memory, size, layout.center, step.k)
         safe_center = now.t + int(
             safe_for(abs(at_center(layout.uneven, seen.c)), bound, 0.0, push, run.step_time) / tick
@@ -197,6 +203,8 @@ def settle(memory, blocks, place, run, now, step, done, room, book, asked, outpu
         book.work += done.work
         book.gross_work += done.gross
         book.lost += done.lost
+    count_given(layout.forced, book, done.given)
+    count_circuit(memory, layout, layout.circuit, step.p1, book, done.tap)
     if outputs is not None:
         book.dissipated += done.dissipated + done.lost
     track(book, seen, seen1, step.length)

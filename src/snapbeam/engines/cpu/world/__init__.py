@@ -1,0 +1,1 @@
+"""What surrounds a beam, in a march: forces on every mode that change in time, and circuits."""

@@ -1,0 +1,70 @@
+"""An axial load that changes: an independent solution, its work, slow unbuckling, and parametric resonance."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from around_oracle import Surroundings, live
+from oracle import PaperBeam
+from test_moving_base import SLOW, ledger, model
+
+import snapbeam as sb
+from snapbeam.core.validate import InputError
+
+
+@pytest.mark.parametrize("modes", [pytest.param(1, marks=SLOW), 3, pytest.param(8, marks=SLOW)])
+def test_against_an_independent_solution(modes) -> None:
+    """With a base beside it: several motions, each by its own clock."""
+    beam, cycles = PaperBeam(modes), 3
+    first = float(beam.omega[0])
+    size = 0.3 * beam.gamma * beam.rest[0] ** 2
+    hardest = 0.1 * 0.335e-3 * first**2
+
+    def base(t: float) -> tuple[float, float, float]:
+        return 0.0, 0.0, -hardest * math.sin(0.9 * first * t)
+
+    around = Surroundings(base, lambda t: size * math.sin(1.7 * first * t + 0.4))
+    times = np.linspace(0.0, cycles * 2.0 * math.pi / (0.9 * first), 801) * (1.0 - 1e-13)
+    truth = live(beam, around, times)
+    system = sb.System(
+        model(modes),
+        base=sb.Base(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1)),
+        axial=sb.AxialLoad(motion=sb.LoadSine(frequency_ratio=1.7, amplitude=size, phase=0.4)),
+    )
+    for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
+        run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
+        data = run.dataset
+        np.testing.assert_allclose(data.center_displacement, truth.center_displacement, rtol=0.0, atol=bound)
+        for name in ("base_work", "load_work"):
+            wanted = getattr(truth, name)
+            own = data["work_base" if name == "base_work" else "work_load"]
+            np.testing.assert_allclose(own, wanted, rtol=0.0, atol=10 * bound * np.abs(wanted).max())
+        assert ledger(run) < 1e-4
+
+
+def test_slow_unbuckling() -> None:
+    """A load that falls slowly takes the well with it, quasi-statically."""
+    beam = model(1)
+    excess = float(beam.tension_stiffness * beam.equilibrium[0] ** 2)
+    ramp = sb.LoadRamp(change=-0.5 * excess, duration=60.0)
+    run = sb.simulate(sb.System(beam, axial=sb.AxialLoad(motion=ramp)), sb.Integration(cycles=80))
+    # quasi-statically alpha^2 = (P - P_cr)/gamma
+    assert float(run.dataset.center_displacement[-1]) == pytest.approx(-math.sqrt(0.5), abs=2e-3)
+    assert ledger(run) < 1e-4
+    assert float(run.dataset.load_change[-1]) == pytest.approx(-0.5 * excess)
+
+
+def test_refusals() -> None:
+    with pytest.raises(InputError, match="must be a LoadSine"):
+        sb.AxialLoad(motion=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1))
+    plain = sb.ReducedModel.from_matrices(
+        [[1.0]], [-1.0], contact_shape=[1.0], tension_stiffness=1.0, equilibrium=[-1.0]
+    )
+    load = sb.AxialLoad(motion=sb.LoadSine(frequency_ratio=2.0, amplitude=1.0))
+    with pytest.raises(InputError, match="has its load in its stiffness"):
+        sb.System(plain, axial=load)
+    system = sb.System(model(1), axial=load)
+    assert sb.System.from_mapping(system.to_mapping()) == system
+    assert system.replace(**{"axial.amplitude": 2.0}).get("axial.amplitude") == 2.0

@@ -1,0 +1,143 @@
+"""Harvesters: an independent solution with the circuit as its own equation, the ledger, the limits, what is refused."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from around_oracle import Surroundings, live, slopes
+from oracle import LENGTH, LEVEL, PaperBeam
+from test_moving_base import SLOW, ledger, model
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.core.validate import InputError
+
+THETA, CAPACITANCE = 4e-3, 60e-9
+PIEZO = sb.Piezo(coupling=THETA, capacitance=CAPACITANCE, resistance=2e4, start=0.0, stop=0.25)
+
+
+def shaken(
+    modes: int, harvester: sb.Piezo | sb.Coil, ratio: float = 0.9, strength: float = 0.25
+) -> sb.System:
+    motion = sb.AccelerationSine(frequency_ratio=ratio, acceleration_amplitude=strength)
+    return sb.System(model(modes), base=sb.Base(motion=motion), harvester=harvester)
+
+
+def compare(
+    modes: int, cycles: int, harvester: sb.Piezo | sb.Coil, row, inertia: float, loss: float, volts: float
+) -> None:
+    beam, ratio, strength = PaperBeam(modes), 0.9, 0.25
+    omega, hardest = ratio * float(beam.omega[0]), strength * LEVEL * float(beam.omega[0]) ** 2
+
+    def base(t: float) -> tuple[float, float, float]:
+        return 0.0, 0.0, -hardest * math.sin(omega * t)
+
+    times = np.linspace(0.0, cycles * 2.0 * math.pi / omega, 801) * (1.0 - 1e-13)
+    around = Surroundings(base, coupling=row(beam), inertia=inertia, loss=loss)
+    truth = live(beam, around, times)
+    free = live(beam, Surroundings(base), times)
+    # the circuit matters: what is met is not the beam without it
+    assert np.abs(truth.center_displacement - free.center_displacement).max() > 3e-3
+    for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
+        run = sb.simulate(
+            shaken(modes, harvester), sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times
+        )
+        data = run.dataset
+        np.testing.assert_allclose(data.center_displacement, truth.center_displacement, rtol=0.0, atol=bound)
+        size = float(np.abs(truth.z).max())
+        np.testing.assert_allclose(
+            data.voltage, volts * truth.z, rtol=0.0, atol=10 * bound * abs(volts) * size
+        )
+        share = float(harvester.share(np.array([harvester.resistance]))[0])
+        given = share * truth.circuit
+        np.testing.assert_allclose(data.energy_harvested, given, rtol=0.0, atol=10 * bound * given[-1])
+        assert run.outcome.harvested_energy == pytest.approx(given[-1], rel=10 * bound)
+        assert run.outcome.harvested_power == pytest.approx(given[-1] / times[-1], rel=10 * bound)
+        assert ledger(run) < 1e-4
+
+
+@pytest.mark.parametrize("modes", [pytest.param(1, marks=SLOW), 3, pytest.param(8, marks=SLOW)])
+def test_piezo(modes) -> None:
+    def row(beam):
+        return THETA * (slopes(beam, 0.25 * LENGTH) - slopes(beam, 0.0))
+
+    compare(modes, 4 if modes == 1 else 2, PIEZO, row, CAPACITANCE, 1.0 / 2e4, 1.0)
+
+
+@pytest.mark.parametrize("modes", [pytest.param(1, marks=SLOW), 3, pytest.param(8, marks=SLOW)])
+@pytest.mark.parametrize("inductance", [0.0, pytest.param(0.01, marks=SLOW)])
+def test_coil(modes, inductance) -> None:
+    coil = sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, inductance=inductance, location=0.4)
+
+    def row(beam):
+        return 1.5 * beam.shape(0.4 * LENGTH)
+
+    compare(modes, 4 if modes == 1 else 2, coil, row, inductance, 40.0, -30.0)
+
+
+def test_a_layer_that_does_not_couple_changes_nothing() -> None:
+    """theta to 0: the struck beam without a harvester, to the error of the level."""
+    shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
+    steps = sb.Integration(cycles=1, accuracy="reference")
+    bare = sb.simulate(sb.System(model(3), paper.CONTACT, shaker), steps).end.amplitude
+    errors = []
+    for coupling in (1e-4, 1e-5, 0.0):
+        system = sb.System(model(3), paper.CONTACT, shaker, harvester=PIEZO.__class__(
+            coupling=coupling, capacitance=CAPACITANCE, resistance=2e4))  # fmt: skip
+        errors.append(np.abs(sb.simulate(system, steps).end.amplitude - bare).max() / abs(bare[0]))
+    assert errors[0] > 30.0 * errors[1]
+    assert errors[2] < 1e-9
+
+
+def test_sweep_of_the_load_has_an_optimum() -> None:
+    """Under a gentle shake the power over the resistance is that of linear theory, with one maximum near 1/(omega C).
+
+    The start rings down within the run, which is long against 1/(zeta omega).
+    """
+    ratio, strength = 0.6, 1e-3
+    system = shaken(1, PIEZO, ratio, strength)
+    beam = system.model
+    loads = np.geomspace(2e3, 2e6, 7)
+    found = sb.sweep(system, {"harvester.resistance": loads}, sb.Integration(cycles=150))
+    from snapbeam.model.world.base import rigid_mass
+
+    theta = float((beam.linear_modes.T @ PIEZO.row(beam))[0])
+    pull = float((beam.linear_modes.T @ rigid_mass(beam))[0])
+    omega, zeta = float(beam.omega[0]), float(beam.damping_ratio[0])
+    at = ratio * omega
+    hardest = strength * paper.BEAM.buckling_level * omega**2
+    voltage = []
+    for load in loads:
+        circuit = -1j * at * theta / (1j * at * CAPACITANCE + 1.0 / load)
+        q = pull * hardest / (omega**2 - at**2 + 2j * zeta * omega * at - theta * circuit)
+        voltage.append(abs(circuit * q))
+    expected = np.array(voltage) ** 2 / (2.0 * loads)
+    np.testing.assert_allclose(found.harvested_power.values, expected, rtol=0.15)
+    assert 0 < int(found.harvested_power.argmax()) < loads.size - 1
+
+
+def test_refusals() -> None:
+    with pytest.raises(InputError, match=r"start = 0.5: must be less than stop"):
+        sb.Piezo(coupling=1e-3, capacitance=1e-9, resistance=1e4, start=0.5, stop=0.4)
+    shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
+    with pytest.raises(InputError, match=r"use a HertzContact"):
+        sb.System(model(1), sb.HuntCrossley(4e8, 1.0), shaker, harvester=PIEZO)
+    with pytest.raises(InputError, match="tangent with a harvester"):
+        sb.advance(sb.System(model(1), paper.CONTACT, shaker, harvester=PIEZO), tangent=np.zeros((1, 2, 1)))
+    system = sb.System(model(1), paper.CONTACT, shaker, harvester=PIEZO)
+    assert sb.System.from_mapping(system.to_mapping()) == system
+    assert system.replace(**{"harvester.resistance": 5e3}).get("harvester.resistance") == 5e3
+
+
+def test_layers_by_their_material() -> None:
+    """Two faces in series have the moment of one and half its capacitance, in parallel twice both."""
+    parts = {
+        "stress_constant": -16.6, "permittivity": 25.55e-9, "layer_thickness": 0.2e-3, "layer_width": 15e-3,
+        "beam": paper.BEAM, "resistance": 1e4,
+    }  # fmt: skip
+    series, parallel = (sb.Piezo.from_material(wiring=wiring, **parts) for wiring in ("series", "parallel"))
+    assert series.coupling == pytest.approx(-16.6 * 15e-3 * 0.3e-3)
+    assert series.capacitance == pytest.approx(0.5 * 25.55e-9 * 15e-3 * 0.25 * 0.161 / 0.2e-3)
+    assert parallel.coupling == 2.0 * series.coupling and parallel.capacitance == 4.0 * series.capacitance
