@@ -24,7 +24,7 @@ from snapbeam.engines.cpu.uneven import about_level, at_center
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.decisions import Seen, count_in_step, track
 from snapbeam.engines.scalar.extras import observe as observe_extras
-from snapbeam.engines.scalar.signals import first_rise
+from snapbeam.engines.scalar.signals import cubic, first_rise, root
 from snapbeam.engines.scalar.tip import seen_from
 
 __all__ = ["settle_newton"]
@@ -113,7 +113,7 @@ def _rises(looked, pieces, piece, still, still_speed):
             return i * piece
         i += 1
     while i < pieces:
-        rise = first_rise(min(looked[i, 0], 0.0), looked[i, 1], looked[i + 1, 0], looked[i + 1, 1], piece)
+        rise = _rise(min(looked[i, 0], 0.0), looked[i, 1], looked[i + 1, 0], looked[i + 1, 1], piece)
         if rise >= 0.0:
             return (i + rise) * piece
         i += 1
@@ -121,30 +121,108 @@ def _rises(looked, pieces, piece, still, still_speed):
 
 
 @inlined
-def _located(memory, blocks, place, run, tip, step, entry, at_end, still_speed):
+def _mend(looked, pieces, length, about):
+    """Bend what was seen inside a step to what is seen at its end.
+
+    It was seen by linear modes under a tension that changes evenly, and a hit of a beam that passes the tip by a
+    billionth of b is one all the same.  The bend is the cubic that begins with neither value nor slope.
+    """
+    off, slope = about.d - looked[pieces, 0], (about.dv - looked[pieces, 1]) * length
+    for i in range(1, pieces + 1):
+        u = i / pieces
+        looked[i, 0] += u * u * (off * (3.0 - 2.0 * u) + slope * (u - 1.0))
+        looked[i, 1] += u * (off * 6.0 * (1.0 - u) + slope * (3.0 * u - 2.0)) / length
+
+
+@inlined
+def _turns(u0, v0, u1, v1, h):
+    """Where in [0, 1] the cubic has its least and its greatest value between two falls; -1 and -1 if it only falls."""
+    _, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
+    inside = c2 * c2 - 3.0 * c1 * c3
+    if not (c3 < 0.0 and inside > 0.0):
+        return -1.0, -1.0
+    root_of = math.sqrt(inside)
+    # without differences of what is alike
+    bottom = c1 / (-c2 - root_of) if c2 > 0.0 else (c2 - root_of) / (-3.0 * c3)
+    return bottom, (c2 + root_of) / (-3.0 * c3)
+
+
+@compiled
+def _rise(u0, v0, u1, v1, h):
+    """As first_rise, and where the signal falls at both ends and has risen between them."""
+    rise = first_rise(u0, v0, u1, v1, h)
+    if rise >= 0.0 or v0 > 0.0 or v1 > 0.0:
+        return rise
+    bottom, top = _turns(u0, v0, u1, v1, h)
+    if not (0.0 <= bottom < top < 1.0):
+        return -1.0
+    c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
+    if ((c3 * top + c2) * top + c1) * top + c0 <= 0.0:
+        return -1.0
+    return root(c0, c1, c2, c3, bottom, top)
+
+
+@compiled
+def _entry(looked, pieces, piece):
+    """When the penetration first becomes positive; -1 if it does not."""
+    for i in range(pieces):
+        rise = _rise(looked[i, 0], looked[i, 1], looked[i + 1, 0], looked[i + 1, 1], piece)
+        if rise >= 0.0:
+            return (i + rise) * piece
+    return -1.0
+
+
+@compiled
+def _top(looked, pieces, piece, entry):
+    """When the penetration is greatest first after *entry*; the end of the step if it only grows."""
+    for i in range(min(int(entry / piece), pieces - 1), pieces):
+        v0, v1 = looked[i, 1], looked[i + 1, 1]
+        if v1 < 0.0:
+            if v0 > 0.0:
+                return (i + v0 / (v0 - v1)) * piece
+            _, top = _turns(looked[i, 0], v0, looked[i + 1, 0], v1, piece)
+            if (i + top) * piece > entry:
+                return (i + top) * piece
+    return pieces * piece
+
+
+@inlined
+def _cut_at(memory, blocks, place, run, tip, step, length):
+    """A step cut to *length*; what it gave, and what is seen there."""
+    cut = cut_to(step, run, 0, length)
+    prepare(memory, place.layout, place.stages, run.struck.drive, cut.length, cut.at)
+    done = take_step(memory, blocks, place.layout, place.stages, tip, cut, True)
+    phase = step.phase + tip.drive.omega * cut.length
+    return cut, done, observe(memory, place.layout, tip, phase, step.q1, step.p1)
+
+
+@inlined
+def _located(memory, blocks, place, run, tip, step, entry, top, at_end, still_speed):
     """The step cut at the hit itself, by Newton's method on the trajectory; what it gave, and what is seen there.
 
-    *at_end* is the penetration at the end of the whole step.  The last value says whether there is a hit at all:
-    whether the bodies meet within the step, and do not merely graze.
+    *top* is where the penetration is greatest if it falls again within the step, *at_end* that at the end of the
+    whole step.  The last value says whether there is a hit at all: whether the bodies meet within the step, and do not
+    merely graze.
     """
-    layout, stages = place.layout, place.stages
-    cut = cut_to(step, run, 0, entry)
     before, low, high = math.inf, 0.0, step.length
-    prepare(memory, layout, stages, run.struck.drive, cut.length, cut.at)
-    done = take_step(memory, blocks, layout, stages, tip, cut, True)
-    about = observe(memory, layout, tip, step.phase + tip.drive.omega * cut.length, step.q1, step.p1)
+    if at_end < 0.0 and top < step.length:
+        cut, done, about = _cut_at(memory, blocks, place, run, tip, step, top)
+        if about.d <= 0.0:
+            return cut, done, about, False
+        high, at_end = top, about.d
+    cut, done, about = _cut_at(memory, blocks, place, run, tip, step, entry)
     for _ in range(_LOCATIONS):
-        if about.dv <= still_speed:
+        if about.dv <= still_speed and not (at_end > 0.0 and about.d > 0.0):
             break
-        change = -about.d / about.dv
-        if abs(change) >= 0.5 * before:
+        change = -about.d / about.dv if about.dv > still_speed else -math.inf
+        if abs(change) >= 0.5 * before and before < math.inf:
             break
         wanted = cut.length + change
         if about.d < 0.0:
             low = cut.length
         else:
             high = cut.length
-        if wanted >= step.length and at_end < 0.0 and high == step.length:
+        if wanted >= high and at_end < 0.0:
             return cut, done, about, False  # they meet in the next step
         if wanted < low or wanted > high:
             # the way is bent: halve what is known to hold the hit
@@ -152,10 +230,7 @@ def _located(memory, blocks, place, run, tip, step, entry, at_end, still_speed):
                 break
             wanted, change = 0.5 * (low + high), math.inf
         before = abs(change)
-        cut = cut_to(step, run, 0, wanted)
-        prepare(memory, layout, stages, run.struck.drive, cut.length, cut.at)
-        done = take_step(memory, blocks, layout, stages, tip, cut, True)
-        about = observe(memory, layout, tip, step.phase + tip.drive.omega * cut.length, step.q1, step.p1)
+        cut, done, about = _cut_at(memory, blocks, place, run, tip, step, wanted)
     return cut, done, about, about.dv > still_speed
 
 
@@ -206,16 +281,18 @@ def settle_newton(memory, blocks, place, run, now, step, done, room, book, asked
         )
     met = meets(memory, layout, run, now, tip, step, about, room)
     entry = met.entry
+    if met.pieces > 0:
+        _mend(room.looked, met.pieces, step.length, about)
+        if t + step.ticks > met.safe_gap:
+            entry = _entry(room.looked, met.pieces, met.piece)
     if seen.d > -still_speed * run.step_time and met.pieces > 0:
         still = still_speed * run.step_time
         entry = _rises(room.looked, met.pieces, met.piece, still, still_speed)
-    if entry < 0.0 and seen.d < 0.0 and about.d > 0.0 and about.dv > still_speed:
-        # what was looked into is the modes' own way: they met at the very end of the step
-        entry = max(0.0, step.length - about.d / about.dv)
     hit, ticks = False, step.ticks
     if entry >= 0.0:
+        top = _top(room.looked, met.pieces, met.piece, entry)
         located, done, about, hit = _located(
-            memory, blocks, place, run, tip, step, entry, about.d, still_speed
+            memory, blocks, place, run, tip, step, entry, top, about.d, still_speed
         )
         ticks = min(max(1, math.ceil(located.length / tick)), step.ticks)
         if hit:
