@@ -112,18 +112,21 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
                 label="simulated",
             )  # fmt: skip
             ax.set_ylabel(f"{word} ($b$)")
-        for ax, impacts, color, height in (
-            (top, result.measured_impacts, BEAM_COLOR, 0.03),
-            (top, result.simulated_impacts, SHAKER_COLOR, 0.09),
+        for ax, impacts, color, height, word in (
+            (top, result.measured_impacts, BEAM_COLOR, 0.03, "impact, measured"),
+            (top, result.simulated_impacts, SHAKER_COLOR, 0.09, "impact, simulated"),
         ):
             shown = impacts[(impacts >= cycle[0]) & (impacts <= cycle[-1])]
             if shown.size:
                 ax.plot(
                     shown, np.full(shown.size, height), "|", color=color, markersize=5,
-                    transform=ax.get_xaxis_transform(),
+                    transform=ax.get_xaxis_transform(), label=word,
                 )  # fmt: skip
         difference = waveforms["measured_displacement"] - waveforms["simulated_displacement"]
-        bottom.axhspan(-result.apart, result.apart, color=CENTER_COLOR, alpha=0.35, linewidth=0.0)
+        bottom.axhspan(
+            -result.apart, result.apart, color=CENTER_COLOR, alpha=0.35, linewidth=0.0,
+            label=rf"within {result.apart:.2g} $b$",
+        )  # fmt: skip
         bottom.plot(cycle, difference, color=BEAM_COLOR, linewidth=0.7)
         bottom.set(
             xlabel=r"Cycles of excitation $\tau$", ylabel="difference ($b$)", xlim=(cycle[0], cycle[-1])
@@ -136,8 +139,9 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
             f"{parted}; RMS difference {result.rms_difference:.3f} $b$, correlation {result.correlation:.3f}",
             loc="left",
         )
-        handles, labels = top.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=2)
+        parts = [ax.get_legend_handles_labels() for ax in (top, bottom)]
+        handles, labels = ([*one, *other] for one, other in zip(*parts, strict=True))
+        figure.legend(handles, labels, loc="outside upper right", ncols=len(labels))
         figure.align_ylabels((top, middle, bottom))
         fix_ticks(top, middle, bottom)
     return figure

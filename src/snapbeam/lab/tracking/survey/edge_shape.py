@@ -71,32 +71,31 @@ def edge_shape(
 def _symmetry(x: Floats, y: Floats, error: Floats, ratio: float, sign: float) -> tuple[float, float, float]:
     """Gamma that makes the edge symmetric in light, its standard error, and where its centre then lies.
 
-    The centre is 0 where a linear camera will do; of two curves that do alike, it is that of the one further off.
+    The centre is 0 where a linear camera will do.
     """
     outer = np.abs(x) > 0.8 * np.abs(x).max()
     low, high = float(y[outer & (x < 0.0)].mean()), float(y[outer & (x > 0.0)].mean())
     y, error = (y - low) / (high - low), error / (high - low)
     found = np.array([_asymmetry(x, *_light(y, error, gamma, ratio, sign)) for gamma in _GAMMAS])
     scatter, centres = found[:, 0], found[:, 1]
-    best = first = int(np.argmin(scatter))
+    best = int(np.argmin(scatter))
     freedom = max(float(np.count_nonzero((x > 0.0) & (x < 4.0))) - 2.0, 1.0)
     unit = max(1.0, scatter[best] / freedom)
-    # whether the edge is bent is asked of the curve that does best, whichever curve is the likelier one
-    worse = (float(np.interp(0.0, np.log(_GAMMAS), scatter)) - scatter[best]) / unit
-    # a strong curve can bend one symmetric edge into another: one near 1 that does as well is the likelier
+    # a strong curve can bend one symmetric edge into another: one near 1 that does as well is the likelier, if curves
+    # on both sides of it do worse; where they only get worse towards 1, the strong one is what bent the edge
     likely = np.flatnonzero(np.abs(np.log(_GAMMAS)) < _LIKELY)
     other = int(likely[np.argmin(scatter[likely])])
-    if (scatter[other] - scatter[best]) / unit < _CERTAIN:
+    least = scatter[other] <= scatter[[other - 1, other + 1]].min()
+    if least and (scatter[other] - scatter[best]) / unit < _CERTAIN:
         best, unit = other, max(1.0, scatter[other] / freedom)
+    worse = (float(np.interp(0.0, np.log(_GAMMAS), scatter)) - scatter[best]) / unit
     alike = (np.abs(scatter - scatter[best]) / unit < 1.0) & (
         np.abs(np.log(_GAMMAS / _GAMMAS[best])) < _LIKELY
     )
     spread = np.log(_GAMMAS[alike])
-    ambiguous = abs(math.log(_GAMMAS[best] / _GAMMAS[first])) if first not in np.flatnonzero(alike) else 0.0
-    log_se = max(0.5 * float(np.ptp(spread)), 0.5 * math.log(_GAMMAS[1] / _GAMMAS[0]), ambiguous)
+    log_se = max(0.5 * float(np.ptp(spread)), 0.5 * math.log(_GAMMAS[1] / _GAMMAS[0]))
     gamma = float(_GAMMAS[best])
-    widest = max((best, first), key=lambda k: abs(centres[k]))
-    shift = float(centres[widest]) if worse > _CERTAIN else 0.0
+    shift = float(centres[best]) if worse > _CERTAIN else 0.0
     return gamma, gamma * log_se, shift
 
 
