@@ -13,7 +13,7 @@ import panel as pn
 from snapbeam import InputError, write_netcdf
 from snapbeam.explorer.downloads import drawing, file_bytes
 from snapbeam.explorer.jobs import Token
-from snapbeam.explorer.limits import UPLOAD
+from snapbeam.explorer.limits import UPLOAD, too_large
 from snapbeam.explorer.lines import map_command, python_lines, run_command
 
 if TYPE_CHECKING:
@@ -113,6 +113,10 @@ class TakeCard:
         windows = self.page.card.windows()
         return windows[-1] if windows else None
 
+    def refuse(self, words: str) -> None:
+        """Say what cannot be done."""
+        self.words.object = f'<p class="bad" role="alert">{html.escape(words)}</p>'
+
     # ------------------------------------------------------------------ files
 
     def _make(self, name: str, suffix: str, write: Callable[[Any, Token], object]) -> None:
@@ -152,7 +156,7 @@ class TakeCard:
         try:
             cut = self._cut()
         except InputError as error:
-            self.words.object = f'<p class="bad">{html.escape(str(error))}</p>'
+            self.refuse(str(error))
             return
         quasi = "quasi" in self.page.card.layers.value
         dots = self.page.card.dots if "dots" in self.page.card.layers.value else None
@@ -214,10 +218,7 @@ class TakeCard:
             return
 
         def write(path: Any, _: Token) -> None:
-            whole = source.skeleton.drop_vars(list(source.skeleton.data_vars))
-            for name in source.numbers():
-                whole[name] = source.values(name)
-            write_netcdf(whole, path)
+            write_netcdf(source.whole(), path)
 
         self._make("map", ".nc", write)
 
@@ -237,14 +238,14 @@ class TakeCard:
         attrs = self.page.card.source.attrs
         try:
             if len(content) > UPLOAD:
-                raise InputError(f"the file has {len(content)} bytes: at most {UPLOAD}")
+                raise InputError(too_large("the table", len(content)))
             with tempfile.TemporaryDirectory(prefix="snapbeam-") as folder:
                 path = Path(folder) / "dots.csv"
                 path.write_bytes(content)
                 level = attrs.get("beam_buckling_level")
                 dots = read_dots(path, reference_freq=attrs.get("reference_freq"), buckling_level=level)
         except (InputError, UnicodeDecodeError) as error:
-            self.words.object = f'<p class="bad">{html.escape(str(error))}</p>'
+            self.refuse(str(error))
             return
         self.page.card.dots = dots
         self.words.object = f'<p class="note">{len(dots)} measured points</p>'
