@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import panel as pn
 
 from snapbeam import InputError, write_netcdf
+from snapbeam.config import lookup
 from snapbeam.explorer.downloads import drawing, file_bytes
 from snapbeam.explorer.jobs import Token
 from snapbeam.explorer.limits import UPLOAD, too_large
@@ -89,7 +90,13 @@ class TakeCard:
         if run is not None and point is not None:
             file = page.shared.file.name if page.shared.file is not None else ""
             on_map = bool(file) and not page.card.changed and page.card.plane.find(point.values) is not None
-            command = run_command(point.values, file, on_map)
+            skeleton = page.shared.source.skeleton
+            over = {
+                name: value
+                for name, value in point.values.items()
+                if page.card.source.is_list or lookup(name).short in skeleton.dims
+            }
+            command = run_command(over if on_map else point.values, file, on_map)
             beside = "" if on_map else " (with the system saved as system.toml beside it)"
             parts.append(
                 f'<h2>The command that makes this run{beside}</h2><pre class="command">{html.escape(command)}</pre>'
@@ -290,7 +297,6 @@ def window_dataset(window: Any) -> xr.Dataset:
     import numpy as np
 
     from snapbeam import STATISTICS
-    from snapbeam.config import lookup
     from snapbeam.explorer.maps.source import axes_dataset
 
     dataset = axes_dataset(
