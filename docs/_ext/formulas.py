@@ -114,5 +114,6 @@ def typeset(_app: Any, _what: str, _name_: str, _object: Any, _options: Any, lin
 
 def setup(app: Any) -> dict[str, bool]:
     """Connect to Sphinx."""
+    app.setup_extension("sphinx.ext.autodoc")
     app.connect("autodoc-process-docstring", typeset, priority=400)
     return {"parallel_read_safe": True}
