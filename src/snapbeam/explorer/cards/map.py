@@ -87,8 +87,8 @@ class MapCard:
         if address.show and address.show not in names:
             self._words.append(f"address: this map has no {address.show}")
         options = {name.replace("_", " "): name for name in dims}
-        self.x = pn.widgets.Select(name="Across", options=options, value=x, width=150)
-        self.y = pn.widgets.Select(name="Upward", options=options, value=y, width=150)
+        self.x = pn.widgets.Select(name="Across", options=options, value=x, width=170)
+        self.y = pn.widgets.Select(name="Upward", options=options, value=y, width=170)
         self.show = pn.widgets.Select(
             name="Shown", options={name.replace("_", " "): name for name in names}, value=show, width=170
         )  # fmt: skip
@@ -118,6 +118,7 @@ class MapCard:
         self.again.on_click(lambda _: self.post(lambda: self.control.compute_view(force=True)))
         for slider in self.sliders.values():
             slider.param.watch(lambda _: self.post(self._cut_changed), "value")
+        self.auto.visible = self.again.visible = not source.is_list
         self.slider_box = pn.FlexBox(margin=0)
 
     def _slider(self, name: str, address: Address) -> Any:
