@@ -22,23 +22,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from snapbeam.runs.response import statistics_of
 
 import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.codes import ResponseClass
-from snapbeam.engines.columns import Counts, Numbers
+from snapbeam.engines.answer import statistics_of
+from snapbeam.engines.assemble import make_ensemble
 from snapbeam.engines.cpu import driver as cpu_engine
 from snapbeam.engines.cuda import driver as cuda_engine
 from snapbeam.engines.cuda.driver import Options
 from snapbeam.engines.cuda.layout import device_structure
-from snapbeam.engines.ensemble import Ensemble, make_ensemble
-from snapbeam.engines.plan import plan_steps
+from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.scalar.composition import COMPOSITIONS
 
 CONTACT = sb.HertzContact(stiffness=4e8)
 LOCATION = 1 / 2.1
 PAIRS = ((0.3, 0.2), (0.625, 0.1), (1.21, 0.05), (1.21, 0.18), (1.625, 0.3), (3.0, 0.4))
+COMPARED = ("max_displacement", "min_displacement", "gross_work", "contact_share")
+COUNTED = ("steps", "crossings", "impacts")
 SEED = 20240118
 AIM_SECONDS = 60.0
 # Double-precision multiply-adds a multiprocessor ends per clock, by compute capability; 2 elsewhere.
@@ -54,19 +55,15 @@ def ensemble_of(
     modes: int, ratio: Any, velocity: Any, cycles: int, *, early_decision: bool = False
 ) -> Ensemble:
     """Runs at points of the plane of frequency ratio and velocity amplitude."""
-    model = model_of(modes)
-    ratio, velocity = np.asarray(ratio, float), np.asarray(velocity, float)
+    shaker = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, location=LOCATION)
+    points = {
+        "drive.frequency_ratio": np.asarray(ratio, float),
+        "drive.velocity_amplitude": np.asarray(velocity, float),
+    }
     return make_ensemble(
-        model,
-        CONTACT,
-        plan_steps(model, CONTACT),
-        frequency_ratio=ratio,
-        velocity_amplitude=velocity,
-        location=np.full(ratio.size, LOCATION),
-        side="below",
-        cycles=cycles,
-        reference_freq=model.reference_freq,
-        early_decision=early_decision,
+        sb.System(model_of(modes), CONTACT, shaker),
+        sb.Integration(cycles=cycles, early_decision=early_decision),
+        points,
     )
 
 
@@ -83,12 +80,17 @@ def timed(function: Callable[[], Any]) -> tuple[float, Any]:
     return time.perf_counter() - began, result
 
 
-def march(ensemble: Ensemble, warps: int | None = None) -> tuple[float, Any, Any]:
-    """Seconds, counts and numbers of a march on the device; the kernel must have been compiled before."""
-    seconds, (counts, numbers) = timed(
-        lambda: cuda_engine.run_ensemble(ensemble, options=Options(warps=warps))
-    )
-    return seconds, counts, numbers
+def march(ensemble: Ensemble, warps: int | None = None) -> tuple[float, dict[str, Any]]:
+    """Seconds and statistics of a march on the device; the kernel must have been compiled before."""
+    simulated = cuda_engine.simulated()
+    options = Options(warps=warps) if not simulated else Options(most_blocks=1, fewest_threads=1)
+    seconds, books = timed(lambda: cuda_engine.run_ensemble(ensemble, options=options))
+    return seconds, measured(ensemble, books)
+
+
+def measured(ensemble: Ensemble, books: Any) -> dict[str, Any]:
+    """Statistics of runs, and their steps."""
+    return {**statistics_of(ensemble, books), "steps": books["steps"]}
 
 
 def device_facts() -> dict[str, Any]:
@@ -123,8 +125,8 @@ def flops_per_step(ensemble: Ensemble) -> float:
     """Operations no flight step gets by without: tension product, sums, kicks and flows of its stages."""
     structure = device_structure(ensemble)
     coupled = 2.0 * np.count_nonzero(structure.coupling)
-    modes = structure.rows.size
-    return float(COMPOSITIONS[ensemble.plan.order].flow.size * (coupled + 16.0 * modes))
+    modes = structure.order.size
+    return float(COMPOSITIONS[ensemble.order].flow.size * (coupled + 16.0 * modes))
 
 
 def conformance(smoke: bool) -> dict[str, Any]:
@@ -133,22 +135,21 @@ def conformance(smoke: bool) -> dict[str, Any]:
     for modes in (1,) if smoke else (1, 2, 8, 32, 128):
         for ratio, velocity in PAIRS[5:] if smoke else PAIRS:
             ensemble = ensemble_of(modes, [ratio], [velocity], 1)
-            _, counts, numbers = march(ensemble)
-            expected_counts, expected = cpu_engine.run_ensemble(ensemble)
-            columns = [Numbers.MAX_DISPLACEMENT, Numbers.MIN_DISPLACEMENT, Numbers.WORK, Numbers.CONTACT_TIME]
-            error = float(np.max(np.abs(numbers[0, columns] / expected[0, columns] - 1.0)))
-            same = bool((counts == expected_counts).all())
+            _, found = march(ensemble)
+            expected = measured(ensemble, cpu_engine.run_ensemble(ensemble))
+            error = max(abs(float(found[name][0] / expected[name][0]) - 1.0) for name in COMPARED)
+            same = all(int(found[name][0]) == int(expected[name][0]) for name in COUNTED)
             rows.append(
                 {"modes": modes, "frequency_ratio": ratio, "velocity_amplitude": velocity,
-                 "impacts": int(counts[0, Counts.IMPACTS]), "same_ticks_and_counts": same, "error": error}
+                 "impacts": int(found["impacts"][0]), "same_counts": same, "error": error}
             )  # fmt: skip
     if smoke:
         return {"first_cycle": rows}
     ratio, velocity = (x.ravel() for x in np.meshgrid(np.linspace(0.1, 4, 40), np.linspace(0.01, 0.65, 26)))
     ensemble = ensemble_of(32, ratio, velocity, 200, early_decision=True)
     shares = []
-    for counts, numbers in (march(ensemble)[1:], cpu_engine.run_ensemble(ensemble)):
-        classes = statistics_of(ensemble, counts, numbers, 200)["response"]
+    for found in (march(ensemble)[1], statistics_of(ensemble, cpu_engine.run_ensemble(ensemble))):
+        classes = found["response"]
         shares.append([float(np.mean(classes == kind)) for kind in ResponseClass])
     table = []
     for kind, gpu, cpu in zip(ResponseClass, *shares, strict=True):
@@ -169,8 +170,8 @@ def throughput(smoke: bool, facts: dict[str, Any]) -> dict[str, Any]:
         for warps in (None,) if smoke else (8, 12, 16):
             ensemble = ensemble_of(modes, *sample(runs, slowest), cycles, early_decision=early)
             compiling, _ = timed(lambda warps=warps: march(ensemble_of(modes, [4.0], [0.1], 1), warps))
-            seconds, counts, _ = march(ensemble, warps)
-            steps = float(counts[:, Counts.STEPS].sum())
+            seconds, found = march(ensemble, warps)
+            steps = float(found["steps"].sum())
             rate = steps * flops_per_step(ensemble) / seconds
             row = {
                 "early_decision": early, "warps": warps, "compile_s": compiling, "seconds": seconds,
@@ -191,8 +192,8 @@ def scaling(smoke: bool) -> dict[str, Any]:
         if not smoke:
             march(ensemble_of(modes, [2.0], [0.1], 1))
         ensemble = ensemble_of(modes, *sample(runs, slowest), cycles)
-        seconds, counts, _ = march(ensemble)
-        steps = float(counts[:, Counts.STEPS].sum())
+        seconds, found = march(ensemble)
+        steps = float(found["steps"].sum())
         by_modes.append(
             {
                 "modes": modes,
@@ -202,7 +203,7 @@ def scaling(smoke: bool) -> dict[str, Any]:
             }
         )
     for count in (1, 2) if smoke else (1_000, 10_000, 100_000, 1_000_000):
-        seconds, _, _ = march(ensemble_of(1 if smoke else 32, *sample(count, slowest), 1 if smoke else 2))
+        seconds, _ = march(ensemble_of(1 if smoke else 32, *sample(count, slowest), 1 if smoke else 2))
         by_runs.append({"runs": count, "seconds": seconds, "us_per_run": 1e6 * seconds / count})
     return {"by_modes": by_modes, "by_runs": by_runs, "cycles": cycles}
 
@@ -265,7 +266,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--smoke", action="store_true", help="a tiny version, for the simulator")
     parser.add_argument("--only", choices=("conformance", "throughput", "scaling", "map"))
     options = parser.parse_args(arguments)
-    reason = cuda_engine.refusal(1, False)
+    reason = cuda_engine.refusal(1)
     if reason is not None:
         print(f"no benchmark of the CUDA engine here: {reason}", file=sys.stderr)
         return 2

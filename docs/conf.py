@@ -30,6 +30,7 @@ version = release = __version__
 
 extensions = [
     "myst_parser",
+    "formulas",
     "reference",
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",

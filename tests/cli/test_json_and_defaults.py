@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import snapbeam as sb
 from snapbeam.cli.app import app
-from snapbeam.config import load_config
+from snapbeam.config import Config, load_config
 
 RUNNER = CliRunner()
 SMALL = ["--modes", "1", "--cycles", "12"]
@@ -196,3 +196,25 @@ def test_refusals_come_before_computing(words, tmp_path, monkeypatch):
     result = RUNNER.invoke(app, words)
     assert result.exit_code == 2 and "error:" in result.stderr
     assert not re.search(r"\d+ of \d+|to compute", result.output)
+
+
+def test_a_point_of_a_list_is_gone_on_from(tmp_path):
+    """The nearest point of a list of points, with all of its parameters to the last digit."""
+    rng = np.random.default_rng(2)
+    system = Config().system.replace(**{"model.modes": 1})
+    table = xr.Dataset({
+        "drive.frequency_ratio": ("point", rng.uniform(0.6, 2.0, 9)),
+        "drive.velocity_amplitude": ("point", rng.uniform(0.05, 0.4, 9)),
+        "beam.thickness": ("point", rng.choice([3.9e-4, 4.1e-4], 9)),
+    })  # fmt: skip
+    found = sb.sweep(system, table, sb.Integration(cycles=8))
+    found.to_netcdf(tmp_path / "list.nc", engine="h5netcdf")
+    names = ("frequency_ratio", "velocity_amplitude")
+    near = ",".join(f"{name}={float(found[name][3]):.4f}" for name in names)
+    command = ["simulate", "--from", str(tmp_path / "list.nc"), "--point", near, "--json", "-", "--quiet"]
+    done = RUNNER.invoke(app, command)
+    assert done.exit_code == 0, done.output
+    told = json.loads(done.stdout)["outcome"]
+    assert told["peak_force"] == float(found.peak_force[3]) and told["crossings"] == int(found.crossings[3])
+    refused = RUNNER.invoke(app, ["simulate", "--from", str(tmp_path / "list.nc"), "--point", "location=0.3"])
+    assert refused.exit_code == 2

@@ -101,6 +101,13 @@ def test_modules_of_the_interface_page_exist():
         import_module(name)
 
 
+def test_names_stand_once_on_the_interface_page():
+    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    named = re.findall(r"auto(?:class|function|exception|data)::\s*(\S+)$", text, re.MULTILINE)
+    assert len(named) > 50
+    assert sorted({name for name in named if named.count(name) > 1}) == []
+
+
 def test_every_page_is_in_the_tree():
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     listed = {

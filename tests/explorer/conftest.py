@@ -20,7 +20,7 @@ from snapbeam.config import Config
 pytest.importorskip("panel", reason="the explorer's extra is not installed: make explorer-deps")
 
 CHROMIUM = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
-PATIENCE = 60_000
+PATIENCE = 180_000
 """Milliseconds that a page may take on a busy machine; a test of what a page does is no test of how fast."""
 
 

@@ -80,6 +80,50 @@ def test_two_tabs_do_not_disturb_each_other(tab, served, small_map):
     )
 
 
+def test_what_one_tab_computes_is_not_laid_over_the_map_of_another(tab, served, small_map):
+    first, second = tab(served.url), tab(served.url)
+    first.js("""() => { const p = Bokeh.documents[0].get_model_by_name('map');
+      p.x_range.setv({start: 0.7, end: 1.9}); p.y_range.setv({start: 0.05, end: 0.45}); }""")
+    first.page.get_by_role("button", name="Compute view").click()
+    first.wait(lambda: len(first.data("map-windows", "image")) == 1, "a window")
+    x, y = float(small_map["frequency_ratio"][12]), float(small_map["velocity_amplitude"][9])
+    second.click(x, y)
+    second.wait(lambda: "bit for bit" in second.notes(), "the map's own point")
+    assert f"frequency ratio {x:.6g}, velocity amplitude {y:.6g}" in second.head()
+    assert second.data("map-windows", "image") == []
+    first.page.get_by_role("button", name="Stop").click()
+
+
+def test_a_list_of_points_is_clicked_point_by_point(tab, serve, system, tmp_path):
+    rng = np.random.default_rng(5)
+    table = xr.Dataset({
+        "drive.frequency_ratio": ("point", np.linspace(0.6, 2.0, 12)),
+        "drive.velocity_amplitude": ("point", rng.uniform(0.05, 0.4, 12)),
+        "beam.thickness": ("point", rng.choice([3.9e-4, 4.1e-4], 12)),
+    })  # fmt: skip
+    found = sb.sweep(system, table, sb.Integration(cycles=10))
+    found.to_netcdf(tmp_path / "list.nc", engine="h5netcdf")
+    page = tab(serve("list.nc", where=tmp_path).url)
+    ratio, velocity = found["frequency_ratio"].values, found["velocity_amplitude"].values
+    assert len(page.data("map-list", "x")) == 12
+    page.click(float(ratio[4]), float(velocity[4]))
+    page.wait(lambda: "bit for bit" in page.notes(), "the run")
+    assert f"beam thickness {float(found['beam_thickness'][4]):.6g}" in page.head()
+    assert sb.ResponseClass(int(found["response"][4])).label in page.head()
+    page.page.keyboard.press("ArrowRight")
+    page.wait(lambda: "bit for bit" in page.notes() and f"{ratio[4]:.6g}" not in page.head(), "another point")
+
+
+def test_a_file_that_is_too_large_is_refused_in_words(tab, served):
+    page = tab(served.url)
+    _turn(page, "Take away")
+    page.wait(lambda: page.page.locator("input[type=file]").count() > 0, "where a file can be given")
+    large = {"name": "large.csv", "mimeType": "text/csv", "buffer": b"1,2,3\n" * (3 * 2**19)}
+    page.page.locator("input[type=file]").first.set_input_files(large)
+    page.wait(lambda: "9.0 MiB; a page takes at most 2 MiB" in page.text("take-words"), "words")
+    assert page.page.locator("#gone").count() == 0, "the page lives on"
+
+
 @pytest.mark.slow
 def test_two_points_side_by_side(tab, served, small_map):
     page = tab(served.url)

@@ -10,6 +10,9 @@ import pytest
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
 from snapbeam.figures import read_dots
+from snapbeam.figures.lab.dot_comparison import plot_dot_comparison
+from snapbeam.lab.compare.dots import Dots
+from snapbeam.lab.compare.maps import compare_dots
 
 
 def table(tmp_path, text):
@@ -87,3 +90,29 @@ def test_refusals(tmp_path, text, message):
 def test_missing_file(tmp_path):
     with pytest.raises(InputError, match="cannot be read, No such file"):
         read_dots(tmp_path / "none.csv")
+
+
+def test_errors_stand_out_in_the_table_of_classes(synthetic_map):
+    """An error of one in a hundred is redder than any agreement, and bold; agreements are grey."""
+    rng = np.random.default_rng(1)
+    i, j = rng.integers(0, 40, 300), rng.integers(0, 25, 300)
+    kinds = synthetic_map["response"].values[i, j].astype(np.int8)
+    kinds[np.flatnonzero(kinds == ResponseClass.INTRAWELL)[:2]] = ResponseClass.TRANSIENT_1
+    ratio, velocity = (
+        synthetic_map["frequency_ratio"].values[i],
+        synthetic_map["velocity_amplitude"].values[j],
+    )
+    dots = Dots(ratio, velocity, np.full(300, 1 / 2.1), kinds)
+    result = compare_dots(dots, synthetic_map)
+    ax = plot_dot_comparison(synthetic_map, dots, result).axes[1]
+    weights = {(int(t.get_position()[1]), int(t.get_position()[0])): t.get_fontweight() for t in ax.texts}
+    images = [image.to_rgba(image.get_array()) for image in ax.images]
+    for (row, column), count in np.ndenumerate(result.confusion):
+        shown = [image[row, column] for image in images if image[row, column, 3] > 0.0]
+        assert len(shown) == (count > 0)
+        red, green, blue, _ = shown[0] if shown else np.ones(4)
+        if count and row != column:
+            assert red - max(green, blue) > 0.1 and weights[row, column] == "bold"
+        else:
+            assert red - min(green, blue) < 0.05 and weights[row, column] == "normal"
+    assert result.confusion[1, 0] == 2

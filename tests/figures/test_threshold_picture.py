@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.colors import to_rgb
+from matplotlib.patches import Rectangle
 
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
@@ -86,4 +87,18 @@ def test_legend_says_how_many_disagree(synthetic_map):
     share = xr.where(kinds == classes, 1.0, 0.0).assign_coords(response_class=classes)
     ax = plot_response_map(synthetic_map.assign(class_share=share))
     texts = [text.get_text() for text in ax.figure.legends[0].get_texts()]
-    assert texts[-1] == "paler: repeats disagree, 0.0 %"
+    assert texts[-1] == "repeats agree, 100 to 25 %;\n0.0 % of cells are split"
+
+
+def test_the_legends_shades_are_those_of_the_map(synthetic_map):
+    kinds = synthetic_map["response"]
+    classes = xr.DataArray([int(k) for k in ResponseClass], dims="response_class")
+    share = xr.where(kinds == classes, 1.0, 0.0).assign_coords(response_class=classes)
+    ax = plot_response_map(synthetic_map.assign(class_share=share))
+    ax.figure.canvas.draw()
+    legend = ax.figure.legends[0]
+    shades = [each for each in legend.findobj(Rectangle) if each is not legend.legendPatch][-4:]
+    color = np.array(to_rgb(CLASS_COLORS[ResponseClass.INTRAWELL]))
+    for agree, shade in zip((1.0, 0.75, 0.5, 0.25), shades, strict=True):
+        white = 0.85 * (1.0 - agree)  # as the map lays it over its cells
+        np.testing.assert_allclose(shade.get_facecolor()[:3], color + white * (1.0 - color), atol=1e-9)

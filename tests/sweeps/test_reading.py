@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.config import Config
+from snapbeam.config import Config, lookup
 
 pytest.importorskip("zarr")
 
@@ -74,3 +74,24 @@ def test_what_is_no_store_is_refused(tmp_path):
         sb.read_store(tmp_path)
     with pytest.raises(sb.InputTypeError, match="must be a folder"):
         sb.read_store(3)
+
+
+def test_the_order_of_the_axes_is_kept_before_anything_is_computed(system, tmp_path):
+    """The first axis changes the structure: points are counted alike in either order, and no task is done."""
+    axes = {"frequency_ratio": np.linspace(0.5, 2.0, 4), "beam.thickness": np.array([3.9e-4, 4.0e-4])}
+
+    class Enough(Exception):
+        pass
+
+    def stop(done, total):
+        raise Enough
+
+    for name, order in (("one", list(axes)), ("other", list(axes)[::-1])):
+        path = tmp_path / f"{name}.store"
+        with pytest.raises(Enough):
+            given = {each: axes[each] for each in order}
+            sb.sweep(system, given, sb.Integration(cycles=2), store=sb.Keeping(path, chunk=2), progress=stop)
+        (path / "ledger.jsonl").write_text("")
+        read = sb.read_store(path)
+        assert read["response"].dims == tuple(lookup(each).short for each in order)
+        assert read.attrs["points_done"] == 0

@@ -196,6 +196,7 @@ def made_by(parameters: Any = None, *, command: str | None = None) -> dict[str, 
     return attributes
 
 
+@cache
 def _installed_version(package: str) -> str:
     from importlib.metadata import PackageNotFoundError, version
 

@@ -10,6 +10,7 @@ import panel as pn
 from bokeh.events import ConnectionLost, DocumentReady
 from bokeh.models import CustomJS
 
+from snapbeam.explorer.limits import UPLOAD
 from snapbeam.explorer.look import sheet, styled
 
 if TYPE_CHECKING:
@@ -47,6 +48,16 @@ document.addEventListener('keydown', (event) => {
   event.preventDefault();
   keys.data = {key: [event.key], count: [keys.data.count[0] + 1]};
 });
+"""
+_TOO_LARGE = """
+document.addEventListener('input', (event) => {
+  const field = event.composedPath()[0];
+  if (!(field instanceof HTMLInputElement) || field.type !== 'file') { return; }
+  const large = [...field.files].find((file) => file.size > %d);
+  if (!large) { return; }
+  field.value = '';
+  refused.data = {name: [large.name], bytes: [large.size], count: [refused.data.count[0] + 1]};
+}, true);
 """
 _THEME = """
 const search = new URLSearchParams(window.location.search);
@@ -109,9 +120,12 @@ def framed(page: Page) -> Any:
     page.bar.js_on_change("data", CustomJS(args={"bar": page.bar}, code=_ADDRESS))
     if doc is not None:
         doc.js_on_event(DocumentReady, CustomJS(args={"keys": page.keys}, code=_KEYS))
+        large = CustomJS(args={"refused": page.refused}, code=_TOO_LARGE % UPLOAD)
+        doc.js_on_event(DocumentReady, large)
         doc.js_on_event(ConnectionLost, CustomJS(code=_GONE))
         doc.add_root(page.bar)
         doc.add_root(page.keys)
+        doc.add_root(page.refused)
         doc.add_root(page.downloads.source)
     return whole
 

@@ -10,8 +10,9 @@ import logging
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -62,12 +63,14 @@ class Token:
 class Jobs:
     """Threads that the pages of one server share."""
 
-    def __init__(self, runs: int = 2, windows: int = 1) -> None:
+    def __init__(self, runs: int = 2, windows: int = 8) -> None:
         self._runs = ThreadPoolExecutor(runs, "snapbeam-run")
         self._windows = ThreadPoolExecutor(windows, "snapbeam-window")
         self._exports = ThreadPoolExecutor(1, "snapbeam-export")
         self._waiting = 0
         self._free = threading.Condition()
+        self._turns = threading.Condition()
+        self._queue: list[object] = []
 
     def run(self, work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
         """Do *work* at once; then ``done(result, words)``, one of the two empty, on the thread that did it."""
@@ -98,6 +101,29 @@ class Jobs:
             while self._waiting and not token.cancelled:
                 self._free.wait(0.1)
         token.check()
+
+    @contextmanager
+    def turn(self, token: Token) -> Iterator[None]:
+        """The turn of one batch of a window: windows of several pages take turns, first come, first served.
+
+        Raises
+        ------
+        Cancelled
+            If the window was told to stop while it waited.
+        """
+        ticket = object()
+        with self._turns:
+            self._queue.append(ticket)
+        try:
+            with self._turns:
+                while self._queue[0] is not ticket and not token.cancelled:
+                    self._turns.wait(0.1)
+            self.give_way(token)
+            yield
+        finally:
+            with self._turns:
+                self._queue.remove(ticket)
+                self._turns.notify_all()
 
     def close(self) -> None:
         """Take no more work, and drop what has not begun."""

@@ -16,6 +16,7 @@ __all__ = [
     "WINDOW_POINTS",
     "check_run",
     "samples_of",
+    "too_large",
 ]
 
 SESSIONS = 24
@@ -40,6 +41,11 @@ BODY = 8 * 2**20
 
 _FEWEST = 200
 """Regular samples of a cycle of the excitation, or of the first mode, that a run is recorded with by itself."""
+
+
+def too_large(name: str, size: int) -> str:
+    """Words for a file that is too large for a page to give."""
+    return f"{name[:80]}: has {size / 2**20:.1f} MiB; a page takes at most {UPLOAD // 2**20} MiB"
 
 
 def check_run(system: System, integration: Integration) -> None:

@@ -20,8 +20,9 @@ from snapbeam.explorer.cards.take import TakeCard
 from snapbeam.explorer.downloads import Downloads
 from snapbeam.explorer.frame import framed
 from snapbeam.explorer.jobs import Token
-from snapbeam.explorer.limits import RUN_SECONDS, check_run, samples_of
+from snapbeam.explorer.limits import RUN_SECONDS, check_run, samples_of, too_large
 from snapbeam.explorer.look import Look, look_of
+from snapbeam.explorer.maps.layers import chances as chances_of
 from snapbeam.explorer.maps.points import Point, compared
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.views.run import RunView
@@ -30,6 +31,8 @@ __all__ = ["Page"]
 
 _GROWTH = 1500
 """Milliseconds between two looks at a store that may be growing."""
+_AFTER = 700
+"""Milliseconds from the first picture of the page to the building of views that are not seen yet."""
 _QUICK = 4000
 """Samples of a run that is shown at once; all others follow."""
 
@@ -73,6 +76,8 @@ class Page:
         self.bar = ColumnDataSource({"search": [""]}, name="address")
         self.keys = ColumnDataSource({"key": [""], "count": [0]}, name="keys")
         self.keys.on_change("data", lambda _, __, data: self._key(str(data["key"][0])))
+        self.refused = ColumnDataSource({"name": [""], "bytes": [0], "count": [0]}, name="refused")
+        self.refused.on_change("data", lambda _, __, data: self._too_large(data))
         self.changes: dict[str, Any] = {}
         self._take: TakeCard | None = None
         self._system: SystemCard | None = None
@@ -81,6 +86,7 @@ class Page:
         if shared.source.growing and self.doc is not None:
             self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
         self._begin()
+        pn.state.onload(lambda: self.later(self.runs[0].complete, _AFTER))
 
     def system_card(self) -> SystemCard:
         """The card of the system, made when it is first needed."""
@@ -127,7 +133,7 @@ class Page:
                 token.cancel()
 
     def _make_fields(self) -> None:
-        names = [*self.card.plane.names, *self.card.plane.fixed_values()]
+        names = self.card.plane.parameters
         from snapbeam.config import lookup
 
         self.fields = {
@@ -150,7 +156,7 @@ class Page:
             except InputError as error:
                 self.card.say(f"address, set: {error}")
         at = dict(self.address.at)
-        names = set(self.card.plane.names) | set(self.card.plane.fixed_values())
+        names = set(self.card.plane.parameters)
         if at and names <= at.keys():
             self.post(lambda: self.ask(Point({name: at[name] for name in at if name in names})))
 
@@ -196,16 +202,18 @@ class Page:
         view.begin(words)
         base, how = self.card.system, self.card.integration
 
-        def work(token: Token) -> tuple[Run, str, bool]:
+        def work(token: Token) -> tuple[Run, str, bool, str]:
             return self._computed(which, point, base, how, token)
 
-        def done(found: tuple[Run, str, bool] | None, error: str) -> None:
+        def done(found: tuple[Run, str, bool, str] | None, error: str) -> None:
             self.post(lambda: self._done(which, point, token, found, error))
 
         self.shared.jobs.run(work, done, token)
         self._write_address()
 
-    def _computed(self, which: int, point: Point, base: Any, how: Any, token: Token) -> tuple[Run, str, bool]:
+    def _computed(
+        self, which: int, point: Point, base: Any, how: Any, token: Token
+    ) -> tuple[Run, str, bool, str]:
         """A run, on a thread of the server; a first look at it is shown before it is recorded whole."""
         system, integration = point.system(base, how.replace(engine="auto", threads=None))
         check_run(system, integration)
@@ -215,14 +223,16 @@ class Page:
         count = samples_of(system, integration)
         times = None if count is None else _even_times(system, integration, count)
         run = sb.simulate(system, integration, sample_times=times, progress=token.check)
+        chances = ""
         try:
             held = self.card.expected(point)
+            chances = chances_of(self.shared.source.layers, held)
             same, words = compared(held, run.outcome, str(self.shared.source.attrs.get("engine", "cpu")))
         except InputError as error:  # the run stands, although its map cannot be read any more
             same, words = False, str(error)
         if times is not None:
             words += f"; recorded at {times.size} instants, the most that a page may ask for"
-        return run, words, same
+        return run, words, same, chances
 
     def _quick(self, system: Any, integration: Any, token: Token) -> Run | None:
         if system.striker is None or not system.striker.drive.harmonic or integration.early_decision:
@@ -237,7 +247,7 @@ class Page:
             self.runs[which].show(run, point.words(), fresh=True)
 
     def _done(
-        self, which: int, point: Point, token: Token, found: tuple[Run, str, bool] | None, error: str
+        self, which: int, point: Point, token: Token, found: tuple[Run, str, bool, str] | None, error: str
     ) -> None:
         if token.cancelled or self.points[which] is not point:
             return
@@ -245,11 +255,12 @@ class Page:
         if found is None:
             view.fail(f"{point.words()}: {error}")
             return
-        run, words, same = found
+        run, words, same, chances = found
         shown = view.run
         fresh = shown is None or shown.system.hash != run.system.hash
         view.show(run, point.words(), fresh=fresh)
         view.say("map", words, bad=not same)
+        view.say("chances", chances)
         view.say("conditioning", "")
         if self._take is not None:
             self._take.refresh()
@@ -296,6 +307,7 @@ class Page:
         if self.compare.value and len(self.runs) == 1:
             self.runs.append(RunView(self.look, "B", self.post, self.later))
             self.add_run(self.runs[1])
+            self.later(self.runs[1].complete, _AFTER)
         if len(self.runs) > 1:
             self.runs[1].layout.visible = self.compare.value
         if self.compare.value:
@@ -342,6 +354,13 @@ class Page:
         neighbour = self.card.step(point.values, *steps[key])
         if neighbour is not None and neighbour.values != point.values:
             self.ask(neighbour)
+
+    def _too_large(self, file: Any) -> None:
+        """A file that the browser did not send; said wherever one can be given."""
+        words = too_large(str(file["name"][0]), int(file["bytes"][0]))
+        for card in (self._take, self._system):
+            if card is not None:
+                card.refuse(words)
 
     # ------------------------------------------------------------------ address
 

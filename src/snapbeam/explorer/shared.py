@@ -55,10 +55,10 @@ class Shared:
                 self._windows.popitem(last=False)
             return found
 
-    def windows(self, plane: Any) -> list[Window]:
-        """The windows over one plane, the widest first; *plane* is the first part of their keys."""
+    def windows(self, plane: Any, keys: set[Any]) -> list[Window]:
+        """Those of the windows over one plane that have one of *keys*, the widest first; *plane* begins their keys."""
         with self._lock:
-            found = [window for key, window in self._windows.items() if key[0] == plane]
+            found = [window for key, window in self._windows.items() if key[0] == plane and key in keys]
         return sorted(found, key=_area, reverse=True)
 
     def close(self) -> None:

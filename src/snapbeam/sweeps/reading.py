@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -68,7 +69,7 @@ def read_store(store: str | os.PathLike[str]) -> xr.Dataset:
         for (stage, task), record in ledger.records.items()
         if stage == _STAGE and record.state == "done"
     }
-    work = _work(held["parameters"], str(store), int(held["chunk"]), done)
+    work = _work(held, str(store), done)
     stage = Stage(_STAGE, work.setup.points, int(held["chunk"]))
     table, points = _rows(folder, work, stage, done)
     attrs = work.setup.attributes(more={"points_done": points, "points_total": stage.size})
@@ -85,12 +86,13 @@ class _Table:
         return ResultTable(self._table.integers[start:stop], self._table.numbers[start:stop])
 
 
-def _work(held: dict[str, Any], name: str, chunk: int, done: dict[int, Record]) -> PointWork:
+def _work(described: dict[str, Any], name: str, done: dict[int, Record]) -> PointWork:
     """What is computed, from its description.
 
-    The description does not say in which order the axes were given, in which points are counted; the hash of a
-    finished task does.
+    Its parameters are sorted by name; the description says in which order the axes were given, in which points are
+    counted.  Stores of earlier versions do not say it: there the hash of a finished task tells.
     """
+    held, chunk = described["parameters"], int(described["chunk"])
     if held.get("statistics") != list(STATISTICS):
         raise InputError(f"store = {name!r}: was written with other statistics than this version has")
     axes = {axis: values for axis, values in held["points"].items() if isinstance(values, list)}
@@ -108,7 +110,10 @@ def _work(held: dict[str, Any], name: str, chunk: int, done: dict[int, Record]) 
     integration = Integration(**held["integration"])
     repeats = Replicas(**held["replicas"]) if "replicas" in held else None
     number, record = next(iter(done.items()), (0, None))
-    for order in itertools.permutations(axes):
+    given = described.get("axes")
+    known = isinstance(given, list) and sorted(map(str, given)) == sorted(axes)
+    orders: Iterable[Any] = [given] if known else itertools.permutations(axes)
+    for order in orders:
         points = Grid({axis: np.array(axes[axis]) for axis in order})
         work = PointWork(SweepSetup(system, integration, points), repeats)
         if (

@@ -63,6 +63,8 @@ def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, A
     axes = {name: dataset[name] for name in map(str, dataset.dims) if "parameter" in dataset[name].attrs}
     if point is None:
         return {}
+    if "point" in dataset.dims:
+        return _of_list(dataset, point, path)
     found: dict[str, Any] = {}
     for part in point.split(","):
         name, equals, value = part.partition("=")
@@ -85,6 +87,36 @@ def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, A
         if axes[name].size == 1:
             found.setdefault(str(axes[name].attrs["parameter"]), axes[name].values[0].item())
     return found
+
+
+def _of_list(dataset: xr.Dataset, point: str, path: Path) -> dict[str, Any]:
+    """Values of all parameters of the point of a list that is nearest to what is given, by dotted name."""
+    from snapbeam.config import lookup
+    from snapbeam.core.validate import InputError
+
+    columns = {
+        str(name): item.values
+        for name, item in dataset.coords.items()
+        if item.dims == ("point",) and "parameter" in item.attrs
+    }
+    away = np.zeros(dataset.sizes["point"])
+    for part in point.split(","):
+        name, equals, value = part.partition("=")
+        short = lookup(name.strip()).short
+        if not equals or short not in columns:
+            raise InputError(f"point = {point!r}: must name parameters of {path.name}: {', '.join(columns)}")
+        values = columns[short]
+        if values.dtype.kind in "OU":
+            away = np.where(values == value.strip(), away, np.inf)
+            continue
+        try:
+            away = away + ((values - float(value)) / (float(np.ptp(values)) or 1.0)) ** 2
+        except ValueError:
+            raise InputError(f"point = {point!r}: {value!r} is not a number") from None
+    if not np.isfinite(away).any():
+        raise InputError(f"point = {point!r}: {path.name} has no such point")
+    at = int(np.argmin(away))
+    return {str(dataset[name].attrs["parameter"]): values[at].item() for name, values in columns.items()}
 
 
 def point_text(coordinates: dict[str, Any]) -> str:

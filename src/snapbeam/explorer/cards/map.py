@@ -17,6 +17,7 @@ from snapbeam.explorer.cards.windows import WindowControl
 from snapbeam.explorer.look import Look
 from snapbeam.explorer.maps.plane import Plane
 from snapbeam.explorer.maps.points import Point
+from snapbeam.explorer.maps.scatter import Scatter
 from snapbeam.explorer.maps.windows import Window
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.views.map import MapView
@@ -56,12 +57,15 @@ class MapCard:
         self.marks: list[tuple[dict[str, Any], str]] = []
         self.asked: Callable[[Point], None] = lambda _: None
         self.moved: Callable[[], None] = lambda: None
+        self.own: set[Any] = set()
+        """Keys of the windows that this page has asked for: those of other tabs are not laid over its map."""
+        self._drawn: list[tuple[Window, NDArray[np.int8]]] = []
         self._picked: tuple[float, float] | None = None
         self._words = list(address.words)
         self._make_controls(address)
         self.control = WindowControl(self)
         self.holder = pn.Column(sizing_mode="stretch_width", margin=0)
-        self.plane: Plane
+        self.plane: Any  # a cut through a grid, or a list of points, which have one interface
         self.view: MapView
         self.rebuild(address.view)
 
@@ -83,12 +87,13 @@ class MapCard:
         if address.show and address.show not in names:
             self._words.append(f"address: this map has no {address.show}")
         options = {name.replace("_", " "): name for name in dims}
-        self.x = pn.widgets.Select(name="Across", options=options, value=x, width=150)
-        self.y = pn.widgets.Select(name="Upward", options=options, value=y, width=150)
+        self.x = pn.widgets.Select(name="Across", options=options, value=x, width=170)
+        self.y = pn.widgets.Select(name="Upward", options=options, value=y, width=170)
         self.show = pn.widgets.Select(
             name="Shown", options={name.replace("_", " "): name for name in names}, value=show, width=170
         )  # fmt: skip
-        self.sliders = {name: self._slider(name, address) for name in dims}
+        grid = [name for name in dims if not source.is_list and source.skeleton[name].size > 1]
+        self.sliders = {name: self._slider(name, address) for name in grid}
         self.auto = pn.widgets.Checkbox(name="compute what is seen", value=True, align="center")
         self.stop = pn.widgets.Button(
             name="Stop", button_type="warning", width=70, visible=False, align="center"
@@ -113,6 +118,7 @@ class MapCard:
         self.again.on_click(lambda _: self.post(lambda: self.control.compute_view(force=True)))
         for slider in self.sliders.values():
             slider.param.watch(lambda _: self.post(self._cut_changed), "value")
+        self.auto.visible = self.again.visible = not source.is_list
         self.slider_box = pn.FlexBox(margin=0)
 
     def _slider(self, name: str, address: Address) -> Any:
@@ -157,7 +163,11 @@ class MapCard:
     def rebuild(self, view: tuple[float, ...] | None) -> None:
         """Make the figure anew, of other axes."""
         self.control.cancel("")
-        self.plane = Plane.of(self.source, self.x.value, self.y.value, self._fixed())
+        self.plane = (
+            Scatter.of(self.source, self.x.value, self.y.value)
+            if self.source.is_list
+            else Plane.of(self.source, self.x.value, self.y.value, self._fixed())
+        )
         self.view = MapView(self.look, self.plane.x, self.plane.y, _HEIGHT)
         if (
             view is not None
@@ -194,10 +204,10 @@ class MapCard:
         return self.system.hash, self.integration, self.plane.names, fixed
 
     def windows(self) -> list[Window]:
-        """The windows over this cut."""
+        """The windows over this cut that this page has asked for, the widest first."""
         if self.system is None or self.source.is_list:
             return []
-        return self.shared.windows(self.plane_key)
+        return self.shared.windows(self.plane_key, self.own)
 
     # ------------------------------------------------------------------ drawing
 
@@ -213,13 +223,20 @@ class MapCard:
         limits = self._limits(name, values)
         label, unit = self.source.label(name)
         title = f"{label}{'' if unit == '1' else f' ({unit})'}"
-        self.view.show(name, values, limits, "" if name == "response" else title)
+        title = "" if name == "response" else title
+        if self.source.is_list and values is not None:
+            self.view.show_list(self.plane.x.at, self.plane.y.at, name, values, limits, title)
+        else:
+            self.view.show(name, values, limits, title)
         self.view.fade(self.changed)
         self.show_windows()
         words.append(
             self.view.show_quasi_static("quasi" in layers, self.source.scalars() | self._fixed_short())
         )
-        kinds = self.plane.values("response") if "threshold" in layers and values is not None else None
+        if "threshold" in layers and self.source.is_list:
+            words.append("the threshold is that of the columns of a grid; these are points")
+        wanted = "threshold" in layers and values is not None and not self.source.is_list
+        kinds = self.plane.values("response") if wanted else None
         self.view.show_threshold(kinds)
         self._draw_dots("dots" in layers, words)
         self._draw_marks()
@@ -238,7 +255,7 @@ class MapCard:
             self.view.mapper.update(
                 low=self.view.limits[0], high=max(self.view.limits[1], self.view.limits[0] + 1e-300)
             )
-        self.view.show_windows(shown, self.show.value)
+        self._drawn = self.view.show_windows(shown, self.show.value)
 
     def _limits(self, name: str, values: NDArray[Any] | None) -> tuple[float, float]:
         return (0.0, 1.0) if values is None or name == "response" else _span(values)
@@ -305,17 +322,16 @@ class MapCard:
         self.asked(self.point(x, y))
 
     def point(self, x: float, y: float) -> Point:
-        """The point that is shown at a place: that of the finest window over it, or the map's."""
-        for window in reversed(self.windows()):
-            at = window.computed_at(x, y) if window.covers(x, y) else None
+        """The point that is shown at a place: that of the finest window drawn over it, or the map's."""
+        for window, stride in reversed(self._drawn):
+            at = window.computed_at(x, y, stride) if window.covers(x, y) else None
             if at is not None:
                 values = dict(
                     zip(window.names, (window.x[at[1]].item(), window.y[at[0]].item()), strict=True)
                 )
                 held = {name: found[at].item() for name, found in window.values.items()}
                 return Point(values | self.plane.fixed_values(), held)
-        row, column = self.plane.index(x, y)
-        return self.plane.at(row, column)
+        return self.plane.at(*self.plane.index(x, y))
 
     def expected(self, point: Point) -> dict[str, Any]:
         """What the map holds of a point; empty if it is none of the map's, or the system has changed."""
@@ -329,17 +345,17 @@ class MapCard:
         place = self.plane.place(values)
         if place is None:
             return None
-        for window in reversed(self.windows()):
-            at = window.computed_at(*place) if window.covers(*place) else None
+        for window, drawn in reversed(self._drawn):
+            at = window.computed_at(place[0], place[1], drawn) if window.covers(*place) else None
             if at is not None:
-                stride = max(int(window.stride[at]), 1)
+                stride = max(int(drawn[at]), 1)
                 column = int(np.clip(at[1] + across * stride, 0, window.x.size - 1))
                 row = int(np.clip(at[0] + upward * stride, 0, window.y.size - 1))
                 return self.point(float(window.x[column]), float(window.y[row]))
-        row, column = self.plane.index(*place)
-        row = int(np.clip(row + upward, 0, self.plane.y.at.size - 1))
-        column = int(np.clip(column + across, 0, self.plane.x.at.size - 1))
-        return self.point(float(self.plane.x.at[column]), float(self.plane.y.at[row]))
+        beside = self.plane.beside(place, across, upward)
+        if self.source.is_list:
+            return self.plane.at(*beside)
+        return self.point(float(self.plane.x.at[beside[1]]), float(self.plane.y.at[beside[0]]))
 
     def _hovered(self, x: float, y: float) -> None:
         point = self.point(x, y)
@@ -347,9 +363,8 @@ class MapCard:
         held = point.expected
         if not held and not self.changed:
             place = self.plane.index(x, y)
-            names = {"response", "crossings", "peak_force", name} & set(self.source.variables())
             held = {}
-            for each in names:
+            for each in {"response", "crossings", "peak_force", name} & set(self.source.variables()):
                 try:
                     values = self.plane.values(each)
                 except InputError:

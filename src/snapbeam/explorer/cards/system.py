@@ -14,7 +14,7 @@ from snapbeam import InputError, Integration, System
 from snapbeam.config import Config, Parameter, config_from_mapping, parameters
 from snapbeam.explorer.address import number
 from snapbeam.explorer.downloads import Downloads
-from snapbeam.explorer.limits import CYCLES, MODES, UPLOAD
+from snapbeam.explorer.limits import CYCLES, MODES, UPLOAD, too_large
 from snapbeam.explorer.lines import plain, system_toml
 from snapbeam.explorer.look import Look, styled
 from snapbeam.explorer.maps.source import integration_mapping
@@ -194,7 +194,7 @@ class SystemCard:
             system = System.from_mapping(sections)
             self.take(system, Integration(**run))
         except InputError as error:
-            self.words.object = f'<p class="bad">{html.escape(str(error))}</p>'
+            self.refuse(str(error))
 
     def take(self, system: System, integration: Integration) -> None:
         """Use a system from now on."""
@@ -217,7 +217,7 @@ class SystemCard:
             return
         try:
             if len(content) > UPLOAD:
-                raise InputError(f"the file has {len(content)} bytes: at most {UPLOAD}")
+                raise InputError(too_large("the file", len(content)))
             try:
                 sections = tomllib.loads(content.decode("utf-8"))
             except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError, ValueError) as error:
@@ -225,13 +225,17 @@ class SystemCard:
             config: Config = config_from_mapping(sections, "the file")
             self.take(config.system, config.integration)
         except InputError as error:
-            self.words.object = f'<p class="bad">{html.escape(str(error))}</p>'
+            self.refuse(str(error))
+
+    def refuse(self, words: str) -> None:
+        """Say what cannot be done."""
+        self.words.object = f'<p class="bad" role="alert">{html.escape(words)}</p>'
 
     def _save(self) -> None:
         try:
             text = system_toml(self.system, self.integration)
         except InputError as error:
-            self.words.object = f'<p class="bad">{html.escape(str(error))}</p>'
+            self.refuse(str(error))
             return
         self.downloads.give("system.toml", text.encode())
 

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import panel as pn
 
 from snapbeam import InputError, write_netcdf
+from snapbeam.config import lookup
 from snapbeam.explorer.downloads import drawing, file_bytes
 from snapbeam.explorer.jobs import Token
-from snapbeam.explorer.limits import UPLOAD
+from snapbeam.explorer.limits import UPLOAD, too_large
 from snapbeam.explorer.lines import map_command, python_lines, run_command
 
 if TYPE_CHECKING:
@@ -89,7 +90,13 @@ class TakeCard:
         if run is not None and point is not None:
             file = page.shared.file.name if page.shared.file is not None else ""
             on_map = bool(file) and not page.card.changed and page.card.plane.find(point.values) is not None
-            command = run_command(point.values, file, on_map)
+            skeleton = page.shared.source.skeleton
+            over = {
+                name: value
+                for name, value in point.values.items()
+                if page.card.source.is_list or lookup(name).short in skeleton.dims
+            }
+            command = run_command(over if on_map else point.values, file, on_map)
             beside = "" if on_map else " (with the system saved as system.toml beside it)"
             parts.append(
                 f'<h2>The command that makes this run{beside}</h2><pre class="command">{html.escape(command)}</pre>'
@@ -112,6 +119,10 @@ class TakeCard:
     def _window(self) -> Any:
         windows = self.page.card.windows()
         return windows[-1] if windows else None
+
+    def refuse(self, words: str) -> None:
+        """Say what cannot be done."""
+        self.words.object = f'<p class="bad" role="alert">{html.escape(words)}</p>'
 
     # ------------------------------------------------------------------ files
 
@@ -152,7 +163,7 @@ class TakeCard:
         try:
             cut = self._cut()
         except InputError as error:
-            self.words.object = f'<p class="bad">{html.escape(str(error))}</p>'
+            self.refuse(str(error))
             return
         quasi = "quasi" in self.page.card.layers.value
         dots = self.page.card.dots if "dots" in self.page.card.layers.value else None
@@ -214,10 +225,7 @@ class TakeCard:
             return
 
         def write(path: Any, _: Token) -> None:
-            whole = source.skeleton.drop_vars(list(source.skeleton.data_vars))
-            for name in source.numbers():
-                whole[name] = source.values(name)
-            write_netcdf(whole, path)
+            write_netcdf(source.whole(), path)
 
         self._make("map", ".nc", write)
 
@@ -237,14 +245,14 @@ class TakeCard:
         attrs = self.page.card.source.attrs
         try:
             if len(content) > UPLOAD:
-                raise InputError(f"the file has {len(content)} bytes: at most {UPLOAD}")
+                raise InputError(too_large("the table", len(content)))
             with tempfile.TemporaryDirectory(prefix="snapbeam-") as folder:
                 path = Path(folder) / "dots.csv"
                 path.write_bytes(content)
                 level = attrs.get("beam_buckling_level")
                 dots = read_dots(path, reference_freq=attrs.get("reference_freq"), buckling_level=level)
         except (InputError, UnicodeDecodeError) as error:
-            self.words.object = f'<p class="bad">{html.escape(str(error))}</p>'
+            self.refuse(str(error))
             return
         self.page.card.dots = dots
         self.words.object = f'<p class="note">{len(dots)} measured points</p>'
@@ -289,7 +297,6 @@ def window_dataset(window: Any) -> xr.Dataset:
     import numpy as np
 
     from snapbeam import STATISTICS
-    from snapbeam.config import lookup
     from snapbeam.explorer.maps.source import axes_dataset
 
     dataset = axes_dataset(

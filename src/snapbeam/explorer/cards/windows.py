@@ -70,10 +70,8 @@ class WindowControl:
         if bounds is None:
             return
         key = (self.card.plane_key, bounds)
-        known = [window for window in self.card.windows() if window.key == key]
-        if known and known[0].finished:
-            return
         self.cancel("")
+        self.card.own.add(key)
         try:
             system, integration = Point(self.card.plane.fixed_values()).system(
                 self.card.system, self.card.integration
@@ -86,6 +84,9 @@ class WindowControl:
             system, integration, self.card.plane.names, bounds, log, self.card.view.pixels, key=key
         )
         window = self.card.shared.window(made)
+        if window.finished:  # by this page before, or by another
+            self.card.show_windows()
+            return
         self._token = token = Token(WINDOW_SECONDS)
         self.card.stop.visible = True
         self.card.tell("computing what is seen")

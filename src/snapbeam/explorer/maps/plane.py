@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from snapbeam import InputError
 from snapbeam.config import lookup
+from snapbeam.explorer.maps.layers import parameter_name
 from snapbeam.explorer.maps.points import Point, parameter_of
 from snapbeam.explorer.maps.raster import Axis
 from snapbeam.explorer.maps.source import Source
@@ -63,8 +64,12 @@ class Plane:
         found = self.source.values(name)
         if found is None:
             return None
-        cut = found.isel(self.fixed).squeeze()
-        return np.asarray(cut.transpose(self.y.name, self.x.name).values)
+        cut = found.isel({name: at for name, at in self.fixed.items() if name in found.dims})
+        for name in (self.y.name, self.x.name):
+            if name not in cut.dims:  # known of the whole map: a strip
+                cut = cut.drop_vars(name, errors="ignore").expand_dims(name)
+        one = {name: 0 for name in cut.dims if name not in (self.x.name, self.y.name)}
+        return np.asarray(cut.isel(one).transpose(self.y.name, self.x.name).values)
 
     def index(self, x: float, y: float) -> tuple[int, int]:
         """Row and column of the point whose cell holds a place."""
@@ -79,8 +84,8 @@ class Plane:
         for name in map(str, self.source.skeleton.dims):
             if (
                 self.source.skeleton.sizes[name] == 1
-                and name in self.source.skeleton.coords
-                and name != "point"
+                and name not in (self.x.name, self.y.name)
+                and parameter_name(self.source.skeleton, name) is not None
             ):
                 found[parameter_of(self.source.skeleton, name)] = _plain(self.source.coordinate(name)[0])
         return found
@@ -94,6 +99,19 @@ class Plane:
     def indexers(self, row: int, column: int) -> dict[str, int]:
         """Where a cell lies in the arrays of the map."""
         return {self.x.name: column, self.y.name: row, **self.fixed}
+
+    def beside(self, place: tuple[float, float], across: int, upward: int) -> tuple[int, int]:
+        """Row and column of the point *across* and *upward* points from that at a place; the last one at an edge."""
+        row, column = self.index(*place)
+        return (
+            int(np.clip(row + upward, 0, self.y.at.size - 1)),
+            int(np.clip(column + across, 0, self.x.at.size - 1)),
+        )
+
+    @property
+    def parameters(self) -> list[str]:
+        """Dotted names of all that a point is given by."""
+        return list(dict.fromkeys([*self.names, *self.fixed_values()]))
 
     def find(self, values: dict[str, Any]) -> tuple[int, int] | None:
         """Row and column of a point given by its exact values; None if it is not one of the map's."""

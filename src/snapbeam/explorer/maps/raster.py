@@ -59,25 +59,40 @@ class Axis:
     @classmethod
     def of(cls, source: Source, name: str) -> Axis:
         """The axis of a map."""
-        from snapbeam.config import lookup
-
         skeleton = source.skeleton
+        if not skeleton[name].dims:
+            skeleton = skeleton.drop_vars(name).assign_coords({
+                name: (name, source.coordinate(name), skeleton[name].attrs)
+            })  # fmt: skip
         at, words = positions(skeleton, name)
-        text, unit = source.label(name)
-        text = text.replace("omega_1", "ω₁")
-        symbol = ""
-        if "parameter" in skeleton[name].attrs or name in (
-            "frequency_ratio",
-            "velocity_amplitude",
-            "location",
-        ):
-            symbol = plain_symbol(lookup(str(skeleton[name].attrs.get("parameter", name))).quantity.symbol)
-        label = " ".join(part for part in (text, symbol, "" if unit == "1" else f"({unit})") if part)
+        label = cls.words_of(source, name)
         edges = (
             edges_of(skeleton, name) if at.size > 1 else at[0] + np.array([-0.5, 0.5]) * max(abs(at[0]), 1.0)
         )
         log = words is None and is_geometric(at)
         return cls(name, label, source.coordinate(name), at, edges, words, log)
+
+    @classmethod
+    def scattered(cls, source: Source, name: str, size: int) -> Axis:
+        """One parameter of a list of points, in the order of the list."""
+        at = np.broadcast_to(source.coordinate(name).astype(np.float64), (size,))
+        low, high = float(at.min()), float(at.max())
+        room = 0.04 * (high - low) or 0.5 * max(abs(low), 1.0)
+        edges = np.array([low - room, high + room])
+        return cls(name, cls.words_of(source, name), source.coordinate(name), at, edges)
+
+    @staticmethod
+    def words_of(source: Source, name: str) -> str:
+        """What stands along it: words, symbol and unit."""
+        from snapbeam.config import lookup
+
+        attrs = source.skeleton[name].attrs
+        text, unit = source.label(name)
+        text = text.replace("omega_1", "ω₁")
+        symbol = ""
+        if "parameter" in attrs or name in ("frequency_ratio", "velocity_amplitude", "location"):
+            symbol = plain_symbol(lookup(str(attrs.get("parameter", name))).quantity.symbol)
+        return " ".join(part for part in (text, symbol, "" if unit == "1" else f"({unit})") if part)
 
     @property
     def span(self) -> tuple[float, float]:

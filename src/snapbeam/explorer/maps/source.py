@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam import STATISTICS, InputError, InputTypeError, Integration, System
+from snapbeam.explorer.maps.layers import POINT, Layer, layers_of, parameter_dims, parameter_name
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["DatasetSource", "FileSource", "Source", "SystemSource", "opened"]
-
-_HIDDEN = ("status",)
 
 
 class Source:
@@ -44,22 +43,35 @@ class Source:
         return dict(self.skeleton.attrs)
 
     @property
+    def layers(self) -> dict[str, Layer]:
+        """All that is known of a point, by name."""
+        found: dict[str, Layer] = self._of_skeleton("layers", layers_of)
+        return found
+
+    def _of_skeleton(self, what: str, make: Callable[[xr.Dataset], Any]) -> Any:
+        """Something that follows from the skeleton, kept until that is another one."""
+        kept: dict[str, tuple[Any, Any]] = self.__dict__.setdefault("_kept", {})
+        if what not in kept or kept[what][0] is not self.skeleton:
+            kept[what] = (self.skeleton, make(self.skeleton))
+        return kept[what][1]
+
+    @property
     def dims(self) -> list[str]:
-        """Dimensions of more than one point."""
-        return [str(name) for name, size in self._response_sizes().items() if size > 1]
+        """What may stand along an axis: dimensions of more than one point; of a list what differs among its points.
+
+        A map needs two: of one axis, or of one point, what else is known of it stands along the other, as a strip.
+        """
+        found: list[str] = self._of_skeleton("dims", _axes_of)
+        return found
 
     @property
     def is_list(self) -> bool:
         """Whether it is a list of points, not a grid."""
-        return "point" in self._response_sizes()
-
-    def _response_sizes(self) -> Mapping[Any, int]:
-        found = self.skeleton
-        return found["response"].sizes if "response" in found else found.sizes
+        return POINT in parameter_dims(self.skeleton)
 
     def coordinate(self, name: str) -> NDArray[Any]:
         """The points of an axis."""
-        return np.asarray(self.skeleton[name].values)
+        return np.atleast_1d(np.asarray(self.skeleton[name].values))
 
     def scalars(self) -> dict[str, Any]:
         """Dimensions of one point, and coordinates that hold throughout, by name."""
@@ -70,23 +82,16 @@ class Source:
 
     def variables(self) -> list[str]:
         """What can be shown, the class first."""
-        over = set(self._response_sizes())
-        names = [
-            str(name)
-            for name, item in self.skeleton.data_vars.items()
-            if set(item.dims) == over and item.dtype.kind in "biuf" and name not in _HIDDEN
-        ]
-        return sorted(
-            names,
-            key=lambda name: (name != "response", list(STATISTICS).index(name) if name in STATISTICS else 99),
-        )
+        return [name for name, layer in self.layers.items() if layer.shown]
 
     def numbers(self) -> list[str]:
         """All that the map holds of a point."""
-        return [*self.variables(), *(name for name in _HIDDEN if name in self.skeleton)]
+        return list(self.layers)
 
     def label(self, name: str) -> tuple[str, str]:
         """What a variable or an axis is, in words, and its unit."""
+        if name in self.layers:
+            return self.layers[name].words, self.layers[name].unit
         if name in self.skeleton.variables:
             attrs = self.skeleton[name].attrs
             return str(attrs.get("long_name", name)), str(attrs.get("units", "1"))
@@ -94,23 +99,35 @@ class Source:
         return (name, "1") if row is None else (row.words, row.unit)
 
     def values(self, name: str) -> xr.DataArray | None:
-        """A variable, in memory; None if there are no numbers yet.
+        """A number over the parameters, in memory; None if there are no numbers yet.
 
         Raises
         ------
         InputError
             If they cannot be read.
         """
-        return self.skeleton[name] if name in self.skeleton else None
+        layer = self.layers.get(name)
+        return None if layer is None else self.variable(layer.variable).isel(layer.where)
+
+    def variable(self, name: str) -> xr.DataArray:
+        """A variable as the dataset has it, in memory."""
+        return self.skeleton[name]
 
     def point(self, where: Mapping[str, int]) -> dict[str, Any]:
-        """All that the map holds of one point, by name of the statistic."""
-        found = {}
-        for name in self.numbers():
-            values = self.values(name)
-            if values is not None:
-                found[name] = values.isel(where).values.item()
-        return found
+        """All that the map holds of one point, by name."""
+        return self._numbers_of(self.skeleton, where)
+
+    def _numbers_of(self, dataset: xr.Dataset, where: Mapping[str, int]) -> dict[str, Any]:
+        inside = {name: at for name, at in where.items() if name in dataset.dims}
+        names = dict.fromkeys(layer.variable for layer in self.layers.values())
+        part = dataset[list(names)].isel(inside).load()
+        return {
+            name: part[layer.variable].isel(layer.where).values.item() for name, layer in self.layers.items()
+        }
+
+    def whole(self) -> xr.Dataset:
+        """All of the map, in memory."""
+        return self.skeleton
 
     def refresh(self) -> bool:
         """Look whether there is more; True if there is."""
@@ -121,9 +138,9 @@ class DatasetSource(Source):
     """A map in memory."""
 
     def __init__(self, dataset: xr.Dataset, name: str = "map") -> None:
-        if "response" not in dataset:
+        if not parameter_dims(dataset) or not layers_of(dataset):
             known = ", ".join(map(str, dataset.data_vars)) or "none"
-            raise InputError(f"{name}: is no map; it has no variable 'response' among {known}")
+            raise InputError(f"{name}: is no map; it has no variable over swept parameters among {known}")
         self.skeleton = dataset
         self.name = name
 
@@ -137,7 +154,7 @@ class SystemSource(Source):
 
     def variables(self) -> list[str]:
         """All that a sweep gives."""
-        return [name for name in STATISTICS if name not in _HIDDEN]
+        return [name for name in STATISTICS if name != "status"]
 
 
 class FileSource(DatasetSource):
@@ -169,10 +186,8 @@ class FileSource(DatasetSource):
         except Exception as error:  # of damaged bytes the libraries make errors of every kind
             raise InputError(f"{self._path.name}: is no NetCDF file of results, or is damaged") from error
 
-    def values(self, name: str) -> xr.DataArray | None:
+    def variable(self, name: str) -> xr.DataArray:
         """A variable, read from the file the first time."""
-        if name not in self.skeleton:
-            return None
         with self._lock:
             if name not in self._held:
                 with self._open() as dataset:
@@ -190,10 +205,41 @@ class FileSource(DatasetSource):
             if self._stamped() != self._stamp:
                 raise InputError(f"{self.name}: the file was changed; load the page again")
             try:
-                part = dataset[self.numbers()].isel(where).load()
+                return self._numbers_of(dataset, where)
             except (OSError, ValueError, RuntimeError) as error:
                 raise InputError(f"{self.name}: cannot be read ({error})") from error
-            return {str(name): item.values.item() for name, item in part.data_vars.items()}
+
+    def whole(self) -> xr.Dataset:
+        """All of the map, read now."""
+        with self._lock, self._open() as dataset:
+            if self._stamped() != self._stamp:
+                raise InputError(f"{self.name}: the file was changed; load the page again")
+            try:
+                return dataset.load()
+            except (OSError, ValueError, RuntimeError) as error:
+                raise InputError(f"{self.name}: cannot be read ({error})") from error
+
+
+def _axes_of(skeleton: xr.Dataset) -> list[str]:
+    dims = parameter_dims(skeleton)
+    if POINT in dims:
+        over = [str(name) for name, item in skeleton.coords.items() if item.dims == (POINT,)]
+        known = [
+            name
+            for name in over
+            if parameter_name(skeleton, name) is not None and skeleton[name].dtype.kind in "iuf"
+        ]
+        found = [name for name in known if np.unique(skeleton[name].values).size > 1]
+        spare = [name for name in known if name not in found]
+    else:
+        found = [name for name in dims if skeleton.sizes[name] > 1]
+        spare = [name for name in dims if name not in found]
+    spare += [
+        str(name)
+        for name, item in skeleton.coords.items()
+        if item.ndim == 0 and parameter_name(skeleton, str(name)) is not None and item.dtype.kind in "iuf"
+    ]
+    return [*found, *spare[: max(2 - len(found), 0)]]
 
 
 def _unread(item: xr.DataArray) -> NDArray[Any]:

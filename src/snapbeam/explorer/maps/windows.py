@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -61,6 +62,10 @@ class Window:
     seconds: float = 0.0
     version: int = 0
     finished: bool = False
+    lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+    """Held by who computes it."""
+    writing: threading.Lock = field(default_factory=threading.Lock, repr=False)
+    """Held while values and strides do not agree."""
 
     def __post_init__(self) -> None:
         self.stride = np.zeros((self.y.size, self.x.size), dtype=np.int8)
@@ -81,10 +86,16 @@ class Window:
             place.append(int(np.clip(share * size, 0, size - 1)))
         return place[0], place[1]
 
-    def computed_at(self, x: float, y: float) -> tuple[int, int] | None:
-        """Row and column of the point that stands for a place; None if there is none."""
+    def computed_at(
+        self, x: float, y: float, stride_of: NDArray[np.int8] | None = None
+    ) -> tuple[int, int] | None:
+        """Row and column of the point that stands for a place; None if there is none.
+
+        *stride_of* is what ``stride`` was when the window was drawn: cells that have been computed since are not yet
+        seen by who clicks on them.
+        """
         row, column = self.cell(x, y)
-        stride = int(self.stride[row, column])
+        stride = int((self.stride if stride_of is None else stride_of)[row, column])
         if stride == 0:
             return None
         return _middle(row, stride), _middle(column, stride)
@@ -148,6 +159,15 @@ def compute(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], N
     InputError
         For a point that no system has.
     """
+    while not window.lock.acquire(timeout=0.1):  # another page has asked for it, and computes it
+        token.check()
+    try:
+        return _filled(window, jobs, token, tell)
+    finally:
+        window.lock.release()
+
+
+def _filled(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], None]) -> Window:
     pace = None
     structural = [not _is_run(name) for name in window.names]
     for stride in _STRIDES:
@@ -161,22 +181,27 @@ def compute(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], N
         order = _structure_order(todo, structural)
         at = 0
         while at < len(order):
-            jobs.give_way(token)
             batch = _FIRST if pace is None else int(np.clip(_BATCH_SECONDS / pace, 1, _MOST))
             part = order[at : at + batch]
             fresh = [item for item in part if not _known(window, item[2], item[3])]
-            begun = time.monotonic()
+            found: dict[str, NDArray[Any]] = {}
             if fresh:
-                _run(window, fresh, token)
+                with jobs.turn(token):
+                    begun = time.monotonic()
+                    found = _run(window, fresh, token)
                 spent = (time.monotonic() - begun) / len(fresh)
                 first = pace is None
                 pace = spent if first or pace is None else 0.5 * (pace + spent)
                 window.seconds = pace
-            for a, b, i, j in part:
-                block = (slice(a, a + stride), slice(b, b + stride))
-                for values in window.values.values():
-                    values[block] = values[i, j]
-                window.stride[block] = stride
+            with window.writing:
+                for name, values in found.items():
+                    held = window.values.setdefault(name, np.zeros(window.stride.shape, dtype=values.dtype))
+                    held[[item[2] for item in fresh], [item[3] for item in fresh]] = values
+                for a, b, i, j in part:
+                    block = (slice(a, a + stride), slice(b, b + stride))
+                    for values in window.values.values():
+                        values[block] = values[i, j]
+                    window.stride[block] = stride
             at += batch
             window.done += len(fresh)
             window.version += 1
@@ -209,7 +234,8 @@ def _is_run(name: str) -> bool:
     return lookup(name).is_run
 
 
-def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) -> None:
+def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) -> dict[str, NDArray[Any]]:
+    """Statistics of some cells, by name."""
     import xarray as xr
 
     rows = np.array([item[2] for item in points])
@@ -220,10 +246,4 @@ def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) 
     })  # fmt: skip
     spare = max(1, (os.cpu_count() or 2) - 1)  # a run that is clicked on needs a core
     found = sweep(window.system, table, window.integration.replace(threads=spare), progress=token.check)
-    for name, item in found.data_vars.items():
-        if item.dims != ("point",):
-            continue
-        if name not in window.values:
-            kind = item.dtype if item.dtype.kind == "f" else np.dtype(item.dtype)
-            window.values[str(name)] = np.zeros((window.y.size, window.x.size), dtype=kind)
-        window.values[str(name)][rows, columns] = item.values
+    return {str(name): item.values for name, item in found.data_vars.items() if item.dims == ("point",)}

@@ -91,9 +91,9 @@ class MapView:
         self.plot.scatter(
             "x", "y", color="color", source=self.dots, size=8, line_color="#ffffff", line_width=1.2
         )
-        self.list = ColumnDataSource({"x": [], "y": [], "color": []})
+        self.list = ColumnDataSource({"x": [], "y": [], "color": []}, name="map-list")
         self.plot.scatter(
-            "x", "y", color="color", source=self.list, size=7, line_color="#000000", line_width=0.4
+            "x", "y", color="color", source=self.list, size=9, line_color=look.text, line_width=0.5
         )
         self.mark = ColumnDataSource({"x": [], "y": [], "text": []}, name="map-mark")
         for size, color, width in ((17, "#000000", 3.6), (17, "#ffffff", 1.6)):
@@ -201,15 +201,19 @@ class MapView:
         """Show the map pale, if it is of another system than what is computed."""
         self.whole.glyph.global_alpha = 0.3 if old else 1.0
 
-    def show_windows(self, windows: list[Window], name: str) -> None:
-        """Lay windows over the map, the finest uppermost."""
+    def show_windows(self, windows: list[Window], name: str) -> list[tuple[Window, NDArray[np.int8]]]:
+        """Lay windows over the map, the finest uppermost; returns them with their strides as they are drawn."""
         data: dict[str, list[Any]] = {"image": [], "x": [], "y": [], "dw": [], "dh": []}
         borders: dict[str, list[float]] = {"left": [], "right": [], "bottom": [], "top": []}
+        drawn = []
         for window in windows:
             if name not in window.values:
                 continue
-            image = colors_of(name, window.values[name], self.limits).copy()
-            image[window.stride == 0] = 0
+            with window.writing:
+                stride = window.stride.copy()
+                image = colors_of(name, window.values[name], self.limits).copy()
+            drawn.append((window, stride))
+            image[stride == 0] = 0
             left, right, low, high = window.bounds
             for key, value in zip(data, (image, left, low, right - left, high - low), strict=True):
                 data[key].append(value)
@@ -217,16 +221,28 @@ class MapView:
                 borders[key].append(side)
         self.tiles.data = data
         self.frames.data = borders
+        return drawn
 
     def show_list(
-        self, x: NDArray[Any], y: NDArray[Any], name: str, values: NDArray[Any], limits: tuple[float, float]
+        self,
+        x: NDArray[Any],
+        y: NDArray[Any],
+        name: str,
+        values: NDArray[Any],
+        limits: tuple[float, float],
+        title: str,
     ) -> None:
-        """Show a list of points as dots in the colours of a variable."""
+        """Show a list of points as dots in the colours of a variable; those without a number are clear."""
         self.limits = limits
+        self.plot.title.text = title
         packed = colors_of(name, values[None, :], limits)[0].view(np.uint8).reshape(-1, 4)
         self.bar.update(visible=name != "response")
         self.mapper.update(low=limits[0], high=limits[1] if limits[1] > limits[0] else limits[0] + 1.0)
-        self.list.data = {"x": x, "y": y, "color": [f"#{r:02x}{g:02x}{b:02x}" for r, g, b, _ in packed]}
+        self.list.data = {
+            "x": x,
+            "y": y,
+            "color": [f"#{r:02x}{g:02x}{b:02x}{a:02x}" for r, g, b, a in packed],
+        }
 
     def show_marks(self, marks: list[tuple[float, float, str]]) -> None:
         """Mark the points whose runs are shown."""

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 __all__ = ["RunView"]
 
+_PAUSE = 60
+"""Milliseconds between two views that are built while nobody looks at them."""
 _SETTLE = 60
 """Milliseconds that a range must rest before the samples in it are sent."""
 
@@ -67,8 +69,7 @@ class RunView:
             *((part.title, part.place) for part in self.parts), dynamic=True, sizing_mode="stretch_width", margin=0
         )  # fmt: skip
         self.tabs.param.watch(lambda _: post(self._activated), "active")
-        for part in self.parts:  # all at once: what follows the cursor must be known before the page is
-            part.activate()
+        self.parts[0].activate()
         self._moved = 0
         self._quiet = False
         for edge in ("start", "end"):
@@ -138,7 +139,15 @@ class RunView:
             start, end = float(self.cursor.range.start), float(self.cursor.range.end)
             self.active.show(self.run, min(start, end), max(start, end))
 
+    def complete(self) -> None:
+        """Build the views that are not seen, one after the other, so that what is asked for meanwhile need not wait."""
+        waiting = [part for part in self.parts if not part.built]
+        if waiting:
+            waiting[0].activate()
+            self.later(self.complete, _PAUSE)
+
     def _activated(self) -> None:
+        self.active.activate()
         self.later(self._draw, _SETTLE)  # once the browser has what it is to be drawn in
 
     def _range_moved(self) -> None:

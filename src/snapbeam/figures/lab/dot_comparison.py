@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from snapbeam.figures.response_map import plot_response_map
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
@@ -25,7 +26,8 @@ _DRAWN = ("frequency_ratio", "location", "velocity_amplitude")  # across first, 
 def plot_dot_comparison(dataset: xr.Dataset, dots: Dots, result: DotComparison) -> Figure:
     """Draw measured responses on a map, and the table of measured against simulated classes beside it.
 
-    Dots whose class is not that of the map are crossed out.
+    Dots whose class is not that of the map are crossed out.  In the table what agrees is grey, on the diagonal,
+    and what does not is red and bold, each the darker the greater its share of the measured class is.
     """
     with house_style():
         figure = new_figure("double", 92.0)
@@ -33,12 +35,7 @@ def plot_dot_comparison(dataset: xr.Dataset, dots: Dots, result: DotComparison) 
         left = plot_response_map(dataset, figure.add_subplot(grid[0]), dots=dots)
         _mark_disagreeing(left, dataset, result)
         ax = figure.add_subplot(grid[1])
-        counts = result.confusion
-        rows = np.maximum(counts.sum(axis=1, keepdims=True), 1)
-        ax.imshow(counts / rows, cmap="Greys", vmin=0.0, vmax=1.0, origin="upper")
-        for (i, j), value in np.ndenumerate(counts):
-            dark = value / rows[i, 0] > 0.5
-            ax.text(j, i, str(value), ha="center", va="center", color="white" if dark else "black")
+        _confusion(ax, result.confusion)
         names = [kind.label.replace(" interwell", "\ninterwell") for kind in result.classes]
         ax.set_xticks(np.arange(len(names)), names, rotation=40, ha="right", rotation_mode="anchor")
         ax.set_yticks(np.arange(len(names)), names)
@@ -48,11 +45,30 @@ def plot_dot_comparison(dataset: xr.Dataset, dots: Dots, result: DotComparison) 
             f"{100 * result.agreement:.0f} % of {result.used} agree "
             f"(95 %: {100 * low:.0f} to {100 * high:.0f} %), × do not"
             if result.used
-            else "no measured point counts",
+            else "No measured point counts",
             loc="left",
         )
         fix_ticks(ax)
     return figure
+
+
+def _confusion(ax: Axes, counts: NDArray[np.int64]) -> None:
+    """Counts of measured (rows) and simulated classes (columns), agreements and errors in two colours."""
+    share = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    right = np.eye(len(counts), dtype=bool)
+    for cells, colors in ((right, "Greys"), (~right, "Reds")):
+        # a single error is seen too: shades begin at a quarter
+        shade = np.ma.masked_where(~cells | (counts == 0), 0.25 + 0.6 * share)
+        ax.imshow(shade, cmap=colors, vmin=0.0, vmax=1.0, origin="upper")
+    for (i, j), value in np.ndenumerate(counts):
+        error = i != j and value > 0
+        color = "0.6" if value == 0 else "white" if share[i, j] > 0.6 else "black"
+        weight = "bold" if error else "normal"
+        ax.text(j, i, str(value), ha="center", va="center", color=color, fontweight=weight)
+    ax.set_xticks(np.arange(-0.5, len(counts)), minor=True)
+    ax.set_yticks(np.arange(-0.5, len(counts)), minor=True)
+    ax.grid(which="minor", color="white", linewidth=1.0)
+    ax.tick_params(which="minor", length=0)
 
 
 def _mark_disagreeing(ax: Axes, dataset: xr.Dataset, result: DotComparison) -> None:

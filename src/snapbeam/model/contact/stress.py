@@ -88,7 +88,7 @@ def hertz_stress(
 
 
 def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array:
-    """Greatest bending stress along the beam, E (h/2) max |w''|, Pa, of amplitudes of shape (..., N), shape (...).
+    """Greatest bending stress along the beam, E (h/2) max abs(w''), Pa, of amplitudes of shape (..., N), shape (...).
 
     The stress of the shape itself is meant, that of a beam made straight; the axial stress is not in it.
     """

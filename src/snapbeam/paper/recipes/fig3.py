@@ -57,13 +57,13 @@ def draw(results: Results) -> Figure:
         wave.plot(cycle, run.displacement, color=BEAM_COLOR, label=r"beam $w_\mathrm{b}(x_\mathrm{s})$")
         wave.plot(cycle, run.shaker_displacement, color=SHAKER_COLOR, label=r"shaker $w_\mathrm{s}$")
         wave.set(xlabel=r"Cycles of excitation $\tau$", ylabel="Displacement $w$", xlim=(0.0, cycle[-1]))
-        top = float(run.displacement.max())
-        wave.set_ylim(top=top + 0.18 * (top - float(run.displacement.min())))
+        low, top = float(run.displacement.min()), float(run.displacement.max())
+        wave.set_ylim(low - 0.22 * (top - low), top + 0.18 * (top - low))
         wave.legend(loc="upper right", ncols=2)
         at = onset / period
         wave.annotate(
-            "B", (at, float(np.interp(onset, time, run.displacement.values))), (-20, 14),
-            textcoords="offset points", arrowprops={"arrowstyle": "-", "linewidth": 0.5}, va="center",
+            "B, C", (at, float(np.interp(onset, time, run.displacement.values))), (-9, -20),
+            textcoords="offset points", arrowprops={"arrowstyle": "-", "linewidth": 0.5}, ha="center",
         )  # fmt: skip
         beam, tip = run.displacement.values[near], run.shaker_displacement.values[near]
         close.fill_between(micro[near], beam, tip, where=tip >= beam, color=SHAKER_COLOR, alpha=0.25, lw=0)

@@ -174,7 +174,9 @@ def draw(results: Results, measured: Sequence[str | os.PathLike[str]] | None = N
     with house_style():
         figure = new_figure("double", 132.0)
         axes = figure.subplots(3, 2, sharey=True, sharex=measured is None)
-        for (first, second), recorded, (kind, words) in zip(axes, left, KINDS.items(), strict=True):
+        for row, ((first, second), recorded, (kind, words)) in enumerate(
+            zip(axes, left, KINDS.items(), strict=True)
+        ):
             run = data[kind]
             _waveform(first, recorded)
             _waveform(second, run)
@@ -182,9 +184,9 @@ def draw(results: Results, measured: Sequence[str | os.PathLike[str]] | None = N
             place = (
                 rf"$\Omega$ = {run.attrs['frequency_ratio']:.4g}, $V$ = {run.attrs['velocity_amplitude']:.4g}"
             )
-            second.set_title(f"{words}\n{place}", loc="left")
-        title = "synthetic recording, tracked" if measured is None else "measured"
-        axes[0, 0].set_title(title, loc="left")
+            second.set_title(f"{words[0].upper()}{words[1:]}\n{place}", loc="left")
+            again = f"No measurement: the run of {'BDF'[row]}, drawn as\na camera would see it, and tracked"
+            first.set_title(again if measured is None else "Measured", loc="left")
         for ax in axes[-1]:
             ax.set_xlabel(_across(ax))
         handles, labels = axes[0, 1].get_legend_handles_labels()

@@ -28,6 +28,8 @@ FREQUENCY_RATIO, VELOCITY_AMPLITUDE = 1.21, 0.18
 _CYCLES = 16
 _SAMPLES = 400  # a cycle
 _MODE_COLORS = ("#000000", "#B03A27", "#2E7EBB", "#E0A030")
+_HALF_WAY = 0.5
+"""Displacement of the centre, in b, at the first and the last snapshot."""
 _AROUND = 0.9  # cycles shown before and after the snap-through
 
 
@@ -70,9 +72,7 @@ def draw(results: Results) -> Figure:
         raise InputError("fig5: the run does not snap through, so that there is nothing to show")
     first = snaps[0] / period
     inside = snaps[snaps < snaps[0] + 0.5 * period] / period
-    marks = np.array([inside[0] - 0.15, inside[0], inside[-1] + 1e-9, inside[-1] + 0.15])
-    if inside.size == 1:
-        marks[2] = inside[0] + 0.05
+    marks = _instants(cycle, run.center_displacement.values.astype(float), inside)
     rest = abs(float(along.attrs["rest_amplitude"]))
     with house_style():
         figure = new_figure("double", 125.0)
@@ -88,6 +88,17 @@ def draw(results: Results) -> Figure:
         fix_ticks(wave, snapshots, modes, amplitudes)
         panel_letters([wave, snapshots, modes, amplitudes])
     return figure
+
+
+def _instants(cycle: _Array, w: _Array, zeros: _Array) -> _Array:
+    """Instants of the snapshots: the centre leaves half way up the first well, passes zero for the first and the last
+    time, and comes half way down the other well."""
+    before = np.flatnonzero((cycle < zeros[0]) & (w < -_HALF_WAY))
+    after = np.flatnonzero((cycle > zeros[-1]) & (w > _HALF_WAY))
+    begin = cycle[before[-1]] if before.size else max(zeros[0] - 0.15, cycle[0])
+    end = cycle[after[0]] if after.size else min(zeros[-1] + 0.15, cycle[-1])
+    last = zeros[-1] if zeros.size > 1 else 0.5 * (zeros[0] + end)
+    return np.array([begin, zeros[0], last, end])
 
 
 def _waveform(ax: Axes, run: xr.Dataset, marks: _Array, first: float) -> None:
@@ -109,7 +120,7 @@ def _waveform(ax: Axes, run: xr.Dataset, marks: _Array, first: float) -> None:
 
 
 def _numbers(ax: Axes, cycle: _Array, curve: _Array, marks: _Array) -> None:
-    offsets = ((-6, -3), (-7, 5), (7, -7), (7, 0))
+    offsets = ((-7, 2), (-6, 6), (6, -7), (7, -3))
     for number, (at, offset) in enumerate(zip(marks, offsets, strict=True), 1):
         y = float(np.interp(at, cycle, curve))
         ax.plot(at, y, "o", markersize=2.5, color=SHAKER_COLOR, markeredgewidth=0)
@@ -122,10 +133,10 @@ def _snapshots(ax: Axes, run: xr.Dataset, along: xr.Dataset, marks: _Array) -> N
     x, shapes, scale = along.position.values, along["shape"].values, float(along.attrs["length_scale"])
     alpha, cycle = run.modal_amplitude.values, run.cycle.values
     ax.axhline(0.0, color="0.7", linewidth=0.5)
-    styles = (("-", "0.0"), ("--", "#B03A27"), ("-.", "#2E7EBB"), ("-", "0.55"))
+    styles = (("-", "0.0"), ("--", "#B03A27"), ("-.", "#2E7EBB"), (":", "0.35"))
     for number, (at, (dashes, color)) in enumerate(zip(marks, styles, strict=True), 1):
         now = np.array([np.interp(at, cycle, column) for column in alpha.T])
-        ax.plot(x, shapes @ now / scale, dashes, color=color, label=str(number))
+        ax.plot(x, shapes @ now / scale, dashes, color=color, label=str(number), linewidth=1.2)
     ax.set(xlabel="Position $x/L$", ylabel="Displacement $w$", xlim=(0.0, 1.0))
     ax.legend(loc="upper left", ncols=4, handlelength=1.8, columnspacing=0.8)
     low, high = ax.get_ylim()
@@ -145,7 +156,7 @@ def _amplitudes(ax: Axes, run: xr.Dataset, marks: _Array, first: float, rest: fl
     cycle, alpha = run.cycle.values, run.modal_amplitude.values.astype(float) / rest
     near = (cycle >= first - _AROUND) & (cycle <= marks[2] + _AROUND)
     others = np.sqrt(np.sum(alpha[:, 1:] ** 2, axis=1))
-    ax.fill_between(
+    band = ax.fill_between(
         cycle[near], 0.0, 1.0, where=(others > np.abs(alpha[:, 0]))[near], color="0.88", lw=0,
         transform=ax.get_xaxis_transform(), label=r"$|\alpha_1|$ less than the rest",
     )  # fmt: skip
@@ -154,4 +165,5 @@ def _amplitudes(ax: Axes, run: xr.Dataset, marks: _Array, first: float, rest: fl
     _numbers(ax, cycle, alpha[:, 0], marks)
     ax.set(xlabel=r"Cycles of excitation $\tau$", ylabel=r"Modal amplitude $\alpha_i\,/\,|\alpha_1(0)|$")
     ax.set_xlim(cycle[near][0], cycle[near][-1])
-    ax.legend(loc="upper left", ncols=1)
+    ax.add_artist(ax.legend(handles=[band], loc="lower right", handlelength=1.0))
+    ax.legend(handles=ax.lines[:4], loc="upper left", ncols=2, columnspacing=0.8, handlelength=1.4)

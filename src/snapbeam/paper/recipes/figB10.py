@@ -23,6 +23,8 @@ __all__ = ["LEVELS", "compute", "draw", "maxima"]
 
 LEVELS = (0.005, 0.02)
 """Low and moderate drive; the paper does not give its own.  Neither snaps through."""
+_FOOT = -1.01
+"""Where the frequencies of the lower drive's maxima stand, below all curves."""
 _STYLES = (("#2E7EBB", "-"), ("#B03A27", "-"))
 
 
@@ -71,15 +73,22 @@ def draw(results: Results) -> Figure:
                 )
                 for ratio, height in maxima(ds, level)[:2]:
                     ax.plot(ratio, height, "v", color=color, markersize=3.5, markeredgewidth=0)
-                    ax.annotate(
-                        f"{ratio:.2f}", (ratio, height), (0, 4), textcoords="offset points", fontsize=7,
-                        color=color, ha="center",
-                    )  # fmt: skip
+                    if level == len(_STYLES) - 1:  # no curve is above it
+                        ax.annotate(
+                            f"{ratio:.2f}", (ratio, height), (0, 4), textcoords="offset points", fontsize=7,
+                            color=color, ha="center",
+                        )  # fmt: skip
+                    else:  # below all curves, under its maximum
+                        ax.plot([ratio, ratio], [height, _FOOT], ":", color=color, linewidth=0.6)
+                        ax.annotate(
+                            f"{ratio:.2f}", (ratio, _FOOT), (0, -1), textcoords="offset points", fontsize=7,
+                            color=color, ha="center", va="top",
+                        )  # fmt: skip
             ax.set(xlabel=r"Excitation frequency $\Omega$", xlim=(0.0, 4.0))
             ax.set_title(f"$N$ = {int(ds.attrs['modes'])}, {int(ds.attrs['cycles'])} cycles", loc="left")
         axes[0].set_ylabel(r"Greatest displacement $w_\mathrm{b}(x_\mathrm{s})$")
         low, high = axes[0].get_ylim()
-        axes[0].set_ylim(low, high + 0.08 * (high - low))
+        axes[0].set_ylim(min(low, _FOOT - 0.06), high + 0.08 * (high - low))
         axes[0].legend(loc="upper left")
         fix_ticks(*axes)
         panel_letters(axes)

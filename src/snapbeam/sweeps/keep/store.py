@@ -31,6 +31,7 @@ from snapbeam.sweeps.compute.tasks import Stage, chunk_size
 from snapbeam.sweeps.errors import StoreError
 from snapbeam.sweeps.keep.durable import PARTIAL, StoreLock, durable_write, member, refuse_links
 from snapbeam.sweeps.keep.ledger import Ledger, Record
+from snapbeam.sweeps.points import Grid
 
 __all__ = ["MapStore", "StoredRows", "read_stored_config"]
 
@@ -129,6 +130,10 @@ class MapStore:
         setup = self.work.setup
         chunk = chunk_size(setup.points.size, setup.integration.engine) if chunk is None else chunk
         held = _FORMAT | {"parameters": wanted, "parameter_hash": parameter_hash(wanted), "chunk": chunk}
+        if isinstance(
+            setup.points, Grid
+        ):  # the parameters are sorted by name: the order of the axes is said apart
+            held["axes"] = list(setup.points.names)
         if config is not None:
             held["config"] = config
         try:

@@ -1,0 +1,51 @@
+"""The benchmarks begin: every module is imported, and the GPU's is run small in the simulator."""
+
+from __future__ import annotations
+
+import json
+import os
+import pkgutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+NEEDS = {"diffrax", "equinox", "heyoka", "jax", "numbalsoda", "panel", "playwright"}
+"""Packages that single benchmarks need; without them that one is left out."""
+_IMPORT = """
+import importlib, sys
+for name in sys.argv[1:]:
+    try:
+        importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        print(error.name.partition(".")[0])
+"""
+
+
+def test_every_benchmark_can_be_imported():
+    names = [
+        name
+        for _, name, _ in pkgutil.walk_packages([str(ROOT / "benchmarks")], "benchmarks.")
+        if not name.endswith("__main__")
+    ]
+    assert len(names) > 15 and "benchmarks.gpu" in names
+    done = subprocess.run(
+        [sys.executable, "-c", _IMPORT, *names], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert set(done.stdout.split()) <= NEEDS, done.stdout
+
+
+@pytest.mark.slow
+def test_the_gpus_benchmark_runs_in_the_simulator(tmp_path):
+    pytest.importorskip("numba_cuda")
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.gpu", "--smoke", "-o", str(tmp_path / "gpu.json")],
+        cwd=ROOT, env=dict(os.environ, NUMBA_ENABLE_CUDASIM="1"), capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "gpu.json").read_text())
+    assert {"facts", "conformance", "throughput", "scaling", "map"} <= found.keys()
+    assert found["conformance"]["first_cycle"][0]["error"] < 1e-6
