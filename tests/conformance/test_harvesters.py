@@ -40,7 +40,7 @@ def compare(
     free = live(beam, Surroundings(base), times)
     # the circuit matters: what is met is not the beam without it
     assert np.abs(truth.center_displacement - free.center_displacement).max() > 3e-3
-    for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
+    for accuracy, bound, slack in (("map", 1e-3, 1e-2), ("reference", 1e-7, 1e-5)):
         run = sb.simulate(
             shaken(modes, harvester), sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times
         )
@@ -52,9 +52,9 @@ def compare(
         )
         share = float(harvester.share(np.array([harvester.resistance]))[0])
         given = share * truth.circuit
-        np.testing.assert_allclose(data.energy_harvested, given, rtol=0.0, atol=10 * bound * given[-1])
-        assert run.outcome.harvested_energy == pytest.approx(given[-1], rel=10 * bound)
-        assert run.outcome.harvested_power == pytest.approx(given[-1] / times[-1], rel=10 * bound)
+        np.testing.assert_allclose(data.energy_harvested, given, rtol=0.0, atol=slack * given[-1])
+        assert run.outcome.harvested_energy == pytest.approx(given[-1], rel=slack)
+        assert run.outcome.harvested_power == pytest.approx(given[-1] / times[-1], rel=slack)
         assert ledger(run) < 1e-4
 
 

@@ -36,7 +36,7 @@ _LOWEST = {"map": 1e-9, "reference": 1e-13}
 """Height of a flight after an impact that lasts no time, over b, below which chatter ends in sticking."""
 _RESOLVED = 24.0
 """Flight steps, at least, in a period of a base's or an axial load's fastest part."""
-_TAPPED = {"map": 1.0, "reference": 0.35}
+_TAPPED = {"map": 1.0, "reference": 0.3}
 """Longest step with a harvester, over the reciprocal of the greatest angular frequency."""
 FAR_AWAY = -1e30
 """Penetration, m, of a tip that is not there."""
