@@ -91,8 +91,8 @@ def test_a_layer_that_does_not_couple_changes_nothing() -> None:
     assert errors[2] < 1e-9
 
 
-def test_sweep_of_the_load_has_an_optimum() -> None:
-    """Under a gentle shake the power over the resistance is that of linear theory, with one maximum near 1/(omega C).
+def test_sweep_of_the_load() -> None:
+    """Under a gentle shake the power over the resistance is that of linear theory.
 
     The start rings down within the run, which is long against 1/(zeta omega).
     """
@@ -115,7 +115,7 @@ def test_sweep_of_the_load_has_an_optimum() -> None:
         voltage.append(abs(circuit * q))
     expected = np.array(voltage) ** 2 / (2.0 * loads)
     np.testing.assert_allclose(found.harvested_power.values, expected, rtol=0.15)
-    assert 0 < int(found.harvested_power.argmax()) < loads.size - 1
+    assert int(found.harvested_power.argmax()) == int(expected.argmax())
 
 
 def test_refusals() -> None:
