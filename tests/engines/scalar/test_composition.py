@@ -9,7 +9,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.scalar.composition import COMPOSITIONS, TURNS, slot_length
+from snapbeam.engines.scalar.composition import COMPOSITIONS, COUPLED, TURNS, slot_length
 
 
 @pytest.mark.parametrize("order", [4, 6])
@@ -77,3 +77,26 @@ def test_measured_order_with_contact(modes: int, pair: tuple[float, float]) -> N
     assert math.log2(errors[0] / errors[-1]) / 4.0 > 2.2, errors
     slope = -np.polyfit(np.arange(5), np.log2(errors), 1)[0]
     assert slope > 2.2, errors
+
+
+@pytest.mark.parametrize(("order", "counts"), [(4, (10, 20, 40)), (6, (6, 12, 24))])
+def test_order_with_kicks_that_depend_on_velocity(order: int, counts: tuple[int, ...]) -> None:
+    """q'' = -q - q^3 - 0.3 q', the last two terms in the kick, whose flow is exact at a fixed place."""
+    table = COUPLED[order]
+    stages = int(np.flatnonzero(table.elapsed == 1.0)[0])
+
+    def end(count: int) -> float:
+        h, q, p = 3.0 / count, 1.0, 0.3
+        for _ in range(count):
+            for i in range(stages + 1):
+                lost = np.exp(-0.3 * table.kick[i] * h)
+                p = p * lost - q**3 * (1.0 - lost) / 0.3
+                if i < stages:
+                    c, s = np.cos(table.flow[i] * h), np.sin(table.flow[i] * h)
+                    q, p = q * c + p * s, p * c - q * s
+        return float(q)
+
+    best = end(2000)
+    errors = [abs(end(count) - best) for count in counts]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(order, abs=0.3)

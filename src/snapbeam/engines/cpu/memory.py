@@ -186,7 +186,9 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
             circuit=None if first.circuit is None else first.circuit._replace(rate=rate, kick=kick),
         )
     at = second.work + WORK_ROWS * size + slots
-    stages, weights = in_memory(ensemble.order, at, general=ensemble.law.lossy or first.circuit is not None)
+    stages, weights = in_memory(
+        ensemble.order, at, general=ensemble.law.lossy, coupled=first.circuit is not None
+    )
     table = stages.flow + weights.size
     length = table + ensemble.samples.size
     raw = np.zeros(length + _ALIGNMENT // 8)

@@ -15,7 +15,7 @@ from snapbeam.engines.cpu.rows import (
 )
 from snapbeam.engines.cpu.step import observe, prepare
 from snapbeam.engines.cpu.uneven import about_level, above_own_well, lifted, put
-from snapbeam.engines.cpu.world.circuit import put_rate
+from snapbeam.engines.cpu.world.circuit import calm, put_rate
 from snapbeam.engines.cpu.world.forced import changed_load, enter_forces
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS, Stages
@@ -220,7 +220,7 @@ def land(memory, blocks, layout, run, t, home, rows, touching, landed, sample):
     energy = lifted(memory, layout.size, layout.uneven, q, energy)
     quiet = is_quiet(above_own_well(layout.uneven, home, energy), layout.gamma, layout.stretch)
     status = _RUNNING if t < run.clock.end else _OK
-    watch = Watch(touching, quiet, t, t, t, 0)
+    watch = Watch(touching, calm(layout.circuit, quiet), t, t, t, 0)
     return Now(t, home, 2.0 * gq + qr, rows, seen, watch, sample, landed, status), energy
 
 

@@ -14,7 +14,7 @@ from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot, look_slot
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.cpu.uneven import about_level, above_own_well, at_center, lifted, second_well
 from snapbeam.engines.cpu.world.around import count_given
-from snapbeam.engines.cpu.world.circuit import count_circuit
+from snapbeam.engines.cpu.world.circuit import calm, count_circuit
 from snapbeam.engines.cpu.world.forced import extra_speed
 from snapbeam.engines.scalar.compile import inlined
 from snapbeam.engines.scalar.contact import jumps, slack_at
@@ -144,6 +144,7 @@ def weighed(memory, layout, run, now, t, state, seen1, watch, event, status, boo
                 energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
             energy = lifted(memory, layout.size, layout.uneven, q, energy)
             quiet = is_quiet(above_own_well(layout.uneven, now.home, energy), layout.gamma, layout.stretch)
+            quiet = calm(layout.circuit, quiet)
             if not event and now.home < 0.0 and (beat & 15) == 0 and seen1.w > clock.decide_reach:
                 if at_center(layout.uneven, seen1.c) > 0.0 and energy < clock.decide_energy:
                     status = _DECIDED

@@ -23,6 +23,7 @@ __all__ = [
     "Circuit",
     "Tap",
     "apply_tap",
+    "calm",
     "count_circuit",
     "kick_source",
     "lean_kick",
@@ -69,6 +70,14 @@ def put_rate(memory, circuit, rate):
     if circuit is None:
         return
     memory[circuit.rate] = rate
+
+
+@inlined
+def calm(circuit, quiet):
+    """Whether steps may be longer: never with a circuit, which couples all modes at any energy."""
+    if circuit is None:
+        return quiet
+    return False
 
 
 @inlined
