@@ -51,7 +51,7 @@ def test_every_file_of_the_engines_and_the_codes_is_in_it(copy) -> None:
     first = mark()
     files = [copy / "core" / "codes.py", *sorted((copy / "engines").rglob("*.py"))]
     assert len(files) > 35
-    assert {path.parent.name for path in files} == {"core", "engines", "cpu", "cuda", "scalar"}
+    assert {path.parent.name for path in files} == {"core", "engines", "cpu", "few", "cuda", "scalar"}
     marks = {changed(path) for path in files}
     assert first not in marks
     assert len(marks) == len(files)

@@ -169,8 +169,7 @@ def _march(
 ) -> Landings:
     packed = pack(ensemble.structure, ensemble.high_omega)
     if landings == 0 and _few_modes_pay(ensemble, packed):
-        march, arguments = _side_by_side(ensemble, packed)
-        return _spread_over(ensemble, packed, march, arguments, threads, progress, landings)
+        return _spread_over(ensemble, packed, *_side_by_side(ensemble, packed), threads, progress, landings)
     march = _kernel(march_many, ensemble)
 
     def arguments(which: _Integers, kept: Kept) -> tuple[Any, ...]:

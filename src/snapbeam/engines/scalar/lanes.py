@@ -22,6 +22,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_model
 
+from snapbeam.engines.scalar.compile import INLINE_HERE, overloaded
+
 __all__ = [
     "WIDTH",
     "fma",
@@ -149,14 +151,14 @@ def spread(value: Any) -> Any:
     raise TypeError("spread runs in compiled code only")
 
 
-@overload(spread)
+@overload(spread, jit_options=INLINE_HERE)
 def _spread(value):
     if _is_lanes(value):
         return lambda value: value
     return lambda value: splat(value)
 
 
-@overload(fma)
+@overloaded(fma)
 def _fma(a, b, c):
     if any(map(_is_lanes, (a, b, c))):
         return lambda a, b, c: _lanes_fma(spread(a), spread(b), spread(c))
@@ -168,7 +170,7 @@ def select_less(a: Any, b: Any, yes: Any, no: Any) -> Any:
     return yes if a < b else no
 
 
-@overload(select_less)
+@overloaded(select_less)
 def _select_less(a, b, yes, no):
     if any(map(_is_lanes, (a, b, yes, no))):
         return lambda a, b, yes, no: _lanes_select(spread(a), spread(b), spread(yes), spread(no))
@@ -197,14 +199,14 @@ vtrunc = _unary("trunc")
 _vsqrt = _unary("sqrt")
 
 
-@overload(abs)
+@overload(abs, jit_options=INLINE_HERE)
 def _abs(value):
     if _is_lanes(value):
         return lambda value: vabs(value)
     return None
 
 
-@overload(math.sqrt)
+@overload(math.sqrt, jit_options=INLINE_HERE)
 def _sqrt(value):
     if _is_lanes(value):
         return lambda value: _vsqrt(value)
@@ -245,7 +247,7 @@ def _arithmetic(python_operator: Any, llvm_name: str) -> None:
 
         return LANES(LANES, LANES), codegen
 
-    @overload(python_operator)
+    @overload(python_operator, jit_options=INLINE_HERE)
     def implementation(a, b):
         if isinstance(a, Lanes) and isinstance(b, Lanes):
             return lambda a, b: lanewise(a, b)

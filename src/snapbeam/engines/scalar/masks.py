@@ -13,6 +13,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_model
 
+from snapbeam.engines.scalar.compile import INLINE_HERE
 from snapbeam.engines.scalar.lanes import LANES, WIDTH, splat, spread
 
 __all__ = [
@@ -66,7 +67,7 @@ def less(a: Any, b: Any) -> Any:
     raise TypeError("less runs in compiled code only")
 
 
-@overload(less)
+@overload(less, jit_options=INLINE_HERE)
 def _less(a, b):
     return lambda a, b: _lanes_less(spread(a), spread(b))
 
@@ -116,7 +117,7 @@ def pick(mask: Any, yes: Any, no: Any) -> Any:
     raise TypeError("pick runs in compiled code only")
 
 
-@overload(pick)
+@overload(pick, jit_options=INLINE_HERE)
 def _pick(mask, yes, no):
     return lambda mask, yes, no: _lanes_pick(mask, spread(yes), spread(no))
 
@@ -126,7 +127,7 @@ def vmin(a: Any, b: Any) -> Any:
     raise TypeError("vmin runs in compiled code only")
 
 
-@overload(vmin)
+@overload(vmin, jit_options=INLINE_HERE)
 def _vmin(a, b):
     return lambda a, b: pick(less(b, a), b, a)
 
@@ -136,7 +137,7 @@ def vmax(a: Any, b: Any) -> Any:
     raise TypeError("vmax runs in compiled code only")
 
 
-@overload(vmax)
+@overload(vmax, jit_options=INLINE_HERE)
 def _vmax(a, b):
     return lambda a, b: pick(less(a, b), b, a)
 
@@ -198,7 +199,7 @@ def power_of_two(exponent: Any) -> Any:
     raise TypeError("power_of_two runs in compiled code only")
 
 
-@overload(power_of_two)
+@overload(power_of_two, jit_options=INLINE_HERE)
 def _power_of_two(exponent):
     return lambda exponent: _power(exponent)
 
@@ -208,7 +209,7 @@ def halvings(much: Any, little: Any) -> Any:
     raise TypeError("halvings runs in compiled code only")
 
 
-@overload(halvings)
+@overload(halvings, jit_options=INLINE_HERE)
 def _halvings(much, little):
     def implementation(much, little):
         once = pick(less(_mantissa(little), _mantissa(much)), splat(1.0), splat(0.0))
