@@ -29,6 +29,7 @@ __all__ = [
     "fma",
     "lanes_sum",
     "load",
+    "move",
     "select_less",
     "splat",
     "spread_at",
@@ -105,6 +106,18 @@ def store(typingctx: Any, array: Any, index: Any, value: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(array, types.intp, LANES), codegen
+
+
+@intrinsic
+def move(typingctx: Any, array: Any, to: Any, origin: Any) -> Any:
+    """``array[to] = array[origin]``, unchecked."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, args[0]).data
+        builder.store(builder.load(builder.gep(data, [args[2]])), builder.gep(data, [args[1]]))
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, types.intp), codegen
 
 
 @intrinsic
