@@ -15,6 +15,9 @@ LOCATION ?= 0.47619
 MAP ?= map.nc
 PLOT ?= map.png
 
+# Processes that the tests are shared out to
+WORKERS ?= 2
+
 # Where the benchmarks write; the docs show what is in docs/images
 BENCH ?= out/bench
 
@@ -71,7 +74,7 @@ lint: $(VENV)/.installed-test
 	$(BIN)/lint-imports
 
 test: lint
-	$(BIN)/python -m pytest -m "not slow" --durations=15
+	$(BIN)/python -m pytest -m "not slow" --durations=15 -n $(WORKERS) --dist loadfile
 
 test-slow: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -m slow --durations=15

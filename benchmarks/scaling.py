@@ -24,7 +24,7 @@ from snapbeam.engines.scalar.composition import COMPOSITIONS
 from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, splat, store
 from snapbeam.engines.scalar.physics import tension_factors
 from snapbeam.engines.structure import structure_of
-from snapbeam.model.modes import BucklingModes
+from snapbeam.model.galerkin.modes import BucklingModes
 
 __all__ = ["run"]
 

@@ -17,13 +17,13 @@ import numpy as np
 import snapbeam as sb
 import snapbeam.lab as lab
 from snapbeam import paper
-from snapbeam.figures.calibration import plot_calibration
-from snapbeam.figures.dot_comparison import plot_dot_comparison
-from snapbeam.figures.identification import plot_decay
+from snapbeam.figures.lab.calibration import plot_calibration
+from snapbeam.figures.lab.dot_comparison import plot_dot_comparison
+from snapbeam.figures.lab.identification import plot_decay
+from snapbeam.figures.lab.tracking import plot_frame, plot_tracking_quality
+from snapbeam.figures.lab.vibrometer import plot_drive
+from snapbeam.figures.lab.waveform_comparison import plot_waveform_comparison
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
-from snapbeam.figures.tracking import plot_frame, plot_tracking_quality
-from snapbeam.figures.vibrometer import plot_drive
-from snapbeam.figures.waveform_comparison import plot_waveform_comparison
 from snapbeam.lab.compare.dots import Dots
 
 folder = tempfile.TemporaryDirectory()

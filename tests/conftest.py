@@ -14,6 +14,11 @@ from snapbeam.core.codes import ResponseClass
 from snapbeam.runs.schema import trajectory_dataset
 
 
+def pytest_addoption(parser):
+    parser.addoption("--seed", type=int, default=7, help="of tests that draw at random (slow ones)")
+    parser.addoption("--draws", type=int, default=100, help="how many such tests draw")
+
+
 @pytest.fixture
 def synthetic_map():
     """A map over frequency ratio and velocity amplitude whose classes are known point by point."""

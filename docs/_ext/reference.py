@@ -14,6 +14,8 @@ __all__ = ["command_line", "parameter_tables", "setup", "variable_tables", "writ
 _SECTIONS = {
     "beam": "The beam. Of `buckling_level` and `axial_load` one is given.",
     "model": "The reduced model.",
+    "ends": "How the ends of the beam are held; clamped and rigid where nothing is given.",
+    "imperfection": "What makes the wells unequal; a section that is nothing is a perfect beam.",
     "contact": "The law of contact, by `law`: `hertz` (the default) or `restitution`. Hertz's stiffness may be "
     "given by the materials in its place: `radius` of the sphere (m), `young_modulus` (Pa) and `poisson_ratio`, two "
     "numbers each, of sphere and beam.",

@@ -15,6 +15,23 @@ if TYPE_CHECKING:
     from snapbeam.core.netcdf import write_netcdf
     from snapbeam.core.validate import InputError, InputTypeError
     from snapbeam.core.version import __version__
+    from snapbeam.design.distributions import Between, LogNormal, Normal, Uniform
+    from snapbeam.design.optimum.design import Effort, design, design_problem
+    from snapbeam.design.optimum.evolution import Evolution
+    from snapbeam.design.optimum.measures import Goal, Limit
+    from snapbeam.design.plan import Cost, plan
+    from snapbeam.design.posterior.classes import class_likelihood
+    from snapbeam.design.posterior.posterior import Posterior, posterior
+    from snapbeam.design.probability.allocation import Allocation
+    from snapbeam.design.probability.dots import judge_dots
+    from snapbeam.design.probability.probability_map import probability_map
+    from snapbeam.design.quantiles.quantile_threshold import quantile_threshold
+    from snapbeam.design.quantiles.search import Search
+    from snapbeam.design.sensitivity.answers import LifetimeOf, NotchOf, StatisticOf, ThresholdOf
+    from snapbeam.design.sensitivity.given_data import given_data_indices
+    from snapbeam.design.sensitivity.sensitivity import sensitivity
+    from snapbeam.design.sensitivity.variance import sobol
+    from snapbeam.design.spread import Spread
     from snapbeam.dynamics.attractors import Attractor, Attractors, attractors
     from snapbeam.dynamics.basins import basins
     from snapbeam.dynamics.bifurcation import bifurcation_diagram
@@ -54,10 +71,13 @@ if TYPE_CHECKING:
         Still,
         TwoSines,
     )
-    from snapbeam.model.frequencies import exact_natural_freq
+    from snapbeam.model.ends import Ends
+    from snapbeam.model.galerkin.frequencies import exact_natural_freq
+    from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
+    from snapbeam.model.galerkin.reduction import ReducedModel
+    from snapbeam.model.imperfection import Imperfection
+    from snapbeam.model.imperfection.fitted import fit_wells
     from snapbeam.model.integration import Integration
-    from snapbeam.model.quasi_static import quasi_static_threshold
-    from snapbeam.model.reduction import ReducedModel
     from snapbeam.model.state import State
     from snapbeam.model.striker import RecordedDrive, Shaker, Striker
     from snapbeam.model.system import System
@@ -81,32 +101,46 @@ __all__ = [
     "STATISTICS",
     "AccelerationSine",
     "Accuracy",
+    "Allocation",
     "Attractor",
     "Attractors",
     "Beam",
+    "Between",
     "Branch",
     "Burst",
     "Chirp",
     "ContactLaw",
+    "Cost",
     "DisplacementSine",
     "Drive",
     "EdgeState",
+    "Effort",
+    "Ends",
     "Event",
+    "Evolution",
     "Finding",
     "Flight",
+    "Goal",
     "HalfSine",
     "HertzContact",
     "HuntCrossley",
+    "Imperfection",
     "InputError",
     "InputTypeError",
     "Integration",
     "Keeping",
     "KelvinVoigt",
+    "LifetimeOf",
+    "Limit",
+    "LogNormal",
     "NoOrbit",
     "Noise",
+    "Normal",
+    "NotchOf",
     "Orbit",
     "Outcome",
     "PlausibilityWarning",
+    "Posterior",
     "PowerLaw",
     "Recorded",
     "RecordedDrive",
@@ -117,18 +151,23 @@ __all__ = [
     "Restitution",
     "Run",
     "RunStatus",
+    "Search",
     "Shaker",
     "Sine",
+    "Spread",
     "Starts",
     "State",
     "Statistic",
+    "StatisticOf",
     "Still",
     "StoreError",
     "Striker",
     "Survival",
     "System",
     "Tally",
+    "ThresholdOf",
     "TwoSines",
+    "Uniform",
     "__version__",
     "advance",
     "attractors",
@@ -136,25 +175,37 @@ __all__ = [
     "basins",
     "bending_stress",
     "bifurcation_diagram",
+    "class_likelihood",
     "classify",
     "conditioning",
     "continue_orbit",
+    "design",
+    "design_problem",
     "edge_state",
     "exact_natural_freq",
     "explore",
+    "fit_wells",
+    "given_data_indices",
     "hertz_stress",
     "integrity",
+    "judge_dots",
     "lifetime_map",
     "load_run",
     "long_map",
     "lyapunov",
     "periodic_orbit",
+    "plan",
     "poincare",
+    "posterior",
+    "probability_map",
+    "quantile_threshold",
     "quasi_static_threshold",
     "read_store",
     "response_map",
+    "sensitivity",
     "separation_exponent",
     "simulate",
+    "sobol",
     "sweep",
     "switch_branch",
     "threshold",
@@ -170,6 +221,23 @@ _NAMES = {
     "core.netcdf": "write_netcdf",
     "core.validate": "InputError InputTypeError",
     "core.version": "__version__",
+    "design.distributions": "Between LogNormal Normal Uniform",
+    "design.optimum.design": "Effort design design_problem",
+    "design.optimum.evolution": "Evolution",
+    "design.optimum.measures": "Goal Limit",
+    "design.plan": "Cost plan",
+    "design.posterior.classes": "class_likelihood",
+    "design.posterior.posterior": "Posterior posterior",
+    "design.probability.allocation": "Allocation",
+    "design.probability.dots": "judge_dots",
+    "design.probability.probability_map": "probability_map",
+    "design.quantiles.quantile_threshold": "quantile_threshold",
+    "design.quantiles.search": "Search",
+    "design.sensitivity.answers": "LifetimeOf NotchOf StatisticOf ThresholdOf",
+    "design.sensitivity.given_data": "given_data_indices",
+    "design.sensitivity.sensitivity": "sensitivity",
+    "design.sensitivity.variance": "sobol",
+    "design.spread": "Spread",
     "dynamics.attractors": "Attractor Attractors attractors",
     "dynamics.basins": "basins",
     "dynamics.bifurcation": "bifurcation_diagram",
@@ -189,10 +257,13 @@ _NAMES = {
     "hertz_stress",
     "model.drive": "AccelerationSine Burst Chirp DisplacementSine Drive Flight HalfSine Noise Recorded Sine Still "
     "TwoSines",
-    "model.frequencies": "exact_natural_freq",
+    "model.galerkin.frequencies": "exact_natural_freq",
+    "model.ends": "Ends",
+    "model.imperfection": "Imperfection",
+    "model.imperfection.fitted": "fit_wells",
     "model.integration": "Integration",
-    "model.quasi_static": "quasi_static_threshold",
-    "model.reduction": "ReducedModel",
+    "model.galerkin.quasi_static": "quasi_static_threshold",
+    "model.galerkin.reduction": "ReducedModel",
     "model.state": "State",
     "model.striker": "RecordedDrive Shaker Striker",
     "model.system": "System",
@@ -212,6 +283,7 @@ _NAMES = {
 }
 _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 _ROOMS = frozenset(module.partition(".")[0] for module in _NAMES) | {"figures", "lab", "paper"}
+_ROOMS -= {"design"}  # a function of that name; its room can be called too
 
 register_accessor()
 del register_accessor

@@ -10,7 +10,13 @@ import pytest
 import xarray as xr
 from rich.console import Console
 
-from snapbeam.cli.summary import class_table, deepest_notch, lowest_interwell, map_summary, status_lines
+from snapbeam.cli.common.summary import (
+    class_table,
+    deepest_notch,
+    lowest_interwell,
+    map_summary,
+    status_lines,
+)
 from snapbeam.core.codes import ResponseClass, RunStatus
 
 

@@ -15,12 +15,14 @@ from snapbeam.config.parameters import Parameter, short_names
 from snapbeam.core.validate import InputError
 from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
+from snapbeam.model.galerkin.reduction import MODEL_QUANTITIES
 from snapbeam.model.quantity import RUN, STRUCTURE, quantities
-from snapbeam.model.reduction import MODEL_QUANTITIES
 
 TABLE = parameters()
 CLASSES = {
     "beam": [sb.Beam],
+    "ends": [sb.Ends],
+    "imperfection": [sb.Imperfection],
     "striker": [sb.Striker],
     "run": [sb.Integration],
     "contact": list(LAWS.values()),
@@ -44,12 +46,12 @@ def test_every_field_of_every_class_is_a_quantity(section: str) -> None:
     """What a person can give to a class is in the table; but for the one of two that the other follows from."""
     for kind in CLASSES[section]:
         fields = {item.name for item in dataclasses.fields(kind) if item.init}
-        parts = {"drive"} if kind is sb.Striker else set()
+        parts = {sb.Striker: {"drive"}, sb.Beam: {"ends"}}.get(kind, set())
         assert fields - parts == set(quantities(kind)), kind
 
 
 def test_every_argument_of_a_model_of_a_beam_is_in_it() -> None:
-    asked = set(inspect.signature(sb.ReducedModel.from_beam).parameters) - {"beam"}
+    asked = set(inspect.signature(sb.ReducedModel.from_beam).parameters) - {"beam", "imperfection"}
     assert {f"model.{name}" for name in asked} == {name for name in TABLE if name.startswith("model.")}
     assert {f"model.{name}" for name in MODEL_QUANTITIES} == {f"model.{name}" for name in asked}
 

@@ -17,24 +17,24 @@ from snapbeam import paper
 
 # modes, (Omega, V), cycles, error of w in b measured at the default step
 CASES = [
-    (1, (1.21, 0.18), 6, 9e-5),
-    (1, (1.21, 0.05), 4, 3e-7),
-    (1, (1.625, 0.3), 6, 2e-4),
-    (1, (1.4, 0.02), 4, 8e-8),
-    (2, (1.21, 0.18), 6, 1e-4),
-    (2, (1.21, 0.05), 4, 3e-8),
-    (2, (2.5, 0.2), 6, 3e-6),
-    (2, (1.4, 0.02), 4, 1e-8),
-    (8, (1.21, 0.18), 1, 7e-8),
-    (8, (1.21, 0.05), 1, 2e-9),
-    (8, (1.625, 0.3), 1, 6e-7),
-    (8, (1.4, 0.02), 1, 4e-10),
+    (1, (1.21, 0.18), 6, 9e-7),
+    (1, (1.21, 0.05), 4, 2e-7),
+    (1, (1.625, 0.3), 6, 4e-6),
+    (1, (1.4, 0.02), 4, 3e-9),
+    (2, (1.21, 0.18), 6, 6e-6),
+    (2, (1.21, 0.05), 4, 1.6e-8),
+    (2, (2.5, 0.2), 6, 5e-7),
+    (2, (1.4, 0.02), 4, 8e-10),
+    (8, (1.21, 0.18), 1, 4e-7),
+    (8, (1.21, 0.05), 1, 4e-7),
+    (8, (1.625, 0.3), 1, 1.4e-7),
+    (8, (1.4, 0.02), 1, 4e-8),
 ]
 DEAR = [
-    (32, (1.21, 0.18), 2, 2e-6),
-    (32, (1.21, 0.05), 2, 1.2e-6),
-    (32, (1.625, 0.3), 2, 5e-6),
-    (32, (1.4, 0.02), 2, 2e-7),
+    (32, (1.21, 0.18), 2, 2.2e-7),
+    (32, (1.21, 0.05), 2, 3e-7),
+    (32, (1.625, 0.3), 2, 2.1e-7),
+    (32, (1.4, 0.02), 2, 4.4e-8),
 ]
 SAMPLES = 3000
 
@@ -63,7 +63,7 @@ def test_trajectory(modes, pair, cycles, measured) -> None:
 
     assert run.impacts.sizes["impact"] == len(truth.impacts)
     onset, duration, peak = truth.impacts.T
-    np.testing.assert_allclose(run.impacts.onset, onset, rtol=0.0, atol=6e-7 + 0.01 * bound)
+    np.testing.assert_allclose(run.impacts.onset, onset, rtol=0.0, atol=8e-7 + 0.01 * bound)
     # the last may be cut by the end of the run; an impact of one mode is the least resolved: 0.8 %
     np.testing.assert_allclose(run.impacts.duration[:-1], duration[:-1], rtol=1e-2)
     np.testing.assert_allclose(run.impacts.peak_force[:-1], peak[:-1], rtol=3e-3)
@@ -89,7 +89,7 @@ def test_statistics(march, model_of, modes, pair, cycles, measured) -> None:
         model_of(modes), frequency_ratio=pair[0], velocity_amplitude=pair[1], cycles=cycles
     ).statistics
     # of b: what a cubic through the flight steps may miss, and what may lie between two samples
-    cubic, grid = 2e-5 + measured, 2e-3
+    cubic, grid = 5e-5 + measured, 2e-3
     for name, values in (
         ("displacement", truth.displacement),
         ("center_displacement", truth.center_displacement),

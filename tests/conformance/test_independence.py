@@ -8,7 +8,7 @@ import pytest
 import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.codes import RunStatus
-from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.state import State
 
 

@@ -66,6 +66,8 @@ def follow(beam: PaperBeam, tip: Tip, times: Array, rtol: float = 1e-11) -> Foll
         out = np.empty(2 * n + m)
         out[: 2 * n] = linear @ y[: 2 * n]
         out[n : 2 * n] -= beam.inverse @ ((beam.gamma * (a @ a)) * a)
+        if hasattr(beam, "pull"):
+            out[n : 2 * n] += beam.inverse @ beam.pull(a)
         f = tip.force(*_above(seen(t, y))) if pressing else 0.0
         out[n : 2 * n] += push * f
         if tip.body is not None:

@@ -15,7 +15,7 @@ from snapbeam.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), *ROOT.glob("*.md")])
-CODE = ("systems.md", "sweeps.md", "states.md", "getting-started.md", "README.md")
+CODE = ("systems.md", "sweeps.md", "states.md", "getting-started.md", "design.md", "README.md")
 """Pages whose blocks of Python run, one after the other, as they stand; README's is the one that takes seconds."""
 COMMANDS = typer.main.get_command(app).commands
 

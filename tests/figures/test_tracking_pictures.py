@@ -11,9 +11,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "lab"))
 from lab_waveforms import BUCKLING_LEVEL, FRAME_RATE, PIXEL, impacts
 
 from snapbeam import InputError
+from snapbeam.figures.lab.tracking import found_edges, plot_frame, plot_tracking_quality
+from snapbeam.figures.lab.tracking_video import annotated_video
 from snapbeam.figures.style import save_figure
-from snapbeam.figures.tracking import found_edges, plot_frame, plot_tracking_quality
-from snapbeam.figures.tracking_video import annotated_video
 from snapbeam.lab.camera.recording import open_recording
 from snapbeam.lab.synthetic.recording import render_recording
 from snapbeam.lab.synthetic.setup import SyntheticCamera, SyntheticStage

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from snapbeam.config import load_config
 from snapbeam.core.validate import InputError
-from snapbeam.figures.calibration import plot_calibration
+from snapbeam.figures.lab.calibration import plot_calibration
 from snapbeam.lab.calibration.calibrate import ContactTest, Measurements, calibrate, load_measurements
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import HertzContact
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.paper_values import BEAM
-from snapbeam.model.reduction import ReducedModel
 
 PAPER = Measurements(
     straight_freq=[80.0, 221.0],

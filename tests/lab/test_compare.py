@@ -9,14 +9,14 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from snapbeam.cli.calibrate import calibrate
-from snapbeam.cli.compare import compare
-from snapbeam.cli.identify import identify
-from snapbeam.cli.vibrometer import vibrometer
+from snapbeam.cli.lab.calibrate import calibrate
+from snapbeam.cli.lab.compare import compare
+from snapbeam.cli.lab.identify import identify
+from snapbeam.cli.lab.vibrometer import vibrometer
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
-from snapbeam.figures.dot_comparison import plot_dot_comparison
-from snapbeam.figures.waveform_comparison import plot_waveform_comparison
+from snapbeam.figures.lab.dot_comparison import plot_dot_comparison
+from snapbeam.figures.lab.waveform_comparison import plot_waveform_comparison
 from snapbeam.lab.compare.dots import Dots
 from snapbeam.lab.compare.maps import compare_dots
 from snapbeam.lab.compare.waveforms import compare_waveforms

@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 import snapbeam as sb
 from snapbeam.core.codes import ResponseClass, classify
 from snapbeam.core.validate import InputError
-from snapbeam.figures.identification import plot_decay
+from snapbeam.figures.lab.identification import plot_decay
 from snapbeam.lab.compare.response import measure_response
 from snapbeam.lab.decay.identify import METHODS, identify_decay
 from snapbeam.lab.decay.wells import compare_wells
@@ -82,7 +82,7 @@ def demand(found, within: float, cover: float) -> None:
     assert (found[:, 2:] > 0.97).mean(axis=0).min() > 0.18
 
 
-@pytest.mark.parametrize(("law", "draws"), [(one_well, 100), (chirp, 50)])
+@pytest.mark.parametrize(("law", "draws"), [pytest.param(one_well, 100, marks=pytest.mark.slow), (chirp, 50)])
 def test_a_hundred_noisy_decays(law, draws):
     demand(scores(law(0.12), draws), 0.97, 0.90)
 

@@ -11,7 +11,16 @@ from mistakes.table import CASES
 ENDS = ("right", "flagged", "refused")
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.group}: {case.mistake}")
+LONG = ("with an exposure of 0.9 of a frame", "video with lossy compression")
+
+
+def shown(case):
+    """A case as a parameter; those that render many frames are slow."""
+    marks = pytest.mark.slow if case.mistake.endswith(LONG) else ()
+    return pytest.param(case, marks=marks, id=f"{case.group}: {case.mistake}")
+
+
+@pytest.mark.parametrize("case", [shown(case) for case in CASES])
 def test_a_mistake_is_right_or_flagged_or_refused(case, tmp_path):
     outcome = looked(case, tmp_path)
     assert case.end in ENDS

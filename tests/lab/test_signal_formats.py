@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 import wave
 
 import numpy as np
@@ -195,3 +197,16 @@ def test_more_units_and_sensitivities_the_other_way_round():
     assert (unit, per) == ("m/s^2", "V") and factor == pytest.approx(98.0665)
     assert parse_sensitivity("s", "50 mV/Pa") == (20.0, "Pa", "V")
     assert parse_sensitivity("s", "10 mV/(m/s^2)")[0] == pytest.approx(100.0)
+
+
+@pytest.mark.parametrize(
+    ("end", "cut"), [("0.12", True), ("0.123456", False), ("0.123456\n", False), ("0.12\n", False)]
+)
+def test_a_table_that_was_cut_in_its_last_number_says_so(tmp_path, end, cut):
+    rows = "".join(f"{i * 1e-4:.6f},{math.sin(0.3 * i):.6f}\n" for i in range(400))
+    file = tmp_path / "cut.csv"
+    file.write_text(f"time [s],velocity [mm/s]\n{rows}0.040000,{end}")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        read_signal(file)
+    assert any("ends inside its last number" in str(each.message) for each in told) == cut

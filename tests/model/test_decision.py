@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import minimize
 
 from snapbeam.model.decision import decidable_energy, least_energy_at
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.paper_values import BEAM
-from snapbeam.model.reduction import ReducedModel
 
 
 def brute_force(model: ReducedModel, location: float, displacement: float) -> float:

@@ -9,9 +9,9 @@ import pytest
 import scipy.linalg
 
 from snapbeam.core.validate import InputError
-from snapbeam.model.frequencies import exact_natural_freq
+from snapbeam.model.galerkin.frequencies import exact_natural_freq
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.paper_values import BEAM, STRAIGHT_BEAM
-from snapbeam.model.reduction import ReducedModel
 
 UNIT = math.sqrt(BEAM.bending_stiffness / BEAM.mass_per_length) / BEAM.length**2 / (2.0 * math.pi)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from snapbeam.core.validate import InputError
-from snapbeam.model.modes import BucklingModes, wavenumbers
+from snapbeam.model.galerkin.modes import BucklingModes, wavenumbers
 
 LENGTH = 0.161
 

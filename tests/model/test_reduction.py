@@ -10,10 +10,10 @@ from scipy.optimize import minimize
 
 from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.model.beam import Beam
-from snapbeam.model.modes import BucklingModes
+from snapbeam.model.galerkin.modes import BucklingModes
+from snapbeam.model.galerkin.rank_one import rank_one_eigenpairs
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.paper_values import BEAM, LOCATION, STRAIGHT_BEAM
-from snapbeam.model.rank_one import rank_one_eigenpairs
-from snapbeam.model.reduction import ReducedModel
 
 # above P_cr2 the second mode forms the saddles
 DEEP_BEAM = BEAM.replace(buckling_level=8.0 * BEAM.radius_of_gyration)

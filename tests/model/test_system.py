@@ -83,7 +83,7 @@ def test_what_is_read_back_runs_alike(tmp_path) -> None:
     for name in ("start", "recorded", "restitution"):
         SYSTEMS[name].save(tmp_path / "system.toml")
         runs = [
-            sb.simulate(system, sb.Integration(cycles=1), sample_times=[0.0])
+            sb.simulate(system, sb.Integration(cycles=1, accuracy="reference"), sample_times=[0.0])
             for system in (SYSTEMS[name], sb.System.load(tmp_path / "system.toml"))
         ]
         np.testing.assert_equal(dict(runs[0].outcome), dict(runs[1].outcome))
@@ -135,6 +135,14 @@ CHANGES = {
     "model.modes": 5,
     "model.damping_ratio": 0.01,
     "model.reference_freq": 80.0,
+    "ends.left": 10.0,
+    "ends.right": 10.0,
+    "ends.axial": 1e8,
+    "imperfection.rise": 1e-5,
+    "imperfection.skew": 1e-6,
+    "imperfection.point_load": 0.01,
+    "imperfection.uniform_load": 0.05,
+    "imperfection.gravity": 0.1,
     "contact.stiffness": 2e8,
     "striker.location": 0.3,
     "striker.side": "above",
@@ -169,8 +177,10 @@ def test_every_parameter_of_scope_run_can_be_changed() -> None:
         for name, row in parameters().items()
         if row.section != "run" and (not row.kinds or own[row.section] in row.kinds)
     }
-    # of a body alone
-    assert names - set(CHANGES) == {"striker.spring", "striker.damper"}
+    # of a body alone, or of a rise or a force that is there; a profile is no number
+    others = {"striker.spring", "striker.damper"}
+    others |= {f"imperfection.{name}" for name in ("form", "point_location", "profile")}
+    assert names - set(CHANGES) == others
 
 
 OF_OTHERS = {
@@ -326,7 +336,10 @@ def test_another_number_of_modes_keeps_the_start() -> None:
     ("changes", "message"),
     [
         ({"beam.thicknes": 1.0}, r"beam\.thicknes: no parameter of a beam; must be one of length, thickness"),
-        ({"nothing.x": 1.0}, r"nothing\.x: no parameter of a system; its sections are beam, model, contact"),
+        (
+            {"nothing.x": 1.0},
+            r"nothing\.x: no parameter of a system; its sections are beam, model, ends, imperfection, contact",
+        ),
         ({"modes": 3}, "modes: no parameter of a system"),
         (
             {"contact.coefficient": 0.5},

@@ -132,7 +132,7 @@ def test_commands_on_a_full_disk(mounted, tmp_path, tried, place):
 
 
 def test_a_full_disk_for_the_log_ends_no_map(tmp_path, mounted, capsys):
-    from snapbeam.cli.long import LongReport
+    from snapbeam.cli.common.long import LongReport
 
     disk = mounted("disk", "size=8k")
     (disk / "filler").write_bytes(b"0" * 8192)

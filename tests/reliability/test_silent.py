@@ -10,7 +10,7 @@ import pytest
 import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.validate import InputError, InputTypeError, finite, finite_array, integer
-from snapbeam.model.rank_one import rank_one_eigenpairs
+from snapbeam.model.galerkin.rank_one import rank_one_eigenpairs
 
 MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=2)
 

@@ -69,7 +69,8 @@ def test_chaos_shortens_the_horizon() -> None:
 
 def test_a_request_beyond_reach_is_said(monkeypatch) -> None:
     """What the finest steps do not meet is a warning and a shorter horizon, not a claim."""
-    monkeypatch.setattr("snapbeam.runs.tolerance._LADDER", ((4, 1), (4, 2)))
+    monkeypatch.setattr("snapbeam.runs.tolerance._FINE", (("map", 1.0),))
+    monkeypatch.setattr("snapbeam.runs.tolerance._ROUGH", (("map", 4.0), ("map", 2.0)))
     model, shaker = model_of(8), shaker_at(0.7, 0.4)
     with pytest.warns(RuntimeWarning, match="met only up to"):
         run = sb.simulate(model, shaker, CONTACT, 5, tolerance=5e-5, sample_times=[0.01])

@@ -7,14 +7,24 @@ from typing import Annotated, Any
 
 import typer
 
-from snapbeam.cli.console import door, file_line, out
-from snapbeam.cli.parameter_options import BEAM, CONTACT, DRIVE, MODEL, STRIKER, configured, with_parameters
+from snapbeam.cli.common.console import door, file_line, out
+from snapbeam.cli.common.parameter_options import (
+    BEAM,
+    CONTACT,
+    DRIVE,
+    ENDS,
+    IMPERFECTION,
+    MODEL,
+    STRIKER,
+    configured,
+    with_parameters,
+)
 
 __all__ = ["draw"]
 
 
 @door
-@with_parameters(*BEAM, *MODEL, *CONTACT, *STRIKER, *DRIVE)
+@with_parameters(*BEAM, *ENDS, *IMPERFECTION, *MODEL, *CONTACT, *STRIKER, *DRIVE)
 def draw(
     given: Any,
     output: Annotated[
@@ -22,7 +32,7 @@ def draw(
     ],
 ) -> None:
     """Draw what is studied: beam and wells, what strikes it, how it is held, and how it moves."""
-    from snapbeam.cli.results import check_pictures
+    from snapbeam.cli.common.results import check_pictures
 
     check_pictures(("output", output))
     from snapbeam.figures.schematic import plot_system

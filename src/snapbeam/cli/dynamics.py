@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import answer, door, duration, file_line, out, progress
-from snapbeam.cli.parameter_options import (
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import answer, door, duration, file_line, out, progress
+from snapbeam.cli.common.parameter_options import (
     BEAM,
     CONTACT,
     DRIVE,
@@ -50,7 +50,7 @@ Values = Annotated[
 
 
 def _checked(output: Path, plot: Path | None) -> None:
-    from snapbeam.cli.results import check_pictures
+    from snapbeam.cli.common.results import check_pictures
     from snapbeam.core.files import check_writable
 
     check_writable(output, "output", (".nc",))
@@ -59,7 +59,7 @@ def _checked(output: Path, plot: Path | None) -> None:
 
 def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, picture: str, lines: list[str]) -> None:
     """Write the results, draw them, and say what they are."""
-    from snapbeam.cli.results import draw_dynamics, write_map
+    from snapbeam.cli.common.results import draw_dynamics, write_map
 
     files = [write_map(dataset, output)]
     if plot is not None:
@@ -262,7 +262,7 @@ def branch(
 
     Example: snapbeam dynamics branch --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --between 0.005:0.3
     """
-    from snapbeam.cli.options import parse_window
+    from snapbeam.cli.common.options import parse_window
     from snapbeam.dynamics.orbits.continuation import continue_orbit
     from snapbeam.dynamics.orbits.orbit import NoOrbit, periodic_orbit
 

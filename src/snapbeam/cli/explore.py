@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from snapbeam.cli.console import door, out
+from snapbeam.cli.common.console import door, out
 
 __all__ = ["explore"]
 

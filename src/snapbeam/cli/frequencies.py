@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import answer, door, out
-from snapbeam.cli.parameter_options import BEAM, MODEL, configured, with_parameters
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import answer, door, out
+from snapbeam.cli.common.parameter_options import BEAM, ENDS, MODEL, configured, with_parameters
 
 __all__ = ["frequencies"]
 
 
 @door
-@with_parameters(*BEAM, *MODEL)
+@with_parameters(*BEAM, *ENDS, *MODEL)
 def frequencies(
     given: Any,
     count: Annotated[int, opt.count_option("How many to print (10).", "Output")] = 10,
@@ -25,7 +25,7 @@ def frequencies(
     from rich.table import Table
 
     from snapbeam.core.validate import integer
-    from snapbeam.model.frequencies import exact_natural_freq
+    from snapbeam.model.galerkin.frequencies import exact_natural_freq
 
     count = integer("count", count, 1, 200)
     model = configured(given).model

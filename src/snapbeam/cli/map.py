@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
-from snapbeam.cli import long
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import FAILED, answer, door, out
-from snapbeam.cli.parameter_options import (
+from snapbeam.cli.common import long
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import FAILED, answer, door, out
+from snapbeam.cli.common.parameter_options import (
     BEAM,
     CONTACT,
     DRIVE,
@@ -55,8 +55,8 @@ def compute_map(
     Example: snapbeam map --modes 32 --cycles 200 --frequency-ratio 0.1:4:64 --velocity-amplitude
     0.01:0.65:40 --location 1/2.1 -o map.nc --plot map.png
     """
-    from snapbeam.cli.results import check_pictures, draw_map, read_overlay
-    from snapbeam.cli.summary import map_facts, map_summary
+    from snapbeam.cli.common.results import check_pictures, draw_map, read_overlay
+    from snapbeam.cli.common.summary import map_facts, map_summary
     from snapbeam.core.files import check_writable
 
     settings = long.resumed(given, keeping, configured(given, _axes_of))
@@ -95,7 +95,7 @@ def compute_map(
         raise typer.Exit(FAILED if tally.failed else 0)
     elapsed = time.monotonic() - start
     if not long.is_long(keeping):
-        from snapbeam.cli.results import write_map
+        from snapbeam.cli.common.results import write_map
 
         write_map(dataset, output)
     files = [output]

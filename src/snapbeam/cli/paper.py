@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import answer, door, duration, file_line, notes, out
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import answer, door, duration, file_line, notes, out
 
 __all__ = ["paper"]
 
@@ -106,7 +106,7 @@ def paper(
 
 def _check_measured(figure: str, names: list[str], dots: Path | None, measured: list[Path] | None) -> None:
     """Refuse, before anything is computed, measured responses and runs that cannot be shown."""
-    from snapbeam.cli.results import read_overlay
+    from snapbeam.cli.common.results import read_overlay
     from snapbeam.core.validate import InputError
     from snapbeam.paper import BEAM
     from snapbeam.paper.recipes.fig4 import read_measured

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import answer, door, file_line, out
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import answer, door, file_line, out
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,7 +40,7 @@ def plot(
     window: opt.Window = None,
 ) -> None:
     """Draw a map or a run again: other format, measured dots, one slice of a map of three axes."""
-    from snapbeam.cli.results import (
+    from snapbeam.cli.common.results import (
         check_pictures,
         draw_map,
         draw_run,
@@ -71,7 +71,7 @@ def plot(
 
 def _sliced(dataset: xr.Dataset, wanted: dict[str, float | None], at: list[str]) -> xr.Dataset:
     """The map at the points that were named, the nearest there are."""
-    from snapbeam.cli.parameter_options import parse_number
+    from snapbeam.cli.common.parameter_options import parse_number
     from snapbeam.config import lookup
     from snapbeam.core.validate import InputError
 

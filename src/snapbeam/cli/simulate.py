@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import FAILED, answer, compiling_told, door, duration, errors, file_line, out
-from snapbeam.cli.parameter_options import (
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import FAILED, answer, compiling_told, door, duration, errors, file_line, out
+from snapbeam.cli.common.parameter_options import (
     BEAM,
     CONTACT,
     DRIVE,
@@ -67,7 +67,7 @@ def simulate(
     Example: snapbeam simulate --frequency-ratio 1.21 --velocity-amplitude 0.18 -o run.nc --plot run.png
     --window 0:20
     """
-    from snapbeam.cli.results import check_pictures, draw_run
+    from snapbeam.cli.common.results import check_pictures, draw_run
     from snapbeam.core.files import check_writable
 
     settings = configured(given)
@@ -160,16 +160,9 @@ class _share_done:
 
 
 def _recorded(path: Path) -> xr.Dataset:
-    import xarray as xr
+    from snapbeam.core.netcdf import read_netcdf
 
-    from snapbeam.core.validate import InputError
-
-    try:
-        return xr.load_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"drive = {path.name!r}: must be a NetCDF file of a recorded drive ({error})"
-        ) from None
+    return read_netcdf(path, "drive")
 
 
 def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | None) -> Path:

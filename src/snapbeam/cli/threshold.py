@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from snapbeam.cli import options as opt
-from snapbeam.cli.console import answer, door, duration, file_line, out, progress
-from snapbeam.cli.parameter_options import (
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import answer, door, duration, file_line, out, progress
+from snapbeam.cli.common.parameter_options import (
     BEAM,
     CONTACT,
     DRIVE,
@@ -21,7 +21,7 @@ from snapbeam.cli.parameter_options import (
     configured,
     with_parameters,
 )
-from snapbeam.cli.summary import coordinate_text
+from snapbeam.cli.common.summary import coordinate_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,7 +74,7 @@ def threshold(
     Example: snapbeam threshold --modes 1,32 --frequency-ratio 0.1:4:64 --velocity-amplitude 0.005:0.64:128
     -o threshold.nc --plot threshold.png
     """
-    from snapbeam.cli.results import check_pictures, draw_threshold, write_map
+    from snapbeam.cli.common.results import check_pictures, draw_threshold, write_map
     from snapbeam.config import lookup
     from snapbeam.core.files import check_writable
 

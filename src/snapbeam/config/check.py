@@ -20,7 +20,7 @@ from snapbeam.model.paper_values import BEAM
 
 __all__ = ["SECTIONS", "checked_sections", "contradictions", "parsed_axis", "with_section"]
 
-SECTIONS = ("beam", "model", "contact", "striker", "drive", "start", "axes", "run")
+SECTIONS = ("beam", "model", "ends", "imperfection", "contact", "striker", "drive", "start", "axes", "run")
 _OF_MAP = {"frequency_ratio": "drive", "velocity_amplitude": "drive", "location": "striker"}
 """Names that a section [map] of version 0.1 may hold, and the sections they belong to."""
 _SYMBOLS = {

@@ -18,9 +18,11 @@ from snapbeam.core.validate import InputError, shown
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
+from snapbeam.model.ends import Ends
+from snapbeam.model.galerkin.reduction import MODEL_QUANTITIES
+from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN, Quantity, quantities
-from snapbeam.model.reduction import MODEL_QUANTITIES
 from snapbeam.model.start import START_NAME
 from snapbeam.model.striker import Striker
 
@@ -93,7 +95,13 @@ class Parameter:
 
 
 def _rows() -> Iterable[Parameter]:
-    own: tuple[tuple[str, type], ...] = (("beam", Beam), ("striker", Striker), ("run", Integration))
+    own: tuple[tuple[str, type], ...] = (
+        ("beam", Beam),
+        ("ends", Ends),
+        ("imperfection", Imperfection),
+        ("striker", Striker),
+        ("run", Integration),
+    )
     for section, part in own:
         yield from _of_class(section, part)
     for name, (item, default) in MODEL_QUANTITIES.items():
@@ -119,7 +127,7 @@ def parameters() -> dict[str, Parameter]:
         if row.name in table:
             row = dataclasses.replace(row, kinds=(*table[row.name].kinds, *row.kinds))
         table[row.name] = row
-    order = ("beam", "model", "contact", "striker", "drive", "start", "run")
+    order = ("beam", "model", "ends", "imperfection", "contact", "striker", "drive", "start", "run")
     return dict(sorted(table.items(), key=lambda item: order.index(item[1].section)))
 
 

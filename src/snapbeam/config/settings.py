@@ -15,11 +15,11 @@ from snapbeam.config.contact import MATERIALS, contact_of, contact_rivals, law_o
 from snapbeam.config.parameters import lookup
 from snapbeam.config.physical import PHYSICAL, checked_physical, physical_name, unit_of
 from snapbeam.core.validate import InputError, instance, mapping
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import parts_from_mapping
 from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
 from snapbeam.model.quantity import quantities
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.system import System
 
 __all__ = ["DEFAULT_AXES", "DEFAULT_DRIVE", "Config", "config_from_mapping", "override", "same_axis"]
@@ -79,6 +79,7 @@ class Config:
         axes = self.axes() if axes is None and self.section("axes") else dict(axes or {})
         if self.model.length_scale is None:  # a beam that does not buckle makes no system
             sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
+            sections |= {name: self.section(name) for name in ("ends", "imperfection") if self.section(name)}
         else:
             sections = {
                 name: {key: value for key, value in values.items() if f"{name}.{key}" not in axes}
@@ -142,6 +143,7 @@ class Config:
         sections: dict[str, Any] = {
             name: values | self.section(name) for name, values in self._defaults().items()
         }
+        sections |= {name: self.section(name) for name in ("ends", "imperfection") if self.section(name)}
         sections["contact"] = contact_of(sections["contact"])
         sections["drive"].setdefault("kind", "sine")
         later = {
@@ -167,6 +169,7 @@ class Config:
     def model(self) -> ReducedModel:
         """The reduced model alone, of a beam that need not be buckled."""
         sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
+        sections |= {name: self.section(name) for name in ("ends", "imperfection") if self.section(name)}
         found: ReducedModel = parts_from_mapping(sections)["model"]
         return found
 
@@ -202,7 +205,7 @@ class Config:
         own = [name for name in PHYSICAL if name.partition(".")[2] in self.section(name.partition(".")[0])]
         for name in [*own, *(name for name in self.section("axes") if name in PHYSICAL)]:
             for axis, values in axes.items():
-                if axis.partition(".")[0] not in ("beam", "model"):
+                if axis.partition(".")[0] not in ("beam", "ends", "imperfection", "model"):
                     continue
                 there = [self.system.replace(**{axis: values[at].item()}) for at in (0, -1)]
                 if any(abs(unit_of(each, name) / unit_of(self.system, name) - 1.0) > 1e-9 for each in there):

@@ -57,6 +57,7 @@ class RunStatus(IntEnum):
     STEP_LIMIT = 4
     NOT_RUN = 5
     INFERRED = 6
+    UNBALANCED = 7
 
     @property
     def advice(self) -> str:
@@ -73,6 +74,8 @@ _ADVICE = {
     RunStatus.STEP_LIMIT: "used more steps than allowed, as happens when the contact is far stiffer than the "
     "default step expects; use a larger step or a softer contact",
     RunStatus.NOT_RUN: "never started: the task that held this point failed or was skipped",
+    RunStatus.UNBALANCED: "ended with more energy than the striker put in, so that its steps were too long for what "
+    "the beam did; use accuracy = 'reference' or a smaller step",
     RunStatus.INFERRED: "not run: the points around it in a refined map are all of this class",
 }
 

@@ -18,13 +18,39 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snapbeam.core.files import NoRoomError, atomic_path, check_writable
-from snapbeam.core.validate import instance, mapping
+from snapbeam.core.validate import InputError, instance, mapping
 
 if TYPE_CHECKING:
     import h5netcdf
     import xarray as xr
 
-__all__ = ["hdf5_stream", "netcdf_file", "write_netcdf"]
+__all__ = ["hdf5_stream", "netcdf_file", "read_netcdf", "write_netcdf"]
+
+
+def read_netcdf(
+    path: str | os.PathLike[str], name: str = "path", group: str | None = None, *, lazily: bool = False
+) -> xr.Dataset:
+    """Read the dataset in a NetCDF file, or in a group of it, into memory unless *lazily*.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is none of NetCDF, or is damaged; *name* is that of the parameter.
+    """
+    import xarray as xr
+
+    if not Path(path).is_file():
+        raise InputError(f"{name} = {str(path)!r}: no such file")
+    read = xr.open_dataset if lazily else xr.load_dataset
+    try:
+        return read(path, engine="h5netcdf", group=group)
+    except MemoryError:
+        raise
+    except Exception as error:  # of damaged bytes the libraries make errors of every kind
+        said = str(error).strip().split("\n")[0][:200]
+        raise InputError(
+            f"{name} = {str(path)!r}: is no NetCDF file of results, or is damaged ({said or type(error).__name__})"
+        ) from error
 
 
 def write_netcdf(

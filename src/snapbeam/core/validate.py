@@ -7,6 +7,7 @@ what is allowed.  Nothing is clipped or converted silently.
 
 from __future__ import annotations
 
+import json
 import math
 import os
 from collections.abc import Mapping
@@ -31,6 +32,7 @@ __all__ = [
     "integer",
     "mapping",
     "nonnegative",
+    "parsed_json",
     "positive",
     "shown",
     "within",
@@ -222,6 +224,17 @@ def mapping(name: str, value: Any) -> Mapping[Any, Any]:
     if not isinstance(value, Mapping):
         raise InputTypeError(f"{name} = {shown(value)}: must be a mapping, not {type(value).__name__}")
     return value
+
+
+def parsed_json(text: Any, name: str) -> dict[str, Any]:
+    """The object that a JSON text holds; refused, by the name of where it stands, if it is damaged."""
+    try:
+        found = json.loads(text)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"{name}: its description is damaged ({error})") from None
+    if not isinstance(found, dict):
+        raise InputError(f"{name}: its description is damaged")
+    return found
 
 
 def callback(name: str, value: Any) -> Any:

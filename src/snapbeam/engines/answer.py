@@ -12,9 +12,14 @@ from numpy.typing import NDArray
 from snapbeam.core.codes import RunStatus
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.outcomes import STATISTICS
-from snapbeam.model.decision import decidable_energy
+from snapbeam.model.decision import crossing_energy, decidable_energy, passed_heights
 
 __all__ = ["Reading", "statistics_of"]
+
+_MADE = 0.01
+"""Of the gross work: energy out of nothing from which a run is not believed."""
+_ROUNDED = 1e-6
+"""Of the energies themselves, the same."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +51,22 @@ class Reading:
         return self.ensemble.first_side
 
     @cached_property
+    def status(self) -> NDArray[np.int64]:
+        """How each run ended; what ended with more energy than it was given is unbalanced.
+
+        Damping, and a contact with losses, only take energy.
+        """
+        book, status = self.book, self.book["status"]
+        done = (status == RunStatus.OK) | (status == RunStatus.DECIDED)
+        made = book["energy"] - book["first_energy"] - book["work"]
+        allowed = _MADE * book["gross_work"]
+        allowed = allowed + _ROUNDED * (np.abs(book["energy"]) + np.abs(book["first_energy"]))
+        return np.where(done & (made > allowed), RunStatus.UNBALANCED, status)
+
+    @cached_property
     def good(self) -> NDArray[np.bool_]:
         """Runs whose class is known."""
-        status = self.book["status"]
+        status = self.status
         return np.asarray((status == RunStatus.OK) | (status == RunStatus.DECIDED))
 
     @cached_property
@@ -80,11 +98,15 @@ class Reading:
         found = np.zeros(book.size, dtype=bool)
         if not model.is_bistable:
             return found
-        settled = self.good & (book["energy"] < model.barrier_energy - model.well_energy)
+        settled = self.good & (book["energy"] < crossing_energy(model) - model.well_energy)
         if not (ensemble.highest > -np.inf).any():
             return np.asarray(settled)
-        away = settled & (book["side"] > 0) & (book["displacement"] > np.maximum(ensemble.highest, 0.0))
-        away &= book["center"] > 0.0
+        reach, level = np.maximum(ensemble.highest, 0.0), 0.0
+        if ensemble.structure.uneven is not None:
+            level = ensemble.structure.uneven.level
+            reach = passed_heights(model, ensemble.location, ensemble.highest)
+        away = settled & (book["side"] > 0) & (book["displacement"] > reach)
+        away &= book["center"] > level
         which = np.flatnonzero(away)
         if which.size:
             bound = decidable_energy(model, ensemble.location[which], ensemble.highest[which])

@@ -17,8 +17,9 @@ from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.plan import Plan, plan_steps
 from snapbeam.engines.structure import Structure, structure_of
 from snapbeam.model.contact import ContactLaw, HertzContact
-from snapbeam.model.decision import decidable_energy
+from snapbeam.model.decision import decidable_energy, passed_heights
 from snapbeam.model.drive import Drive, Sine
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN as RUN_SCOPE
 from snapbeam.model.quantity import quantities
@@ -90,7 +91,7 @@ def make_ensemble(
     if structure.body_mass is not None:
         highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown
     time = clocked(table, system, integration, driven.period, plans, periods)
-    _decisions(table, system, integration, time, places.location, highest)
+    _decisions(table, system, structure, integration, time, places.location, highest)
     table["lowest"] = system.scale.length * _LOWEST[integration.accuracy]
     law: type[ContactLaw] = HertzContact if system.contact is None else type(system.contact)
     return Ensemble(
@@ -145,9 +146,15 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     plans, striker = _plans_of(system, integration, columns), system.striker
     if striker is None or striker.mass is None:
         return plans
-    mass = system.model.lightest_contact_mass
+    mass = _struck(system).lightest_contact_mass
     more = max(0, math.ceil(0.5 * math.log2(1.0 + mass / striker.mass) - 1e-9))
     return [each._replace(coarsest=each.coarsest + more, finest=each.finest + more) for each in plans]
+
+
+def _struck(system: System) -> ReducedModel:
+    """The model as the striker sees it, so that mirror images are stepped alike."""
+    above = system.striker is not None and system.striker.side == "above"
+    return system.model.mirrored if above else system.model
 
 
 def _plans_of(system: System, integration: Integration, columns: Mapping[str, _Array]) -> list[Plan]:
@@ -156,12 +163,12 @@ def _plans_of(system: System, integration: Integration, columns: Mapping[str, _A
     runs = next(iter(columns.values())).size if columns else 1
     contact = system.contact if system.striker is not None else None
     if contact is None or not of_contact:
-        return [plan_steps(system.model, contact, step=step, accuracy=accuracy)] * runs
+        return [plan_steps(_struck(system), contact, step=step, accuracy=accuracy)] * runs
     table = np.stack(list(of_contact.values()), axis=1)
     different, which = np.unique(table, axis=0, return_inverse=True)
     plans = [
         plan_steps(
-            system.model,
+            _struck(system),
             dataclasses.replace(contact, **dict(zip(of_contact, map(float, row), strict=True))),  # type: ignore[type-var]
             step=step,
             accuracy=accuracy,
@@ -304,6 +311,7 @@ def _law_numbers(law: type[ContactLaw], system: System, columns: Mapping[str, _A
 def _decisions(
     table: NDArray[Any],
     system: System,
+    structure: Structure,
     integration: Integration,
     time: Clocked,
     location: _Array,
@@ -316,4 +324,6 @@ def _decisions(
         return
     table["decide_crossings"] = int(time.cycles / 20.0)
     table["decide_reach"] = np.maximum(highest, 0.0)
-    table["decide_energy"] = decidable_energy(system.model, location, highest)
+    if structure.uneven is not None:
+        table["decide_reach"] = passed_heights(structure.model, location, highest)
+    table["decide_energy"] = decidable_energy(structure.model, location, highest)

@@ -60,6 +60,8 @@ class Ensemble:
         """-1 for a run that starts in the well away from which the striker pushes, +1 for the other one."""
         moved = np.array([float(start[0] @ self.structure.center) for start in self.starts])
         center = self.runs["home"] * self.runs["rest_center"] + moved[self.runs["start_row"]]
+        if self.structure.uneven is not None:
+            center = center - self.structure.uneven.level
         side: _Integers = np.where(center > 0.0, 1, -1)
         return side
 

@@ -15,9 +15,9 @@ import numpy as np
 from snapbeam.engines.assemble import make_ensemble
 from snapbeam.engines.cpu import driver
 from snapbeam.model.drive import Sine
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import ACCURACIES, Integration
 from snapbeam.model.paper_values import BEAM, CONTACT
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from snapbeam.engines.scalar.compile import kernel
 from snapbeam.engines.scalar.composition import COMPOSITIONS
 from snapbeam.engines.structure import Structure, structure_of
-from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.galerkin.reduction import ReducedModel
 
 __all__ = ["flight_step"]
 
@@ -69,6 +69,8 @@ def flight_step(model: ReducedModel, order: int, limit: float) -> float:
     key = (structure.hash, order, limit)
     if key not in _KEPT:
         _KEPT[key] = period / _Bench(structure, order).fewest(limit)
+        if structure.uneven is not None:
+            _KEPT[key] = min(_KEPT[key], period / _Bench(structure, order, far=True).fewest(limit))
         while len(_KEPT) > _MOST_KEPT:
             _KEPT.popitem(last=False)
     return _KEPT[key]
@@ -77,7 +79,7 @@ def flight_step(model: ReducedModel, order: int, limit: float) -> float:
 class _Bench:
     """The structure, let go."""
 
-    def __init__(self, structure: Structure, order: int) -> None:
+    def __init__(self, structure: Structure, order: int, far: bool = False) -> None:
         model = structure.model
         self.structure = structure
         self.order = order
@@ -90,6 +92,12 @@ class _Bench:
         self.omega, self.damping = structure.omega[kept], (structure.damping_ratio * structure.omega)[kept]
         self.columns = np.array(structure.coupling[kept, kept].T, order="C")
         self.well = structure.well[kept]
+        self.rest = self.force = np.zeros(self.omega.size)
+        if (
+            far and structure.uneven is not None
+        ):  # about the mirror image of the first well, at rest in the second
+            self.well = -self.well
+            self.rest, self.force = structure.uneven.second[kept], structure.uneven.force[kept]
         self.rows = (np.array(shapes) @ model.linear_modes)[:, kept] / length
         if model.beam is not None:
             struck = model.shape_at(_STRUCK)
@@ -98,7 +106,9 @@ class _Bench:
         blow = (struck @ model.linear_modes)[kept]
         if not blow.any():
             blow = np.ones(self.omega.size)
-        if model.is_bistable:
+        if structure.uneven is not None and model.landscape is not None:
+            barrier = model.barrier_energy - model.landscape.deepest.energy
+        elif model.is_bistable:
             straight, well = np.zeros(model.modes), structure.equilibrium
             barrier = float(model.potential_energy(straight) - model.potential_energy(well))
         else:
@@ -133,7 +143,17 @@ class _Bench:
         kicks = np.multiply.outer(steps, composition.kick)
         out, work = np.empty((counts.size, self.omega.size)), np.empty((3, self.omega.size))
         whole, gamma = counts.astype(np.int64), self.structure.tension_stiffness
-        kernel(_march, ())(whole, flows, kicks, self.columns, self.well, gamma, velocity, work, out)
+        kernel(_march, ())(
+            whole,
+            flows,
+            kicks,
+            self.columns,
+            self.well,
+            gamma,
+            np.stack((self.rest, velocity, self.force)),
+            work,
+            out,
+        )
         return out @ self.rows.T
 
     def fewest(self, limit: float) -> float:
@@ -170,7 +190,7 @@ def _march(counts, flows, kicks, columns, well, gamma, start, work, out):
     q, p, r = work[0], work[1], work[2]
     for run in range(counts.size):
         for i in range(modes):
-            q[i], p[i] = 0.0, start[i]
+            q[i], p[i] = start[0, i], start[1, i]
         for step in range(counts[run]):
             for stage in range(last + 1):
                 weight = kicks[run, stage]
@@ -190,6 +210,7 @@ def _march(counts, flows, kicks, columns, well, gamma, start, work, out):
                     toward, back = -gamma * along * weight, -gamma * (2.0 * along_well + along) * weight
                     for i in range(modes):
                         p[i] += toward * well[i] + back * r[i]
+                        p[i] += weight * start[2, i]
                 if stage < last:
                     for i in range(modes):
                         turned = flows[run, stage, 0, i] * q[i] + flows[run, stage, 1, i] * p[i]

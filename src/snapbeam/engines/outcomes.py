@@ -187,7 +187,7 @@ def _mean_power(reading: Reading) -> Values:
 
 _ROWS = (
     Statistic("response", "int8", "1", "response class", _response),
-    Statistic("status", "int8", "1", "status of the run", _plain("status")),
+    Statistic("status", "int8", "1", "status of the run", lambda reading: reading.status),
     Statistic("crossings", "int32", "1", "zero crossings of the centre displacement", _plain("crossings")),
     Statistic(
         "crossings_last_quarter", "int32", "1", "zero crossings in the last quarter", _plain("crossings_last_quarter")

@@ -8,8 +8,8 @@ from typing import NamedTuple
 from snapbeam.core.validate import choice, positive
 from snapbeam.engines.measure import flight_step
 from snapbeam.model.contact import ContactLaw
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import ACCURACIES
-from snapbeam.model.reduction import ReducedModel
 
 __all__ = ["Plan", "plan_steps"]
 
@@ -22,12 +22,12 @@ _FREE_TURN = 4.0
 """Of the fastest mode in a flight step of level "reference", rad."""
 _MOST_DECAY = 1.8
 """Of the mode that decays fastest, in a flight step."""
-# Contact: longest step over the duration of an impact at the speed 0.2 b omega_1, and how many halvings below
-# it the shortest step is, by order.
-_CONTACT_SHARE = 1.0 / 8.0
+# Contact: longest step over the duration of an impact at the speed 0.2 b omega_1, by level, and how many
+# halvings below it the shortest step is, by order.
+_CONTACT_SHARE = {"map": 1.0 / 8.0, "reference": 1.0 / 32.0}
 _CONTACT_SPEED = 0.2
 _HALVINGS = {4: 4, 6: 10}
-_MOST_HALVINGS = 5
+_MOST_HALVINGS = {"map": 5, "reference": 7}
 _CONTACT_TURN = math.pi
 """Of the fastest mode in the longest contact step, rad: the contact moves every mode, and beyond half a turn
 its kicks come in step with the fastest ones."""
@@ -82,8 +82,8 @@ def plan_steps(
         speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_freq
         duration = contact.impact_duration(mass, speed)
     if duration > 0.0:
-        impact = _CONTACT_SHARE * duration
-        flight = min(flight, impact * 2**_MOST_HALVINGS)
+        impact = _CONTACT_SHARE[accuracy] * duration
+        flight = min(flight, impact * 2 ** _MOST_HALVINGS[accuracy])
         if fastest > 0.0:
             impact = min(impact, _CONTACT_TURN / fastest)
     coarsest = max(0, math.ceil(math.log2(flight / impact)))

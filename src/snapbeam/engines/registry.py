@@ -72,6 +72,7 @@ def resolve(
     law: type[ContactLaw] | None = None,
     drive: type[Drive] = Sine,
     body: bool = False,
+    uneven: bool = False,
 ) -> tuple[str, Engine]:
     """The engine that *name* stands for, and its own name.
 
@@ -91,6 +92,8 @@ def resolve(
         Of contact, and of the striker.
     body : bool
         Whether the striker is a body with a mass.
+    uneven : bool
+        Whether the wells are unequal.
 
     Raises
     ------
@@ -105,6 +108,8 @@ def resolve(
         reason = cuda.refusal(modes, law, drive)
         if body:
             reason = "a striker with a mass is marched by the CPU engine alone"
+        if uneven:
+            reason = "a beam with unequal wells is marched by the CPU engine alone"
         if reason is None and (name == "cuda" or not cuda.simulated()):
             return "cuda", cuda
         if name == "cuda":

@@ -11,12 +11,33 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.striker import Striker
 
-__all__ = ["Structure", "structure_of"]
+__all__ = ["Structure", "Uneven", "structure_of"]
 
 _Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Uneven:
+    """What unequal wells add: about the mirror image of the first well the beam is the same, but for a constant force.
+
+    With B the side force and a the first well, K0 a + gamma (a . a) a = B.  At alpha = -a + V q the same linear modes
+    and the same tension terms, g negated, hold exactly, and 2 V^T B is left over: the origin of q on the far side is
+    -a, near the second well, wherever that is.
+    """
+
+    force: _Array
+    """2 V^T B, shape (N,), on the far side."""
+    lift: float
+    """Potential energy of -a above that of a, 2 B . a, J."""
+    second: _Array
+    """The second well about -a, as q."""
+    depth: float
+    """Potential energy of the second well above the first, J."""
+    level: float
+    """Displacement of the centre that divides the wells, m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +60,7 @@ class Structure:
     center: _Array
     """V^T phi(1/2)."""
     shift: _Array
-    """From this well to the other one, as q."""
+    """From this well to its mirror image, as q: the other well, where the two are equal."""
     stretch: float
     """Squared slopes in the well, alpha_eq . alpha_eq; 0 if there is one well only."""
     center_rest: float
@@ -49,6 +70,8 @@ class Structure:
     equilibrium: _Array
     """alpha in the well, as it is in space."""
     model: ReducedModel
+    uneven: Uneven | None = None
+    """Of unequal wells."""
     body_mass: float | None = None
     """Of a striker that is a body, whose own mode is then the last one; kg."""
 
@@ -93,6 +116,8 @@ class Structure:
         for part in (self.omega, self.damping_ratio, self.coupling, self.well, self.center, self.equilibrium):
             digest.update(np.ascontiguousarray(part).tobytes())
         digest.update(np.array([self.tension_stiffness, self.sign]).tobytes())
+        if self.uneven is not None:
+            digest.update(np.ascontiguousarray(self.uneven.force).tobytes())
         if self.body_mass is not None:
             digest.update(np.array([self.body_mass]).tobytes())
         return digest.hexdigest()
@@ -105,6 +130,7 @@ def structure_of(model: ReducedModel, side: str, striker: Striker | None = None)
     beyond the motion that its drive gives it: no tension, contact row -1/sqrt(m_s).
     """
     sign = 1.0 if side == "below" else -1.0
+    model = model if sign > 0.0 else model.mirrored
     equilibrium = sign * model.equilibrium
     modes = model.linear_modes
     struck = Structure(
@@ -120,8 +146,24 @@ def structure_of(model: ReducedModel, side: str, striker: Striker | None = None)
         sign=sign,
         equilibrium=equilibrium,
         model=model,
+        uneven=_uneven(model, sign),
     )
     return struck if striker is None or striker.mass is None else _with_body(struck, striker)
+
+
+def _uneven(model: ReducedModel, sign: float) -> Uneven | None:
+    """What unequal wells add, of a model that is seen from the striker's side."""
+    if model.landscape is None or model.side_force is None or not model.is_bistable:
+        return None
+    lower, upper = model.landscape.lower, model.landscape.upper
+    away = upper.amplitude + lower.amplitude
+    return Uneven(
+        force=sign * 2.0 * (model.linear_modes.T @ model.side_force),
+        lift=2.0 * float(model.side_force @ lower.amplitude),
+        second=sign * (model.linear_modes.T @ (model.mass @ away)),
+        depth=upper.energy - lower.energy,
+        level=model.dividing_height,
+    )
 
 
 def _with_body(structure: Structure, striker: Striker) -> Structure:
@@ -138,5 +180,12 @@ def _with_body(structure: Structure, striker: Striker) -> Structure:
         well=np.append(structure.well, 0.0),
         center=np.append(structure.center, 0.0),
         shift=np.append(structure.shift, 0.0),
+        uneven=None if structure.uneven is None else _with_rest(structure.uneven),
         body_mass=striker.mass,
+    )
+
+
+def _with_rest(uneven: Uneven) -> Uneven:
+    return dataclasses.replace(
+        uneven, force=np.append(uneven.force, 0.0), second=np.append(uneven.second, 0.0)
     )

@@ -16,7 +16,9 @@ from snapbeam.core.files import atomic_path, check_writable
 from snapbeam.core.validate import InputError, integer, nonnegative, positive
 from snapbeam.figures.captions import caption
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.bent import displacement_along
+from snapbeam.model.ends import Ends
+from snapbeam.model.ends.of_beam import modes_between
+from snapbeam.model.galerkin.bent import displacement_along
 from snapbeam.runs.schema import check_trajectory
 
 if TYPE_CHECKING:
@@ -311,9 +313,17 @@ class _BeamShape:
         self.length, self.scale = (float(dataset.attrs[name]) for name in ("beam_length", "length_scale"))
         self.time = dataset["time"].values
         self.alpha = dataset["modal_amplitude"].values
+        held = {name: dataset.attrs.get(f"ends_{name}") for name in ("left", "right")}
+        self.modes = None
+        if any(each is not None for each in held.values()):
+            young, width, thickness = (
+                float(dataset.attrs[f"beam_{name}"]) for name in ("young_modulus", "width", "thickness")
+            )
+            stiff = young * width * thickness**3 / 12.0
+            self.modes = modes_between(Ends(**held), self.length, stiff, self.alpha.shape[-1])
 
     def at(self, time: float) -> _Array:
         after = int(np.clip(np.searchsorted(self.time, time), 1, self.time.size - 1))
         share = (time - self.time[after - 1]) / (self.time[after] - self.time[after - 1])
         alpha = (1.0 - share) * self.alpha[after - 1] + share * self.alpha[after]
-        return displacement_along(self.length, alpha, self.position) / self.scale
+        return displacement_along(self.length, alpha, self.position, self.modes) / self.scale

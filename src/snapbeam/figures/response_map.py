@@ -20,7 +20,7 @@ from snapbeam.figures.panels import class_cells
 from snapbeam.figures.response_line import draw_response_line
 from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_figure
 from snapbeam.lab.compare.dots import Dots
-from snapbeam.model.quasi_static import quasi_static_threshold
+from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError, instance
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
+from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, house_style, new_figure
 from snapbeam.model.drive import Flight
-from snapbeam.model.modes import BucklingModes
+from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
 
@@ -33,6 +33,7 @@ _LAWS = {
     "restitution": "restitution",
 }
 _CYCLES = 8.0
+_LOAD_COLOR = CENTER_COLOR
 
 
 def plot_system(system: System, title: str = "") -> Figure:
@@ -80,7 +81,7 @@ def _shape(system: System, amplitude: _Array) -> tuple[_Array, _Array]:
     beam = system.model.beam
     assert beam is not None
     x = np.linspace(0.0, beam.length, _POINTS)
-    shapes = BucklingModes(beam.length, system.model.modes).shape(x)
+    shapes = beam.buckling_modes(system.model.modes).shape(x)
     return _WIDE * x / beam.length, amplitude @ shapes / system.scale.length
 
 
@@ -90,23 +91,78 @@ def _sign(striker: Striker | None) -> float:
 
 def _draw_beam(ax: Axes, system: System) -> None:
     sign = _sign(system.striker)
-    rest = sign * system.model.equilibrium
+    lower, upper = system.model.wells
+    rest, other = (lower, upper) if sign > 0.0 else (upper, lower)
     ax.plot([0.0, _WIDE], [0.0, 0.0], color="0.75", linewidth=0.5, linestyle=(0, (6, 4)))
-    ax.plot(*_shape(system, -rest), color=BEAM_COLOR, linewidth=0.8, linestyle="--")
+    if system.model.is_bistable:
+        ax.plot(*_shape(system, other), color=BEAM_COLOR, linewidth=0.8, linestyle="--")
     ax.plot(*_shape(system, rest), color=BEAM_COLOR, linewidth=1.8, solid_capstyle="butt")
+    if system.model.imperfection is not None:
+        _draw_imperfection(ax, system, system.model.imperfection, rest)
     clamp: Any = {"facecolor": "0.85", "edgecolor": BEAM_COLOR, "linewidth": 0.6, "hatch": "////"}
-    for x in (-0.3, _WIDE):
-        ax.add_patch(Rectangle((x, -0.35), 0.3, 0.7, **clamp))
+    beam = system.model.beam
+    assert beam is not None
+    for at, outward, stiffness in ((0.0, -1.0, beam.ends.left), (_WIDE, 1.0, beam.ends.right)):
+        if stiffness is None:
+            ax.add_patch(Rectangle((min(at, at + 0.3 * outward), -0.35), 0.3, 0.7, **clamp))
+        else:
+            _draw_hinge(ax, at, outward, stiffness, sign, clamp)
     arrow: Any = {"arrowstyle": "-|>", "lw": 0.8, "color": BEAM_COLOR}
     for x, toward in ((-0.85, 0.5), (_WIDE + 0.85, -0.5)):
         ax.annotate("", (x + toward, 0.0), (x, 0.0), arrowprops=arrow)
     ax.text(-0.62, 0.14, "$P$", ha="center", va="bottom")
 
 
+def _draw_hinge(ax: Axes, at: float, outward: float, stiffness: float, sign: float, block: Any) -> None:
+    """A pin on its support, away from the striker's side, and a coil about it if it is a spring."""
+    foot = 0.34 * sign
+    ax.add_patch(Polygon([(at, 0.0), (at - 0.2, foot), (at + 0.2, foot)], fc="0.95", ec=BEAM_COLOR, lw=0.7))
+    ax.add_patch(Rectangle((at - 0.3, min(foot, foot + 0.12 * sign)), 0.6, 0.12, **block))
+    ax.add_patch(Circle((at, 0.0), 0.06, facecolor="white", edgecolor=BEAM_COLOR, linewidth=0.8, zorder=5))
+    if stiffness > 0.0:
+        turn = np.linspace(0.0, 3.5 * np.pi, 90)
+        reach = 0.1 + 0.022 * turn
+        ax.plot(at + reach * np.cos(turn), reach * np.sin(turn), color=BEAM_COLOR, linewidth=0.6)
+        ax.text(at + 0.42 * outward, -0.42 * sign, r"$k_\theta$", ha="center", va="center")
+
+
+def _draw_imperfection(ax: Axes, system: System, imperfection: Imperfection, rest: _Array) -> None:
+    """The initial shape, dotted, and arrows for the side load, on the side that it pushes from."""
+    beam, model = system.model.beam, system.model
+    assert beam is not None
+    initial = imperfection.initial_shape(beam.buckling_modes(model.modes))
+    if initial.any():
+        ax.plot(*_shape(system, initial), color=BEAM_COLOR, linewidth=0.9, linestyle=":")
+    x, w = _shape(system, rest)
+    arrow: Any = {"arrowstyle": "-|>", "lw": 0.8, "color": _LOAD_COLOR}
+    uniform = imperfection.uniform_load - beam.mass_per_length * imperfection.gravity
+    for load, places, reach in (
+        (imperfection.point_load, [imperfection.point_location], 0.55),
+        (uniform, np.linspace(0.1, 0.9, 9), 0.25),
+    ):
+        if load == 0.0:
+            continue
+        push = 1.0 if load > 0.0 else -1.0
+        for place in places:
+            at, height = place * _WIDE, float(np.interp(place * _WIDE, x, w))
+            ax.annotate("", (at, height - 0.03 * push), (at, height - reach * push), arrowprops=arrow)
+    if imperfection.point_load != 0.0:
+        push = 1.0 if imperfection.point_load > 0.0 else -1.0
+        at = imperfection.point_location * _WIDE
+        ax.text(
+            at - 0.16,
+            float(np.interp(at, x, w)) - 0.22 * push,
+            "$F$",
+            ha="right",
+            va="center",
+            color=_LOAD_COLOR,
+        )
+
+
 def _draw_striker(ax: Axes, system: System, striker: Striker) -> None:
     """The tip under (or above) the beam, the rod, and what holds it."""
     sign = _sign(striker)
-    x, w = _shape(system, sign * system.model.equilibrium)
+    x, w = _shape(system, system.model.wells[0 if sign > 0.0 else 1])
     at = striker.location * _WIDE
     beam_there = float(np.interp(at, x, w))
     gap = 0.0 if striker.gap is None else striker.gap / system.scale.length

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from snapbeam.core.validate import InputError, instance
 from snapbeam.figures.axes import dress, positions, symbol_of
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
-from snapbeam.model.quasi_static import quasi_static_threshold
+from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
 
 if TYPE_CHECKING:
     import xarray as xr

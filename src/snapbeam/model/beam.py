@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from snapbeam.core.validate import InputError, finite
-from snapbeam.model.modes import wavenumbers
+from snapbeam.core.validate import InputError, InputTypeError, finite, shown
+from snapbeam.model.ends.ends import CLAMPED, Ends
+from snapbeam.model.ends.of_beam import Modes, modes_between
+from snapbeam.model.galerkin.modes import wavenumbers
 from snapbeam.model.quantity import quantities, quantity
 
 __all__ = ["Beam"]
@@ -24,7 +26,7 @@ class _Derived(float):
 
 @dataclass(frozen=True, kw_only=True)
 class Beam:
-    """A clamped-clamped Euler-Bernoulli beam of rectangular section under axial compression.
+    """An Euler-Bernoulli beam of rectangular section under axial compression, clamped at both ends by default.
 
     Exactly one of ``buckling_level`` and ``axial_load`` is given; the other follows from Eqs. (2)-(3),
 
@@ -50,6 +52,9 @@ class Beam:
     axial_load : float
         Axial load P, N, compression positive.  Below the critical load the beam is straight; a
         negative load is tension.
+    ends : Ends
+        How the ends are held; clamped and rigid by default.  Others change the critical loads, the first of them in the
+        relation above, and 4 L^2/(pi^2 E S) in it to phi_1(L/2)^2/gamma.
 
     Raises
     ------
@@ -96,9 +101,12 @@ class Beam:
         optional=True,
         short="beam_axial_load",
     )
+    ends: Ends = CLAMPED
     _given: str = dataclasses.field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.ends, Ends):
+            raise InputTypeError(f"ends = {shown(self.ends)}: must be Ends")
         level: float | None = self.buckling_level
         load: float | None = self.axial_load
         # what followed from the other in the beam that dataclasses.replace starts from is not given
@@ -113,18 +121,30 @@ class Beam:
             )
         for name in ("length", "thickness", "width", "density", "young_modulus"):
             self._set(name, _beam_quantities()[name].check(name, getattr(self, name)))
-        # tension per square of the buckling level: P - P_cr = stretch b^2
-        stretch = math.pi**2 * self.young_modulus * self.area / (4.0 * self.length**2)
+        try:
+            level, load = self._completed(level, load)
+        except OverflowError:
+            raise InputError(
+                f"length = {self.length:g} m, buckling_level = {level!r}: the square of one is more than a number holds"
+            ) from None
+        self._set("axial_load", load)
+        self._set("buckling_level", level)
+
+    def _completed(self, level: float | None, load: float | None) -> tuple[float, float]:
+        """Buckling level and axial load, of which one is given: P - P_cr = stretch b^2."""
+        stretch = self._stretch()
         if load is None:
             level = _beam_quantities()["buckling_level"].check("buckling_level", level)
             self._set("_given", "buckling_level")
-            load = _Derived(self.critical_load + stretch * level**2)
-        else:
-            load = finite("axial_load", load, "a finite number of N, compression positive")
-            level = _Derived(math.sqrt(max(load - self.critical_load, 0.0) / stretch))
-            self._set("_given", "axial_load")
-        self._set("axial_load", load)
-        self._set("buckling_level", level)
+            return level, _Derived(self.critical_load + stretch * level**2)
+        load = finite("axial_load", load, "a finite number of N, compression positive")
+        self._set("_given", "axial_load")
+        return _Derived(math.sqrt(max(load - self.critical_load, 0.0) / stretch)), load
+
+    def _stretch(self) -> float:
+        if self.ends.is_ideal:
+            return math.pi**2 * self.young_modulus * self.area / (4.0 * self.length**2)
+        return self.tension_stiffness / float(self.buckling_modes(1).shape(0.5 * self.length)[0]) ** 2
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
@@ -154,6 +174,10 @@ class Beam:
             kept[self._given] = getattr(self, self._given)
         return Beam(**(kept | changes))
 
+    def buckling_modes(self, count: int) -> Modes:
+        """The first *count* buckling modes between the beam's ends."""
+        return modes_between(self.ends, self.length, self.bending_stiffness, count)
+
     @property
     def area(self) -> float:
         """Area S of the section, m^2."""
@@ -181,17 +205,22 @@ class Beam:
 
     @property
     def tension_stiffness(self) -> float:
-        """Stiffness gamma = E S / (2 L) of the midplane stretching, N/m (Eq. 15)."""
-        return self.young_modulus * self.area / (2.0 * self.length)
+        """Stiffness gamma = E S / (2 L) of the midplane stretching, N/m (Eq. 15), less for supports that give way."""
+        rigid = self.young_modulus * self.area / (2.0 * self.length)
+        return rigid if self.ends.axial is None else rigid / (1.0 + 2.0 * rigid / self.ends.axial)
 
     @property
     def critical_load(self) -> float:
-        """First critical load P_cr = 4 pi^2 E I / L^2, N (Eq. 3)."""
+        """First critical load P_cr = E I k_1^2, N: 4 pi^2 E I / L^2 between clamps (Eq. 3)."""
+        if self.ends.turn:
+            return self.bending_stiffness * float(self.buckling_modes(1).wavenumber[0]) ** 2
         return self.bending_stiffness * (2.0 * math.pi / self.length) ** 2
 
     @property
     def second_critical_load(self) -> float:
-        """Second critical load E I k_2^2 = 2.0457 P_cr, N, at which the antisymmetric mode buckles."""
+        """Second critical load E I k_2^2, N, of the antisymmetric mode: 2.0457 P_cr between clamps."""
+        if self.ends.turn:
+            return self.bending_stiffness * float(self.buckling_modes(2).wavenumber[1]) ** 2
         return self.bending_stiffness * float(wavenumbers(2, self.length)[1]) ** 2
 
     @property

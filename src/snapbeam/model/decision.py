@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.galerkin.reduction import ReducedModel
+from snapbeam.model.imperfection.passing import least_energy_through, pinned_load
 
-__all__ = ["RESERVE", "decidable_energy", "least_energy_at"]
+__all__ = ["RESERVE", "crossing_energy", "decidable_energy", "least_energy_at", "passed_heights"]
 
 # Energy kept in hand, as a share of the barrier.  The energy error of a damped free flight at the default step
 # was measured as at most 1.2e-4 of it over 8 cycles, in which damping takes a thousand times as much; undamped,
@@ -45,7 +46,7 @@ def least_energy_at(model: ReducedModel, location: ArrayLike, displacement: Arra
     places, which = np.unique(x.ravel(), return_inverse=True)
     squares = np.array([model.shape_at(float(place)) ** 2 for place in places])
     k0, gamma = np.asarray(model.stiffness), model.tension_stiffness
-    pinned = np.array([_pinned(square, k0) for square in squares])[which]
+    pinned = np.array([pinned_load(square, k0) for square in squares])[which]
     squares, heights = squares[which], r.ravel() ** 2
 
     # the root of the slope of a concave function, by Newton's method inside a bracket; mu = Lambda - P
@@ -77,24 +78,35 @@ def least_energy_at(model: ReducedModel, location: ArrayLike, displacement: Arra
     return np.where(np.isfinite(value), value, -np.inf).reshape(x.shape)
 
 
-def _pinned(square: NDArray[np.float64], k0: NDArray[np.float64]) -> float:
-    """Load, less P, that buckles the beam pinned at the point: S_1's first zero, or an untouched mode."""
-    from scipy.optimize import brentq
+def passed_heights(
+    model: ReducedModel, location: NDArray[np.float64], highest: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Height of the contact point, m, above which early decision speaks of a run in the far well.
 
-    touched = square > 1e-20 * square.max()
-    free = np.sort(k0[~touched])
-    poles = np.sort(k0[touched])
-    lowest_free = float(free[0]) if free.size else np.inf
-    if poles.size < 2:
-        return lowest_free if np.isfinite(lowest_free) else float(poles[0] + 1e6 * abs(poles[0]))
-    gap = poles[1] - poles[0]
-    zero = brentq(
-        lambda mu: float(np.sum(square[touched] / (k0[touched] - mu))),
-        poles[0] + 1e-13 * gap,
-        poles[1] - 1e-13 * gap,
-        xtol=1e-12 * gap,
+    The tip's highest position, or that of the saddle between the wells if it is higher: to come down to the tip
+    the beam must pass it.
+    """
+    if model.landscape is None or model.landscape.saddle is None:
+        return np.maximum(highest, 0.0)
+    places, which = np.unique(location, return_inverse=True)
+    saddle = np.array([float(model.shape_at(float(x)) @ model.landscape.saddle.amplitude) for x in places])[
+        which
+    ]
+    return np.maximum(highest, saddle)
+
+
+def crossing_energy(model: ReducedModel) -> float:
+    """Energy, J, that a beam needs at least for its centre to pass from one well to the other."""
+    if model.landscape is None or model.side_force is None or model.stiffness.ndim > 1:
+        return model.barrier_energy
+    bound = least_energy_through(
+        model.stiffness,
+        model.tension_stiffness,
+        model.side_force,
+        model.center_shape[None],
+        np.array([model.dividing_height]),
     )
-    return min(float(zero), lowest_free)
+    return min(float(bound[0]), model.barrier_energy)
 
 
 def decidable_energy(
@@ -108,6 +120,8 @@ def decidable_energy(
     """
     if model.beam is None or not model.is_bistable:
         return np.full(location.shape, -np.inf)
+    if model.landscape is not None:
+        return _uneven_energy(model, location, highest)
     bounded = highest < np.inf
     reach = np.where(bounded, np.maximum(highest, 0.0), 0.0)
     barrier = model.barrier_energy
@@ -116,3 +130,19 @@ def decidable_energy(
     well = np.abs(np.array([float(model.shape_at(float(x)) @ model.equilibrium) for x in places]))[which]
     energy = limit - model.well_energy - RESERVE * (barrier - model.well_energy)
     return np.where(bounded & (reach < well), energy, -np.inf)
+
+
+def _uneven_energy(
+    model: ReducedModel, location: NDArray[np.float64], highest: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The same of unequal wells, above the first of them."""
+    assert model.landscape is not None and model.side_force is not None
+    bounded = highest < np.inf
+    reach = passed_heights(model, location, np.where(bounded, highest, 0.0))
+    places, which = np.unique(location, return_inverse=True)
+    shapes = np.array([model.shape_at(float(x)) for x in places])[which.ravel()]
+    through = least_energy_through(model.stiffness, model.tension_stiffness, model.side_force, shapes, reach)
+    limit = np.minimum(through, crossing_energy(model))
+    kept = RESERVE * (model.barrier_energy - model.landscape.deepest.energy)
+    well = shapes @ model.landscape.upper.amplitude
+    return np.where(bounded & (reach < well), limit - model.well_energy - kept, -np.inf)

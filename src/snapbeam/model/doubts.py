@@ -5,8 +5,8 @@ from __future__ import annotations
 from snapbeam.core.findings import Finding
 from snapbeam.model.beam import Beam
 from snapbeam.model.drive import Sine
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.quantity import quantities
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.striker import Striker
 
 __all__ = ["doubts_of"]
@@ -24,6 +24,14 @@ def doubts_of(model: ReducedModel, striker: Striker | None) -> tuple[Finding, ..
     found = [] if model.beam is None else _of_beam(model.beam) + _of_modes(model, model.beam)
     if striker is not None and isinstance(striker.drive, Sine):
         found += _of_sine(striker.drive, model)
+    if model.imperfection is not None and not model.is_bistable:
+        found.append(
+            Finding(
+                "monostable",
+                "this imperfection leaves one well: the beam is monostable, and crossings of its centre are no "
+                "change of wells",
+            )
+        )
     return tuple(found)
 
 

@@ -12,14 +12,16 @@ from snapbeam.core.validate import InputError, mapping, shown
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import LAWS, ContactLaw
 from snapbeam.model.drive import DRIVES, Drive
+from snapbeam.model.ends import Ends
+from snapbeam.model.galerkin.reduction import ReducedModel
+from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.quantity import quantities
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.model.striker import Striker
 
 __all__ = ["SECTIONS", "parts_from_mapping", "parts_to_mapping"]
 
-SECTIONS = ("beam", "model", "contact", "striker", "drive", "start")
+SECTIONS = ("beam", "model", "ends", "imperfection", "contact", "striker", "drive", "start")
 """Sections of a system, in their order."""
 
 _MATRICES = (
@@ -49,8 +51,16 @@ def parts_to_mapping(
         names = ("length", "thickness", "width", "density", "young_modulus", beam.given)
         sections["beam"] = {name: float(getattr(beam, name)) for name in names}
         section["modes"] = model.modes
+        if not beam.ends.is_ideal:
+            sections["ends"] = _fields(beam.ends)
+        if model.imperfection is not None:
+            own = {name: getattr(model.imperfection, name) for name in quantities(Imperfection)}
+            sections["imperfection"] = {name: value for name, value in own.items() if value is not None}
     else:
         section |= {name: getattr(model, name) for name in _MATRICES}
+        if model.side_force is not None:
+            section.pop("equilibrium")  # follows from the force
+            section["side_force"] = model.side_force
     section["damping_ratio"] = float(damping[0]) if uniform else np.array(damping)
     if model.given_reference_freq is not None:
         section["reference_freq"] = model.given_reference_freq
@@ -106,11 +116,23 @@ def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
     own = dict(sections.get("model", {}))
     if "beam" in sections:
         values = dict(sections["beam"])
-        _only(values, "beam", [item.name for item in dataclasses.fields(Beam) if item.init])
+        _only(values, "beam", list(quantities(Beam)))
         _only(own, "model", ["modes", "damping_ratio", "reference_freq"])
         _needed(values, "beam", Beam)
-        return ReducedModel.from_beam(Beam(**values), **own)
-    _only(own, "model", [*_MATRICES, "damping_ratio", "reference_freq"])
+        uneven = dict(sections.get("imperfection", {}))
+        _only(uneven, "imperfection", list(quantities(Imperfection)))
+        held = dict(sections.get("ends", {}))
+        _only(held, "ends", list(quantities(Ends)))
+        return ReducedModel.from_beam(
+            Beam(**values, ends=Ends(**held)), **own, imperfection=Imperfection(**uneven)
+        )
+    if "ends" in sections:
+        raise InputError("[ends]: belong to a beam; a structure given by matrices has them in its matrices")
+    if "imperfection" in sections:
+        raise InputError(
+            "[imperfection]: belongs to a beam; give the side_force of a structure given by matrices"
+        )
+    _only(own, "model", [*_MATRICES, "side_force", "damping_ratio", "reference_freq"])
     for name in ("mass", "stiffness", "contact_shape"):
         if name not in own:
             raise InputError(f"[model] {name} is missing: give it, or a section [beam]")

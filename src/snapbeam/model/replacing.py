@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from snapbeam.core.validate import InputError
+from snapbeam.model.ends import CLAMPED
+from snapbeam.model.galerkin.reduction import ReducedModel
+from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.mapping import SECTIONS
 from snapbeam.model.quantity import quantities
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.start import started
 from snapbeam.model.state import State
 
@@ -36,9 +38,13 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     for name in ("model", "contact", "striker", "start"):
         if name in whole:
             found[name] = whole[name]
-    found["model"] = _model(
-        found["model"], whole.get("beam"), inside.get("beam", {}), inside.get("model", {})
-    )
+    of_beam = inside.get("beam", {})
+    if "ends" in whole or "ends" in inside:
+        of_beam = of_beam | {"ends": _ends(found["model"], whole, inside.get("ends", {}))}
+    found["model"] = _model(found["model"], whole.get("beam"), of_beam, inside.get("model", {}))
+    if "imperfection" in whole or "imperfection" in inside:
+        given = whole.get("imperfection", found["model"].imperfection)
+        found["model"] = _with_imperfection(found["model"], given, inside.get("imperfection", {}))
     if "contact" in inside:
         found["contact"] = _changed(found["contact"], "contact", inside["contact"])
     if "drive" in whole:
@@ -74,6 +80,31 @@ def _changed(part: Any, section: str, values: Mapping[str, Any]) -> Any:
     return dataclasses.replace(part, **values)
 
 
+def _ends(model: ReducedModel, whole: Mapping[str, Any], values: Mapping[str, Any]) -> Any:
+    if model.beam is None:
+        raise InputError("ends: this model was given by matrices, it has no beam")
+    ends = whole.get("ends", whole.get("beam", model.beam).ends)
+    ends = CLAMPED if ends is None else ends
+    return _changed(ends, "ends", values) if values else ends
+
+
+def _with_imperfection(
+    model: ReducedModel, imperfection: Imperfection | None, values: Mapping[str, Any]
+) -> ReducedModel:
+    """The model of the same beam with another imperfection; of a perfect one *values* are all that it then has."""
+    if model.beam is None:
+        raise InputError(
+            "imperfection: this model was given by matrices, it has no beam; give its side_force"
+        )
+    if values:
+        changed = _changed(Imperfection() if imperfection is None else imperfection, "imperfection", values)
+        imperfection = changed
+    damping: Any = model.damping_ratio
+    return ReducedModel.from_beam(
+        model.beam, model.modes, damping, model.given_reference_freq, imperfection=imperfection
+    )
+
+
 def _model(
     model: ReducedModel, beam: Any, of_beam: Mapping[str, Any], of_model: Mapping[str, Any]
 ) -> ReducedModel:
@@ -91,6 +122,9 @@ def _model(
         }
         names = ("mass", "stiffness", "contact_shape", "center_shape", "tension_stiffness", "equilibrium")
         rest = {name: getattr(model, name) for name in names}
+        if model.side_force is not None:
+            rest = {name: value for name, value in rest.items() if name != "equilibrium"}
+            rest["side_force"] = model.side_force
         return ReducedModel.from_matrices(**rest, length_scale=model.length_scale or 1.0, **given)
     known = [item.name for item in dataclasses.fields(model.beam) if item.init]
     for name in of_beam:
@@ -103,5 +137,6 @@ def _model(
         "modes": model.modes,
         "damping_ratio": damping,
         "reference_freq": model.given_reference_freq,
+        "imperfection": model.imperfection,
     } | dict(of_model)
     return ReducedModel.from_beam((model.beam if beam is None else beam).replace(**of_beam), **changed)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from snapbeam.core.validate import InputError, finite_array, integer
-from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.model.striker import Striker
 
@@ -30,8 +30,9 @@ def amplitude_scale(model: ReducedModel) -> float:
 
 def rest_state(model: ReducedModel, striker: Striker | None = None) -> State:
     """At rest in the well that the striker pushes away from, and touched by it."""
-    sign = -1.0 if striker is not None and striker.side == "above" else 1.0
-    return State(amplitude=sign * model.equilibrium)
+    if striker is not None and striker.side == "above":
+        return State(amplitude=-model.mirrored.equilibrium)
+    return State(amplitude=model.equilibrium)
 
 
 def started(

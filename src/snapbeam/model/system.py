@@ -20,8 +20,8 @@ from snapbeam.core.validate import InputError, InputTypeError, file_path, instan
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.doubts import doubts_of
 from snapbeam.model.drive import Scale
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.mapping import parts_from_mapping, parts_to_mapping
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.replacing import replaced
 from snapbeam.model.state import State
 from snapbeam.model.striker import RecordedDrive, Shaker, Striker

@@ -53,7 +53,7 @@ def load_results(path: Path, size: str | None = None) -> dict[str, xr.Dataset]:
     try:
         with xr.open_datatree(path, engine="h5netcdf") as tree:
             tree.load()
-    except (OSError, ValueError) as error:
+    except Exception as error:  # of damaged bytes the libraries make errors of every kind
         raise InputError(f"data = {str(path)!r}: cannot be read, {error}") from error
     there = tree.attrs.get("paper_size")
     if size is not None and there != size:

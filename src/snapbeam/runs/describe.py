@@ -39,6 +39,9 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
         attrs |= _short(system.contact)
     if model.beam is not None:
         attrs |= {name: float(value) for name, value in _short(model.beam).items()}
+        attrs |= _short(model.beam.ends)
+    if model.imperfection is not None:
+        attrs |= _short(model.imperfection)
     return attrs
 
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, positive, shown
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.drive import Sine
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import Integration
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.model.striker import RecordedDrive, Shaker, Striker
 from snapbeam.model.system import System

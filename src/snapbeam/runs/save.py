@@ -10,7 +10,7 @@ import numpy as np
 
 from snapbeam.core.codes import ResponseClass, RunStatus
 from snapbeam.core.files import check_writable
-from snapbeam.core.netcdf import write_netcdf
+from snapbeam.core.netcdf import read_netcdf, write_netcdf
 from snapbeam.core.validate import InputError, file_path
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.model.integration import Integration
@@ -72,17 +72,12 @@ def load_run(path: str | os.PathLike[str]) -> Run:
     InputError
         If the file cannot be read or holds no run.
     """
-    import xarray as xr
-
     path = file_path("path", path)
-    try:
-        parts = {name: xr.load_dataset(path, engine="h5netcdf", group=name) for name in (None, *_GROUPS)}
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"path = {str(path)!r}: is no file of a run that Run.save wrote ({error})") from None
-    dataset = parts[None]
+    dataset = read_netcdf(path)
     attrs = dict(dataset.attrs)
     if attrs.pop("snapbeam_format", None) != _FORMAT:
         raise InputError(f"path = {str(path)!r}: is no file of a run that Run.save wrote")
+    parts = {name: read_netcdf(path, group=name) for name in _GROUPS}
     try:
         system = System.from_mapping(_arrays(json.loads(attrs.pop("snapbeam_system"))))
         integration = Integration(**json.loads(attrs.pop("snapbeam_integration")))
@@ -90,7 +85,7 @@ def load_run(path: str | os.PathLike[str]) -> Run:
             Accuracy(**json.loads(attrs.pop("snapbeam_accuracy"))) if "snapbeam_accuracy" in attrs else None
         )
         end = _state(json.loads(attrs.pop("snapbeam_end"))) if "snapbeam_end" in attrs else None
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"path = {str(path)!r}: its description is damaged ({error})") from None
     dataset = check_trajectory(dataset.drop_attrs(deep=False).assign_attrs(attrs))
     values = {str(name): array.values.item() for name, array in parts["outcome"].variables.items()}

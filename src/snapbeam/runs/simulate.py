@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.core.findings import tell
+from snapbeam.core.findings import Finding, tell
 from snapbeam.core.reporting import counting, sharing
 from snapbeam.core.validate import InputError, InputTypeError, finite_array
 from snapbeam.engines.answer import statistics_of
@@ -22,8 +22,8 @@ from snapbeam.engines.outputs import Recorded
 from snapbeam.engines.registry import resolve
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.drive import Recorded as RecordedMotion
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import Integration
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.model.striker import RecordedDrive, Shaker, Striker
 from snapbeam.model.system import System
@@ -43,6 +43,8 @@ _SAMPLES_PER_CYCLE = 200
 """Regular samples of a run per cycle of the excitation or of the first mode, whichever is the faster."""
 MEMORY_LIMIT = 4 * 2**30
 """Bytes that the samples of a run may take."""
+_ENERGY_ERROR = 1e-3
+"""Of the gross work, from which a run says that it misses its energy ledger."""
 _ENDED = (RunStatus.OK, RunStatus.DECIDED)
 
 
@@ -159,6 +161,8 @@ def simulate(
     more["status"] = f"{outcome.status.name}: {outcome.status.advice}"
     attrs = attributes_of("run of a struck bistable beam", system, integration, plan, more)
     attrs["gross_work"] = float(recorded.books["gross_work"][0])
+    attrs["energy_error"] = _energy_error(recorded.books)
+    tell(_unbalanced(attrs["energy_error"]))
     if reached is not None:
         attrs |= reached.attributes()
     return Run.of(
@@ -216,6 +220,31 @@ def _own_attributes(system: System, integration: Integration, lasted: float) -> 
         attrs |= {"location": striker.location, "side": striker.side}
     attrs["early_decision"] = int(integration.early_decision)
     return attrs
+
+
+def _energy_error(books: Any) -> float:
+    """What the ledger of a recorded run misses at its end, over the gross work: 0 for exact steps.
+
+    The striker's work less what the beam and the contact gained and what was dissipated, as it was integrated.
+    """
+    book = books[0]
+    with np.errstate(invalid="ignore"):  # a run that failed has no numbers
+        missed = book["work"] - (book["energy"] - book["first_energy"]) - book["dissipated"]
+    scale = float(book["gross_work"]) or float(abs(book["first_energy"]) + abs(book["energy"])) or 1.0
+    return float(missed) / scale
+
+
+def _unbalanced(error: float) -> list[Finding]:
+    if not abs(error) > _ENERGY_ERROR:
+        return []
+    return [
+        Finding(
+            "ledger-missed",
+            f"the run misses its energy ledger by {abs(error):.2g} of the gross work of the striker: its steps are too "
+            "long for what the beam does; use accuracy = 'reference', a tolerance, or a smaller step",
+            {"energy_error": error},
+        )
+    ]
 
 
 def _regular_count(system: System, end: float, period: float) -> int:

@@ -42,9 +42,11 @@ _SAMPLES_PER_CYCLE = 40
 _MOST_SAMPLES = 400_000
 _CHEAP = 3e-5
 """Tolerance from which order 4 is the cheaper one."""
-_HALVINGS = {4: 2, 6: 6}
-_LADDER = ((4, 1), (4, 2), (6, 2), (6, 4), (6, 8), (6, 16), (6, 32))
-"""Order of the composition and divisor of the flight step of level "map", from coarse to fine."""
+_ROUGH = (("map", 1.0), ("map", 0.5))
+_FINE = tuple(("reference", 2.0**power) for power in range(1, -5, -1))
+"""Level of accuracy and length of its steps over those that the level takes, from coarse to fine."""
+_BETWEEN = 2.0
+"""What a difference may be between the instants that are compared, over what it is there."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,8 @@ class Accuracy:
     tolerance: float
     """Asked: greatest error of the displacement at the contact point and at the centre, b."""
     estimated_error: float
-    """Greatest difference, up to the horizon, between this run and the next coarser one, b."""
+    """Bound of the error up to the horizon, b: twice the greatest difference from the next coarser run, which is larger
+    than the error wherever refinement converges, and the conditioning there."""
     horizon: float
     """Up to here, s, the estimate holds: the end of the run, or where the conditioning forbids more."""
     conditioning: float
@@ -142,30 +145,33 @@ def steps_for(system: System, integration: Integration) -> tuple[Plan, Accuracy]
     """Steps with which a run meets the tolerance of *integration*, and what they gave.
 
     Runs of ever finer steps are compared with the one before, at the contact point and at the centre, 40 times
-    a cycle, until they differ by less than the tolerance up to the horizon; the finer one is taken, so the
-    difference bounds its error from above wherever refinement converges.
+    a cycle, until they differ by less than half the tolerance up to the horizon; the finer one is taken, so the
+    difference bounds its error from above wherever refinement converges.  What the run makes of a relative change
+    of the drive by 1e-13, little more than it makes of rounding, is added.
     """
     limit = integration.tolerance
     assert limit is not None
     whole = integration.replace(tolerance=None, early_decision=False)
-    base = plans_of(system, whole, run_columns(system, {}))[0]
-    levels = [_level(base, order, divisor) for order, divisor in _LADDER]
-    if limit < _CHEAP:
-        levels = levels[2:]
-    times = _instants(system, make_ensemble(system, whole, plan=base))
+    steps = {
+        level: plans_of(system, whole.replace(accuracy=level), run_columns(system, {}))[0]
+        for level in ACCURACIES
+    }
+    rungs = _FINE if limit < _CHEAP else (*_ROUGH, *_FINE[1:])
+    levels = [steps[level]._replace(step=length * steps[level].step) for level, length in rungs]
+    times = _instants(system, make_ensemble(system, whole, plan=steps["map"]))
     coarse = _watch(system, make_ensemble(system, whole, plan=levels[0]), times)
     for plan in levels[1:]:
         ensemble = make_ensemble(system, whole, plan=plan)
         fine = _watch(system, ensemble, times)
         response = _apart(fine, _watch(system, _perturbed(ensemble, PERTURBATION), times))
-        difference = _apart(coarse, fine)
+        bound = _BETWEEN * _apart(coarse, fine) + response
         last = _last_within(response, _SHARE * limit)
-        reached = bool(difference[last] <= limit)
+        reached = bool(bound[last] <= limit)
         if reached:
             break
         coarse = fine
     if not reached:
-        last = min(last, _last_within(difference, limit))
+        last = min(last, _last_within(bound, limit))
         warnings.warn(
             f"tolerance = {limit:g} b is met only up to {times[last]:g} s of {times[-1]:g} s although the conditioning "
             "would allow more; run.accuracy says so too",
@@ -174,17 +180,13 @@ def steps_for(system: System, integration: Integration) -> tuple[Plan, Accuracy]
         )
     return plan, Accuracy(
         tolerance=limit,
-        estimated_error=float(difference[last]),
+        estimated_error=float(bound[last]),
         horizon=float(times[last]),
         conditioning=float(response[-1]),
         reached=reached,
         step=plan.step,
         order=plan.order,
     )
-
-
-def _level(base: Plan, order: int, divisor: int) -> Plan:
-    return Plan(order, base.step / divisor, base.coarsest, base.coarsest + _HALVINGS[order])
 
 
 def _instants(system: System, ensemble: Ensemble) -> _Array:

@@ -22,8 +22,8 @@ from snapbeam.core.validate import (
     within,
 )
 from snapbeam.model.contact import ContactLaw
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import Integration
-from snapbeam.model.reduction import ReducedModel
 from snapbeam.model.striker import Shaker
 from snapbeam.model.system import System
 from snapbeam.sweeps.points import Grid, PointList, points_of

@@ -105,6 +105,7 @@ class SweepSetup:
                     law=ensemble.law,
                     drive=ensemble.drive,
                     body=ensemble.structure.body_mass is not None,
+                    uneven=ensemble.structure.model.side_force is not None,
                 )[1]
                 books = engine.run_ensemble(ensemble, threads, report)
                 for name, values in statistics_of(ensemble, books).items():
@@ -169,7 +170,7 @@ class SweepSetup:
         return [
             name
             for name in self.points.names
-            if name.startswith(("beam.", "model.", "run.step", "run.accuracy"))
+            if name.startswith(("beam.", "model.", "ends.", "imperfection.", "run.step", "run.accuracy"))
         ]
 
     def identity(self) -> dict[str, Any]:
@@ -206,7 +207,7 @@ class SweepSetup:
                 "length_scale",
             }
         beam = self.system.model.beam
-        if beam is not None and any(name.startswith("beam.") for name in self.points.names):
+        if beam is not None and any(name.startswith(("beam.", "ends.")) for name in self.points.names):
             # the one of the two that follows from the other follows anew at every point
             pair = {"beam.buckling_level", "beam.axial_load"}
             given = pair & set(self.points.names) or {f"beam.{beam.given}"}
@@ -293,6 +294,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         modes=system.model.modes,
         law=law,
         body=system.striker is not None and system.striker.mass is not None,
+        uneven=system.model.side_force is not None,
         **({} if system.striker is None else {"drive": type(system.striker.drive)}),
     )[0]
     setup = SweepSetup(system, integration.replace(engine=resolved), points)

@@ -10,6 +10,7 @@ from snapbeam.engines.cpu.recording import record_held
 from snapbeam.engines.cpu.settle import swapped, weighed
 from snapbeam.engines.cpu.state import Now, Watch, cut_slot, phase_at
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
+from snapbeam.engines.cpu.uneven import about_level, at_center
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.decisions import Seen, count_in_step, finish_impact, track
 from snapbeam.engines.scalar.extras import observe as observe_extras
@@ -94,7 +95,10 @@ def carry(memory, blocks, place, run, tip, now, step, room, book, asked, outputs
     seen1 = Seen(about.w + rest_contact, about.wv, 0.0, 0.0, about.c + rest_center, about.cv)
     track(book, seen, seen1, length)
     # a carried centre moves as the tip does, slowly enough for one cubic
-    count_in_step(book, clock, t, length, seen, seen1, room.looked, rest_center, 0, 0.0)
+    count_in_step(
+        book, clock, t, length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1), room.looked,
+        at_center(layout.uneven, rest_center), 0, 0.0,
+    )  # fmt: skip
     observe_extras(asked.extras, book, t * tick, length, seen, seen1, True)
     t += ticks
     status = _RUNNING if t < clock.end else _OK

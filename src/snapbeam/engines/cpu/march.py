@@ -29,6 +29,7 @@ from snapbeam.engines.cpu.state import (
     phase_at,
 )
 from snapbeam.engines.cpu.step import Done, Step, prepare, take_step, take_two
+from snapbeam.engines.cpu.uneven import turn_over
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import released_at
 from snapbeam.engines.scalar.decisions import contact_level, flight_level, ticks_of
@@ -60,7 +61,7 @@ def choose(memory, blocks, place, run, now, book):
     layout, clock, home, stretch, t = place.layout, run.clock, now.home, now.stretch, now.t
     rows, seen, watch = now.rows, now.seen, now.watch
     r = layout.work + 9 * layout.size
-    if layout.stretch > 0.0 and seen.c * (home * run.rest_center) < 0.0:
+    if layout.stretch > 0.0 and turn_over(layout.uneven, seen.c, home, run.rest_center):
         stretch = change_well(memory, blocks, layout, home, rows.q, rows.k, r)
         home = -home
     book.steps += 1

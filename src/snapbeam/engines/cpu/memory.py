@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.engines.cpu.rows import Layout
+from snapbeam.engines.cpu.uneven import Uneven
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.scalar.composition import Stages, in_memory, slot_length
 from snapbeam.engines.scalar.lanes import WIDTH
@@ -107,16 +108,25 @@ def pack(structure: Structure, high_omega: float = np.inf) -> Packed:
         "high": padded((omega > high_omega).astype(np.float64)),
         "tension": np.concatenate(strips),
     }
+    away = structure.uneven
+    if away is not None:
+        pieces |= {"far": padded(away.force), "second": padded(away.second), "here": np.zeros(size + WIDTH)}
     starts = np.concatenate(([0], np.cumsum([piece.size for piece in pieces.values()])))
+    placed = dict(zip(pieces, map(int, starts), strict=False))
+    uneven = None
+    if away is not None:
+        own = placed.pop("far"), placed.pop("second"), placed.pop("here")
+        uneven = Uneven(*own, away.lift, away.depth, away.level)
     moving = bool(np.all(omega * np.sqrt(1.0 - zeta * zeta) > 0.0))
     gentle = _LONGEST_DECAY / max(float((zeta * omega).max()), _SLOWEST) if moving else 0.0
     layout = Layout(
         size=size,
-        **dict(zip(pieces, map(int, starts), strict=False)),
+        **placed,
         work=int(starts[-1]),
         gamma=structure.tension_stiffness,
         stretch=structure.stretch,
         gentle=gentle,
+        uneven=uneven,
     )
     return Packed(
         np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows, tuple(held)
@@ -146,6 +156,10 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
     second = first._replace(
         g=first.work + work, contact=first.work + work + size, work=first.work + work + 2 * size
     )
+    if first.uneven is not None:
+        second = second._replace(
+            work=second.work + size + WIDTH, uneven=first.uneven._replace(here=second.work)
+        )
     at = second.work + WORK_ROWS * size + slots
     stages, weights = in_memory(ensemble.order, at, general=ensemble.law.lossy)
     table = stages.flow + weights.size

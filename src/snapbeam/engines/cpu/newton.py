@@ -20,6 +20,7 @@ from snapbeam.engines.cpu.recording import record_instants
 from snapbeam.engines.cpu.settle import cut_to, meets, swapped, weighed
 from snapbeam.engines.cpu.state import Now, Watch, cut_slot, phase_at
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
+from snapbeam.engines.cpu.uneven import about_level, at_center
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.decisions import Seen, count_in_step, track
 from snapbeam.engines.scalar.extras import observe as observe_extras
@@ -217,8 +218,9 @@ def settle_newton(memory, blocks, place, run, now, step, done, room, book, asked
     track(book, seen, seen1, step.length)
     if hit or t + step.ticks > met.safe_center:
         count_in_step(
-            book, clock, t, step.length, seen, seen1, room.looked, rest_center, met.pieces, met.piece
-        )
+            book, clock, t, step.length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1),
+            room.looked, at_center(layout.uneven, rest_center), met.pieces, met.piece,
+        )  # fmt: skip
     observe_extras(asked.extras, book, t * tick, step.length, seen, seen1, False)
 
     t += step.ticks

@@ -8,6 +8,7 @@ from snapbeam.engines.cpu.hold import held_for, hold
 from snapbeam.engines.cpu.rows import modal_energy
 from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
+from snapbeam.engines.cpu.uneven import lifted
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import contact_energy, felt_force
 from snapbeam.engines.scalar.decisions import Seen
@@ -101,6 +102,7 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, book, o
         here = take_step(memory, blocks, layout, stages, tip, short, True)
         about = observe(memory, layout, tip, step.phase + tip.drive.omega * part, q2, p2)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, here.gq, here.qr)
+        energy = lifted(memory, size, layout.uneven, q2, energy)
         _write(
             memory, layout, now.home, q2, p2, outputs, sample, times[done], tip, about, energy,
             book.work + here.work, book.dissipated + here.dissipated + here.lost, book.lost + here.lost,
@@ -126,6 +128,7 @@ def record_held(memory, blocks, layout, run, tip, now, step, book, outputs):
         _, work, _, dissipated, _ = held_for(memory, blocks, layout, run, tip, step.phase, part)
         force, gq, qr = hold(memory, blocks, layout, tip, phase, q2, p2, run.spare + 2 * size)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, gq, qr)
+        energy = lifted(memory, size, layout.uneven, q2, energy)
         _write(
             memory, layout, now.home, q2, p2, outputs, sample, times[done], tip, _TOGETHER, energy,
             book.work + work, book.dissipated + dissipated, book.lost,
@@ -142,6 +145,7 @@ def record_aside(memory, layout, tip, now, short, here, when, about, sample, boo
     if not outputs.in_contact:
         return sample
     energy = modal_energy(memory, layout, short.q1, short.p1) + tension_energy(layout.gamma, here.gq, here.qr)
+    energy = lifted(memory, layout.size, layout.uneven, short.q1, energy)
     _write(
         memory, layout, now.home, short.q1, short.p1, outputs, sample, when, tip, about, energy,
         book.work + here.work, book.dissipated + here.dissipated + here.lost, book.lost + here.lost,
@@ -161,6 +165,7 @@ def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, boo
         return sample
     outputs.marks[2] += 1
     energy = modal_energy(memory, layout, step.q1, step.p1) + tension_energy(layout.gamma, done.gq, done.qr)
+    energy = lifted(memory, layout.size, layout.uneven, step.q1, energy)
     _write(
         memory, layout, now.home, step.q1, step.p1, outputs, sample, when, tip, seen1, energy, book.work,
         book.dissipated, book.lost,

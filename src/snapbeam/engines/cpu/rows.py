@@ -9,8 +9,9 @@ column by column, so that the product G q streams through it once.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+from snapbeam.engines.cpu.uneven import pushed
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.lanes import (
     WIDTH,
@@ -79,6 +80,8 @@ class Layout(NamedTuple):
     """Squared slopes of the beam in a well, alpha_eq . alpha_eq; 0 if there is one well only."""
     gentle: float
     """Longest flow, s, that polynomials serve; 0 if there is an overdamped or a still mode."""
+    uneven: Any
+    """Of unequal wells, an :class:`~snapbeam.engines.cpu.uneven.Uneven`; else None."""
 
 
 @inlined
@@ -217,10 +220,11 @@ def dot(memory, size, a, b):
 
 @inlined
 def acceleration_rows(memory, layout, along_g, along_r, r, k):
-    """k = the modal acceleration by the change of tension."""
+    """k = the modal acceleration by the change of tension, and by the side force where q has another origin."""
     for row in range(0, layout.size, WIDTH):
         g_row = load(memory, layout.g + row)
-        store(memory, k + row, tension_acceleration(along_g, along_r, g_row, load(memory, r + row)))
+        tension = tension_acceleration(along_g, along_r, g_row, load(memory, r + row))
+        store(memory, k + row, pushed(memory, layout.uneven, row, tension))
 
 
 @inlined
@@ -237,6 +241,7 @@ def kick_and_flow(memory, layout, flow, weight, along_g, along_r, r, force, q, p
     size = layout.size
     for row in range(0, size, WIDTH):
         k = tension_acceleration(along_g, along_r, load(memory, layout.g + row), load(memory, r + row))
+        k = pushed(memory, layout.uneven, row, k)
         k = fma(force, load(memory, layout.contact + row), k)
         kicked = fma(weight, k, load(memory, p + row))
         q_row, at = load(memory, q + row), flow + row

@@ -12,6 +12,7 @@ from snapbeam.engines.cpu.recording import record_contact, record_instants
 from snapbeam.engines.cpu.rows import dot, flow_coefficients, modal_energies, modal_energy, speed_bound
 from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot, look_slot
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
+from snapbeam.engines.cpu.uneven import about_level, above_own_well, at_center, lifted, second_well
 from snapbeam.engines.scalar.compile import inlined
 from snapbeam.engines.scalar.contact import jumps, slack_at
 from snapbeam.engines.scalar.decisions import (
@@ -87,7 +88,9 @@ def meets(memory, layout, run, now, tip, step, seen1, room):
     if after > safe_center:
         bound = speed_bound(memory, layout, layout.center, step.q, step.p)
         push = dot(memory, size, layout.center, step.k)
-        safe_center = now.t + int(safe_for(abs(seen.c), bound, 0.0, push, run.step_time) / tick)
+        safe_center = now.t + int(
+            safe_for(abs(at_center(layout.uneven, seen.c)), bound, 0.0, push, run.step_time) / tick
+        )
     if after > min(safe_gap, safe_center):
         look, pieces = look_slot(run), run.step_pieces
         if step.ticks == 2 * clock.step:
@@ -122,17 +125,21 @@ def weighed(memory, layout, run, now, t, state, seen1, watch, event, status, boo
     if released or (beat & 7) == 0:
         q, p, gq, qr = state
         high = 0.0
+        near = second_well(memory, layout.size, layout.uneven, now.home, q, run.spare)
         if asked.high:
-            linear, high = modal_energies(memory, layout, q, p)
+            linear, high = modal_energies(memory, layout, near, p)
         else:
-            linear = modal_energy(memory, layout, q, p)
+            linear = modal_energy(memory, layout, near, p)
         track_energy(book, linear, high, (t - last) * clock.tick)
         last = t
         if not watch.touching:
             energy = linear + tension_energy(layout.gamma, gq, qr)
-            quiet = is_quiet(energy, layout.gamma, layout.stretch)
+            if layout.uneven is not None:
+                energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
+            energy = lifted(memory, layout.size, layout.uneven, q, energy)
+            quiet = is_quiet(above_own_well(layout.uneven, now.home, energy), layout.gamma, layout.stretch)
             if not event and now.home < 0.0 and (beat & 15) == 0 and seen1.w > clock.decide_reach:
-                if seen1.c > 0.0 and energy < clock.decide_energy:
+                if at_center(layout.uneven, seen1.c) > 0.0 and energy < clock.decide_energy:
                     status = _DECIDED
     if clock.decide_crossings >= 0 and book.crossings_last_quarter > clock.decide_crossings:
         status = _DECIDED
@@ -195,8 +202,9 @@ def settle(memory, blocks, place, run, now, step, done, room, book, asked, outpu
     track(book, seen, seen1, step.length)
     if touching or t + step.ticks > met.safe_center:
         count_in_step(
-            book, clock, t, step.length, seen, seen1, room.looked, rest_center, met.pieces, met.piece
-        )
+            book, clock, t, step.length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1),
+            room.looked, at_center(layout.uneven, rest_center), met.pieces, met.piece,
+        )  # fmt: skip
     observe_extras(asked.extras, book, t * tick, step.length, seen, seen1, touching)
 
     # accept

@@ -14,6 +14,7 @@ from snapbeam.engines.cpu.rows import (
     tension_rows,
 )
 from snapbeam.engines.cpu.step import observe, prepare
+from snapbeam.engines.cpu.uneven import about_level, above_own_well, lifted, put
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS, Stages
 from snapbeam.engines.scalar.contact import contact_energy, is_impulsive
@@ -212,7 +213,8 @@ def land(memory, blocks, layout, run, t, home, rows, touching, landed, sample):
     rest_contact, rest_center = home * run.rest_contact, home * run.rest_center
     seen = Seen(about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv)
     energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
-    quiet = is_quiet(energy, layout.gamma, layout.stretch)
+    energy = lifted(memory, layout.size, layout.uneven, q, energy)
+    quiet = is_quiet(above_own_well(layout.uneven, home, energy), layout.gamma, layout.stretch)
     status = _RUNNING if t < run.clock.end else _OK
     watch = Watch(touching, quiet, t, t, t, 0)
     return Now(t, home, 2.0 * gq + qr, rows, seen, watch, sample, landed, status), energy
@@ -232,6 +234,7 @@ def begin(memory, blocks, place, asked, i, book):
     if record.home < 0.0:
         for row in range(size):
             memory[layout.g + row] = -memory[layout.g + row]
+    put(memory, size, layout.uneven, record.home)
     now, energy = land(memory, blocks, layout, run, 0, record.home, rows, False, 0, 0)
     seen, since = now.seen, record.contact_time
     touching = since >= 0.0
@@ -242,14 +245,21 @@ def begin(memory, blocks, place, asked, i, book):
     book.touching, book.onset = int(touching), 0
     if math.isfinite(since) and since > 0.0:
         book.onset = -int(since / run.clock.tick + 0.5)
-    open_book(book, seen, run.struck.law, energy + contact_energy(run.struck.law, seen.d))
+    open_book(
+        book,
+        about_level(layout.uneven, seen).c,
+        seen,
+        run.struck.law,
+        energy + contact_energy(run.struck.law, seen.d),
+    )
     watch = Watch(touching, now.watch.quiet, 0, 0, 0, 0)
     return run, Now(0, now.home, now.stretch, rows, seen, watch, 0, 0, now.status)
 
 
 @compiled
 def change_well(memory, blocks, layout, home, q, k, r):
-    """Take the other well as the origin: exact, since the structure is the same about both.
+    """Take the other well, or where it would be if the two were equal, as the origin: exact, since the structure is the
+    same about both, but for a constant force if they are not.
 
     About the well that the beam is in, the linear flow holds most of the motion of every mode; about
     the far one, modes faster than the step would be held in place by kicks alone.
@@ -257,6 +267,7 @@ def change_well(memory, blocks, layout, home, q, k, r):
     for row in range(layout.size):
         memory[q + row] -= home * memory[layout.shift + row]
         memory[layout.g + row] = -memory[layout.g + row]
+    put(memory, layout.size, layout.uneven, -home)
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
     acceleration_rows(memory, layout, along_g, along_r, r, k)
@@ -275,11 +286,9 @@ def finish(memory, blocks, layout, run, now, book, impacts, before, goes_on):
     if now.status == _DECIDED:
         book.decided_at = now.t * tick
     gq, qr = tension_rows(memory, blocks, layout, q, layout.work + 9 * layout.size)
-    book.energy = (
-        modal_energy(memory, layout, q, p)
-        + tension_energy(layout.gamma, gq, qr)
-        + contact_energy(run.struck.law, now.seen.d)
-    )
+    stored = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
+    stored = lifted(memory, layout.size, layout.uneven, q, stored)
+    book.energy = stored + contact_energy(run.struck.law, now.seen.d)
     book.displacement, book.center = now.seen.w, now.seen.c
     if now.home < 0.0:
         # the place in memory is left as it was found

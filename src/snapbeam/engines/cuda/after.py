@@ -62,11 +62,10 @@ class Taken(NamedTuple):
     gross: float
 
 
-def step_function(functions: Functions) -> Any:
-    """The device function that takes a run one step further."""
+def _watching(functions: Functions) -> tuple[Any, Any, Any]:
+    """Device functions of what is watched for: a change of well, how long nothing can happen, what is in a step."""
     sum_four, tension = functions.sum_four, functions.tension
-    observe, take_step, prepare = functions.observe, functions.take_step, functions.prepare
-    look_inside, flow_into, synchronise = functions.look_inside, functions.flow_into, functions.synchronise
+    look_inside, flow_into = functions.look_inside, functions.flow_into
 
     @device
     def home_again(block, fixed, held):
@@ -115,6 +114,13 @@ def step_function(functions: Functions) -> Any:
         piece = length / pieces
         look_inside(block, fixed.mode, tip, look, pieces, piece, phase, own.q, own.p, own.k, k1)
         return pieces, piece
+
+    return home_again, safe_until, looked
+
+
+def _taking(functions: Functions, safe_until: Any, looked: Any) -> Any:
+    """The device function that takes a step and cuts it short."""
+    observe, take_step, prepare = functions.observe, functions.take_step, functions.prepare
 
     @device
     def taken(block, fixed, held, own, home, span, slot, phase):
@@ -194,6 +200,13 @@ def step_function(functions: Functions) -> Any:
             impulse, work, gross,
         )  # fmt: skip
 
+    return taken
+
+
+def _keeping(functions: Functions) -> tuple[Any, Any]:
+    """Device functions of what is kept of a step."""
+    sum_four = functions.sum_four
+
     @device
     def keep(block, fixed, held, home, step, counted, book):
         """Enter a step in the statistics; the first thread keeps the book."""
@@ -227,6 +240,16 @@ def step_function(functions: Functions) -> Any:
                 if not step.event and far and (held.steps & 15) == 0 and energy < fixed.clock.decide_energy:
                     status = _DECIDED
         return quiet, weighed, status
+
+    return keep, weigh
+
+
+def step_function(functions: Functions) -> Any:
+    """The device function that takes a run one step further."""
+    home_again, safe_until, looked = _watching(functions)
+    taken = _taking(functions, safe_until, looked)
+    keep, weigh = _keeping(functions)
+    synchronise = functions.synchronise
 
     @device
     def further(block, fixed, held, book):

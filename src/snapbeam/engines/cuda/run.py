@@ -82,9 +82,15 @@ class Held(NamedTuple):
 
 def run_functions(functions: Functions, threads: int, finest: int) -> tuple[Any, Any, Any, Any, Any]:
     """Device functions: fixed_of, begin, take_up, lay_down, finish."""
-    sum_one, sum_four, tension = functions.sum_one, functions.sum_four, functions.tension
-    observe, prepare, flow_into = functions.observe, functions.prepare, functions.flow_into
-    distinct = functions.distinct
+    begin, finish = _ends(functions)
+    take_up, lay_down = _pauses()
+
+    return _fixing(functions, threads, finest), begin, take_up, lay_down, finish
+
+
+def _fixing(functions: Functions, threads: int, finest: int) -> Any:
+    """The device function of what stays the same in a run."""
+    prepare, flow_into, distinct = functions.prepare, functions.flow_into, functions.distinct
 
     @device
     def fixed_of(block, structure, asked, i, fresh):
@@ -117,6 +123,14 @@ def run_functions(functions: Functions, threads: int, finest: int) -> tuple[Any,
             asked.gamma, asked.stretch, finest + 2, whole_look,
         )  # fmt: skip
 
+    return fixed_of
+
+
+def _ends(functions: Functions) -> tuple[Any, Any]:
+    """Device functions: how a run begins, and how it ends."""
+    sum_one, sum_four, tension = functions.sum_one, functions.sum_four, functions.tension
+    observe = functions.observe
+
     @device
     def tensioned(block, fixed, home, q, p):
         """This thread's part of a state, with the tension's sums."""
@@ -145,8 +159,33 @@ def run_functions(functions: Functions, threads: int, finest: int) -> tuple[Any,
         touching = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
         if lane == 0:
             book.status, book.touching, book.onset = _RUNNING, int(touching), 0
-            _open_book(book, seen, fixed.struck.law, energy + contact_energy(fixed.struck.law, seen.d))
+            _open_book(
+                book, seen.c, seen, fixed.struck.law, energy + contact_energy(fixed.struck.law, seen.d)
+            )
         return Held(0, home, own, seen, touching, quiet, 0, 0, 0, max(seen.d, 0.0), 0, 0, _RUNNING)
+
+    @device
+    def finish(block, fixed, held, book):
+        linear = sum_one(block, mode_energy(fixed.mode.omega, held.own.q, held.own.p))
+        if block.lane == 0:
+            clock, law = fixed.clock, fixed.struck.law
+            if held.touching:
+                _finish_impact(book, None, 0, law, held.t, clock.tick)
+            if held.status == _DECIDED:
+                book.decided_at = held.t * clock.tick
+            book.energy = (
+                linear
+                + tension_energy(fixed.gamma, held.own.gq, held.own.qr)
+                + contact_energy(law, held.seen.d)
+            )
+            book.displacement, book.center = held.seen.w, held.seen.c
+            book.time, book.status, book.steps = held.t, held.status, held.steps
+
+    return begin, finish
+
+
+def _pauses() -> tuple[Any, Any]:
+    """Device functions: a run is taken up where it stood, and laid down."""
 
     @device
     def take_up(block, index, kept, book):
@@ -195,21 +234,4 @@ def run_functions(functions: Functions, threads: int, finest: int) -> tuple[Any,
             book.time, book.status, book.steps = held.t, held.status, held.steps
             book.touching, book.onset = int(held.touching), held.onset
 
-    @device
-    def finish(block, fixed, held, book):
-        linear = sum_one(block, mode_energy(fixed.mode.omega, held.own.q, held.own.p))
-        if block.lane == 0:
-            clock, law = fixed.clock, fixed.struck.law
-            if held.touching:
-                _finish_impact(book, None, 0, law, held.t, clock.tick)
-            if held.status == _DECIDED:
-                book.decided_at = held.t * clock.tick
-            book.energy = (
-                linear
-                + tension_energy(fixed.gamma, held.own.gq, held.own.qr)
-                + contact_energy(law, held.seen.d)
-            )
-            book.displacement, book.center = held.seen.w, held.seen.c
-            book.time, book.status, book.steps = held.t, held.status, held.steps
-
-    return fixed_of, begin, take_up, lay_down, finish
+    return take_up, lay_down

@@ -111,9 +111,12 @@ def clock_of(run, max_steps):
 
 
 @compiled
-def open_book(book, seen, law, energy):
-    """Begin a run's statistics with what is seen of it at the start."""
-    book.side = sign_of(seen.c, 0)
+def open_book(book, center, seen, law, energy):
+    """Begin a run's statistics with what is seen of it at the start.
+
+    *center* is where the centre is from the height that divides the wells.
+    """
+    book.side = sign_of(center, 0)
     book.min_displacement, book.max_displacement = seen.w, seen.w
     book.min_center, book.max_center = seen.c, seen.c
     book.deepest = mark_of(law, seen.d, seen.dv)

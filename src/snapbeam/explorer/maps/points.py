@@ -62,7 +62,7 @@ def system_of(attrs: Mapping[str, Any], name: str) -> System:
     text = attrs.get("system")
     if not isinstance(text, str):
         raise InputError(f"{name}: does not hold the system that it was computed of")
-    sections = json.loads(text)
+    sections = _parsed(text, name)
     if any(isinstance(value, dict) for values in sections.values() for value in values.values()):
         raise InputError(f"{name}: was driven by a record, which is too long to be kept in it")
     arrays = {
@@ -72,9 +72,19 @@ def system_of(attrs: Mapping[str, Any], name: str) -> System:
     return System.from_mapping(arrays)
 
 
+def _parsed(text: str, name: str) -> dict[str, Any]:
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{name}: its description is damaged ({error})") from None
+    if not isinstance(found, dict):
+        raise InputError(f"{name}: its description is damaged")
+    return found
+
+
 def integration_of(attrs: Mapping[str, Any]) -> Integration:
     """How a map says that it was integrated; one run is always the processor's work."""
-    found = json.loads(str(attrs.get("integration", "{}")))
+    found = _parsed(str(attrs.get("integration", "{}")), "integration")
     known = {item: value for item, value in found.items() if value is not None and item != "engine"}
     return Integration(**known)
 

@@ -160,14 +160,14 @@ class FileSource(DatasetSource):
         return found.st_mtime_ns, found.st_size
 
     def _open(self) -> xr.Dataset:
-        import xarray as xr
-
         if not self._path.is_file():
             raise InputError(f"{self._path.name}: there is no such file any more")
+        import xarray as xr
+
         try:
             return xr.open_dataset(self._path, engine="h5netcdf")
-        except (OSError, ValueError, KeyError) as error:
-            raise InputError(f"{self._path.name}: is no NetCDF file of results") from error
+        except Exception as error:  # of damaged bytes the libraries make errors of every kind
+            raise InputError(f"{self._path.name}: is no NetCDF file of results, or is damaged") from error
 
     def values(self, name: str) -> xr.DataArray | None:
         """A variable, read from the file the first time."""

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Part", "across", "within"]
 
+_ROUNDED = 1e-9
+
 
 class Part:
     """One view of a run.
@@ -70,7 +72,8 @@ def across(run: Run) -> tuple[NDArray[np.float64], str]:
 
 
 def within(x: NDArray[np.float64], low: float, high: float) -> slice:
-    """The samples from *low* to *high*, at least two."""
+    """The samples from *low* to *high*, at least two; one that rounding has put beyond an end is in."""
+    low, high = low - _ROUNDED * abs(low), high + _ROUNDED * abs(high)
     first, last = int(np.searchsorted(x, low)), int(np.searchsorted(x, high, side="right"))
     if last - first < 2:
         first, last = max(first - 1, 0), min(first + 2, x.size)

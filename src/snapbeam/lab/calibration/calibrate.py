@@ -24,8 +24,8 @@ from snapbeam.lab.calibration.measurements import ContactTest, Measurements, loa
 from snapbeam.lab.calibration.parity import either_well, shape_findings
 from snapbeam.lab.plausibility.calibration import KINDS
 from snapbeam.model.beam import Beam
+from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.paper_values import BEAM, MODES
-from snapbeam.model.reduction import ReducedModel
 
 __all__ = ["Calibration", "ContactTest", "Measurements", "Residual", "calibrate", "load_measurements"]
 
@@ -187,57 +187,15 @@ def calibrate(
             "beam: is straight, but frequencies about wells were measured; give a buckling_level (in the file of "
             "--config)"
         )
-    begin = np.array([math.log(getattr(beam, name)) for name in names])
-    target = np.array([item.measured for item in data])
-    errors = np.array([item.standard_error for item in data])
-
-    def frequencies(logs: _Array) -> _Array:
-        return _model(_changed(beam, names, logs), data, count)
-
-    def residual(logs: _Array) -> _Array:
-        return (frequencies(logs) - target) / errors
-
-    logs = begin
-    covariance = np.zeros((0, 0))
-    undetermined: tuple[str, ...] = ()
-    findings: list[Finding] = []
-    scatter, freedom = 1.0, len(data)
-    if names:
-        keep = directions(sensitivity(frequencies, begin, errors))
-        freedom = len(data) - keep.shape[1]
-        logs = search(residual, begin, keep, names, freedom)
-        jacobian = sensitivity(frequencies, logs, errors)
-        # where the fit ends the data may respond to less than where it began
-        here = directions(jacobian)
-        if here.shape[1] < keep.shape[1]:
-            keep, freedom = here, len(data) - here.shape[1]
-        chi = float(np.sum(residual(logs) ** 2))
-        scatter = max(1.0, math.sqrt(chi / freedom)) if freedom > 0 else 1.0
-        inner = np.linalg.inv((jacobian @ keep).T @ (jacobian @ keep))
-        covariance = keep @ inner @ keep.T * scatter**2
-        undetermined = tuple(name for i, name in enumerate(names) if (keep @ keep.T)[i, i] < 1.0 - 1e-4)
-        findings += words.links(names, covariance, undetermined)
-        if "buckling_level" not in undetermined and open_upwards(residual, logs, names):
-            undetermined += ("buckling_level",)
-            findings.append(words.at_least(math.exp(logs[names.index("buckling_level")])))
-        if freedom <= 0:
-            findings.append(KINDS["no_check"].found())
-    result = _changed(beam, names, logs)
+    fitted_to = _fit(beam, data, names, count)
+    findings = list(fitted_to.findings)
+    result = _changed(beam, names, fitted_to.logs)
     fitted = _model(result, data, count)
     residuals = tuple(
         Residual(item.name, item.measured, item.standard_error, float(f))
         for item, f in zip(data, fitted, strict=True)
     )
-    values = {name: math.exp(log) for name, log in zip(names, logs, strict=True)}
-    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    standard = {
-        name: values[name] * float(s)
-        for name, s in zip(names, spread, strict=True)
-        if name not in undetermined
-    }
-    correlation = (
-        covariance / np.outer(spread, spread) if names and (spread > 0.0).all() else np.eye(len(names))
-    )
+    values, standard, correlation = fitted_to.values(names)
     damping, damping_se = _mean(measured.damping_ratio, measured.damping_ratio_se, 0.1)
     tests = [test.stiffness() for test in measured.contact]
     contact, contact_se = _mean(tuple(k for k, _ in tests), tuple(se for _, se in tests) or None, 0.1)
@@ -249,10 +207,10 @@ def calibrate(
         values=values,
         standard_errors=standard,
         correlation=correlation,
-        undetermined=undetermined,
+        undetermined=fitted_to.undetermined,
         residuals=residuals,
-        scatter=scatter,
-        degrees_of_freedom=freedom,
+        scatter=fitted_to.scatter,
+        degrees_of_freedom=fitted_to.freedom,
         modes=count,
         damping_ratio=damping,
         damping_ratio_se=damping_se,
@@ -270,6 +228,67 @@ def calibrate(
     return dataclasses.replace(
         answer, remarks=tuple(words.remarks(answer, measured)), findings=tuple(findings)
     )
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """What the measured frequencies say of the parameters that are fitted."""
+
+    logs: _Array
+    covariance: _Array
+    undetermined: tuple[str, ...]
+    scatter: float
+    freedom: int
+    findings: tuple[Finding, ...]
+
+    def values(self, names: list[str]) -> tuple[dict[str, float], dict[str, float], _Array]:
+        """Values and standard errors by name, and the correlations."""
+        values = {name: math.exp(log) for name, log in zip(names, self.logs, strict=True)}
+        spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        standard = {
+            name: values[name] * float(s)
+            for name, s in zip(names, spread, strict=True)
+            if name not in self.undetermined
+        }
+        if names and (spread > 0.0).all():
+            return values, standard, self.covariance / np.outer(spread, spread)
+        return values, standard, np.eye(len(names))
+
+
+def _fit(beam: Beam, data: list[_Datum], names: list[str], modes: int) -> _Fitted:
+    """Least squares in the logarithms of the parameters, along what the data respond to."""
+    begin = np.array([math.log(getattr(beam, name)) for name in names])
+    target = np.array([item.measured for item in data])
+    errors = np.array([item.standard_error for item in data])
+
+    def frequencies(logs: _Array) -> _Array:
+        return _model(_changed(beam, names, logs), data, modes)
+
+    def residual(logs: _Array) -> _Array:
+        return (frequencies(logs) - target) / errors
+
+    if not names:
+        return _Fitted(begin, np.zeros((0, 0)), (), 1.0, len(data), ())
+    keep = directions(sensitivity(frequencies, begin, errors))
+    freedom = len(data) - keep.shape[1]
+    logs = search(residual, begin, keep, names, freedom)
+    jacobian = sensitivity(frequencies, logs, errors)
+    # where the fit ends the data may respond to less than where it began
+    here = directions(jacobian)
+    if here.shape[1] < keep.shape[1]:
+        keep, freedom = here, len(data) - here.shape[1]
+    chi = float(np.sum(residual(logs) ** 2))
+    scatter = max(1.0, math.sqrt(chi / freedom)) if freedom > 0 else 1.0
+    inner = np.linalg.inv((jacobian @ keep).T @ (jacobian @ keep))
+    covariance = keep @ inner @ keep.T * scatter**2
+    undetermined = tuple(name for i, name in enumerate(names) if (keep @ keep.T)[i, i] < 1.0 - 1e-4)
+    findings = list(words.links(names, covariance, undetermined))
+    if "buckling_level" not in undetermined and open_upwards(residual, logs, names):
+        undetermined += ("buckling_level",)
+        findings.append(words.at_least(math.exp(logs[names.index("buckling_level")])))
+    if freedom <= 0:
+        findings.append(KINDS["no_check"].found())
+    return _Fitted(logs, covariance, undetermined, scatter, freedom, tuple(findings))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from snapbeam.core.findings import Finding
 from snapbeam.lab.calibration.measurements import Measurements
 from snapbeam.lab.plausibility.calibration import KINDS
 from snapbeam.model.beam import Beam
-from snapbeam.model.reduction import ReducedModel
+from snapbeam.model.galerkin.reduction import ReducedModel
 
 __all__ = ["either_well", "shape_findings"]
 

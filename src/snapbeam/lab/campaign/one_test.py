@@ -81,7 +81,7 @@ def kept_result(path: Path, fingerprint: str) -> TestResult | None:
         values["findings"] = tuple((str(a), str(b), str(c)) for a, b, c in values["findings"])
         filled: dict[str, Any] = {name: _NAN if value is None else value for name, value in values.items()}
         return TestResult(**filled)
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
 
 

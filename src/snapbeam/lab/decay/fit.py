@@ -68,9 +68,14 @@ def fit_decay(
     Raises
     ------
     InputError
-        If lmfit finds no minimum.
+        If lmfit finds no minimum, or is not there.
     """
-    import lmfit
+    try:
+        import lmfit
+    except ImportError as missing:
+        raise InputError(
+            f"the fit of a decay needs {missing.name} (pip install 'snapbeam[lab]')"
+        ) from missing
 
     t = samples.time - samples.time[0]
     y = samples.values

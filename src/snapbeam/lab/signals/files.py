@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.findings import PlausibilityWarning
 from snapbeam.core.validate import InputError, InputTypeError, positive, shown
 from snapbeam.lab.signals.formats.channel import Channel, Told
 from snapbeam.lab.signals.formats.registry import READERS, WRITERS
@@ -65,6 +66,7 @@ def read_channels(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
+            warnings.simplefilter("default", PlausibilityWarning)
             channels = reader(source, Told(rate, columns))
     except InputError as error:
         raise InputError(error.args[0] if str(source) in str(error) else f"{source}: {error}") from error

@@ -50,20 +50,20 @@ def _expose(
     thickness: float,
     profile: NDArray,
     cover: NDArray,
-    marker_from: float,
-    marker_to: float,
-    beam_step: float,
-    shaker_step: float,
-    marker_step: float,
+    marker: tuple[float, float],
+    contrast: tuple[float, float, float],
     table: NDArray,
 ) -> None:  # pragma: no cover
     """Add the edges of all instants of one exposure to *steps* (rows, columns), the change of light by row.
 
     ``beam`` and ``tip`` are rows of the beam's far edge and of the tip at the contact at each instant;
     ``slope`` the beam's drop at each column, ``profile`` the tip's, ``cover`` how much of a column the
-    shaker covers.
+    shaker covers; ``marker`` where a sticker begins and ends behind the tip, ``contrast`` the steps of
+    light at the beam's, the shaker's and the sticker's edges.
     """
     weight = 1.0 / beam.size
+    marker_from, marker_to = marker
+    beam_step, shaker_step, marker_step = contrast
     for n in range(beam.size):
         for x in range(steps.shape[1]):
             far = beam[n] + slope[x]

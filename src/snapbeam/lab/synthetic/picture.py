@@ -68,6 +68,7 @@ class GaussianPicture:
         stage, thickness = shape.stage, shape.thickness
         steps = np.zeros((shape.height, shape.width))
         steps[0] = stage.background
+        sticker = stage.marker - stage.shaker if stage.marker_thickness > 0.0 else 0.0
         expose(
             steps,
             beam - 0.5 * thickness,
@@ -76,10 +77,8 @@ class GaussianPicture:
             thickness,
             self.profile,
             self.cover,
-            *shape.marker,
-            stage.beam - stage.background,
-            stage.shaker - stage.background,
-            stage.marker - stage.shaker if stage.marker_thickness > 0.0 else 0.0,
+            shape.marker,
+            (stage.beam - stage.background, stage.shaker - stage.background, sticker),
             self.tables[blurred],
         )
         light: NDArray[np.float32] = np.cumsum(steps, axis=0).astype(np.float32)

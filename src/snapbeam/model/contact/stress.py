@@ -92,7 +92,6 @@ def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array
 
     The stress of the shape itself is meant, that of a beam made straight; the axial stress is not in it.
     """
-    from snapbeam.model.modes import BucklingModes
 
     if not hasattr(model, "beam"):
         raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")
@@ -104,6 +103,6 @@ def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array
     alpha = finite_array("amplitude", amplitude)
     if alpha.shape[-1:] != (model.modes,):
         raise InputError(f"amplitude of shape {alpha.shape}: must have the shape (..., {model.modes})")
-    shapes = BucklingModes(beam.length, model.modes).curvature(np.linspace(0.0, beam.length, count))
+    shapes = beam.buckling_modes(model.modes).curvature(np.linspace(0.0, beam.length, count))
     found: _Array = 0.5 * beam.young_modulus * beam.thickness * np.abs(alpha @ shapes).max(axis=-1)
     return found

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
+from snapbeam.core.netcdf import read_netcdf
 from snapbeam.core.validate import InputError
 from snapbeam.figures.panels import panel_letters
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
@@ -159,12 +160,7 @@ def _recorded(run: xr.Dataset) -> xr.Dataset:
 
 def read_measured(path: str | os.PathLike[str]) -> xr.Dataset:
     """A measured run: NetCDF with ``displacement`` and ``shaker_displacement``, in b, over ``time``."""
-    import xarray as xr
-
-    try:
-        dataset = xr.load_dataset(path, engine="h5netcdf")
-    except (OSError, ValueError) as error:
-        raise InputError(f"measured = {str(path)!r}: cannot be read, {error}") from error
+    dataset = read_netcdf(path, "measured")
     return check_trajectory(dataset, require=("displacement", "shaker_displacement"))
 
 

@@ -341,7 +341,7 @@ def _read_description(file: Path) -> dict[str, Any]:
             and isinstance(held["chunk"], int)
             and held["chunk"] >= 1
         )
-    except (ValueError, KeyError):
+    except (ValueError, KeyError, RecursionError):
         raise damaged from None
     if not sound:
         raise damaged

@@ -171,7 +171,7 @@ def seat(m, n, shape, world, asked, lane, i, book):
     book.touching, book.onset = int(touching), 0
     if math.isfinite(since) and since > 0.0:
         book.onset = -int(since / record.tick + 0.5)
-    open_book(book, seen, law, energy + contact_energy(law, seen.d))
+    open_book(book, seen.c, seen, law, energy + contact_energy(law, seen.d))
     m[at.ONSET + lane], m[at.SIDE + lane], m[at.DEEPEST + lane] = book.onset, book.side, book.deepest
     m[at.MIN_W + lane], m[at.MAX_W + lane] = book.min_displacement, book.max_displacement
     m[at.MIN_C + lane], m[at.MAX_C + lane] = book.min_center, book.max_center

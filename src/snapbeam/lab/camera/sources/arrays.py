@@ -68,8 +68,13 @@ class ArraySource(FrameSource):
         found: dict[str, Any] = {}
 
         def visit(name: str, item: Any) -> None:
-            if isinstance(item, h5py.Dataset) and _is_stack(item.shape, item.dtype):
-                found[name] = item
+            if not isinstance(item, h5py.Dataset) or not _is_stack(item.shape, item.dtype):
+                return
+            if item.external or item.is_virtual:
+                raise InputError(
+                    f"{self.path}: {name!r} has its pictures in another file: copy them into this one"
+                )
+            found[name] = item
 
         self._file.visititems(visit)
         if dataset:

@@ -20,6 +20,8 @@ _STEPS = (
     "sampleinterval", "samplingintervall", "samplinginterval", "sampleperiod", "samplingperiod", "timestep",
     "timeincrement", "timeinterval", "deltat", "deltats", "dt", "dts", "xincrement", "increment", "resolutionx",
 )  # fmt: skip
+_LONGEST_LINE = 2000
+"""Letters of a line of a header that is looked into."""
 _PER_SECOND = {
     "": 1.0,
     "hz": 1.0,
@@ -40,6 +42,8 @@ def header_values(lines: Iterable[str]) -> dict[str, str]:
     """
     values: dict[str, str] = {}
     for line in lines:
+        if len(line) > _LONGEST_LINE:
+            continue
         found = re.match(r'\s*"?([^:=,;\t"]+?)"?\s*([:=,;\t])\s*"?(.*?)"?\s*[,;\t]*\s*$', line)
         if found:
             key = re.sub(r"[^a-z0-9]", "", found[1].lower())

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Table", "read_csv", "read_table", "split_unit", "write_csv"]
 
+_LONGEST_NAME = 500
+"""Letters of a name of a column that a unit is looked for in."""
 _SUFFIX_UNITS = {
     "_m_s": "m/s",
     "_mm_s": "mm/s",
@@ -186,6 +188,8 @@ def split_unit(column: str) -> tuple[str, str | None]:
 
     A name that is a unit itself, such as ``Volt``, is one too.
     """
+    if len(column) > _LONGEST_NAME:
+        return column, None
     found = re.fullmatch(r"\s*(.*?)\s*[\[(]\s*(.+?)\s*[\])]\s*", column)
     if found:
         return found[1] or column, found[2]

@@ -14,12 +14,15 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from snapbeam.core.findings import Finding, tell
 from snapbeam.core.validate import InputError
 
 __all__ = ["TextBlock", "decoded", "read_block", "to_number"]
 
 _COMMENT = ("#", "%", "//", "!")
 _LOOK = 400  # lines in which the table must begin
+_ABOVE = 20
+"""Rows at the end whose numbers are compared."""
 _GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?([eE][-+]?\d+)?")
 
 
@@ -131,6 +134,16 @@ def _dialects(lines: list[str]) -> list[_Dialect]:
     return found
 
 
+def _is_short(cells: list[list[str]]) -> bool:
+    """Whether the last number has fewer digits behind its point than those above it, which all have as many."""
+    column = [re.search(r"[.,](\d*)$", row[-1].strip()) for row in cells[-_ABOVE:] if row]
+    digits = {len(found[1]) for found in column[:-1] if found}
+    if len(digits) != 1 or len(column) < _ABOVE:
+        return False
+    last = column[-1]
+    return last is None or len(last[1]) < digits.pop()
+
+
 def read_block(path: Path, columns: int = 0) -> TextBlock:
     """Take a text file apart.
 
@@ -146,7 +159,8 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
     InputError
         If there is no row of numbers, or the way to read it is not clear.
     """
-    numbered = [(i, line.rstrip("\r")) for i, line in enumerate(decoded(path).split("\n"), 1) if line.strip()]
+    text = decoded(path)
+    numbered = [(i, line.rstrip("\r")) for i, line in enumerate(text.split("\n"), 1) if line.strip()]
     comments = [line.strip().lstrip("#%/!").strip() for _, line in numbered if line.startswith(_COMMENT)]
     numbered = [(i, line) for i, line in numbered if not line.startswith(_COMMENT)]
     lines = [line for _, line in numbered]
@@ -168,6 +182,9 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
         raise InputError(f"{path}: is no table ({error})") from error
     if len(cells) != len(lines) - first:
         raise InputError(f"{path}: a quoted value runs over the end of a line")
+    if not text.endswith("\n") and _is_short(cells):
+        words = f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}, as a copy that was broken off does"
+        tell([Finding("signal.cut", words, {"lines": float(len(lines))})])
     return TextBlock(
         path=path,
         header=(*comments, *(line for k, line in enumerate(lines[: dialect.first]) if k not in taken)),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.model.modes import BucklingModes
+from snapbeam.model.galerkin.modes import BucklingModes
 from snapbeam.model.paper_values import BEAM, MODES
 from snapbeam.paper.claims.finding import Finding, Quantity, above, below, found
 from snapbeam.paper.system import paper_model

@@ -1,0 +1,111 @@
+"""``snapbeam identify``: natural frequencies and damping ratios from a free decay."""
+
+from __future__ import annotations
+
+from snapbeam.cli.common import options as opt
+from snapbeam.cli.common.console import door, file_line, out
+from snapbeam.cli.lab import identify_options as asked
+from snapbeam.cli.lab import options as lab
+
+__all__ = ["identify"]
+
+
+@door
+def identify(
+    signal: lab.SignalFile,
+    modes: asked.Modes = 1,
+    frequencies: asked.Frequencies = None,
+    method: asked.Method = "fit",
+    start: asked.Start = None,
+    stop: asked.Stop = None,
+    soften: asked.Soften = True,
+    buckling_level: asked.BucklingLevel = None,
+    mirror_channel: asked.MirrorChannel = None,
+    channel: lab.Channel = None,
+    units: lab.Units = None,
+    sensitivity: lab.Sensitivity = None,
+    sampling_freq: lab.SamplingFreq = None,
+    columns: lab.Columns = None,
+    plot: opt.Plot = None,
+    stabilisation: asked.Stabilisation = None,
+    report: lab.JsonFile = None,
+    strict: lab.Strict = False,
+) -> None:
+    """Identify natural frequency, damping ratio and softening from a free decay, with standard errors.
+
+    The frequency is that of vanishing amplitude: about a well a buckled beam softens.
+
+    Example: snapbeam identify decay.csv --start 0.12 --method all --plot decay.png --json lower.json
+    """
+    from rich.table import Table
+
+    from snapbeam.core.files import check_writable
+    from snapbeam.core.findings import refuse
+    from snapbeam.core.validate import choice
+    from snapbeam.figures.style import FIGURE_SUFFIXES, save_figure
+    from snapbeam.lab.decay.identify import METHODS, identify_decay
+    from snapbeam.lab.decay.shapes import mode_shapes
+
+    for name, path in (("plot", plot), ("stabilisation", stabilisation)):
+        if path is not None:
+            check_writable(path, name, FIGURE_SUFFIXES)
+    if report is not None:
+        check_writable(report, "json", (".json",))
+    choice("method", method, (*METHODS, "all"))
+    data = lab.open_signal(signal, channel, units, sensitivity, sampling_freq, columns)
+    rough = lab.numbers("frequencies", frequencies) or None
+    fits = {
+        name: identify_decay(
+            data, modes=modes, frequencies=rough, method=name, start=start, stop=stop, soften=soften,
+            buckling_level=buckling_level,
+        )
+        for name in (METHODS if method == "all" else (method,))
+    }  # fmt: skip
+    first = next(iter(fits.values()))
+    console = out()
+    console.print(
+        f"{signal.name}: {first.start:.4g} to {first.stop:.4g} s, {first.snr:.1f} dB above noise at the start"
+    )
+    table = Table(box=None, pad_edge=False)
+    for title in ("method", "mode", "frequency (Hz)", "damping (%)", "amplitude", "softening"):
+        table.add_column(title, justify="left" if title == "method" else "right", no_wrap=True)
+    for name, fit in fits.items():
+        for i, mode in enumerate(fit.modes):
+            table.add_row(
+                name if i == 0 else "",
+                str(i + 1),
+                f"{mode.natural_freq:.4f} +- {mode.natural_freq_se:.4f}",
+                f"{100 * mode.damping_ratio:.4f} +- {100 * mode.damping_ratio_se:.4f}",
+                f"{mode.amplitude:.4g} {fit.units}",
+                f"{mode.softening * mode.amplitude**2:.4f}" if i == 0 else "",
+            )
+    console.print(table)
+    console.print("softening: relative fall of the first frequency at the starting amplitude")
+    for mode in first.modes[:1]:
+        if mode.law != "viscous":
+            strength = f"{mode.law_strength:.3f} +- {mode.law_strength_se:.3f}"
+            console.print(f"damping: viscous and {mode.law}, {strength} times as strong at the start")
+    if mirror_channel is not None:
+        second = lab.open_signal(signal, mirror_channel, units, sensitivity, sampling_freq, columns)
+        shapes = mode_shapes(data, second, first)
+        told = ", ".join(
+            f"{mode.natural_freq:.4g} Hz {kind}" for mode, kind in zip(first.modes, shapes, strict=True)
+        )
+        console.print(f"shapes: {told}")
+    findings = tuple({one.code: one for fit in fits.values() for one in fit.findings}.values())
+    lab.tell_findings(console, findings)
+    if plot is not None:
+        from snapbeam.figures.lab.identification import plot_decay
+
+        save_figure(plot_decay(data, first), plot)
+        console.print(f"Written: {file_line(plot)}")
+    if stabilisation is not None:
+        from snapbeam.figures.lab.identification import plot_stabilisation
+
+        save_figure(plot_stabilisation(data, first), stabilisation)
+        console.print(f"Written: {file_line(stabilisation)}")
+    if strict:
+        refuse(findings, str(signal))
+    if report is not None:
+        lab.write_json(report, {name: fit.summary() for name, fit in fits.items()})
+        console.print(f"Written: {file_line(report)}")

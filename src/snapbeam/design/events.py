@@ -1,0 +1,44 @@
+"""What a run may come to, read from its class: outcomes that have a probability."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.core.codes import ResponseClass, RunStatus
+
+__all__ = ["OUTCOMES", "Event", "reached"]
+
+Statistics = dict[str, NDArray[Any]]
+_REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
+_FIRST = (ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_1)
+
+
+class Event(NamedTuple):
+    """Something that a run does or does not."""
+
+    words: str
+    happened: Callable[[Statistics], NDArray[np.bool_]]
+
+
+OUTCOMES: dict[str, Event] = {
+    "snap": Event("the beam snaps through at least once", lambda found: found["response"] > 0),
+    "continuous": Event(
+        "the beam snaps on at the end", lambda found: found["response"] == ResponseClass.CONTINUOUS
+    ),
+    "first_well": Event(
+        "the beam ends about the well it began in", lambda found: np.isin(found["response"], _FIRST)
+    ),
+    "other_well": Event(
+        "the beam ends about the other well", lambda found: found["response"] == ResponseClass.TRANSIENT_2
+    ),
+}
+"""Outcomes that every probability map has.  The last three exclude each other and one of them happens."""
+
+
+def reached(found: Statistics) -> NDArray[np.bool_]:
+    """Whether runs came to an end that says their class."""
+    return np.isin(found["status"], _REACHED)

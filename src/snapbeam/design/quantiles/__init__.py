@@ -1,0 +1,1 @@
+"""Quantile thresholds: where the probability of snapping passes given values."""

@@ -1,0 +1,7 @@
+"""The ends of a beam: clamped, pinned, or anything between."""
+
+from __future__ import annotations
+
+from snapbeam.model.ends.ends import CLAMPED, Ends
+
+__all__ = ["CLAMPED", "Ends"]

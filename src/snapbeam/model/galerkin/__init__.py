@@ -1,0 +1,1 @@
+"""The reduced model: buckling modes, their frequencies and matrices."""

@@ -1,0 +1,95 @@
+"""``snapbeam probability`` and ``snapbeam design``: files and pictures from one parameter file, and refusals."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from snapbeam.cli.app import app
+
+SYSTEM = """
+[model]
+modes = 1
+[drive]
+frequency_ratio = 0.02
+[striker]
+location = 0.3
+[run]
+cycles = 1
+[spread]
+"drive.velocity_amplitude" = {normal = 0.02, relative = true}
+"""
+PROBABILITY = """
+[axes]
+"drive.velocity_amplitude" = [0.01, 0.0131, 0.016]
+[probability]
+half_width = 0.2
+first = 16
+"""
+DESIGN = """
+[design]
+goals = "drive.velocity_amplitude"
+variables = {"drive.velocity_amplitude" = [0.005, 0.03]}
+limits = [{of = "snap", at_least = 0.8}]
+effort = {generations = 6, population = 6, draws = 16, fresh = 60}
+"""
+
+
+def run(tmp_path, text: str, *arguments: str):
+    file = tmp_path / "question.toml"
+    file.write_text(text, encoding="utf-8")
+    return CliRunner().invoke(app, [arguments[0], str(file), *arguments[1:]])
+
+
+def test_probability(tmp_path) -> None:
+    target, picture = tmp_path / "p.nc", tmp_path / "p.png"
+    result = run(
+        tmp_path, SYSTEM + PROBABILITY, "probability", "-o", str(target), "--plot", str(picture), "--yes"
+    )
+    assert result.exit_code == 0, result.output
+    with xr.open_dataset(target, engine="h5netcdf") as dataset:
+        snap = dataset["probability"].sel(outcome="snap").values
+    assert snap[0] == 0.0 and 0.0 < snap[1] < 1.0 and snap[2] == 1.0
+    assert picture.stat().st_size > 5_000 and "runs at 3 points" in result.output
+
+
+def test_design(tmp_path) -> None:
+    target, picture, told = tmp_path / "d.nc", tmp_path / "d.png", tmp_path / "d.json"
+    result = run(
+        tmp_path,
+        SYSTEM + DESIGN,
+        "design",
+        "-o",
+        str(target),
+        "--plot",
+        str(picture),
+        "--json",
+        str(told),
+        "--yes",
+    )
+    assert result.exit_code == 0, result.output
+    with xr.open_dataset(target, engine="h5netcdf") as dataset:
+        assert 0.012 < float(dataset["velocity_amplitude"][0]) < 0.0145
+    assert "limits on fresh draws: " in result.output and picture.stat().st_size > 5_000
+    found = json.loads(told.read_text())
+    assert found["plan"]["runs"] > 0 and found["designs"]["kept_snap"]
+
+
+@pytest.mark.parametrize(
+    ("command", "text", "words"),
+    [
+        ("probability", PROBABILITY, "no [spread]"),
+        ("probability", SYSTEM + "[probability]\nhalf = 0.1\n", "half"),
+        ("probability", SYSTEM + "[probability]\nhalf_width = 0.9\n", "half_width"),
+        ("design", SYSTEM, "goals"),
+        ("design", SYSTEM + '[design]\ngoals = "speed"\n', "variables"),
+        ("design", SYSTEM + DESIGN.replace("at_least", "least"), "least"),
+        ("design", "not toml", "TOML"),
+    ],
+)
+def test_refusals(tmp_path, command: str, text: str, words: str) -> None:
+    result = run(tmp_path, text, command)
+    assert result.exit_code == 2 and words in result.output.replace("\n", " ")

@@ -1,0 +1,163 @@
+"""Designs: the search against random ones, limits on fresh draws, the quasi-static optimum, fronts, resumption."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small import small_system
+
+import snapbeam as sb
+from snapbeam.core.validate import InputError
+from snapbeam.design.optimum.evolution import front_of
+
+SPREAD = sb.Spread(of={"velocity_amplitude": sb.Normal(0.02, relative=True)})
+HOW = sb.Integration(cycles=1, threads=1)
+
+
+def noisy(x, draws: int = 64):
+    """A bowl to go down, and a chance of keeping a limit that is greater higher up: a trade-off as a beam has one.
+
+    The best design lies where the chance is just enough; draws are common to all designs.
+    """
+    rank = np.random.Generator(np.random.Philox(key=[7, 0])).random(draws)
+    chance = 1.0 / (1.0 + np.exp(-12.0 * (x[:, 0] + 0.5 * x[:, 1] - 0.6)))
+    share = (rank[None, :] < chance[:, None]).mean(axis=1)
+    goal = (
+        1.0 + x[:, 0] ** 2 + 2.0 * (x[:, 1] - 0.1 * np.sin(9.0 * x[:, 0])) ** 2 + 0.5 * (x[:, 2] - 0.3) ** 2
+    )
+    return goal[:, None], np.maximum(0.0, 0.95 - share)
+
+
+@pytest.mark.slow
+def test_better_than_as_many_random_designs() -> None:
+    """2,000 designs of each, in 20 of 20 seeds."""
+    bounds = [(-1.0, 1.5)] * 3
+    wins = 0
+    for seed in range(20):
+        search = sb.Evolution(bounds, 40, seed)
+        for _ in range(50):
+            goals, violation = noisy(search.ask())
+            search.tell(goals, violation)
+        assert search.violation[0] == 0.0
+        x = np.random.default_rng(1000 + seed).uniform(-1.0, 1.5, (2000, 3))
+        goals, violation = noisy(x)
+        wins += bool(search.goals[0, 0] < goals[violation == 0.0].min())
+    assert wins == 20
+
+
+def test_a_front_is_found() -> None:
+    """Two bowls: the front is the segment between their bottoms, and it is covered."""
+    search = sb.Evolution([(-1.0, 2.0)] * 2, 40, 3)
+    for _ in range(60):
+        x = search.ask()
+        goals = np.stack([np.sum(x**2, axis=1), np.sum((x - 1.0) ** 2, axis=1)], axis=1)
+        search.tell(goals, np.zeros(len(x)))
+    first = front_of(search.goals)
+    front, goals = np.sort(search.designs[first, 0]), search.goals[first]
+    # on the segment the distances from the two bottoms add up to that between them
+    around = np.sqrt(goals).sum(axis=1) / np.sqrt(2.0)
+    assert around.max() < 1.05 and np.median(around) < 1.005 and len(front) >= 30
+    assert front[0] < 0.05 and front[-1] > 0.95 and np.diff(front).max() < 0.15
+
+
+def test_asking_again_changes_nothing() -> None:
+    one, two = sb.Evolution([(0.0, 1.0)], 8), sb.Evolution([(0.0, 1.0)], 8)
+    for _ in range(4):
+        np.testing.assert_array_equal(one.ask(), one.ask())
+        np.testing.assert_array_equal(one.ask(), two.ask())
+        for each in (one, two):
+            x = each.ask()
+            each.tell((x - 0.3) ** 2, np.zeros(len(x)))
+    with pytest.raises(InputError):
+        one.tell(np.zeros((8, 1)), np.zeros(8))
+
+
+def test_the_quasi_static_optimum(tmp_path) -> None:
+    """One mode at Omega = 0.02: the least V that snaps with P = 0.9 under a spread of 2 % is V_QS1 (1 + 1.28 x 2 %).
+
+    It holds on fresh draws, its interval is said, and a second call computes nothing.
+    """
+    system = small_system(frequency_ratio=0.02, location=0.3)
+    effort = sb.Effort(generations=8, population=8, draws=40, fresh=200, candidates=4)
+    arguments = (
+        system, {"velocity_amplitude": (0.005, 0.03)}, "velocity_amplitude",
+        sb.Limit(of="snap", at_least=0.9), SPREAD, effort,
+    )  # fmt: skip
+    ds = sb.design(*arguments, integration=HOW, store=tmp_path / "store")
+    expected = float(sb.quasi_static_threshold(0.3, 0.02)) * 1.026
+    assert float(ds["velocity_amplitude"][0]) == pytest.approx(expected, rel=0.08)
+    assert int(ds["holds"][0]) in (1, 2)
+    assert float(ds["kept_snap_low"][0]) >= 0.85 and float(ds["kept_snap"][0]) > 0.9
+    tally = sb.Tally()
+    again = sb.design(*arguments, integration=HOW, store=sb.Keeping(tmp_path / "store", tally=tally))
+    assert tally.runs == 0 and again.equals(ds)
+    fresh = sb.design_problem(*arguments[:5], integration=HOW).estimate(
+        [float(ds["velocity_amplitude"][0])], np.arange(5 * 10**9, 5 * 10**9 + 200)
+    )
+    assert fresh.limits[0, 0] >= 0.87
+
+
+def test_an_optimiser_of_ones_own() -> None:
+    """Any that asks and is told: here SciPy's, with violations as a penalty."""
+    from scipy.optimize import minimize_scalar
+
+    system = small_system(frequency_ratio=0.02, location=0.3)
+    problem = sb.design_problem(
+        system, {"velocity_amplitude": (0.005, 0.03)}, "speed", sb.Limit(of="snap", at_least=0.9), SPREAD,
+        draws=16, integration=HOW,
+    )  # fmt: skip
+
+    def cost(v: float) -> float:
+        goals, violation, _ = problem.evaluate([[v]])
+        return float(violation[0]) + 1.0 if violation[0] > 0.0 else float(goals[0, 0])
+
+    found = minimize_scalar(cost, bounds=(0.005, 0.03), method="bounded", options={"maxiter": 10})
+    assert found.fun < 1.0
+
+
+def test_limits_of_the_design_itself_cost_no_run() -> None:
+    system = small_system()
+    problem = sb.design_problem(
+        system, {"velocity_amplitude": (0.05, 0.4)}, "peak_force", sb.Limit(of="stroke", at_most=1e-9), SPREAD
+    )
+    worth = problem.evaluate([[0.1], [0.3]])
+    assert (worth.violation > 1.0).all() and (worth.runs == 0).all() and problem.trials.runs == 0
+    scale = system.scale
+    stroke = sb.Goal(of="stroke").quantity.of(system, {"drive.velocity_amplitude": np.array([0.2])})
+    assert float(stroke[0]) == pytest.approx(0.2 * scale.length / 1.21)
+    with pytest.raises(InputError, match="no design"):
+        sb.design(system, {"velocity_amplitude": (0.05, 0.4)}, "speed", sb.Limit(of="stroke", at_most=1e-9), SPREAD,
+                  sb.Effort(generations=2, population=6))  # fmt: skip
+
+
+def test_intervals_of_goals_cover() -> None:
+    """Mean and quantile of normal numbers: 95 % intervals hold the truth in 93 to 97 % of 2000 trials."""
+    generator = np.random.default_rng(5)
+    for goal, truth in (
+        (sb.Goal(of="peak_force"), 0.0),
+        (sb.Goal(of="peak_force", quantile=0.9), 1.2815515655446004),
+    ):
+        rows = np.array([goal.estimate(generator.standard_normal(200), 0, 0.95) for _ in range(2000)])
+        assert 0.93 <= ((rows[:, 1] <= truth) & (truth <= rows[:, 2])).mean() <= 0.975
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: sb.Goal(of="peak_farce"), "no quantity"),
+        (lambda: sb.Goal(of="snap", quantile=0.5), "quantiles"),
+        (lambda: sb.Limit(of="peak_force"), "at_least or at_most"),
+        (lambda: sb.Limit(of="snap", at_most=0.5), "at_least"),
+        (lambda: sb.Effort(population=2), "population"),
+        (lambda: sb.design(small_system(), {}, "speed", [], SPREAD), "variables"),
+        (lambda: sb.design(small_system(), {"modes": (1, 2)}, "speed", [], SPREAD), "cannot be chosen"),
+        (lambda: sb.design(small_system(), {"location": (0.5, 0.2)}, "speed", [], SPREAD), "less than high"),
+        (
+            lambda: sb.design(small_system(), {"location": (0.2, 0.5)}, "speed", [], sb.Spread()),
+            "nothing differs",
+        ),
+    ],
+)
+def test_refusals(make, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        make()

@@ -1,0 +1,126 @@
+"""What is known of a beam after it was measured: the linear answer, coverage, prior, what follows from it, classes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small import small_system
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.core.validate import InputError
+from snapbeam.design.posterior.posterior import _population
+from snapbeam.figures import Dots
+from snapbeam.lab.calibration.calibrate import calibrate
+from snapbeam.lab.calibration.measurements import ContactTest, Measurements
+
+PRIOR = {"thickness": 0.1, "buckling_level": 0.1}
+
+
+def measured_of(beam, modes: int = 2, error: float = 0.003, draw=None) -> Measurements:
+    """Frequencies of a beam, straight and about its well, with errors of their own if *draw* is given."""
+    straight = sb.ReducedModel.from_beam(beam.replace(axial_load=0.0), modes).natural_freq
+    well = sb.ReducedModel.from_beam(beam, modes).natural_freq
+    noise = [np.zeros(modes), np.zeros(modes)] if draw is None else draw.standard_normal((2, modes))
+    values = [f * (1.0 + error * z) for f, z in zip((straight, well), noise, strict=True)]
+    return Measurements(
+        straight_freq=values[0].tolist(), straight_freq_se=(error * straight).tolist(),
+        lower_well_freq=values[1].tolist(), lower_well_freq_se=(error * well).tolist(),
+        damping_ratio=[0.005, 0.0052, 0.0048],
+        contact=[ContactTest(closing_speed=0.1, duration=5e-4, peak_force=4.0)],
+    )  # fmt: skip
+
+
+def test_it_is_that_of_the_linear_fit() -> None:
+    """Small errors: medians and widths agree with those of least squares."""
+    measured = measured_of(paper.BEAM)
+    found = sb.posterior(measured, paper.BEAM, PRIOR, modes=2, draws=400)
+    fit = calibrate(measured, paper.BEAM, modes=2)
+    assert found.effective > 200.0 and not found.is_doubtful
+    for name in PRIOR:
+        middle, low, high = found.interval()[f"beam.{name}"]
+        assert middle == pytest.approx(getattr(paper.BEAM, name), rel=2e-3)
+        assert low < getattr(paper.BEAM, name) < high
+        assert high - low == pytest.approx(3.92 * fit.standard_errors[name], rel=0.25)
+    damping = found.interval()["model.damping_ratio"]
+    assert damping[1] < 0.005 < damping[2]
+
+
+def test_what_the_data_do_not_say_stays_as_it_was() -> None:
+    """Density and modulus come in as a ratio: their product is as uncertain as before."""
+    prior = {"young_modulus": 0.05, "density": 0.05}
+    found = sb.posterior(measured_of(paper.BEAM), paper.BEAM, prior, modes=2, draws=500).resampled(500)
+    ratio = np.log(found.values[:, 0] / found.values[:, 1])
+    product = np.log(found.values[:, 0] * found.values[:, 1])
+    assert ratio.std() < 0.01 and product.std() == pytest.approx(0.05 * np.sqrt(2.0), rel=0.2)
+
+
+@pytest.mark.slow
+def test_intervals_cover() -> None:
+    """400 beams from the prior, measured with errors of 2 %: 93 to 97 % of the intervals hold the beam.
+
+    Frequencies as those of one mode go: with the thickness h where it is straight, with the buckling level b about a
+    well, and a third one with both.
+    """
+    draw, covered = np.random.default_rng(11), []
+    known = np.array(list(PRIOR.values()))
+
+    def frequencies(logs):
+        h, b = np.exp(logs)
+        return np.array([30.0 * h, 80.0 * b, 150.0 * np.sqrt(h**2 + 0.5 * b**2)])
+
+    for trial in range(400):
+        truth = known * draw.standard_normal(2)
+        seen = frequencies(truth) * (1.0 + 0.02 * draw.standard_normal(3))
+
+        def terms(logs, seen=seen, error=0.02 * frequencies(truth)):  # noqa: B008
+            return np.concatenate([(frequencies(logs) - seen) / error, logs / known])
+
+        logs, weights = _population(terms, np.zeros(2), 400, trial)
+        limits = sb.Posterior(("beam.thickness", "beam.buckling_level"), logs, weights).interval()
+        covered.append(
+            [low <= value <= high for (_, low, high), value in zip(limits.values(), truth, strict=True)]
+        )
+    print("covered", np.mean(covered, axis=0))
+    assert 0.93 <= np.mean(covered) <= 0.97
+
+
+def test_what_follows_is_drawn_from_it() -> None:
+    found = sb.posterior(measured_of(paper.BEAM, error=0.02), paper.BEAM, PRIOR, modes=2, draws=400)
+    spread = found.spread(of={"velocity_amplitude": sb.Normal(0.02, relative=True)})
+    scores = spread.normals(np.arange(2000))
+    for j, name in enumerate(found.parameters):
+        values = spread.of[name].at(np.zeros(2000), scores[:, j])
+        middle, low, _ = found.interval()[name]
+        assert np.median(values) == pytest.approx(middle, rel=0.01)
+        assert (values < low).mean() == pytest.approx(0.025, abs=0.015)
+    held = sb.Integration(cycles=2, threads=1)
+    axes = {"velocity_amplitude": [0.02, 0.5]}
+    ds = sb.probability_map(small_system(2), axes, spread, 12, integration=held)
+    assert (ds["runs"] == 12).all() and float(ds["probability"].sel(outcome="snap")[1]) == 1.0
+
+
+def test_classes_weigh_samples() -> None:
+    """A dot that snapped speaks for the beam that snaps there."""
+    values = np.array([[0.8], [1.25]]) * paper.BEAM.buckling_level
+    found = sb.Posterior(("beam.buckling_level",), values, np.array([0.5, 0.5]))
+    system = small_system(frequency_ratio=0.02, location=0.4)
+    limit = float(sb.quasi_static_threshold(0.4, 0.02))
+    one = Dots(np.array([0.02]), np.array([1.02 * limit]), np.array([0.4]), np.array([2], dtype=np.int8))
+    spread = sb.Spread(of={"velocity_amplitude": sb.Normal(0.01, relative=True)}, held="ratios")
+    likelihood = sb.class_likelihood(found, system, one, spread, runs=8, integration=sb.Integration(cycles=1))
+    assert likelihood.shape == (2,) and (likelihood < 0.0).all()
+    np.testing.assert_allclose(found.updated([0.0, np.log(3.0)]).weights, [0.25, 0.75])
+    assert found.updated([0.0, 0.0]).is_doubtful
+    with pytest.raises(InputError, match="worth"):
+        found.interval()
+
+
+def test_refusals() -> None:
+    measured = measured_of(paper.BEAM)
+    with pytest.raises(InputError, match="must be one of"):
+        sb.posterior(measured, paper.BEAM, {"width": 0.1})
+    with pytest.raises(InputError, match="prior"):
+        sb.posterior(measured, paper.BEAM, {})
+    with pytest.raises(InputError, match="straight_freq_se"):
+        sb.posterior(Measurements(straight_freq=[30.0]), paper.BEAM, PRIOR)

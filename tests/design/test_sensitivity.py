@@ -1,0 +1,99 @@
+"""Sensitivity: Ishigami's indices within their intervals, coverage, and which parameter of a beam matters."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small import small_system
+
+import snapbeam as sb
+from snapbeam.core.validate import InputError
+
+A, B = 7.0, 0.1
+VARIANCE = A**2 / 8.0 + B * np.pi**4 / 5.0 + B**2 * np.pi**8 / 18.0 + 0.5
+FIRST = np.array([0.5 * (1.0 + B * np.pi**4 / 5.0) ** 2, A**2 / 8.0, 0.0]) / VARIANCE
+SHARED = 8.0 * B**2 * np.pi**8 / 225.0 / VARIANCE
+TOTAL = FIRST + np.array([SHARED, 0.0, SHARED])
+
+
+def ishigami(ranks):
+    x = np.pi * (2.0 * ranks - 1.0)
+    return np.sin(x[0]) + A * np.sin(x[1]) ** 2 + B * x[2] ** 4 * np.sin(x[0])
+
+
+def test_ishigami() -> None:
+    """0.314, 0.442 and 0, within the intervals of both estimates; at 99 %, since there are nine of them."""
+    np.testing.assert_allclose(FIRST, [0.314, 0.442, 0.0], atol=5e-4)
+    found = sb.sobol(ishigami, 3, 128, confidence=0.99)
+    for indices, truth in ((found.first, FIRST), (found.total, TOTAL)):
+        assert (indices.low <= truth).all() and (truth <= indices.high).all()
+        assert (indices.high - indices.low < 0.2).all()
+    ranks = np.random.default_rng(4).random((4000, 3))
+    given = sb.given_data_indices(ranks, ishigami(ranks.T), confidence=0.99)
+    assert (given.low <= FIRST).all() and (FIRST <= given.high).all()
+    assert (given.high - given.low < 0.2).all()
+
+
+@pytest.mark.slow
+def test_intervals_cover() -> None:
+    """93 to 97 % of 400 trials, over the indices."""
+    covered = []
+    for seed in range(400):
+        found = sb.sobol(ishigami, 3, 16, seed=seed)
+        covered += [
+            ((each.low <= truth) & (truth <= each.high))
+            for each, truth in ((found.first, FIRST), (found.total, TOTAL))
+        ]
+    shares = np.array(covered).reshape(400, 2, 3).mean(axis=0)
+    print("sobol", shares)
+    assert (shares > 0.92).all() and 0.93 <= np.mean(covered) <= 0.97
+    covered = []
+    for seed in range(400):
+        ranks = np.random.default_rng(seed).random((2000, 3))
+        given = sb.given_data_indices(ranks, ishigami(ranks.T), seed=seed)
+        covered.append((given.low <= FIRST) & (FIRST <= given.high))
+    print("given data", np.mean(covered, axis=0))
+    assert (np.mean(covered, axis=0) > 0.92).all() and 0.93 <= np.mean(covered) <= 0.97
+
+
+def test_correlated_inputs_are_no_trouble_for_given_data() -> None:
+    """y = x1 with x2 correlated by 0.8: the first has all of the variance, the second 0.64 of it."""
+    generator = np.random.default_rng(3)
+    x = generator.multivariate_normal([0.0, 0.0], [[1.0, 0.8], [0.8, 1.0]], 6000)
+    found = sb.given_data_indices(x, x[:, 0])
+    np.testing.assert_allclose(found.estimate, [1.0, 0.64], atol=0.05)
+
+
+def test_the_quasi_static_threshold_moves_with_the_location() -> None:
+    """At Omega = 0.02 V_QS1 = Omega sin^2(pi x_s): the derivative is known, and damping has no part in it."""
+    system = small_system(frequency_ratio=0.02, location=0.3)
+    of = {"location": sb.Normal(0.005), "model.damping_ratio": sb.LogNormal(0.1)}
+    answer = sb.ThresholdOf(between=(0.005, 0.02), values=9, halvings=6)
+    ds = sb.sensitivity(
+        system, answer, sb.Spread(of=of), size=2, integration=sb.Integration(cycles=1, threads=1)
+    )
+    slope = 0.02 * np.pi * np.sin(2.0 * np.pi * 0.3)
+    assert float(ds["derivative"][0]) == pytest.approx(slope, rel=0.1)
+    assert abs(float(ds["effect"][1])) < 0.15 * abs(float(ds["effect"][0]))
+    assert ds["unit"].values.tolist() == ["1", "1"] and ds["step"][0] == pytest.approx(0.005)
+
+
+def test_refusals() -> None:
+    system, spread = (
+        small_system(),
+        sb.Spread(of={"location": sb.Normal(0.001), "contact.stiffness": sb.LogNormal(0.1)}),
+    )
+    with pytest.raises(InputError, match="no parameter"):
+        sb.sensitivity(system, "peak_force", sb.Spread(displacement=1e-6))
+    with pytest.raises(InputError, match="statistic"):
+        sb.sensitivity(system, "peak", spread)
+    tied = sb.Spread(of=spread.of, correlation=[[1.0, 0.5], [0.5, 1.0]])
+    with pytest.raises(InputError, match="given_data"):
+        sb.sensitivity(system, "peak_force", tied, "sobol")
+    far = sb.ThresholdOf(between=(1e-4, 2e-4), values=2, halvings=0)
+    with pytest.raises(InputError, match="is not there"):
+        sb.sensitivity(system, far, spread, size=2, integration=sb.Integration(cycles=1))
+    with pytest.raises(InputError, match="at least 200"):
+        sb.given_data_indices(np.zeros((10, 2)), np.zeros(10))
+    with pytest.raises(InputError, match="power of 2"):
+        sb.sobol(ishigami, 3, 100)

@@ -1,0 +1,111 @@
+"""Files that were damaged, or made to do damage: refused by name, at once, and nothing of them is run."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.cli import app
+from snapbeam.core.netcdf import read_netcdf
+from snapbeam.lab.signals.formats.header import header_values
+from snapbeam.lab.signals.formats.tables import split_unit
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("written")
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
+    system = sb.System(model, paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1))
+    sb.simulate(system, sb.Integration(cycles=2)).save(folder / "run.nc")
+    sb.response_map(
+        model, paper.CONTACT, frequency_ratio=[1.0, 1.5], velocity_amplitude=[0.1, 0.2], cycles=5
+    ).to_netcdf(folder / "map.nc", engine="h5netcdf")
+    return folder
+
+
+def test_a_damaged_netcdf_file_is_refused_or_read(written, tmp_path):
+    """Forty bytes in other places each time: never an error of another kind."""
+    rng, refused = np.random.default_rng(1), 0
+    whole = (written / "run.nc").read_bytes()
+    for number in range(40):
+        spoiled = bytearray(whole)
+        for at in rng.integers(0, len(spoiled), 40):
+            spoiled[at] ^= 255
+        path = tmp_path / f"{number}.nc"
+        path.write_bytes(spoiled)
+        try:
+            sb.load_run(path)
+        except sb.InputError as error:
+            assert str(path) in str(error)
+            refused += 1
+    assert refused > 20
+
+
+@pytest.mark.parametrize("command", [["info"], ["plot", "-o", "out.png"]])
+def test_commands_say_it_in_a_line(written, tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    whole = (written / "map.nc").read_bytes()
+    (tmp_path / "half.nc").write_bytes(whole[: len(whole) // 2])
+    said = CliRunner().invoke(app, [command[0], "half.nc", *command[1:]])
+    assert said.exit_code == 2
+    assert isinstance(said.exception, SystemExit)
+    assert "half.nc" in said.output and "damaged" in said.output
+    assert not (tmp_path / "out.png").exists()
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"a": ' * 50_000, "nothing", "[1]"])
+def test_a_description_that_is_none(written, tmp_path, text):
+    with xr.open_dataset(written / "map.nc", engine="h5netcdf") as ds:
+        ds.load().assign_attrs(system=text).to_netcdf(tmp_path / "m.nc", engine="h5netcdf")
+    said = CliRunner().invoke(app, ["map", "--from", str(tmp_path / "m.nc")])
+    assert said.exit_code == 2 and isinstance(said.exception, SystemExit)
+    assert "its description is damaged" in " ".join(said.output.split())
+
+
+def test_long_headers_are_no_trap():
+    """The patterns that take a header apart need a time that goes with the square of its length."""
+    start = time.perf_counter()
+    assert split_unit("[" * 60_000) == ("[" * 60_000, None)
+    assert header_values(["a" * 60_000 + ":", " " * 60_000, "rate: 5"]) == {"rate": "5"}
+    assert time.perf_counter() - start < 1.0
+
+
+def test_files_that_point_elsewhere_are_refused(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    secret = tmp_path / "secret"
+    secret.write_bytes(bytes(4 * 64 * 64))
+    with h5py.File(tmp_path / "stack.h5", "w") as file:
+        file.create_dataset("frames", (4, 64, 64), "u1", external=[(str(secret), 0, 4 * 64 * 64)])
+    with pytest.raises(sb.InputError, match="in another file"):
+        from snapbeam.lab.camera.recording import open_recording
+
+        open_recording(tmp_path / "stack.h5", frame_rate=1e4, pixel_size=1e-5)
+
+
+def test_an_interrupt_while_it_loads_is_no_traceback():
+    code = (
+        "import builtins, sys\n"
+        "from snapbeam.__main__ import main\n"
+        "real = builtins.__import__\n"
+        "def stop(name, *rest):\n"
+        "    if name == 'snapbeam.cli':\n"
+        "        raise KeyboardInterrupt\n"
+        "    return real(name, *rest)\n"
+        "builtins.__import__ = stop\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 130 and "Traceback" not in done.stderr
+
+
+def test_no_such_file(tmp_path):
+    with pytest.raises(sb.InputError, match=r"drive = .*no such file"):
+        read_netcdf(tmp_path / "none.nc", "drive")

@@ -1,0 +1,61 @@
+"""Runs that miss their energy ledger say so."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.core.findings import PlausibilityWarning
+from snapbeam.engines.answer import statistics_of
+from snapbeam.engines.assemble import make_ensemble
+from snapbeam.engines.cpu.driver import run_ensemble
+
+VIOLENT = sb.System(
+    sb.ReducedModel.from_beam(paper.BEAM, 1),
+    contact=paper.CONTACT,
+    striker=sb.Shaker(frequency_ratio=6.8, velocity_amplitude=30.0),
+)
+
+
+def test_a_run_with_steps_too_long_for_it_says_so() -> None:
+    with pytest.warns(PlausibilityWarning, match="misses its energy ledger by"):
+        rough = sb.simulate(VIOLENT, sb.Integration(cycles=20))
+    assert abs(rough.dataset.attrs["energy_error"]) > 1e-3
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fine = sb.simulate(VIOLENT, sb.Integration(cycles=20, accuracy="reference"))
+    assert abs(fine.dataset.attrs["energy_error"]) < 1e-7
+
+
+def test_the_error_is_that_of_the_ledger_in_the_dataset() -> None:
+    system = VIOLENT.replace(**{"drive.frequency_ratio": 1.4, "drive.velocity_amplitude": 0.3})
+    data = sb.simulate(system, sb.Integration(cycles=20)).dataset
+    stored = data.energy_beam + data.energy_contact + data.energy_dissipated - data.work_shaker
+    missed = -float(stored[-1] - stored[0]) / data.attrs["gross_work"]
+    assert data.attrs["energy_error"] == pytest.approx(missed, rel=1e-3, abs=1e-12)
+
+
+def test_energy_out_of_nothing_is_no_result() -> None:
+    """Also where no ledger is kept: a map's class is unknown where more energy is found than was put in."""
+    ensemble = make_ensemble(VIOLENT, sb.Integration(cycles=2))
+    books = run_ensemble(ensemble, 1)
+    believed = statistics_of(ensemble, books)
+    assert believed["status"][0] == sb.RunStatus.OK
+    books["energy"] = books["first_energy"] + books["work"] + 0.02 * books["gross_work"]
+    found = statistics_of(ensemble, books)
+    assert found["status"][0] == sb.RunStatus.UNBALANCED
+    assert found["response"][0] == sb.ResponseClass.UNKNOWN
+    assert np.isnan(found["peak_displacement"][0])
+    assert "more energy than the striker put in" in sb.RunStatus.UNBALANCED.advice
+
+
+def test_free_vibration_is_balanced() -> None:
+    model = sb.ReducedModel.from_beam(paper.BEAM, 4)
+    start = (0.9 * np.asarray(model.equilibrium), np.zeros(4))
+    run = sb.simulate(model, cycles=3, initial_state=start)
+    assert run.outcome.status == sb.RunStatus.OK
+    assert abs(run.dataset.attrs["energy_error"]) < 1e-4
