@@ -17,7 +17,7 @@ from snapbeam.engines.cpu.rows import (
     tension_rows,
     tension_rows_twice,
 )
-from snapbeam.engines.scalar.compile import compiled, inlined
+from snapbeam.engines.scalar.compile import called, compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS
 from snapbeam.engines.scalar.contact import contact_force, is_lossy
 from snapbeam.engines.scalar.decisions import Seen
@@ -62,7 +62,7 @@ class Done(NamedTuple):
     dissipated: float
 
 
-@compiled
+@called
 def prepare(memory, layout, stages, drive, length, at):
     """What a step of *length* needs, from *at* on: its distinct flows and the drive's turn at each kick."""
     size = layout.size
@@ -153,7 +153,7 @@ def _kick(memory, layout, stages, step, stage, weight, along_g, along_r, force, 
     return before - modal_energy(memory, layout, q1, p1)
 
 
-@compiled
+@called
 def take_step(memory, blocks, layout, stages, tip, step, ledger):
     """Advance (q, p) with tension acceleration k by a step into (q1, p1, k1).
 

@@ -23,7 +23,7 @@ from snapbeam.engines.scalar.fingerprint import fingerprint
 from snapbeam.engines.scalar.kept_code import keep_code
 from snapbeam.engines.scalar.parts import pipeline
 
-__all__ = ["INLINE", "INLINE_HERE", "compiled", "inlined", "kernel", "overloaded", "ready"]
+__all__ = ["INLINE", "INLINE_HERE", "called", "compiled", "inlined", "kernel", "overloaded", "ready"]
 
 _LOG = logging.getLogger("snapbeam")
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
@@ -67,6 +67,14 @@ def compiled(function: Callable[..., Any], **options: Any) -> Any:
     if type(part) is CPUDispatcher:  # under NUMBA_DISABLE_JIT it is the function itself
         part.__class__ = _Part
     return part
+
+
+def called(function: Callable[..., Any]) -> Any:
+    """As :func:`compiled`, for what is long and rarely needed: never forced into its callers.
+
+    What is merely compiled is written into a caller that is inlined itself, since Numba's options pass on from there.
+    """
+    return compiled(function, forceinline=False)
 
 
 def inlined(function: Callable[..., Any]) -> Any:

@@ -30,7 +30,8 @@ _KNOWN = {
     "__name__": __name__, "both": both, "bulge": bulge, "contact_force": contact_force, "fma": fma, "less": less,
     "load": load, "move": move, "mode_energy": mode_energy, "pick": pick, "shaker_motion": shaker_motion,
     "sincos": sincos, "splat": splat, "spread_at": spread_at, "store": store,
-    "tension_acceleration": tension_acceleration, "tension_factors": tension_factors, "turned": turned, "vabs": vabs, "vmax": vmax,
+    "tension_acceleration": tension_acceleration, "tension_factors": tension_factors, "turned": turned, "vabs": vabs,
+    "vmax": vmax,
 }  # fmt: skip
 
 
