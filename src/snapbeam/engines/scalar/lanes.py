@@ -260,7 +260,7 @@ def _arithmetic(python_operator: Any, llvm_name: str) -> None:
     pairs = ((LANES, LANES), (LANES, types.float64), (types.float64, LANES))
 
     @infer_global(python_operator)
-    class _Operation(ConcreteTemplate):  # type: ignore[misc]
+    class _Operation(ConcreteTemplate):
         cases = [signature(LANES, *pair) for pair in pairs]  # noqa: RUF012
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:

@@ -38,6 +38,8 @@ def pipeline() -> dict[str, Any]:
     class Part(JITCodeLibrary):
         """Code that waits to be linked into the code that calls it."""
 
+        _shared_module: Any = None
+
         @property
         def codegen(self) -> Any:
             return _Nobody()
