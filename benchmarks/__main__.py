@@ -12,6 +12,7 @@ _PARTS = {
     "work-precision": "work_precision",
     "rivals": "rivals",
     "ensemble": "ensemble",
+    "layouts": "layouts",
     "scaling": "scaling",
     "requests": "requests",
     "levels": "levels",

@@ -9,7 +9,7 @@ import numpy as np
 
 from snapbeam.figures.style import house_style, new_figure, save_figure
 
-__all__ = ["requests_chart", "scaling_chart", "work_precision_chart"]
+__all__ = ["layouts_chart", "requests_chart", "scaling_chart", "work_precision_chart"]
 
 # library: colour; method: marker and line
 _COLORS = {
@@ -128,4 +128,21 @@ def scaling_chart(data: dict[str, Any], path: Path) -> None:
         for ax in (middle, right):
             ax.set_xticks(count, [str(n) for n in count])
             ax.xaxis.minorticks_off()
+        save_figure(figure, path)
+
+
+def layouts_chart(path: Path, records: list[dict[str, Any]]) -> None:
+    """Time of a step of one run against the number of modes, in both layouts of the CPU engine."""
+    modes = [record["modes"] for record in records]
+    with house_style():
+        figure = new_figure("single", 62.0)
+        ax = figure.subplots()
+        for name, words, marker, color in (
+            ("modes_wide", "eight modes of a run in a register", "o", _COLORS["snapbeam"]),
+            ("runs_wide", "eight runs in a register", "s", _COLORS["heyoka"]),
+        ):
+            ax.plot(modes, [record[name] for record in records], marker=marker, color=color, label=words)
+        ax.set(xlabel="Number of modes $N$", ylabel="Time per step and run (ns)", ylim=(0.0, None))
+        ax.set_xticks(modes)
+        ax.legend(loc="upper left")
         save_figure(figure, path)

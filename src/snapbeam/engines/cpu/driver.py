@@ -38,7 +38,7 @@ _CHUNK_STEPS = 3_000_000
 _CHUNKS = 4
 """Tasks per thread at least, of _FEW runs each at least, so that the threads end together."""
 _FEW = 4
-FEW_MODES = 8
+FEW_MODES = 12
 """Modes up to which eight runs in a register are faster than eight modes of one: measured, see benchmarks/README.md."""
 FEWEST_STEPS = 5e6
 """Flight steps asked for, of one kind of ensembles, from which on what they save pays for another kernel."""

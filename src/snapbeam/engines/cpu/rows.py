@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from snapbeam.engines.cpu.uneven import pushed
 from snapbeam.engines.cpu.world.forced import shaken
-from snapbeam.engines.scalar.compile import compiled, inlined
+from snapbeam.engines.scalar.compile import called, inlined
 from snapbeam.engines.scalar.lanes import (
     WIDTH,
     fma,
@@ -342,7 +342,7 @@ def glide(memory, layout, flow, pieces, piece, q, p, k0, k1, center, parts):
                 store(parts, at + 3 * WIDTH, fma(e_row, p_row, load(parts, at + 3 * WIDTH)))
 
 
-@compiled
+@called
 def flow_coefficients(memory, layout, length, at):
     """Rows a11 - 1, a12, a21, a22 - 1 of the exact flow over *length* seconds, written from *at* on."""
     size = layout.size

@@ -17,7 +17,7 @@ from snapbeam.engines.cpu.step import observe, prepare
 from snapbeam.engines.cpu.uneven import about_level, above_own_well, lifted, put
 from snapbeam.engines.cpu.world.circuit import calm, put_rate
 from snapbeam.engines.cpu.world.forced import changed_load, enter_forces
-from snapbeam.engines.scalar.compile import compiled, inlined
+from snapbeam.engines.scalar.compile import called, compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS, Stages
 from snapbeam.engines.scalar.contact import contact_energy, is_impulsive
 from snapbeam.engines.scalar.decisions import (
@@ -203,7 +203,7 @@ def run_of(memory, layout, stages, asked, i):
     return run
 
 
-@inlined
+@called
 def land(memory, blocks, layout, run, t, home, rows, touching, landed, sample):
     """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from a landing."""
     q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size

@@ -20,7 +20,7 @@ from snapbeam.engines.cpu.rows import (
 from snapbeam.engines.cpu.world.around import around_kick
 from snapbeam.engines.cpu.world.circuit import Tap, kick_source, no_tap
 from snapbeam.engines.cpu.world.forced import Given, changed_load, enter_forces, no_given
-from snapbeam.engines.scalar.compile import compiled, inlined
+from snapbeam.engines.scalar.compile import called, compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS
 from snapbeam.engines.scalar.contact import contact_force, is_lossy
 from snapbeam.engines.scalar.decisions import Seen
@@ -69,7 +69,7 @@ class Done(NamedTuple):
     """What a circuit did."""
 
 
-@compiled
+@called
 def prepare(memory, layout, stages, drive, length, at):
     """What a step of *length* needs, from *at* on: its distinct flows and the drive's turn at each kick."""
     size = layout.size
@@ -167,7 +167,7 @@ def _forces(memory, layout, stages, tip, step, stage):
     enter_forces(layout.forced, memory, tip.drive, now)
 
 
-@compiled
+@called
 def take_step(memory, blocks, layout, stages, tip, step, ledger):
     """Advance (q, p) with tension acceleration k by a step into (q1, p1, k1).
 

@@ -8,6 +8,7 @@ check sum (:mod:`~snapbeam.engines.scalar.kept_code`).
 
 from __future__ import annotations
 
+import gc
 import logging
 from collections.abc import Callable
 from functools import cache
@@ -16,12 +17,13 @@ from typing import Any
 from numba import njit, typeof
 from numba.core import event
 from numba.core.registry import CPUDispatcher
+from numba.extending import overload
 
 from snapbeam.engines.scalar.fingerprint import fingerprint
 from snapbeam.engines.scalar.kept_code import keep_code
 from snapbeam.engines.scalar.parts import pipeline
 
-__all__ = ["INLINE", "INLINE_HERE", "compiled", "inlined", "kernel", "ready"]
+__all__ = ["INLINE", "INLINE_HERE", "called", "compiled", "inlined", "kernel", "overloaded", "ready"]
 
 _LOG = logging.getLogger("snapbeam")
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": False}
@@ -30,6 +32,17 @@ INLINE: dict[str, Any] = {"error_model": "numpy", "forceinline": True}
 """Options of an overload that is to be written into its callers, on every engine."""
 INLINE_HERE: dict[str, Any] = {**INLINE, **_PART}
 """The same, for what only the processor's engine calls."""
+
+
+def overloaded(function: Any) -> Callable[[Any], Any]:
+    """As :func:`numba.extending.overload`, inlined on every engine, and on the processor as a part of its kernel."""
+
+    def register(implementation: Any) -> Any:
+        overload(function, jit_options=INLINE)(implementation)
+        overload(function, jit_options=INLINE_HERE, target="cpu")(implementation)
+        return implementation
+
+    return register
 
 
 class _Part(CPUDispatcher):
@@ -54,6 +67,14 @@ def compiled(function: Callable[..., Any], **options: Any) -> Any:
     if type(part) is CPUDispatcher:  # under NUMBA_DISABLE_JIT it is the function itself
         part.__class__ = _Part
     return part
+
+
+def called(function: Callable[..., Any]) -> Any:
+    """As :func:`compiled`, for what is long and rarely needed: never forced into its callers.
+
+    What is merely compiled is written into a caller that is inlined itself, since Numba's options pass on from there.
+    """
+    return compiled(function, forceinline=False)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
@@ -87,5 +108,11 @@ class _Telling(event.Listener):
 
 def ready(march: Any, *arguments: Any) -> None:
     """Compile a kernel for such arguments, or fetch it from the disk, before anything is timed; says so in the log."""
-    with event.install_listener("numba:compile", _Telling(march.py_func.__name__)):
-        march.compile(tuple(typeof(value) for value in arguments))
+    collecting = gc.isenabled()
+    gc.disable()  # a compiler's garbage has no cycles worth a tenth of the time
+    try:
+        with event.install_listener("numba:compile", _Telling(march.py_func.__name__)):
+            march.compile(tuple(typeof(value) for value in arguments))
+    finally:
+        if collecting:
+            gc.enable()

@@ -9,9 +9,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from numba.extending import overload
-
-from snapbeam.engines.scalar.compile import INLINE, inlined
+from snapbeam.engines.scalar.compile import inlined, overloaded
 from snapbeam.engines.scalar.lanes import Lanes, select_less
 from snapbeam.engines.scalar.losses import Loss, lossy_kick
 from snapbeam.engines.scalar.signals import cubic
@@ -65,7 +63,7 @@ def _when_touching(kind: type, name: str) -> Any:
     return implementation
 
 
-@overload(contact_force, jit_options=INLINE)
+@overloaded(contact_force)
 def _contact_force(law, penetration):
     if isinstance(penetration, Lanes):
         force = scalar_function(law.instance_class.owner, "force")
@@ -73,12 +71,12 @@ def _contact_force(law, penetration):
     return _when_touching(law.instance_class.owner, "force")
 
 
-@overload(contact_energy, jit_options=INLINE)
+@overloaded(contact_energy)
 def _contact_energy(law, penetration):
     return _when_touching(law.instance_class.owner, "energy")
 
 
-@overload(contact_slope, jit_options=INLINE)
+@overloaded(contact_slope)
 def _contact_slope(law, penetration):
     return _when_touching(law.instance_class.owner, "slope")
 
@@ -93,7 +91,7 @@ def peak_force(law: Any, deepest: float) -> float:
     return deepest if owner.impulsive or owner.lossy else contact_force(law, deepest)
 
 
-@overload(peak_force, jit_options=INLINE)
+@overloaded(peak_force)
 def _peak_force(law, deepest):
     owner = law.instance_class.owner
     if owner.impulsive or owner.lossy:
@@ -106,7 +104,7 @@ def is_impulsive(law: Any) -> bool:
     return bool(type(law).owner.impulsive)
 
 
-@overload(is_impulsive, jit_options=INLINE)
+@overloaded(is_impulsive)
 def _is_impulsive(law):
     impulsive = bool(law.instance_class.owner.impulsive)
     return lambda law: impulsive
@@ -117,7 +115,7 @@ def is_lossy(law: Any) -> bool:
     return bool(type(law).owner.lossy)
 
 
-@overload(is_lossy, jit_options=INLINE)
+@overloaded(is_lossy)
 def _is_lossy(law):
     lossy = bool(law.instance_class.owner.lossy)
     return lambda law: lossy
@@ -129,7 +127,7 @@ def jumps(law: Any) -> bool:
     return bool(owner.lossy and not owner.keeps.smooth)
 
 
-@overload(jumps, jit_options=INLINE)
+@overloaded(jumps)
 def _jumps(law):
     owner = law.instance_class.owner
     found = bool(owner.lossy and not owner.keeps.smooth)
@@ -144,7 +142,7 @@ def felt_force(law: Any, penetration: float, rate: float) -> float:
     return max(0.0, float(owner.force(law, penetration) + owner.damping(law, penetration) * rate))
 
 
-@overload(felt_force, jit_options=INLINE)
+@overloaded(felt_force)
 def _felt_force(law, penetration, rate):
     owner = law.instance_class.owner
     if not owner.lossy:
@@ -167,7 +165,7 @@ def kick_force(law: Any, penetration: float, rate: float, mobility: float, push:
     raise TypeError("kick_force runs in compiled code only")
 
 
-@overload(kick_force, jit_options=INLINE)
+@overloaded(kick_force)
 def _kick_force(law, penetration, rate, mobility, push, weight):
     owner = law.instance_class.owner
     force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping")
@@ -188,7 +186,7 @@ def mark_of(law: Any, penetration: float, rate: float) -> float:
     return max(penetration, 0.0) if not type(law).owner.lossy else felt_force(law, penetration, rate)
 
 
-@overload(mark_of, jit_options=INLINE)
+@overloaded(mark_of)
 def _mark_of(law, penetration, rate):
     if law.instance_class.owner.lossy:
         return lambda law, penetration, rate: felt_force(law, penetration, rate)
@@ -203,7 +201,7 @@ def slack_at(law: Any, d0: float, v0: float, d1: float, v1: float, length: float
     raise TypeError("slack_at runs in compiled code only")
 
 
-@overload(slack_at, jit_options=INLINE)
+@overloaded(slack_at)
 def _slack_at(law, d0, v0, d1, v1, length):
     owner = law.instance_class.owner
     if not owner.lossy:
@@ -240,7 +238,7 @@ def released_at(law: Any, penetration: float, rate: float) -> float:
     raise TypeError("released_at runs in compiled code only")
 
 
-@overload(released_at, jit_options=INLINE)
+@overloaded(released_at)
 def _released_at(law, penetration, rate):
     owner = law.instance_class.owner
     if not owner.lossy:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections import namedtuple
 from typing import Any
 
-from numba.extending import overload
-
 from snapbeam.engines.outcomes import Passed, Statistic, updated
-from snapbeam.engines.scalar.compile import INLINE, inlined
+from snapbeam.engines.scalar.compile import inlined, overloaded
 from snapbeam.model.numbers import own_name
 
 __all__ = ["Extras", "extras_of_table", "observe"]
@@ -76,7 +74,7 @@ def _chain(rows: tuple[Statistic, ...]) -> Any:
     return one_and_rest
 
 
-@overload(observe, jit_options=INLINE)
+@overloaded(observe)
 def _observe(extras, book, time, length, seen, seen1, touching):
     rows = extras.instance_class.owner.rows
     if not rows:

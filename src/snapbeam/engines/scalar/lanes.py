@@ -20,13 +20,17 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.extending import intrinsic, models, overload, register_model
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, overload, register_model
+
+from snapbeam.engines.scalar.compile import INLINE_HERE, overloaded
 
 __all__ = [
     "WIDTH",
     "fma",
     "lanes_sum",
     "load",
+    "move",
     "select_less",
     "splat",
     "spread_at",
@@ -106,6 +110,18 @@ def store(typingctx: Any, array: Any, index: Any, value: Any) -> Any:
 
 
 @intrinsic
+def move(typingctx: Any, array: Any, to: Any, origin: Any) -> Any:
+    """``array[to] = array[origin]``, unchecked."""
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, args[0]).data
+        builder.store(builder.load(builder.gep(data, [args[2]])), builder.gep(data, [args[1]]))
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, types.intp), codegen
+
+
+@intrinsic
 def splat(typingctx: Any, value: Any) -> Any:
     """The same number in every lane."""
 
@@ -115,14 +131,27 @@ def splat(typingctx: Any, value: Any) -> Any:
     return LANES(types.float64), codegen
 
 
+def kinds_of(*kinds: Any) -> list[Any]:
+    """The types that lanes and numbers beside them are taken as: lanes, and doubles that go into every lane."""
+    return [kind if isinstance(kind, Lanes) else types.float64 for kind in kinds]
+
+
+def wide(builder: Any, signature: Any, args: Any) -> list[Any]:
+    """Arguments as registers, numbers among them in every lane."""
+    return [
+        value if isinstance(kind, Lanes) else _splat(builder, value)
+        for kind, value in zip(signature.args, args, strict=True)
+    ]
+
+
 @intrinsic
 def _lanes_fma(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         kind = ir.FunctionType(_VECTOR, [_VECTOR] * 3)
         function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.fma.{_INTRINSIC}")
-        return builder.call(function, args)
+        return builder.call(function, wide(builder, signature, args))
 
-    return LANES(LANES, LANES, LANES), codegen
+    return LANES(*kinds_of(a, b, c)), codegen
 
 
 @intrinsic
@@ -144,22 +173,10 @@ def _is_lanes(kind: Any) -> bool:
     return isinstance(kind, Lanes)
 
 
-def spread(value: Any) -> Any:
-    """Lanes as they are; a float in every lane."""
-    raise TypeError("spread runs in compiled code only")
-
-
-@overload(spread)
-def _spread(value):
-    if _is_lanes(value):
-        return lambda value: value
-    return lambda value: splat(value)
-
-
-@overload(fma)
+@overloaded(fma)
 def _fma(a, b, c):
     if any(map(_is_lanes, (a, b, c))):
-        return lambda a, b, c: _lanes_fma(spread(a), spread(b), spread(c))
+        return lambda a, b, c: _lanes_fma(a, b, c)
     return lambda a, b, c: _scalar_fma(a, b, c)
 
 
@@ -168,10 +185,10 @@ def select_less(a: Any, b: Any, yes: Any, no: Any) -> Any:
     return yes if a < b else no
 
 
-@overload(select_less)
+@overloaded(select_less)
 def _select_less(a, b, yes, no):
     if any(map(_is_lanes, (a, b, yes, no))):
-        return lambda a, b, yes, no: _lanes_select(spread(a), spread(b), spread(yes), spread(no))
+        return lambda a, b, yes, no: _lanes_select(a, b, yes, no)
     return lambda a, b, yes, no: yes if a < b else no
 
 
@@ -197,14 +214,14 @@ vtrunc = _unary("trunc")
 _vsqrt = _unary("sqrt")
 
 
-@overload(abs)
+@overload(abs, jit_options=INLINE_HERE)
 def _abs(value):
     if _is_lanes(value):
         return lambda value: vabs(value)
     return None
 
 
-@overload(math.sqrt)
+@overload(math.sqrt, jit_options=INLINE_HERE)
 def _sqrt(value):
     if _is_lanes(value):
         return lambda value: _vsqrt(value)
@@ -214,9 +231,10 @@ def _sqrt(value):
 @intrinsic
 def _lanes_select(typingctx: Any, a: Any, b: Any, yes: Any, no: Any) -> Any:
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.select(builder.fcmp_ordered("<", args[0], args[1]), args[2], args[3])
+        low, high, if_less, otherwise = wide(builder, signature, args)
+        return builder.select(builder.fcmp_ordered("<", low, high), if_less, otherwise)
 
-    return LANES(LANES, LANES, LANES, LANES), codegen
+    return LANES(*kinds_of(a, b, yes, no)), codegen
 
 
 @intrinsic
@@ -238,22 +256,18 @@ def lanes_sum(typingctx: Any, value: Any) -> Any:
 
 
 def _arithmetic(python_operator: Any, llvm_name: str) -> None:
-    @intrinsic
-    def lanewise(typingctx: Any, a: Any, b: Any) -> Any:
-        def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            return getattr(builder, llvm_name)(*args)
+    """An operation on lanes, or on lanes and numbers, as one instruction: no function is compiled for it."""
+    pairs = ((LANES, LANES), (LANES, types.float64), (types.float64, LANES))
 
-        return LANES(LANES, LANES), codegen
+    @infer_global(python_operator)
+    class _Operation(ConcreteTemplate):
+        cases = [signature(LANES, *pair) for pair in pairs]  # noqa: RUF012
 
-    @overload(python_operator)
-    def implementation(a, b):
-        if isinstance(a, Lanes) and isinstance(b, Lanes):
-            return lambda a, b: lanewise(a, b)
-        if isinstance(a, Lanes) and isinstance(b, (types.Float, types.Integer)):
-            return lambda a, b: lanewise(a, splat(b))
-        if isinstance(b, Lanes) and isinstance(a, (types.Float, types.Integer)):
-            return lambda a, b: lanewise(splat(a), b)
-        return None
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return getattr(builder, llvm_name)(*wide(builder, signature, args))
+
+    for pair in pairs:
+        lower_builtin(python_operator, *pair)(codegen)
 
 
 for _operator, _name in (

@@ -13,7 +13,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, overload, register_model
 
-from snapbeam.engines.scalar.lanes import LANES, WIDTH, splat, spread
+from snapbeam.engines.scalar.compile import INLINE_HERE
+from snapbeam.engines.scalar.lanes import LANES, WIDTH, kinds_of, splat, wide
 
 __all__ = [
     "ALL",
@@ -54,21 +55,13 @@ class _MaskModel(models.PrimitiveModel):
 
 
 @intrinsic
-def _lanes_less(typingctx: Any, a: Any, b: Any) -> Any:
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.fcmp_ordered("<", args[0], args[1])
-
-    return MASK(LANES, LANES), codegen
-
-
-def less(a: Any, b: Any) -> Any:
+def less(typingctx: Any, a: Any, b: Any) -> Any:
     """Where ``a < b``; nowhere beside what is no number."""
-    raise TypeError("less runs in compiled code only")
 
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.fcmp_ordered("<", *wide(builder, signature, args))
 
-@overload(less)
-def _less(a, b):
-    return lambda a, b: _lanes_less(spread(a), spread(b))
+    return MASK(*kinds_of(a, b)), codegen
 
 
 @intrinsic
@@ -104,41 +97,36 @@ def lowest(typingctx: Any, which: Any) -> Any:
 
 
 @intrinsic
-def _lanes_pick(typingctx: Any, mask: Any, yes: Any, no: Any) -> Any:
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.select(args[0], args[1], args[2])
-
-    return LANES(MASK, LANES, LANES), codegen
-
-
-def pick(mask: Any, yes: Any, no: Any) -> Any:
+def pick(typingctx: Any, mask: Any, yes: Any, no: Any) -> Any:
     """*yes* where the mask is true, else *no*."""
-    raise TypeError("pick runs in compiled code only")
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        chosen = wide(builder, signature.replace(args=signature.args[1:]), args[1:])
+        return builder.select(args[0], *chosen)
+
+    return LANES(MASK, *kinds_of(yes, no)), codegen
 
 
-@overload(pick)
-def _pick(mask, yes, no):
-    return lambda mask, yes, no: _lanes_pick(mask, spread(yes), spread(no))
-
-
-def vmin(a: Any, b: Any) -> Any:
+@intrinsic
+def vmin(typingctx: Any, a: Any, b: Any) -> Any:
     """The lesser of two, lane by lane; the first of equal ones."""
-    raise TypeError("vmin runs in compiled code only")
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        first, second = wide(builder, signature, args)
+        return builder.select(builder.fcmp_ordered("<", second, first), second, first)
+
+    return LANES(*kinds_of(a, b)), codegen
 
 
-@overload(vmin)
-def _vmin(a, b):
-    return lambda a, b: pick(less(b, a), b, a)
-
-
-def vmax(a: Any, b: Any) -> Any:
+@intrinsic
+def vmax(typingctx: Any, a: Any, b: Any) -> Any:
     """The greater of two, lane by lane; the first of equal ones."""
-    raise TypeError("vmax runs in compiled code only")
 
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        first, second = wide(builder, signature, args)
+        return builder.select(builder.fcmp_ordered("<", first, second), second, first)
 
-@overload(vmax)
-def _vmax(a, b):
-    return lambda a, b: pick(less(a, b), b, a)
+    return LANES(*kinds_of(a, b)), codegen
 
 
 @intrinsic
@@ -198,7 +186,7 @@ def power_of_two(exponent: Any) -> Any:
     raise TypeError("power_of_two runs in compiled code only")
 
 
-@overload(power_of_two)
+@overload(power_of_two, jit_options=INLINE_HERE)
 def _power_of_two(exponent):
     return lambda exponent: _power(exponent)
 
@@ -208,7 +196,7 @@ def halvings(much: Any, little: Any) -> Any:
     raise TypeError("halvings runs in compiled code only")
 
 
-@overload(halvings)
+@overload(halvings, jit_options=INLINE_HERE)
 def _halvings(much, little):
     def implementation(much, little):
         once = pick(less(_mantissa(little), _mantissa(much)), splat(1.0), splat(0.0))

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from snapbeam.engines.scalar.compile import inlined
+from snapbeam.engines.scalar.compile import called, inlined
 
 __all__ = ["bulge", "count_crossings", "first_fall", "first_rise", "sign_of", "turning_point", "widened"]
 
@@ -37,7 +37,7 @@ def _at(c0, c1, c2, c3, s):
     return c0 + s * (c1 + s * (c2 + s * c3))
 
 
-@inlined
+@called
 def turning_point(u0, v0, u1, v1, h):
     """Where in (0, 1) the cubic turns, given slopes of opposite sign; -1 if they are not."""
     if not v0 * v1 < 0.0:
@@ -63,7 +63,7 @@ def turning_point(u0, v0, u1, v1, h):
     return s
 
 
-@inlined
+@called
 def root(c0, c1, c2, c3, low, high):
     """The root of the cubic in [low, high], whose ends must have opposite signs."""
     below = _at(c0, c1, c2, c3, low)

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
-from snapbeam.engines.scalar.compile import INLINE, inlined
+from snapbeam.engines.scalar.compile import inlined, overloaded
 from snapbeam.engines.scalar.contact import scalar_function
 from snapbeam.engines.scalar.joined import joined_motion
 from snapbeam.engines.scalar.physics import shaker_motion, sincos
@@ -49,7 +49,7 @@ def tip_motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
     return moved
 
 
-@overload(tip_motion, jit_options=INLINE)
+@overloaded(tip_motion)
 def _tip_motion(drive, memory, argument):
     owner = drive.instance_class.owner
     if owner.harmonic:
@@ -74,7 +74,7 @@ def tip_acceleration(drive: Any, memory: Any, argument: float) -> float:
     return float(owner.acceleration(drive, memory, argument))
 
 
-@overload(tip_acceleration, jit_options=INLINE)
+@overloaded(tip_acceleration)
 def _tip_acceleration(drive, memory, argument):
     owner = drive.instance_class.owner
     if owner.harmonic:
@@ -100,7 +100,7 @@ def turned_motion(
     return tip_motion(drive, memory, argument)
 
 
-@overload(turned_motion, jit_options=INLINE)
+@overloaded(turned_motion)
 def _turned_motion(drive, memory, argument, sine, cosine):
     if drive.instance_class.owner.harmonic:
         return lambda drive, memory, argument, sine, cosine: shaker_motion(
@@ -117,7 +117,7 @@ def drive_rate(drive: Any) -> float:
     return float(drive.fastest if "fastest" in drive._fields else drive.omega)
 
 
-@overload(drive_rate, jit_options=INLINE)
+@overloaded(drive_rate)
 def _drive_rate(drive):
     if "fastest" in drive.fields:
         return lambda drive: drive.fastest
@@ -145,6 +145,6 @@ def _read_numbers(typingctx: Any, template: Any, table: Any, row: Any) -> Any:
     return template(template, table, types.intp), codegen
 
 
-@overload(numbers_of, jit_options=INLINE)
+@overloaded(numbers_of)
 def _numbers_of(template, table, row):
     return lambda template, table, row: _read_numbers(template, table, row)

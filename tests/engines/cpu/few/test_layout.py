@@ -112,12 +112,12 @@ def test_more_modes_and_finer_steps_are_the_same_to_the_bit(monkeypatch, modes, 
 
 
 def test_what_it_does_not_serve_goes_to_the_other_layout():
-    def serves(made, most=8):
+    def serves(made, most=driver.FEW_MODES):
         return suits(made, pack(made.structure, made.high_omega), most)
 
     assert serves(ensemble(2, cycles=2))
-    assert serves(ensemble(8, cycles=2))
-    assert not serves(ensemble(9, cycles=2))
+    assert serves(ensemble(12, cycles=2))
+    assert not serves(ensemble(13, cycles=2))
     assert not serves(ensemble(1, runs=1, cycles=2))
     assert not serves(ensemble(1, cycles=2, contact=sb.Restitution(coefficient=0.6)))
     assert not serves(ensemble(1, cycles=2, contact=sb.HuntCrossley(stiffness=2e8, loss=0.5)))

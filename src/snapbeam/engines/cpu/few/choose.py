@@ -19,6 +19,7 @@ from snapbeam.engines.scalar.masks import (
     vmax,
     vmin,
 )
+from snapbeam.engines.scalar.physics import sincos
 
 __all__ = ["choose", "fetch"]
 
@@ -86,7 +87,11 @@ def choose(m, n, shape, world):
     store(m, at.TICKS, ticks)
     store(m, at.LEVEL, pick(which, level, load(m, at.LEVEL)))
     store(m, at.LENGTH, pick(mask_of(n[at.ASIDE]), load(m, at.LENGTH), ticks * load(m, at.TICK)))
-    store(m, at.PHASE, load(m, at.PHASE0) + TWO_PI * (load(m, at.WITHIN) / load(m, at.PERIOD)))
+    phase = load(m, at.PHASE0) + TWO_PI * (load(m, at.WITHIN) / load(m, at.PERIOD))
+    sine, cosine = sincos(phase)
+    store(m, at.PHASE, phase)
+    store(m, at.SINE, sine)
+    store(m, at.COSINE, cosine)
     return fresh
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from snapbeam.core.codes import RunStatus
 from snapbeam.engines.cpu.few import places as at
 from snapbeam.engines.cpu.few.modes import groups_of, modal_energy, modes_of, signals, tension
-from snapbeam.engines.scalar.compile import compiled, inlined
+from snapbeam.engines.scalar.compile import called, compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS, Stages
 from snapbeam.engines.scalar.contact import contact_energy, is_impulsive
 from snapbeam.engines.scalar.decisions import PIECES, Seen, is_quiet, open_book
@@ -60,7 +60,7 @@ def flows_over(m, shape, length, place, which):
         store(m, row + 3 * WIDTH, pick(which, a22, load(m, row + 3 * WIDTH)))
 
 
-@inlined
+@called
 def prepare(m, shape, world, place, length, omega):
     """What a step of *length* needs, from *place* on: all modes' flows, and the turns of a drive of rate *omega*."""
     for group in range(groups_of(shape)):

@@ -12,7 +12,7 @@ from typing import Any
 from snapbeam.engines.cpu.few import places as at
 from snapbeam.engines.scalar.composition import TURNS
 from snapbeam.engines.scalar.contact import contact_force
-from snapbeam.engines.scalar.lanes import WIDTH, fma, load, splat, spread_at, store, vabs
+from snapbeam.engines.scalar.lanes import WIDTH, fma, load, move, splat, spread_at, store, vabs
 from snapbeam.engines.scalar.masks import both, less, pick, vmax
 from snapbeam.engines.scalar.physics import (
     mode_energy,
@@ -28,9 +28,10 @@ __all__ = ["TEXTS", "Modes", "made"]
 
 _KNOWN = {
     "__name__": __name__, "both": both, "bulge": bulge, "contact_force": contact_force, "fma": fma, "less": less,
-    "load": load, "mode_energy": mode_energy, "pick": pick, "shaker_motion": shaker_motion, "sincos": sincos,
-    "splat": splat, "spread_at": spread_at, "store": store, "tension_acceleration": tension_acceleration,
-    "tension_factors": tension_factors, "turned": turned, "vabs": vabs, "vmax": vmax,
+    "load": load, "move": move, "mode_energy": mode_energy, "pick": pick, "shaker_motion": shaker_motion,
+    "sincos": sincos, "splat": splat, "spread_at": spread_at, "store": store,
+    "tension_acceleration": tension_acceleration, "tension_factors": tension_factors, "turned": turned, "vabs": vabs,
+    "vmax": vmax,
 }  # fmt: skip
 
 
@@ -134,8 +135,7 @@ def _take(modes: Modes) -> list[str]:
     body += ["impulse, work, gross, force = splat(0.0), splat(0.0), splat(0.0), splat(0.0)"]
     body += [f"offset = load(m, {at.OFFSET}) + (1.0 - load(m, {at.HOME})) * load(m, {at.REST_CONTACT})"]
     body += [f"amplitude, omega = load(m, {at.AMPLITUDE}), load(m, {at.OMEGA})"]
-    body += ["sine0, cosine0 = splat(0.0), splat(1.0)", "if any_touching:"]
-    body += [f"    sine0, cosine0 = sincos(load(m, {at.PHASE}))"]
+    body += [f"sine0, cosine0 = load(m, {at.SINE}), load(m, {at.COSINE})"]
     for i in modes.each():
         body += [
             f"q{i}, p{i}, g{i} = {modes.row(i, at.Q)}, {modes.row(i, at.P)}, {modes.row(i, at.SEEN_WELL)}"
@@ -249,10 +249,13 @@ def _glide(modes: Modes) -> list[str]:
         f"center0 = {total(lambda i: (f'e{i}', f'k{i}'))}",
         f"center1 = {total(lambda i: (f'e{i}', f'l{i}'))}",
     ]
-    body += ["turn_sine, turn_cosine = sincos(omega * piece)", f"sine, cosine = sincos(load(m, {at.PHASE}))"]
+    body += [
+        "turn_sine, turn_cosine = sincos(omega * piece)",
+        f"sine, cosine = load(m, {at.SINE}), load(m, {at.COSINE})",
+    ]
     cq, cp = total(lambda i: (f"c{i}", f"q{i}")), total(lambda i: (f"c{i}", f"p{i}"))
     eq, ep = total(lambda i: (f"e{i}", f"q{i}")), total(lambda i: (f"e{i}", f"p{i}"))
-    body += ["before, before_rate, greatest = splat(0.0), splat(0.0), splat(-1.0)"]
+    body += ["before, before_rate, begun, greatest = splat(0.0), splat(0.0), splat(0.0), splat(-1.0)"]
     body += ["for i in range(most + 1):"]
     step = ["done = i / pieces", "if i > 0:"]
     # the piece that ends here, after the kick at its beginning
@@ -283,7 +286,7 @@ def _glide(modes: Modes) -> list[str]:
     step += ["if i > 0:"]
     step += ["    reach = vmax(before, d) + bulge(before_rate, dv, piece)"]
     step += ["    greatest = pick(written, vmax(greatest, reach), greatest)"]
-    step += ["before, before_rate = d, dv"]
+    step += ["before, before_rate, begun = d, dv, done"]
     step += [
         "sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine"
     ]
@@ -299,12 +302,12 @@ def _at_hand(modes: Modes) -> list[str]:
             group, j = divmod(i * modes.distinct + flow, WIDTH)
             for c in range(4):
                 to = modes.place(i, at.FLOW + (4 * flow + c) * WIDTH)
-                lines += [f"    m[{to} + lane] = m[place + {(4 * group + c) * WIDTH + j}]"]
+                lines += [f"    move(m, {to} + lane, place + {(4 * group + c) * WIDTH + j})"]
     turns = at.groups(modes.count, modes.distinct) * 4 * WIDTH
     for stage in range(modes.flows + 1):
         for part in (0, TURNS):
             to = at.TURN + (part + stage) * WIDTH
-            lines += [f"    m[{to} + lane] = m[place + {turns + part + stage}]"]
+            lines += [f"    move(m, {to} + lane, place + {turns + part + stage})"]
     return lines
 
 

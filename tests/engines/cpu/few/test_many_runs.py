@@ -1,0 +1,101 @@
+"""A great many short runs of one mode: memory that grows with their number alone, progress, and an end at once."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+import tracemalloc
+from _thread import interrupt_main
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam.core.codes import RunStatus
+from snapbeam.engines.assemble import make_ensemble
+from snapbeam.engines.cpu import driver
+from snapbeam.model.paper_values import BEAM, CONTACT
+
+MOST_BYTES = 700
+"""Of a run, at most: its numbers, its book, and what is held while the runs are put in order."""
+
+
+@pytest.fixture(autouse=True)
+def eight_runs_in_a_register(monkeypatch):
+    monkeypatch.setattr(driver, "FEWEST_STEPS", 0.0)
+
+
+def many(runs, cycles=10):
+    """Runs of one mode over the plane of Fig. 6."""
+    generator = np.random.default_rng(0)
+    striker = sb.Striker(drive=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.2))
+    system = sb.System(sb.ReducedModel.from_beam(BEAM, modes=1, damping_ratio=0.005), CONTACT, striker)
+    points = {
+        "drive.frequency_ratio": generator.uniform(0.1, 4.0, runs),
+        "drive.velocity_amplitude": generator.uniform(0.02, 0.65, runs),
+    }
+    return make_ensemble(system, sb.Integration(cycles=cycles), points)
+
+
+def marched(runs):
+    """Bytes a run at the peak, what was told of progress, and the books."""
+    told = []
+    tracemalloc.start()
+    try:
+        made = many(runs)
+        books = driver.run_ensemble(made, 2, lambda done, total: told.append((done, total)))
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    return peak / runs, told, books
+
+
+def assert_marched(runs, told, books):
+    assert (books["status"] == RunStatus.OK).all()
+    assert (books["time"] > 0).all()
+    assert told[0] == (0, runs)
+    assert told[-1] == (runs, runs)
+    assert all(before[0] <= after[0] for before, after in pairwise(told))
+
+
+def test_memory_of_a_run_does_not_depend_on_their_number():
+    marched(100)  # what is compiled and measured once
+    few, _, _ = marched(10_000)
+    more, told, books = marched(20_000)
+    assert_marched(20_000, told, books)
+    assert more < 1.05 * few
+    assert more < MOST_BYTES
+
+
+def test_an_interrupt_ends_them_at_once():
+    """One that comes in the midst of runs that would take half a minute at least, none of which ends before."""
+    driver.run_ensemble(many(16, cycles=1), 2)
+    made, sent = many(256, cycles=100_000), []
+
+    def interrupt():
+        sent.append(time.perf_counter())
+        interrupt_main()
+
+    timer = threading.Timer(0.5, interrupt)
+    # a process that was started in the background is deaf to it
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            driver.run_ensemble(made, 2)
+    finally:
+        timer.cancel()
+        signal.signal(signal.SIGINT, before)
+    # a fifth of a second to hear it, and what a busy machine takes to end two threads
+    assert time.perf_counter() - sent[0] < 3.0
+
+
+@pytest.mark.slow
+def test_ten_million_runs():
+    size = 10_000_000
+    bytes_a_run, told, books = marched(size)
+    assert_marched(size, told, books)
+    assert len(told) > 100
+    assert bytes_a_run < MOST_BYTES
