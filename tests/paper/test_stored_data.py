@@ -37,11 +37,7 @@ def test_says_what_made_it(name):
             assert "/" not in dataset.attrs["command"].replace("docs/data", "")
 
 
-OLDER = ("fig8",)
-"""Maps of the steps of version 0.1, which take two cores most of an hour; their page says so."""
-
-
-@pytest.mark.parametrize("name", [name for name in KEPT if name not in OLDER])
+@pytest.mark.parametrize("name", KEPT)
 def test_one_engine_made_them_all_and_it_is_todays(name):
     with xr.open_datatree(DATA / f"{name}.nc", engine="h5netcdf") as tree:
         assert tree.attrs["engine_fingerprint"] == engine_mark()
