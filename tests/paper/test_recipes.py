@@ -109,7 +109,7 @@ def test_measured_runs_take_the_left_column(tmp_path, results):
         files.append(tmp_path / f"{kind}.nc")
         results["fig4"][f"{kind}_recorded"].to_netcdf(files[-1], engine="h5netcdf")
     figure = paper.fig4(results=results, measured=files)
-    assert figure.axes[0].get_title(loc="left") == "measured"
+    assert figure.axes[0].get_title(loc="left") == "Measured"
 
 
 def test_snap_times_are_zeros_of_the_first_amplitude(results):
