@@ -44,6 +44,7 @@ def test_against_an_independent_solution(modes) -> None:
         assert ledger(run) < 1e-4
 
 
+@pytest.mark.slow
 def test_slow_unbuckling() -> None:
     """A load that falls slowly takes the well with it, quasi-statically."""
     beam = model(1)

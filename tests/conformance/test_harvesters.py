@@ -91,6 +91,7 @@ def test_a_layer_that_does_not_couple_changes_nothing() -> None:
     assert errors[2] < 1e-9
 
 
+@pytest.mark.slow
 def test_sweep_of_the_load() -> None:
     """Under a gentle shake the power over the resistance is that of linear theory.
 

@@ -36,7 +36,11 @@ def ledger(run: sb.Run) -> np.ndarray:
     return (data.energy_beam + data.energy_contact + data.energy_dissipated - data.work_shaker).values
 
 
-LAWS = [(name, e) for name in ("hunt_crossley", "kelvin_voigt") for e in (0.9, 0.5, 0.05)]
+LAWS = [
+    pytest.param(name, e, marks=[pytest.mark.slow] if e == 0.9 else [])
+    for name in ("hunt_crossley", "kelvin_voigt")
+    for e in (0.9, 0.5, 0.05)
+]
 
 
 @pytest.mark.parametrize(("name", "e"), LAWS)
