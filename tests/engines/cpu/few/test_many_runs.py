@@ -72,24 +72,30 @@ def test_memory_of_a_run_does_not_depend_on_their_number():
 def test_an_interrupt_ends_them_at_once():
     """One that comes in the midst of runs that would take half a minute at least, none of which ends before."""
     driver.run_ensemble(many(16, cycles=1), 2)
-    made, sent = many(256, cycles=100_000), []
+    made, sent, over = many(256, cycles=100_000), [], threading.Event()
 
     def interrupt():
-        sent.append(time.perf_counter())
-        interrupt_main()
+        # again after a while: one that falls into the clearing away of garbage is swallowed by Python
+        wait = 0.5
+        while not over.wait(wait):
+            sent.append(time.perf_counter())
+            interrupt_main()
+            wait = 5.0
 
-    timer = threading.Timer(0.5, interrupt)
+    sender = threading.Thread(target=interrupt, daemon=True)
     # a process that was started in the background is deaf to it
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        timer.start()
+        sender.start()
         with pytest.raises(KeyboardInterrupt):
             driver.run_ensemble(made, 2)
+        ended = time.perf_counter()
     finally:
-        timer.cancel()
+        over.set()
+        sender.join()
         signal.signal(signal.SIGINT, before)
     # a fifth of a second to hear it, and what a busy machine takes to end two threads
-    assert time.perf_counter() - sent[0] < 3.0
+    assert ended - sent[-1] < 3.0 and len(sent) < 3
 
 
 @pytest.mark.slow
