@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from doubles import henon, logistic
 from scipy.optimize import brentq
-from test_orbits import exact_orbit, oscillator, system_of
+from test_orbits import EXACT, exact_orbit, oscillator, system_of
 
 import snapbeam as sb
 
@@ -24,6 +24,10 @@ def test_flips_of_the_logistic_map() -> None:
     second = sb.continue_orbit(doubled, "r", (2.2, 3.7))
     flips = [event.value for event in second.events if event.kind == "flip"]
     assert flips[0] == pytest.approx(1.0 + math.sqrt(6.0), abs=1e-7)
+    first = next(event for event in second.events if event.kind == "flip")
+    for event, exact in ((flip, 3.0), (first, 1.0 + math.sqrt(6.0))):
+        assert abs(event.value - exact) <= event.error < 1e-7
+    assert "±" in repr(flip) and float(branch.to_dataset()["event_error"][0]) == flip.error
     np.testing.assert_allclose(branch.orbits[-1].coordinates, 1.0 - 1.0 / 3.7, atol=1e-9)
 
 
@@ -33,6 +37,7 @@ def test_a_fold_is_passed() -> None:
     branch = sb.continue_orbit(orbit, "a", (-0.2, 0.3), direction="down")
     fold = next(event for event in branch.events if event.kind == "fold")
     assert fold.value == pytest.approx(-0.1225, abs=1e-8)
+    assert abs(fold.value + 0.1225) <= fold.error < 1e-8
     assert branch.values[-1] > branch.values.min()
     stable = branch.is_stable
     assert stable[0] and not stable[-1]
@@ -55,41 +60,65 @@ def test_an_isola_is_closed_from_a_seed_on_it() -> None:
     assert branch.end == "closed"
     assert sorted(event.value for event in branch.events) == pytest.approx([1.5, 2.5], abs=1e-8)
     assert {event.kind for event in branch.events} == {"fold"}
+    for event in branch.events:
+        assert min(abs(event.value - 1.5), abs(event.value - 2.5)) <= event.error < 1e-7
     radius = np.hypot([orbit.coordinates[0] for orbit in branch.orbits], branch.values - 2.0)
     np.testing.assert_allclose(radius, 0.5, atol=1e-8)
     other = sb.periodic_orbit(ring, [0.1, 0.0], deflate=[seed.orbit], iterations=200)
     assert other.coordinates[0] == pytest.approx(-seed.orbit.coordinates[0], abs=1e-9) and other.unstable == 1
 
 
-def room(ratio: float, restitution: float, periods: int) -> float:
+def room(ratio: float, restitution: float, periods: int, looks: int = 40_001) -> float:
     """Least gap between the flight of the exact (1, n) orbit and the wall, away from its ends."""
     speed, _ = exact_orbit(ratio, restitution, periods)
     w = 0.5 * (1.0 + restitution) / math.tan(math.pi * periods / ratio) * speed
     up, wall = 0.5 * (1.0 + restitution) * speed, 0.5 * (1.0 - restitution) * speed
-    time = np.linspace(0.0, 2.0 * math.pi * periods / ratio, 40_001)
+    time = np.linspace(0.0, 2.0 * math.pi * periods / ratio, looks)
     gap = w * np.cos(time) + up * np.sin(time) - np.sin(ratio * time + math.atan2(w, wall / ratio))
     before, here, after = gap[:-2], gap[1:-1], gap[2:]
     turns = (here <= before) & (here < after)
     bend = (before - 2.0 * here + after)[turns]
-    return float((here[turns] - (after - before)[turns] ** 2 / (8.0 * bend)).min())
+    return float((here[turns] - (after - before)[turns] ** 2 / (8.0 * bend)).min(initial=10.0))
+
+
+def grazes_at(restitution: float, periods: int, below: float) -> float:
+    """The greatest ratio below another at which the flight touches the wall a second time."""
+    ratios = np.linspace(below, 1.002 * periods, 80)
+    rooms = np.array([room(float(ratio), restitution, periods, 4001) for ratio in ratios])
+    first = int(np.flatnonzero(rooms < 0.0)[0])
+    return float(brentq(room, ratios[first], ratios[first - 1], args=(restitution, periods)))
+
+
+def follow_to_grazing(ratio: float, restitution: float, periods: int, longest: float) -> sb.Branch:
+    """Every orbit is the exact one, and the branch ends where its flight touches the wall a second time."""
+    _, state = exact_orbit(ratio, restitution, periods)
+    orbit = sb.periodic_orbit(oscillator(ratio, restitution), state, periods, phase=math.pi)
+    between = (1.0005 * periods, ratio + 0.01)
+    branch = sb.continue_orbit(orbit, "frequency_ratio", between, direction="down", longest=longest)
+    assert branch.end == "grazing"
+    for each, value in zip(branch.orbits, branch.values, strict=True):
+        # at the same velocity the wall's amplitude goes with 1/omega
+        exact = exact_orbit(float(value), restitution, periods)[1] * ratio / value
+        np.testing.assert_allclose(each.coordinates, exact, rtol=0.0, atol=1e-8)
+    grazing = branch.events[-1]
+    assert grazing.kind == "grazing" and grazing.orbit.passage.clearance < 5e-3
+    assert abs(grazing.value - grazes_at(restitution, periods, ratio)) <= grazing.error < 1e-2
+    return branch
 
 
 def test_restitution_orbits_are_followed_to_grazing() -> None:
-    """Every orbit is the exact one, and the branch ends where its flight touches the wall a second time."""
-    restitution = 0.8
-    _, state = exact_orbit(3.6, restitution, 2)
-    orbit = sb.periodic_orbit(oscillator(3.6, restitution), state, 2, phase=math.pi)
-    branch = sb.continue_orbit(orbit, "frequency_ratio", (2.1, 3.8), direction="down")
-    assert branch.end == "grazing"
-    for each, ratio in zip(branch.orbits, branch.values, strict=True):
-        # at the same velocity the wall's amplitude goes with 1/omega
-        exact = exact_orbit(float(ratio), restitution, 2)[1] * 3.6 / ratio
-        np.testing.assert_allclose(each.coordinates, exact, rtol=0.0, atol=1e-8)
-    grazing = branch.events[-1]
-    assert grazing.kind == "grazing" and grazing.orbit.passage.clearance < 1e-4
-    assert grazing.value == pytest.approx(brentq(room, 3.0, 3.2, args=(restitution, 2)), abs=1e-5)
+    branch = follow_to_grazing(3.6, 0.8, 2, 0.02)
+    assert branch.events[-1].orbit.passage.clearance < 1e-4 and branch.events[-1].error < 1e-4
     ds = branch.to_dataset()
     assert set(ds["event_kind"].values) <= {"fold", "flip", "Neimark-Sacker", "branch point", "grazing"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("ratio", "restitution", "periods"), EXACT)
+def test_orbits_of_twenty_points_are_followed_to_grazing(
+    ratio: float, restitution: float, periods: int
+) -> None:
+    follow_to_grazing(ratio, restitution, periods, 0.1)
 
 
 def test_a_branch_of_the_beam() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -32,9 +33,12 @@ class Event:
     """Of the parameter."""
     after: int
     """Number of the orbit of the branch that it comes after."""
+    error: float = math.nan
+    """By how much the value may be off at these steps; NaN: not known."""
 
     def __repr__(self) -> str:
-        return f"<{self.kind} at {self.value:.8g}>"
+        off = "" if math.isnan(self.error) else f" ± {self.error:.1g}"
+        return f"<{self.kind} at {self.value:.8g}{off}>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +117,11 @@ class Branch:
                     "event",
                     [event.value for event in self.events],
                     {"units": unit, "long_name": words},
+                ),
+                "event_error": (
+                    "event",
+                    np.array([event.error for event in self.events], dtype=np.float64),
+                    {"units": unit, "long_name": f"by how much it may be off at these steps: {words}"},
                 ),
                 "event_state": (
                     ("event", "coordinate"),

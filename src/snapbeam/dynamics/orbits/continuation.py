@@ -6,114 +6,25 @@ branch and corrected on the plane across it (Keller, in Applications of Bifurcat
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.findings import tell
 from snapbeam.core.validate import InputError, InputTypeError, choice, integer, positive
-from snapbeam.dynamics.flow import Flow, Stroboscope
+from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.orbits.branch import Branch, Event
+from snapbeam.dynamics.orbits.corrector import Corrector, Spot
+from snapbeam.dynamics.orbits.events import between as events_between
+from snapbeam.dynamics.orbits.events import grazing_end
 from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit
-from snapbeam.dynamics.orbits.shooting import Family, Return, jacobian, newton
+from snapbeam.dynamics.orbits.shooting import Family
 
 __all__ = ["continue_orbit", "switch_branch"]
 
 _Array = NDArray[np.float64]
 _TOLERANCE = 1e-10
-_ITERATIONS = 14
-_DIFFERENCE = 2e-6
-"""Of the difference by the parameter, over its range."""
 _EASY, _HARD = 4, 9
 """Iterations up to which the step grows, and from which on it shrinks."""
-_LOCATED = 1e-9
-"""Of a multiplier at an event."""
-_HALVINGS = 20
-_TOUCHES = 5e-3
-"""Clearance, over the length scale, below which a branch that goes no further ends by grazing."""
-
-
-class Spot(NamedTuple):
-    """One orbit of a branch."""
-
-    y: _Array
-    """State, and the parameter over its range."""
-    tangent: _Array
-    came: Return
-    slope: _Array
-    """Derivative of the return map by the parameter over its range."""
-    iterations: int
-
-
-@dataclass(frozen=True, eq=False)
-class Corrector:
-    """Finds orbits on planes across a branch."""
-
-    family: Family
-    period: int
-    span: float
-    tolerance: float
-
-    def bordered(self, came: Return, slope: _Array, row: _Array) -> _Array:
-        """Derivative of the equations of an orbit and a plane."""
-        size = slope.size
-        table = np.empty((size + 1, size + 1))
-        table[:size, :size] = came.jacobian - np.eye(size)
-        table[:size, size] = slope
-        table[size] = row
-        return table
-
-    def derivatives(self, y: _Array) -> tuple[Return, _Array]:
-        """The return map and its derivatives at a state and a value."""
-        value = float(y[-1]) * self.span
-        came = jacobian(self.family, y[:-1], self.period, value)
-        step = _DIFFERENCE * self.span
-        return came, self.family.slope(y[:-1], self.period, value, step) * self.span
-
-    def correct(
-        self, guess: _Array, row: _Array, before: _Array, known: tuple[Return, _Array] | None = None
-    ) -> Spot:
-        """The orbit on the plane through *guess* across *row*; its tangent goes on as *before* does.
-
-        Raises
-        ------
-        NoOrbit
-        """
-
-        def residual(y: _Array) -> _Array:
-            value = float(y[-1]) * self.span
-            there = self.family.march(y[None, :-1], self.period, value).states[0]
-            return np.append(there - y[:-1], row @ (y - guess))
-
-        def derivative(y: _Array) -> tuple[_Array, _Array]:
-            came, slope = self.derivatives(y)
-            return np.append(came.x - y[:-1], row @ (y - guess)), self.bordered(came, slope, row)
-
-        first = None if known is None else self.bordered(*known, row)
-        shot = newton(residual, derivative, guess, self.tolerance, _ITERATIONS, first)
-        came, slope = self.derivatives(shot.x)
-        if not np.isfinite(came.jacobian).all() or not np.isfinite(slope).all():
-            raise NoOrbit("a run beside the orbit failed")
-        return Spot(shot.x, self.tangent(came, slope, before), came, slope, shot.iterations)
-
-    def tangent(self, came: Return, slope: _Array, before: _Array) -> _Array:
-        """Of the branch, of length one, towards where *before* points."""
-        wanted = np.zeros(slope.size + 1)
-        wanted[-1] = 1.0
-        try:
-            found = np.linalg.solve(self.bordered(came, slope, before), wanted)
-        except np.linalg.LinAlgError:
-            return before
-        return found / np.linalg.norm(found)
-
-    def orbit(self, spot: Spot) -> Orbit:
-        """As an orbit of the flow at its value."""
-        came, x = spot.came, spot.y[:-1]
-        residual = float(np.abs(came.x - x).max())
-        flow = self.family.at(float(spot.y[-1]) * self.span)
-        return Orbit(flow, x, self.period, came.jacobian, residual, spot.iterations)
 
 
 def continue_orbit(
@@ -222,19 +133,13 @@ def _follow(
             length *= 0.5
             if length < shortest:
                 end = f"no further orbit: {error}"
-                if _grazes(corrector, last):
-                    events.append(
-                        Event(
-                            "grazing",
-                            corrector.orbit(last),
-                            float(last.y[-1]) * corrector.span,
-                            len(spots) - 1,
-                        )
-                    )
+                grazing = grazing_end(corrector, spots)
+                if grazing is not None:
+                    events.append(grazing)
                     end = "grazing"
                 break
             continue
-        events += _between(corrector, last, spot, len(spots) - 1)
+        events += events_between(corrector, last, spot, len(spots) - 1)
         spots.append(spot)
         if over is not None:
             end = "limit of the parameter"
@@ -254,110 +159,6 @@ def _follow(
     assert corrector.family.name is not None
     impacts = [spot.came.impacts for spot in spots]
     return Branch(corrector.family.name, orbits, events, end, impacts, [spot.tangent for spot in spots])
-
-
-def _grazes(corrector: Corrector, spot: Spot) -> bool:
-    """Whether an orbit passes the tip without room to spare."""
-    if not isinstance(corrector.family.flow, Stroboscope):
-        return False
-    passage = corrector.orbit(spot).passage
-    return bool(passage.clearance < _TOUCHES)
-
-
-# ---------------------------------------------------------------------- events
-
-
-def _counts(came: Return) -> tuple[int, int, int]:
-    """Real multipliers above 1, real ones below -1, and others outside the unit circle."""
-    values = np.linalg.eigvals(came.jacobian)
-    real = np.abs(values.imag) < 1e-12 * np.maximum(np.abs(values), 1e-300)
-    out = np.abs(values) > 1.0
-    return (
-        int((real & (values.real > 1.0)).sum()), int((real & (values.real < -1.0)).sum()), int((out & ~real).sum())
-    )  # fmt: skip
-
-
-def _between(corrector: Corrector, one: Spot, other: Spot, at: int) -> list[Event]:
-    """What happens between two orbits of a branch, located."""
-    found = []
-    up, flip, pair = (b - a for a, b in zip(_counts(one.came), _counts(other.came), strict=True))
-    if one.tangent[-1] * other.tangent[-1] < 0.0:
-        found.append(_located(corrector, one, other, "fold", at))
-    elif up % 2:
-        found.append(_located(corrector, one, other, "branch point", at))
-    if flip % 2:
-        found.append(_located(corrector, one, other, "flip", at))
-    if pair and not (up or flip):
-        found.append(_located(corrector, one, other, "Neimark-Sacker", at))
-    if one.came.impacts != other.came.impacts:
-        found.append(_grazing(corrector, one, other, at))
-    return [event for event in found if event is not None]
-
-
-def _test(spot: Spot, kind: str) -> float:
-    """What vanishes at an event."""
-    if kind == "fold":
-        return float(spot.tangent[-1])
-    values = np.linalg.eigvals(spot.came.jacobian)
-    if kind == "Neimark-Sacker":
-        pairs = np.abs(values[np.abs(values.imag) > 1e-12])
-        return float(pairs[np.argmin(np.abs(pairs - 1.0))] - 1.0) if pairs.size else np.nan
-    sign = -1.0 if kind == "flip" else 1.0
-    size = values.size
-    # the determinant changes its sign with one real multiplier, whatever the others do
-    logs = np.linalg.slogdet(spot.came.jacobian - sign * np.eye(size))
-    near = values[np.argmin(np.abs(values - sign))]
-    return float(logs[0].real * abs(near - sign))
-
-
-def _between_at(corrector: Corrector, one: Spot, other: Spot, part: float) -> Spot:
-    along = other.y - one.y
-    row = along / np.linalg.norm(along)
-    nearer = one if part < 0.5 else other
-    return corrector.correct(one.y + part * along, row, one.tangent, (nearer.came, nearer.slope))
-
-
-def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -> Event | None:
-    """An event between two orbits, by the Illinois form of false position."""
-    low, high, f_low, f_high = 0.0, 1.0, _test(one, kind), _test(other, kind)
-    if not f_low * f_high < 0.0:
-        return None
-    best, side = one if abs(f_low) < abs(f_high) else other, 0
-    for _ in range(_HALVINGS):
-        part = (low * f_high - high * f_low) / (f_high - f_low)
-        try:
-            spot = _between_at(corrector, one, other, part)
-        except NoOrbit:
-            break
-        value = _test(spot, kind)
-        best = spot
-        if not abs(value) > _LOCATED or high - low < 1e-9:
-            break
-        if value * f_high > 0.0:
-            high, f_high = part, value
-            f_low *= 0.5 if side == 1 else 1.0
-            side = 1
-        else:
-            low, f_low = part, value
-            f_high *= 0.5 if side == -1 else 1.0
-            side = -1
-    return Event(kind, corrector.orbit(best), float(best.y[-1]) * corrector.span, at)
-
-
-def _grazing(corrector: Corrector, one: Spot, other: Spot, at: int) -> Event:
-    """Where the number of impacts changes between two orbits, by halving."""
-    low, high, best = 0.0, 1.0, other
-    for _ in range(_HALVINGS):
-        part = 0.5 * (low + high)
-        try:
-            spot = _between_at(corrector, one, other, part)
-        except NoOrbit:
-            break
-        if spot.came.impacts == one.came.impacts:
-            low = part
-        else:
-            high, best = part, spot
-    return Event("grazing", corrector.orbit(best), float(best.y[-1]) * corrector.span, at)
 
 
 def switch_branch(event: Event, name: str, between: tuple[float, float], *, size: float = 0.01) -> Orbit:
