@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snapbeam.core.files import NoRoomError, atomic_path, check_writable
-from snapbeam.core.validate import InputError, instance, mapping
+from snapbeam.core.validate import InputError, file_path, instance, mapping
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -39,7 +39,7 @@ def read_netcdf(
     """
     import xarray as xr
 
-    if not Path(path).is_file():
+    if not file_path(name, path).is_file():
         raise InputError(f"{name} = {str(path)!r}: no such file")
     read = xr.open_dataset if lazily else xr.load_dataset
     try:

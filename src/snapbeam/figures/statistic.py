@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 
-from snapbeam.core.validate import InputError, instance
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, instance, shown
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.figures.axes import dress, edges_of, positions
 from snapbeam.figures.captions import scale_of
@@ -25,6 +26,7 @@ _DECADES = 300.0
 """Greatest over least value, from which colours go by powers of ten."""
 
 
+@checked
 def plot_statistic(
     dataset: xr.Dataset, name: str, ax: Axes | None = None, *, log: bool | None = None
 ) -> Axes:
@@ -56,7 +58,7 @@ def plot_statistic(
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if instance("name", name, str, "text") not in dataset:
-        raise InputError(f"variable = {name!r}: the map has {', '.join(map(str, dataset.data_vars))}")
+        raise InputError(f"variable = {shown(name)}: the map has {', '.join(map(str, dataset.data_vars))}")
     values = dataset[name].squeeze()
     dims = [str(each) for each in values.dims]
     if not 1 <= len(dims) <= 2 or "point" in dims:
