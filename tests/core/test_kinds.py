@@ -24,6 +24,7 @@ def asked(
     share: float = 0.5,
     loud: bool = False,
     names: Sequence[str] = (),
+    between: tuple[float, float] = (0.0, 1.0),
     report: Callable[[int], object] | None = None,
     unknown: SomethingElse = None,  # noqa: F821
 ):
@@ -40,6 +41,7 @@ def asked(
         ({"share": None}, "share = None: must be a number, not NoneType"),
         ({"loud": 1}, "loud = 1: must be True or False"),
         ({"names": "abc"}, "names = 'abc': must be a sequence, not str"),
+        ({"between": 0.3}, "between = 0.3: must be two numbers, not float"),
         ({"report": 3}, "report = 3: must be callable or None, not int"),
     ],
 )
@@ -53,7 +55,8 @@ def test_another_kind_is_refused_by_name(given, words):
 def test_what_suits_or_cannot_be_told_passes():
     """Numbers of NumPy, lists and tuples, None where it may be; an annotation that cannot be read refuses nothing."""
     assert asked(None, count=np.int64(4), share=np.float32(0.1), names=["a"], unknown=object()) == 4
-    assert asked(None, names=("a",), report=print, share=np.array(0.2)) == 3
+    assert asked(None, names=("a",), report=print, share=np.array(0.2), between=[0.1, 0.2]) == 3
+    assert asked(None, between=np.array([0.1, 0.2])) == 3
 
 
 def test_missing_arguments_are_pythons_own_error():

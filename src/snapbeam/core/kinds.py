@@ -68,6 +68,8 @@ def _suits(value: Any, kind: Any) -> bool:
         return True  # the function names the words that it takes
     if kind is float or kind is int:
         return isinstance(value, Real) or (isinstance(value, np.ndarray) and value.ndim == 0)
+    if origin in (tuple, list):
+        origin = Sequence
     if origin in (Sequence, Iterable):
         if isinstance(value, np.ndarray):
             return value.ndim > 0
@@ -85,6 +87,10 @@ def _words(kinds: list[Any]) -> str:
         origin = typing.get_origin(kind) or kind
         if kind is None or kind is type(None):
             names.append("None")
+        elif origin is tuple and typing.get_args(kind) == (float, float):
+            names.append("two numbers")
+        elif origin in (tuple, list):
+            names.append("a sequence")
         elif origin in _ABSTRACT:
             names.append(_ABSTRACT[origin])
         elif kind in (float, int):
