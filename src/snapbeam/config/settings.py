@@ -262,6 +262,7 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config
     InputError
         One line for each thing that is wrong: unknown names, wrong kinds, wrong units.
     """
+    instance("source", source, str, "text")
     found, lines = checked_sections(sections)
     config = Config(found)
     lines = lines or contradictions(found)

@@ -220,6 +220,8 @@ def periodic_orbit(
         if not np.isfinite(x).all():
             raise NoOrbit("the run from the guess failed; see its status with sb.advance")
     tell(getattr(flow, "findings", ()))
+    if not all(isinstance(orbit, Orbit) for orbit in deflate):
+        raise InputTypeError(f"deflate = {shown(deflate)}: must be orbits, as periodic_orbit gives")
     known = tuple(point for orbit in deflate for point in orbit.points)
     return shoot(flow, x, periods, allowed, integer("iterations", iterations, 1, 10_000), deflate=known)
 
