@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 import shlex
 import tomllib
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import snapbeam as sb
-from snapbeam.cli.app import app
+from snapbeam.cli.app import _COMMANDS, app
 from snapbeam.config import Config, load_config
 
 RUNNER = CliRunner()
@@ -100,7 +102,15 @@ LEAVES = dict(leaves(typer.main.get_command(app)))
 @pytest.mark.parametrize("command", LEAVES)
 def test_json_and_quiet_everywhere(command):
     flags = {flag for each in LEAVES[command].params for flag in each.opts}
-    assert {"--json", "--quiet"} <= flags
+    assert {"--json", "--quiet", "--force"} <= flags
+    assert ("--set" in flags) == ("--print-config" in flags), "what takes parameters prints them"
+
+
+@pytest.mark.parametrize("name", _COMMANDS)
+def test_every_command_has_something_to_answer(name):
+    """A command that answers nothing would leave no file where --json asked for one."""
+    module = import_module(f"snapbeam.cli.{_COMMANDS[name].rpartition('.')[0]}")
+    assert re.search(r"^\s+(answer|answer_now|lab\.write_json)\(", inspect.getsource(module), re.MULTILINE)
 
 
 def test_json_goes_to_standard_output_alone(tmp_path):

@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snapbeam.core.files import NoRoomError, atomic_path, check_writable
+from snapbeam.core.foreign import VERSION
 from snapbeam.core.validate import InputError, instance, mapping
+from snapbeam.core.version import __version__
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -97,6 +99,8 @@ def netcdf_file(path: str | os.PathLike[str]) -> Iterator[h5netcdf.File]:
     with atomic_path(path) as temporary, hdf5_stream(temporary, Path(path)) as stream:
         with h5netcdf.File(stream, "w", invalid_netcdf=False) as file:
             yield file
+            if VERSION not in file.attrs:
+                file.attrs[VERSION] = __version__
 
 
 @contextmanager
