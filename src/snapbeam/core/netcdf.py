@@ -62,6 +62,8 @@ def write_netcdf(
 ) -> None:
     """Write a dataset, or one for each group, to a NetCDF file, whole or not at all.
 
+    A root without the attribute ``snapbeam_version`` gets it, by which the file is known.
+
     Parameters
     ----------
     data : xarray.Dataset or mapping of str to xarray.Dataset
