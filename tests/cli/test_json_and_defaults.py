@@ -228,3 +228,16 @@ def test_a_point_of_a_list_is_gone_on_from(tmp_path):
     assert told["peak_force"] == float(found.peak_force[3]) and told["crossings"] == int(found.crossings[3])
     refused = RUNNER.invoke(app, ["simulate", "--from", str(tmp_path / "list.nc"), "--point", "location=0.3"])
     assert refused.exit_code == 2
+
+
+def test_what_is_given_beside_a_store_is_compared_with_the_store(tmp_path, monkeypatch):
+    """Not with the paper's beam: only what is asked for otherwise is told to differ."""
+    monkeypatch.chdir(tmp_path)
+    run("map", *MAPS["a beam of its own"], "--store", "kept")
+    before = xr.load_dataset("map.nc").response
+    run("map", "--store", "kept", "--cycles", "12", "--length", "0.1", "-o", "again.nc")
+    np.testing.assert_array_equal(xr.load_dataset("again.nc").response, before)
+    refused = RUNNER.invoke(app, ["map", "--store", "kept", "--cycles", "13"])
+    assert refused.exit_code == 2
+    differences = [line for line in refused.stderr.splitlines() if "in the store" in line]
+    assert len(differences) == 1 and "cycles: 12 in the store, 13 asked for" in differences[0]
