@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from snapbeam.core.files import NoRoomError, atomic_path, check_writable
 from snapbeam.core.foreign import VERSION
-from snapbeam.core.validate import InputError, instance, mapping
+from snapbeam.core.validate import InputError, file_path, instance, mapping
 from snapbeam.core.version import __version__
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def read_netcdf(
     """
     import xarray as xr
 
-    if not Path(path).is_file():
+    if not file_path(name, path).is_file():
         raise InputError(f"{name} = {str(path)!r}: no such file")
     read = xr.open_dataset if lazily else xr.load_dataset
     try:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from snapbeam.core.validate import InputError, InputTypeError, flag, integer, nonnegative
+from snapbeam.core.validate import InputError, InputTypeError, flag, integer, nonnegative, shown
 from snapbeam.model.start import rest_state
 from snapbeam.model.state import State
 from snapbeam.model.system import System
@@ -88,7 +88,7 @@ def starts_of(given: Starts | int) -> Starts:
     if isinstance(given, Starts):
         return given
     if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, np.integer)):
-        raise InputTypeError(f"starts = {given!r}: must be a number of starts, or Starts")
+        raise InputTypeError(f"starts = {shown(given)}: must be a number of starts, or Starts")
     return Starts(count=int(given))
 
 
@@ -110,6 +110,11 @@ def held_in_space(system: System) -> System:
         )
     if striker is None:
         return system
+    if striker.mass is not None:
+        raise InputError(
+            f"striker.mass = {striker.mass:g}: the tools of dynamics know a tip that moves as prescribed; "
+            "march a system with a body of its own by sb.advance(system, every=True), which lands after each cycle"
+        )
     if not striker.drive.harmonic:
         raise InputError("striker.drive: is recorded; dynamics need a drive that repeats, such as a Sine")
     from snapbeam.engines.assemble import make_ensemble

@@ -12,7 +12,8 @@ from matplotlib.colors import LogNorm, Normalize
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError, instance
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, instance, shown
 from snapbeam.figures.axes import axis_label
 from snapbeam.figures.response_map import UPWARD, class_handles, draw_dots, draw_threshold_line, subtitle
 from snapbeam.figures.statistic import scaled_values, wants_powers
@@ -36,6 +37,7 @@ _SHARE = 0.04
 """Room beyond the outermost dots, as a share of the axis."""
 
 
+@checked
 def plot_points(
     dataset: xr.Dataset,
     name: str = "response",
@@ -79,7 +81,7 @@ def plot_points(
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if instance("name", name, str, "text") not in dataset.data_vars or dataset[name].dims != ("point",):
         named = [str(key) for key, item in dataset.data_vars.items() if item.dims == ("point",)]
-        raise InputError(f"variable = {name!r}: the points have {', '.join(named) or 'no variables'}")
+        raise InputError(f"variable = {shown(name)}: the points have {', '.join(named) or 'no variables'}")
     along = _along(dataset, across, upward)
     of_class = name == "response"
     with house_style():
@@ -136,7 +138,7 @@ def _along(dataset: xr.Dataset, across: str | None, upward: str | None) -> tuple
     ]
     for what, given in (("across", across), ("upward", upward)):
         if given is not None and given not in names:
-            raise InputError(f"{what} = {given!r}: the points are given by {', '.join(names) or 'nothing'}")
+            raise InputError(f"{what} = {shown(given)}: the points are given by {', '.join(names) or 'nothing'}")
     differing = [name for name in names if np.unique(dataset[name].values).size > 1]
     free = [name for name in (*differing, *names) if name not in (across, upward)]
     if upward is None:

@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, finite_array, instance
 from snapbeam.figures.agreement import draw_agreement
 from snapbeam.figures.axes import dress, edges_of, symbol_of
@@ -35,6 +36,7 @@ UPWARD = ("velocity_amplitude", "location")
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 
 
+@checked
 def plot_response_map(
     dataset: xr.Dataset,
     ax: Axes | None = None,

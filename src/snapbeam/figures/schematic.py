@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, instance
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, house_style, new_figure
 from snapbeam.figures.surroundings import FRAME, draw_surroundings
@@ -37,6 +38,7 @@ _CYCLES = 8.0
 _LOAD_COLOR = CENTER_COLOR
 
 
+@checked
 def plot_system(system: System, title: str = "") -> Figure:
     """Draw a system: the beam in the well that it rests in and, dashed, in the other, what strikes it, and its drive.
 

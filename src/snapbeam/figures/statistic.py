@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, instance
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, instance, shown
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.figures.axes import dress, edges_of, positions
 from snapbeam.figures.captions import scale_of
@@ -28,6 +29,7 @@ _DECADES = 300.0
 """Greatest over least value, from which colours go by powers of ten."""
 
 
+@checked
 def plot_statistic(
     dataset: xr.Dataset, name: str, ax: Axes | None = None, *, log: bool | None = None
 ) -> Axes:
@@ -59,7 +61,7 @@ def plot_statistic(
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if instance("name", name, str, "text") not in dataset:
-        raise InputError(f"variable = {name!r}: the map has {', '.join(map(str, dataset.data_vars))}")
+        raise InputError(f"variable = {shown(name)}: the map has {', '.join(map(str, dataset.data_vars))}")
     if dataset[name].dims == ("point",):
         from snapbeam.figures.point_list import plot_points
 

@@ -116,7 +116,7 @@ class Beam:
             load = None
         if (level is None) == (load is None):
             raise InputError(
-                f"buckling_level = {level!r}, axial_load = {load!r}: "
+                f"buckling_level = {shown(level)}, axial_load = {shown(load)}: "
                 "give exactly one of the two, the other follows from it"
             )
         for name in ("length", "thickness", "width", "density", "young_modulus"):

@@ -174,10 +174,10 @@ def _chosen(values: Mapping[str, Any], section: str, key: str, known: Mapping[st
     own = dict(values)
     name = own.pop(key, None)
     if name not in known:
-        raise InputError(f"[{section}] {key} = {name!r}: must be one of {', '.join(map(repr, known))}")
+        raise InputError(f"[{section}] {key} = {shown(name)}: must be one of {', '.join(map(repr, known))}")
     kind = known[name]
     _only(own, section, [item.name for item in dataclasses.fields(kind)])
-    _needed(own, section, kind, f" for {key} = {name!r}")
+    _needed(own, section, kind, f" for {key} = {shown(name)}")
     return kind(**own)
 
 

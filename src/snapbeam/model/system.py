@@ -93,7 +93,7 @@ class System:
             )
         if contact is not None and contact.most_modes is not None and model.modes > contact.most_modes:
             raise InputError(
-                f"contact = {contact!r} with modes = {model.modes}: Newton's law needs one mode, since the "
+                f"contact = {shown(contact)} with modes = {model.modes}: Newton's law needs one mode, since the "
                 "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
             )
         if striker is not None and striker.mass is not None and contact is not None and contact.impulsive:

@@ -133,7 +133,7 @@ def advance(
 def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
     if system.contact is not None and not system.contact.keeps.smooth:
         raise InputError(
-            f"tangent with contact = {system.contact!r}: its force jumps, so that the tangent flow does; give none"
+            f"tangent with contact = {shown(system.contact)}: its force jumps, so that the tangent flow does; give none"
         )
     if system.striker is not None and system.striker.mass is not None:
         raise InputError(

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.findings import tell
-from snapbeam.core.validate import InputError, InputTypeError, choice, integer, positive
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, InputTypeError, choice, integer, positive, shown
 from snapbeam.dynamics.flow import Flow, Stroboscope
 from snapbeam.dynamics.orbits.branch import Branch, Event
 from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit
@@ -116,6 +117,7 @@ class Corrector:
         return Orbit(flow, x, self.period, came.jacobian, residual, spot.iterations)
 
 
+@checked
 def continue_orbit(
     orbit: Orbit,
     name: str,
@@ -161,7 +163,7 @@ def continue_orbit(
         For bad input.
     """
     if not isinstance(orbit, Orbit):
-        raise InputTypeError(f"orbit = {orbit!r}: must be an Orbit, as periodic_orbit gives")
+        raise InputTypeError(f"orbit = {shown(orbit)}: must be an Orbit, as periodic_orbit gives")
     low, high = _limits(between)
     begun = orbit.flow.value(name)
     if not low <= begun <= high:
@@ -186,7 +188,7 @@ def _limits(between: tuple[float, float]) -> tuple[float, float]:
         low, high = (float(value) for value in between)
     except (TypeError, ValueError):
         raise InputTypeError(
-            f"between = {between!r}: must be a pair of numbers, least and greatest"
+            f"between = {shown(between)}: must be a pair of numbers, least and greatest"
         ) from None
     if not low < high:
         raise InputError(f"between = ({low:g}, {high:g}): must be increasing")
@@ -360,6 +362,7 @@ def _grazing(corrector: Corrector, one: Spot, other: Spot, at: int) -> Event:
     return Event("grazing", corrector.orbit(best), float(best.y[-1]) * corrector.span, at)
 
 
+@checked
 def switch_branch(event: Event, name: str, between: tuple[float, float], *, size: float = 0.01) -> Orbit:
     """An orbit of the branch that is born at a flip or a branch point, *size* away from it.
 
@@ -386,7 +389,7 @@ def switch_branch(event: Event, name: str, between: tuple[float, float], *, size
         If there is none at that distance; try another.
     """
     if not isinstance(event, Event) or event.kind not in ("flip", "branch point"):
-        raise InputError(f"event = {event!r}: must be a flip or a branch point")
+        raise InputError(f"event = {shown(event)}: must be a flip or a branch point")
     low, high = _limits(between)
     orbit, span = event.orbit, high - low
     doubled = event.kind == "flip"

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.findings import Finding, tell, to_json
-from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive, shown
 from snapbeam.dynamics.flow import Flow, Stroboscope, flow_of
 from snapbeam.dynamics.orbits.passage import Passage, passage_of
 from snapbeam.dynamics.orbits.shooting import Family, NoOrbit, jacobian, newton
@@ -153,6 +154,7 @@ class Orbit:
         return f"<Orbit of period {self.period}: {kind}, largest multiplier {size:.6g}>"
 
 
+@checked
 def periodic_orbit(
     system: System | Flow,
     guess: State | ArrayLike | Orbit | None = None,
@@ -208,7 +210,7 @@ def periodic_orbit(
         if phase is not None:
             flow = Stroboscope(flow.system, flow.integration, phase)
     elif phase is not None:
-        raise InputError(f"phase = {phase!r}: is for a System")
+        raise InputError(f"phase = {shown(phase)}: is for a System")
     periods = integer("period", period, 1, 10_000)
     allowed = positive("tolerance", tolerance)
     x = _guess_of(flow, guess)
@@ -227,7 +229,7 @@ def _guess_of(flow: Flow, guess: State | ArrayLike | Orbit | None) -> _Array:
         return np.array(guess.coordinates)
     if guess is None or isinstance(guess, State):
         if not isinstance(flow, Stroboscope):
-            raise InputTypeError(f"guess = {guess!r}: must be an array of {flow.dimension} numbers")
+            raise InputTypeError(f"guess = {shown(guess)}: must be an array of {flow.dimension} numbers")
         if isinstance(guess, State) and guess.batch:
             raise InputError(f"guess: a batch of shape {guess.batch}: must be one state")
         return flow.coordinates(guess)[0]

@@ -122,7 +122,9 @@ class _KeptCode(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)
+            # without refreshing the context, which loads what only compiling needs, half a second of each start
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
         except Exception as error:  # whatever became of the file: compile
             _LOG.debug("compiled code could not be loaded: %s", error)
             return None

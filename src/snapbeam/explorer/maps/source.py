@@ -320,7 +320,11 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
         return DatasetSource(what)
     if isinstance(what, (str, Path)):
         path = Path(what)
-        if path.is_dir():
+        try:
+            folder = path.is_dir()
+        except (OSError, ValueError) as error:  # a name that no file can have
+            raise InputError(f"file: is no path ({error})") from None
+        if folder:
             from snapbeam.explorer.maps.store import StoreSource
 
             return StoreSource(path)

@@ -10,7 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.findings import Finding
-from snapbeam.core.validate import InputError, InputTypeError, finite_array, nonnegative, positive, shown
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import (
+    InputError,
+    InputTypeError,
+    finite_array,
+    integer,
+    nonnegative,
+    positive,
+    shown,
+)
 
 __all__ = ["HertzStress", "bending_stress", "hertz_stress"]
 
@@ -87,6 +96,7 @@ def hertz_stress(
     )
 
 
+@checked
 def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array:
     """Greatest bending stress along the beam, E (h/2) max abs(w''), Pa, of amplitudes of shape (..., N), shape (...).
 
@@ -103,6 +113,7 @@ def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array
     alpha = finite_array("amplitude", amplitude)
     if alpha.shape[-1:] != (model.modes,):
         raise InputError(f"amplitude of shape {alpha.shape}: must have the shape (..., {model.modes})")
-    shapes = beam.buckling_modes(model.modes).curvature(np.linspace(0.0, beam.length, count))
+    places = np.linspace(0.0, beam.length, integer("count", count, 2, 10**6))
+    shapes = beam.buckling_modes(model.modes).curvature(places)
     found: _Array = 0.5 * beam.young_modulus * beam.thickness * np.abs(alpha @ shapes).max(axis=-1)
     return found

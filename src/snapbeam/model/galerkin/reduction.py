@@ -279,7 +279,7 @@ class ReducedModel(Wells):
 
         A model given by matrices has its one contact point and returns it whatever the location.
         """
-        if np.ndim(location) == 0:
+        if not isinstance(location, (list, tuple)) and np.ndim(location) == 0:
             at: Any = within("location", location, 0.0, 1.0, closed="both")
         else:
             at = finite_array("location", location)
@@ -312,7 +312,9 @@ class ReducedModel(Wells):
         location = within("location", location, 0.0, 1.0)
         compliance = float(np.sum((self.linear_modes.T @ self.shape_at(location)) ** 2))
         if not compliance > _LEAST_COMPLIANCE:
-            raise InputError(f"location = {location!r}: is so near a clamp that the beam does not move there")
+            raise InputError(
+                f"location = {shown(location)}: is so near a clamp that the beam does not move there"
+            )
         return 1.0 / compliance
 
     # ------------------------------------------------------------------ linear modes about a well
