@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snapbeam.core.files import NoRoomError, atomic_path, check_writable
+from snapbeam.core.foreign import VERSION
 from snapbeam.core.validate import InputError, file_path, instance, mapping
+from snapbeam.core.version import __version__
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -60,6 +62,8 @@ def write_netcdf(
 ) -> None:
     """Write a dataset, or one for each group, to a NetCDF file, whole or not at all.
 
+    A root without the attribute ``snapbeam_version`` gets it, by which the file is known.
+
     Parameters
     ----------
     data : xarray.Dataset or mapping of str to xarray.Dataset
@@ -97,6 +101,8 @@ def netcdf_file(path: str | os.PathLike[str]) -> Iterator[h5netcdf.File]:
     with atomic_path(path) as temporary, hdf5_stream(temporary, Path(path)) as stream:
         with h5netcdf.File(stream, "w", invalid_netcdf=False) as file:
             yield file
+            if VERSION not in file.attrs:
+                file.attrs[VERSION] = __version__
 
 
 @contextmanager

@@ -26,7 +26,7 @@ from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["UPWARD", "class_handles", "plot_response_map", "subtitle"]
+__all__ = ["UPWARD", "class_handles", "draw_dots", "draw_threshold_line", "plot_response_map", "subtitle"]
 
 _Array = NDArray[np.float64]
 
@@ -54,7 +54,8 @@ def plot_response_map(
     Parameters
     ----------
     dataset : xarray.Dataset
-        A map with the variable ``response`` over one or two axes of more than one point.
+        A map with the variable ``response`` over one or two axes of more than one point, or over a list of points
+        (:func:`plot_points`).
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
     dots : Dots, optional
@@ -77,6 +78,10 @@ def plot_response_map(
     import xarray as xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if "response" in dataset and dataset["response"].dims == ("point",):
+        from snapbeam.figures.point_list import plot_points
+
+        return plot_points(dataset, "response", ax, dots=dots, threshold_line=threshold_line, legend=legend)
     if "response" in dataset and _is_line(dataset):
         return _line(dataset, ax, dots is not None or threshold_line, legend)
     across, upward, kinds = _two_axes(dataset)
@@ -101,9 +106,9 @@ def plot_response_map(
             handles.append(draw_agreement(ax, dataset, (across, upward), edges))
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
         if threshold_line:
-            handles.append(_draw_threshold(ax, across, upward, fixed))
+            handles.append(draw_threshold_line(ax, across, upward, fixed))
         if dots is not None:
-            handles.append(_draw_dots(ax, dots, across, upward, fixed))
+            handles.append(draw_dots(ax, dots, across, upward, fixed))
         if legend and own is not None:
             own.legend(handles=handles, loc="outside lower center", ncols=2)
         elif legend:
@@ -203,7 +208,8 @@ def _percent(count: int, total: int) -> str:
     return "<0.1 %" if 0.0 < share < 0.1 else f"{share:.1f} %"
 
 
-def _draw_threshold(ax: Axes, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+def draw_threshold_line(ax: Axes, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+    """Draw V_QS1 of one mode (Eq. 21) over two of the paper's coordinates, the third of them fixed."""
     x = np.linspace(*ax.get_xlim(), 402)[1:-1]
     if {across, upward} - {"frequency_ratio", "location", "velocity_amplitude"}:
         raise InputError(
@@ -228,7 +234,8 @@ def _given(fixed: dict[str, float | None], name: str) -> float:
     return value
 
 
-def _draw_dots(ax: Axes, dots: Dots, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+def draw_dots(ax: Axes, dots: Dots, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+    """Draw measured responses over a map, those at other values of its fixed coordinates left out with a warning."""
     keep = np.ones(len(dots), dtype=bool)
     for name, value in fixed.items():
         there = getattr(dots, name)
