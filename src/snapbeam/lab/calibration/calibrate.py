@@ -204,6 +204,10 @@ def calibrate(
             "beam: is straight, but frequencies about wells were measured; give a buckling_level (in the file of "
             "--config)"
         )
+    if beam.ends.left != beam.ends.right and any(item.parity for item in data):
+        raise InputError(
+            "lower_well_shape, upper_well_shape: between unequal ends no mode is symmetric; give frequencies by order"
+        )
     fitted_to = _fit(beam, data, names, count)
     findings = list(fitted_to.findings)
     result = _changed(beam, names, fitted_to.logs)
