@@ -113,7 +113,7 @@ class Config:
         contact: dict[str, Any] = {}
         of_contact = self.section("contact")
         if (
-            law_of(of_contact) in ("hertz", "hunt_crossley")
+            law_of(of_contact) in ("hertz", "hunt_crossley", "layer")
             and not {"stiffness", *MATERIALS} & of_contact.keys()
         ):
             contact = {"stiffness": CONTACT.stiffness}
