@@ -92,7 +92,7 @@ def plot_points(
         fix_ticks(ax)
         at = [_place(axis, dataset, each) for axis, each in zip((ax.xaxis, ax.yaxis), along, strict=True)]
         size = float(np.clip(_AREA / max(at[0].size, 1), _SMALLEST, _LARGEST))
-        look = {"s": size, "linewidths": 0.2 if size > 6.0 else 0.0, "edgecolors": "black"}
+        look: dict[str, Any] = {"s": size, "linewidths": 0.2 if size > 6.0 else 0.0, "edgecolors": "black"}
         look["rasterized"] = at[0].size > 5000
         handles: list[Any] = []
         if of_class:
@@ -138,7 +138,9 @@ def _along(dataset: xr.Dataset, across: str | None, upward: str | None) -> tuple
     ]
     for what, given in (("across", across), ("upward", upward)):
         if given is not None and given not in names:
-            raise InputError(f"{what} = {shown(given)}: the points are given by {', '.join(names) or 'nothing'}")
+            raise InputError(
+                f"{what} = {shown(given)}: the points are given by {', '.join(names) or 'nothing'}"
+            )
     differing = [name for name in names if np.unique(dataset[name].values).size > 1]
     free = [name for name in (*differing, *names) if name not in (across, upward)]
     if upward is None:
@@ -164,11 +166,13 @@ def _place(axis: Axis, dataset: xr.Dataset, name: str) -> NDArray[np.float64]:
         places = inverse.astype(np.float64)
     low, high = float(places.min()), float(places.max())
     margin = _SHARE * (high - low) or 0.5
-    (axis.axes.set_xlim if axis.axis_name == "x" else axis.axes.set_ylim)(low - margin, high + margin)  # type: ignore[attr-defined]
+    (axis.axes.set_xlim if axis.axis_name == "x" else axis.axes.set_ylim)(low - margin, high + margin)
     return places
 
 
-def _statistic(ax: Axes, dataset: xr.Dataset, name: str, at: list[NDArray[np.float64]], look: dict) -> None:  # type: ignore[type-arg]
+def _statistic(
+    ax: Axes, dataset: xr.Dataset, name: str, at: list[NDArray[np.float64]], look: dict[str, Any]
+) -> None:
     """Dots in colours by their value; those without one are hollow."""
     values, label = scaled_values(dataset, name)
     good = np.isfinite(values)
