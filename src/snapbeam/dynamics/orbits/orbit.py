@@ -205,8 +205,8 @@ def periodic_orbit(
     """
     flow = flow_of(system, integration, "reference")
     if isinstance(flow, Stroboscope):
-        if flow.system.striker is None:
-            raise InputError("striker = None: a beam that nothing strikes has no orbit but rest")
+        if flow.system.leads is None:
+            raise InputError("striker = None: a beam that nothing moves has no orbit but rest")
         if phase is not None:
             flow = Stroboscope(flow.system, flow.integration, phase)
     elif phase is not None:
