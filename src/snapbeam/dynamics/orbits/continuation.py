@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from snapbeam.core.findings import tell
 from snapbeam.core.kinds import checked
-from snapbeam.core.validate import InputError, InputTypeError, choice, integer, positive, shown
+from snapbeam.core.validate import InputError, choice, integer, positive, shown
 from snapbeam.dynamics.flow import Flow, Stroboscope
 from snapbeam.dynamics.orbits.branch import Branch, Event
 from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit
@@ -162,8 +162,6 @@ def continue_orbit(
     InputError
         For bad input.
     """
-    if not isinstance(orbit, Orbit):
-        raise InputTypeError(f"orbit = {shown(orbit)}: must be an Orbit, as periodic_orbit gives")
     low, high = _limits(between)
     begun = orbit.flow.value(name)
     if not low <= begun <= high:
@@ -187,9 +185,7 @@ def _limits(between: tuple[float, float]) -> tuple[float, float]:
     try:
         low, high = (float(value) for value in between)
     except (TypeError, ValueError):
-        raise InputTypeError(
-            f"between = {shown(between)}: must be a pair of numbers, least and greatest"
-        ) from None
+        raise InputError(f"between = {shown(between)}: must be a least and a greatest number") from None
     if not low < high:
         raise InputError(f"between = ({low:g}, {high:g}): must be increasing")
     return low, high

@@ -36,7 +36,10 @@ class LayeredHertz(ContactLaw):
         k_l, N/m^2.
     """
 
-    stiffness: float = quantity("N/m^1.5", "contact stiffness", low=0.0, scope=RUN, symbol=r"k_\mathrm{c}")
+    stiffness: float = quantity(
+        "N/m^1.5", "contact stiffness", low=0.0, scope=RUN, symbol="k_c", short="contact_stiffness",
+        plausible=(1.0, 1e15, "N/mm^1.5"),
+    )  # fmt: skip
     layer_stiffness: float = quantity(
         "N/m^2", "stiffness of the layer", low=0.0, scope=RUN, symbol=r"k_\mathrm{l}"
     )

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, instance
+from snapbeam.figures.schematic.surroundings import FRAME, draw_surroundings
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, house_style, new_figure
-from snapbeam.figures.surroundings import FRAME, draw_surroundings
 from snapbeam.model.drive import Flight, Still
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.striker import Striker
