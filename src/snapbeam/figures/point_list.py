@@ -138,7 +138,9 @@ def _along(dataset: xr.Dataset, across: str | None, upward: str | None) -> tuple
     ]
     for what, given in (("across", across), ("upward", upward)):
         if given is not None and given not in names:
-            raise InputError(f"{what} = {shown(given)}: the points are given by {', '.join(names) or 'nothing'}")
+            raise InputError(
+                f"{what} = {shown(given)}: the points are given by {', '.join(names) or 'nothing'}"
+            )
     differing = [name for name in names if np.unique(dataset[name].values).size > 1]
     free = [name for name in (*differing, *names) if name not in (across, upward)]
     if upward is None:
