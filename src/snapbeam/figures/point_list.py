@@ -92,7 +92,7 @@ def plot_points(
         fix_ticks(ax)
         at = [_place(axis, dataset, each) for axis, each in zip((ax.xaxis, ax.yaxis), along, strict=True)]
         size = float(np.clip(_AREA / max(at[0].size, 1), _SMALLEST, _LARGEST))
-        look = {"s": size, "linewidths": 0.2 if size > 6.0 else 0.0, "edgecolors": "black"}
+        look: dict[str, Any] = {"s": size, "linewidths": 0.2 if size > 6.0 else 0.0, "edgecolors": "black"}
         look["rasterized"] = at[0].size > 5000
         handles: list[Any] = []
         if of_class:
@@ -170,7 +170,9 @@ def _place(axis: Axis, dataset: xr.Dataset, name: str) -> NDArray[np.float64]:
     return places
 
 
-def _statistic(ax: Axes, dataset: xr.Dataset, name: str, at: list[NDArray[np.float64]], look: dict) -> None:  # type: ignore[type-arg]
+def _statistic(
+    ax: Axes, dataset: xr.Dataset, name: str, at: list[NDArray[np.float64]], look: dict[str, Any]
+) -> None:
     """Dots in colours by their value; those without one are hollow."""
     values, label = scaled_values(dataset, name)
     good = np.isfinite(values)
