@@ -53,6 +53,7 @@ if TYPE_CHECKING:
         HertzContact,
         HuntCrossley,
         KelvinVoigt,
+        LayeredHertz,
         PowerLaw,
         Restitution,
         bending_stress,
@@ -136,6 +137,7 @@ __all__ = [
     "Integration",
     "Keeping",
     "KelvinVoigt",
+    "LayeredHertz",
     "LifetimeOf",
     "Limit",
     "LoadRamp",
@@ -265,8 +267,8 @@ _NAMES = {
     "dynamics.starts": "Starts",
     "engines.outcomes": "STATISTICS Statistic",
     "model.beam": "Beam",
-    "model.contact": "ContactLaw HertzContact HuntCrossley KelvinVoigt PowerLaw Restitution bending_stress "
-    "hertz_stress",
+    "model.contact": "ContactLaw HertzContact HuntCrossley KelvinVoigt LayeredHertz PowerLaw Restitution "
+    "bending_stress hertz_stress",
     "model.drive": "AccelerationSine Burst Chirp DisplacementSine Drive Flight HalfSine Noise Recorded Sine Still "
     "TwoSines",
     "model.galerkin.frequencies": "exact_natural_freq",

@@ -113,7 +113,7 @@ class Config:
         contact: dict[str, Any] = {}
         of_contact = self.section("contact")
         if (
-            law_of(of_contact) in ("hertz", "hunt_crossley")
+            law_of(of_contact) in ("hertz", "hunt_crossley", "layer")
             and not {"stiffness", *MATERIALS} & of_contact.keys()
         ):
             contact = {"stiffness": CONTACT.stiffness}
@@ -262,6 +262,7 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config
     InputError
         One line for each thing that is wrong: unknown names, wrong kinds, wrong units.
     """
+    instance("source", source, str, "text")
     found, lines = checked_sections(sections)
     config = Config(found)
     lines = lines or contradictions(found)

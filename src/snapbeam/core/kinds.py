@@ -120,7 +120,11 @@ def checked(function: _F) -> _F:
     def door(*args: Any, **named: Any) -> Any:
         if not known:
             known.update({name: _members(kind) for name, kind in _kinds(function).items()})
-        for name, value in signature.bind(*args, **named).arguments.items():
+        try:
+            given = signature.bind(*args, **named).arguments
+        except TypeError:
+            return function(*args, **named)  # which says so in Python's words
+        for name, value in given.items():
             kinds = known.get(name)
             if kinds is None:
                 continue

@@ -125,6 +125,10 @@ class Stroboscope:
             raise InputError(
                 f"tolerance = {self.integration.tolerance:g}: is for one run; give steps, or accuracy = 'reference'"
             )
+        if self.phase is not None and self.system.has_surroundings:
+            raise InputError(
+                f"phase = {self.phase:g}: a base or an axial load is at its own phase when a period begins; give none"
+            )
         object.__setattr__(self, "system", held_in_space(self.system))
 
     @property

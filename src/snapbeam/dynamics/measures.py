@@ -49,6 +49,8 @@ def _labels(labels: ArrayLike) -> NDArray[np.int64]:
         array = np.asarray(labels)
     except ValueError:
         raise InputError("labels: must be an array, not a list of unequal lengths") from None
+    except Exception as error:  # of an object that cannot be one
+        raise InputTypeError(f"labels = {shown(labels)}: must be an array of labels ({error})") from None
     if array.dtype.kind not in "iub":
         raise InputTypeError(f"labels of {array.dtype}: must be whole numbers")
     if array.ndim < 1 or array.size < 2:
@@ -183,7 +185,7 @@ def integrity(
         Distance between points along each axis; 1 by default.
     """
     grid = _labels(labels)
-    inside = np.pad(grid == int(label), 1)
+    inside = np.pad(grid == integer("label", label, -(2**31), 2**31), 1)
     steps = np.ones(grid.ndim) if spacing is None else np.asarray(spacing, dtype=float)
     if steps.shape != (grid.ndim,) or not (steps > 0.0).all():
         raise InputError(

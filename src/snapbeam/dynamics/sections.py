@@ -69,8 +69,8 @@ def poincare(
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
-    if system.striker is None:
-        raise InputError("striker = None: a section of a beam that nothing strikes is of no drive")
+    if system.leads is None:
+        raise InputError("striker = None: a section of a beam that nothing moves is of no drive")
     total, before = integer("periods", periods, 1, 10**6), integer("transient", transient, 0, 10**7)
     flow = Stroboscope(system, Integration() if integration is None else integration, phase)
     level = _level(section)
@@ -79,7 +79,9 @@ def poincare(
         begun = flow.march(begun, before).states
     if not np.isfinite(begun).all():
         raise InputError("transient: the run failed before the section; use a smaller step")
-    held = flow.system.replace(**{"start": flow.state(begun[0]), "drive.phase": flow.striker_phase})
+    held = flow.system.replace(start=flow.state(begun[0]))
+    if held.striker is not None:
+        held = held.replace(**{"drive.phase": flow.striker_phase})
     how = flow.integration.replace(cycles=total, early_decision=False)
     end = total * flow.period
     if section == "stroboscopic":

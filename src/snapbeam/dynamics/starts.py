@@ -103,11 +103,12 @@ def held_in_space(system: System) -> System:
         For a recorded drive, whose periods differ.
     """
     striker = system.striker
-    if system.has_surroundings:
+    if system.harvester is not None:
         raise InputError(
-            "base, axial, harvester: the tools of dynamics know a beam and its striker alone; march a system with any "
-            "of these by sb.advance(system, every=True), which lands after each cycle"
+            "harvester: has a state of its own, which the tools of dynamics do not carry; march such a system by "
+            "sb.advance(system, every=True), which lands after each cycle"
         )
+    _require_common_period(system)
     if striker is None:
         return system
     if striker.mass is not None:
@@ -127,3 +128,20 @@ def held_in_space(system: System) -> System:
         return held
     free = State(amplitude=start.amplitude, velocity=start.velocity, phase=start.phase)
     return System(held.model, held.contact, held.striker, free)
+
+
+def _require_common_period(system: System) -> None:
+    """Refuse a base or an axial load that does not repeat with the cycle that is asked about."""
+    if len(system.moving) == 0:
+        return
+    (section, first), *others = system.moving
+    for name, drive in system.moving if system.has_surroundings else ():
+        if not drive.harmonic:
+            raise InputError(f"{name}: is no sine; dynamics need what repeats")
+    for name, drive in others:
+        times = float(drive.frequency_ratio) / float(first.frequency_ratio)  # type: ignore[attr-defined]
+        if round(times) < 1 or abs(times - round(times)) > 1e-12 * times:
+            raise InputError(
+                f"{name}.frequency_ratio = {drive.frequency_ratio:g}: must be a whole multiple of that of {section}, "  # type: ignore[attr-defined]
+                f"{first.frequency_ratio:g}, after whose period the system is seen"  # type: ignore[attr-defined]
+            )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import cmcrameri.cm as crameri
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
+from matplotlib.axis import Axis, XAxis
 from matplotlib.colors import LogNorm, Normalize
 from numpy.typing import NDArray
 
@@ -97,7 +97,7 @@ def plot_points(
         handles: list[Any] = []
         if of_class:
             kinds = dataset[name].values.astype(int)
-            ax.scatter(*at, c=[CLASS_COLORS[ResponseClass(int(kind))] for kind in kinds], **look)
+            ax.scatter(at[0], at[1], c=[CLASS_COLORS[ResponseClass(int(kind))] for kind in kinds], **look)
             handles += class_handles(kinds)
         else:
             _statistic(ax, dataset, name, at, look)
@@ -166,7 +166,8 @@ def _place(axis: Axis, dataset: xr.Dataset, name: str) -> NDArray[np.float64]:
         places = inverse.astype(np.float64)
     low, high = float(places.min()), float(places.max())
     margin = _SHARE * (high - low) or 0.5
-    (axis.axes.set_xlim if axis.axis_name == "x" else axis.axes.set_ylim)(low - margin, high + margin)  # type: ignore[attr-defined]
+    limits = axis.axes.set_xlim if isinstance(axis, XAxis) else axis.axes.set_ylim
+    limits(low - margin, high + margin)
     return places
 
 

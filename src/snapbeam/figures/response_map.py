@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.kinds import checked
-from snapbeam.core.validate import InputError, finite_array, instance
+from snapbeam.core.validate import InputError, InputTypeError, finite_array, instance
 from snapbeam.figures.agreement import draw_agreement
 from snapbeam.figures.axes import dress, edges_of, positions, symbol_of
 from snapbeam.figures.captions import beam_text
@@ -208,7 +208,10 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
         Classes of runs, whose shares then stand beside the names; unknown ones are named if there are any.
     """
     if kinds is not None:
-        shown_kinds = np.asarray(kinds)
+        try:
+            shown_kinds = np.asarray(kinds, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputTypeError("kinds: must be an array of class codes") from None
         # points that a picture leaves out are NaN in it
         kinds = finite_array("kinds", shown_kinds[shown_kinds == shown_kinds]).astype(np.int8)
     handles: list[Patch | Line2D] = []

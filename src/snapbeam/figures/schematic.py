@@ -31,6 +31,7 @@ _LAWS = {
     "hertz": "Hertz",
     "hunt_crossley": "Hunt–Crossley",
     "kelvin_voigt": "Kelvin–Voigt",
+    "layer": "Hertz, layer",
     "power": "power law",
     "restitution": "restitution",
 }

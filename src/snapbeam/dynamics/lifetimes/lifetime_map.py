@@ -95,8 +95,13 @@ def lifetime_map(
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
-    if system.striker is None:
-        raise InputError("striker = None: a beam that nothing strikes does not go on snapping")
+    if system.striker is None or system.has_surroundings:
+        raise InputError(
+            "base, axial, harvester: starts differ by the phase of a striker, and what else moves has a phase to it; "
+            "march a batch of states by sb.advance(system, every=True) and count"
+            if system.has_surroundings
+            else "striker = None: a beam that nothing strikes does not go on snapping"
+        )
     integration = Integration() if integration is None else integration
     if not isinstance(integration, Integration):
         raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")

@@ -205,8 +205,8 @@ def periodic_orbit(
     """
     flow = flow_of(system, integration, "reference")
     if isinstance(flow, Stroboscope):
-        if flow.system.striker is None:
-            raise InputError("striker = None: a beam that nothing strikes has no orbit but rest")
+        if flow.system.leads is None:
+            raise InputError("striker = None: a beam that nothing moves has no orbit but rest")
         if phase is not None:
             flow = Stroboscope(flow.system, flow.integration, phase)
     elif phase is not None:
@@ -220,6 +220,8 @@ def periodic_orbit(
         if not np.isfinite(x).all():
             raise NoOrbit("the run from the guess failed; see its status with sb.advance")
     tell(getattr(flow, "findings", ()))
+    if not all(isinstance(orbit, Orbit) for orbit in deflate):
+        raise InputTypeError(f"deflate = {shown(deflate)}: must be orbits, as periodic_orbit gives")
     known = tuple(point for orbit in deflate for point in orbit.points)
     return shoot(flow, x, periods, allowed, integer("iterations", iterations, 1, 10_000), deflate=known)
 

@@ -331,4 +331,6 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
         if not path.exists():
             raise InputError(f"map = {str(path)!r}: there is no such file or store")
         return FileSource(path)
-    raise InputTypeError(f"map = {what!r}: must be a map, a file, a store, a System, or nothing")
+    raise InputTypeError(
+        f"map is a {type(what).__name__}: must be a map, a file, a store, a System, or nothing"
+    )

@@ -279,12 +279,14 @@ class ReducedModel(Wells):
 
         A model given by matrices has its one contact point and returns it whatever the location.
         """
-        if not isinstance(location, (list, tuple)) and np.ndim(location) == 0:
+        if isinstance(location, (int, float, np.number)):
             at: Any = within("location", location, 0.0, 1.0, closed="both")
         else:
             at = finite_array("location", location)
-            if at.size and (at.min() < 0.0 or at.max() > 1.0):
-                raise InputError(f"location from {at.min():g} to {at.max():g}: must lie in [0, 1]")
+            if at.ndim == 0:
+                at = float(at)
+            if np.size(at) and (np.min(at) < 0.0 or np.max(at) > 1.0):
+                raise InputError(f"location from {np.min(at):g} to {np.max(at):g}: must lie in [0, 1]")
         if self.beam is None:
             assert self.contact_shape is not None
             several = np.ndim(at) > 0

@@ -95,7 +95,7 @@ def pinned_load(square: _Array, k0: _Array) -> float:
         return lowest_free if np.isfinite(lowest_free) else float(poles[0] + 1e6 * abs(poles[0]))
     gap = poles[1] - poles[0]
     low, high = poles[0] + 1e-13 * gap, poles[1] - 1e-13 * gap
-    # rises from -infinity to infinity; halved here, since loading scipy.optimize takes a quarter of a second of each start
+    # rises from -infinity to infinity; halved here: scipy.optimize would take a quarter of a second of each start
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         if np.sum(square[touched] / (k0[touched] - middle)) > 0.0:
