@@ -15,10 +15,9 @@ from snapbeam.core.codes import ResponseClass
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, instance
 from snapbeam.figures.agreement import draw_agreement
-from snapbeam.figures.axes import dress, edges_of, symbol_of
+from snapbeam.figures.axes import dress, edges_of, positions, symbol_of
 from snapbeam.figures.captions import beam_text
 from snapbeam.figures.panels import class_cells
-from snapbeam.figures.response_line import draw_response_line
 from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_figure
 from snapbeam.lab.compare.dots import Dots
 from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
@@ -33,6 +32,8 @@ _Array = NDArray[np.float64]
 UPWARD = ("velocity_amplitude", "location")
 """Axes that are drawn upward rather than across, the first of them first."""
 
+_CURVES = ("min_center_displacement", "max_center_displacement")
+"""Drawn over the classes of a map over one axis."""
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 
 
@@ -131,7 +132,7 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
         ax = own.add_subplot() if own is not None else ax
         assert ax is not None
         fix_ticks(ax)
-        draw_response_line(ax, dataset, name)
+        _draw_line(ax, dataset, name)
         ax.set_title(subtitle(dataset, (name,)), loc="left")
         handles = class_handles(dataset["response"].values)
         if legend and own is not None:
@@ -139,6 +140,25 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
         elif legend:
             ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
     return ax
+
+
+def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
+    """Draw classes along the axis *name*, with the least and the greatest displacement of the centre above them."""
+    points, _ = positions(dataset, name)
+    edges = edges_of(dataset, name)
+    kinds = dataset["response"].squeeze().values[None, :]
+    low, high = -1.6, 1.6
+    curves = [dataset[key].squeeze().values for key in _CURVES if key in dataset]
+    if curves and np.isfinite(np.concatenate(curves)).any():
+        low, high = min(low, np.nanmin(curves[0])), max(high, np.nanmax(curves[-1]))
+    pad = 0.08 * (high - low)
+    class_cells(ax, edges, np.array([low - pad, high + pad]), kinds)
+    for curve in curves:
+        ax.plot(points, curve, color="white", linewidth=2.0)
+        ax.plot(points, curve, ".-", color="black", linewidth=0.8, markersize=2.5)
+    dress(ax.xaxis, dataset, name)
+    ax.set_ylabel("Centre displacement $w/b$,\nleast and greatest")
+    ax.set(xlim=edges[[0, -1]], ylim=(low - pad, high + pad))
 
 
 def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
