@@ -44,8 +44,10 @@ __all__ = [
     "fig8",
     "figA9",
     "figB10",
+    "harvesting",
     "lifetimes",
     "low_frequency",
+    "notch",
     "resonance",
     "sensitivity",
     "shared_results",
@@ -77,6 +79,10 @@ windows = Recipe("windows", "amplitudes of transient responses near a clamp and 
 disturbances = Recipe(
     "disturbances", "start-up transients, starts off the well, impacts without higher modes", "studies"
 )
+harvesting = Recipe(
+    "harvesting", "power of a harvester by impact, and its share at high frequencies", "studies"
+)
+notch = Recipe("notch", "how far each thing left out of the model moves the notch of fig6", "studies")
 sensitivity = Recipe("sensitivity", "how the map changes with what the paper leaves open", "studies")
 
 FIGURES: dict[str, Recipe] = {
@@ -84,6 +90,7 @@ FIGURES: dict[str, Recipe] = {
     for recipe in (
         fig2, fig3, fig4, fig5, fig6, fig7, fig8, figA9, figB10, si5,
         low_frequency, resonance, waveforms, transients, lifetimes, windows, disturbances, sensitivity,
+        notch, harvesting,
     )
 }  # fmt: skip
 """Every recipe by name: the figures of the paper, its fifth video, and those that its claims need beside."""
