@@ -159,7 +159,7 @@ def kicked(flow: Stroboscope, size: float | None, horizon: int) -> tuple[_Array,
     sizes = [0.1 * 2.0**k for k in range(8)] if size is None else [positive("kick", size)]
     rows = np.repeat(quiet[None], len(sizes) + 1, axis=0)
     rows[1:, flow.modes] += towards * np.array(sizes)
-    told = _snaps(flow, rows, horizon)
+    told = _snaps(flow, rows, integer("horizon", horizon, 1, 10**6))
     if told[0]:
         raise InputError(f"the start: it snaps within {horizon} periods by itself; take a weaker drive")
     if not told.any():

@@ -210,7 +210,7 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
     if kinds is not None:
         try:
             shown_kinds = np.asarray(kinds, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputTypeError("kinds: must be an array of class codes") from None
         # points that a picture leaves out are NaN in it
         kinds = finite_array("kinds", shown_kinds[shown_kinds == shown_kinds]).astype(np.int8)

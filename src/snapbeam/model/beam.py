@@ -123,9 +123,9 @@ class Beam:
             self._set(name, _beam_quantities()[name].check(name, getattr(self, name)))
         try:
             level, load = self._completed(level, load)
-        except OverflowError:
+        except (OverflowError, ZeroDivisionError):
             raise InputError(
-                f"length = {self.length:g} m, buckling_level = {level!r}: the square of one is more than a number holds"
+                f"length = {self.length:g} m, buckling_level = {level!r}: a square is out of what a number holds"
             ) from None
         self._set("axial_load", load)
         self._set("buckling_level", level)

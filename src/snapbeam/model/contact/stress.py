@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -62,6 +63,16 @@ class HertzStress:
         )
 
 
+def _held(value: Callable[[], float]) -> float:
+    try:
+        found = value()
+    except (OverflowError, ZeroDivisionError):
+        found = math.inf
+    if not math.isfinite(found):
+        raise InputError("force, stiffness, radius, yield_stress: their stress is more than a number holds")
+    return found
+
+
 def hertz_stress(
     force: float, stiffness: float, radius: float, yield_stress: float | None = None
 ) -> HertzStress:
@@ -87,10 +98,10 @@ def hertz_stress(
     limit = None
     if yield_stress is not None:
         pressure = _YIELD * positive("yield_stress", yield_stress, "Pa")
-        limit = math.pi**3 * radius**2 * pressure**3 / (6.0 * modulus**2)
+        limit = _held(lambda: math.pi**3 * radius**2 * pressure**3 / (6.0 * modulus**2))
     return HertzStress(
-        pressure=(6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0),
-        contact_radius=(0.75 * force * radius / modulus) ** (1.0 / 3.0),
+        pressure=_held(lambda: (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)),
+        contact_radius=_held(lambda: (0.75 * force * radius / modulus) ** (1.0 / 3.0)),
         yield_force=limit,
         force=force,
     )
