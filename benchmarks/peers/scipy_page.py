@@ -25,7 +25,7 @@ from benchmarks.peers.equations import equations_of
 
 __all__ = ["TOLERANCE", "page", "waveform"]
 
-TOLERANCE = 1e-8
+TOLERANCE = 1e-9
 _WEIGHT = 400.0
 """How much looser the absolute tolerance is on velocities, as in the bench."""
 _SAMPLES = 4000
