@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import covering
 import numpy as np
 import pytest
 from small import small_system
@@ -9,7 +10,6 @@ from small import small_system
 import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.validate import InputError
-from snapbeam.design.posterior.posterior import _population
 from snapbeam.figures import Dots
 from snapbeam.lab.calibration.calibrate import calibrate
 from snapbeam.lab.calibration.measurements import ContactTest, Measurements
@@ -57,32 +57,9 @@ def test_what_the_data_do_not_say_stays_as_it_was() -> None:
 
 @pytest.mark.slow
 def test_intervals_cover() -> None:
-    """400 beams from the prior, measured with errors of 2 %: 93 to 97 % of the intervals hold the beam.
-
-    Frequencies as those of one mode go: with the thickness h where it is straight, with the buckling level b about a
-    well, and a third one with both.
-    """
-    draw, covered = np.random.default_rng(11), []
-    known = np.array(list(PRIOR.values()))
-
-    def frequencies(logs):
-        h, b = np.exp(logs)
-        return np.array([30.0 * h, 80.0 * b, 150.0 * np.sqrt(h**2 + 0.5 * b**2)])
-
-    for trial in range(400):
-        truth = known * draw.standard_normal(2)
-        seen = frequencies(truth) * (1.0 + 0.02 * draw.standard_normal(3))
-
-        def terms(logs, seen=seen, error=0.02 * frequencies(truth)):  # noqa: B008
-            return np.concatenate([(frequencies(logs) - seen) / error, logs / known])
-
-        logs, weights = _population(terms, np.zeros(2), 400, trial)
-        limits = sb.Posterior(("beam.thickness", "beam.buckling_level"), logs, weights).interval()
-        covered.append(
-            [low <= value <= high for (_, low, high), value in zip(limits.values(), truth, strict=True)]
-        )
-    print("covered", np.mean(covered, axis=0))
-    assert 0.93 <= np.mean(covered) <= 0.97
+    """400 beams from the prior, measured with errors of 2 %: 93 to 97 % of the intervals hold the beam."""
+    counted = covering.posterior()
+    assert counted.trials == 400 and 0.93 <= counted.all <= 0.97, counted
 
 
 def test_what_follows_is_drawn_from_it() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import covering
 import numpy as np
 import pytest
 from small import small_system
@@ -35,25 +36,12 @@ def test_ishigami() -> None:
 
 
 @pytest.mark.slow
-def test_intervals_cover() -> None:
+@pytest.mark.parametrize("kind", ["sobol", "given"])
+def test_intervals_cover(kind: str) -> None:
     """93 to 97 % of 400 trials, over the indices."""
-    covered = []
-    for seed in range(400):
-        found = sb.sobol(ishigami, 3, 16, seed=seed)
-        covered += [
-            ((each.low <= truth) & (truth <= each.high))
-            for each, truth in ((found.first, FIRST), (found.total, TOTAL))
-        ]
-    shares = np.array(covered).reshape(400, 2, 3).mean(axis=0)
-    print("sobol", shares)
-    assert (shares > 0.92).all() and 0.93 <= np.mean(covered) <= 0.97
-    covered = []
-    for seed in range(400):
-        ranks = np.random.default_rng(seed).random((2000, 3))
-        given = sb.given_data_indices(ranks, ishigami(ranks.T), seed=seed)
-        covered.append((given.low <= FIRST) & (FIRST <= given.high))
-    print("given data", np.mean(covered, axis=0))
-    assert (np.mean(covered, axis=0) > 0.92).all() and 0.93 <= np.mean(covered) <= 0.97
+    counted = covering.KINDS[kind][1]()
+    assert counted.trials == 400 and 0.93 <= counted.all <= 0.97, counted
+    assert min(counted.shares.values()) > 0.92, counted
 
 
 def test_correlated_inputs_are_no_trouble_for_given_data() -> None:

@@ -10,6 +10,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import study_claims
 import xarray as xr
 from scipy import stats
 
@@ -91,7 +92,25 @@ def lasting(ds: xr.Dataset) -> str:
     still = last > end
     _, low, high = proportion(int(still.sum()), last.size)
     share = f"{int(still.sum())} of {last.size} ({low:.2f} to {high:.2f})"
-    return f"{share}, the others ended within {last[~still].max():.0f} cycles"
+    return share if still.all() else f"{share}, the others ended within {last[~still].max():.0f} cycles"
+
+
+def _many(data: dict[str, xr.Dataset]) -> list[str]:
+    """The same of 32 modes, once data hold it."""
+    if "long_many_map" not in data:
+        return []
+    ratio, velocity = (
+        float(data["long_many_map"].attrs[name]) for name in ("frequency_ratio", "velocity_amplitude")
+    )
+    told = [f"at level {level} {lasting(data[f'long_many_{level}'])}" for level in ("map", "reference")]
+    return ["", f"32 modes at ({ratio:g}, {velocity:g}), 10,000 cycles: still snapping {'; '.join(told)}."]
+
+
+def rows() -> list[study_claims.Row]:
+    """What the study claims."""
+    data = stored("lifetimes")
+    shares = {modes: plane(data[f"modes_{modes}"], 950) for modes in MODES}
+    return study_claims.claims(data, shares, figures(), sensitivity())
 
 
 def text() -> str:
@@ -147,6 +166,7 @@ def text() -> str:
         "",
         "One mode at (1.625, 0.3), 10,000 cycles: still snapping at accuracy level map "
         f"{lasting(data['long_map'])}; at level reference {lasting(data['long_reference'])}.",
+        *_many(data),
         "",
         "| at (1.625, 0.3), 32 modes | value | from |",
         "|---|---|---|",
@@ -161,6 +181,7 @@ def text() -> str:
     for name, (words, source) in sources.items():
         value, error = found[name]
         lines.append(f"| {words} | {value:.4f} ± {error:.4f} | {source} |")
+    lines += ["", *study_claims.table(rows())]
     return "\n".join(lines) + "\n"
 
 

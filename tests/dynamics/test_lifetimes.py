@@ -9,6 +9,7 @@ import xarray as xr
 import snapbeam as sb
 from snapbeam import paper
 from snapbeam.dynamics.lifetimes.lifetime_map import refit
+from snapbeam.model.start import rest_state
 
 MEASURED = {(1.21, 0.25): 32.0, (1.625, 0.3): 46.0, (2.5, 0.55): 89.0, (3.5, 0.6): 99.0}
 """Lifetimes in cycles, N = 32, from some 210 runs each: to 7 %."""
@@ -127,3 +128,23 @@ def test_refusals(given, words: str) -> None:
 def test_a_free_beam_is_refused() -> None:
     with pytest.raises(sb.InputError, match="striker = None"):
         sb.lifetime_map(sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), paper.CONTACT))
+
+
+def test_no_start_presses_the_tip() -> None:
+    """Beside a tip that hardly moves nothing touches at the start: an overlap would shoot the beam away."""
+    ds = sb.lifetime_map(
+        system_of(1, 1.2, 0.0005), {"location": [0.3, 0.5]}, SHORT, starts=sb.Starts(count=64, displacement=1e-5),
+        survival=sb.Survival(quiet=20.0),
+    )  # fmt: skip
+    assert (ds.runs_never == 64).all() and (ds.end_probability.sel(well="first") == 1.0).all()
+    system = system_of(4)
+    for side, away in (("below", 1.0), ("above", -1.0)):
+        turned = system.replace(**{"striker.side": side})
+        for number in range(6):
+            place = np.array([0.1, 0.35, 0.5])
+            many = sb.Starts(count=6).state(turned, number, location=place)
+            rest = rest_state(turned.model, turned.striker)
+            moved = np.sum(turned.model.shape_at(place) * (many.amplitude - rest.amplitude), axis=-1)
+            assert (away * moved > 0.0).all()
+            one = sb.Starts(count=6).state(turned.replace(**{"striker.location": 0.35}), number)
+            np.testing.assert_array_equal(one.amplitude, many.amplitude[1])

@@ -19,7 +19,7 @@ from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.design.spread import Spread
 from snapbeam.dynamics.starts import Starts, held_in_space
 from snapbeam.model.integration import Integration
-from snapbeam.model.start import amplitude_scale, rest_state
+from snapbeam.model.start import amplitude_scale
 from snapbeam.model.system import System
 from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.points import Columns, PointList
@@ -216,22 +216,18 @@ class Trials:
         striker, size = self.system.striker, numbers.size
         assert striker is not None
         modes = self.system.model.modes
-        away = 1.0 if striker.side == "below" else -1.0
         location = columns.get("striker.location", np.full(size, striker.location))
         table = np.empty((size, 2, modes))
         starts = Starts(count=1, displacement=self.spread.displacement, seed=self.spread.seed)
         for system, which in self._structures(columns, size):
             scale = amplitude_scale(system.model)
             speed = scale * 2.0 * np.pi * system.model.reference_freq
-            rest = system.start if system.start is not None else rest_state(system.model, system.striker)
-            begun = np.stack((rest.amplitude / scale, rest.velocity / speed))
-            made: dict[int, NDArray[np.float64]] = {}
-            for number in {int(numbers[i]) for i in which}:
-                state = starts.state(system, number)
-                made[number] = np.stack((state.amplitude / scale, state.velocity / speed)) - begun
-            change = np.array([made[int(numbers[i])] for i in which])
-            reach = np.sum(np.atleast_2d(system.model.shape_at(location[which])) * change[:, 0], axis=-1)
-            table[which] = begun + np.where(away * reach < 0.0, -1.0, 1.0)[:, None, None] * change
+            runs: dict[int, list[int]] = {}
+            for i in which:
+                runs.setdefault(int(numbers[i]), []).append(i)
+            for number, alike in runs.items():
+                state = starts.state(system, number, location=location[alike])
+                table[alike] = np.stack((state.amplitude / scale, state.velocity / speed), axis=1)
         return {
             f"start.{what}[{mode + 1}]": table[:, k, mode]
             for k, what in enumerate(("amplitude", "velocity"))

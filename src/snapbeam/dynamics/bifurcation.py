@@ -174,8 +174,9 @@ class _Diagram:
     def begin(self, label: str, starts: Starts, number: int, report: Callable[[int], None]) -> None:
         """Every value from one start."""
         system = self.flow.system
-        state = starts.state(system, number, system.start or rest_state(system.model, system.striker))
-        rows = np.repeat(self.flow.coordinates(state), self.values.size, axis=0)
+        place = self.values if self.name == "striker.location" else None
+        state = starts.state(system, number, system.start or rest_state(system.model, system.striker), place)
+        rows = np.broadcast_to(self.flow.coordinates(state), (self.values.size, self.flow.dimension))
         kept, counts = self._go(rows, np.arange(self.values.size))
         self.sweeps.append(label)
         self.rows.append(kept)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.validate import InputError, InputTypeError, flag, integer, nonnegative, shown
 from snapbeam.model.start import rest_state
@@ -14,7 +15,7 @@ from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicas, perturbed_start
 
-__all__ = ["Starts", "held_in_space", "starts_of"]
+__all__ = ["Starts", "held_in_space", "leaving", "starts_of"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +28,8 @@ class Starts:
         Starts, at least 1.
     displacement : float
         Root mean square of the change of the centre, m: every linear mode rings with equal mean energy.  0 for none;
-        by default the error of reading a position to a pixel of the paper's camera.
+        by default the error of reading a position to a pixel of the paper's camera.  A start that would press the beam
+        into the tip begins on the other side of its rest: the overlap would hold energy that nothing put there.
     phase : bool
         Whether the drive begins at any phase of the half of its cycle in which the tip is drawn back, so that none
         presses a beam at rest.
@@ -57,15 +59,22 @@ class Starts:
             "displacement": self.displacement,
             "phase": self.phase,
             "seed": self.seed,
+            "side": "away from the tip",
         }
 
-    def state(self, system: System, number: int, state: State | None = None) -> State:
-        """Start *number* of a system, or that start added to *state* or a batch of states."""
+    def state(
+        self, system: System, number: int, state: State | None = None, location: ArrayLike | None = None
+    ) -> State:
+        """Start *number* of a system, or that start added to *state* or a batch of states.
+
+        *location* is where the tip strikes, x_s/L, or that of each of several runs; the system's by default.
+        """
         found = state if state is not None else system.start
         if found is None:
             found = rest_state(system.model, system.striker)
         if self.displacement > 0.0:
-            found = perturbed_start(system, Replicas(1, self.displacement, seed=self.seed), number, found)
+            rung = perturbed_start(system, Replicas(1, self.displacement, seed=self.seed), number, found)
+            found = leaving(system, found, rung, location)
         if not self.phase:
             return found
         generator = np.random.Generator(np.random.Philox(key=[self.seed, number]).jumped())
@@ -76,6 +85,27 @@ class Starts:
             phase=np.array(phase),
             striker_position=found.striker_position,
         )
+
+
+def leaving(system: System, rest: State, begun: State, location: ArrayLike | None = None) -> State:
+    """A state beside *rest*, turned about it where it would move the beam towards the tip.
+
+    *location* is x_s/L, or that of each of several runs; then the state is a batch.
+    """
+    striker = system.striker
+    if striker is None:
+        return begun
+    place = np.asarray(striker.location if location is None else location, dtype=np.float64)
+    change: list[NDArray[np.float64]] = [begun.amplitude - rest.amplitude, begun.velocity - rest.velocity]
+    away = 1.0 if striker.side == "below" else -1.0
+    reach = np.sum(system.model.shape_at(place) * change[0], axis=-1)
+    turn = np.where(away * reach < 0.0, -1.0, 1.0)[..., None]
+    return State(
+        amplitude=rest.amplitude + turn * change[0],
+        velocity=rest.velocity + turn * change[1],
+        phase=begun.phase,
+        striker_position=begun.striker_position,
+    )
 
 
 def starts_of(given: Starts | int) -> Starts:

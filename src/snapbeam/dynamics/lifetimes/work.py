@@ -87,7 +87,9 @@ class LifetimeWork(PointWork):
         setup, found, done = self.setup, dict[str, NDArray[Any]](), 0
         size = next(iter(points.values())).size
         for system, integration, which, own in setup.groups(points):
-            begun = self.starts.state(system, number, setup.start_of(system, own))
+            begun = self.starts.state(
+                system, number, setup.start_of(system, own), own.get("striker.location")
+            )
             columns = {name: values for name, values in own.items() if not name.startswith("start.")}
             ensemble = make_ensemble(system, integration, columns, start=begun)
             ensemble.runs["decide_crossings"] = -1

@@ -24,12 +24,14 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["ENDLESS", "POINTS", "compute", "draw"]
+__all__ = ["ENDLESS", "LONGEST", "POINTS", "compute", "draw"]
 
 POINTS = {"frequency_ratio": (1.21, 1.625, 2.5, 3.5), "velocity_amplitude": (0.25, 0.3, 0.55, 0.6)}
 """Where 32 modes have many starts."""
 ENDLESS = (1.625, 0.3)
 """Where one mode snaps on in many runs; its exponents are measured with 32 modes."""
+LONGEST = (0.75, 0.58)
+"""Where 32 modes snap longest."""
 _SEED = 118291
 _SCALE = (5.0, 5000.0)
 """Of the colours, cycles."""
@@ -73,6 +75,12 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
         )
     found["exponents"] = _exponents(results, most)
     found["sensitivity"] = _sensitivity(results, most)
+    for accuracy in ("map", "reference"):
+        long = sb.Integration(cycles=results.pick(120, 10_000), accuracy=accuracy)
+        found[f"long_many_{accuracy}"] = sb.lifetime_map(
+            _system(most, *LONGEST), None, long, starts=results.pick(2, 8), survival=survival,
+            progress=results.progress(f"longest of {most} modes, {accuracy}"),
+        )  # fmt: skip
     return found
 
 
