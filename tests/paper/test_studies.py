@@ -14,7 +14,7 @@ import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.codes import ResponseClass
 from snapbeam.paper.store import load_results
-from snapbeam.paper.studies import disturbances, notch
+from snapbeam.paper.studies import disturbances, notch, switch
 from snapbeam.paper.studies.harvesting import power_above
 from snapbeam.paper.studies.resonance import ridge
 from snapbeam.paper.studies.sensitivity import buckling_mode_damping
@@ -38,6 +38,7 @@ STUDIES = (
     "sensitivity",
     "lifetimes",
     pytest.param("notch", marks=pytest.mark.slow),
+    pytest.param("switch", marks=pytest.mark.slow),
     pytest.param("harvesting", marks=pytest.mark.slow),
 )
 
@@ -105,6 +106,17 @@ def test_power_above_a_frequency():
     power, share = power_above(voltage, rate, 50.0, 400.0)
     assert power == pytest.approx(5.0 / 50.0, rel=1e-6)
     assert share == pytest.approx(0.1, rel=1e-6)
+
+
+def test_fold_of_a_biased_beam():
+    """The bias at which the lower well is gone: by bisection, and the barrier vanishes there as the power 3/2."""
+    fold = switch.fold_load(2)
+    barriers = []
+    for away in (0.04, 0.01):
+        load = sb.Imperfection(uniform_load=(1.0 - away) * fold)
+        model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, imperfection=load)
+        barriers.append(model.barrier_energy - float(model.potential_energy(model.wells[0])))
+    assert np.log(barriers[0] / barriers[1]) / np.log(4.0) == pytest.approx(1.5, abs=0.05)
 
 
 def test_every_impact_and_passage_belongs_to_a_run(results):

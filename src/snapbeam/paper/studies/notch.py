@@ -52,7 +52,13 @@ def _system(modes: int, beam: sb.Beam = BEAM, **parts: Any) -> sb.System:
     return sb.System(model, contact, sb.Striker(drive=drive, **parts))
 
 
-def _body(mass: float, frequency: float, zeta: float = 0.1) -> dict[str, float]:
+def _ended(**ends: float) -> sb.Beam:
+    """The paper's beam between other ends."""
+    parts: dict[str, Any] = {"ends": sb.Ends(**ends)}
+    return BEAM.replace(**parts)
+
+
+def _body(mass: float, frequency: float, zeta: float = 0.1) -> dict[str, Any]:
     """A shaker of moving mass (kg) on a suspension of its own frequency (Hz) and damping ratio."""
     omega = 2.0 * np.pi * frequency
     return {"mass": mass, "spring": float(mass * omega**2), "damper": float(2.0 * zeta * mass * omega)}
@@ -63,7 +69,7 @@ def _start_up(rise: float) -> sb.Burst:
     return sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.1, length=1e6, rise=rise, fall=1.0)
 
 
-_SOFT = {k: BEAM.replace(ends=sb.Ends(left=k * _UNIT, right=k * _UNIT)) for k in (100.0, 30.0)}
+_SOFT = {k: _ended(left=k * _UNIT, right=k * _UNIT) for k in (100.0, 30.0)}
 _GIVING = BEAM.young_modulus * BEAM.thickness * BEAM.width / BEAM.length
 
 VARIANTS: dict[str, tuple[str, Callable[[int], sb.System]]] = {
@@ -78,7 +84,7 @@ VARIANTS: dict[str, tuple[str, Callable[[int], sb.System]]] = {
     "rises over 20 cycles": ("start-up", lambda n: _system(n, drive=_start_up(20.0))),
     r"$k_\theta = 100\,EI/L$": ("ends", lambda n: _system(n, _SOFT[100.0])),
     r"$k_\theta = 30\,EI/L$": ("ends", lambda n: _system(n, _SOFT[30.0])),
-    "supports give as the beam": ("ends", lambda n: _system(n, BEAM.replace(ends=sb.Ends(axial=_GIVING)))),
+    "supports give as the beam": ("ends", lambda n: _system(n, _ended(axial=_GIVING))),
     "higher well struck": ("asymmetry", lambda n: _system(n, imperfection=sb.Imperfection(rise=1.2e-6))),
     "lower well struck": ("asymmetry", lambda n: _system(n, imperfection=sb.Imperfection(rise=-1.2e-6))),
     "crooked by 5 µm": ("asymmetry", lambda n: _system(n, imperfection=sb.Imperfection(skew=5e-6))),
