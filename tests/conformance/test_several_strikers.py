@@ -14,7 +14,7 @@ import snapbeam as sb
 from snapbeam import paper
 
 FIRST = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.12)
-GAP = 0.15 * LEVEL
+GAP = 0.1 * LEVEL
 
 
 def model(modes: int) -> sb.ReducedModel:
@@ -39,7 +39,7 @@ def still(t: float) -> tuple[float, float]:
 CASES = [
     pytest.param("stop", 1, 3),
     pytest.param("stop", 3, 3),
-    pytest.param("stop", 8, 1, marks=pytest.mark.slow),
+    pytest.param("stop", 8, 2, marks=pytest.mark.slow),
     pytest.param("both move", 1, 3, marks=pytest.mark.slow),
     pytest.param("both move", 3, 2, marks=pytest.mark.slow),
     pytest.param("three", 3, 2, marks=pytest.mark.slow),
@@ -118,6 +118,7 @@ def test_mirrored() -> None:
     np.testing.assert_array_equal(one.dataset.striker_force, other.dataset.striker_force)
 
 
+@pytest.mark.slow
 def test_two_of_half_the_stiffness_are_one() -> None:
     """Two strikers at one place that move alike share the force of one."""
     half = sb.HertzContact(0.5 * CONTACT_STIFFNESS)
@@ -138,17 +139,17 @@ def test_two_of_half_the_stiffness_are_one() -> None:
 
 @pytest.mark.slow
 def test_order() -> None:
-    """Halving the step divides the error by sixteen or so, impacts of both on the way."""
+    """A fifth of the step, impacts of both on the way: order 3.7 measured, 4 but for the edges of contacts."""
     system = sb.System(model(1), paper.CONTACT, [FIRST, stop()])
     times = np.linspace(0.0, 2.0, 101) / (1.21 * model(1).reference_freq) * (1.0 - 1e-12)
     exact = sb.simulate(
         system, sb.Integration(cycles=2, accuracy="reference"), sample_times=times
     ).dataset.displacement
     errors = []
-    for step in (4e-5, 2e-5, 1e-5):
+    for step in (1e-4, 2e-5):
         run = sb.simulate(system, sb.Integration(cycles=2, step=step), sample_times=times)
         errors.append(float(np.abs(run.dataset.displacement - exact).max()))
-    assert math.log2(errors[0] / errors[2]) / 2.0 > 3.3, errors
+    assert math.log(errors[0] / errors[1], 5.0) > 3.3, errors
 
 
 def test_swept_by_dotted_names() -> None:

@@ -80,7 +80,7 @@ def plot_system(system: System, title: str = "") -> Figure:
         if title:
             axes[0].set_title(title, loc="left")
         both = any(each.striker.side != striker.side for each in system.others if striker is not None)
-        outward, inward = 2.55, 2.0 if both else 1.25
+        outward, inward = (2.0, 1.7) if both else (2.55, 1.25)
         axes[0].set_xlim(-0.85, _WIDE + 0.85)
         axes[0].set_ylim(*((-outward, inward) if _sign(striker) > 0.0 else (-inward, outward)))
         axes[0].set_aspect("equal")
@@ -224,6 +224,7 @@ def _caption(
         lines.append(f"gap {gap:.3g} $b$" if gap > 0.0 else f"preload {-gap:.3g} $b$")
     if striker.mass is not None:
         lines.append(r"$m_\mathrm{s}$ = " + _grams(striker.mass))
+    lines = [", ".join(lines)] if number else lines
     right = at < 0.6 * _WIDE
     x = at + 0.75 if right else at - 0.75
     for i, line in enumerate(lines):

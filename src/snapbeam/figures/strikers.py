@@ -29,11 +29,11 @@ def draw_tips(ax: Axes, system: System, tips: list[tuple[int, Any]]) -> None:
     for (number, drive), line in zip(tips, _LINES, strict=False):
         columns = _columns(drive)
         moved = motion_of(drive, columns, scale, times, float(columns.get("phase", np.zeros(1))[0]))
-        ax.plot(times / times[-1] * _CYCLES, moved / scale.length, label=str(number), **line)
+        ax.plot(times / times[-1] * _CYCLES, moved / scale.length, label=f"striker {number}", **line)
     ax.set_xlabel("Cycles of the drive")
     ax.set_ylabel("Tips / $b$")
     ax.set_xlim(0.0, _CYCLES)
-    ax.legend(title="striker", ncols=len(tips), loc="lower center", bbox_to_anchor=(0.5, 1.0), frameon=False)
+    ax.legend(ncols=2, loc="lower center", bbox_to_anchor=(0.45, 1.0), frameon=False, columnspacing=1.0)
 
 
 def _columns(drive: Any) -> dict[str, _Array]:
