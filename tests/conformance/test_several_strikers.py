@@ -38,7 +38,7 @@ def still(t: float) -> tuple[float, float]:
 
 CASES = [
     pytest.param("stop", 1, 3),
-    pytest.param("stop", 3, 3),
+    pytest.param("stop", 3, 2),
     pytest.param("stop", 8, 2, marks=pytest.mark.slow),
     pytest.param("both move", 1, 3, marks=pytest.mark.slow),
     pytest.param("both move", 3, 2, marks=pytest.mark.slow),
@@ -139,17 +139,17 @@ def test_two_of_half_the_stiffness_are_one() -> None:
 
 @pytest.mark.slow
 def test_order() -> None:
-    """A fifth of the step, impacts of both on the way: order 3.7 measured, 4 but for the edges of contacts."""
+    """Half the step, impacts of both on the way: order 3.8 measured; a finer one is as good as the reference."""
     system = sb.System(model(1), paper.CONTACT, [FIRST, stop()])
     times = np.linspace(0.0, 2.0, 101) / (1.21 * model(1).reference_freq) * (1.0 - 1e-12)
     exact = sb.simulate(
         system, sb.Integration(cycles=2, accuracy="reference"), sample_times=times
     ).dataset.displacement
     errors = []
-    for step in (1e-4, 2e-5):
+    for step in (1e-4, 5e-5):
         run = sb.simulate(system, sb.Integration(cycles=2, step=step), sample_times=times)
         errors.append(float(np.abs(run.dataset.displacement - exact).max()))
-    assert math.log(errors[0] / errors[1], 5.0) > 3.3, errors
+    assert math.log2(errors[0] / errors[1]) > 3.3, errors
 
 
 def test_swept_by_dotted_names() -> None:

@@ -37,7 +37,7 @@ class _Drives(dict[str, "type[Drive]"]):
 
         return named(name) is not None
 
-    def get(self, name: str, default: Any = None) -> Any:  # type: ignore[override]
+    def get(self, name: str, default: Any = None) -> Any:
         """As of any mapping."""
         return self[name] if name in self else default
 
