@@ -20,6 +20,7 @@ from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import parts_from_mapping
 from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
 from snapbeam.model.quantity import quantities
+from snapbeam.model.striker.another import numbered
 from snapbeam.model.system import System
 
 __all__ = ["DEFAULT_AXES", "DEFAULT_DRIVE", "Config", "config_from_mapping", "override", "same_axis"]
@@ -146,6 +147,7 @@ class Config:
         }
         optional = ("ends", "imperfection", *_AROUND)
         sections |= {name: self.section(name) for name in optional if self.section(name)}
+        sections |= self._further
         if self._is_unstruck:
             for name in _STRIKING:
                 del sections[name]
@@ -169,6 +171,18 @@ class Config:
                 for name, value in later.items()
             })  # fmt: skip
         return self._started(system)
+
+    @property
+    def _further(self) -> dict[str, dict[str, Any]]:
+        """The sections of strikers beside the first, complete."""
+        found = {}
+        for name in self.given:
+            kind, number = numbered(name)
+            if number > 1:
+                found[name] = contact_of(self.section(name)) if kind == "contact" else self.section(name)
+                if kind == "drive":
+                    found[name].setdefault("kind", "sine")
+        return found
 
     @property
     def _is_unstruck(self) -> bool:

@@ -94,6 +94,11 @@ def advance(
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if state is not None and not isinstance(state, State):
         raise InputTypeError(f"state = {shown(state)}: must be a State")
+    if system.others:
+        raise InputError(
+            "striker: a state says where one striker stands and since when it touches; of several strikers ask for "
+            "whole runs, by simulate or a sweep"
+        )
     integration = instance(
         "integration", Integration() if integration is None else integration, Integration, "an Integration"
     )
