@@ -19,6 +19,7 @@ _PARTS = {
     "tried": "tried",
     "explorer": "explorer",
     "dynamics": "dynamics",
+    "worlds": "worlds",
 }
 
 

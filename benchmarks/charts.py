@@ -138,11 +138,15 @@ def layouts_chart(path: Path, records: list[dict[str, Any]]) -> None:
         figure = new_figure("single", 62.0)
         ax = figure.subplots()
         for name, words, marker, color in (
-            ("modes_wide", "eight modes of a run in a register", "o", _COLORS["snapbeam"]),
-            ("runs_wide", "eight runs in a register", "s", _COLORS["heyoka"]),
+            ("modes_wide", "eight modes of a run\nin a register", "o-", "#16245E"),
+            ("runs_wide", "eight runs\nin a register", "s-", "#B03A27"),
         ):
-            ax.plot(modes, [record[name] for record in records], marker=marker, color=color, label=words)
-        ax.set(xlabel="Number of modes $N$", ylabel="Time per step and run (ns)", ylim=(0.0, None))
+            ax.plot(
+                modes, [record[name] for record in records], marker, color=color, markersize=4, label=words
+            )
+        most = max(max(record["modes_wide"], record["runs_wide"]) for record in records)
+        ax.set(xlabel="Number of modes $N$", ylabel="Time per step and run (ns)", ylim=(0.0, 1.15 * most))
         ax.set_xticks(modes)
-        ax.legend(loc="upper left")
+        ax.grid(True, color="#E4E4E4", linewidth=0.4)
+        ax.legend(loc="lower right")
         save_figure(figure, path)

@@ -1,18 +1,21 @@
 """The explorer in a browser: from the address to the map, and from a click to the waveform.
 
-Both are taken by the browser's own clock, after the frame that shows them has been drawn.
+Both are taken by the browser's own clock, after the frame that shows them has been drawn.  A page of HoloViews and
+SciPy (:mod:`benchmarks.peers.scipy_page`) is timed by the same script on the same map.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +57,8 @@ def run(folder: Path, quick: bool) -> None:
     if browser is None:
         print("explorer left out: there is no Chromium")
         return
-    found = measured(browser, modes=8 if quick else 32, clicks=5 if quick else 20, paints=3 if quick else 8)
+    modes, cycles = (4, 20) if quick else (32, 200)
+    found = measured(browser, modes, cycles, clicks=5 if quick else 20, paints=3 if quick else 8)
     for name, values in found.items():
         print(f"explorer, {name}: {json.dumps(values)}")
     folder.mkdir(parents=True, exist_ok=True)
@@ -62,31 +66,54 @@ def run(folder: Path, quick: bool) -> None:
     (folder / "explorer.json").write_text(text + "\n", encoding="utf-8")
 
 
-def measured(browser: str, modes: int, clicks: int, paints: int) -> dict[str, Any]:
-    """Milliseconds of first paints and of clicks, and the load of the machine meanwhile."""
+def measured(browser: str, modes: int, cycles: int, clicks: int, paints: int) -> dict[str, Any]:
+    """Milliseconds of first paints and of clicks, of the explorer and of its peer, and the load of the machine."""
     from playwright.sync_api import sync_playwright
 
     system = Config().system.replace(**{"model.modes": modes})
     axes = {"frequency_ratio": np.linspace(0.4, 2.4, 12), "velocity_amplitude": np.linspace(0.05, 0.45, 8)}
-    dataset = sb.sweep(system, axes, sb.Integration(cycles=200))
-    sb.simulate(system, sb.Integration(cycles=200))  # the compile aside
+    before = list(os.getloadavg()) if hasattr(os, "getloadavg") else []
+    dataset = sb.sweep(system, axes, sb.Integration(cycles=cycles))
+    sb.simulate(system, sb.Integration(cycles=cycles))  # the compile aside
+    own = ["-c", "from snapbeam.cli import main; main()", "explore", "map.nc", "--no-browser"]
+    peer = ["-m", "benchmarks.peers.scipy_page", "map.nc", str(modes), str(cycles)]
+    found: dict[str, Any] = {
+        "case": {
+            "modes": modes, "cycles": cycles, "load before": before, "cores": os.cpu_count(),
+            "peer": f"holoviews {_version('holoviews')}, panel {_version('panel')}, scipy {_version('scipy')} (odeint)",
+        }
+    }  # fmt: skip
     with tempfile.TemporaryDirectory() as where, sync_playwright() as driver:
         dataset.to_netcdf(Path(where) / "map.nc", engine="h5netcdf")
-        process, url = _served(where)
         opened = driver.chromium.launch(executable_path=browser, args=["--no-sandbox"])
         try:
-            first = [_paint(opened, url) for _ in range(paints)]
-            times = _clicks(opened, url, dataset, clicks)
+            for name, command, pause, count in (
+                ("explorer", own, 3.0, clicks), ("HoloViews and SciPy", peer, 0.5, min(clicks, 5)),
+            ):  # fmt: skip
+                if command is peer and find_spec("holoviews") is None:
+                    print("the peer's page left out: holoviews is not installed", flush=True)
+                    continue
+                process, url = _served(where, command)
+                try:
+                    first = [_paint(opened, url) for _ in range(paints)]
+                    times = _clicks(opened, url, dataset, count, pause)
+                finally:
+                    process.terminate()
+                    process.wait()
+                found[name] = {"first paint, ms": _summary(first), "click to waveform, ms": _summary(times)}
         finally:
             opened.close()
-            process.terminate()
-            process.wait()
-    load = list(os.getloadavg()) if hasattr(os, "getloadavg") else []
-    return {
-        "modes": {"modes": modes, "cycles": 200, "load of the machine": load, "cores": os.cpu_count()},
-        "first paint, ms": _summary(first),
-        "click to waveform, ms": _summary(times),
-    }
+    found["case"]["load after"] = list(os.getloadavg()) if hasattr(os, "getloadavg") else []
+    return found
+
+
+def _version(package: str) -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
 
 
 def _summary(values: list[float]) -> dict[str, float]:
@@ -96,22 +123,24 @@ def _summary(values: list[float]) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _served(where: str) -> tuple[subprocess.Popen[str], str]:
-    code = "from snapbeam.cli import main; main()"
+def _served(where: str, command: list[str]) -> tuple[subprocess.Popen[str], str]:
+    here = os.pathsep.join(filter(None, (str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH"))))
     process = subprocess.Popen(
-        [sys.executable, "-u", "-c", code, "explore", "map.nc", "--no-browser"],
-        cwd=where, stdout=subprocess.PIPE, text=True, env=dict(os.environ, COLUMNS="400"),
+        [sys.executable, "-u", *command], cwd=where, stdout=subprocess.PIPE, text=True,
+        env=dict(os.environ, COLUMNS="400", PYTHONPATH=here),
     )  # fmt: skip
     assert process.stdout is not None
     for line in process.stdout:
-        if line.startswith("Explorer at"):
+        address = re.search(r"http://\S+", line)
+        if address is not None:
             threading.Thread(target=process.stdout.read, daemon=True).start()
-            return process, line.split()[-1]
-    raise RuntimeError("the explorer did not start")
+            return process, address[0]
+    raise RuntimeError(f"{' '.join(command)}: did not start")
 
 
 def _paint(browser: Any, url: str) -> float:
     page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.set_default_timeout(120_000.0)
     page.goto(url)
     page.wait_for_function(_STAND, polling="raf")
     spent = float(page.evaluate("() => performance.now()"))
@@ -119,8 +148,9 @@ def _paint(browser: Any, url: str) -> float:
     return spent
 
 
-def _clicks(browser: Any, url: str, dataset: Any, clicks: int) -> list[float]:
+def _clicks(browser: Any, url: str, dataset: Any, clicks: int, pause: float) -> list[float]:
     page = browser.new_page(viewport={"width": 1280, "height": 720})
+    page.set_default_timeout(600_000.0)  # of a peer that takes its time
     page.goto(url)
     page.wait_for_function(_STAND)
     page.evaluate(_WATCH)
@@ -133,6 +163,6 @@ def _clicks(browser: Any, url: str, dataset: Any, clicks: int) -> list[float]:
         page.wait_for_function("() => window.shown.length > 0")
         if at > 1:
             times.append(float(page.evaluate("() => window.shown[0]")))
-        time.sleep(3.0)  # until the samples that follow, and the neighbour, are computed too
+        time.sleep(pause)  # until the samples that follow, and the neighbour, are computed too
     page.close()
     return times

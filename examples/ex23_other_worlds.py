@@ -47,3 +47,46 @@ print(
     f"impacts {run.outcome.impacts}, peak force {run.outcome.peak_force:.1f} N, {run.outcome.response.label}"
 )
 plot_run(run.dataset)
+
+# %%
+# Unequal wells and ends that turn
+# --------------------------------
+# An initial shape and a side load make the wells unequal; each end may turn on a spring of its own.
+
+soft = paper.BEAM.replace(ends=sb.Ends(left=20.0, right=5.0))
+uneven = sb.ReducedModel.from_beam(
+    soft, modes=8, imperfection=sb.Imperfection(rise=8e-6, point_load=0.02, point_location=0.3)
+)
+print(
+    f"first frequency about the lower well {uneven.well_freq[0, 0]:.1f} Hz, upper {uneven.well_freq[1, 0]:.1f} Hz"
+)
+plot_system(
+    sb.System(uneven, paper.CONTACT, sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2)))
+)
+
+# %%
+# A harvester on a base that moves
+# --------------------------------
+# Nothing strikes but a stop that is carried along; layers next to the clamp feed a resistor.
+
+motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25)
+stop = sb.Striker(drive=sb.Still(), gap=0.2 * level)
+piezo = sb.Piezo(coupling=4e-3, capacitance=60e-9, resistance=2e4, start=0.0, stop=0.25)
+shaken = sb.System(model, paper.CONTACT, stop, base=sb.Base(motion=motion), harvester=piezo)
+plot_system(shaken)
+
+# %%
+# A coil, under a load that changes
+# ---------------------------------
+
+coil = sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)
+load = sb.AxialLoad(motion=sb.LoadSine(frequency_ratio=2.0, amplitude=3.0))
+plot_system(
+    sb.System(
+        model,
+        paper.CONTACT,
+        sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.2),
+        axial=load,
+        harvester=coil,
+    )
+)

@@ -53,6 +53,7 @@ if TYPE_CHECKING:
         HertzContact,
         HuntCrossley,
         KelvinVoigt,
+        LayeredHertz,
         PowerLaw,
         Restitution,
         bending_stress,
@@ -70,6 +71,7 @@ if TYPE_CHECKING:
         Recorded,
         Sine,
         Still,
+        Sum,
         TwoSines,
     )
     from snapbeam.model.ends import Ends
@@ -81,6 +83,7 @@ if TYPE_CHECKING:
     from snapbeam.model.integration import Integration
     from snapbeam.model.state import State
     from snapbeam.model.striker import RecordedDrive, Shaker, Striker
+    from snapbeam.model.striker.another import Another
     from snapbeam.model.system import System
     from snapbeam.model.world import AxialLoad, Base, Coil, LoadRamp, LoadSine, Piezo
     from snapbeam.runs.advance import advance
@@ -105,6 +108,7 @@ __all__ = [
     "AccelerationSine",
     "Accuracy",
     "Allocation",
+    "Another",
     "Attractor",
     "Attractors",
     "AxialLoad",
@@ -136,6 +140,7 @@ __all__ = [
     "Integration",
     "Keeping",
     "KelvinVoigt",
+    "LayeredHertz",
     "LifetimeOf",
     "Limit",
     "LoadRamp",
@@ -171,6 +176,7 @@ __all__ = [
     "Still",
     "StoreError",
     "Striker",
+    "Sum",
     "Survival",
     "System",
     "Tally",
@@ -265,10 +271,10 @@ _NAMES = {
     "dynamics.starts": "Starts",
     "engines.outcomes": "STATISTICS Statistic",
     "model.beam": "Beam",
-    "model.contact": "ContactLaw HertzContact HuntCrossley KelvinVoigt PowerLaw Restitution bending_stress "
-    "hertz_stress",
+    "model.contact": "ContactLaw HertzContact HuntCrossley KelvinVoigt LayeredHertz PowerLaw Restitution "
+    "bending_stress hertz_stress",
     "model.drive": "AccelerationSine Burst Chirp DisplacementSine Drive Flight HalfSine Noise Recorded Sine Still "
-    "TwoSines",
+    "Sum TwoSines",
     "model.galerkin.frequencies": "exact_natural_freq",
     "model.ends": "Ends",
     "model.imperfection": "Imperfection",
@@ -278,6 +284,7 @@ _NAMES = {
     "model.galerkin.reduction": "ReducedModel",
     "model.state": "State",
     "model.striker": "RecordedDrive Shaker Striker",
+    "model.striker.another": "Another",
     "model.system": "System",
     "model.world": "AxialLoad Base Coil LoadRamp LoadSine Piezo",
     "runs.advance": "advance",

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-NEEDS = {"diffrax", "equinox", "heyoka", "jax", "numbalsoda", "panel", "playwright"}
+NEEDS = {"diffrax", "equinox", "heyoka", "holoviews", "jax", "numbalsoda", "panel", "playwright"}
 """Packages that single benchmarks need; without them that one is left out."""
 _IMPORT = """
 import importlib, sys

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 import shlex
 import tomllib
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import snapbeam as sb
-from snapbeam.cli.app import app
+from snapbeam.cli.app import _COMMANDS, app
 from snapbeam.config import Config, load_config
 
 RUNNER = CliRunner()
@@ -100,7 +102,15 @@ LEAVES = dict(leaves(typer.main.get_command(app)))
 @pytest.mark.parametrize("command", LEAVES)
 def test_json_and_quiet_everywhere(command):
     flags = {flag for each in LEAVES[command].params for flag in each.opts}
-    assert {"--json", "--quiet"} <= flags
+    assert {"--json", "--quiet", "--force"} <= flags
+    assert ("--set" in flags) == ("--print-config" in flags), "what takes parameters prints them"
+
+
+@pytest.mark.parametrize("name", _COMMANDS)
+def test_every_command_has_something_to_answer(name):
+    """A command that answers nothing would leave no file where --json asked for one."""
+    module = import_module(f"snapbeam.cli.{_COMMANDS[name].rpartition('.')[0]}")
+    assert re.search(r"^\s+(answer|answer_now|lab\.write_json)\(", inspect.getsource(module), re.MULTILINE)
 
 
 def test_json_goes_to_standard_output_alone(tmp_path):
@@ -218,3 +228,16 @@ def test_a_point_of_a_list_is_gone_on_from(tmp_path):
     assert told["peak_force"] == float(found.peak_force[3]) and told["crossings"] == int(found.crossings[3])
     refused = RUNNER.invoke(app, ["simulate", "--from", str(tmp_path / "list.nc"), "--point", "location=0.3"])
     assert refused.exit_code == 2
+
+
+def test_what_is_given_beside_a_store_is_compared_with_the_store(tmp_path, monkeypatch):
+    """Not with the paper's beam: only what is asked for otherwise is told to differ."""
+    monkeypatch.chdir(tmp_path)
+    run("map", *MAPS["a beam of its own"], "--store", "kept")
+    before = xr.load_dataset("map.nc").response
+    run("map", "--store", "kept", "--cycles", "12", "--length", "0.1", "-o", "again.nc")
+    np.testing.assert_array_equal(xr.load_dataset("again.nc").response, before)
+    refused = RUNNER.invoke(app, ["map", "--store", "kept", "--cycles", "13"])
+    assert refused.exit_code == 2
+    differences = [line for line in refused.stderr.splitlines() if "in the store" in line]
+    assert len(differences) == 1 and "cycles: 12 in the store, 13 asked for" in differences[0]

@@ -55,6 +55,7 @@ def compare(
         np.testing.assert_allclose(data.energy_harvested, given, rtol=0.0, atol=slack * given[-1])
         assert run.outcome.harvested_energy == pytest.approx(given[-1], rel=slack)
         assert run.outcome.harvested_power == pytest.approx(given[-1] / times[-1], rel=slack)
+        assert run.outcome.harvested_per_cycle == pytest.approx(given[-1] / cycles, rel=slack)
         assert ledger(run) < 1e-4
 
 

@@ -33,7 +33,7 @@ def ledger(run: sb.Run) -> float:
 
 
 @pytest.mark.parametrize(
-    ("modes", "cycles"), [pytest.param(1, 6, marks=SLOW), (3, 3), pytest.param(8, 2, marks=SLOW)]
+    ("modes", "cycles"), [pytest.param(1, 4, marks=SLOW), (3, 3), pytest.param(8, 2, marks=SLOW)]
 )
 @pytest.mark.parametrize("stop", ["none", "carried", "in space"])
 def test_against_an_independent_solution(modes, cycles, stop) -> None:

@@ -34,6 +34,8 @@ class Tip:
     gap: float = 0.0
     """m, at the start."""
     location: float = LOCATION
+    breaks: tuple[float, ...] = ()
+    """Instants (s) at which the motion is not smooth: integrated up to and from."""
 
 
 @dataclass
@@ -99,8 +101,9 @@ def follow(beam: PaperBeam, tip: Tip, times: Array, rtol: float = 1e-11) -> Foll
     longest = 1e-4 if n <= 2 else 2e-5
     taken = np.zeros(0)
     while t < times[-1]:
+        until = min([at for at in tip.breaks if at > t] + [float(times[-1])])
         part = solve_ivp(
-            rate, (t, times[-1]), y, "DOP853", dense_output=True, rtol=rtol, atol=0.1 * rtol * scale,
+            rate, (t, until), y, "DOP853", dense_output=True, rtol=rtol, atol=0.1 * rtol * scale,
             max_step=4e-6 if touching else longest, args=(pressing,),
             events=[gap_opens, vanishes if pressing else presses] if touching else [gap_closes],
         )  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -13,6 +15,7 @@ from snapbeam.figures.lab.calibration import plot_calibration
 from snapbeam.lab.calibration.calibrate import ContactTest, Measurements, calibrate, load_measurements
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import HertzContact
+from snapbeam.model.ends import Ends
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.paper_values import BEAM
 
@@ -64,6 +67,26 @@ def test_the_papers_numbers(tmp_path):
     assert config.model.beam.buckling_level == pytest.approx(found.values["buckling_level"], rel=1e-12)
     assert np.all(np.asarray(config.model.damping_ratio) == 0.005) and config.model.modes == 32
     assert "unequal wells" in path.read_text()
+
+
+@pytest.mark.parametrize(("kind", "value"), [("rise", 1.2e-6), ("uniform_load", 11e-3)])
+def test_two_wells_and_soft_ends_go_into_the_file(tmp_path, kind, value):
+    """The file's own system has both measured frequencies; what was known of the ends is kept."""
+    ends = Ends(left=40.0, right=60.0)
+    for beam in (BEAM, BEAM.replace(ends=ends)):
+        found = calibrate(PAPER, beam, modes=6, imperfection=kind)
+        path = tmp_path / f"{kind}.toml"
+        found.write_config(path)
+        config = load_config(path)
+        model = config.model
+        assert model.well_freq[:, 0] == pytest.approx([81.3, 80.5], rel=1e-6)
+        assert model.beam.ends == beam.ends
+        assert abs(getattr(model.imperfection, kind)) == pytest.approx(value, rel=0.2)
+        assert any(f"{kind} = " in text for text in found.remarks)
+        assert ("[ends]" in path.read_text()) == (beam is not BEAM)
+    one = dataclasses.replace(PAPER, upper_well_freq=())
+    with pytest.raises(InputError, match="needs the first frequency about both wells; the upper one's"):
+        calibrate(one, modes=4, imperfection=kind)
 
 
 @given(

@@ -75,10 +75,10 @@ def test_a_few(what, good, spoiled, tmp_path):
     hold(what, tmp_path, good=good, spoiled=spoiled)
 
 
-@pytest.mark.parametrize(("k", "kind"), [(242, "gamma"), (216, "glare")])
-def test_what_went_by_in_silence_once(k, kind, tmp_path):
+@pytest.mark.parametrize(("seed", "k", "kind"), [(22, 242, "gamma"), (22, 216, "glare"), (23, 216, "glare")])
+def test_what_went_by_in_silence_once(seed, k, kind, tmp_path):
     """A curve that another one, nearer to 1, undoes nearly as well; glare too faint to show in any one frame."""
-    outcome = MAKERS["scene"][1](kind, np.random.default_rng((SEED, k)), tmp_path)
+    outcome = MAKERS["scene"][1](kind, np.random.default_rng((seed, k)), tmp_path)
     assert outcome.flagged and outcome.ratio < SURE
 
 

@@ -65,6 +65,22 @@ def test_standard_errors_of_the_sine_fit_cover_the_truth():
     assert (spread > 0.85).all() and (spread < 1.15).all()
 
 
+def test_a_frequency_that_is_pulled_has_the_error_of_its_mean():
+    time = np.arange(18_000) / 2e4
+    noise = 5e-4 * np.random.default_rng(0).standard_normal(time.size)
+    steady = make_signal(0.03 * np.sin(2.0 * np.pi * 97.9 * time) + noise, "m/s", 2e4)
+    pulled = make_signal(
+        0.03 * np.sin(2.0 * np.pi * (97.9 + 0.025 * time / 0.9) * time) + noise, "m/s", 2e4
+    )  # by 0.05 Hz from one end to the other
+    lost = make_signal(np.delete(steady.values, slice(9000, 9200)), "m/s", 2e4)
+    sine = measure_drive(steady, 97.9).steady
+    assert sine.frequency_se < 1e-3 and abs(sine.frequency - 97.9) < 5.0 * sine.frequency_se
+    for signal, mean in ((pulled, 97.925), (lost, 97.9)):
+        sine = measure_drive(signal, 97.9).steady
+        assert abs(sine.frequency - mean) < 3.0 * sine.frequency_se
+        assert sine.frequency_se < 0.05
+
+
 def test_snr_and_distortion_are_told_apart():
     time = np.arange(20_000) / 2e4
     rng = np.random.default_rng(2)
@@ -196,6 +212,7 @@ def test_resampling_noise_free_is_faithful():
     ("make", "word"),
     [
         (lambda: measure_drive(make_signal(np.zeros(4000), "m/s", 1e4)), "no oscillation"),
+        (lambda: measure_drive(make_signal(np.ones(4000), "m/s", 1e4), 97.9), r"is 1 everywhere.*--channel"),
         (lambda: measure_drive(make_signal(np.cos(np.arange(400) * 0.06), "m/s", 1e4)), "at least 8"),
         (lambda: measure_drive(make_signal(np.cos(np.arange(4000)), "V", 1e4)), "must be in m/s or m"),
         (lambda: measure_drive(np.zeros(5)), "DataArray"),

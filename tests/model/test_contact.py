@@ -6,11 +6,18 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from snapbeam.core.validate import InputError, InputTypeError
-from snapbeam.model.contact import HertzContact, HuntCrossley, KelvinVoigt, PowerLaw, Restitution
+from snapbeam.model.contact import (
+    HertzContact,
+    HuntCrossley,
+    KelvinVoigt,
+    LayeredHertz,
+    PowerLaw,
+    Restitution,
+)
 from snapbeam.model.contact.loss import loss_number, restitution_of_loss
 
 
@@ -118,3 +125,49 @@ def test_power_law_is_hertz_at_three_halves() -> None:
         assert getattr(power, name)(power, 3e-6) == pytest.approx(
             getattr(hertz, name)(hertz, 3e-6), rel=1e-12
         )
+
+
+def test_layer_and_hertz_carry_one_force_and_share_the_penetration() -> None:
+    """d = (f/k_c)^(2/3) + (f/k_l)^(1/2) to rounding; the energy is the integral, the slope the derivative."""
+    for k_l in (1e8, 1e13, 1e18):
+        law = LayeredHertz(4e8, k_l)
+        for d in 10.0 ** np.arange(-12.0, 1.0, 0.5) * 1e-3:
+            f = law.force(law, d)
+            assert (f / 4e8) ** (2.0 / 3.0) + math.sqrt(f / k_l) == pytest.approx(d, rel=1e-13)
+            assert law.energy(law, d) == pytest.approx(
+                quad(lambda x, law=law: law.force(law, x), 0.0, d, epsabs=0.0)[0], rel=1e-9
+            )
+            step = 1e-5 * d
+            rise = (law.force(law, d + step) - law.force(law, d - step)) / (2.0 * step)
+            assert law.slope(law, d) == pytest.approx(rise, rel=1e-8)
+
+
+def test_layer_between_its_limits() -> None:
+    """A stiff layer leaves Hertz's law, a soft one f = k_l d^2; a free impact lasts as long as a numerical one."""
+    stiff, hertz = LayeredHertz(4e8, 1e26), HertzContact(4e8)
+    soft, square = LayeredHertz(4e20, 1e10), PowerLaw.from_stiffness(1e10, 2.0)
+    for law, limit in ((stiff, hertz), (soft, square)):
+        assert law.force(law, 3e-6) == pytest.approx(limit.force(limit, 3e-6), rel=1e-4)
+        assert law.impact_duration(2e-3, 0.1) == pytest.approx(limit.impact_duration(2e-3, 0.1), rel=1e-4)
+    law = LayeredHertz(4e8, 5e10)
+
+    def rate(t, y):
+        return [y[1], -law.force(law, max(y[0], 1e-30)) / 2e-3]
+
+    def apart(t, y):
+        return y[0] + 1e-15 if t > 1e-6 else 1.0
+
+    apart.terminal = True
+    bounce = solve_ivp(
+        rate, (0.0, 1.0), [0.0, 0.1], "DOP853", rtol=1e-11, atol=1e-16, events=apart, max_step=1e-5
+    )
+    assert bounce.t[-1] == pytest.approx(law.impact_duration(2e-3, 0.1), rel=1e-6)
+    assert bounce.y[0].max() == pytest.approx(law.max_penetration(2e-3, 0.1), rel=1e-3)
+
+
+def test_layer_from_its_material() -> None:
+    """pi R E (1 - nu)/[(1 + nu)(1 - 2 nu) h]."""
+    law = LayeredHertz.from_layer(4e8, radius=5e-3, thickness=1e-4, young_modulus=2e6, poisson_ratio=0.4)
+    assert law.layer_stiffness == pytest.approx(math.pi * 5e-3 * 2e6 * 0.6 / (1.4 * 0.2) / 1e-4, rel=1e-12)
+    with pytest.raises(InputError, match="poisson_ratio"):
+        LayeredHertz.from_layer(4e8, 5e-3, 1e-4, 2e6, 0.5)

@@ -188,6 +188,7 @@ OF_OTHERS = {
     "hunt_crossley": (sb.HuntCrossley(4e8, 2.0), {"loss": 1.0, "stiffness": 3e8}),
     "kelvin_voigt": (sb.KelvinVoigt(1e6, 2.0), {"spring": 2e6, "damper": 1.0}),
     "power": (sb.PowerLaw(1.0, 2.0), {"force_at_micrometre": 2.0, "exponent": 1.7}),
+    "layer": (sb.LayeredHertz(4e8, 1e13), {"stiffness": 3e8, "layer_stiffness": 2e13}),
     "restitution": (None, {}),
     "recorded": (None, {}),
     "burst": (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -12,7 +13,9 @@ import xarray as xr
 import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.codes import ResponseClass
-from snapbeam.paper.studies import disturbances
+from snapbeam.paper.store import load_results
+from snapbeam.paper.studies import disturbances, notch, switch
+from snapbeam.paper.studies.harvesting import power_above
 from snapbeam.paper.studies.resonance import ridge
 from snapbeam.paper.studies.sensitivity import buckling_mode_damping
 from snapbeam.paper.studies.waveforms import passages
@@ -24,6 +27,7 @@ def results():
     return paper.Results()
 
 
+DATA = Path(__file__).parents[2] / "docs" / "data"
 STUDIES = (
     "low_frequency",
     "resonance",
@@ -33,6 +37,9 @@ STUDIES = (
     "disturbances",
     "sensitivity",
     "lifetimes",
+    pytest.param("notch", marks=pytest.mark.slow),
+    pytest.param("switch", marks=pytest.mark.slow),
+    pytest.param("harvesting", marks=pytest.mark.slow),
 )
 
 
@@ -63,6 +70,53 @@ def test_passages_of_a_known_motion():
     # |cos| reaches 0.6 where the angle past the quarter is asin 0.6
     np.testing.assert_allclose(found[:, 3], np.arcsin(0.6) / (2.0 * np.pi), atol=3e-4)
     assert passages(alpha[:500], time[:500]).shape == (0, 4)
+
+
+def test_notch_of_a_known_threshold():
+    """The lowest that rises on both sides, not the window's edge; its stretch is what is within a step of it."""
+    ratio = np.arange(1.0, 1.61, 0.1)
+    rows = np.array(
+        [[[0.10, 0.20, 0.15, 0.155, 0.25, 0.18, 0.30], [0.10, 0.20, 0.30, 0.16, 0.25, np.nan, np.nan]]]
+    )
+    ds = xr.Dataset(
+        {"threshold": (("variant", "location", "frequency_ratio"), rows)},
+        {"variant": ["v"], "location": [0.4, 0.5], "frequency_ratio": ratio},
+        {"amplitude_step": 0.01},
+    )
+    first, second = notch.notches(ds, "v")
+    assert (first.position, first.height, first.low, first.high) == pytest.approx((1.2, 0.15, 1.2, 1.3))
+    assert (second.position, second.height, second.low, second.high) == pytest.approx((1.3, 0.16, 1.3, 1.3))
+    assert notch.moved(ds, "v") == pytest.approx((1.25, 1.2, 1.3))
+
+
+def test_notch_moves_with_the_mass_of_the_shaker_alone():
+    """What the page says, from the stored data: one bar reaches 1.4, that of a shaker as light as the beam."""
+    ds = load_results(DATA / "notch.nc", "full")["thresholds"]
+    where = {str(name): notch.moved(ds, str(name)) for name in ds.variant.values}
+    there = {name for name, (_, low, high) in where.items() if low <= notch.MEASURED <= high}
+    assert there == {"2 g on 20 Hz", "10 g on 20 Hz"}
+    assert where[notch.BASE][0] == pytest.approx(1.225) and set(where) <= set(notch.VARIANTS)
+
+
+def test_power_above_a_frequency():
+    """Two tones of known strength: the share is that of the stronger one's square."""
+    rate = 20_000.0
+    time = np.arange(40_000) / rate
+    voltage = 3.0 * np.sin(2.0 * np.pi * 80.0 * time) + 1.0 * np.sin(2.0 * np.pi * 900.0 * time + 0.3)
+    power, share = power_above(voltage, rate, 50.0, 400.0)
+    assert power == pytest.approx(5.0 / 50.0, rel=1e-6)
+    assert share == pytest.approx(0.1, rel=1e-6)
+
+
+def test_fold_of_a_biased_beam():
+    """The bias at which the lower well is gone: by bisection, and the barrier vanishes there as the power 3/2."""
+    fold = switch.fold_load(2)
+    barriers = []
+    for away in (0.04, 0.01):
+        load = sb.Imperfection(uniform_load=(1.0 - away) * fold)
+        model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, imperfection=load)
+        barriers.append(model.barrier_energy - float(model.potential_energy(model.wells[0])))
+    assert np.log(barriers[0] / barriers[1]) / np.log(4.0) == pytest.approx(1.5, abs=0.05)
 
 
 def test_every_impact_and_passage_belongs_to_a_run(results):

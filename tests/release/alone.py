@@ -1,81 +1,160 @@
-"""Install each archive of a folder alone in a fresh environment and run it: ``python alone.py dist [extra ...]``."""
+"""Install archives alone in fresh environments and use them: ``python alone.py dist [extra ...]``.
+
+The source archive is installed as it stands, the wheel as it stands and once more with each extra, by itself: what an
+extra needs and does not name is not there.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
+import time
+import urllib.request
 import venv
 from pathlib import Path
 
 CONSTRAINTS = Path(__file__).parents[2] / "constraints.txt"
-CHECKS = {
+EXTRAS = ("lab", "video", "cluster", "explorer", "cuda")
+"""What users install; the others are for working on snapbeam."""
+
+_SYSTEM = (
+    "import snapbeam as sb; from snapbeam import paper; "
+    "system = sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=1), paper.CONTACT, "
+    "sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2)); "
+)
+_CORE = (
+    f"{_SYSTEM}run = sb.simulate(system, sb.Integration(cycles=3)); "
+    "run.save('run.nc'); assert sb.load_run('run.nc').system == run.system; print(run)"
+)
+_SIGNAL = (
+    "import numpy as np; t = np.arange(40000) / 20e3; ramp = np.clip(t / 0.3, 0, 1); "
+    "np.savetxt('velocity.csv', np.c_[t, 0.02 * ramp * np.sin(2 * np.pi * 100 * t)], delimiter=',', "
+    "header='time_s,velocity_m_s', comments='')"
+)
+_CUDA = (
+    f"import numba.cuda; {_SYSTEM}\n"
+    "try:\n"
+    "    print(sb.simulate(system, sb.Integration(cycles=2, engine='cuda')))\n"
+    "except sb.InputError as error:\n"
+    "    assert not numba.cuda.is_available() and 'cuda' in str(error).lower(), error\n"
+    "    print('no device:', error)\n"
+)
+_GRID = "--frequency-ratio 1:1.5:3 --velocity-amplitude 0.1:0.4:3"
+USES = {
     "": (
-        "import snapbeam as sb; from snapbeam import paper; "
-        "run = sb.simulate(sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=2), paper.CONTACT, "
-        "sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2)), sb.Integration(cycles=3)); "
-        "run.save('run.nc'); assert sb.load_run('run.nc').system == run.system; print(run)"
+        ("python", "-c", _CORE),
+        "snapbeam --version",
+        "python -m snapbeam frequencies --count 3",
+        f"snapbeam map --modes 1 --cycles 4 {_GRID} --plot map.png",
+        "snapbeam info map.nc",
+        "snapbeam plot map.nc -o again.pdf",
     ),
-    "lab": "import snapbeam.lab as lab; print(*[getattr(lab, name).__name__ for name in lab.__all__])",
-    "video": "import imageio_ffmpeg, PIL; from snapbeam.figures.animation import animate_run; print(animate_run)",
-    "cluster": "import zarr, distributed; from snapbeam.sweeps.keep.store import MapStore; print(MapStore)",
-}
-COMMANDS = (
-    ["--version"],
-    ["frequencies", "--count", "3"],
-    ["map", "--modes", "1", "--cycles", "4", "--frequency-ratio", "1:1.5:3", "--velocity-amplitude", "0.1:0.4:3",
-     "--plot", "map.png"],
-    ["info", "map.nc"],
-)  # fmt: skip
+    "lab": (
+        ("python", "-c", "import snapbeam.lab as lab; print(*[getattr(lab, name).__name__ for name in lab.__all__])"),
+        ("python", "-c", _SIGNAL),
+        "snapbeam vibrometer velocity.csv --frequency 100 --plot drive.png --json drive.json",
+    ),
+    "video": (
+        "snapbeam simulate --modes 1 --cycles 2 --animate beam.gif",
+        "snapbeam simulate --modes 1 --cycles 2 --animate beam.mp4",
+    ),
+    "cluster": (
+        f"snapbeam map --modes 1 --cycles 4 {_GRID} --store kept --cluster local:1 -o kept.nc",
+    ),
+    "explorer": (f"snapbeam map --modes 1 --cycles 4 {_GRID}", "page: snapbeam explore map.nc --no-browser"),
+    "cuda": (("python", "-c", _CUDA),),
+}  # fmt: skip
 
 
-def run(*words: str | Path, cwd: Path) -> str:
-    """Run a command away from the source tree; its output, or an error that shows it."""
-    environment = {
-        key: value for key, value in os.environ.items() if key not in ("PYTHONPATH", "VIRTUAL_ENV")
-    }
-    done = subprocess.run(
-        [str(word) for word in words], cwd=cwd, env=environment, capture_output=True, text=True
-    )
-    if done.returncode:
-        raise SystemExit(f"{' '.join(map(str, words))}\n{done.stdout}\n{done.stderr}")
-    return done.stdout
+class Alone:
+    """An environment with one archive in it, in a folder of its own, away from the source tree."""
 
+    def __init__(self, folder: Path, code: Path) -> None:
+        self.folder = folder
+        self._binaries = folder / "env" / ("Scripts" if os.name == "nt" else "bin")
+        hidden = ("PYTHONPATH", "VIRTUAL_ENV")
+        self._environment = {key: value for key, value in os.environ.items() if key not in hidden}
+        self._environment["NUMBA_CACHE_DIR"] = str(code)  # the same code need not be compiled in each
+        venv.create(folder / "env")
 
-def try_alone(archive: Path, extras: tuple[str, ...] = ()) -> None:
-    """Install an archive into an empty environment, with extras, and use it."""
-    with tempfile.TemporaryDirectory() as folder:
-        here = Path(folder)
-        venv.create(here / "env", with_pip=True)
-        binaries = here / "env" / ("Scripts" if os.name == "nt" else "bin")
-        named = f"{archive.resolve()}[{','.join(extras)}]" if extras else str(archive.resolve())
-        run(
-            binaries / "python",
+    def install(self, archive: Path, extra: str) -> None:
+        """Install the archive, with an extra or none."""
+        named = f"{archive.resolve()}[{extra}]" if extra else str(archive.resolve())
+        # by the pip that is there; what is never imported need not be compiled
+        pip = [
+            sys.executable,
             "-m",
             "pip",
-            "install",
-            "--quiet",
-            "--constraint",
-            CONSTRAINTS,
-            named,
-            cwd=here,
-        )
-        for extra in ("", *extras):
-            print(run(binaries / "python", "-c", CHECKS[extra], cwd=here).strip()[:200])
-        for words in COMMANDS:
-            run(binaries / "snapbeam", *words, cwd=here)
-        assert (here / "map.png").stat().st_size > 10_000
+            "--python",
+            str(self._binaries / "python"),
+            "--disable-pip-version-check",
+        ]
+        words = ["install", "--quiet", "--no-compile", "--constraint", str(CONSTRAINTS), named]
+        done = subprocess.run([*pip, *words], capture_output=True, text=True, cwd=self.folder)
+        if done.returncode:
+            raise SystemExit(f"{' '.join(words)}\n{done.stdout}\n{done.stderr}")
+
+    def run(self, program: str, *words: str) -> str:
+        """Run a command; its output, or an error that shows it."""
+        done = subprocess.run(
+            [str(self._binaries / program), *words], cwd=self.folder, env=self._environment, capture_output=True,
+            text=True,
+        )  # fmt: skip
+        if done.returncode:
+            raise SystemExit(f"{program} {' '.join(words)}\n{done.stdout}\n{done.stderr}")
+        return done.stdout
+
+    def open_page(self, program: str, *words: str) -> str:
+        """Start a command that serves a page, and fetch the page."""
+        served = subprocess.Popen(
+            [str(self._binaries / program), *words], cwd=self.folder, env=self._environment, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+        try:
+            assert served.stdout is not None
+            line = served.stdout.readline()
+            found = re.search(r"http://\S+", line)
+            if found is None:
+                raise SystemExit(f"{program} {' '.join(words)}\n{line}{served.communicate()[0]}")
+            with urllib.request.urlopen(found[0], timeout=300) as page:
+                text: str = page.read().decode()
+            assert "snapbeam" in text
+            return f"a page of {len(text)} characters"
+        finally:
+            served.terminate()
+            served.communicate()
+
+
+def try_alone(archive: Path, extra: str = "", code: Path | None = None) -> None:
+    """Install an archive into an empty environment, with an extra or none, and use it."""
+    with tempfile.TemporaryDirectory() as folder:
+        here = Alone(Path(folder), Path(folder) / "code" if code is None else code)
+        here.install(archive, extra)
+        for use in USES[extra]:
+            words = list(use) if isinstance(use, tuple) else use.split()
+            if words[0] == "page:":
+                print(here.open_page(*words[1:]), flush=True)
+            else:
+                print(here.run(*words).strip()[:200], flush=True)
+        pictures = [*here.folder.glob("*.png"), *here.folder.glob("*.gif"), *here.folder.glob("*.mp4")]
+        assert all(picture.stat().st_size > 10_000 for picture in pictures), pictures
+        if not extra:
+            assert (here.folder / "map.png").exists() and (here.folder / "again.pdf").exists()
 
 
 def main() -> None:
-    """Try every archive of a folder; the wheel with each extra too."""
+    """Try every archive of a folder; the wheel with each of the extras named, or with all, too."""
     folder, *extras = sys.argv[1:]
-    archives = sorted(Path(folder).glob("snapbeam-*"))
-    assert len(archives) == 2, archives
-    for archive in archives:
-        print(archive.name, flush=True)
-        try_alone(archive, tuple(extras) if archive.suffix == ".whl" else ())
+    source, wheel = next(Path(folder).glob("snapbeam-*.tar.gz")), next(Path(folder).glob("snapbeam-*.whl"))
+    with tempfile.TemporaryDirectory() as code:
+        for archive, extra in ((source, ""), (wheel, ""), *((wheel, extra) for extra in extras or EXTRAS)):
+            start = time.monotonic()
+            print(f"{archive.name} [{extra}]", flush=True)
+            try_alone(archive, extra, Path(code))
+            print(f"  {time.monotonic() - start:.0f} s", flush=True)
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 import tarfile
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -15,6 +16,8 @@ import pytest
 import snapbeam as sb
 
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(Path(__file__).parent))
+import alone  # noqa: E402
 
 
 def test_one_version_everywhere():
@@ -69,11 +72,24 @@ def test_archives_hold_what_they_must(archives):
     assert not [name for name in held if "_build" in name or name.endswith(".pyc")]
 
 
-@pytest.mark.slow
-def test_each_runs_alone(archives):
-    """In a fresh environment, from nothing but the archive."""
-    sys.path.insert(0, str(Path(__file__).parent))
-    from alone import try_alone
+@pytest.fixture(scope="module")
+def code(tmp_path_factory):
+    return tmp_path_factory.mktemp("code")
 
-    for archive in archives:
-        try_alone(archive)
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("which", "extra"), [("source", ""), ("wheel", ""), *(("wheel", extra) for extra in alone.EXTRAS)]
+)
+def test_each_runs_alone(which, extra, archives, code):
+    """In a fresh environment, from nothing but the archive and what it says it needs."""
+    source, wheel = archives
+    alone.try_alone(source if which == "source" else wheel, extra, code)
+
+
+def test_every_extra_is_tried():
+    """Those that are for users in fresh environments; the others are tools for working on snapbeam."""
+    stated = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    tools = {"explorer-test", "docs", "dev", "bench", "bench-fortran"}
+    assert set(stated["optional-dependencies"]) == set(alone.EXTRAS) | tools
+    assert set(alone.USES) == {"", *alone.EXTRAS}

@@ -63,9 +63,10 @@ class _Unit(float):
     units = "mm"
 
 
+_LARGE = 10**5
 HOSTILE: list[Any] = [
     None, True, False, 0, -1, 1, 2, 3.5, -0.0, 1e-320, 1e-200, 1e200, 1e308, -1e308, float("nan"), float("inf"),
-    float("-inf"), 10**400, -(10**400), 10**5000, 2**63, 1j, complex("nan"), fractions.Fraction(1, 3),
+    float("-inf"), _LARGE, 10**400, -(10**400), 10**5000, 2**63, 1j, complex("nan"), fractions.Fraction(1, 3),
     fractions.Fraction(10**400, 3), np.float32(0.1), np.int8(-3), np.uint64(2**64 - 1), np.bool_(True),
     np.timedelta64(3, "s"), np.datetime64("2024-01-01"), datetime.timedelta(1), "", "abc", "1", "nan", "../x", "\0",
     "x" * 10_000, "0.1:2:5", "0.1:2:1000000000", "1/0", b"bytes", (), [], {}, set(), object(), _Odd(), _Unit(3.0),
@@ -101,6 +102,9 @@ def _valid(name: str, draw: random.Random) -> Any:
 
 _KEPT_OFF = {"cluster": [None, "", "abc", "local:x", 3, "x.toml"], "threads": [1, None, 0, "a", -1, 1.5]}
 """Parameters whose hostile values would start processes by the dozen."""
+
+_MANY = ("periods", "transient", "cycles", "runs", "count", "samples", "orbits")
+"""Parameters for which 100,000 is a long request, not a mistake."""
 
 
 def public() -> dict[str, Any]:
@@ -161,6 +165,10 @@ def arguments(function: Any, draw: random.Random) -> tuple[list[Any], dict[str, 
             continue
         off = _KEPT_OFF.get(each.name, HOSTILE)
         value = draw.choice(off) if at in spoilt else _valid(each.name, draw)
+        if each.name in _MANY and value is _LARGE:
+            value = -1
+        if each.name == "progress" and callable(value):
+            value = None  # what a function of the caller's raises is the caller's
         if each.kind is each.KEYWORD_ONLY:
             named[each.name] = value
         elif each.kind is each.POSITIONAL_ONLY or (needed and len(fixed) == at):
@@ -205,7 +213,7 @@ def _judged(longest: float, function: Any, fixed: Sequence[Any], named: Mapping[
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             result = function(*fixed, **named)
-    except (InputError, sb.StoreError, NoRoomError):
+    except (InputError, sb.StoreError, sb.NoOrbit, NoRoomError):
         return ""
     except _TooLong as error:
         return f"over {longest:g} s, {_trouble(error)}"
@@ -227,7 +235,12 @@ def commands() -> dict[str, list[Any]]:
 
     from snapbeam.cli import app
 
-    return {name: list(each.params) for name, each in typer.main.get_command(app).commands.items()}
+    found: dict[str, list[Any]] = {}
+    for name, each in typer.main.get_command(app).commands.items():
+        below = getattr(each, "commands", None)
+        parts = {name: each} if below is None else {f"{name} {part}": below[part] for part in below}
+        found |= {words: list(part.params) for words, part in parts.items()}
+    return found
 
 
 _COMMAND_VALUES = {
@@ -236,12 +249,17 @@ _COMMAND_VALUES = {
     "threads": "1",
     "frequency_ratio": "1.0",
     "velocity_amplitude": "0.3",
+    "values": "0.1:0.3:3",
+    "amplitudes": "-1.5:1.5:3",
+    "velocities": "-1:1:3",
+    "states": "20",
+    "periods": "20",
 }
 
 
 def command_line(name: str, parameters: list[Any], draw: random.Random) -> list[str]:
     """Words after the program: a few options with any value, cheap ones where the command has them."""
-    words = [name]
+    words = name.split()
     for each in parameters:
         if each.param_type_name == "argument":
             words.append(draw.choice(WORDS))
@@ -252,8 +270,8 @@ def command_line(name: str, parameters: list[Any], draw: random.Random) -> list[
             words.append(max(each.opts, key=len))
             if not each.is_flag:
                 words.append(draw.choice(WORDS))
-        elif each.name in _COMMAND_VALUES:
-            words += [max(each.opts, key=len), _COMMAND_VALUES[each.name]]
+        elif (short := each.name.rpartition("__")[2]) in _COMMAND_VALUES:
+            words += [max(each.opts, key=len), _COMMAND_VALUES[short]]
     return words
 
 

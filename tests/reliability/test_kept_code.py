@@ -153,3 +153,27 @@ def test_a_run_from_read_only_package_and_home(python, copied, mounted, read_onl
     assert done.stdout == free.stdout and done.stdout.startswith("OK")
     assert "Traceback" not in done.stderr
     tried("starts with package and HOME read-only")
+
+
+ARRAYS = """
+import numpy as np
+from numba import njit
+from snapbeam.engines.scalar.kept_code import keep_code
+
+@njit
+def total(values):
+    twice = 2.0 * values
+    return twice.sum()
+
+keep_code(total, "mark")
+print(total(np.arange(4.0)), "loaded" if total.stats.cache_hits else "compiled")
+"""
+"""A function that needs memory, for which Numba's runtime must stand before its kept code is loaded."""
+
+
+def test_code_that_needs_numbas_runtime_is_loaded_in_a_fresh_process(python, tmp_path):
+    (tmp_path / "arrays.py").write_text(ARRAYS)
+    for how in ("compiled", "loaded"):
+        done = python("import arrays", f"{tmp_path}{os.pathsep}{python.package}", timeout=120)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.split() == ["12.0", how]

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from snapbeam.cli.common.console import door, file_line, out
+from snapbeam.cli.common.console import answer, door, file_line, out
 from snapbeam.cli.common.parameter_options import (
     BEAM,
     CONTACT,
@@ -40,6 +40,7 @@ def draw(
 
     system = configured(given).system
     save_figure(plot_system(system), output)
+    answer(system=system.hash, files=[output])
     console = out()
     console.print(system.describe())
     console.print(f"Written: {file_line(output)}")

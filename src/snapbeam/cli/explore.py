@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from snapbeam.cli.common.console import door, out
+from snapbeam.cli.common.console import answer_now, door, out
 
 __all__ = ["explore"]
 
@@ -58,6 +58,7 @@ def explore(
         system, integration = settings.system, settings.integration
 
     def ready(url: str) -> None:
+        answer_now(url=url)
         out().print(f"Explorer at {url}", markup=False)
         out().print("Press Ctrl+C to stop it.", markup=False)
         if browser:

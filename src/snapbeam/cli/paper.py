@@ -76,6 +76,7 @@ def paper(
     results = Results(size, read=data, write=output if full else None, progress=_Tell())
     names = [name for name in FIGURES if figure in (name, "all")]
     _check_measured(figure, names, dots, measured)
+    _check_targets(output, names, claims=figure in ("claims", "all"))
     written: list[Path] = []
     for name in names:
         start = time.monotonic()
@@ -123,6 +124,18 @@ def _check_measured(figure: str, names: list[str], dots: Path | None, measured: 
             raise InputError(f"measured: {len(measured)} files; fig4 shows three")
         for file in measured:
             read_measured(file)
+
+
+def _check_targets(folder: Path, names: list[str], claims: bool) -> None:
+    """Refuse, before anything is computed, files that cannot be written or are not to be replaced."""
+    from snapbeam.core.files import check_writable
+    from snapbeam.paper.claims.table import BEGINS
+
+    for name in names:
+        for suffix in (".pdf", ".png", ".nc"):
+            check_writable(folder / f"{name}{suffix}")
+    for name, begin in BEGINS.items() if claims else ():
+        check_writable(folder / name, begin=begin)
 
 
 class _Tell:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, InputTypeError, axis, finite, shown
+from snapbeam.core.validate import InputError, InputTypeError, axis, finite, flag, instance, shown
 
 __all__ = ["Axis", "parse_axis"]
 
@@ -42,6 +42,8 @@ def parse_axis(name: str, value: float | str | Sequence[float], *, whole: bool =
     InputError
         If it cannot be read so, is not finite, or does not increase.
     """
+    instance("name", name, str, "text")
+    flag("whole", whole)
     if isinstance(value, str):
         return _parse_text(name, value, _WHOLE if whole else _FORMS)
     if isinstance(value, (int, float)) and not isinstance(value, bool):

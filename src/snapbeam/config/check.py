@@ -11,12 +11,13 @@ import numpy as np
 
 from snapbeam.config.axes import parse_axis
 from snapbeam.config.contact import MATERIALS, WANTED
-from snapbeam.config.parameters import Parameter, lookup, parameters
+from snapbeam.config.parameters import Parameter, lookup, parameters, row_of
 from snapbeam.config.physical import PHYSICAL, physical_name
 from snapbeam.core.validate import InputError, finite, mapping, shown
 from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
 from snapbeam.model.paper_values import BEAM
+from snapbeam.model.striker.another import numbered
 from snapbeam.model.world import HARVESTERS, LOADS
 
 __all__ = ["SECTIONS", "checked_sections", "contradictions", "parsed_axis", "with_section"]
@@ -63,7 +64,7 @@ def _entries(sections: Mapping[str, Any], lines: list[str]) -> list[tuple[str, s
     shaker = sections.get("shaker")
     single = set(shaker) if isinstance(shaker, Mapping) else set()
     for section, values in sections.items():
-        if section not in (*SECTIONS, "shaker", "map"):
+        if numbered(str(section))[0] not in (*SECTIONS, "shaker", "map"):
             lines.append(f"[{section}]: unknown section{_nearest(str(section), list(SECTIONS))}")
         elif not isinstance(values, Mapping):
             lines.append(f"{section} = {shown(values)}: must be a section [{section}]")
@@ -96,7 +97,11 @@ def _place(section: str, name: str, value: Any) -> tuple[str, str]:
 
 def _known(section: str, found: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Names that a section may hold."""
-    names = [row.name.partition(".")[2] for row in parameters().values() if row.section == section]
+    kind, number = numbered(section)
+    names = [row.name.partition(".")[2] for row in parameters().values() if row.section == kind]
+    if number > 1:
+        names = [name for name in names if row_of(f"{section}.{name}") is not None]
+        return names + {"drive": ["kind"], "contact": ["law"]}.get(kind, [])
     names += [name.partition(".")[2] for name in PHYSICAL if name.startswith(f"{section}.")]
     names += ["kind"] if section in _KINDS else []
     return names + (["law", *MATERIALS, *WANTED] if section == "contact" else [])
@@ -114,9 +119,9 @@ def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any
             return f"{name}: unknown key; must be amplitude[i], velocity[i] or striker_position"
     else:
         known = _known(section, found)
-        if name not in known:
+        if name not in known and row_of(f"{section}.{name}") is None:
             return f"{name}: unknown key{_nearest(name, known)}"
-        row = parameters().get(f"{section}.{name}")
+        row = row_of(f"{section}.{name}")
     if row is None:
         message, checked = _special(section, name, value)
     else:
@@ -168,11 +173,18 @@ def _array(name: str, value: Any) -> tuple[str, Any]:
         return f"{name} = {shown(value)}: must be a list of numbers", None
 
 
+def _is_sum(section: str, value: Any) -> bool:
+    """Whether a kind is a sum of drives, such as ``"sine+burst"``, that the section may hold."""
+    if not isinstance(value, str) or "+" not in value or value not in DRIVES:
+        return False
+    return numbered(section)[0] == "drive" or (section == "base" and DRIVES[value].shakes())
+
+
 def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
     """What is in no row: the law, the drive's kind, materials, and physical units."""
     if name in ("law", "kind"):
-        known = LAWS if name == "law" else _KINDS[section]
-        if value not in known:
+        known = LAWS if name == "law" else _KINDS[numbered(section)[0]]
+        if value not in known and not _is_sum(section, value):
             return f"{name} = {value!r}: must be one of {', '.join(map(repr, known))}", None
         return "", value
     full = f"{section}.{name}"

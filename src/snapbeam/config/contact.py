@@ -24,10 +24,11 @@ WANTED = {
 """What a loss may follow from: unit and words."""
 _TELLING = {
     "coefficient": "restitution", "loss": "hunt_crossley", "restitution": "hunt_crossley", "speed": "hunt_crossley",
+    "layer_stiffness": "layer",
     "spring": "kelvin_voigt", "damper": "kelvin_voigt", "force_at_micrometre": "power", "exponent": "power",
 }  # fmt: skip
 """Names that one law alone has."""
-_SPHERES = ("hertz", "hunt_crossley")
+_SPHERES = ("hertz", "hunt_crossley", "layer")
 
 
 def law_of(values: Mapping[str, Any]) -> str:
@@ -72,6 +73,7 @@ def contact_rivals() -> list[tuple[set[str], set[str]]]:
     sphere, lossy = {"stiffness", *MATERIALS}, {"loss", *WANTED}
     spring, power = {"spring", "damper"}, {"force_at_micrometre", "exponent"}
     pairs = [({"stiffness"}, set(MATERIALS)), ({"loss"}, set(WANTED))]
-    groups = [{"coefficient"}, sphere | lossy, spring, power]
+    pairs.append(({"layer_stiffness"}, lossy))
+    groups = [{"coefficient"}, sphere | lossy | {"layer_stiffness"}, spring, power]
     pairs += [(one, other) for i, one in enumerate(groups) for other in groups[i + 1 :]]
     return pairs

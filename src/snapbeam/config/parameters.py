@@ -25,9 +25,10 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import RUN, Quantity, quantities
 from snapbeam.model.start import START_NAME
 from snapbeam.model.striker import Striker
+from snapbeam.model.striker.another import numbered
 from snapbeam.model.world import HARVESTERS, LOADS, Base
 
-__all__ = ["Parameter", "lookup", "parameters", "short_names"]
+__all__ = ["Parameter", "lookup", "parameters", "row_of", "short_names"]
 
 _NONE = dataclasses.MISSING
 _POWER = re.compile(r"\^([\d.]+)")
@@ -161,6 +162,48 @@ def parameters() -> dict[str, Parameter]:
     return dict(sorted(table.items(), key=lambda item: order.index(item[1].section)))
 
 
+_OF_STRIKER = re.compile(r"(.+)_striker_([2-9])")
+_OF_TERM = re.compile(r"(.+)_([1-4])")
+_FIRST_ALONE = ("striker.mass", "striker.spring", "striker.damper")
+
+
+def row_of(name: str) -> Parameter | None:
+    """The row of a dotted name, of a striker beside the first too (``striker_2.location``); None if there is none."""
+    table, (section, _, field) = parameters(), name.partition(".")
+    kind, number = numbered(section)
+    row = table.get(f"{kind}.{field}")
+    found = _OF_TERM.fullmatch(field)
+    if row is None and found is not None and kind in ("drive", "base"):
+        row = table.get(f"{kind}.{found[1]}")
+        if row is not None:
+            words = f"{row.quantity.words}, of term {found[2]}"
+            own = dataclasses.replace(row.quantity, words=words)
+            row = dataclasses.replace(row, name=name, short=f"{row.short}_{found[2]}", quantity=own)
+    if number == 1 or row is None:
+        return row
+    if row.name in _FIRST_ALONE:
+        return None
+    words = f"{row.quantity.words}, of striker {number}"
+    quantity = dataclasses.replace(row.quantity, words=words)
+    return dataclasses.replace(row, name=name, short=f"{row.short}_striker_{number}", quantity=quantity)
+
+
+def _by_short(name: str, shorts: Mapping[str, str]) -> Parameter | None:
+    """The row of a striker beside the first, or of a term of a sum, by the name that datasets use."""
+    found = _OF_STRIKER.fullmatch(name)
+    striker = f"_{found[2]}" if found is not None else ""
+    plain = name if found is None else found[1]
+    term = _OF_TERM.fullmatch(plain)
+    if plain in shorts:
+        section, _, field = shorts[plain].partition(".")
+    elif term is not None and term[1] in shorts:
+        section, _, field = shorts[term[1]].partition(".")
+        field = f"{field}_{term[2]}"
+    else:
+        return None
+    return row_of(f"{section}{striker}.{field}")
+
+
 def short_names() -> dict[str, str]:
     """Dotted names by the names that datasets use."""
     return {row.short: name for name, row in parameters().items()}
@@ -179,8 +222,9 @@ def lookup(name: str) -> Parameter:
     if not isinstance(name, str):
         raise InputError(f"parameter {shown(name)}: must be a name, such as 'drive.frequency_ratio'")
     table = parameters()
-    if name in table:
-        return table[name]
+    row = row_of(name)
+    if row is not None:
+        return row
     found = START_NAME.fullmatch(name.removeprefix("start."))
     if found is not None:
         of, mode = found[1], found[2]
@@ -193,6 +237,9 @@ def lookup(name: str) -> Parameter:
     shorts = short_names()
     if name in shorts:
         return table[shorts[name]]
+    row = _by_short(name, shorts)
+    if row is not None:
+        return row
     tails: dict[str, list[str]] = {}
     for full in (each for each in table if each.partition(".")[0] not in _AROUND):
         tails.setdefault(full.partition(".")[2], []).append(full)

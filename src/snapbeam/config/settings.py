@@ -20,6 +20,7 @@ from snapbeam.model.integration import CYCLES, Integration
 from snapbeam.model.mapping import parts_from_mapping
 from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
 from snapbeam.model.quantity import quantities
+from snapbeam.model.striker.another import numbered
 from snapbeam.model.system import System
 
 __all__ = ["DEFAULT_AXES", "DEFAULT_DRIVE", "Config", "config_from_mapping", "override", "same_axis"]
@@ -113,7 +114,7 @@ class Config:
         contact: dict[str, Any] = {}
         of_contact = self.section("contact")
         if (
-            law_of(of_contact) in ("hertz", "hunt_crossley")
+            law_of(of_contact) in ("hertz", "hunt_crossley", "layer")
             and not {"stiffness", *MATERIALS} & of_contact.keys()
         ):
             contact = {"stiffness": CONTACT.stiffness}
@@ -146,6 +147,7 @@ class Config:
         }
         optional = ("ends", "imperfection", *_AROUND)
         sections |= {name: self.section(name) for name in optional if self.section(name)}
+        sections |= self._further
         if self._is_unstruck:
             for name in _STRIKING:
                 del sections[name]
@@ -169,6 +171,18 @@ class Config:
                 for name, value in later.items()
             })  # fmt: skip
         return self._started(system)
+
+    @property
+    def _further(self) -> dict[str, dict[str, Any]]:
+        """The sections of strikers beside the first, complete."""
+        found = {}
+        for name in self.given:
+            kind, number = numbered(name)
+            if number > 1:
+                found[name] = contact_of(self.section(name)) if kind == "contact" else self.section(name)
+                if kind == "drive":
+                    found[name].setdefault("kind", "sine")
+        return found
 
     @property
     def _is_unstruck(self) -> bool:
@@ -262,6 +276,7 @@ def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config
     InputError
         One line for each thing that is wrong: unknown names, wrong kinds, wrong units.
     """
+    instance("source", source, str, "text")
     found, lines = checked_sections(sections)
     config = Config(found)
     lines = lines or contradictions(found)

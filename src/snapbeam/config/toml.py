@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from snapbeam.config.parameters import parameters
+from snapbeam.config.parameters import row_of
 from snapbeam.config.physical import PHYSICAL
 from snapbeam.config.settings import Config, config_from_mapping
 from snapbeam.core.files import atomic_path, check_writable
@@ -58,13 +58,12 @@ def config_text(config: Config, comment: str = "") -> str:
     """What was given, as the text of a parameter file."""
     instance("config", config, Config, "a Config")
     instance("comment", comment, str, "text")
-    table = parameters()
     lines = [f"# {line}" for line in comment.splitlines()]
     for section, values in config.to_mapping().items():
         lines += [""] if lines else []
         lines.append(f"[{section}]")
         for name, value in values.items():
-            row = table.get(f"{section}.{name}")
+            row = row_of(f"{section}.{name}")
             physical = PHYSICAL.get(f"{section}.{name}")
             if row is not None:
                 unit = "" if row.quantity.unit == "1" else f", {row.quantity.unit}"

@@ -11,29 +11,34 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from snapbeam.core.foreign import refuse_foreign
 from snapbeam.core.validate import InputError, file_path
 
 __all__ = ["NoRoomError", "atomic_path", "check_writable", "lives"]
 
 
 def check_writable(
-    path: str | os.PathLike[str], name: str = "output", suffixes: tuple[str, ...] = ()
+    path: str | os.PathLike[str], name: str = "output", suffixes: tuple[str, ...] = (), begin: str = ""
 ) -> Path:
     """Return *path* if a file can be written there; refuse it, before any work, if not.
 
     Parameters
     ----------
     path : path
-        The file to be written.  One that exists will be replaced.
+        The file to be written.  One that exists will be replaced; a command of the command line replaces only
+        what snapbeam wrote (:mod:`snapbeam.core.foreign`).
     name : str
         The parameter to name in a refusal.
     suffixes : tuple of str
         The allowed ends of the name, such as ``(".nc",)``; any if empty.
+    begin : str
+        What text of this kind begins with, by which a file that snapbeam wrote is known.
 
     Raises
     ------
     InputError
-        If the folder is missing or cannot be written to, *path* is a folder, or its suffix is not allowed.
+        If the folder is missing or cannot be written to, *path* is a folder, its suffix is not allowed, or a
+        command would replace what is not snapbeam's.
     """
     target = file_path(name, path)
     if suffixes and target.suffix.lower() not in suffixes:
@@ -53,6 +58,7 @@ def check_writable(
                 pass
     except OSError as error:
         raise InputError(f"{name} = {str(path)!r}: cannot be written, {error.strerror or error}") from error
+    refuse_foreign(target, name, begin)
     return target
 
 

@@ -18,7 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from snapbeam.core.files import NoRoomError, atomic_path, check_writable
-from snapbeam.core.validate import InputError, instance, mapping
+from snapbeam.core.foreign import VERSION
+from snapbeam.core.validate import InputError, file_path, instance, mapping
+from snapbeam.core.version import __version__
 
 if TYPE_CHECKING:
     import h5netcdf
@@ -39,7 +41,7 @@ def read_netcdf(
     """
     import xarray as xr
 
-    if not Path(path).is_file():
+    if not file_path(name, path).is_file():
         raise InputError(f"{name} = {str(path)!r}: no such file")
     read = xr.open_dataset if lazily else xr.load_dataset
     try:
@@ -59,6 +61,8 @@ def write_netcdf(
     encoding: Mapping[str | None, Mapping[Any, Any]] | None = None,
 ) -> None:
     """Write a dataset, or one for each group, to a NetCDF file, whole or not at all.
+
+    A root without the attribute ``snapbeam_version`` gets it, by which the file is known.
 
     Parameters
     ----------
@@ -97,6 +101,8 @@ def netcdf_file(path: str | os.PathLike[str]) -> Iterator[h5netcdf.File]:
     with atomic_path(path) as temporary, hdf5_stream(temporary, Path(path)) as stream:
         with h5netcdf.File(stream, "w", invalid_netcdf=False) as file:
             yield file
+            if VERSION not in file.attrs:
+                file.attrs[VERSION] = __version__
 
 
 @contextmanager

@@ -48,6 +48,7 @@ class InputTypeError(InputError, TypeError):
 
 
 _LONGEST = 300
+_LONGEST_PATH = 4000
 _NO_NUMBERS = (bool, np.bool_, np.timedelta64)
 """Kinds that count as numbers in Python or NumPy and are none here."""
 
@@ -216,7 +217,10 @@ def file_path(name: str, value: Any) -> Path:
     """Return *value* as a path; refuse what is none, such as a number, which would name a stream of the process."""
     if not isinstance(value, (str, os.PathLike)) or "\0" in str(value):
         raise InputTypeError(f"{name} = {shown(value)}: must be a path")
-    return Path(value)
+    path = Path(value)
+    if len(os.fsencode(path)) > _LONGEST_PATH or any(len(os.fsencode(part)) > 255 for part in path.parts):
+        raise InputError(f"{name} = {shown(str(value))}: must be a path of names up to 255 bytes")
+    return path
 
 
 def mapping(name: str, value: Any) -> Mapping[Any, Any]:

@@ -1,6 +1,7 @@
 """Where and how to strike, how sure, and what matters most: questions to many runs of a system not known exactly."""
 
 import sys
+from inspect import Signature, signature
 from types import ModuleType
 from typing import Any
 
@@ -12,6 +13,12 @@ class _Room(ModuleType):
         from snapbeam.design.optimum.design import design
 
         return design(*args, **options)
+
+    @property
+    def __signature__(self) -> Signature:
+        from snapbeam.design.optimum.design import design
+
+        return signature(design)
 
 
 sys.modules[__name__].__class__ = _Room

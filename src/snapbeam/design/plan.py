@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, positive
 from snapbeam.design.events import OUTCOMES
 from snapbeam.design.optimum.design import Effort, design
@@ -74,6 +75,7 @@ class Cost:
         )
 
 
+@checked
 def plan(question: Callable[..., Any], *arguments: Any, trial: float = 10.0, **options: Any) -> Cost:
     """What a question costs, from a trial of some seconds with runs scattered over it.
 

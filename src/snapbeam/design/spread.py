@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.parameters import lookup
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import (
     InputError,
     InputTypeError,
@@ -114,6 +115,7 @@ class Spread:
         return matrix
 
     @classmethod
+    @checked
     def from_calibration(cls, calibration: Calibration, **more: Any) -> Spread:
         """The spread that a calibration leaves: its standard errors and their correlation, damping and contact too.
 

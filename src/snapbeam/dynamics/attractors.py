@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, finite_array, integer, positive
 from snapbeam.dynamics.bifurcation import least_period
 from snapbeam.dynamics.capture import Ball, Cloud, balls_of, cloud_of
@@ -145,6 +146,7 @@ def spread_states(flow: Stroboscope, count: int, seed: int = 0) -> _Array:
     return rows
 
 
+@checked
 def attractors(
     system: System | Flow,
     states: ArrayLike | int = 200,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError, InputTypeError, axis, integer
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, InputTypeError, axis, finite_array, integer, shown
 from snapbeam.dynamics.attractors import UNDECIDED, Attractors
 from snapbeam.dynamics.capture import Cloud
 from snapbeam.dynamics.flow import Flow, Stroboscope
@@ -24,6 +25,7 @@ _AMONG = 8
 """Looks in a row at which a state must lie among the points of a chaotic attractor."""
 
 
+@checked
 def basins(
     found: Attractors,
     plane: Mapping[str, ArrayLike],
@@ -65,7 +67,7 @@ def basins(
         For bad input.
     """
     if not isinstance(found, Attractors):
-        raise InputTypeError(f"found = {found!r}: must be Attractors, as sb.attractors gives")
+        raise InputTypeError(f"found = {shown(found)}: must be Attractors, as sb.attractors gives")
     flow = found.flow
     total, step = integer("periods", periods, 1, 10**6), integer("every", every, 1, 10**4)
     names, columns, rows = _plane(flow, plane, rest)
@@ -78,7 +80,7 @@ def _plane(
 ) -> tuple[list[str], list[_Array], _Array]:
     known = list(getattr(flow, "names", tuple(f"x[{i + 1}]" for i in range(flow.dimension))))
     if not isinstance(plane, Mapping) or len(plane) != 2:
-        raise InputTypeError(f"plane = {plane!r}: must map two coordinates to their values")
+        raise InputTypeError(f"plane = {shown(plane)}: must map two coordinates to their values")
     for name in plane:
         if name not in known:
             raise InputError(f"plane {name}: no coordinate; must be one of {', '.join(known[:4])}, ...")
@@ -88,7 +90,7 @@ def _plane(
         assert isinstance(flow, Stroboscope)
         base = flow.coordinates(rest)[0]
     else:
-        base = np.zeros(flow.dimension) if rest is None else np.asarray(rest, dtype=np.float64)
+        base = np.zeros(flow.dimension) if rest is None else finite_array("rest", rest)
     if base.shape != (flow.dimension,):
         raise InputError(f"rest of shape {base.shape}: must have the shape ({flow.dimension},)")
     first, second = np.meshgrid(*columns, indexing="ij")

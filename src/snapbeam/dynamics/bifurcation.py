@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.parameters import lookup
-from snapbeam.core.validate import InputError, InputTypeError, axis, choice, flag, integer
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, InputTypeError, axis, choice, flag, integer, shown
 from snapbeam.dynamics.flow import Stroboscope
 from snapbeam.dynamics.orbits.passage import passage_of
 from snapbeam.dynamics.starts import Starts, starts_of
@@ -29,6 +30,7 @@ _PASSAGE = 4
 """Periods that approaches are looked at in."""
 
 
+@checked
 def bifurcation_diagram(
     system: System,
     name: str,
@@ -77,10 +79,10 @@ def bifurcation_diagram(
         For bad input.
     """
     if not isinstance(system, System):
-        raise InputTypeError(f"system = {system!r}: must be a System")
+        raise InputTypeError(f"system = {shown(system)}: must be a System")
     row = lookup(name)
     if row.quantity.kind is not float:
-        raise InputError(f"name = {name!r}: must be a parameter that is a number")
+        raise InputError(f"name = {shown(name)}: must be a parameter that is a number")
     points = axis(row.short, values, row.quantity.low, row.quantity.high, closed=row.quantity.closed)
     kinds = [choice("sweeps", kind, SWEEPS) for kind in sweeps]
     leave, keep = _periods(periods)
@@ -112,7 +114,7 @@ def _periods(periods: tuple[int, int]) -> tuple[int, int]:
         leave, keep = periods
     except (TypeError, ValueError):
         raise InputTypeError(
-            f"periods = {periods!r}: must be a pair, periods to leave out and to keep"
+            f"periods = {shown(periods)}: must be a pair, periods to leave out and to keep"
         ) from None
     return integer("periods[0]", leave, 0, 10**7), integer("periods[1]", keep, 2, 10**6)
 

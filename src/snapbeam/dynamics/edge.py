@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError, InputTypeError, integer, positive
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive
 from snapbeam.dynamics.bifurcation import least_period
 from snapbeam.dynamics.flow import Flow, Stroboscope, flow_of
 from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit, shoot
@@ -76,6 +77,7 @@ class EdgeState:
         return f"<EdgeState over {len(self.states)} periods, {end}>"
 
 
+@checked
 def edge_state(
     system: System | Flow,
     quiet: State | ArrayLike,
@@ -157,7 +159,7 @@ def kicked(flow: Stroboscope, size: float | None, horizon: int) -> tuple[_Array,
     sizes = [0.1 * 2.0**k for k in range(8)] if size is None else [positive("kick", size)]
     rows = np.repeat(quiet[None], len(sizes) + 1, axis=0)
     rows[1:, flow.modes] += towards * np.array(sizes)
-    told = _snaps(flow, rows, horizon)
+    told = _snaps(flow, rows, integer("horizon", horizon, 1, 10**6))
     if told[0]:
         raise InputError(f"the start: it snaps within {horizon} periods by itself; take a weaker drive")
     if not told.any():
@@ -172,8 +174,8 @@ def _row(flow: Flow, state: State | ArrayLike, name: str) -> _Array:
         if not isinstance(flow, Stroboscope):
             raise InputTypeError(f"{name}: must be an array of {flow.dimension} numbers")
         return flow.coordinates(state)[0]
-    row = np.asarray(state, dtype=np.float64)
-    if row.shape != (flow.dimension,) or not np.isfinite(row).all():
+    row = finite_array(name, state)
+    if row.shape != (flow.dimension,):
         raise InputError(f"{name} of shape {row.shape}: must be {flow.dimension} finite numbers")
     return row
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.config.parameters import lookup
 from snapbeam.core.codes import RunStatus
 from snapbeam.core.findings import Finding
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.dynamics.starts import held_in_space
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble
@@ -118,12 +118,16 @@ class Stroboscope:
 
     def __post_init__(self) -> None:
         if not isinstance(self.system, System):
-            raise InputTypeError(f"system = {self.system!r}: must be a System")
+            raise InputTypeError(f"system = {shown(self.system)}: must be a System")
         if not isinstance(self.integration, Integration):
-            raise InputTypeError(f"integration = {self.integration!r}: must be an Integration")
+            raise InputTypeError(f"integration = {shown(self.integration)}: must be an Integration")
         if self.integration.tolerance is not None:
             raise InputError(
                 f"tolerance = {self.integration.tolerance:g}: is for one run; give steps, or accuracy = 'reference'"
+            )
+        if self.phase is not None and self.system.has_surroundings:
+            raise InputError(
+                f"phase = {self.phase:g}: a base or an axial load is at its own phase when a period begins; give none"
             )
         object.__setattr__(self, "system", held_in_space(self.system))
 
@@ -251,7 +255,7 @@ class Stroboscope:
         return found[0] if len(found) == 1 else _joined(found)
 
     def _begun(self, states: ArrayLike) -> State:
-        rows = np.atleast_2d(np.asarray(states, dtype=np.float64))
+        rows = _rows(states)
         if rows.ndim != 2 or rows.shape[1] != self.dimension:
             raise InputError(f"states of shape {rows.shape}: must have the shape (runs, {self.dimension})")
         # a failed state stands still and stays lost
@@ -360,8 +364,16 @@ def flow_of(system: System | Flow, integration: Integration | None = None, accur
         return Stroboscope(system, Integration(accuracy=accuracy) if integration is None else integration)
     if not isinstance(system, Flow):
         raise InputTypeError(
-            f"system = {system!r}: must be a System, or a Flow that takes states a period on"
+            f"system = {shown(system)}: must be a System, or a Flow that takes states a period on"
         )
     if integration is not None:
         raise InputTypeError("integration: is for a System; a Flow brings its own")
     return system
+
+
+def _rows(states: ArrayLike) -> _Array:
+    """States as rows of numbers, NaN in those that were lost."""
+    try:
+        return np.atleast_2d(np.asarray(states, dtype=np.float64))
+    except (TypeError, ValueError, OverflowError):
+        raise InputTypeError(f"states = {shown(states)}: must be an array of numbers, a row a run") from None

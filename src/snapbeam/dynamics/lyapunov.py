@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.parameters import lookup
-from snapbeam.core.validate import InputError, InputTypeError, integer, positive
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive, shown
 from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
@@ -27,6 +28,7 @@ _BLOCKS = 20
 """Means of as many stretches tell the standard error."""
 
 
+@checked
 def lyapunov(
     system: System | Flow,
     k: int = 1,
@@ -104,10 +106,12 @@ def _runs(
     """Where runs begin, the points of a map, and its columns."""
     if states is None or isinstance(states, State):
         if not isinstance(flow, Stroboscope):
-            raise InputTypeError(f"states = {states!r}: must be an array of shape (runs, {flow.dimension})")
+            raise InputTypeError(
+                f"states = {shown(states)}: must be an array of shape (runs, {flow.dimension})"
+            )
         begun = flow.coordinates(states)
     else:
-        begun = np.atleast_2d(np.asarray(states, dtype=np.float64))
+        begun = np.atleast_2d(finite_array("states", states))
     if axes is None:
         return begun, None, None
     points = points_of(axes)
@@ -198,6 +202,7 @@ def _periods(flow: Flow, points: Points) -> _Array:
     return np.array([flow.neighbour(name, float(ratio)).period for ratio in ratios])[which]
 
 
+@checked
 def separation_exponent(
     system: System | Flow,
     periods: int = 500,

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import ndimage, stats
 
-from snapbeam.core.validate import InputError, InputTypeError, integer
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, InputTypeError, integer, shown
 
 __all__ = [
     "BasinEntropy",
@@ -44,7 +45,12 @@ class BasinEntropy(NamedTuple):
 
 
 def _labels(labels: ArrayLike) -> NDArray[np.int64]:
-    array = np.asarray(labels)
+    try:
+        array = np.asarray(labels)
+    except ValueError:
+        raise InputError("labels: must be an array, not a list of unequal lengths") from None
+    except Exception as error:  # of an object that cannot be one
+        raise InputTypeError(f"labels = {shown(labels)}: must be an array of labels ({error})") from None
     if array.dtype.kind not in "iub":
         raise InputTypeError(f"labels of {array.dtype}: must be whole numbers")
     if array.ndim < 1 or array.size < 2:
@@ -52,6 +58,7 @@ def _labels(labels: ArrayLike) -> NDArray[np.int64]:
     return array.astype(np.int64)
 
 
+@checked
 def basin_entropy(labels: ArrayLike, box: int = 5) -> BasinEntropy:
     """Basin entropy and boundary basin entropy (Daza et al., Sci. Rep. 6 (2016) 31416).
 
@@ -101,6 +108,7 @@ class UncertaintyExponent(NamedTuple):
     """f(epsilon)."""
 
 
+@checked
 def uncertainty_exponent(labels: ArrayLike, sizes: ArrayLike | None = None) -> UncertaintyExponent:
     """The uncertainty exponent of the borders on a grid (Grebogi et al., Phys. Lett. A 99 (1983) 415).
 
@@ -157,6 +165,7 @@ class Integrity(NamedTuple):
     """Of that circle."""
 
 
+@checked
 def integrity(
     labels: ArrayLike, label: int, attractor: tuple[int, ...] | None = None, spacing: ArrayLike | None = None
 ) -> Integrity:
@@ -176,11 +185,11 @@ def integrity(
         Distance between points along each axis; 1 by default.
     """
     grid = _labels(labels)
-    inside = np.pad(grid == int(label), 1)
+    inside = np.pad(grid == integer("label", label, -(2**31), 2**31), 1)
     steps = np.ones(grid.ndim) if spacing is None else np.asarray(spacing, dtype=float)
     if steps.shape != (grid.ndim,) or not (steps > 0.0).all():
         raise InputError(
-            f"spacing = {spacing!r}: must be a number greater than 0 for each of {grid.ndim} axes"
+            f"spacing = {shown(spacing)}: must be a number greater than 0 for each of {grid.ndim} axes"
         )
     away = ndimage.distance_transform_edt(inside, sampling=steps)
     away = away[(slice(1, -1),) * grid.ndim]
@@ -191,7 +200,7 @@ def integrity(
             not 0 <= i < n for i, n in zip(attractor, grid.shape, strict=True)
         ):
             raise InputError(
-                f"attractor = {attractor!r}: must be indices of a point of the grid {grid.shape}"
+                f"attractor = {shown(attractor)}: must be indices of a point of the grid {grid.shape}"
             )
         local = float(away[tuple(attractor)])
     return Integrity(float((grid == int(label)).mean()), local, float(away.max()), center)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, InputTypeError, choice, finite, integer
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, InputTypeError, choice, finite, integer, shown
 from snapbeam.dynamics.flow import Stroboscope
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
@@ -27,6 +28,7 @@ _SAMPLES = 128
 _RATES = {"displacement": "velocity", "center_displacement": "center_velocity"}
 
 
+@checked
 def poincare(
     system: System,
     section: str | tuple[str, float, str] = "stroboscopic",
@@ -66,9 +68,9 @@ def poincare(
         For bad input.
     """
     if not isinstance(system, System):
-        raise InputTypeError(f"system = {system!r}: must be a System")
-    if system.striker is None:
-        raise InputError("striker = None: a section of a beam that nothing strikes is of no drive")
+        raise InputTypeError(f"system = {shown(system)}: must be a System")
+    if system.leads is None:
+        raise InputError("striker = None: a section of a beam that nothing moves is of no drive")
     total, before = integer("periods", periods, 1, 10**6), integer("transient", transient, 0, 10**7)
     flow = Stroboscope(system, Integration() if integration is None else integration, phase)
     level = _level(section)
@@ -77,7 +79,9 @@ def poincare(
         begun = flow.march(begun, before).states
     if not np.isfinite(begun).all():
         raise InputError("transient: the run failed before the section; use a smaller step")
-    held = flow.system.replace(**{"start": flow.state(begun[0]), "drive.phase": flow.striker_phase})
+    held = flow.system.replace(start=flow.state(begun[0]))
+    if held.striker is not None:
+        held = held.replace(**{"drive.phase": flow.striker_phase})
     how = flow.integration.replace(cycles=total, early_decision=False)
     end = total * flow.period
     if section == "stroboscopic":
@@ -98,7 +102,7 @@ def _level(section: Any) -> tuple[str, float, str] | None:
         name, value, direction = section
     except (TypeError, ValueError):
         raise InputTypeError(
-            f"section = {section!r}: must be one of {', '.join(SECTIONS)}, or (variable, level, direction)"
+            f"section = {shown(section)}: must be one of {', '.join(SECTIONS)}, or (variable, level, direction)"
         ) from None
     choice("section[0]", name, _LEVELS)
     return name, finite("section[1]", value), choice("section[2]", direction, _DIRECTIONS)
@@ -139,7 +143,7 @@ def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope,
     import xarray as xr
 
     if not times.size:
-        raise InputError(f"section = {section!r}: is never met within the periods asked for")
+        raise InputError(f"section = {shown(section)}: is never met within the periods asked for")
     data = simulate(system, how, sample_times=times).dataset
     kept = data[["displacement", "velocity", "center_displacement", "center_velocity", "modal_amplitude",
                  "modal_velocity"]]  # fmt: skip

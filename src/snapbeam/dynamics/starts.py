@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError, InputTypeError, flag, integer, nonnegative
+from snapbeam.core.validate import InputError, InputTypeError, flag, integer, nonnegative, shown
 from snapbeam.model.start import rest_state
 from snapbeam.model.state import State
 from snapbeam.model.system import System
@@ -118,7 +118,7 @@ def starts_of(given: Starts | int) -> Starts:
     if isinstance(given, Starts):
         return given
     if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, np.integer)):
-        raise InputTypeError(f"starts = {given!r}: must be a number of starts, or Starts")
+        raise InputTypeError(f"starts = {shown(given)}: must be a number of starts, or Starts")
     return Starts(count=int(given))
 
 
@@ -133,13 +133,19 @@ def held_in_space(system: System) -> System:
         For a recorded drive, whose periods differ.
     """
     striker = system.striker
-    if system.has_surroundings:
+    if system.harvester is not None:
         raise InputError(
-            "base, axial, harvester: the tools of dynamics know a beam and its striker alone; march a system with any "
-            "of these by sb.advance(system, every=True), which lands after each cycle"
+            "harvester: has a state of its own, which the tools of dynamics do not carry; march such a system by "
+            "sb.advance(system, every=True), which lands after each cycle"
         )
+    _require_common_period(system)
     if striker is None:
         return system
+    if striker.mass is not None:
+        raise InputError(
+            f"striker.mass = {striker.mass:g}: the tools of dynamics know a tip that moves as prescribed; "
+            "march a system with a body of its own by sb.advance(system, every=True), which lands after each cycle"
+        )
     if not striker.drive.harmonic:
         raise InputError("striker.drive: is recorded; dynamics need a drive that repeats, such as a Sine")
     from snapbeam.engines.assemble import make_ensemble
@@ -152,3 +158,20 @@ def held_in_space(system: System) -> System:
         return held
     free = State(amplitude=start.amplitude, velocity=start.velocity, phase=start.phase)
     return System(held.model, held.contact, held.striker, free)
+
+
+def _require_common_period(system: System) -> None:
+    """Refuse a base or an axial load that does not repeat with the cycle that is asked about."""
+    if len(system.moving) == 0:
+        return
+    (section, first), *others = system.moving
+    for name, drive in system.moving if system.has_surroundings else ():
+        if not drive.harmonic:
+            raise InputError(f"{name}: is no sine; dynamics need what repeats")
+    for name, drive in others:
+        times = float(drive.frequency_ratio) / float(first.frequency_ratio)  # type: ignore[attr-defined]
+        if round(times) < 1 or abs(times - round(times)) > 1e-12 * times:
+            raise InputError(
+                f"{name}.frequency_ratio = {drive.frequency_ratio:g}: must be a whole multiple of that of {section}, "  # type: ignore[attr-defined]
+                f"{first.frequency_ratio:g}, after whose period the system is seen"  # type: ignore[attr-defined]
+            )

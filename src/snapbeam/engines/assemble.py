@@ -15,6 +15,7 @@ from snapbeam.engines.clock import Clocked, clocked, most_steps
 from snapbeam.engines.columns import RUN
 from snapbeam.engines.driven import Driven, begun_at, cycles_of, driven_of, fastest_of, phases_of
 from snapbeam.engines.ensemble import Ensemble, Tapped
+from snapbeam.engines.others import others_of
 from snapbeam.engines.plan import Plan, plan_steps
 from snapbeam.engines.structure import Structure, structure_of
 from snapbeam.model.contact import ContactLaw, HertzContact
@@ -25,6 +26,7 @@ from snapbeam.model.quantity import RUN as RUN_SCOPE
 from snapbeam.model.quantity import quantities
 from snapbeam.model.start import rest_state
 from snapbeam.model.state import State
+from snapbeam.model.striker.another import numbered
 from snapbeam.model.system import System
 
 __all__ = ["FAR_AWAY", "cycles_of", "make_ensemble", "plans_of", "run_columns"]
@@ -96,7 +98,7 @@ def make_ensemble(
     if tapped is not None:
         table["circuit_rate"] = tapped.rate
     highest = table["rest_contact"] + table["offset"] + driven.highest
-    if structure.body_mass is not None or driven.kind.parts:
+    if structure.body_mass is not None or driven.kind.parts or system.others:
         highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown, and a shaken beam too
     time = clocked(table, system, integration, driven.period, plans, periods)
     _decisions(table, system, structure, integration, time, places.location, highest)
@@ -121,6 +123,7 @@ def make_ensemble(
         cycles=time.cycles,
         tapped=tapped,
         harvester=system.harvester,
+        others=others_of(system, structure, columns, runs),
     )
 
 
@@ -131,7 +134,11 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
     """
     size = next(iter(points.values())).size if points else 1
     own: dict[str, float] = {}
-    for section, part in (("contact", system.contact), ("striker", system.striker)):
+    parts: list[tuple[str, Any]] = [("contact", system.contact), ("striker", system.striker)]
+    for number, each in enumerate(system.others, 2):
+        parts += [(f"contact_{number}", each.contact), (f"striker_{number}", each.striker)]
+        own |= {f"drive_{number}.{name}": value for name, value in each.striker.drive.values().items()}
+    for section, part in parts:
         if part is not None:
             own |= {
                 f"{section}.{name}": value
@@ -147,7 +154,10 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
             own |= {f"{section}.{name}": value for name, value in around.motion.values().items()}
     columns = {name: np.full(size, value) for name, value in own.items()}
     for name, values in points.items():
-        if name not in columns and not (name == "striker.gap" and system.striker is not None):
+        section, _, field = name.partition(".")
+        strikers = 0 if system.striker is None else 1 + len(system.others)
+        may_gap = field == "gap" and numbered(section)[0] == "striker" and numbered(section)[1] <= strikers
+        if name not in columns and not may_gap:
             raise InputError(f"{name}: no parameter that may differ between the runs of one ensemble")
         columns[name] = np.asarray(values, dtype=np.float64)
     return columns
@@ -159,6 +169,9 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     A striker with a mass meets the beam for a shorter time, as the two masses together do: m_s m/(m_s + m).
     """
     plans, striker = _plans_of(system, integration, columns), system.striker
+    for number, each in enumerate(system.others, 2):
+        further = _plans_of(system, integration, columns, f"contact_{number}", each.contact)
+        plans = [_finer(one, other) for one, other in zip(plans, further, strict=True)]
     if integration.step is None and (system.base is not None or system.axial is not None):
         fastest = fastest_of(system, columns, len(plans))
         plans = [
@@ -188,11 +201,29 @@ def _struck(system: System) -> ReducedModel:
     return system.model.mirrored if above else system.model
 
 
-def _plans_of(system: System, integration: Integration, columns: Mapping[str, _Array]) -> list[Plan]:
-    of_contact = {name[8:]: values for name, values in columns.items() if name.startswith("contact.")}
+def _finer(one: Plan, other: Plan) -> Plan:
+    """Steps that serve two contacts: as short as the shorter ones of both, in flight and in contact."""
+    step = min(one.step, other.step)
+    longest = min(each.step * 0.5**each.coarsest for each in (one, other))
+    shortest = min(each.step * 0.5**each.finest for each in (one, other))
+    coarsest, finest = (math.ceil(math.log2(step / each) - 1e-9) for each in (longest, shortest))
+    return one._replace(step=step, coarsest=max(0, coarsest), finest=max(0, coarsest, finest))
+
+
+def _plans_of(
+    system: System,
+    integration: Integration,
+    columns: Mapping[str, _Array],
+    section: str = "contact",
+    contact: ContactLaw | None = None,
+) -> list[Plan]:
+    """The steps that a contact asks for: that of the first striker, or another one's."""
+    of_contact = {
+        name.partition(".")[2]: values for name, values in columns.items() if name.startswith(f"{section}.")
+    }
     step, accuracy = integration.step, integration.accuracy
     runs = next(iter(columns.values())).size if columns else 1
-    contact = system.contact if system.striker is not None else None
+    contact = contact or (system.contact if system.striker is not None else None)
     if contact is None or not of_contact:
         return [plan_steps(_struck(system), contact, step=step, accuracy=accuracy)] * runs
     table = np.stack(list(of_contact.values()), axis=1)
@@ -308,7 +339,7 @@ def _decisions(
     """When a run may end early."""
     table["decide_crossings"], table["decide_energy"] = -1, -math.inf
     keeps = system.contact is None or system.contact.keeps.energy_bound
-    if not integration.early_decision or not keeps:
+    if not integration.early_decision or not keeps or system.others:
         return
     table["decide_crossings"] = int(time.cycles / 20.0)
     table["decide_reach"] = np.maximum(highest, 0.0)

@@ -15,7 +15,7 @@ from snapbeam.model.drive import Drive, Sine
 from snapbeam.model.drive.joined import HORIZON, joined
 from snapbeam.model.system import System
 
-__all__ = ["Driven", "begun_at", "cycles_of", "driven_of", "fastest_of", "motions_of", "phases_of"]
+__all__ = ["Driven", "begun_at", "cycles_of", "driven_of", "fastest_of", "motions_of", "phases_of", "tip_of"]
 
 _Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _A
 
 def driven_of(system: System, columns: Mapping[str, _Array], runs: int) -> Driven:
     """Arrange the striker's drive, or it and what else moves, for kernels."""
-    if system.base is not None or system.axial is not None:
+    if any(section != "drive" for section, _ in system.moving):
         return _together(system, columns, runs)
     scale, striker = system.scale, system.striker
     if striker is None:
@@ -80,11 +80,12 @@ def driven_of(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
 
 
 def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Driven:
-    """The motions of a system with a base or a load as one drive.
+    """The motions of a system with a base, a load or several strikers as one drive.
 
     Nothing is said of how high the tip comes to be used: no such run is decided by it.
     """
     scale, names = system.scale, {"drive": "tip", "base": "base", "axial": "load"}
+    names |= {f"drive_{number}": f"tip{number - 1}" for number in range(2, 2 + len(system.others))}
     kinds: dict[str, type[Drive]] = {}
     found: dict[str, _Array] = {}
     speed, fastest = np.zeros(runs), np.zeros(runs)
@@ -117,7 +118,7 @@ def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
     """Greatest angular frequency of the base and of the axial load, rad/s; 0 without them."""
     found = np.zeros(runs)
     for section, drive in system.moving:
-        if section != "drive":
+        if section in ("base", "axial"):
             numbers = drive.numbers(_own(columns, section, runs), system.scale)
             found = np.maximum(found, numbers["fastest" if "fastest" in numbers else "omega"])
     return found
@@ -133,7 +134,7 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
     if not alone:
         times = times + begun / float(ensemble.drive_numbers[0, ensemble.drive.number_names.index("omega")])
     for section, drive in system.moving:
-        if section == "drive":
+        if section not in ("base", "axial"):
             continue
         own = {name: np.array([value]) for name, value in drive.values().items()}
         numbers, kind = drive.numbers(own, system.scale), drive.marched_as or type(drive)
@@ -145,6 +146,23 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
         )
         found[section] = sign * pairs[:, 0], sign * pairs[:, 1]
     return found
+
+
+def tip_of(system: System, number: int, times: _Array) -> tuple[_Array, _Array]:
+    """Displacement from its mid-position (m) and velocity (m/s) of a striker of several, the first being 1.
+
+    Seen from its own side, in the frame of the ends but without what a base does to it.  Of systems whose run begins
+    with their drives.
+    """
+    striker = system.others[number - 2].striker if number > 1 else system.striker
+    assert striker is not None
+    drive = striker.drive
+    own = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
+    numbers, kind = drive.numbers(own, system.scale), drive.marched_as or type(drive)
+    table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
+    arguments = numbers["omega"][0] * times + float(getattr(drive, "phase", 0.0))
+    pairs = np.array([tip_motion(table, np.empty(0), at) for at in arguments.tolist()]).reshape(-1, 2)
+    return pairs[:, 0], pairs[:, 1]
 
 
 def begun_at(driven: Driven, phase: _Array) -> _Array:

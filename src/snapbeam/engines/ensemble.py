@@ -13,7 +13,7 @@ from snapbeam.model.contact import ContactLaw
 from snapbeam.model.drive import Drive, Scale
 from snapbeam.model.world import Harvester
 
-__all__ = ["Ensemble", "Tapped"]
+__all__ = ["Ensemble", "OtherStrikers", "Tapped"]
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
@@ -28,6 +28,19 @@ class Tapped(NamedTuple):
     """Of the loss, that ends in the load."""
     volts: _Array
     """Across the load, V, per unit of the circuit's coordinate."""
+
+
+@dataclass(frozen=True, eq=False)
+class OtherStrikers:
+    """The strikers beside the first one of every run."""
+
+    laws: tuple[type[ContactLaw], ...]
+    numbers: _Array
+    """Where each is and what it touches by, shape (runs, strikers, 32), in the order of the engine's blocks."""
+    places: _Integers
+    """Which row each has, shape (runs, strikers)."""
+    rows: _Array
+    """Contact rows, each with the sign of its own side, shape (rows, N)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +76,12 @@ class Ensemble:
     """Cycles of excitation of each run."""
     tapped: Tapped | None = None
     harvester: Harvester | None = None
+    others: OtherStrikers | None = None
+
+    @property
+    def forced(self) -> bool:
+        """Whether a base moves or the axial load changes."""
+        return any(part in ("base", "load") for part, _ in self.drive.parts)
 
     @property
     def size(self) -> int:

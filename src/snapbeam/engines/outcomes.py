@@ -195,6 +195,13 @@ def _harvested_power(reading: Reading) -> Values:
         return np.where(reading.duration > 0.0, _harvested(reading) / reading.duration, np.nan)
 
 
+def _harvested_per_cycle(reading: Reading) -> Values:
+    runs = reading.ensemble.runs
+    with np.errstate(invalid="ignore", divide="ignore"):
+        done = reading.cycles * reading.duration / (runs["end"] * runs["tick"])
+        return np.where(done > 0.0, _harvested(reading) / done, np.nan)
+
+
 def _peak_voltage(reading: Reading) -> Values:
     tapped = reading.ensemble.tapped
     return reading.seen("peak_circuit") * (0.0 if tapped is None else np.abs(tapped.volts))
@@ -291,6 +298,10 @@ _ROWS = (
     Statistic("harvested_energy", "float64", "J", "energy that ended in the harvester's load", _harvested),
     Statistic(
         "harvested_power", "float64", "W", "energy in the harvester's load over the time of the run", _harvested_power
+    ),
+    Statistic(
+        "harvested_per_cycle", "float64", "J", "energy in the harvester's load over the cycles of the run",
+        _harvested_per_cycle,
     ),
     Statistic("peak_voltage", "float64", "V", "greatest voltage across the load at the end of a step", _peak_voltage),
 )  # fmt: skip

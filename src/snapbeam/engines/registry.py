@@ -74,6 +74,7 @@ def resolve(
     body: bool = False,
     uneven: bool = False,
     around: bool = False,
+    several: bool = False,
 ) -> tuple[str, Engine]:
     """The engine that *name* stands for, and its own name.
 
@@ -97,6 +98,8 @@ def resolve(
         Whether the wells are unequal.
     around : bool
         Whether a base moves, the axial load changes, or a harvester taps the beam.
+    several : bool
+        Whether several strikers strike.
 
     Raises
     ------
@@ -117,6 +120,8 @@ def resolve(
             reason = (
                 "a moving base, a changing axial load and a harvester are marched by the CPU engine alone"
             )
+        if several:
+            reason = "several strikers are marched by the CPU engine alone"
         if reason is None and (name == "cuda" or not cuda.simulated()):
             return "cuda", cuda
         if name == "cuda":

@@ -29,11 +29,19 @@ class Cancelled(Exception):
 
 @dataclass(eq=False)
 class Token:
-    """By which a job is told to stop, and stops itself when its time is up."""
+    """By which a job is told to stop, and stops itself when its time is up.
+
+    The time before its first report, in which an engine may be compiled, is not counted.
+    """
 
     seconds: float = float("inf")
     begun: float = field(default_factory=time.monotonic)
     event: threading.Event = field(default_factory=threading.Event)
+    reported: bool = False
+
+    def begin(self) -> None:
+        """The work begins."""
+        self.begun, self.reported = time.monotonic(), False
 
     def cancel(self) -> None:
         """Stop it at its next report."""
@@ -44,7 +52,7 @@ class Token:
         """Whether it was told to stop."""
         return self.event.is_set()
 
-    def check(self, *_: Any) -> None:
+    def check(self, *report: Any) -> None:
         """Go on, or not.
 
         Raises
@@ -56,6 +64,8 @@ class Token:
         """
         if self.event.is_set():
             raise Cancelled
+        if report and not self.reported:
+            self.begun, self.reported = time.monotonic(), True
         if time.monotonic() - self.begun > self.seconds:
             raise InputError(f"given up after {self.seconds:g} s, the longest that a page may ask for")
 
@@ -133,7 +143,7 @@ class Jobs:
 
 
 def _guarded(work: Callable[[Token], Any], done: Callable[[Any, str], None], token: Token) -> None:
-    token.begun = time.monotonic()
+    token.begin()
     result, words = None, ""
     try:
         token.check()

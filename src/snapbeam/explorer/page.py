@@ -26,6 +26,7 @@ from snapbeam.explorer.maps.layers import chances as chances_of
 from snapbeam.explorer.maps.points import Point, compared
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.views.run import RunView
+from snapbeam.explorer.waiting import Waiting
 
 __all__ = ["Page"]
 
@@ -57,6 +58,7 @@ class Page:
         self.card = MapCard(self.look, shared, self.address, self.post, self.later)
         self.card.asked = self.ask
         self.card.moved = self._write_address
+        self.waiting = Waiting(shared.compiling, self.later)
         self.runs = [RunView(self.look, "A", self.post, self.later)]
         self.points: list[Point | None] = [None, None]
         self._tokens: list[Token | None] = [None, None]
@@ -86,7 +88,12 @@ class Page:
         if shared.source.growing and self.doc is not None:
             self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
         self._begin()
-        pn.state.onload(lambda: self.later(self.runs[0].complete, _AFTER))
+        pn.state.onload(lambda: self.later(self._at_rest, _AFTER))
+
+    def _at_rest(self) -> None:
+        """Once the page stands: what is not seen yet, and what the first run will need."""
+        self.runs[0].complete()
+        self.shared.warm()
 
     def system_card(self) -> SystemCard:
         """The card of the system, made when it is first needed."""
@@ -200,6 +207,7 @@ class Page:
         self.points[which] = point
         self._mark()
         view.begin(words)
+        self.waiting.begin(which, lambda seconds, why: view.wait(words, seconds, why))
         base, how = self.card.system, self.card.integration
 
         def work(token: Token) -> tuple[Run, str, bool, str]:
@@ -244,6 +252,7 @@ class Page:
 
     def _look(self, which: int, point: Point, token: Token, run: Run) -> None:
         if not token.cancelled and self.points[which] is point:
+            self.waiting.end(which)
             self.runs[which].show(run, point.words(), fresh=True)
 
     def _done(
@@ -251,6 +260,7 @@ class Page:
     ) -> None:
         if token.cancelled or self.points[which] is not point:
             return
+        self.waiting.end(which)
         view = self.runs[which]
         if found is None:
             view.fail(f"{point.words()}: {error}")

@@ -7,11 +7,13 @@ from collections import OrderedDict
 from pathlib import Path
 from typing import Any
 
+import snapbeam as sb
 from snapbeam import InputError, Integration, System
-from snapbeam.explorer.jobs import Jobs
+from snapbeam.explorer.jobs import Jobs, Token
 from snapbeam.explorer.maps.points import integration_of, system_of
 from snapbeam.explorer.maps.source import Source
 from snapbeam.explorer.maps.windows import Window
+from snapbeam.explorer.waiting import Compiling
 
 __all__ = ["Shared"]
 
@@ -34,6 +36,8 @@ class Shared:
         self.source = source
         self.file = file
         self.jobs = Jobs()
+        self.compiling = Compiling()
+        self._warm = False
         self.pages = 0
         self._lock = threading.Lock()
         self._windows: OrderedDict[Any, Window] = OrderedDict()
@@ -45,6 +49,15 @@ class Shared:
             self.integration = integration_of(source.attrs)
         except (InputError, ValueError) as error:
             self.why_not = str(error)
+
+    def warm(self) -> None:
+        """Have the engine compiled, or fetched from the disk, while nobody waits for it; once."""
+        system, how = self.system, self.integration
+        if self._warm or system is None:
+            return
+        self._warm = True
+        short = how.replace(cycles=1, engine="auto", threads=None)
+        self.jobs.run(lambda token: sb.simulate(system, short), lambda *_: self.compiling.over(), Token())
 
     def window(self, made: Window) -> Window:
         """The window that was computed for the same question, or *made*, kept from now on."""
@@ -64,6 +77,7 @@ class Shared:
     def close(self) -> None:
         """Compute no more."""
         self.jobs.close()
+        self.compiling.close()
 
 
 def _area(window: Window) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from snapbeam import InputError, Integration, System
+from snapbeam import InputError, InputTypeError, Integration, System
 
 __all__ = ["Explorer", "explore", "serve"]
 
@@ -76,6 +76,8 @@ def explore(what: Any = None, *, integration: Integration | None = None, height:
     InputError
         If *what* is no map, or Panel is not installed.
     """
+    if not isinstance(integration, (Integration, type(None))):
+        raise InputTypeError(f"integration is a {type(integration).__name__}: must be an Integration or None")
     shared = _shared(what, None, integration)
     from snapbeam.explorer.server import make_server
 

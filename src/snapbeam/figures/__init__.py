@@ -8,6 +8,7 @@ from snapbeam.figures.dynamics import (
     plot_section,
     plot_survival,
 )
+from snapbeam.figures.point_list import plot_points
 from snapbeam.figures.response_map import class_handles, plot_response_map
 from snapbeam.figures.run import plot_run
 from snapbeam.figures.schematic import plot_system
@@ -30,6 +31,7 @@ __all__ = [
     "plot_lifetimes",
     "plot_modal_amplitudes",
     "plot_phase_portrait",
+    "plot_points",
     "plot_response_map",
     "plot_run",
     "plot_section",

@@ -13,6 +13,7 @@ from matplotlib.gridspec import GridSpec
 from numpy.typing import NDArray
 
 from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.foreign import MADE_BY
 from snapbeam.core.validate import InputError, integer, nonnegative, positive
 from snapbeam.figures.captions import caption
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
@@ -173,6 +174,7 @@ def _write_mp4(pictures: Iterator[NDArray[np.uint8]], path: Path, rate: float) -
                 writer = imageio_ffmpeg.write_frames(
                     str(path), picture.shape[1::-1], fps=rate * repeat, codec="libx264", quality=7,
                     macro_block_size=2, ffmpeg_log_level="error",
+                    output_params=["-metadata", f"comment={MADE_BY}"],
                 )  # fmt: skip
                 writer.send(None)
             for _ in range(repeat):
@@ -191,7 +193,13 @@ def _write_gif(pictures: Iterator[NDArray[np.uint8]], path: Path, rate: float) -
     if not images:
         raise InputError("frames: must hold at least one figure")
     images[0].save(
-        path, save_all=True, append_images=images[1:], duration=1000.0 / rate, loop=0, optimize=True
+        path,
+        save_all=True,
+        append_images=images[1:],
+        duration=1000.0 / rate,
+        loop=0,
+        optimize=True,
+        comment=MADE_BY.encode(),
     )
 
 

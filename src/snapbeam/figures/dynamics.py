@@ -12,6 +12,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError
 from snapbeam.figures.axes import dress, edges_of, positions
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
@@ -39,6 +40,7 @@ def _axes(ax: Axes | None, width: str = "single", height: float = 72.0) -> Axes:
     return new_figure(width, height).add_subplot() if ax is None else ax
 
 
+@checked
 def plot_lifetimes(
     dataset: xr.Dataset,
     ax: Axes | None = None,
@@ -107,6 +109,7 @@ def _lifetime_cells(
     dress(ax.yaxis, dataset, dims[1])
 
 
+@checked
 def plot_survival(
     dataset: xr.Dataset, ax: Axes | None = None, *, labels: Sequence[str] | None = None
 ) -> Axes:
@@ -147,6 +150,7 @@ def plot_survival(
     return ax
 
 
+@checked
 def plot_diagram(
     dataset: xr.Dataset | None,
     ax: Axes | None = None,
@@ -240,6 +244,7 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
     return handles
 
 
+@checked
 def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw Lyapunov exponents: how they converge over periods, or the largest over one or two parameters."""
     if "exponent" not in dataset:
@@ -282,6 +287,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     return ax
 
 
+@checked
 def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "center_displacement") -> Axes:
     """Draw a Poincare section: a displacement against its velocity."""
     y = x.replace("displacement", "velocity")
@@ -304,6 +310,7 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "center_d
     return ax
 
 
+@checked
 def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw basins of attraction: a colour an attractor, grey where it is undecided, attractors as rings."""
     if "basin" not in dataset:

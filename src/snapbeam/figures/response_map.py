@@ -12,12 +12,12 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError, finite_array, instance
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, InputTypeError, finite_array, instance
 from snapbeam.figures.agreement import draw_agreement
-from snapbeam.figures.axes import dress, edges_of, symbol_of
+from snapbeam.figures.axes import dress, edges_of, positions, symbol_of
 from snapbeam.figures.captions import beam_text
 from snapbeam.figures.panels import class_cells
-from snapbeam.figures.response_line import draw_response_line
 from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_figure
 from snapbeam.lab.compare.dots import Dots
 from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
@@ -25,16 +25,19 @@ from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["UPWARD", "class_handles", "plot_response_map", "subtitle"]
+__all__ = ["UPWARD", "class_handles", "draw_dots", "draw_threshold_line", "plot_response_map", "subtitle"]
 
 _Array = NDArray[np.float64]
 
 UPWARD = ("velocity_amplitude", "location")
 """Axes that are drawn upward rather than across, the first of them first."""
 
+_CURVES = ("min_center_displacement", "max_center_displacement")
+"""Drawn over the classes of a map over one axis."""
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 
 
+@checked
 def plot_response_map(
     dataset: xr.Dataset,
     ax: Axes | None = None,
@@ -52,7 +55,8 @@ def plot_response_map(
     Parameters
     ----------
     dataset : xarray.Dataset
-        A map with the variable ``response`` over one or two axes of more than one point.
+        A map with the variable ``response`` over one or two axes of more than one point, or over a list of points
+        (:func:`plot_points`).
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
     dots : Dots, optional
@@ -75,6 +79,10 @@ def plot_response_map(
     import xarray as xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if "response" in dataset and dataset["response"].dims == ("point",):
+        from snapbeam.figures.point_list import plot_points
+
+        return plot_points(dataset, "response", ax, dots=dots, threshold_line=threshold_line, legend=legend)
     if "response" in dataset and _is_line(dataset):
         return _line(dataset, ax, dots is not None or threshold_line, legend)
     across, upward, kinds = _two_axes(dataset)
@@ -99,9 +107,9 @@ def plot_response_map(
             handles.append(draw_agreement(ax, dataset, (across, upward), edges))
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
         if threshold_line:
-            handles.append(_draw_threshold(ax, across, upward, fixed))
+            handles.append(draw_threshold_line(ax, across, upward, fixed))
         if dots is not None:
-            handles.append(_draw_dots(ax, dots, across, upward, fixed))
+            handles.append(draw_dots(ax, dots, across, upward, fixed))
         if legend and own is not None:
             own.legend(handles=handles, loc="outside lower center", ncols=2)
         elif legend:
@@ -124,7 +132,7 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
         ax = own.add_subplot() if own is not None else ax
         assert ax is not None
         fix_ticks(ax)
-        draw_response_line(ax, dataset, name)
+        _draw_line(ax, dataset, name)
         ax.set_title(subtitle(dataset, (name,)), loc="left")
         handles = class_handles(dataset["response"].values)
         if legend and own is not None:
@@ -132,6 +140,25 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
         elif legend:
             ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
     return ax
+
+
+def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
+    """Draw classes along the axis *name*, with the least and the greatest displacement of the centre above them."""
+    points, _ = positions(dataset, name)
+    edges = edges_of(dataset, name)
+    kinds = dataset["response"].squeeze().values[None, :]
+    low, high = -1.6, 1.6
+    curves = [dataset[key].squeeze().values for key in _CURVES if key in dataset]
+    if curves and np.isfinite(np.concatenate(curves)).any():
+        low, high = min(low, np.nanmin(curves[0])), max(high, np.nanmax(curves[-1]))
+    pad = 0.08 * (high - low)
+    class_cells(ax, edges, np.array([low - pad, high + pad]), kinds)
+    for curve in curves:
+        ax.plot(points, curve, color="white", linewidth=2.0)
+        ax.plot(points, curve, ".-", color="black", linewidth=0.8, markersize=2.5)
+    dress(ax.xaxis, dataset, name)
+    ax.set_ylabel("Centre displacement $w/b$,\nleast and greatest")
+    ax.set(xlim=edges[[0, -1]], ylim=(low - pad, high + pad))
 
 
 def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
@@ -181,7 +208,10 @@ def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]
         Classes of runs, whose shares then stand beside the names; unknown ones are named if there are any.
     """
     if kinds is not None:
-        shown_kinds = np.asarray(kinds)
+        try:
+            shown_kinds = np.asarray(kinds, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            raise InputTypeError("kinds: must be an array of class codes") from None
         # points that a picture leaves out are NaN in it
         kinds = finite_array("kinds", shown_kinds[shown_kinds == shown_kinds]).astype(np.int8)
     handles: list[Patch | Line2D] = []
@@ -198,7 +228,8 @@ def _percent(count: int, total: int) -> str:
     return "<0.1 %" if 0.0 < share < 0.1 else f"{share:.1f} %"
 
 
-def _draw_threshold(ax: Axes, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+def draw_threshold_line(ax: Axes, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+    """Draw V_QS1 of one mode (Eq. 21) over two of the paper's coordinates, the third of them fixed."""
     x = np.linspace(*ax.get_xlim(), 402)[1:-1]
     if {across, upward} - {"frequency_ratio", "location", "velocity_amplitude"}:
         raise InputError(
@@ -223,7 +254,8 @@ def _given(fixed: dict[str, float | None], name: str) -> float:
     return value
 
 
-def _draw_dots(ax: Axes, dots: Dots, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+def draw_dots(ax: Axes, dots: Dots, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+    """Draw measured responses over a map, those at other values of its fixed coordinates left out with a warning."""
     keep = np.ones(len(dots), dtype=bool)
     for name, value in fixed.items():
         there = getattr(dots, name)

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, finite
 from snapbeam.figures.captions import caption, scale_of
 from snapbeam.figures.series import across as across_of
@@ -29,6 +30,7 @@ _CURVES = (
 _MANY = 20_000  # samples above which a curve is stored as pixels in a vector file
 
 
+@checked
 def plot_run(
     run: Run | xr.Dataset, window: tuple[float, float] | None = None, ax: Axes | None = None
 ) -> Axes:

@@ -8,6 +8,7 @@ import cmcrameri.cm as crameri
 import numpy as np
 from matplotlib.axes import Axes
 
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, choice, integer
 from snapbeam.figures.captions import caption, scale_of
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
@@ -54,6 +55,7 @@ def _axes(ax: Axes | None, dataset: xr.Dataset) -> Axes:
     return ax
 
 
+@checked
 def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, modes: int = 5) -> Axes:
     """Draw the amplitudes of the first *modes* buckling modes, over that of the well.
 
@@ -107,6 +109,7 @@ def _legend(ax: Axes, entries: int) -> None:
     ax.legend(loc="upper left", ncols=entries, columnspacing=1.0, handlelength=1.2)
 
 
+@checked
 def plot_energies(run: Run | xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw where the striker's work went: into the beam, the contact, and damping.
 
@@ -135,6 +138,7 @@ def plot_energies(run: Run | xr.Dataset, ax: Axes | None = None) -> Axes:
     return ax
 
 
+@checked
 def plot_spectrum(
     run: Run | xr.Dataset,
     ax: Axes | None = None,
@@ -187,6 +191,7 @@ def plot_spectrum(
     return ax
 
 
+@checked
 def plot_phase_portrait(
     run: Run | xr.Dataset, ax: Axes | None = None, *, of: str = "center", strobe: bool = True
 ) -> Axes:

@@ -8,8 +8,10 @@ import cmcrameri.cm as crameri
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
+from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, instance
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, instance, shown
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.figures.axes import dress, edges_of, positions
 from snapbeam.figures.captions import scale_of
@@ -19,16 +21,19 @@ from snapbeam.figures.style import BEAM_COLOR, fix_ticks, house_style, new_figur
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["plot_statistic"]
+__all__ = ["plot_statistic", "scaled_values", "wants_powers"]
+
+_Array = NDArray[np.float64]
 
 _DECADES = 300.0
 """Greatest over least value, from which colours go by powers of ten."""
 
 
+@checked
 def plot_statistic(
     dataset: xr.Dataset, name: str, ax: Axes | None = None, *, log: bool | None = None
 ) -> Axes:
-    """Draw a statistic of a map: colours over two axes, a curve over one.
+    """Draw a statistic of a map: colours over two axes, a curve over one, coloured dots of a list of points.
 
     Cells of runs that failed, or that have none of it, are grey.
 
@@ -56,7 +61,11 @@ def plot_statistic(
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if instance("name", name, str, "text") not in dataset:
-        raise InputError(f"variable = {name!r}: the map has {', '.join(map(str, dataset.data_vars))}")
+        raise InputError(f"variable = {shown(name)}: the map has {', '.join(map(str, dataset.data_vars))}")
+    if dataset[name].dims == ("point",):
+        from snapbeam.figures.point_list import plot_points
+
+        return plot_points(dataset, name, ax)
     values = dataset[name].squeeze()
     dims = [str(each) for each in values.dims]
     if not 1 <= len(dims) <= 2 or "point" in dims:
@@ -65,13 +74,10 @@ def plot_statistic(
             f"a statistic is drawn over one or two axes; this one has {sizes}: select one point of the others, as with "
             "dataset.isel(location=0)"
         )
-    data = values.astype(float)
-    factor, label = _label(dataset, name, data.values)
-    data = data / factor
-    good = data.values[np.isfinite(data.values)]
-    positive = good[good > 0.0]
+    scaled, label = scaled_values(dataset, name)
+    data = values.copy(data=scaled.reshape(values.shape))
     if log is None:
-        log = bool(positive.size and (good >= 0.0).all() and positive.max() > _DECADES * positive.min())
+        log = wants_powers(scaled)
     with house_style():
         if ax is None:
             ax = new_figure("single", 74.0).add_subplot()
@@ -86,6 +92,7 @@ def plot_statistic(
             upward = next((each for each in UPWARD if each in dims), dims[1])
             across = dims[0] if dims[1] == upward else dims[1]
             field = np.ma.masked_invalid(data.transpose(upward, across).values)
+            positive = scaled[scaled > 0.0]
             norm = LogNorm(positive.min(), positive.max()) if log else Normalize()
             ax.set_facecolor("0.8")
             mesh = ax.pcolormesh(
@@ -97,6 +104,21 @@ def plot_statistic(
             dress(ax.yaxis, dataset, upward)
         ax.set_title(subtitle(dataset, (*dims,)), loc="left")
     return ax
+
+
+def scaled_values(dataset: xr.Dataset, name: str) -> tuple[_Array, str]:
+    """Values of a variable in a unit that suits them, and what stands beside them."""
+    values = dataset[name].values.astype(np.float64)
+    factor, label = _label(dataset, name, values)
+    scaled: _Array = values / factor
+    return scaled, label
+
+
+def wants_powers(values: _Array) -> bool:
+    """Whether values span so much that colours go by powers of ten: none negative, more than two of them."""
+    good = values[np.isfinite(values)]
+    positive = good[good > 0.0]
+    return bool(positive.size and (good >= 0.0).all() and positive.max() > _DECADES * positive.min())
 
 
 def _label(dataset: xr.Dataset, name: str, values: np.ndarray) -> tuple[float, str]:

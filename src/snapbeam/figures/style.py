@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.foreign import MADE_BY
 from snapbeam.core.validate import choice, positive
 
 __all__ = [
@@ -121,7 +122,10 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
         assert whole is not None
         figure = whole
     kind = target.suffix.lower().lstrip(".")
-    stamp = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
+    stamp = {
+        "pdf": {"Creator": MADE_BY, "CreationDate": None},
+        "svg": {"Creator": MADE_BY, "Date": None},
+    }.get(kind, {"Description": MADE_BY})
     with house_style(), atomic_path(target) as temporary:
         figure.savefig(temporary, format=kind, metadata=stamp)
     return target

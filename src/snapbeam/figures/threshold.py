@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, instance
 from snapbeam.figures.axes import dress, positions, symbol_of
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
@@ -21,6 +22,7 @@ __all__ = ["plot_threshold"]
 _STYLES = (("#B03A27", "-"), ("#16245E", "-"), ("#4C97C8", "--"), ("#6E8B2F", "-."), ("#000000", ":"))
 
 
+@checked
 def plot_threshold(
     dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static: bool = True, legend: bool = True
 ) -> Axes:

@@ -116,16 +116,16 @@ class Beam:
             load = None
         if (level is None) == (load is None):
             raise InputError(
-                f"buckling_level = {level!r}, axial_load = {load!r}: "
+                f"buckling_level = {shown(level)}, axial_load = {shown(load)}: "
                 "give exactly one of the two, the other follows from it"
             )
         for name in ("length", "thickness", "width", "density", "young_modulus"):
             self._set(name, _beam_quantities()[name].check(name, getattr(self, name)))
         try:
             level, load = self._completed(level, load)
-        except OverflowError:
+        except (OverflowError, ZeroDivisionError):
             raise InputError(
-                f"length = {self.length:g} m, buckling_level = {level!r}: the square of one is more than a number holds"
+                f"length = {self.length:g} m, buckling_level = {level!r}: a square is out of what a number holds"
             ) from None
         self._set("axial_load", load)
         self._set("buckling_level", level)

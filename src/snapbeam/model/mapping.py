@@ -18,6 +18,7 @@ from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.quantity import quantities
 from snapbeam.model.state import State
 from snapbeam.model.striker import Striker
+from snapbeam.model.striker.another import Another, numbered
 from snapbeam.model.world import HARVESTERS, LOADS, AxialLoad, Base
 
 __all__ = ["SECTIONS", "parts_from_mapping", "parts_to_mapping"]
@@ -89,6 +90,11 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         own = {name: getattr(striker, name) for name in quantities(Striker) if name not in left_out}
         sections["striker"] = {name: value for name, value in own.items() if value is not None}
         sections["drive"] = {"kind": striker.drive.name} | _fields(striker.drive)
+    for number, each in enumerate(system.others, 2):
+        sections[f"contact_{number}"] = {"law": each.contact.name} | _fields(each.contact)
+        own = {name: getattr(each.striker, name) for name in ("location", "side", "gap")}
+        sections[f"striker_{number}"] = {name: value for name, value in own.items() if value is not None}
+        sections[f"drive_{number}"] = {"kind": each.striker.drive.name} | _fields(each.striker.drive)
     if system.base is not None:
         own = {name: getattr(system.base, name) for name in quantities(Base)}
         sections["base"] = {"kind": system.base.motion.name} | own | _fields(system.base.motion)
@@ -115,7 +121,7 @@ def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, A
     """The parts that sections describe."""
     mapping("sections", sections)
     for name, values in sections.items():
-        if name not in SECTIONS:
+        if numbered(name)[0] not in SECTIONS:
             raise InputError(f"[{name}]: unknown section; must be one of {', '.join(SECTIONS)}")
         if not isinstance(values, Mapping):
             raise InputError(f"{name} = {shown(values)}: must be a section [{name}]")
@@ -127,6 +133,7 @@ def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, A
         own = dict(sections.get("striker", {}))
         _only(own, "striker", list(quantities(Striker)))
         parts["striker"] = Striker(drive=drive, **own)
+    parts["others"] = _others(sections, parts.get("contact"))
     if "base" in sections:
         own = dict(sections["base"])
         around = {name: own.pop(name) for name in quantities(Base) if name in own}
@@ -141,6 +148,24 @@ def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, A
         _needed(values, "start", State)
         parts["start"] = State(**values)
     return parts
+
+
+def _others(sections: Mapping[str, Mapping[str, Any]], contact: Any) -> tuple[Another, ...]:
+    """The strikers beside the first: sections striker_2, drive_2 and contact_2 (without it the first one's law)."""
+    numbers = sorted({numbered(name)[1] for name in sections} - {1})
+    if numbers != list(range(2, 2 + len(numbers))):
+        raise InputError(f"[striker_{numbers[-1]}]: there is no striker before it; number them 2, 3, ...")
+    found = []
+    for number in numbers:
+        names = {kind: f"{kind}_{number}" for kind in ("striker", "drive", "contact")}
+        own = dict(sections.get(names["striker"], {}))
+        _only(own, names["striker"], list(quantities(Striker)))
+        drive = _chosen(sections.get(names["drive"], {"kind": "still"}), names["drive"], "kind", DRIVES)
+        law = contact
+        if names["contact"] in sections:
+            law = _chosen(sections[names["contact"]], names["contact"], "law", LAWS)
+        found.append(Another(Striker(drive=drive, **own), law))
+    return tuple(found)
 
 
 def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
@@ -174,10 +199,10 @@ def _chosen(values: Mapping[str, Any], section: str, key: str, known: Mapping[st
     own = dict(values)
     name = own.pop(key, None)
     if name not in known:
-        raise InputError(f"[{section}] {key} = {name!r}: must be one of {', '.join(map(repr, known))}")
+        raise InputError(f"[{section}] {key} = {shown(name)}: must be one of {', '.join(map(repr, known))}")
     kind = known[name]
     _only(own, section, [item.name for item in dataclasses.fields(kind)])
-    _needed(own, section, kind, f" for {key} = {name!r}")
+    _needed(own, section, kind, f" for {key} = {shown(name)}")
     return kind(**own)
 
 

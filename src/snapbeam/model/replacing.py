@@ -16,6 +16,7 @@ from snapbeam.model.mapping import SECTIONS
 from snapbeam.model.quantity import quantities
 from snapbeam.model.start import started
 from snapbeam.model.state import State
+from snapbeam.model.striker.another import Another, numbered
 
 __all__ = ["replaced"]
 
@@ -28,7 +29,7 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     inside: dict[str, dict[str, Any]] = {}
     for name, value in changes.items():
         section, dot, field = name.partition(".")
-        if section not in SECTIONS:
+        if numbered(section)[0] not in SECTIONS:
             raise InputError(f"{name}: no parameter of a system; its sections are {', '.join(SECTIONS)}")
         if dot:
             inside.setdefault(section, {})[field] = value
@@ -55,6 +56,7 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         found["striker"] = dataclasses.replace(striker, drive=drive)
     if "striker" in inside:
         found["striker"] = _changed(found["striker"], "striker", inside["striker"])
+    found["others"] = _others(found.get("others", ()), whole, inside)
     for name in ("base", "axial"):
         if name in inside:
             found[name] = _around(found.get(name), name, inside[name])
@@ -66,6 +68,33 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     if "start" in inside:
         found["start"] = started(found["model"], found["striker"], found["start"], inside["start"])
     return found
+
+
+def _others(
+    others: tuple[Another, ...], whole: Mapping[str, Any], inside: Mapping[str, Mapping[str, Any]]
+) -> tuple[Another, ...]:
+    """The strikers beside the first one, changed by dotted name or whole part."""
+    for name in (*whole, *inside):
+        if numbered(name)[1] > 1 + len(others):
+            raise InputError(f"{name}: this system has {1 + len(others)} strikers")
+    made = []
+    for number, each in enumerate(others, 2):
+        striker, contact = (
+            whole.get(f"striker_{number}", each.striker),
+            whole.get(f"contact_{number}", each.contact),
+        )
+        drive = whole.get(f"drive_{number}", striker.drive)
+        if f"drive_{number}" in inside:
+            drive = _changed(drive, f"drive_{number}", inside[f"drive_{number}"])
+        own = {"drive": drive} if drive is not striker.drive else {}
+        if own:
+            striker = dataclasses.replace(striker, **own)
+        if f"striker_{number}" in inside:
+            striker = _changed(striker, f"striker_{number}", inside[f"striker_{number}"])
+        if f"contact_{number}" in inside:
+            contact = _changed(contact, f"contact_{number}", inside[f"contact_{number}"])
+        made.append(Another(striker, contact))
+    return tuple(made)
 
 
 def _there(part: Any, section: str) -> Any:

@@ -25,6 +25,7 @@ from snapbeam.model.mapping import parts_from_mapping, parts_to_mapping
 from snapbeam.model.replacing import replaced
 from snapbeam.model.state import State
 from snapbeam.model.striker import RecordedDrive, Shaker, Striker
+from snapbeam.model.striker.another import Another, check_others, parted
 from snapbeam.model.world import AxialLoad, Base, Harvester
 from snapbeam.model.world.check import check_world
 
@@ -38,10 +39,11 @@ class System:
     Parameters
     ----------
     model : ReducedModel
-    contact : ContactLaw, optional
-        Needed with a striker.
-    striker : Striker, Shaker or RecordedDrive, optional
-        Without one the structure vibrates freely from *start*.
+    contact : ContactLaw, or a sequence of them, optional
+        Needed with a striker.  Of several strikers, one law each or one for all.
+    striker : Striker, Shaker or RecordedDrive, or a sequence of them, optional
+        Without one the structure vibrates freely from *start*.  Several strike at once, each with its own place, side,
+        law and drive; runs begin in the well that the first one pushes away from.
     base : Base, optional
         The motion of what both ends of the beam are mounted on.
     axial : AxialLoad, optional
@@ -50,6 +52,11 @@ class System:
         A circuit that turns motion into power in a resistor.
     start : State, optional
         Where runs begin, one state; by default at rest in the well that the striker pushes away from, touched by it.
+
+    Attributes
+    ----------
+    others : tuple of Another
+        The strikers beside the first one, with their laws.
 
     Raises
     ------
@@ -75,8 +82,12 @@ class System:
     base: Base | None = None
     axial: AxialLoad | None = None
     harvester: Harvester | None = None
+    others: tuple[Another, ...] = ()
 
     def __post_init__(self) -> None:
+        if isinstance(self.striker, (list, tuple)) or isinstance(self.contact, (list, tuple)):
+            for name, value in parted(self.striker, self.contact, self.others).items():
+                object.__setattr__(self, name, value)
         model, contact, striker, start = self.model, self.contact, self.striker, self.start
         if not isinstance(model, ReducedModel):
             raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")
@@ -93,7 +104,7 @@ class System:
             )
         if contact is not None and contact.most_modes is not None and model.modes > contact.most_modes:
             raise InputError(
-                f"contact = {contact!r} with modes = {model.modes}: Newton's law needs one mode, since the "
+                f"contact = {shown(contact)} with modes = {model.modes}: Newton's law needs one mode, since the "
                 "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
             )
         if striker is not None and striker.mass is not None and contact is not None and contact.impulsive:
@@ -106,6 +117,7 @@ class System:
                 "contact = None: a striker needs a law of contact, such as HertzContact(stiffness)"
             )
         check_world(self)
+        check_others(self)
         if model.length_scale is None:
             model.require_bistable("a run")
         if start is not None:
@@ -129,7 +141,8 @@ class System:
 
         Names are those of the table of parameters (:data:`snapbeam.config.PARAMETERS`), such as
         ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``striker.location`` and
-        ``drive.frequency_ratio``, or whole parts: ``beam``, ``model``, ``contact``, ``striker``, ``drive``, ``start``,
+        ``drive.frequency_ratio`` (of the second striker ``striker_2.location``, ``drive_2.frequency_ratio``,
+        ``contact_2.stiffness``), or whole parts: ``beam``, ``model``, ``contact``, ``striker``, ``drive``, ``start``,
         ``base``, ``axial``, ``harvester``.
 
         Raises
@@ -175,9 +188,15 @@ class System:
         A striker that stands still moves nothing where a base or an axial load does.
         """
         found: list[tuple[str, Drive]] = []
-        alone = self.base is None and self.axial is None
+        more = [
+            (f"drive_{number}", each.striker.drive)
+            for number, each in enumerate(self.others, 2)
+            if not isinstance(each.striker.drive, Still)
+        ]
+        alone = self.base is None and self.axial is None and not more
         if self.striker is not None and (alone or not isinstance(self.striker.drive, Still)):
             found.append(("drive", self.striker.drive))
+        found += more
         if self.base is not None:
             found.append(("base", self.base.motion))
         if self.axial is not None:
@@ -278,6 +297,8 @@ class System:
         parts = [f"modes={self.model.modes}", f"contact={self.contact!r}"]
         if self.striker is not None:
             parts.append(f"striker={self.striker!r}" if self.striker.drive.harmonic else "striker=recorded")
+        if self.others:
+            parts.append(f"strikers={1 + len(self.others)}")
         return f"<System {', '.join(parts)}, hash {self.hash[:12]}>"
 
 

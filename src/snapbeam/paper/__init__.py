@@ -44,12 +44,15 @@ __all__ = [
     "fig8",
     "figA9",
     "figB10",
+    "harvesting",
     "lifetimes",
     "low_frequency",
+    "notch",
     "resonance",
     "sensitivity",
     "shared_results",
     "si5",
+    "switch",
     "transients",
     "waveforms",
     "windows",
@@ -77,6 +80,11 @@ windows = Recipe("windows", "amplitudes of transient responses near a clamp and 
 disturbances = Recipe(
     "disturbances", "start-up transients, starts off the well, impacts without higher modes", "studies"
 )
+harvesting = Recipe(
+    "harvesting", "power of a harvester by impact, and its share at high frequencies", "studies"
+)
+switch = Recipe("switch", "the cheapest burst that switches a beam with a bias", "studies")
+notch = Recipe("notch", "how far each thing left out of the model moves the notch of fig6", "studies")
 sensitivity = Recipe("sensitivity", "how the map changes with what the paper leaves open", "studies")
 
 FIGURES: dict[str, Recipe] = {
@@ -84,6 +92,7 @@ FIGURES: dict[str, Recipe] = {
     for recipe in (
         fig2, fig3, fig4, fig5, fig6, fig7, fig8, figA9, figB10, si5,
         low_frequency, resonance, waveforms, transients, lifetimes, windows, disturbances, sensitivity,
+        notch, switch, harvesting,
     )
 }  # fmt: skip
 """Every recipe by name: the figures of the paper, its fifth video, and those that its claims need beside."""

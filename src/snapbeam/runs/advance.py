@@ -94,6 +94,11 @@ def advance(
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if state is not None and not isinstance(state, State):
         raise InputTypeError(f"state = {shown(state)}: must be a State")
+    if system.others:
+        raise InputError(
+            "striker: a state says where one striker stands and since when it touches; of several strikers ask for "
+            "whole runs, by simulate or a sweep"
+        )
     integration = instance(
         "integration", Integration() if integration is None else integration, Integration, "an Integration"
     )
@@ -133,7 +138,7 @@ def advance(
 def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
     if system.contact is not None and not system.contact.keeps.smooth:
         raise InputError(
-            f"tangent with contact = {system.contact!r}: its force jumps, so that the tangent flow does; give none"
+            f"tangent with contact = {shown(system.contact)}: its force jumps, so that the tangent flow does; give none"
         )
     if system.striker is not None and system.striker.mass is not None:
         raise InputError(

@@ -12,6 +12,7 @@ from snapbeam.core.provenance import array_hash, made_by
 from snapbeam.engines.plan import Plan
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import quantities
+from snapbeam.model.striker.another import numbered
 from snapbeam.model.system import System
 
 __all__ = ["CONVENTIONS", "attributes_of", "describe_system"]
@@ -48,6 +49,21 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
         for name, value in sections.get(section, {}).items():
             short = f"{section}_kind" if name == "kind" else lookup(f"{section}.{name}").short
             attrs[short] = int(value) if isinstance(value, bool) else value
+    return attrs | _of_others(system)
+
+
+def _of_others(system: System) -> dict[str, Any]:
+    """What is said of the strikers beside the first."""
+    attrs: dict[str, Any] = {"strikers": 1 + len(system.others)} if system.others else {}
+    for section, values in system.to_mapping().items() if system.others else ():
+        number = numbered(section)[1]
+        if number > 1:
+            attrs |= {
+                f"{name}_striker_{number}"
+                if name in ("law", "kind")
+                else lookup(f"{section}.{name}").short: value
+                for name, value in values.items()
+            }
     return attrs
 
 

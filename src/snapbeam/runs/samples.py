@@ -12,6 +12,7 @@ from snapbeam.engines.ensemble import Ensemble, Tapped
 from snapbeam.engines.outputs import Recorded
 from snapbeam.model.system import System
 from snapbeam.runs.schema import trajectory_dataset
+from snapbeam.runs.strikers import strikers_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +26,7 @@ IMPACT_COLUMNS = (
     ("duration", "s", "duration of the impact"),
     ("peak_force", "N", "peak contact force"),
     ("impulse", "N s", "impulse on the beam"),
+    ("striker", "1", "number of the striker"),
 )
 
 
@@ -89,6 +91,10 @@ def run_dataset(
         variables["energy_striker"] = own
     variables["energy_dissipated"] = values[:, 5]
     variables |= _around(ensemble, system, recorded, values)
+    if ensemble.others is not None:
+        of_each = strikers_of(ensemble, system, recorded, values, variables["shaker_displacement"])
+        variables["energy_contact"] = of_each.pop("energy_contact")
+        variables |= of_each
     if ensemble.tapped is not None:
         variables |= _harvested(ensemble, ensemble.tapped, recorded, values)
     if struck and system.contact is not None and system.contact.loses:
@@ -151,8 +157,12 @@ def impact_table(table: _Array, attrs: dict[str, Any]) -> xr.Dataset:
     import xarray as xr
 
     data = {
-        name: ("impact", table[:, i], {"units": units, "long_name": words})
-        for i, (name, units, words) in enumerate(IMPACT_COLUMNS)
+        name: (
+            "impact",
+            table[:, i].astype(np.int64) if name == "striker" else table[:, i],
+            {"units": units, "long_name": words},
+        )
+        for i, (name, units, words) in enumerate(IMPACT_COLUMNS[: table.shape[1]])
     }
     number = ("impact", np.arange(1, len(table) + 1), {"units": "1", "long_name": "number of the impact"})
     return xr.Dataset(data, {"impact": number}, attrs)

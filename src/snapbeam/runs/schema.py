@@ -33,6 +33,7 @@ SCHEMA: dict[str, Quantity] = {
     "time": Quantity(("time",), "s", "time"),
     "cycle": Quantity(("time",), "1", "cycles of excitation"),
     "mode": Quantity(("mode",), "1", "buckling mode"),
+    "striker": Quantity(("striker",), "1", "number of the striker"),
     "displacement": Quantity(("time",), "1", "beam displacement at the striker, over b"),
     "center_displacement": Quantity(("time",), "1", "beam displacement at the centre, over b"),
     "velocity": Quantity(("time",), "1", "beam velocity at the striker, over b omega_1"),
@@ -40,6 +41,9 @@ SCHEMA: dict[str, Quantity] = {
     "shaker_displacement": Quantity(("time",), "1", "striker displacement, over b"),
     "penetration": Quantity(("time",), "1", "penetration, over b"),
     "contact_force": Quantity(("time",), "N", "contact force"),
+    "striker_displacement": Quantity(("time", "striker"), "1", "displacement of each striker's tip, over b"),
+    "striker_penetration": Quantity(("time", "striker"), "1", "penetration of each striker, over b"),
+    "striker_force": Quantity(("time", "striker"), "N", "contact force of each striker"),
     "modal_amplitude": Quantity(("time", "mode"), "m^0.5", "modal amplitude"),
     "modal_velocity": Quantity(("time", "mode"), "m^0.5/s", "modal velocity"),
     "energy_beam": Quantity(("time",), "J", "kinetic and potential energy of the beam, above its well"),
@@ -64,9 +68,10 @@ SCHEMA: dict[str, Quantity] = {
 """Every variable a run may have, by name; ``time``, ``cycle`` and ``mode`` are coordinates."""
 
 _MODAL = ("modal_amplitude", "modal_velocity")
+_OF_STRIKERS = ("striker_displacement", "striker_penetration", "striker_force")
 _FORMER_UNITS = {"b": "1"}
 """Units that files of version 0.1 give to numbers over b."""
-_COORDINATES = ("time", "cycle", "mode")
+_COORDINATES = ("time", "cycle", "mode", "striker")
 
 
 def trajectory_dataset(
@@ -117,6 +122,8 @@ def trajectory_dataset(
         data[name] = _labelled(name, array)
         if name in _MODAL and array.ndim == 2:
             coords["mode"] = _labelled("mode", np.arange(1, array.shape[1] + 1))
+        if name in _OF_STRIKERS and array.ndim == 2:
+            coords["striker"] = _labelled("striker", np.arange(1, array.shape[1] + 1))
     length = len(coords["time"][1])
     for name, (dims, values, _) in (*coords.items(), *data.items()):
         if values.ndim != len(dims) or (dims[0] == "time" and values.shape[0] != length):

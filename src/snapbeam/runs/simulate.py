@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from snapbeam.core.codes import RunStatus
 from snapbeam.core.reporting import counting, sharing
-from snapbeam.core.validate import InputTypeError
+from snapbeam.core.validate import InputTypeError, shown
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.cpu.driver import usable_cores
 from snapbeam.engines.registry import resolve
@@ -148,7 +148,7 @@ def _several(
     report = counting(progress, "simulate", "runs")
     for at, system in enumerate(systems):
         if not isinstance(system, System):
-            raise InputTypeError(f"system[{at}] = {system!r}: must be a System")
+            raise InputTypeError(f"system[{at}] = {shown(system)}: must be a System")
     checked = [asked(system, parts, dict(options)) for system in systems]
     threads = next((each.threads for _, each in checked), None) or usable_cores()
     with ThreadPoolExecutor(max_workers=max(1, min(threads, len(systems) or 1))) as pool:

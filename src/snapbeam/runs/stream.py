@@ -13,7 +13,7 @@ from snapbeam.core.codes import RunStatus
 from snapbeam.core.files import check_writable
 from snapbeam.core.netcdf import netcdf_file
 from snapbeam.core.reporting import sharing
-from snapbeam.core.validate import InputTypeError
+from snapbeam.core.validate import InputTypeError, instance, shown
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.outputs import Recorded
 from snapbeam.engines.registry import resolve
@@ -74,8 +74,8 @@ def simulate_to_file(
         If the disk has no room for it.
     """
     if not isinstance(system, System):
-        raise InputTypeError(f"system = {system!r}: must be a System")
-    integration = Integration() if integration is None else integration
+        raise InputTypeError(f"system = {shown(system)}: must be a System")
+    integration = instance("integration", integration or Integration(), Integration, "an Integration")
     target, report = check_writable(path, "path", (".nc",)), sharing(progress, "run")
     run = prepared(system, integration, sample_times)
     _, engine = resolve("cpu")

@@ -27,7 +27,8 @@ def require_parameters(system: System, points: Points) -> None:
     for name in first:
         if name.startswith(("run.", "start.")) or not lookup(name).is_run or name in system.parameters:
             continue
-        if name != "striker.gap" or system.striker is None:
+        section, _, field = name.partition(".")
+        if field != "gap" or section not in {each.partition(".")[0] for each in system.parameters}:
             raise InputError(f"{name}: no parameter of this system; it has {', '.join(system.parameters)}")
     if (
         system.striker is None

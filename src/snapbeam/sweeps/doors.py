@@ -88,7 +88,7 @@ def _is_number(value: Any) -> bool:
     """Whether it stands for the whole map; lists of unequal lengths do not."""
     try:
         return np.ndim(value) == 0
-    except ValueError:
+    except (TypeError, ValueError):
         return False
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.core.validate import InputError, file_path, shown
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
@@ -56,9 +56,7 @@ def read_store(store: str | os.PathLike[str]) -> xr.Dataset:
     StoreError
         If its description is damaged.
     """
-    if not isinstance(store, (str, os.PathLike)):
-        raise InputTypeError(f"store = {store!r}: must be a folder")
-    folder = Path(store)
+    folder = file_path("store", store)
     file = folder / "map.json"
     if file.is_symlink() or not file.is_file():
         raise InputError(f"store = {str(store)!r}: holds no map")
@@ -94,15 +92,15 @@ def _work(described: dict[str, Any], name: str, done: dict[int, Record]) -> Poin
     """
     held, chunk = described["parameters"], int(described["chunk"])
     if held.get("statistics") != list(STATISTICS):
-        raise InputError(f"store = {name!r}: was written with other statistics than this version has")
+        raise InputError(f"store = {shown(name)}: was written with other statistics than this version has")
     axes = {axis: values for axis, values in held["points"].items() if isinstance(values, list)}
     if len(axes) < len(held["points"]) or not axes:
         raise InputError(
-            f"store = {name!r}: holds a list of points, which is read once the sweep has returned it"
+            f"store = {shown(name)}: holds a list of points, which is read once the sweep has returned it"
         )
     sections = held["system"]
     if any(isinstance(value, dict) for values in sections.values() for value in values.values()):
-        raise InputError(f"store = {name!r}: was driven by a record, which is too long to be kept in it")
+        raise InputError(f"store = {shown(name)}: was driven by a record, which is too long to be kept in it")
     system = System.from_mapping({
         section: {key: np.array(value) if isinstance(value, list) else value for key, value in values.items()}
         for section, values in sections.items()
@@ -121,7 +119,9 @@ def _work(described: dict[str, Any], name: str, done: dict[int, Record]) -> Poin
             or work.task_hash(Stage(_STAGE, points, chunk).columns(number)) == record.parameters
         ):
             return work
-    raise InputError(f"store = {name!r}: its tasks are not those of its description, or of another version")
+    raise InputError(
+        f"store = {shown(name)}: its tasks are not those of its description, or of another version"
+    )
 
 
 def _rows(folder: Path, work: PointWork, stage: Stage, done: dict[int, Record]) -> tuple[ResultTable, int]:

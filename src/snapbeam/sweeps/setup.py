@@ -107,6 +107,7 @@ class SweepSetup:
                     body=ensemble.structure.body_mass is not None,
                     uneven=ensemble.structure.model.side_force is not None,
                     around=system.has_surroundings,
+                    several=bool(system.others),
                 )[1]
                 books = engine.run_ensemble(ensemble, threads, report)
                 for name, values in statistics_of(ensemble, books).items():
@@ -297,6 +298,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         body=system.striker is not None and system.striker.mass is not None,
         uneven=system.model.side_force is not None,
         around=system.has_surroundings,
+        several=bool(system.others),
         **({} if system.striker is None else {"drive": type(system.striker.drive)}),
     )[0]
     setup = SweepSetup(system, integration.replace(engine=resolved), points)

@@ -269,7 +269,7 @@ def compute_table(
         What the store says of how it was made.
     """
     if progress is not None and not callable(progress):
-        raise InputTypeError(f"progress = {progress!r}: must be callable, as progress(done, total)")
+        raise InputTypeError(f"progress = {shown(progress)}: must be callable, as progress(done, total)")
     asked = None if cluster is None else parse_cluster(cluster)
     if keeping.path is None and asked is not None:
         raise InputError("cluster: needs a store")

@@ -94,7 +94,7 @@ def threshold(
             f"along = {shown(along)}: must be a number that may differ between runs, such as velocity_amplitude"
         )
     if not isinstance(over, Mapping) or not over:
-        raise InputError(f"over = {over!r}: must map at least one parameter to an array of values")
+        raise InputError(f"over = {shown(over)}: must map at least one parameter to an array of values")
     if np.size(values) < 2:
         raise InputError(f"{along}: must be an array of at least two values to choose from")
     asked = Integration() if integration is None else integration

@@ -50,6 +50,7 @@ def some_of(name: str) -> list[sb.ContactLaw]:
         "hertz": ((1e5,), (4e8,), (1e12,)),
         "hunt_crossley": ((4e8, 0.0), (4e8, 0.5), (1e12, 3.0)),
         "kelvin_voigt": ((1e5, 0.0), (1e7, 3.0)),
+        "layer": ((4e8, 1e13), (4e8, 5e10), (1e12, 1e8)),
         "power": ((0.4, 1.0), (0.4, 1.5), (10.0, 2.5)),
         "restitution": ((0.0,), (0.6,), (1.0,)),
     }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 from lab_waveforms import BUCKLING_LEVEL, FRAME_RATE, PIXEL, impacts
 from random_scenes import write
@@ -26,6 +28,7 @@ STICKER = "Sticker and striker"
 SCENE = "Something else in view"
 LIGHT = "Light and curve of the camera"
 REST = "Recording that begins in motion"
+AFTERWARDS = "Pictures that were changed after they were taken"
 
 
 def scene(
@@ -65,6 +68,60 @@ def scene(
         if value in tracked:
             ratio = max(ratio, off(tracked[value], truth[value].values, tracked[error].values))
     return Outcome(tuple(findings_of(tracked)), "", ratio)
+
+
+def changed(change):
+    """A scene whose frames a camera's noise reduction or a program has changed."""
+
+    def look(folder):
+        time, beam, shaker, *_ = impacts(4)
+        drawn = render_recording(
+            time, beam, shaker, camera=SyntheticCamera(**CAMERA), stage=SyntheticStage(shaker_width=0.8e-3),
+            rest_frames=24,
+        )  # fmt: skip
+        frames = np.stack(list(drawn)).astype(np.float64)
+        whole, pixel = change(frames)
+        np.save(folder / "changed.npy", whole)
+        with open_recording(folder / "changed.npy", frame_rate=FRAME_RATE, pixel_size=pixel) as recording:
+            tracked = track(recording, rest_displacement=-BUCKLING_LEVEL)
+        ratio = 0.0
+        for value, error in (("displacement_mm", "displacement_stderr_mm"),
+                             ("shaker_displacement_mm", "shaker_stderr_mm")):  # fmt: skip
+            ratio = max(ratio, off(tracked[value], drawn.truth[value].values, tracked[error].values))
+        assert ratio < 5.0, ratio
+        return Outcome(tuple(findings_of(tracked)), "", ratio)
+
+    return look
+
+
+def blended(frames):
+    """Each frame the mean of itself and the one before, as programs that change the frame rate make them."""
+    frames[1:] = 0.5 * (frames[1:] + frames[:-1])
+    return np.rint(frames).astype(np.uint16), PIXEL
+
+
+def denoised(frames):
+    """Noise reduction in time: four tenths of the frame before are kept."""
+    for before, after in itertools.pairwise(frames):
+        after[:] = 0.6 * after + 0.4 * before
+    return np.rint(frames).astype(np.uint16), PIXEL
+
+
+def enlarged(frames):
+    """Twice as many pixels, each between two that were taken."""
+    for axis in (1, 2):
+        after = np.concatenate(
+            [frames.take(range(1, frames.shape[axis]), axis), frames.take([-1], axis)], axis
+        )
+        frames = np.stack([frames, 0.5 * (frames + after)], axis + 1)
+        shape = list(frames.shape)
+        frames = frames.reshape(*shape[:axis], -1, *shape[axis + 2 :])
+    return np.rint(frames).astype(np.uint16), 0.5 * PIXEL
+
+
+def dim(frames):
+    """So little light that the beam stands out by a few grey levels."""
+    return (frames // 640).astype(np.uint8), PIXEL
 
 
 def begun_late():
@@ -162,6 +219,12 @@ CASES = (
     light("the same, undone", "right", sees="gamma (--gamma) 2.2 turns grey levels into light",
           defects={"gamma": 2.2}, gamma=2.2),
     light("video with lossy compression", "flagged", "recording.lossy", name="scene.mp4"),
+    Case(AFTERWARDS, "each frame the mean of itself and the one before", changed(blended), "flagged",
+         "camera.averaged"),
+    Case(AFTERWARDS, "noise reduction in time", changed(denoised), "flagged", "camera.averaged"),
+    Case(AFTERWARDS, "pictures enlarged to twice as many pixels", changed(enlarged), "flagged", "camera.smoothed"),
+    Case(AFTERWARDS, "so little light that the beam stands out by a few grey levels", changed(dim), "flagged",
+         "camera.few_levels"),
     case(REST, "the beam moves in the first frame", "flagged", "camera.no_rest", motion=begun_late(), rest=0),
     case(
         "Pixel size",

@@ -11,8 +11,8 @@ import math
 import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from enum import IntEnum
@@ -32,13 +32,16 @@ from rich.progress import (
 )
 from rich.text import Text
 
+from snapbeam.core.foreign import VERSION, foreign_files_kept
 from snapbeam.core.validate import InputError
+from snapbeam.core.version import __version__
 
 __all__ = [
     "FAILED",
     "INTERRUPTED",
     "REFUSED",
     "answer",
+    "answer_now",
     "compiling_told",
     "counted",
     "door",
@@ -87,6 +90,12 @@ _QUIET = Annotated[
     bool,
     typer.Option("--quiet", "-q", help="Say nothing but what went wrong.", rich_help_panel="Output"),
 ]
+_FORCE = Annotated[
+    bool,
+    typer.Option(
+        "--force", help="Replace files that snapbeam did not write, or that are read too.", rich_help_panel="Output"
+    ),
+]  # fmt: skip
 
 
 def out() -> Console:
@@ -100,16 +109,28 @@ def answer(**found: Any) -> None:
     _ASKED.get().found.update(found)
 
 
+def answer_now(**found: Any) -> None:
+    """As :func:`answer`, and write it at once: what goes on until it is stopped does not wait to be asked."""
+    asked = _ASKED.get()
+    if asked.json is not None:
+        write_json(asked.json, asked.found | found)
+        asked.found.clear()
+
+
 def write_json(path: Path, found: Mapping[str, Any]) -> None:
     """Write plain numbers and words to a JSON file, whole or not at all, or, for ``-``, to standard output.
 
-    What is not finite becomes null.
+    What is not finite becomes null.  The version that wrote it comes first.
     """
     from snapbeam.core.files import atomic_path, check_writable
 
-    text = json.dumps(_plain(found), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    text = (
+        json.dumps({VERSION: __version__} | _plain(found), indent=2, ensure_ascii=False, allow_nan=False)
+        + "\n"
+    )
     if path == Path("-"):
         sys.stdout.write(text)
+        sys.stdout.flush()
         return
     with atomic_path(check_writable(path, "json", (".json",))) as temporary:
         temporary.write_text(text, encoding="utf-8")
@@ -146,18 +167,21 @@ def notes() -> Console:
 def door(command: Callable[_P, _R]) -> Callable[_P, _R]:
     """End a command that cannot go on with one clear line, and with the exit status that says why.
 
-    Every command gets ``--quiet``, and ``--json`` if it has none of its own: what it :func:`answer`\\ s.
+    Every command gets ``--quiet`` and ``--force``, and ``--json`` if it has none of its own: what it
+    :func:`answer`\\ s.
     """
     signature = inspect.signature(command, eval_str=True)
     own = next((name for name, each in signature.parameters.items() if "--json" in _flags(each)), None)
 
     @functools.wraps(command)
     def guarded(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        named = _named(kwargs.values())
+        kept = nullcontext() if kwargs.pop("force", False) else foreign_files_kept(named)
         quiet, path = bool(kwargs.pop("quiet", False)), kwargs.get(own) if own else kwargs.pop("json", None)
         asked = _Asked(quiet, path if isinstance(path, Path) else None)
         token = _ASKED.set(asked)
         try:
-            with warnings.catch_warnings():
+            with warnings.catch_warnings(), kept:
                 warnings.showwarning = _show_warning  # type: ignore[assignment]
                 if asked.json is not None and asked.json != Path("-"):
                     from snapbeam.core.files import check_writable
@@ -182,13 +206,22 @@ def door(command: Callable[_P, _R]) -> Callable[_P, _R]:
         finally:
             _ASKED.reset(token)
 
-    more = [inspect.Parameter("quiet", inspect.Parameter.KEYWORD_ONLY, default=False, annotation=_QUIET)]
+    more = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+        for name, kind in (("quiet", _QUIET), ("force", _FORCE))
+    ]
     if own is None:
         more.append(inspect.Parameter("json", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=_JSON))
-    kept = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values()]
-    guarded.__signature__ = inspect.Signature(kept + more)  # type: ignore[attr-defined]
+    mine = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in signature.parameters.values()]
+    guarded.__signature__ = inspect.Signature(mine + more)  # type: ignore[attr-defined]
     guarded.__annotations__ = {}
     return guarded
+
+
+def _named(values: Iterable[Any]) -> list[Path]:
+    """The files among what a command was given."""
+    listed = [each for value in values for each in (value if isinstance(value, (list, tuple)) else [value])]
+    return [each for each in listed if isinstance(each, Path)]
 
 
 def _flags(parameter: inspect.Parameter) -> tuple[str, ...]:

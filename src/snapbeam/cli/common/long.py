@@ -135,15 +135,16 @@ def sweep_options(keeping: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config) -> Config:
-    """The parameters of a store that is named alone, for one can be resumed without repeating them.
+    """The parameters of the store that is named, with those that are given laid over them.
 
-    Options that the store keeps are put into *keeping* where they were left out.
+    So a store is resumed by its name alone, and what is given beside it is compared with what the store holds, not with
+    the paper's beam.  Options that the store keeps are put into *keeping* where they were left out.
     """
-    from snapbeam.config import config_from_mapping
+    from snapbeam.config import config_from_mapping, override
     from snapbeam.core.validate import InputError
     from snapbeam.sweeps.keep.store import read_stored_config
 
-    if keeping["store"] is None or settings.to_mapping():
+    if keeping["store"] is None:
         return settings
     kept = read_stored_config(keeping["store"])
     if kept is None:
@@ -154,7 +155,8 @@ def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config)
     for name, kind in _KEPT.items():
         if not keeping[name] and isinstance(options.get(name), kind):
             keeping[name] = options[name]
-    return config_from_mapping(kept["parameters"], source=f"{keeping['store'].name}/map.json")
+    own = config_from_mapping(kept["parameters"], source=f"{keeping['store'].name}/map.json")
+    return override(own, settings.to_mapping())
 
 
 def kept_config(settings: Config, keeping: Mapping[str, Any]) -> dict[str, Any]:

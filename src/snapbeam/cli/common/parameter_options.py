@@ -332,12 +332,13 @@ def _assignment(text: str, option: str) -> tuple[str, str]:
 
 def _value(name: str, value: Any) -> Any:
     """The text of an option as what its parameter holds."""
-    from snapbeam.config import PHYSICAL, parameters
+    from snapbeam.config import PHYSICAL
+    from snapbeam.config.parameters import row_of
     from snapbeam.core.validate import InputError
 
     if not isinstance(value, str):
         return value
-    row = parameters().get(name)
+    row = row_of(name)
     kind = float if row is None else row.quantity.kind
     try:
         if name in _PAIRS or (name in _LISTS and "," in value):

@@ -34,6 +34,7 @@ def calibrate(
     effective_mass: asked.EffectiveMass = None,
     config: asked.Config = None,
     fit: asked.Fit = None,
+    imperfection: asked.Imperfection = None,
     modes: asked.Modes = None,
     output: asked.Output = None,
     plot: opt.Plot = None,
@@ -99,7 +100,9 @@ def calibrate(
     beam = settings.model.beam
     assert beam is not None
     chosen = tuple(name.strip() for name in fit.split(",")) if fit else None
-    result = fit_beam(Measurements(**given), beam, fit=chosen, modes=settings.model.modes)
+    result = fit_beam(
+        Measurements(**given), beam, fit=chosen, modes=settings.model.modes, imperfection=imperfection
+    )
     console = out()
     for name in result.values:
         console.print(f"  {name:<20}{with_error(result, name)}")

@@ -77,6 +77,14 @@ Fit = Annotated[
         rich_help_panel=_FIT,
     ),
 ]
+Imperfection = Annotated[
+    str | None,
+    typer.Option(
+        help="What makes the wells unequal, fitted to the first frequencies about both: rise, point_load or "
+        "uniform_load.",
+        rich_help_panel=_FIT,
+    ),
+]
 Modes = Annotated[int | None, opt.count_option("Number N of buckling modes, 1 to 256.", _FIT)]
 Output = Annotated[
     Path | None,

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from snapbeam.cli.common import options as opt
-from snapbeam.cli.common.console import FAILED, door, file_line, out
+from snapbeam.cli.common.console import FAILED, answer, door, file_line, out
 from snapbeam.cli.lab import options as lab
 
 __all__ = ["campaign"]
@@ -76,6 +77,7 @@ def campaign(
     Example: snapbeam campaign tests/ --buckling-level 0.331e-3 --location 0.47619 --pixel-size 12e-6 --map
     map.nc
     """
+    from snapbeam.core.files import check_writable
     from snapbeam.lab.campaign.campaign import run_campaign
     from snapbeam.lab.campaign.settings import load_settings
 
@@ -93,6 +95,9 @@ def campaign(
     )  # fmt: skip
     target = folder / "campaign" if output is None else output
     console = out()
+    for name in ("tests.png", "map.png"):
+        if target.is_dir():
+            check_writable(target / name)
     results = run_campaign(folder, wanted, target, table=table, strict=strict, progress=_tell)
     spoiled = [result for result in results if result.status != "measured"]
     console.print(f"{len(results)} tests, {len(spoiled)} spoiled")
@@ -108,6 +113,7 @@ def campaign(
     ]
     if simulated is not None and len(spoiled) < len(results):
         files.append(_on_map(target, simulated))
+    answer(tests=[asdict(result) for result in results], spoiled=len(spoiled), files=files)
     for path in files:
         console.print(f"Written: {file_line(path)}")
     if len(spoiled) == len(results):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snapbeam.cli.common.console import door, duration, file_line, out, progress
+from snapbeam.cli.common.console import answer, door, duration, file_line, out, progress
 from snapbeam.cli.lab import options as lab
 from snapbeam.cli.lab import track_options as asked
 
@@ -73,7 +74,7 @@ def track(
     integer("frame", frame, 0)
     integer("video_every", video_every, 1)
     from snapbeam.core.findings import findings_of, refuse
-    from snapbeam.lab.tracking.quality import tracking_report
+    from snapbeam.lab.tracking.quality import tracking_quality, tracking_report
     from snapbeam.lab.tracking.settings import TrackingSettings
     from snapbeam.lab.tracking.track import track as track_recording
 
@@ -115,9 +116,14 @@ def track(
 
             with progress(len(opened), "video", "frames") as tell:
                 files.append(annotated_video(opened, dataset, video, every=video_every, progress=tell))
+    found = findings_of(dataset)
+    answer(
+        quality=tracking_quality(dataset), findings=[asdict(finding) for finding in found],
+        seconds=elapsed, files=files,
+    )  # fmt: skip
     console = out()
     console.print(tracking_report(dataset, findings=False), markup=False)
-    lab.tell_findings(console, findings_of(dataset))
+    lab.tell_findings(console, found)
     console.print(f"{len(opened) / elapsed:.0f} frames/s, {duration(elapsed)}")
     for path in files:
         console.print(f"wrote {file_line(path)}")

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.config.parameters import lookup
+from snapbeam.core.kinds import checked
 from snapbeam.core.provenance import canonical_json
 from snapbeam.core.reporting import counting
 from snapbeam.core.validate import InputError, InputTypeError, integer, shown, within
@@ -77,6 +78,7 @@ class Effort:
         return self.generations * self.population * self.draws + (self.candidates + 1) * self.fresh
 
 
+@checked
 def design_problem(
     system: System,
     variables: Mapping[str, tuple[float, float]],
@@ -104,6 +106,7 @@ def design_problem(
     return problem_of(trials, variables, goals, limits, draws)
 
 
+@checked
 def design(
     system: System,
     variables: Mapping[str, tuple[float, float]],

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from snapbeam.config.parameters import lookup
-from snapbeam.core.validate import InputError, finite, positive, shown, within
+from snapbeam.core.validate import InputError, finite, instance, positive, shown, within
 from snapbeam.design.events import OUTCOMES
 from snapbeam.design.proportion import interval_of
 from snapbeam.engines.outcomes import STATISTICS
@@ -87,7 +87,7 @@ def quantity_of(name: str) -> Quantity:
     InputError
         If there is none.
     """
-    if name in OWN:
+    if instance("of", name, str, "a name") in OWN:
         return OWN[name]
     if name in OUTCOMES:
         event = OUTCOMES[name]

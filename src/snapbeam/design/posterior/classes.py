@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, integer
 from snapbeam.design.events import reached
 from snapbeam.design.posterior.posterior import Posterior
@@ -33,6 +34,7 @@ _KINDS = (
 _PRIOR = 0.5
 
 
+@checked
 def class_likelihood(
     posterior: Posterior,
     system: System,

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import optimize, special, stats
 
 from snapbeam.config.parameters import lookup
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive, shown, within
 from snapbeam.design.distributions import Distribution, Empirical
 from snapbeam.design.posterior.forward import Forward
@@ -144,6 +145,7 @@ class Posterior:
         return dataset
 
 
+@checked
 def posterior(
     measured: Measurements | None,
     beam: Beam,

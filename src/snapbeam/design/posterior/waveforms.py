@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.physical import unit_of
 from snapbeam.core.findings import PlausibilityWarning
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, InputTypeError, choice, finite_array, positive, shown
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
@@ -75,7 +76,12 @@ class Waveform:
         time = finite_array("time", self.time, 1)
         if time.size < 2 or time[0] < 0.0 or (np.diff(time) <= 0.0).any():
             raise InputError("time: must hold two instants at least, ascending, none before 0")
-        seen = np.array(self.displacement, dtype=np.float64)
+        try:
+            seen = np.array(self.displacement, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            raise InputTypeError(
+                f"displacement = {shown(self.displacement)}: must be an array of numbers"
+            ) from None
         if seen.shape != time.shape or np.isinf(seen).any() or not np.isfinite(seen).any():
             raise InputError(f"displacement of shape {seen.shape}: must hold a number, or NaN, for each time")
         positive("standard_error", self.standard_error, "m")
@@ -85,6 +91,7 @@ class Waveform:
         object.__setattr__(self, "displacement", seen)
 
     @classmethod
+    @checked
     def from_dataset(
         cls, dataset: xr.Dataset, system: System, standard_error: float, *, at: str = "contact", **more: Any
     ) -> Waveform:

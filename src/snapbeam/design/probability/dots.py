@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, InputTypeError, integer
 from snapbeam.design.proportion import interval_of
 from snapbeam.runs.save import code_flags
@@ -42,6 +43,7 @@ def class_counts(dataset: xr.Dataset) -> NDArray[np.int64]:
     ).astype(np.int64)
 
 
+@checked
 def judge_dots(dataset: xr.Dataset, dots: Dots, *, samples: int = 10_000, seed: int = 0) -> xr.Dataset:
     """How likely a probability map makes measured responses, one by one and all together.
 

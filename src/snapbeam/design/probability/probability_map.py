@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.kinds import checked
 from snapbeam.core.provenance import canonical_json
 from snapbeam.core.reporting import counting
 from snapbeam.core.validate import InputError, InputTypeError, shown
@@ -31,6 +32,7 @@ TITLE = "probabilities of the response of a struck bistable beam"
 OUTCOME = "outcome"
 
 
+@checked
 def probability_map(
     system: System,
     axes: Mapping[str, Any] | xr.Dataset | Any,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.parameters import lookup
+from snapbeam.core.kinds import checked
 from snapbeam.core.provenance import canonical_json
 from snapbeam.core.reporting import counting
 from snapbeam.core.validate import InputError, InputTypeError, shown
@@ -39,6 +40,7 @@ _REACH = 3.0
 _FOUND = "found not_reached_in_range exceeded_in_whole_range"
 
 
+@checked
 def quantile_threshold(
     system: System,
     along: str,

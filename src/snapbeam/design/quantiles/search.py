@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, choice, integer, within
+from snapbeam.core.validate import InputError, choice, finite_array, integer, within
 from snapbeam.design.events import OUTCOMES
 from snapbeam.design.quantiles.isotonic import crossing
 
@@ -51,7 +51,8 @@ class Search:
     outcome: str = "snap"
 
     def __post_init__(self) -> None:
-        chosen = tuple(within("probabilities", each, 0.0, 1.0) for each in np.atleast_1d(self.probabilities))
+        given = np.atleast_1d(finite_array("probabilities", self.probabilities))
+        chosen = tuple(within("probabilities", each, 0.0, 1.0) for each in given.ravel())
         if not chosen or (np.diff(chosen) <= 0.0).any():
             raise InputError(f"probabilities = {chosen}: must be increasing")
         object.__setattr__(self, "probabilities", chosen)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, finite_array, integer, within
 
 __all__ = ["Indices", "given_data_indices"]
@@ -24,6 +25,7 @@ class Indices(NamedTuple):
     high: _Array
 
 
+@checked
 def given_data_indices(
     inputs: ArrayLike, output: ArrayLike, *, confidence: float = 0.95, bins: int | None = None, seed: int = 0
 ) -> Indices:

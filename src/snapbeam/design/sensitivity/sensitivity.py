@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import special, stats
 
 from snapbeam.config.parameters import lookup
+from snapbeam.core.kinds import checked
 from snapbeam.core.provenance import canonical_json
 from snapbeam.core.validate import InputError, choice, integer, within
 from snapbeam.design.sensitivity.answers import Answer, answer_of
@@ -33,6 +34,7 @@ _REPLICATES = 16
 PARAMETER = "parameter"
 
 
+@checked
 def sensitivity(
     system: System,
     answer: Answer | str,

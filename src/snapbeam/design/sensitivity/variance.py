@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, integer, within
 from snapbeam.design.sensitivity.given_data import Indices
 
@@ -25,6 +26,7 @@ class Sobol(NamedTuple):
     runs: int
 
 
+@checked
 def sobol(
     function: Callable[[_Array], _Array],
     inputs: int,

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.dynamics.lifetimes.survival import Survival, checked_cycles, fit_lifetime, proportion
 from snapbeam.dynamics.lifetimes.work import LifetimeWork
 from snapbeam.dynamics.starts import Starts, held_in_space, starts_of
@@ -35,6 +36,7 @@ START, WELL, AFTER = "start", "well", "after"
 _REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
 
 
+@checked
 def lifetime_map(
     system: System,
     axes: Mapping[str, Any] | xr.Dataset | Any = None,
@@ -92,15 +94,20 @@ def lifetime_map(
     >>> ds = sb.lifetime_map(system, {"velocity_amplitude": np.linspace(0.1, 0.6, 20)}, starts=100)  # doctest: +SKIP
     """
     if not isinstance(system, System):
-        raise InputTypeError(f"system = {system!r}: must be a System")
-    if system.striker is None:
-        raise InputError("striker = None: a beam that nothing strikes does not go on snapping")
+        raise InputTypeError(f"system = {shown(system)}: must be a System")
+    if system.striker is None or system.has_surroundings:
+        raise InputError(
+            "base, axial, harvester: starts differ by the phase of a striker, and what else moves has a phase to it; "
+            "march a batch of states by sb.advance(system, every=True) and count"
+            if system.has_surroundings
+            else "striker = None: a beam that nothing strikes does not go on snapping"
+        )
     integration = Integration() if integration is None else integration
     if not isinstance(integration, Integration):
-        raise InputTypeError(f"integration = {integration!r}: must be an Integration")
+        raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
     survival = Survival() if survival is None else survival
     if not isinstance(survival, Survival):
-        raise InputTypeError(f"survival = {survival!r}: must be a Survival")
+        raise InputTypeError(f"survival = {shown(survival)}: must be a Survival")
     cycles = CYCLES if integration.cycles is None else integration.cycles
     asked = _after(after, cycles, survival)
     integration = integration.replace(cycles=cycles, early_decision=True)

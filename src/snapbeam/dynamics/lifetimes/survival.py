@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-from snapbeam.core.validate import InputError, integer, nonnegative, within
+from snapbeam.core.validate import InputError, integer, nonnegative, shown, within
 
 __all__ = ["LifetimeFit", "Survival", "fit_lifetime", "proportion"]
 
@@ -51,7 +51,7 @@ class Survival:
         if self.delay is not None:
             nonnegative("delay", self.delay, "cycles")
         if not nonnegative("quiet", self.quiet, "cycles") > 0.0:
-            raise InputError(f"quiet = {self.quiet!r}: must be greater than 0 cycles")
+            raise InputError(f"quiet = {shown(self.quiet)}: must be greater than 0 cycles")
         within("confidence", self.confidence, 0.0, 1.0)
 
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.findings import tell
-from snapbeam.core.validate import InputError, InputTypeError, choice, integer, positive
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, choice, integer, positive, shown
 from snapbeam.dynamics.flow import Flow
 from snapbeam.dynamics.orbits.branch import Branch, Event
 from snapbeam.dynamics.orbits.corrector import Corrector, Spot
@@ -27,6 +28,7 @@ _EASY, _HARD = 4, 9
 """Iterations up to which the step grows, and from which on it shrinks."""
 
 
+@checked
 def continue_orbit(
     orbit: Orbit,
     name: str,
@@ -71,8 +73,6 @@ def continue_orbit(
     InputError
         For bad input.
     """
-    if not isinstance(orbit, Orbit):
-        raise InputTypeError(f"orbit = {orbit!r}: must be an Orbit, as periodic_orbit gives")
     low, high = _limits(between)
     begun = orbit.flow.value(name)
     if not low <= begun <= high:
@@ -96,9 +96,7 @@ def _limits(between: tuple[float, float]) -> tuple[float, float]:
     try:
         low, high = (float(value) for value in between)
     except (TypeError, ValueError):
-        raise InputTypeError(
-            f"between = {between!r}: must be a pair of numbers, least and greatest"
-        ) from None
+        raise InputError(f"between = {shown(between)}: must be a least and a greatest number") from None
     if not low < high:
         raise InputError(f"between = ({low:g}, {high:g}): must be increasing")
     return low, high
@@ -187,7 +185,7 @@ def switch_branch(event: Event, name: str, between: tuple[float, float], *, size
         If there is none at that distance; try another.
     """
     if not isinstance(event, Event) or event.kind not in ("flip", "branch point"):
-        raise InputError(f"event = {event!r}: must be a flip or a branch point")
+        raise InputError(f"event = {shown(event)}: must be a flip or a branch point")
     low, high = _limits(between)
     orbit, span = event.orbit, high - low
     doubled = event.kind == "flip"

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.findings import Finding, tell, to_json
-from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive, shown
 from snapbeam.dynamics.flow import Flow, Stroboscope, flow_of
 from snapbeam.dynamics.orbits.passage import Passage, passage_of
 from snapbeam.dynamics.orbits.shooting import Family, NoOrbit, jacobian, newton
@@ -153,6 +154,7 @@ class Orbit:
         return f"<Orbit of period {self.period}: {kind}, largest multiplier {size:.6g}>"
 
 
+@checked
 def periodic_orbit(
     system: System | Flow,
     guess: State | ArrayLike | Orbit | None = None,
@@ -203,12 +205,12 @@ def periodic_orbit(
     """
     flow = flow_of(system, integration, "reference")
     if isinstance(flow, Stroboscope):
-        if flow.system.striker is None:
-            raise InputError("striker = None: a beam that nothing strikes has no orbit but rest")
+        if flow.system.leads is None:
+            raise InputError("striker = None: a beam that nothing moves has no orbit but rest")
         if phase is not None:
             flow = Stroboscope(flow.system, flow.integration, phase)
     elif phase is not None:
-        raise InputError(f"phase = {phase!r}: is for a System")
+        raise InputError(f"phase = {shown(phase)}: is for a System")
     periods = integer("period", period, 1, 10_000)
     allowed = positive("tolerance", tolerance)
     x = _guess_of(flow, guess)
@@ -218,6 +220,8 @@ def periodic_orbit(
         if not np.isfinite(x).all():
             raise NoOrbit("the run from the guess failed; see its status with sb.advance")
     tell(getattr(flow, "findings", ()))
+    if not all(isinstance(orbit, Orbit) for orbit in deflate):
+        raise InputTypeError(f"deflate = {shown(deflate)}: must be orbits, as periodic_orbit gives")
     known = tuple(point for orbit in deflate for point in orbit.points)
     return shoot(flow, x, periods, allowed, integer("iterations", iterations, 1, 10_000), deflate=known)
 
@@ -227,7 +231,7 @@ def _guess_of(flow: Flow, guess: State | ArrayLike | Orbit | None) -> _Array:
         return np.array(guess.coordinates)
     if guess is None or isinstance(guess, State):
         if not isinstance(flow, Stroboscope):
-            raise InputTypeError(f"guess = {guess!r}: must be an array of {flow.dimension} numbers")
+            raise InputTypeError(f"guess = {shown(guess)}: must be an array of {flow.dimension} numbers")
         if isinstance(guess, State) and guess.batch:
             raise InputError(f"guess: a batch of shape {guess.batch}: must be one state")
         return flow.coordinates(guess)[0]

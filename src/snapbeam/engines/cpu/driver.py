@@ -28,6 +28,8 @@ from snapbeam.engines.scalar.compile import kernel, ready
 from snapbeam.engines.scalar.decisions import PIECES
 from snapbeam.engines.scalar.extras import extras_of_table
 from snapbeam.engines.scalar.lanes import WIDTH
+from snapbeam.engines.scalar.several import several
+from snapbeam.model.drive.joined import MOST_STRIKERS
 
 __all__ = ["march_landing", "march_tangents", "record", "run_ensemble", "usable_cores"]
 
@@ -60,6 +62,11 @@ def usable_cores() -> int:
         return os.cpu_count() or 1
 
 
+def _packed(ensemble: Ensemble) -> Packed:
+    others = None if ensemble.others is None else several(ensemble.others.laws)
+    return pack(ensemble.structure, ensemble.high_omega, forced=ensemble.forced, several=others)
+
+
 def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> Asked:
     """The ensemble in this engine's layout; without *memory*, of a drive that looks nothing up."""
     law, drive = ensemble.law.numbers_type(), ensemble.drive.numbers_type()
@@ -71,6 +78,9 @@ def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> Asked:
         starts=packed.spread(ensemble.starts),
         law=law(*[0.0] * len(law._fields)),
         drive=drive(*[0.0] * len(drive._fields)),
+        other_numbers=None if ensemble.others is None else ensemble.others.numbers,
+        other_places=None if ensemble.others is None else ensemble.others.places,
+        other_rows=None if ensemble.others is None else packed.spread(ensemble.others.rows),
         extras=extras_of_table(),
         max_steps=ensemble.max_steps,
         high=bool((ensemble.structure.omega > ensemble.high_omega).any()),
@@ -84,8 +94,10 @@ def _room(ensemble: Ensemble) -> Room:
 
 
 def _kernel(march: Callable[..., Any], ensemble: Ensemble) -> Any:
-    parts = (kind for _, kind in ensemble.drive.parts)
-    kinds = (ensemble.law, ensemble.drive, *parts, type(extras_of_table()).owner)
+    moving = [kind for _, kind in ensemble.drive.parts]
+    parts = [*moving, *(term for kind in (ensemble.drive, *moving) for term in kind.terms)]
+    others = () if ensemble.others is None else (several(ensemble.others.laws), *ensemble.others.laws)
+    kinds = (ensemble.law, ensemble.drive, *parts, *others, type(extras_of_table()).owner)
     return kernel(march.py_func, kinds)  # type: ignore[attr-defined]
 
 
@@ -136,7 +148,7 @@ def march_tangents(
     tangents : array of shape (runs, k, 2, N)
     """
     landings = int(-(-ensemble.runs["end"][0] // ensemble.runs["landing"][0]))
-    packed = pack(ensemble.structure, ensemble.high_omega, forced=bool(ensemble.drive.parts))
+    packed = _packed(ensemble)
     size = packed.layout.size
     spread = packed.spread(tangents).reshape(*tangents.shape[:2], 2 * size)
     march = _kernel(march_tangent, ensemble)
@@ -169,7 +181,7 @@ def _march(
     progress: Callable[[int, int], object] | None,
     landings: int,
 ) -> Landings:
-    packed = pack(ensemble.structure, ensemble.high_omega, forced=bool(ensemble.drive.parts))
+    packed = _packed(ensemble)
     if landings == 0 and _few_modes_pay(ensemble, packed):
         return _spread_over(ensemble, packed, *_side_by_side(ensemble, packed), threads, progress, landings)
     march = _kernel(march_many, ensemble)
@@ -283,6 +295,11 @@ def _buffers(ensemble: Ensemble, times: _Array, size: int) -> _Buffers:
     return _Buffers(samples, 4096, most + 1)
 
 
+def _impact_rows(ensemble: Ensemble, buffers: _Buffers) -> _Array:
+    """Room for impacts, the first striker's number in each row if there are several."""
+    return np.ones((buffers.impacts + MOST_STRIKERS, 4 if ensemble.others is None else 5))
+
+
 def record(
     ensemble: Ensemble,
     times: _Array,
@@ -300,7 +317,7 @@ def record(
     progress : callable, optional
         Called with the share of the run that is done, several times a second.
     """
-    packed = pack(ensemble.structure, ensemble.high_omega, forced=bool(ensemble.drive.parts))
+    packed = _packed(ensemble)
     size, march = packed.layout.size, _kernel(march_one, ensemble)
     memory, books = lay_out(ensemble, packed), empty_books(1)
     asked, room = _asked(ensemble, packed, memory), _room(ensemble)
@@ -311,7 +328,7 @@ def record(
     book, end = books[0], float(ensemble.runs["end"][0])
     outputs = Outputs(
         times, np.empty(buffers.samples), np.empty((buffers.samples, 2 * size)),
-        np.empty((buffers.samples, VALUES)), np.empty((buffers.impacts, 4)), marks, buffers.most, in_contact,
+        np.empty((buffers.samples, VALUES)), _impact_rows(ensemble, buffers), marks, buffers.most, in_contact,
     )  # fmt: skip
     arguments = (
         memory.memory, memory.blocks, memory.layouts[0], memory.stages, asked, room, book, outputs, aside, _SLICE_STEPS,
@@ -333,6 +350,7 @@ def record(
             if not running:
                 return
             marks[1] += held
+            outputs.impacts[:, 4:] = 1.0
             aside[0][1] = 0
         if progress is not None:
             progress(float(books["time"][0]) / end)

@@ -29,6 +29,8 @@ from snapbeam.engines.cpu.state import (
     phase_at,
 )
 from snapbeam.engines.cpu.step import Done, Step, prepare, take_step, take_two
+from snapbeam.engines.cpu.strikers.force import press, put_others
+from snapbeam.engines.cpu.strikers.meet import close_others, level_of_others
 from snapbeam.engines.cpu.uneven import turn_over
 from snapbeam.engines.cpu.world.circuit import Tap
 from snapbeam.engines.cpu.world.forced import Given, enter_forces
@@ -64,7 +66,10 @@ def choose(memory, blocks, place, run, now, book):
     rows, seen, watch = now.rows, now.seen, now.watch
     r = layout.work + 9 * layout.size
     if layout.stretch > 0.0 and turn_over(layout.uneven, seen.c, home, run.rest_center):
-        enter_forces(layout.forced, memory, run.struck.drive, phase_at(run, t))
+        there = phase_at(run, t)
+        enter_forces(layout.forced, memory, run.struck.drive, there)
+        press(memory, layout.size, layout.others, run.struck.drive, there, rows.q, 0.0, False)
+        put_others(memory, layout.others, -home)
         stretch = change_well(memory, blocks, layout, home, rows.q, rows.k, r)
         home = -home
     book.steps += 1
@@ -72,6 +77,7 @@ def choose(memory, blocks, place, run, now, book):
     if watch.touching:
         left = released_at(run.struck.law, seen.d, seen.dv)
         level = max(level, contact_level(clock, (t - book.onset) * clock.tick, left, seen.dv))
+    level = level_of_others(memory, layout.others, clock, t, level)
     ticks, at = ticks_of(clock, level), run.coefficients + (level + 1) * run.slot
     # up to the next state that is handed out, or to the end
     limit = min((now.landed + 1) * clock.landing, clock.end)
@@ -161,6 +167,8 @@ def march_many(memory, blocks, layouts, stages, asked, which, room, kept):
             )
             now_a = hand_out(memory, blocks, layouts[0], run_a, now_a, book_a, i_a, kept)
             if now_a.status != _RUNNING:
+                if not goes_on:
+                    close_others(memory, layouts[0].others, book_a, None, now_a.t, run_a.clock.tick)
                 finish(memory, blocks, layouts[0], run_a, now_a, book_a, None, 0, goes_on)
                 live_a = False
         if live_b:
@@ -169,6 +177,8 @@ def march_many(memory, blocks, layouts, stages, asked, which, room, kept):
             )
             now_b = hand_out(memory, blocks, layouts[1], run_b, now_b, book_b, i_b, kept)
             if now_b.status != _RUNNING:
+                if not goes_on:
+                    close_others(memory, layouts[1].others, book_b, None, now_b.t, run_b.clock.tick)
                 finish(memory, blocks, layouts[1], run_b, now_b, book_b, None, 0, goes_on)
                 live_b = False
     if live_a:

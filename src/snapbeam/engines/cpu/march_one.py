@@ -8,6 +8,7 @@ from snapbeam.engines.cpu.recording import has_room, lay_aside, take_up
 from snapbeam.engines.cpu.settling.after import after_step
 from snapbeam.engines.cpu.state import Place, begin, finish, run_of
 from snapbeam.engines.cpu.step import take_step
+from snapbeam.engines.cpu.strikers.meet import close_others
 from snapbeam.engines.scalar.compile import compiled
 from snapbeam.engines.scalar.tip import seen_from
 
@@ -37,6 +38,7 @@ def march_one(memory, blocks, layout, stages, asked, room, book, outputs, aside,
         done = take_step(memory, blocks, layout, stages, tip, step, True)
         now, _ = after_step(memory, blocks, place, run, now, step, done, room, book, asked, outputs)
     if now.status != _RUNNING:
+        close_others(memory, layout.others, book, outputs, now.t, run.clock.tick)
         finish(memory, blocks, layout, run, now, book, outputs.impacts, outputs.marks[1], False)
     book.time, book.status, book.samples = now.t, now.status, now.sample
     lay_aside(now, marks, reals)

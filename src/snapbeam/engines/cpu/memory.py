@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.engines.cpu.rows import Layout
+from snapbeam.engines.cpu.strikers.force import Others
 from snapbeam.engines.cpu.uneven import Uneven
 from snapbeam.engines.cpu.world.circuit import Circuit
 from snapbeam.engines.cpu.world.forced import Forced
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.scalar.composition import Stages, in_memory, slot_length
 from snapbeam.engines.scalar.lanes import WIDTH
+from snapbeam.engines.scalar.several import NUMBERS, Several
 from snapbeam.engines.structure import Structure
 
 __all__ = ["Memory", "Packed", "lay_out", "pack"]
@@ -63,11 +65,17 @@ def _blocks_of(coupled: NDArray[np.bool_]) -> NDArray[np.int64]:
         label = least
 
 
-def pack(structure: Structure, high_omega: float = np.inf, forced: bool = False) -> Packed:
+def pack(
+    structure: Structure,
+    high_omega: float = np.inf,
+    forced: bool = False,
+    several: type[Several] | None = None,
+) -> Packed:
     """Arrange a structure in rows.
 
     Linear modes that the tension does not couple (the symmetric and the antisymmetric ones) become
     separate blocks, each padded to a multiple of eight rows.  *forced*: with room for a moving base or a changing load.
+    *several*: with room for strikers beside the first.
     """
     label = _blocks_of(structure.coupling != 0.0)
     omega, zeta = structure.omega, structure.damping_ratio
@@ -120,15 +128,20 @@ def pack(structure: Structure, high_omega: float = np.inf, forced: bool = False)
         pieces |= {"tapped": padded(structure.tapped), "rate": np.zeros(WIDTH)}
     if forced or structure.tapped is not None:
         pieces["kick"] = np.zeros(size)
+    if several is not None:
+        pieces["striker_rows"] = np.zeros(len(several.laws) * size)
+        pieces["strikers"] = np.zeros(len(several.laws) * NUMBERS)
     starts = np.concatenate(([0], np.cumsum([piece.size for piece in pieces.values()])))
     placed = dict(zip(pieces, map(int, starts), strict=False))
-    uneven, forces, circuit = None, None, None
+    uneven, forces, circuit, others = None, None, None, None
     kick = placed.pop("kick", 0)
     if forced:
         forces = Forced(placed.pop("shaken"), placed.pop("now"), kick)
     if structure.tapped is not None:
         element = int(rows[-1]) if structure.circuit else None
         circuit = Circuit(placed.pop("tapped"), placed.pop("rate"), kick, element)
+    if several is not None:
+        others = Others(placed.pop("striker_rows"), placed.pop("strikers"), several.numbers_type()())
     if away is not None:
         own = placed.pop("far"), placed.pop("second"), placed.pop("here")
         uneven = Uneven(*own, away.lift, away.depth, away.level)
@@ -144,6 +157,7 @@ def pack(structure: Structure, high_omega: float = np.inf, forced: bool = False)
         uneven=uneven,
         forced=forces,
         circuit=circuit,
+        others=others,
     )
     return Packed(
         np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows, tuple(held)
@@ -184,6 +198,13 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
             work=kick + size,
             forced=None if first.forced is None else first.forced._replace(now=now, kick=kick),
             circuit=None if first.circuit is None else first.circuit._replace(rate=rate, kick=kick),
+        )
+    if first.others is not None:
+        count = len(type(first.others.kinds).owner.laws)
+        rows = second.work
+        second = second._replace(
+            work=rows + count * (size + NUMBERS),
+            others=first.others._replace(rows=rows, numbers=rows + count * size),
         )
     at = second.work + WORK_ROWS * size + slots
     stages, weights = in_memory(

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 from numba.extending import overload
 
 from snapbeam.engines.cpu.rows import dot
+from snapbeam.engines.cpu.strikers.force import struck_along
 from snapbeam.engines.cpu.uneven import pushed_along
 from snapbeam.engines.cpu.world.forced import shaken_along
 from snapbeam.engines.scalar.compile import INLINE_HERE, inlined
@@ -63,6 +64,7 @@ def _damped(memory, layout, tip, step, stage, weight, along_g, along_r, push):
         rate = dot(memory, size, contact, step.p1)
         along = along_g * dot(memory, size, contact, layout.g) + along_r * dot(memory, size, contact, step.r)
         along = pushed_along(memory, size, layout.uneven, contact, along)
+        along = struck_along(memory, size, layout.others, contact, along)
         along = shaken_along(memory, size, layout.forced, contact, along)
     mobility = dot(memory, size, contact, contact)
     given = kick_force(tip.law, push.penetration, push.velocity - rate, mobility, along, weight)

@@ -8,11 +8,13 @@ from snapbeam.engines.cpu.rows import modal_energy
 from snapbeam.engines.cpu.settling.hold import held_for, hold
 from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
+from snapbeam.engines.cpu.strikers.meet import any_touches
 from snapbeam.engines.cpu.uneven import lifted
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import contact_energy, felt_force
 from snapbeam.engines.scalar.decisions import Seen
 from snapbeam.engines.scalar.physics import tension_energy
+from snapbeam.model.drive.joined import MOST_STRIKERS
 
 __all__ = [
     "MARKS",
@@ -50,7 +52,8 @@ class Outputs(NamedTuple):
     values: Any
     """Shape (samples, VALUES)."""
     impacts: Any
-    """Onset, duration, peak force and impulse of each impact, shape (impacts, 4)."""
+    """Onset, duration, peak force and impulse of each impact, of several strikers which one too, shape (rows, 4 or 5);
+    a few rows more than it takes to be full, since several may end with one step."""
     marks: Any
     """Instants recorded so far; impacts handed on before; samples of the present contact."""
     most: int
@@ -63,7 +66,7 @@ class Outputs(NamedTuple):
 def has_room(now, book, outputs):
     """Whether another step's samples and impact fit."""
     rows = now.sample + outputs.most + 3 <= outputs.at.size
-    return rows and book.impacts - outputs.marks[1] < outputs.impacts.shape[0]
+    return rows and book.impacts - outputs.marks[1] < outputs.impacts.shape[0] - MOST_STRIKERS
 
 
 @inlined
@@ -183,12 +186,13 @@ def record_aside(memory, layout, tip, now, short, here, when, about, sample, boo
 @inlined
 def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, book, outputs):
     """Write down the end of a step in contact, of the first ones of each; returns how many samples there are."""
-    if not outputs.in_contact or not (step.touching or book.touching != 0):
+    others, now_touching = layout.others, book.touching != 0
+    if not outputs.in_contact or not any_touches(memory, others, step.touching or now_touching):
         return sample
-    if not step.touching:
+    if not any_touches(memory, others, step.touching):
         outputs.marks[2] = 0
     when = (now.t + step.ticks) * run.clock.tick
-    if outputs.marks[2] >= _MOST_IN_CONTACT and book.touching != 0:
+    if outputs.marks[2] >= _MOST_IN_CONTACT and any_touches(memory, others, now_touching):
         return sample
     outputs.marks[2] += 1
     energy = modal_energy(memory, layout, step.q1, step.p1) + tension_energy(layout.gamma, done.gq, done.qr)

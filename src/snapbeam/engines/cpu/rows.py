@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+from snapbeam.engines.cpu.dot import dot
+from snapbeam.engines.cpu.strikers.force import struck
 from snapbeam.engines.cpu.uneven import pushed
 from snapbeam.engines.cpu.world.forced import shaken
 from snapbeam.engines.scalar.compile import called, inlined
@@ -87,6 +89,8 @@ class Layout(NamedTuple):
     """Of a moving base or a changing load, a :class:`~snapbeam.engines.cpu.world.forced.Forced`; else None."""
     circuit: Any
     """Of a harvester, a :class:`~snapbeam.engines.cpu.world.circuit.Circuit`; else None."""
+    others: Any
+    """Of several strikers, an :class:`~snapbeam.engines.cpu.strikers.force.Others`; else None."""
 
 
 @inlined
@@ -215,21 +219,13 @@ def tension_rows_twice(memory, blocks, layout_a, q_a, r_a, layout_b, q_b, r_b):
 
 
 @inlined
-def dot(memory, size, a, b):
-    """a.b over a row."""
-    total = splat(0.0)
-    for row in range(0, size, WIDTH):
-        total = fma(load(memory, a + row), load(memory, b + row), total)
-    return lanes_sum(total)
-
-
-@inlined
 def acceleration_rows(memory, layout, along_g, along_r, r, k):
     """k = the modal acceleration by the change of tension, and by the side force where q has another origin."""
     for row in range(0, layout.size, WIDTH):
         g_row = load(memory, layout.g + row)
         tension = tension_acceleration(along_g, along_r, g_row, load(memory, r + row))
         tension = pushed(memory, layout.uneven, row, tension)
+        tension = struck(memory, layout.size, layout.others, row, tension)
         store(memory, k + row, shaken(memory, layout.forced, row, tension))
 
 
@@ -248,6 +244,7 @@ def kick_and_flow(memory, layout, flow, weight, along_g, along_r, r, force, q, p
     for row in range(0, size, WIDTH):
         k = tension_acceleration(along_g, along_r, load(memory, layout.g + row), load(memory, r + row))
         k = pushed(memory, layout.uneven, row, k)
+        k = struck(memory, size, layout.others, row, k)
         k = shaken(memory, layout.forced, row, k)
         k = fma(force, load(memory, layout.contact + row), k)
         kicked = fma(weight, k, load(memory, p + row))
@@ -312,8 +309,8 @@ def signals(memory, layout, q, p):
 
 
 @inlined
-def glide(memory, layout, flow, pieces, piece, q, p, k0, k1, center, parts):
-    """A free step in short pieces: signals at the end of each, one mode a lane, into *parts*.
+def glide(memory, layout, contact, flow, pieces, piece, q, p, k0, k1, center, parts):
+    """A free step in short pieces: signals at the end of each, one mode a lane, into *parts*; c is the row *contact*.
 
     Row by row of modes, so that a row stays in registers all the way.  At the border of pieces i and i + 1
     stands a kick by the tension's acceleration, linear from k0 to k1 (half a kick at the first).  Piece i
@@ -325,7 +322,7 @@ def glide(memory, layout, flow, pieces, piece, q, p, k0, k1, center, parts):
         k0_row, k1_row = load(memory, k0 + row), load(memory, k1 + row)
         a11, a12 = load(memory, flow + row), load(memory, flow + size + row)
         a21, a22 = load(memory, flow + 2 * size + row), load(memory, flow + 3 * size + row)
-        c_row, e_row = load(memory, layout.contact + row), load(memory, layout.center + row)
+        c_row, e_row = load(memory, contact + row), load(memory, layout.center + row)
         for i in range(pieces):
             done, kick, at = i / pieces, piece if i > 0 else 0.5 * piece, 4 * WIDTH * i
             kicked = fma(kick * done, k1_row, p_row)

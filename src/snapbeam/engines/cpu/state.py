@@ -14,6 +14,8 @@ from snapbeam.engines.cpu.rows import (
     tension_rows,
 )
 from snapbeam.engines.cpu.step import observe, prepare
+from snapbeam.engines.cpu.strikers.force import press, stored_by_others
+from snapbeam.engines.cpu.strikers.meet import begin_others
 from snapbeam.engines.cpu.uneven import about_level, above_own_well, lifted, put
 from snapbeam.engines.cpu.world.circuit import calm, put_rate
 from snapbeam.engines.cpu.world.forced import changed_load, enter_forces
@@ -50,6 +52,10 @@ class Asked(NamedTuple):
     law: Any
     """Any numbers of the law, for their type; so is the drive's."""
     drive: Any
+    other_numbers: Any
+    """Of the strikers beside the first, shape (runs, strikers, numbers); so are the places of their rows."""
+    other_places: Any
+    other_rows: Any
     extras: Any
     """Statistics that were registered, by type."""
     max_steps: int
@@ -208,6 +214,7 @@ def land(memory, blocks, layout, run, t, home, rows, touching, landed, sample):
     """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from a landing."""
     q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size
     enter_forces(layout.forced, memory, run.struck.drive, phase_at(run, t))
+    press(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), q, 0.0, False)
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
     along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
@@ -240,6 +247,7 @@ def begin(memory, blocks, place, asked, i, book):
             memory[layout.g + row] = -memory[layout.g + row]
     put(memory, size, layout.uneven, record.home)
     put_rate(memory, layout.circuit, record.circuit_rate)
+    begin_others(memory, size, layout.others, run.struck.drive, asked, i, phase_at(run, 0), record.home, work)
     now, energy = land(memory, blocks, layout, run, 0, record.home, rows, False, 0, 0)
     seen, since = now.seen, record.contact_time
     touching = since >= 0.0
@@ -255,7 +263,7 @@ def begin(memory, blocks, place, asked, i, book):
         about_level(layout.uneven, seen).c,
         seen,
         run.struck.law,
-        energy + contact_energy(run.struck.law, seen.d),
+        stored_by_others(memory, layout.others, energy + contact_energy(run.struck.law, seen.d)),
     )
     watch = Watch(touching, now.watch.quiet, 0, 0, 0, 0)
     return run, Now(0, now.home, now.stretch, rows, seen, watch, 0, 0, now.status)
@@ -294,7 +302,8 @@ def finish(memory, blocks, layout, run, now, book, impacts, before, goes_on):
     gq, qr = tension_rows(memory, blocks, layout, q, layout.work + 9 * layout.size)
     stored = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
     stored = lifted(memory, layout.size, layout.uneven, q, stored)
-    book.energy = stored + contact_energy(run.struck.law, now.seen.d)
+    stored = stored + contact_energy(run.struck.law, now.seen.d)
+    book.energy = stored_by_others(memory, layout.others, stored)
     book.displacement, book.center = now.seen.w, now.seen.c
     if now.home < 0.0:
         # the place in memory is left as it was found

@@ -17,6 +17,7 @@ from snapbeam.engines.cpu.rows import (
     tension_rows,
     tension_rows_twice,
 )
+from snapbeam.engines.cpu.strikers.force import given_by_others, gross_of_others, press
 from snapbeam.engines.cpu.world.around import around_kick
 from snapbeam.engines.cpu.world.circuit import Tap, kick_source, no_tap
 from snapbeam.engines.cpu.world.forced import Given, changed_load, enter_forces, no_given
@@ -58,7 +59,7 @@ class Done(NamedTuple):
     qr: float
     impulse: float
     work: float
-    """Of the striker."""
+    """Of the strikers."""
     gross: float
     lost: float
     """In the contact."""
@@ -162,9 +163,20 @@ def _kick(memory, layout, stages, step, stage, weight, along_g, along_r, force, 
 
 @inlined
 def _forces(memory, layout, stages, tip, step, stage):
-    """Put the forces that follow from time at hand for a kick."""
+    """Put the forces that follow from time, and those of other strikers, at hand for a kick."""
     now = step.phase + memory[stages.elapsed + stage] * step.length * tip.drive.omega
     enter_forces(layout.forced, memory, tip.drive, now)
+    here = step.q1 if stage > 0 else step.q
+    weight = memory[stages.kick + stage] * step.length
+    press(memory, layout.size, layout.others, tip.drive, now, here, weight, stage == 0)
+
+
+@inlined
+def _done(memory, layout, gq, qr, push, dissipated, given):
+    """What a step gave, other strikers included."""
+    work = given_by_others(memory, layout.others, push.work)
+    gross = gross_of_others(memory, layout.others, push.gross)
+    return Done(gq, qr, push.impulse, work, gross, push.lost, dissipated, given[0], given[1])
 
 
 @called
@@ -194,7 +206,7 @@ def take_step(memory, blocks, layout, stages, tip, step, ledger):
             memory, blocks, layout, tip, step, stage, weight, (along_g, along_r, push.force), given
         )
         dissipated += _kick(memory, layout, stages, step, stage, weight, along_g, along_r, push.force, ledger)
-    return Done(gq, qr, push.impulse, push.work, push.gross, push.lost, dissipated, given[0], given[1])
+    return _done(memory, layout, gq, qr, push, dissipated, given)
 
 
 @compiled
@@ -242,6 +254,6 @@ def take_two(memory, blocks, stages, layout_a, tip_a, a, layout_b, tip_b, b):
         _kick(memory, layout_a, stages, a, stage, weight_a, g_a, r_a, push_a.force, None)
         _kick(memory, layout_b, stages, b, stage, weight_b, g_b, r_b, push_b.force, None)
     return (
-        Done(gq_a, qr_a, push_a.impulse, push_a.work, push_a.gross, push_a.lost, 0.0, given_a[0], given_a[1]),
-        Done(gq_b, qr_b, push_b.impulse, push_b.work, push_b.gross, push_b.lost, 0.0, given_b[0], given_b[1]),
+        _done(memory, layout_a, gq_a, qr_a, push_a, 0.0, given_a),
+        _done(memory, layout_b, gq_b, qr_b, push_b, 0.0, given_b),
     )

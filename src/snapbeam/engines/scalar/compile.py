@@ -100,7 +100,7 @@ class _Telling(event.Listener):
     def on_start(self, event: Any) -> None:
         if not self.told:
             self.told = True
-            _LOG.info("compiling %s, once on this machine: some 15 s", self.name)
+            _LOG.info("compiling %s, once on this machine: 10 to 20 s on a free core", self.name)
 
     def on_end(self, event: Any) -> None:
         """Nothing to say."""

@@ -11,7 +11,14 @@ from snapbeam.engines.scalar.compile import INLINE, inlined
 from snapbeam.engines.scalar.contact import scalar_function
 from snapbeam.engines.scalar.physics import sincos
 
-__all__ = ["base_acceleration", "joined_motion", "load_change"]
+__all__ = [
+    "base_acceleration",
+    "joined_motion",
+    "kind_acceleration",
+    "kind_motion",
+    "load_change",
+    "part_motion",
+]
 
 _TWO_PI = 2.0 * math.pi
 
@@ -54,6 +61,77 @@ def _reader(part: str, kind: Any, alone: bool) -> Any:
     return inlined(made["read"])
 
 
+def _of_kind(kind: Any, what: str) -> Any:
+    """The motion or the acceleration of a kind of drive, as a function of its numbers, memory and its argument."""
+    if kind.terms:
+        return _summed(kind, what, len(kind.terms))
+    if kind.harmonic:
+        return _harmonic_motion if what == "motion" else _harmonic_acceleration
+    return scalar_function(kind, what)
+
+
+def _term_reader(kind: Any, i: int) -> Any:
+    """A function that takes the numbers of term i, and its argument, out of those of a sum."""
+    names = ", ".join(f"drive.t{i}_{name}" for name in kind.number_names)
+    lines = ["def read(drive, argument):"]
+    lines.append(f"    at = argument / drive.omega * drive.t{i}_omega + drive.t{i}_phase")
+    if kind.harmonic:
+        lines.append("    at = at - two_pi * floor(at / two_pi)")
+    lines.append(f"    return Numbers({names}), at, drive.t{i}_start")
+    made: dict[str, Any] = {"Numbers": kind.numbers_type(), "two_pi": _TWO_PI, "floor": math.floor}
+    exec("\n".join(lines), made)
+    return inlined(made["read"])
+
+
+def _summed(kind: Any, what: str, count: int) -> Any:
+    """The motion or the acceleration of the first *count* terms of a sum."""
+    term = kind.terms[count - 1]
+    read, own = _term_reader(term, count), _of_kind(term, what)
+    if what == "motion":
+
+        @inlined
+        def moves(drive, memory, argument):
+            numbers, at, start = read(drive, argument)
+            w, speed = own(numbers, memory, at)
+            return w - start, speed
+
+        if count == 1:
+            return moves
+        others = _summed(kind, what, count - 1)
+
+        @inlined
+        def together(drive, memory, argument):
+            one, other = moves(drive, memory, argument), others(drive, memory, argument)
+            return one[0] + other[0], one[1] + other[1]
+
+        return together
+
+    @inlined
+    def hastens(drive, memory, argument):
+        numbers, at, _ = read(drive, argument)
+        return own(numbers, memory, at)
+
+    if count == 1:
+        return hastens
+    rest = _summed(kind, what, count - 1)
+
+    @inlined
+    def in_all(drive, memory, argument):
+        return hastens(drive, memory, argument) + rest(drive, memory, argument)
+
+    return in_all
+
+
+def kind_motion(kind: Any) -> Any:
+    """The motion of a kind of drive that is no sine: displacement (m) and velocity (m/s)."""
+    return _of_kind(kind, "motion")
+
+
+def kind_acceleration(kind: Any) -> Any:
+    """Its acceleration, m/s^2."""
+    return _of_kind(kind, "acceleration")
+
+
 def _of_part(owner: Any, part: str, what: str) -> Any:
     """The motion or the acceleration of a part, as a function of the numbers of all; nothing if it does not move."""
     kinds = dict(owner.parts)
@@ -61,10 +139,7 @@ def _of_part(owner: Any, part: str, what: str) -> Any:
         return _no_motion if what == "motion" else _nothing
     kind = kinds[part]
     read = _reader(part, kind, owner.alone)
-    if kind.harmonic:
-        own = _harmonic_motion if what == "motion" else _harmonic_acceleration
-    else:
-        own = scalar_function(kind, what)
+    own = _of_kind(kind, what)
 
     @inlined
     def of_part(drive, memory, argument):
@@ -72,6 +147,11 @@ def _of_part(owner: Any, part: str, what: str) -> Any:
         return own(numbers, memory, at)
 
     return of_part
+
+
+def part_motion(owner: Any, part: str) -> Any:
+    """A function of the numbers of all parts, memory and the argument: displacement (m) and velocity of one part."""
+    return _of_part(owner, part, "motion")
 
 
 def joined_motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:

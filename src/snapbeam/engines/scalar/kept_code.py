@@ -41,7 +41,8 @@ def keep_code(dispatcher: Any, mark: str) -> Any:
     if not hasattr(dispatcher, "enable_caching"):
         return dispatcher
     try:
-        dispatcher._cache = _KeptCode(dispatcher.py_func, mark)
+        alone = dispatcher.targetoptions.get("_nrt") is False
+        dispatcher._cache = _KeptCode(dispatcher.py_func, mark, alone)
     except Exception as error:  # no folder anywhere, or a Numba that keeps code in another way
         _say(f"compiled code is not kept, each start compiles anew ({error})")
     return dispatcher
@@ -112,8 +113,10 @@ class _KeptCode(FunctionCache):
 
     _impl_class = _Implementation
 
-    def __init__(self, function: Callable[..., Any], mark: str) -> None:
+    def __init__(self, function: Callable[..., Any], mark: str, alone: bool) -> None:
         super().__init__(function)
+        self._alone = alone
+        """Whether the code calls nothing of Numba's runtime, so that it can be loaded by itself."""
         self._cache_file = _CheckedFiles(
             cache_path=self._cache_path,
             filename_base=f"{self._impl.filename_base}-{mark}",
@@ -122,7 +125,11 @@ class _KeptCode(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            return super().load_overload(sig, target_context)
+            if not self._alone:
+                return super().load_overload(sig, target_context)
+            # without refreshing the context, which loads what only compiling needs, half a second of each start
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
         except Exception as error:  # whatever became of the file: compile
             _LOG.debug("compiled code could not be loaded: %s", error)
             return None

@@ -9,8 +9,7 @@ from numba import types
 from numba.extending import intrinsic
 
 from snapbeam.engines.scalar.compile import inlined, overloaded
-from snapbeam.engines.scalar.contact import scalar_function
-from snapbeam.engines.scalar.joined import joined_motion
+from snapbeam.engines.scalar.joined import joined_motion, kind_acceleration, kind_motion
 from snapbeam.engines.scalar.physics import shaker_motion, sincos
 
 __all__ = ["Tip", "drive_rate", "numbers_of", "seen_from", "tip_acceleration", "tip_motion", "turned_motion"]
@@ -61,7 +60,7 @@ def _tip_motion(drive, memory, argument):
         return harmonic
     if owner.parts:
         return lambda drive, memory, argument: joined_motion(drive, memory, argument)
-    motion = scalar_function(owner, "motion")
+    motion = kind_motion(owner)
     return lambda drive, memory, argument: motion(drive, memory, argument)
 
 
@@ -86,7 +85,7 @@ def _tip_acceleration(drive, memory, argument):
         return harmonic
     if owner.parts:  # under Newton's law alone, which is refused beside what else moves
         return lambda drive, memory, argument: 0.0
-    acceleration = scalar_function(owner, "acceleration")
+    acceleration = kind_acceleration(owner)
     return lambda drive, memory, argument: acceleration(drive, memory, argument)
 
 
@@ -108,7 +107,7 @@ def _turned_motion(drive, memory, argument, sine, cosine):
         )
     if drive.instance_class.owner.parts:
         return lambda drive, memory, argument, sine, cosine: joined_motion(drive, memory, argument)
-    motion = scalar_function(drive.instance_class.owner, "motion")
+    motion = kind_motion(drive.instance_class.owner)
     return lambda drive, memory, argument, sine, cosine: motion(drive, memory, argument)
 
 

@@ -168,11 +168,13 @@ class TakeCard:
         quasi = "quasi" in self.page.card.layers.value
         dots = self.page.card.dots if "dots" in self.page.card.layers.value else None
         name = self.page.card.show.value
-        self._make(
-            name if name != "response" else "map",
-            suffix,
-            lambda path, _: _draw_map(cut, name, quasi, dots, path),
-        )
+        label = name if name != "response" else "map"
+        if self.page.card.source.is_list:
+            plane = self.page.card.plane
+            along = str(plane.x.name), str(plane.y.name)
+            self._make(label, suffix, lambda path, _: _draw_points(cut, name, along, quasi, dots, path))
+            return
+        self._make(label, suffix, lambda path, _: _draw_map(cut, name, quasi, dots, path))
 
     def _cut(self) -> xr.Dataset:
         """The map over the two axes that are shown; of a system without a map, its finest window."""
@@ -279,6 +281,16 @@ def _draw_map(cut: xr.Dataset, name: str, quasi: bool, dots: Any, path: Any) -> 
             ax = plot_response_map(cut, threshold_line=quasi, dots=dots)
         else:
             ax = plot_statistic(cut, name)
+        _save(save_figure, ax, path)
+
+
+def _draw_points(
+    cut: xr.Dataset, name: str, along: tuple[str, str], quasi: bool, dots: Any, path: Any
+) -> None:
+    from snapbeam.figures import plot_points, save_figure
+
+    with drawing:
+        ax = plot_points(cut, name, across=along[0], upward=along[1], dots=dots, threshold_line=quasi)
         _save(save_figure, ax, path)
 
 

@@ -13,6 +13,7 @@ from snapbeam.explorer.jobs import Token
 from snapbeam.explorer.limits import WINDOW_SECONDS
 from snapbeam.explorer.maps.points import Point
 from snapbeam.explorer.maps.windows import Window, compute, planned
+from snapbeam.explorer.waiting import Waiting
 
 if TYPE_CHECKING:
     from snapbeam.explorer.cards.map import MapCard
@@ -34,6 +35,7 @@ class WindowControl:
         self.card = card
         self._token: Token | None = None
         self._moved, self._pushed = 0, 0.0
+        self._waiting = Waiting(card.shared.compiling, card.later)
 
     def view_moved(self) -> None:
         """Another part is seen; it is looked at once it rests."""
@@ -90,6 +92,7 @@ class WindowControl:
         self._token = token = Token(WINDOW_SECONDS)
         self.card.stop.visible = True
         self.card.tell("computing what is seen")
+        self._waiting.begin(0, self._still)
         self.card.shared.jobs.window(
             lambda _: compute(window, self.card.shared.jobs, token, lambda w: self._grew(w, token)),
             lambda _, words: self.card.post(lambda: self._ended(window, token, words)),
@@ -120,9 +123,14 @@ class WindowControl:
             self._pushed = now
             self.card.post(lambda: self._draw_growing(window, token))
 
+    def _still(self, seconds: float, why: str) -> None:
+        if self._token is not None:
+            self.card.tell(f"computing what is seen, {seconds:.0f} s" + (f"; {why}" if why else ""))
+
     def _draw_growing(self, window: Window, token: Token) -> None:
         if token is not self._token:
             return
+        self._waiting.end(0)
         self.card.show_windows()
         left = (window.size - window.done) * window.seconds
         finest = int(window.stride[window.stride > 0].min()) if (window.stride > 0).any() else 27
@@ -132,6 +140,7 @@ class WindowControl:
 
     def _ended(self, window: Window, token: Token, words: str) -> None:
         if token is self._token:
+            self._waiting.end(0)
             self.card.stop.visible = False
             self._token = None
             self.card.show_windows()
@@ -142,6 +151,7 @@ class WindowControl:
         if self._token is not None:
             self._token.cancel()
             self._token = None
+            self._waiting.end(0, computed=False)
             self.card.stop.visible = False
         if words:
             self.card.tell(f"{words}; what was computed is kept")

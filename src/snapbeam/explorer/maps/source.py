@@ -320,11 +320,17 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
         return DatasetSource(what)
     if isinstance(what, (str, Path)):
         path = Path(what)
-        if path.is_dir():
+        try:
+            folder = path.is_dir()
+        except (OSError, ValueError) as error:  # a name that no file can have
+            raise InputError(f"file: is no path ({error})") from None
+        if folder:
             from snapbeam.explorer.maps.store import StoreSource
 
             return StoreSource(path)
         if not path.exists():
             raise InputError(f"map = {str(path)!r}: there is no such file or store")
         return FileSource(path)
-    raise InputTypeError(f"map = {what!r}: must be a map, a file, a store, a System, or nothing")
+    raise InputTypeError(
+        f"map is a {type(what).__name__}: must be a map, a file, a store, a System, or nothing"
+    )

@@ -92,6 +92,11 @@ class RunView:
         self._write_notes()
         self._head('<span class="busy">computing</span>', words)
 
+    def wait(self, words: str, seconds: float, why: str) -> None:
+        """Say for how long it has been computed, and what takes the time if that is known."""
+        below = f'<span class="faint">{html.escape(why)}</span>' if why else ""
+        self._head(f'<span class="busy">computing, {seconds:.0f} s</span>', words, below)
+
     def fail(self, words: str) -> None:
         """Say why there is no run."""
         self.notes = {}

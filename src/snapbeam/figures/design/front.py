@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 
-from snapbeam.core.validate import InputError, instance
+from snapbeam.core.validate import InputError, instance, shown
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     elif over in variables:
         across = over
     else:
-        raise InputError(f"over = {over!r}: must be one of {', '.join(variables)}")
+        raise InputError(f"over = {shown(over)}: must be one of {', '.join(variables)}")
     up = f"goal_{goals[0]}"
     with house_style():
         if ax is None:

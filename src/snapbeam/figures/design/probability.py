@@ -11,7 +11,7 @@ from matplotlib.colors import BoundaryNorm
 from matplotlib.lines import Line2D
 
 from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError, instance
+from snapbeam.core.validate import InputError, instance, shown
 from snapbeam.figures.axes import dress, edges_of, is_geometric, positions
 from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_figure
 
@@ -69,7 +69,7 @@ def plot_probability(
         raise InputError(f"no probabilities among {list(map(str, dataset.variables))}")
     known = [str(name) for name in dataset["outcome"].values]
     if outcome not in known:
-        raise InputError(f"outcome = {outcome!r}: must be one of {', '.join(known)}")
+        raise InputError(f"outcome = {shown(outcome)}: must be one of {', '.join(known)}")
     data = dataset.sel(outcome=outcome)
     dims = [str(name) for name in data["probability"].dims if data.sizes[name] > 1]
     data = data.squeeze()

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.files import atomic_path, check_writable
+from snapbeam.core.foreign import MADE_BY
 from snapbeam.core.validate import InputError, integer, positive
 from snapbeam.figures.lab.tracking import flag_words, found_edges
 from snapbeam.lab.tracking.quality import check_tracked
@@ -70,7 +71,7 @@ def annotated_video(
     with atomic_path(target) as temporary:
         writer: Any = imageio_ffmpeg.write_frames(
             str(temporary), canvas.size, fps=rate, codec="libx264", quality=7, macro_block_size=2,
-            ffmpeg_log_level="error",
+            ffmpeg_log_level="error", output_params=["-metadata", f"comment={MADE_BY}"],
         )  # fmt: skip
         writer.send(None)
         try:

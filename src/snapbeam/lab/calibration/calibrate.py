@@ -19,12 +19,20 @@ from snapbeam.config import config_from_mapping, dump_config
 from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError, InputTypeError, choice, integer, shown
 from snapbeam.lab.calibration import wording as words
+from snapbeam.lab.calibration.asymmetry import (
+    ends_section,
+    imperfection_section,
+    uneven_beam,
+    uneven_words,
+)
 from snapbeam.lab.calibration.fit import directions, open_upwards, search, sensitivity
 from snapbeam.lab.calibration.measurements import ContactTest, Measurements, load_measurements
 from snapbeam.lab.calibration.parity import either_well, shape_findings
 from snapbeam.lab.plausibility.calibration import KINDS
 from snapbeam.model.beam import Beam
+from snapbeam.model.ends import Ends
 from snapbeam.model.galerkin.reduction import ReducedModel
+from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.paper_values import BEAM, MODES
 
 __all__ = ["Calibration", "ContactTest", "Measurements", "Residual", "calibrate", "load_measurements"]
@@ -58,7 +66,8 @@ class Calibration:
     standard errors were raised, 1 if the data agree.  ``well_freq``, ``start_well_freq``, ``gauge_well_freq``
     [Hz] are the first frequency about a well of the result, of the beam the fit started from, and of the
     result with the gauge's geometry; ``either_well`` holds the buckling level [m] that each well alone would
-    ask for.  ``remarks`` say in words what was found, ``findings`` what to beware of.
+    ask for.  ``imperfection``, if one was asked for, gives each well its own first frequency; ``beam`` then has
+    the buckling level that goes with it.  ``remarks`` say in words what was found, ``findings`` what to beware of.
     """
 
     beam: Beam
@@ -81,6 +90,7 @@ class Calibration:
     either_well: tuple[float, ...]
     remarks: tuple[str, ...]
     findings: tuple[Finding, ...]
+    imperfection: Imperfection | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -98,6 +108,8 @@ class Calibration:
         else:
             beam["axial_load"] = float(self.beam.axial_load)
         sections: dict[str, dict[str, Any]] = {"beam": beam, "model": {"modes": self.modes}}
+        sections |= {"ends": ends_section(self.beam)} if self.beam.ends != Ends() else {}
+        sections |= {"imperfection": imperfection_section(self.imperfection)} if self.imperfection else {}
         if self.damping_ratio is not None:
             sections["model"]["damping_ratio"] = self.damping_ratio
         if self.contact_stiffness is not None:
@@ -122,6 +134,7 @@ class Calibration:
             "start_well_freq": self.start_well_freq,
             "gauge_well_freq": self.gauge_well_freq,
             "either_well": list(self.either_well),
+            "imperfection": imperfection_section(self.imperfection),
             "remarks": list(self.remarks),
             "findings": [one.plain() for one in self.findings],
         }
@@ -140,6 +153,7 @@ def calibrate(
     *,
     fit: tuple[str, ...] | None = None,
     modes: int = MODES,
+    imperfection: str | None = None,
 ) -> Calibration:
     """Fit a beam to what was measured of it.
 
@@ -155,6 +169,9 @@ def calibrate(
         about a well.
     modes : int
         Number of buckling modes of the model, which is that used for maps.
+    imperfection : {"rise", "point_load", "uniform_load"}, optional
+        What makes the wells unequal, fitted last to the first frequencies about both; the parameter file then has
+        a section ``[imperfection]``.  Equal wells by default.
 
     Returns
     -------
@@ -187,6 +204,10 @@ def calibrate(
             "beam: is straight, but frequencies about wells were measured; give a buckling_level (in the file of "
             "--config)"
         )
+    if beam.ends.left != beam.ends.right and any(item.parity for item in data):
+        raise InputError(
+            "lower_well_shape, upper_well_shape: between unequal ends no mode is symmetric; give frequencies by order"
+        )
     fitted_to = _fit(beam, data, names, count)
     findings = list(fitted_to.findings)
     result = _changed(beam, names, fitted_to.logs)
@@ -196,6 +217,7 @@ def calibrate(
         for item, f in zip(data, fitted, strict=True)
     )
     values, standard, correlation = fitted_to.values(names)
+    uneven = None if imperfection is None else uneven_beam(result, measured, imperfection, count)
     damping, damping_se = _mean(measured.damping_ratio, measured.damping_ratio_se, 0.1)
     tests = [test.stiffness() for test in measured.contact]
     contact, contact_se = _mean(tuple(k for k, _ in tests), tuple(se for _, se in tests) or None, 0.1)
@@ -225,9 +247,12 @@ def calibrate(
     )
     findings += shape_findings(result, measured, count) if wells else []
     findings += words.doubts(answer, measured)
-    return dataclasses.replace(
-        answer, remarks=tuple(words.remarks(answer, measured)), findings=tuple(findings)
-    )
+    told = words.remarks(answer, measured)
+    if uneven is not None and imperfection is not None:
+        assert uneven.beam is not None
+        told.append(uneven_words(imperfection, uneven))
+        answer = dataclasses.replace(answer, beam=uneven.beam, imperfection=uneven.imperfection)
+    return dataclasses.replace(answer, remarks=tuple(told), findings=tuple(findings))
 
 
 @dataclass(frozen=True)

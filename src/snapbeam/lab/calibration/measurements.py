@@ -6,7 +6,7 @@ import itertools
 import math
 import os
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -130,7 +130,7 @@ class Measurements:
                 raise InputError(f"{name} = {list(values)}: must increase, one frequency a mode")
         for name in ("lower_well", "upper_well"):
             shapes = getattr(self, f"{name}_shape")
-            if isinstance(shapes, str) or not hasattr(shapes, "__iter__"):
+            if not isinstance(shapes, (list, tuple)):
                 raise InputTypeError(
                     f"{name}_shape = {shown(shapes)}: must be a list of words, one for each frequency"
                 )
@@ -151,9 +151,13 @@ class Measurements:
 def _numbers(name: str, values: Any) -> tuple[float, ...]:
     if isinstance(values, (int, float)) and not isinstance(values, bool):
         values = (values,)
-    if isinstance(values, (str, bytes, Mapping)) or not hasattr(values, "__iter__"):
+    if isinstance(values, (str, bytes, Mapping)) or not isinstance(values, Iterable):
         raise InputTypeError(f"{name} = {shown(values)}: must be a list of numbers")
-    return tuple(positive(f"{name}[{i}]", value) for i, value in enumerate(values))
+    try:
+        given = tuple(values)
+    except TypeError:
+        raise InputTypeError(f"{name} = {shown(values)}: must be a list of numbers") from None
+    return tuple(positive(f"{name}[{i}]", value) for i, value in enumerate(given))
 
 
 def load_measurements(path: str | os.PathLike[str]) -> tuple[Measurements, dict[str, Any]]:

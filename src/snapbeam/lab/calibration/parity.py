@@ -20,6 +20,8 @@ def shape_findings(beam: Beam, measured: Measurements, modes: int) -> list[Findi
     if modes < 2 or any(told) or not given:
         return []
     model = ReducedModel.from_beam(beam, modes)
+    if not (model.parity > 0).any():  # unequal ends: no mode is either
+        return []
     symmetric = float(model.natural_freq[model.parity > 0][0])
     other = model.natural_freq[model.parity < 0]
     if not other.size:
@@ -49,7 +51,8 @@ def either_well(beam: Beam, measured: Measurements, modes: int) -> tuple[float, 
 
     def symmetric(at: float) -> float:
         model = ReducedModel.from_beam(beam.replace(buckling_level=abs(at) * level), modes)
-        return float(model.natural_freq[model.parity > 0][0])
+        own = model.natural_freq[model.parity > 0] if (model.parity > 0).any() else model.natural_freq
+        return float(own[0])
 
     here = symmetric(1.0)
     for goal in goals:

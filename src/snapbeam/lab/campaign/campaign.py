@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 
-from snapbeam.core.files import atomic_path
+from snapbeam.core.files import atomic_path, check_writable
 from snapbeam.core.validate import InputError
 from snapbeam.lab.campaign.one_test import TestResult, kept_result, run_test
 from snapbeam.lab.campaign.pairing import Test, find_tests
@@ -65,6 +65,7 @@ def run_campaign(
         kept.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"output = {str(output)!r}: cannot be made, {error.strerror}") from error
+    check_table(output / "tests.csv")
     results: list[TestResult] = []
     if progress is not None:
         progress(0, len(tests), None)
@@ -104,6 +105,7 @@ def _set(test: Test) -> str:
 
 def write_table(path: Path, results: list[TestResult]) -> None:
     """Write the table of tests, as ``snapbeam compare`` reads it."""
+    check_table(path)
     with atomic_path(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
@@ -112,6 +114,11 @@ def write_table(path: Path, results: list[TestResult]) -> None:
             values["findings"] = " ".join(code for code, _, _ in result.findings)
             values["comment"] = result.reason
             writer.writerow([_cell(values[name]) for name in COLUMNS])
+
+
+def check_table(path: Path) -> Path:
+    """Refuse, before any work, a table that cannot be written."""
+    return check_writable(path, "output", begin=",".join(COLUMNS))
 
 
 def _cell(value: object) -> str:

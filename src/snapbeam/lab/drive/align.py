@@ -97,7 +97,7 @@ def align(
     InputError
         If a signal is unfit, or the two do not oscillate at the same frequency.
     """
-    if polarity is not None and (np.ndim(polarity) or polarity not in (1, -1)):
+    if polarity is not None and (not isinstance(polarity, (int, np.integer)) or polarity not in (1, -1)):
         raise InputError(f"polarity = {shown(polarity)}: must be 1, -1 or None")
     check_signal(camera, "m", "camera")
     seen = measure_drive(camera, frequency)

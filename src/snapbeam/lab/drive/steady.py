@@ -15,6 +15,7 @@ from snapbeam.lab.signals.sine_fit import SineFit, fit_sine
 __all__ = ["robust_fit", "settled_cycles", "steady_fit", "with_wander"]
 
 _Array = NDArray[np.float64]
+_PULLED = 4.0  # times the noise by which phases off a line are no chance
 _IN_A_ROW = 5  # steady cycles that end a start-up
 
 
@@ -98,4 +99,28 @@ def with_wander(
     parts = [np.abs(part).mean() for part in np.array_split(cycles[used], 8)]
     spread = float(np.std(parts, ddof=1)) / math.sqrt(8.0)
     wander = float(np.std(np.abs(cycles[used]))) / steady.amplitude
-    return dataclasses.replace(steady, amplitude_se=max(steady.amplitude_se, spread)), wander
+    return dataclasses.replace(
+        steady,
+        amplitude_se=max(steady.amplitude_se, spread),
+        frequency_se=max(steady.frequency_se, _pulling(times[used], cycles[used])),
+    ), wander
+
+
+def _pulling(times: _Array, cycles: NDArray[np.complex128]) -> float:
+    """Standard error [Hz] of the mean of a frequency that wanders; 0 where phases stay on a line within their noise.
+
+    The phase is averaged over eighths of the record, and the frequencies from one to the next scatter.
+    """
+    phase = np.unwrap(np.angle(cycles)) / (2.0 * math.pi)
+    parts = np.array_split(np.arange(phase.size), 8)
+    at = np.array([times[part].mean() for part in parts])
+    mean = np.array([phase[part].mean() for part in parts])
+    own = []
+    for part in parts:
+        left = phase[part] - np.polyval(np.polyfit(times[part] - times[part].mean(), phase[part], 1),
+                                        times[part] - times[part].mean())  # fmt: skip
+        own.append(float(np.std(left, ddof=2)) / math.sqrt(part.size) if part.size > 2 else math.inf)
+    off = mean - np.polyval(np.polyfit(at, mean, 1), at)
+    if float(np.sqrt(np.mean(off**2))) < _PULLED * float(np.sqrt(np.mean(np.square(own)))):
+        return 0.0
+    return float(np.std(np.diff(mean) / np.diff(at), ddof=1)) / math.sqrt(7.0)

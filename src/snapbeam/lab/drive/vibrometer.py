@@ -165,6 +165,11 @@ def measure_drive(
     limit = finite("snr_limit", snr_limit)
     tol = within("tolerance", tolerance, 0.0, 0.5)
     stated = None if amplitude is None else positive("amplitude", amplitude)
+    if np.ptp(samples.values) == 0.0:
+        raise InputError(
+            f"signal: no oscillation, it is {samples.values[0]:g} everywhere: nothing was recorded; look at the cable, "
+            "or choose another channel (--channel)"
+        )
     guess = spectral_peak(samples) if frequency is None else frequency
     first, last = moving_part(samples, guess)
     moving = _slice(samples, first, last)

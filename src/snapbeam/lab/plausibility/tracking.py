@@ -11,11 +11,18 @@ from snapbeam.lab.plausibility.kinds import Kind, table
 from snapbeam.lab.tracking.flags import FrameFlag
 from snapbeam.lab.tracking.measure.follower import TrackedRows
 from snapbeam.lab.tracking.measure.series import Rest, Touch
-from snapbeam.lab.tracking.scene import EdgeShape, Scene
+from snapbeam.lab.tracking.scene import BeamView, EdgeShape, Scene
 from snapbeam.lab.tracking.settings import TrackingSettings
 from snapbeam.lab.tracking.survey.edge_shape import CLIPPED
 
-__all__ = ["KINDS", "SeenMotion", "contact_shift", "never_touching", "tracking_findings"]
+__all__ = [
+    "KINDS",
+    "SeenMotion",
+    "contact_shift",
+    "never_touching",
+    "rounding_shift",
+    "tracking_findings",
+]
 
 NOTE, DOUBT, WRONG = Severity.NOTE, Severity.DOUBT, Severity.WRONG
 
@@ -83,6 +90,26 @@ KINDS = table(
         ("contact_column",),
     ),
     Kind(
+        "camera.averaged", DOUBT,
+        "noise of pixels, against that of the same pixels a frame later",
+        "noise of one frame is still there in the next (correlation {correlation:.2f}): frames were averaged, by the "
+        "camera's noise reduction or by a program that changed the frame rate; positions lag by about {lag:.1f} "
+        "frame(s), which is in their standard errors; keep the frames as they were taken",
+    ),
+    Kind(
+        "camera.smoothed", DOUBT,
+        "noise of pixels, against that of their neighbours",
+        "noise of neighbouring pixels is alike (correlation {correlation:.2f}): pictures were enlarged, smoothed or "
+        "compressed, so that edges are known {factor:.1f} times less well than they seem, which is in the standard "
+        "errors; keep the frames as they were taken",
+    ),
+    Kind(
+        "camera.few_levels", DOUBT,
+        "grey levels between beam and background, and noise that would even out their rounding",
+        "the beam stands out by {levels:.1f} grey levels only: rounding moves edges by up to {shift_px:.2f} px, which "
+        "is in the standard errors; more light, or more bits",
+    ),
+    Kind(
         "camera.sticker_alone", DOUBT,
         "a band of one height below the beam with nothing beyond it, that never comes near the beam",
         "all that is seen of the shaker is a band {height_px:.0f} px high that never comes nearer to the beam than "
@@ -143,6 +170,8 @@ KINDS = table(
 
 _OFF = 0.1  # share by which the thickness may be off the known one
 _CONTACT = 6  # stretches of frames in contact from which an offset is told
+_LEVELS = 16.0  # grey levels of contrast
+_EVENED = 0.4  # grey levels of noise that even out their rounding
 _RARE = 0.05  # share of frames that may jump or be distorted without more than a note
 
 
@@ -168,6 +197,7 @@ def tracking_findings(
     """What a tracked recording says against itself; *offset_mm* is the error of the rest position."""
     told = [*_of_the_beam(scene, seen, settings), *_of_the_rest(seen, settings, offset_mm)]
     told += _of_the_edges(scene.shape, settings)
+    told += _of_the_pixels(scene)
     told += _of_the_frames(seen.rows)
     if scene.shaker is not None:
         told += _of_the_tip(scene, seen)
@@ -186,6 +216,14 @@ def contact_shift(touch: Touch, known: float) -> float:
     shift = abs(touch.penetration)
     told = touch.frames >= _CONTACT and shift > max(6.0 * touch.error, 4.0 * known, 0.06)
     return shift if told else 0.0
+
+
+def rounding_shift(beam: BeamView) -> float:
+    """By how much [px] grey levels that were rounded to few move edges; 0 where they are many, or noise evens it
+    out."""
+    if beam.noise > _EVENED or beam.contrast > _LEVELS:
+        return 0.0
+    return 1.5 * max(beam.edge_width, 0.5) / beam.contrast
 
 
 def never_touching(penetration: np.ndarray, row: np.ndarray) -> float:
@@ -237,6 +275,19 @@ def _of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Finding]
     if shape.misfit > 0.03:
         return [KINDS["edge_shape"].found(misfit_percent=100.0 * shape.misfit)]
     return []
+
+
+def _of_the_pixels(scene: Scene) -> list[Finding]:
+    told = []
+    noise = scene.noise
+    if noise.lag > 0.0:
+        told.append(KINDS["averaged"].found(correlation=noise.in_time, lag=noise.lag))
+    if noise.factor > 1.0:
+        told.append(KINDS["smoothed"].found(correlation=noise.along, factor=noise.factor))
+    shift = rounding_shift(scene.beam)
+    if shift > 0.0:
+        told.append(KINDS["few_levels"].found(levels=scene.beam.contrast, shift_px=shift))
+    return told
 
 
 def _of_the_frames(rows: TrackedRows) -> list[Finding]:

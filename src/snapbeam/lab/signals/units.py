@@ -66,7 +66,9 @@ def si_unit(name: str, unit: str) -> tuple[float, str]:
     word = word.replace("sec", "s").replace("²", "^2").replace("/s/s", "/s^2").replace("/s2", "/s^2")
     word = re.sub(r"s\^?-1$", "/s", re.sub(r"s\^?-2$", "/s^2", word)).replace("//", "/")
     if word not in _TO_SI:
-        raise InputError(f"unit of {name} = {shown(unit)}: must be {KNOWN_UNITS}")
+        raise InputError(
+            f"unit of {name if isinstance(name, str) else 'a signal'} = {shown(unit)}: must be {KNOWN_UNITS}"
+        )
     return _TO_SI[word]
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from snapbeam.lab.tracking.edges import Floats
 
-__all__ = ["BeamView", "EdgeShape", "Scene", "ShakerView", "Sticker", "TipOutline"]
+__all__ = ["BeamView", "EdgeShape", "NoiseShape", "Scene", "ShakerView", "Sticker", "TipOutline"]
 
 _OUTLINE = 3.0  # widths of the edge, of its misfit, by which a tip in the beam's light may lie off
 _UNEVEN = 0.02  # px
@@ -147,8 +147,27 @@ class EdgeShape:
 
 
 @dataclass(frozen=True)
+class NoiseShape:
+    """Correlation of a pixel's noise ``in_time`` with that of the next frame, and ``along`` the beam with that of the
+    next pixel; 0 where it is a sensor's own, or too little to tell."""
+
+    in_time: float
+    along: float
+
+    @property
+    def lag(self) -> float:
+        """Frames by which what was averaged over time lags behind."""
+        return self.in_time / (1.0 - self.in_time)
+
+    @property
+    def factor(self) -> float:
+        """By how much errors are larger than neighbouring columns seem to say, as their noise is alike."""
+        return math.sqrt((1.0 + self.along) / (1.0 - self.along))
+
+
+@dataclass(frozen=True)
 class Scene:
-    """All that the survey found: the beam, the shaker if one is followed, and the shape of the edges.
+    """All that the survey found: the beam, the shaker if one is followed, the shape of the edges and of the noise.
 
     ``striker_in_view`` says that a shaker was seen that is not followed.
     """
@@ -156,6 +175,7 @@ class Scene:
     beam: BeamView
     shaker: ShakerView | None
     shape: EdgeShape
+    noise: NoiseShape
     striker_in_view: bool
 
     @property

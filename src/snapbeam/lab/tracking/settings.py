@@ -13,12 +13,14 @@ from numpy.typing import ArrayLike
 
 from snapbeam.core.validate import (
     InputError,
+    InputTypeError,
     choice,
     finite,
     finite_array,
     flag,
     integer,
     positive,
+    shown,
     within,
 )
 from snapbeam.lab.tracking.geometry import SIDES, Orientation
@@ -112,6 +114,8 @@ class TrackingSettings:
             object.__setattr__(self, "rest_frames", pair)
         else:
             self._keep("rest_frames", lambda value: integer("rest_frames", value, 1))
+        if not isinstance(self.fixed_marks, (tuple, list)):
+            raise InputTypeError(f"fixed_marks = {shown(self.fixed_marks)}: must be a list of marks")
         object.__setattr__(self, "fixed_marks", tuple(_mark(i, m) for i, m in enumerate(self.fixed_marks)))
 
     def _keep(self, name: str, check: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +12,19 @@ from numpy.typing import NDArray
 from snapbeam.core.findings import Finding, to_json
 from snapbeam.core.validate import InputError
 from snapbeam.lab.camera.recording import Recording
-from snapbeam.lab.plausibility.tracking import SeenMotion, contact_shift, never_touching, tracking_findings
+from snapbeam.lab.plausibility.tracking import (
+    SeenMotion,
+    contact_shift,
+    never_touching,
+    rounding_shift,
+    tracking_findings,
+)
 from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.flags import FrameFlag
 from snapbeam.lab.tracking.geometry import Orientation
 from snapbeam.lab.tracking.measure.follower import TrackedRows
 from snapbeam.lab.tracking.measure.series import Rest, find_rest, touching
-from snapbeam.lab.tracking.scene import Scene
+from snapbeam.lab.tracking.scene import NoiseShape, Scene
 from snapbeam.lab.tracking.settings import TrackingSettings
 from snapbeam.lab.tracking.survey.edge_shape import CLIPPED
 from snapbeam.runs.schema import trajectory_dataset
@@ -37,6 +44,7 @@ def tracked_dataset(
 
     *drift* [px] is the largest shift of the camera that was taken out.
     """
+    rows = _as_filtered(rows, scene.noise)
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
     if not rest.indices.size:
         raise InputError(
@@ -57,12 +65,12 @@ def tracked_dataset(
     # a shift of the edges by the camera's curve moves the shaker against the beam, not the beam against itself
     placed = scene.placed_error
     bent = math.hypot(2.0 * scene.shape.shift, contact_shift(touch, placed), placed)
-    bent = math.hypot(bent, never_touching(penetration, rows.row))
+    bent = math.hypot(bent, never_touching(penetration, rows.row), rounding_shift(scene.beam))
     # an edge that is no blurred step is found a little off, by where in its pixel it lies
     misfit = 0.7 * float(np.nan_to_num(scene.shape.misfit))
     if scene.shape.clipped > CLIPPED:
         misfit = max(misfit, _CLIPPED_ERROR)
-    common = math.hypot(offset, recording.edge_error, misfit)
+    common = math.hypot(offset, recording.edge_error, misfit, 0.5 * rounding_shift(scene.beam))
     beam_error = np.hypot(rows.error, common)
     shaker_error = np.hypot(rows.shaker_error, math.hypot(common, bent))
     valid = np.isfinite(beam_mm) & (np.isfinite(shaker_mm) if shaker is not None else True)
@@ -99,6 +107,21 @@ def tracked_dataset(
     dataset["flags"].attrs["flag_masks"] = [int(flag) for flag in FrameFlag if flag]
     dataset["flags"].attrs["flag_meanings"] = " ".join(str(flag.name).lower() for flag in FrameFlag if flag)
     return dataset
+
+
+def _as_filtered(rows: TrackedRows, noise: NoiseShape) -> TrackedRows:
+    """The rows with errors of pictures that were averaged over frames or smoothed, where their noise says so."""
+
+    def widened(row: Floats, error: Floats) -> Floats:
+        step = np.abs(np.diff(row, prepend=np.nan, append=np.nan))
+        most = np.nan_to_num(np.fmax(step[1:], step[:-1]))
+        return np.hypot(noise.factor * error, noise.lag * most)
+
+    if noise.lag == 0.0 and noise.factor == 1.0:
+        return rows
+    return dataclasses.replace(
+        rows, error=widened(rows.row, rows.error), shaker_error=widened(rows.shaker, rows.shaker_error)
+    )
 
 
 def _offset_error(row: Floats, rest: Rest) -> float:

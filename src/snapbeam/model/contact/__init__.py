@@ -4,6 +4,7 @@ from snapbeam.model.contact.base import LAWS, ContactLaw, Keeps
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.contact.kelvin_voigt import KelvinVoigt
+from snapbeam.model.contact.layered import LayeredHertz
 from snapbeam.model.contact.power_law import PowerLaw
 from snapbeam.model.contact.restitution import Restitution
 from snapbeam.model.contact.stress import bending_stress, hertz_stress
@@ -15,6 +16,7 @@ __all__ = [
     "HuntCrossley",
     "Keeps",
     "KelvinVoigt",
+    "LayeredHertz",
     "PowerLaw",
     "Restitution",
     "bending_stress",

@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.core.validate import positive
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import positive, within
 from snapbeam.model.contact.base import ContactLaw
 from snapbeam.model.quantity import RUN, quantity
 
@@ -58,9 +59,11 @@ class PowerLaw(ContactLaw):
         return 1e6 * law.force_at_micrometre * law.exponent * power
 
     @classmethod
+    @checked
     def from_stiffness(cls, stiffness: float, exponent: float) -> PowerLaw:
         """The law f = k d^p of a *stiffness* k in N/m^p."""
-        return cls(positive("stiffness", stiffness, "N/m^p") * _MICROMETRE**exponent, exponent)
+        p = within("exponent", exponent, 1.0, 10.0, closed="both")
+        return cls(positive("stiffness", stiffness, "N/m^p") * _MICROMETRE**p, p)
 
     def max_penetration(self, mass: float, velocity: float) -> float:
         """Greatest penetration, m, of a free *mass* (kg) that arrives with *velocity* (m/s): f d/(p + 1) = m v^2/2."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.findings import Finding
-from snapbeam.core.validate import InputError, InputTypeError, finite_array, nonnegative, positive, shown
+from snapbeam.core.kinds import checked
+from snapbeam.core.validate import (
+    InputError,
+    InputTypeError,
+    finite_array,
+    integer,
+    nonnegative,
+    positive,
+    shown,
+)
 
 __all__ = ["HertzStress", "bending_stress", "hertz_stress"]
 
@@ -53,6 +63,16 @@ class HertzStress:
         )
 
 
+def _held(value: Callable[[], float]) -> float:
+    try:
+        found = value()
+    except (OverflowError, ZeroDivisionError):
+        found = math.inf
+    if not math.isfinite(found):
+        raise InputError("force, stiffness, radius, yield_stress: their stress is more than a number holds")
+    return found
+
+
 def hertz_stress(
     force: float, stiffness: float, radius: float, yield_stress: float | None = None
 ) -> HertzStress:
@@ -78,15 +98,16 @@ def hertz_stress(
     limit = None
     if yield_stress is not None:
         pressure = _YIELD * positive("yield_stress", yield_stress, "Pa")
-        limit = math.pi**3 * radius**2 * pressure**3 / (6.0 * modulus**2)
+        limit = _held(lambda: math.pi**3 * radius**2 * pressure**3 / (6.0 * modulus**2))
     return HertzStress(
-        pressure=(6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0),
-        contact_radius=(0.75 * force * radius / modulus) ** (1.0 / 3.0),
+        pressure=_held(lambda: (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)),
+        contact_radius=_held(lambda: (0.75 * force * radius / modulus) ** (1.0 / 3.0)),
         yield_force=limit,
         force=force,
     )
 
 
+@checked
 def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array:
     """Greatest bending stress along the beam, E (h/2) max abs(w''), Pa, of amplitudes of shape (..., N), shape (...).
 
@@ -103,6 +124,7 @@ def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array
     alpha = finite_array("amplitude", amplitude)
     if alpha.shape[-1:] != (model.modes,):
         raise InputError(f"amplitude of shape {alpha.shape}: must have the shape (..., {model.modes})")
-    shapes = beam.buckling_modes(model.modes).curvature(np.linspace(0.0, beam.length, count))
+    places = np.linspace(0.0, beam.length, integer("count", count, 2, 10**6))
+    shapes = beam.buckling_modes(model.modes).curvature(places)
     found: _Array = 0.5 * beam.young_modulus * beam.thickness * np.abs(alpha @ shapes).max(axis=-1)
     return found

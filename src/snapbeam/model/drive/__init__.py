@@ -9,6 +9,7 @@ from snapbeam.model.drive.noise import Noise
 from snapbeam.model.drive.recorded import Recorded
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.drive.still import AccelerationSine, DisplacementSine, Still
+from snapbeam.model.drive.sum import Sum
 from snapbeam.model.drive.timed import HORIZON, Timed
 from snapbeam.model.drive.two_sines import TwoSines
 
@@ -27,6 +28,7 @@ __all__ = [
     "Scale",
     "Sine",
     "Still",
+    "Sum",
     "Timed",
     "TwoSines",
 ]

@@ -16,7 +16,33 @@ __all__ = ["DRIVES", "Drive", "Scale"]
 
 _Array = NDArray[np.float64]
 
-DRIVES: dict[str, type[Drive]] = {}
+
+class _Drives(dict[str, "type[Drive]"]):
+    """Drives by name; a name such as ``sine+burst`` is found too, though it is in no list."""
+
+    def __missing__(self, name: str) -> type[Drive]:
+        from snapbeam.model.drive.sum import named
+
+        found = named(name)
+        if found is None:
+            raise KeyError(name)
+        return found
+
+    def __contains__(self, name: object) -> bool:
+        if super().__contains__(name):
+            return True
+        if not isinstance(name, str) or "+" not in name:
+            return False
+        from snapbeam.model.drive.sum import named
+
+        return named(name) is not None
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """As of any mapping."""
+        return self[name] if name in self else default
+
+
+DRIVES: dict[str, type[Drive]] = _Drives()
 """Every drive by the name it has in parameter files."""
 
 
@@ -49,6 +75,8 @@ class Drive:
     number_names: ClassVar[tuple[str, ...]] = ("omega",)
     parts: ClassVar[tuple[tuple[str, type[Drive]], ...]] = ()
     """What moves, by name, of several motions that are marched as one: :mod:`snapbeam.model.drive.joined`."""
+    terms: ClassVar[tuple[type[Drive], ...]] = ()
+    """The kinds that it is a sum of."""
     registry: ClassVar[dict[str, type[Drive]]] = DRIVES
     """Where it is entered by its name."""
 
@@ -59,6 +87,12 @@ class Drive:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    def __add__(self, other: Drive) -> Drive:
+        """One over the other, a :class:`~snapbeam.Sum`."""
+        from snapbeam.model.drive.sum import Sum
+
+        return Sum.of(self, other)
 
     @classmethod
     def numbers_type(cls) -> Any:

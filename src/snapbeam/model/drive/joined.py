@@ -12,10 +12,12 @@ from typing import Any, ClassVar
 from snapbeam.model.drive.base import DRIVES, Drive
 from snapbeam.model.drive.timed import HORIZON
 
-__all__ = ["HORIZON", "PARTS", "Joined", "joined"]
+__all__ = ["HORIZON", "MOST_STRIKERS", "PARTS", "Joined", "joined"]
 
-PARTS = ("tip", "base", "load")
-"""What may move."""
+MOST_STRIKERS = 4
+"""Of one beam."""
+PARTS = ("tip", *(f"tip{i}" for i in range(1, MOST_STRIKERS)), "base", "load")
+"""What may move; tip1 is the tip of the second striker."""
 _SEPARATOR = "__"
 
 

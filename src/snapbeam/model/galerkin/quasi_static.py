@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, finite_array
 from snapbeam.model.beam import Beam
 
 __all__ = ["quasi_static_threshold"]
 
 
+@checked
 def quasi_static_threshold(
     location: ArrayLike, frequency_ratio: ArrayLike, beam: Beam | None = None
 ) -> NDArray[np.float64]:

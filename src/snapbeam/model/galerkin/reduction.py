@@ -279,20 +279,15 @@ class ReducedModel(Wells):
 
         A model given by matrices has its one contact point and returns it whatever the location.
         """
-        if np.ndim(location) == 0:
-            at: Any = within("location", location, 0.0, 1.0, closed="both")
-        else:
-            at = finite_array("location", location)
-            if at.size and (at.min() < 0.0 or at.max() > 1.0):
-                raise InputError(f"location from {at.min():g} to {at.max():g}: must lie in [0, 1]")
+        at: Any = location if isinstance(location, (int, float)) else finite_array("location", location)
+        if np.ndim(at) == 0:
+            at = within("location", at, 0.0, 1.0, closed="both")
+        elif at.size and (at.min() < 0.0 or at.max() > 1.0):
+            raise InputError(f"location from {at.min():g} to {at.max():g}: must lie in [0, 1]")
         if self.beam is None:
             assert self.contact_shape is not None
-            several = np.ndim(at) > 0
-            return (
-                np.broadcast_to(self.contact_shape, (*at.shape, self.modes))
-                if several
-                else self.contact_shape
-            )
+            one = self.contact_shape
+            return np.broadcast_to(one, (*at.shape, self.modes)) if np.ndim(at) else one
         return np.moveaxis(self.beam.buckling_modes(self.modes).shape(at * self.beam.length), 0, -1)
 
     @cached_property
@@ -312,7 +307,9 @@ class ReducedModel(Wells):
         location = within("location", location, 0.0, 1.0)
         compliance = float(np.sum((self.linear_modes.T @ self.shape_at(location)) ** 2))
         if not compliance > _LEAST_COMPLIANCE:
-            raise InputError(f"location = {location!r}: is so near a clamp that the beam does not move there")
+            raise InputError(
+                f"location = {shown(location)}: is so near a clamp that the beam does not move there"
+            )
         return 1.0 / compliance
 
     # ------------------------------------------------------------------ linear modes about a well

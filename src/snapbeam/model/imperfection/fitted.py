@@ -104,7 +104,7 @@ def fit_wells(
         at, found = at + change, new
     if found is None or not np.abs(found).max() < 1e-6:
         raise InputError(
-            f"lower_freq = {lower_freq:g} Hz, upper_freq = {upper_freq:g} Hz: no load of this beam with a {kind} gives "
+            f"lower_freq = {wanted[0]:g} Hz, upper_freq = {wanted[1]:g} Hz: no load of this beam with a {kind} gives "
             "them; are thickness and length as measured?"
         )
     return model_at(at)

@@ -45,7 +45,7 @@ def check_world(system: Any) -> None:
         )
     if contact is not None and contact.lossy and harvester is not None:
         raise InputError(
-            f"contact = {contact!r} with a harvester: two things that depend on the velocity at once; use a "
+            f"contact = {shown(contact)} with a harvester: two things that depend on the velocity at once; use a "
             "HertzContact or a PowerLaw, and let damping_ratio stand for the loss"
         )
     if striker is not None and isinstance(striker.drive, Recorded) and (base is not None or load is not None):

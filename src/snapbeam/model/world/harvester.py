@@ -9,7 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, choice, positive
+from snapbeam.core.validate import InputError, choice, finite, instance, positive, within
+from snapbeam.model.beam import Beam
 from snapbeam.model.ends.of_beam import modes_between
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.quantity import RUN, check_fields, quantity
@@ -157,10 +158,13 @@ class Piezo(Harvester):
         thick = positive("layer_thickness", layer_thickness, "m")
         wide = positive("layer_width", layer_width, "m")
         two = 2.0 if choice("wiring", wiring, WIRINGS) == "parallel" else 0.5
-        area = wide * (float(stop) - float(start)) * beam.length
+        first, last = (
+            within(name, at, 0.0, 1.0, closed="both") for name, at in (("start", start), ("stop", stop))
+        )
+        area = wide * (last - first) * instance("beam", beam, Beam, "a Beam").length
         arm = 0.5 * (beam.thickness + thick)
         return cls(
-            coupling=(2.0 if two == 2.0 else 1.0) * float(stress_constant) * wide * arm,
+            coupling=(2.0 if two == 2.0 else 1.0) * finite("stress_constant", stress_constant) * wide * arm,
             capacitance=two * positive("permittivity", permittivity, "F/m") * area / thick,
             resistance=resistance,
             start=start,

@@ -17,7 +17,10 @@ from snapbeam.core.provenance import made_by
 from snapbeam.core.validate import choice
 from snapbeam.paper.claims.finding import VERDICTS, Quantity
 
-__all__ = ["Claim", "summary", "write_table"]
+__all__ = ["BEGINS", "Claim", "summary", "write_table"]
+
+BEGINS = {"claims.md": "**Of ", "claims.csv": "number,topic,says,paper,", "claims.json": ""}
+"""The files of the table, and what the text of each begins with."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ def write_table(claims: Sequence[Claim], folder: Path, size: str) -> list[Path]:
     }
     files = []
     for name, text in texts.items():
-        target = check_writable(folder / name, "output")
+        target = check_writable(folder / name, "output", begin=BEGINS[name])
         with atomic_path(target) as temporary:
             temporary.write_text(text, encoding="utf-8")
         files.append(target)

@@ -63,7 +63,7 @@ def parse_cluster(text: str) -> Cluster:
     kind, colon, rest = text.partition(":")
     if kind == "local" and colon:
         if not rest.isdecimal():
-            raise InputError(f"cluster = {text!r}: the workers must be a whole number, as in local:4")
+            raise InputError(f"cluster = {shown(text)}: the workers must be a whole number, as in local:4")
         return Cluster("local", workers=integer("cluster workers", int(rest), 1, 4096))
     if text.startswith(("tcp://", "tls://")):
         return Cluster("address", address=text)
@@ -114,7 +114,7 @@ def open_client(cluster: Cluster) -> Iterator[Client]:
             client = Client(cluster.address, timeout="30s", set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             raise StoreError(
-                f"cluster = {cluster.address!r}: no scheduler answers there ({error})"
+                f"cluster = {shown(cluster.address)}: no scheduler answers there ({error})"
             ) from error
         try:
             yield client

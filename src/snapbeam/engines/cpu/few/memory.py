@@ -46,6 +46,7 @@ def suits(ensemble: Ensemble, packed: Packed, most: int = at.MOST) -> bool:
         packed.rows.size <= most
         and ensemble.structure.uneven is None
         and ensemble.structure.tapped is None
+        and ensemble.others is None
         and ensemble.size > 1
         and ensemble.drive.harmonic
         and law.side_by_side

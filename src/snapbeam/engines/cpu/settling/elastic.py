@@ -12,6 +12,15 @@ from snapbeam.engines.cpu.settling.hardest import hardest_point
 from snapbeam.engines.cpu.settling.look import look_inside
 from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot, look_slot
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
+from snapbeam.engines.cpu.strikers.meet import (
+    count_others,
+    entry_of_others,
+    first_edge,
+    keep_others,
+    see_others,
+    trusted,
+    turn_others,
+)
 from snapbeam.engines.cpu.uneven import about_level, above_own_well, at_center, lifted, second_well
 from snapbeam.engines.cpu.world.around import count_given
 from snapbeam.engines.cpu.world.circuit import calm, count_circuit
@@ -97,6 +106,8 @@ def meets(memory, layout, run, now, tip, step, seen1, room):
         safe_center = now.t + int(
             safe_for(abs(at_center(layout.uneven, seen.c)), bound, 0.0, push, run.step_time) / tick
         )
+    safe_gap = trusted(memory, layout.others, now.t, safe_gap)
+    safe_center = trusted(memory, layout.others, now.t, safe_center)
     if after > min(safe_gap, safe_center):
         look, pieces = look_slot(run), run.step_pieces
         if step.ticks == 2 * clock.step:
@@ -174,22 +185,42 @@ def settle(memory, blocks, place, run, now, step, done, room, book, asked, outpu
             step,
         )
     met = meets(memory, layout, run, now, tip, step, about, room)
+    there = step.phase + omega * step.length
+    see_others(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
+    edge = first_edge(memory, layout, layout.others, look_slot(run), run, t, tip.drive, step, room)
+    if edge < met.cut:
+        met = Met(False, edge, -1.0, met.safe_gap, met.safe_center, met.pieces, met.piece)
     if met.cut < 1:
-        book.touching, book.onset = 1, t
+        if met.event:
+            book.touching, book.onset = 1, t
+        turn_others(memory, layout.others, 0, t, 0.0, tick, book, outputs)
         status = _STEP_LIMIT if book.steps >= clock.max_steps else _RUNNING
-        watch = Watch(True, now.watch.quiet, met.safe_gap, met.safe_center, now.watch.weighed, now.watch.beat)
+        watch = Watch(
+            touching or met.event,
+            now.watch.quiet,
+            met.safe_gap,
+            met.safe_center,
+            now.watch.weighed,
+            now.watch.beat,
+        )
         return Now(t, now.home, now.stretch, now.rows, seen, watch, now.sample, now.landed, status), step
     whole, cut = step.ticks, met.cut
     looks = 0 if touching or not met.event else _LOCATIONS if jumps(tip.law) else 1
+    due = edge < whole and not met.event
     while cut != step.ticks:
         step = cut_to(step, run, cut, cut * tick)
         prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
         done = take_step(memory, blocks, layout, stages, tip, step, ledger)
-        about = observe(memory, layout, tip, step.phase + omega * step.length, step.q1, step.p1)
+        there = step.phase + omega * step.length
+        about = observe(memory, layout, tip, there, step.q1, step.p1)
+        see_others(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
+        least = (clock.step >> clock.finest) * tick
         if looks > 0:
             looks -= 1
-            least = 0.5 * tick if jumps(tip.law) else (clock.step >> clock.finest) * tick
-            cut = entry_again(clock, cut, whole, about, least)
+            cut = entry_again(clock, cut, whole, about, 0.5 * tick if jumps(tip.law) else least)
+        cut = entry_of_others(memory, layout.others, clock, met.cut, cut, whole, least, due)
+        due = False
+    keep_others(memory, layout.others)
     seen1 = Seen(about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv)
     sample = now.sample
     if outputs is not None:
@@ -204,6 +235,7 @@ def settle(memory, blocks, place, run, now, step, done, room, book, asked, outpu
         book.work += done.work
         book.gross_work += done.gross
         book.lost += done.lost
+    count_others(layout.others, touching, done, book)
     count_given(layout.forced, book, done.given)
     count_circuit(memory, layout, layout.circuit, step.p1, book, done.tap)
     if outputs is not None:
@@ -230,6 +262,7 @@ def settle(memory, blocks, place, run, now, step, done, room, book, asked, outpu
             seen1 = Seen(seen1.w, seen1.wv, min(seen1.d, 0.0), seen1.dv, seen1.c, seen1.cv)
         else:
             book.touching, book.onset = 1, t
+    turn_others(memory, layout.others, met.cut, t, step.length, tick, book, outputs)
     touching = touching != met.event
     watch = Watch(touching, quiet, safe_gap, safe_center, now.watch.weighed, now.watch.beat)
     state = step.q1, step.p1, done.gq, done.qr

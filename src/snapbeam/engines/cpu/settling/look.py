@@ -21,7 +21,7 @@ def look_inside(memory, layout, tip, flow, pieces, piece, step, with_center, roo
     """
     looked, parts = room.looked, room.parts
     q, p, k, k1 = step.q, step.p, step.k, step.k1
-    glide(memory, layout, flow, pieces, piece, q, p, k, k1, with_center, parts)
+    glide(memory, layout, layout.contact, flow, pieces, piece, q, p, k, k1, with_center, parts)
     size, drive = layout.size, tip.drive
     contact0, contact1 = dot(memory, size, layout.contact, k), dot(memory, size, layout.contact, k1)
     center0, center1 = dot(memory, size, layout.center, k), dot(memory, size, layout.center, k1)

@@ -34,11 +34,11 @@ def open_source(path: Path) -> FrameSource:
 
 
 def _open_source(path: Path) -> FrameSource:
-    name, _, dataset = path.name.partition("::")
-    suffix = Path(name).suffix.lower()
     if path.is_dir() or any(mark in path.name for mark in "*?["):
         return ImageSource(path)
-    path = path.with_name(name)
+    name, _, dataset = str(path).partition("::")  # a dataset's name may hold "/"
+    path = path if path.exists() else Path(name)
+    dataset, suffix = dataset.replace("\\", "/"), path.suffix.lower()
     if not path.exists():
         raise InputError(f"{path}: no such file")
     if suffix == ".mraw":

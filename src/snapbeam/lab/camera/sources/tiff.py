@@ -32,8 +32,8 @@ def float_range(pictures: list[NDArray[Any]], path: Path) -> float:
     InputError
         If the numbers are no grey levels.
     """
-    top = max(float(one.max()) for one in pictures)
-    low = min(float(one.min()) for one in pictures)
+    top = float(np.max([one.max() for one in pictures]))  # NaN if any is
+    low = float(np.min([one.min() for one in pictures]))
     if not (np.isfinite(top) and low >= 0.0 and 0.0 < top <= 65535.0):
         raise InputError(
             f"{path}: pictures of numbers from {low:g} to {top:g}: must lie in [0, 1], or be grey levels up to 65535"

@@ -17,6 +17,7 @@ from snapbeam.lab.tracking.settings import TrackingSettings
 from snapbeam.lab.tracking.survey.bands import column_objects, fixed_bars
 from snapbeam.lab.tracking.survey.beam import beam_view, find_bands, placed
 from snapbeam.lab.tracking.survey.levels import otsu, pixel_noise
+from snapbeam.lab.tracking.survey.noise import noise_shape
 from snapbeam.lab.tracking.survey.shaker import Wanted, find_rod, shaker_view
 
 __all__ = ["survey"]
@@ -83,11 +84,12 @@ def survey(
         fixtures=tuple((max(first - 1, 0), last + 1) for first, last in fixtures),
     )
     view, shape = beam_view(frames, smooth, bands, rough)
+    noise = noise_shape(frames[:head])
     if not settings.shaker or rod is None:
-        return Scene(view, None, shape, rod is not None)
+        return Scene(view, None, shape, noise, rod is not None)
     distance = None if settings.tip_distance is None else settings.tip_distance / pixel_size
     wanted = Wanted(settings.marker, distance, settings.contact_column is not None, head)
     shaker, column = shaker_view(view, frames, smooth, bands, rod, wanted)
     centre, columns, groups, merged = placed(width, rod, settings.columns, column)
     view = dataclasses.replace(view, contact_column=centre, columns=columns, groups=groups, merged=merged)
-    return Scene(view, shaker, shape, False)
+    return Scene(view, shaker, shape, noise, False)

@@ -10,9 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 
+from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, instance
+from snapbeam.figures.schematic.strikers import draw_tips, motion_of
+from snapbeam.figures.schematic.surroundings import FRAME, draw_surroundings
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, house_style, new_figure
-from snapbeam.figures.surroundings import FRAME, draw_surroundings
+from snapbeam.model.contact import ContactLaw
 from snapbeam.model.drive import Flight, Still
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.striker import Striker
@@ -30,6 +33,7 @@ _LAWS = {
     "hertz": "Hertz",
     "hunt_crossley": "Hunt–Crossley",
     "kelvin_voigt": "Kelvin–Voigt",
+    "layer": "Hertz, layer",
     "power": "power law",
     "restitution": "restitution",
 }
@@ -37,6 +41,7 @@ _CYCLES = 8.0
 _LOAD_COLOR = CENTER_COLOR
 
 
+@checked
 def plot_system(system: System, title: str = "") -> Figure:
     """Draw a system: the beam in the well that it rests in and, dashed, in the other, what strikes it, and its drive.
 
@@ -65,12 +70,19 @@ def plot_system(system: System, title: str = "") -> Figure:
         axes = figure.subplots(1, len(widths), squeeze=False, width_ratios=widths)[0]
         _draw_beam(axes[0], system)
         if striker is not None:
-            _draw_striker(axes[0], system, striker)
-        if system.leads is not None:
+            assert system.contact is not None
+            _draw_striker(axes[0], system, striker, system.contact, 1 if system.others else 0)
+        for number, each in enumerate(system.others, 2):
+            _draw_striker(axes[0], system, each.striker, each.contact, number)
+        tips = [(int(name[6:] or 1), drive) for name, drive in system.moving if name.startswith("drive")]
+        if len(tips) > 1:
+            draw_tips(axes[1], system, tips)
+        elif system.leads is not None:
             _draw_drive(axes[1], system, *system.leads)
         if title:
             axes[0].set_title(title, loc="left")
-        outward, inward = 2.55, 1.25
+        both = any(each.striker.side != striker.side for each in system.others if striker is not None)
+        outward, inward = (2.0, 1.7) if both else (2.55, 1.25)
         axes[0].set_xlim(-0.85, _WIDE + 0.85)
         axes[0].set_ylim(*((-outward, inward) if _sign(striker) > 0.0 else (-inward, outward)))
         axes[0].set_aspect("equal")
@@ -166,16 +178,16 @@ def _draw_imperfection(ax: Axes, system: System, imperfection: Imperfection, res
         )
 
 
-def _draw_striker(ax: Axes, system: System, striker: Striker) -> None:
-    """The tip under (or above) the beam, the rod, and what holds it."""
+def _draw_striker(ax: Axes, system: System, striker: Striker, contact: ContactLaw, number: int) -> None:
+    """The tip under (or above) the beam, the rod, and what holds it; *number* tells several apart, 0: there is one."""
     sign = _sign(striker)
-    x, w = _shape(system, system.model.wells[0 if sign > 0.0 else 1])
+    x, w = _shape(system, system.model.wells[0 if _sign(system.striker) > 0.0 else 1])
     at = striker.location * _WIDE
     beam_there = float(np.interp(at, x, w))
     gap = 0.0 if striker.gap is None else striker.gap / system.scale.length
     center = beam_there - sign * (float(np.clip(gap, -0.6, 0.6)) + _RADIUS)
     ax.add_patch(Circle((at, center), _RADIUS, facecolor=SHAKER_COLOR, edgecolor="none", zorder=4))
-    _caption(ax, at, sign, system, striker, gap)
+    _caption(ax, at, sign, contact, striker, gap, number)
     below = center - sign * _RADIUS
     if striker.mass is None:
         _rod(ax, at, below, below - sign * 0.45)
@@ -204,14 +216,17 @@ def _draw_striker(ax: Axes, system: System, striker: Striker) -> None:
     _block(ax, at, foot, sign, "")
 
 
-def _caption(ax: Axes, at: float, sign: float, system: System, striker: Striker, gap: float) -> None:
+def _caption(
+    ax: Axes, at: float, sign: float, contact: ContactLaw, striker: Striker, gap: float, number: int
+) -> None:
     """What the signs do not say, beside the striker and clear of the beam."""
-    law = "" if system.contact is None else system.contact.name
-    lines = [f"contact: {_LAWS.get(law, law)}"]
+    law = _LAWS.get(contact.name, contact.name)
+    lines = [f"striker {number}: {law}" if number else f"contact: {law}"]
     if gap != 0.0:
         lines.append(f"gap {gap:.3g} $b$" if gap > 0.0 else f"preload {-gap:.3g} $b$")
     if striker.mass is not None:
         lines.append(r"$m_\mathrm{s}$ = " + _grams(striker.mass))
+    lines = [", ".join(lines)] if number else lines
     right = at < 0.6 * _WIDE
     x = at + 0.75 if right else at - 0.75
     for i, line in enumerate(lines):
@@ -268,7 +283,7 @@ def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     period = float(drive.cycle(columns, scale)[0])
     cycles = np.linspace(0.0, 2.0 if isinstance(drive, Flight) else _CYCLES, 1601)
     phase = float(columns.get("phase", np.zeros(1))[0])
-    moved = _motion(drive, columns, scale, cycles * period, phase)
+    moved = motion_of(drive, columns, scale, cycles * period, phase)
     per = 1.0 if section == "axial" else scale.length
     down = section == "base" and system.base is not None and system.base.direction == "down"
     color = SHAKER_COLOR if section == "drive" else _LOAD_COLOR
@@ -277,12 +292,3 @@ def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     ax.set_ylabel({"drive": "Tip / $b$", "base": "Base $y/b$", "axial": r"$P(t) - P$ (N)"}[section])
     ax.set_xlim(0.0, cycles[-1])
     ax.set_title(drive.name.replace("_", " "), loc="left")
-
-
-def _motion(drive: Any, columns: dict[str, _Array], scale: Any, times: _Array, phase: float) -> _Array:
-    found = drive.numbers(columns, scale)
-    if drive.harmonic:
-        return np.asarray(found["amplitude"][0] * np.sin(found["omega"][0] * times + phase))
-    numbers = drive.numbers_type()(*(float(found[name][0]) for name in drive.number_names))
-    samples = drive.samples()
-    return np.array([drive.motion(numbers, samples, numbers.omega * t)[0] for t in times])

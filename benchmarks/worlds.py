@@ -1,0 +1,115 @@
+"""What each world costs: a run and a step of it over the paper's, which is timed before and after each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import snapbeam as sb
+from benchmarks.report import save, table
+from benchmarks.timing import measure
+from snapbeam import paper
+from snapbeam.engines.assemble import make_ensemble
+from snapbeam.engines.cpu import driver as cpu_engine
+from snapbeam.engines.ensemble import Ensemble
+
+__all__ = ["WORLDS", "run"]
+
+_SEED = 20240118
+_MODES = 8
+SINE = sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.2)
+PIEZO = sb.Piezo(coupling=4e-3, capacitance=60e-9, resistance=2e4, start=0.0, stop=0.25)
+COIL = sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)
+Parts = Mapping[str, Any]
+
+
+def _model(beam: sb.Beam = paper.BEAM, imperfection: sb.Imperfection | None = None) -> sb.ReducedModel:
+    return sb.ReducedModel.from_beam(beam, modes=_MODES, imperfection=imperfection)
+
+
+def _system(parts: Parts) -> sb.System:
+    """The paper's, but for what is given."""
+    own = dict(parts)
+    model = _model(own.pop("beam", paper.BEAM), own.pop("imperfection", None))
+    striker = sb.Striker(**({"drive": own.pop("drive", SINE)} | own.pop("striker", {})))
+    return sb.System(model, own.pop("contact", paper.CONTACT), striker, **own)
+
+
+WORLDS: dict[str, Parts] = {
+    "`power`": {"contact": sb.PowerLaw.from_stiffness(4e11, 2.0)},
+    "`hunt_crossley`": {"contact": sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)},
+    "`kelvin_voigt`": {"contact": sb.KelvinVoigt(2e6, 20.0)},
+    "a gap": {"striker": {"gap": 4e-5}},
+    "`burst`": {"drive": sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.2, length=1e6, rise=2.0, fall=1.0)},
+    "`chirp`": {"drive": sb.Chirp(start_ratio=0.5, stop_ratio=3.0, velocity_amplitude=0.2, sweep_length=40.0)},
+    "`two_sines`": {
+        "drive": sb.TwoSines(frequency_ratio=1.0, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.1)
+    },
+    "`noise`": {"drive": sb.Noise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2)},
+    "a body of 20 g": {"striker": {"mass": 0.02, "spring": 700.0, "damper": 0.7}},
+    "unequal wells": {"imperfection": sb.Imperfection(rise=4e-6)},
+    "other ends": {"beam": paper.BEAM.replace(ends=sb.Ends(left=40.0, right=40.0))},
+    "a moving base": {
+        "base": sb.Base(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1))
+    },
+    "a changing load": {"axial": sb.AxialLoad(motion=sb.LoadSine(frequency_ratio=2.0, amplitude=3.0))},
+    "a piezo": {"harvester": PIEZO},
+    "a coil": {"harvester": COIL},
+}  # fmt: skip
+"""What differs from the paper's system."""
+
+
+def _ensemble(parts: Parts, size: int, cycles: int) -> Ensemble:
+    """Runs at random velocities, and at random frequencies where the drive has one."""
+    random = np.random.default_rng(_SEED)
+    columns: dict[str, np.ndarray] = {}
+    ratio, velocity = random.uniform(0.3, 3.5, size), random.uniform(0.05, 0.6, size)
+    system = _system(parts)
+    assert system.striker is not None
+    known = system.striker.drive.values()
+    for name, values in (
+        ("frequency_ratio", ratio),
+        ("velocity_amplitude", velocity),
+        ("velocity_rms", 0.5 * velocity),
+    ):
+        if name in known:
+            columns[f"drive.{name}"] = values
+    return make_ensemble(system, sb.Integration(cycles=cycles), columns)
+
+
+def _time(ensemble: Ensemble, repeats: int) -> tuple[float, float]:
+    """Seconds of simulated time cost, per simulated second and per step."""
+    march: Callable[[], Any] = lambda: cpu_engine.run_ensemble(ensemble, 1)  # noqa: E731
+    seconds = measure(march, repeats).seconds
+    books = march()
+    simulated = float(np.sum(ensemble.runs["tick"] * ensemble.runs["end"]))
+    return seconds / simulated, seconds / float(books["steps"].sum())
+
+
+def run(folder: Path, quick: bool) -> None:
+    """Measure and write ``worlds``."""
+    size, cycles, repeats = (4, 4, 1) if quick else (48, 60, 3)
+    plain = _ensemble({}, size, cycles)
+    records: list[dict[str, Any]] = []
+    before = _time(plain, repeats)
+    for name, parts in WORLDS.items():
+        own = _time(_ensemble(parts, size, cycles), repeats)
+        after = _time(plain, repeats)
+        base = [0.5 * (before[i] + after[i]) for i in range(2)]
+        drift = abs(after[0] / before[0] - 1.0)
+        records.append({"world": name, "time": own[0] / base[0], "step": own[1] / base[1], "drift": drift})
+        before = after
+    rows = [
+        [r["world"], f"{r['time']:.2f}", f"{r['step']:.2f}", f"{100.0 * r['drift']:.0f} %"] for r in records
+    ]
+    head = (
+        "world",
+        "time per simulated second over the paper's",
+        "time per step over the paper's",
+        "the paper's, after over before",
+    )
+    data = {"modes": _MODES, "runs": size, "cycles": cycles, "seed": _SEED, "records": records}
+    save(folder, "worlds", quick, data, table(head, rows))

@@ -1,0 +1,328 @@
+"""When the strikers beside the first one meet the beam and leave it, and what is kept of their contacts.
+
+Each is watched as the first one is: near the beam a free step is looked into, a step that would pass an edge of some
+contact is cut there, and steps in contact are graded.  A step ends at the first edge of all.
+"""
+
+from __future__ import annotations
+
+import math
+
+from snapbeam.engines.cpu.dot import dot
+from snapbeam.engines.cpu.rows import flow_coefficients, glide, speed_bound
+from snapbeam.engines.cpu.strikers.force import block, penetration_of, put_others
+from snapbeam.engines.cpu.world.forced import extra_speed
+from snapbeam.engines.scalar.compile import called, inlined
+from snapbeam.engines.scalar.decisions import TRUST, Seen, contact_level, entry_again, safe_for
+from snapbeam.engines.scalar.lanes import WIDTH, lanes_sum, load
+from snapbeam.engines.scalar.several import (
+    CUT,
+    DEEPEST,
+    DEPTH,
+    DEPTH1,
+    HERE,
+    IMPULSE,
+    KEPT,
+    LAW,
+    NUMBERS,
+    ONSET,
+    PUSHED,
+    RATE,
+    RATE1,
+    SAFE,
+    SIGN,
+    SPEED,
+    TOUCHING,
+    count_of,
+    force_of,
+    motion_of,
+)  # fmt: skip
+from snapbeam.engines.scalar.signals import first_fall, first_rise, widened
+
+__all__ = [
+    "any_touches",
+    "begin_others",
+    "close_others",
+    "count_others",
+    "entry_of_others",
+    "first_edge",
+    "keep_others",
+    "level_of_others",
+    "see_others",
+    "trusted",
+    "turn_others",
+]
+
+
+@called
+def _begin(memory, size, others, drive, asked, i, argument, home, q):
+    put_others(memory, others, home)
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        depth, velocity = penetration_of(memory, size, others, drive, argument, j, q)
+        rate = velocity - dot(memory, size, others.rows + j * size, q + size)
+        memory[at + DEPTH], memory[at + RATE] = depth, rate
+        if depth > 0.0 or (depth == 0.0 and rate > 0.0):
+            memory[at + TOUCHING], memory[at + DEEPEST] = 1.0, max(depth, 0.0)
+
+
+@inlined
+def begin_others(memory, size, others, drive, asked, i, argument, home, q):
+    """Put the strikers of run *i* in memory; one that presses at the start touches from then on; p follows *q*."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        for number in range(NUMBERS):
+            memory[at + number] = asked.other_numbers[i, j, number]
+        place = asked.other_places[i, j]
+        for row in range(size):
+            memory[others.rows + j * size + row] = asked.other_rows[place, row]
+    _begin(memory, size, others, drive, asked, i, argument, home, q)
+
+
+@inlined
+def any_touches(memory, others, touching):
+    """Whether the first striker touches, or another one."""
+    if others is None:
+        return touching
+    for j in range(count_of(others.kinds)):
+        touching = touching or memory[block(others, j) + TOUCHING] != 0.0
+    return touching
+
+
+@inlined
+def trusted(memory, others, t, until):
+    """Until when a bound holds that knows free flight alone: not beyond tick *t* while another striker touches."""
+    if others is None:
+        return until
+    return t if any_touches(memory, others, False) else until
+
+
+@inlined
+def level_of_others(memory, others, clock, t, level):
+    """The level of a step, made finer for those that touch."""
+    if others is None:
+        return level
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        if memory[at + TOUCHING] != 0.0:
+            elapsed = (t - memory[at + ONSET]) * clock.tick
+            level = max(level, contact_level(clock, elapsed, memory[at + DEPTH], memory[at + RATE]))
+    return level
+
+
+@inlined
+def see_others(memory, size, others, drive, argument, q, p):
+    """Note penetrations and their rates at the end of a step."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        depth, velocity = penetration_of(memory, size, others, drive, argument, j, q)
+        memory[at + DEPTH1] = depth
+        memory[at + RATE1] = velocity - dot(memory, size, others.rows + j * size, p)
+
+
+@called
+def _entry(memory, layout, others, drive, flow, pieces, piece, step, j, room):
+    """When within a free step the gap of striker j closes, s; -1 if it does not."""
+    size, row, parts = layout.size, others.rows + j * layout.size, room.parts
+    sign, here = memory[block(others, j) + SIGN], memory[block(others, j) + HERE]
+    glide(memory, layout, row, flow, pieces, piece, step.q, step.p, step.k, step.k1, False, parts)
+    push0, push1 = dot(memory, size, row, step.k), dot(memory, size, row, step.k1)
+    before, rate_before = 0.0, 0.0
+    for i in range(pieces + 1):
+        done, owed = i / pieces, 0.5 * piece
+        if i == 0:
+            owed = 0.0
+            w, rate = dot(memory, size, row, step.q), dot(memory, size, row, step.p)
+        else:
+            at = 4 * WIDTH * (i - 1)
+            w, rate = lanes_sum(load(parts, at)), lanes_sum(load(parts, at + WIDTH))
+        motion, velocity = motion_of(drive, memory, step.phase + i * piece * drive.omega, j, sign)
+        depth = here + motion - w
+        closing = velocity - rate - owed * ((1.0 - done) * push0 + done * push1)
+        if i > 0:
+            rise = first_rise(before, rate_before, depth, closing, piece)
+            if rise >= 0.0:
+                return (i - 1 + rise) * piece
+        before, rate_before = depth, closing
+    return -1.0
+
+
+@inlined
+def _looked_for(memory, layout, others, slot, run, drive, step, j, room):
+    """The same, in pieces as short as the fastest mode asks for."""
+    look, pieces = slot, run.step_pieces
+    if step.ticks == 2 * run.clock.step:
+        pieces *= 2
+    elif step.ticks != run.clock.step:
+        look += 4 * layout.size
+        pieces = max(2, math.ceil(step.length / run.finest_look))
+        flow_coefficients(memory, layout, step.length / pieces, look)
+    return _entry(memory, layout, others, drive, look, pieces, step.length / pieces, step, j, room)
+
+
+@called
+def _edge(memory, layout, others, slot, run, t, drive, step, room):
+    """The tick of a step at which the first of the others meets or leaves the beam, and each one's own."""
+    size, tick, earliest = layout.size, run.clock.tick, step.ticks
+    after = t + step.ticks
+    # a contact changes how fast the others may close: nothing that was known in free flight holds while one lasts
+    busy = any_touches(memory, others, step.touching)
+    for j in range(count_of(others.kinds)):
+        at, row, cut = block(others, j), others.rows + j * size, -1
+        depth, rate, depth1, rate1 = (
+            memory[at + DEPTH], memory[at + RATE], memory[at + DEPTH1], memory[at + RATE1]
+        )  # fmt: skip
+        if memory[at + TOUCHING] != 0.0:
+            if depth1 <= 0.0:
+                cut = step.ticks
+                if depth > 0.0:
+                    cut = max(1, int(first_fall(depth, rate, depth1, rate1, step.length) * step.ticks))
+        else:
+            if busy:
+                memory[at + SAFE] = t
+            elif after > memory[at + SAFE]:
+                bound = speed_bound(memory, layout, row, step.q, step.p)
+                bound += extra_speed(layout.forced, memory, size, drive, row, TRUST * run.step_time)
+                push = dot(memory, size, row, step.k)
+                safe = safe_for(-depth, bound, memory[at + SPEED], push, run.step_time)
+                memory[at + SAFE] = t + int(safe / tick)
+            entry = -1.0
+            if after > memory[at + SAFE]:
+                if step.touching:
+                    # what is looked into knows nothing of the first contact's force; the ends of the step do
+                    entry = first_rise(depth, rate, depth1, rate1, step.length) * step.length
+                else:
+                    entry = _looked_for(memory, layout, others, slot, run, drive, step, j, room)
+            if entry >= 0.0:
+                cut = min(step.ticks, int(entry / tick))
+            elif depth1 > 0.0:
+                cut = step.ticks
+        memory[at + CUT] = cut
+        if cut >= 0:
+            earliest = min(earliest, cut)
+    return earliest
+
+
+@inlined
+def first_edge(memory, layout, others, slot, run, t, drive, step, room):
+    """The tick within a step at which the first of the other strikers meets or leaves the beam; its end if none does.
+
+    *slot* is where the flow over a piece of a look stands.
+    """
+    if others is None:
+        return step.ticks
+    return _edge(memory, layout, others, slot, run, t, drive, step, room)
+
+
+@inlined
+def entry_of_others(memory, others, clock, edge, cut, whole, least, due):
+    """Where a step that was cut at *cut* is to be cut, knowing better how far the gap of one that enters there is.
+
+    Nothing new unless it is *due*: the *edge* at which the step was cut first is one of theirs.
+    """
+    if others is None:
+        return cut
+    if due:
+        for j in range(count_of(others.kinds)):
+            at = block(others, j)
+            if memory[at + TOUCHING] == 0.0 and memory[at + CUT] == edge:
+                seen = Seen(0.0, 0.0, memory[at + DEPTH1], memory[at + RATE1], 0.0, 0.0)
+                return entry_again(clock, cut, whole, seen, least)
+    return cut
+
+
+@inlined
+def keep_others(memory, others):
+    """Keep what the accepted step gave: a look ahead that follows writes over it."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        memory[at + KEPT] = memory[at + IMPULSE]
+
+
+@inlined
+def count_others(others, touching, done, book):
+    """Enter the work of the others in the statistics, of a step in which the first does not touch."""
+    if others is None:
+        return
+    if not touching:
+        book.work += done.work
+        book.gross_work += done.gross
+
+
+@inlined
+def _leave(memory, others, j, book, outputs, t, tick):
+    """Enter a contact that ends at tick *t* in the statistics, unless nothing was pressed."""
+    at = block(others, j)
+    deepest = memory[at + DEEPEST]
+    if deepest > 0.0:
+        onset, pushed = memory[at + ONSET], memory[at + PUSHED]
+        duration, force = (t - onset) * tick, force_of(others.kinds, memory, at + LAW, j, deepest)
+        _write_impact(outputs, book, onset * tick, duration, force, pushed, j)
+        book.impacts += 1
+        book.contact_time += duration
+        book.peak_force = max(book.peak_force, force)
+    book.total_impulse += memory[at + PUSHED]
+    memory[at + TOUCHING], memory[at + DEEPEST], memory[at + PUSHED] = 0.0, 0.0, 0.0
+
+
+@inlined
+def _write_impact(outputs, book, onset, duration, force, impulse, j):
+    if outputs is None:
+        return
+    at = book.impacts - outputs.marks[1]
+    if at < outputs.impacts.shape[0]:
+        outputs.impacts[at, 0], outputs.impacts[at, 1] = onset, duration
+        outputs.impacts[at, 2], outputs.impacts[at, 3] = force, impulse
+        outputs.impacts[at, 4] = j + 2
+
+
+@called
+def _turn(memory, others, edge, t, length, tick, book, outputs):
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        depth, rate, depth1, rate1 = (
+            memory[at + DEPTH], memory[at + RATE], memory[at + DEPTH1], memory[at + RATE1]
+        )  # fmt: skip
+        touching = memory[at + TOUCHING] != 0.0
+        if touching and length > 0.0:
+            memory[at + DEEPEST] = widened(
+                memory[at + DEPTH], max(memory[at + DEEPEST], depth1), depth, rate, depth1, rate1, length
+            )[1]
+            memory[at + PUSHED] += memory[at + KEPT]
+        if length > 0.0:
+            memory[at + DEPTH], memory[at + RATE] = depth1, rate1
+        if memory[at + CUT] >= 0.0 and memory[at + CUT] <= edge:
+            memory[at + SAFE] = t
+            if touching:
+                _leave(memory, others, j, book, outputs, t, tick)
+                memory[at + DEPTH] = min(memory[at + DEPTH], 0.0)
+            else:
+                memory[at + TOUCHING], memory[at + ONSET] = 1.0, t
+                memory[at + DEEPEST], memory[at + PUSHED] = 0.0, 0.0
+
+
+@inlined
+def turn_others(memory, others, edge, t, length, tick, book, outputs):
+    """Where they stand at tick *t*, after a step of *length* (s) whose first edge was at tick *edge* of it.
+
+    With a length of 0 nothing has moved: those turn whose gap closes as the step begins.
+    """
+    if others is None:
+        return
+    _turn(memory, others, edge, t, length, tick, book, outputs)
+
+
+@inlined
+def close_others(memory, others, book, outputs, t, tick):
+    """Enter the contacts that go on at the end of a run."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        if memory[block(others, j) + TOUCHING] != 0.0:
+            _leave(memory, others, j, book, outputs, t, tick)

@@ -1,0 +1,221 @@
+"""The sum of drives: any number of the motions that there are, one over the other."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.core.validate import InputError, InputTypeError, shown
+from snapbeam.model.drive.base import DRIVES, Drive, Scale
+from snapbeam.model.drive.timed import Timed
+
+__all__ = ["MOST_TERMS", "Sum"]
+
+_Array = NDArray[np.float64]
+_SEPARATOR = "__"
+_JOIN = "+"
+MOST_TERMS = 4
+
+
+class Sum(Timed):
+    """Several drives one over the other,
+
+        w_s(t) = w_0 + sum_i [w_i(t) - w_i(0)],
+
+    which begins at zero without a jump, whatever phases the terms have.  Made by :meth:`of`, or by ``+``:
+    ``Sine(...) + Burst(...)``.
+
+    In parameter files its kind is that of its terms, ``"sine+burst"``, and the parameters of term i bear its number,
+    ``frequency_ratio_1``, ``length_2``, counted from 1.  A cycle is one of the first term.
+    """
+
+    terms: ClassVar[tuple[type[Drive], ...]] = ()
+
+    @classmethod
+    def of(cls, *drives: Drive) -> Sum:
+        """The sum of two to four drives, sums included, in their order.
+
+        Raises
+        ------
+        InputError
+            For a recorded drive, whose clock is its own, for a stop, which adds nothing, and for more terms.
+        """
+        flat: list[Drive] = []
+        for drive in drives:
+            if not isinstance(drive, Drive):
+                raise InputTypeError(f"drive = {shown(drive)}: must be a drive, such as Sine(...)")
+            flat += drive.parts_of_sum if isinstance(drive, Sum) else [drive]
+        made = mixture(tuple(type(each) for each in flat))
+        values = {
+            f"{item.name}_{i}": getattr(each, item.name)
+            for i, each in enumerate(flat, 1)
+            for item in dataclasses.fields(each)  # type: ignore[arg-type]
+        }
+        return made(**values)
+
+    @property
+    def parts_of_sum(self) -> list[Drive]:
+        """Its terms."""
+        return [
+            kind(**{name: getattr(self, f"{name}_{i}") for name in _names(kind)})
+            for i, kind in enumerate(self.terms, 1)
+        ]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.parts_of_sum  # noqa: B018  terms refuse what they are not
+
+    @classmethod
+    def shakes(cls) -> bool:
+        """Whether every term has a bounded acceleration."""
+        return all(kind.shakes() for kind in cls.terms)
+
+    def _each(self, columns: Mapping[str, _Array]) -> list[tuple[int, Drive, dict[str, _Array]]]:
+        """Number, drive and columns of every term."""
+        found = []
+        for i, drive in enumerate(self.parts_of_sum, 1):
+            own = {name: columns[f"{name}_{i}"] for name in _names(type(drive)) if f"{name}_{i}" in columns}
+            found.append((i, drive, own or {"": np.zeros(next(iter(columns.values())).size)}))
+        return found
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """That of the first term."""
+        _, drive, own = self._each(columns)[0]
+        return drive.cycle(own, scale)
+
+    def _begun(self, drive: Drive, own: Mapping[str, _Array], scale: Scale) -> _Array:
+        """Where a term begins: a sine with a phase is not at its middle, all others are."""
+        runs = next(iter(own.values())).size
+        if not drive.harmonic or "phase" not in own:
+            return np.zeros(runs)
+        return np.asarray(drive.numbers(own, scale)["amplitude"] * np.sin(own["phase"]))
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """The numbers of every term, its phase and where it begins."""
+        found: dict[str, _Array] = {}
+        fastest = np.zeros(next(iter(columns.values())).size)
+        for i, drive, own in self._each(columns):
+            numbers = drive.numbers(own, scale)
+            found |= {f"t{i}_{name}": values for name, values in numbers.items()}
+            found[f"t{i}_phase"] = own.get("phase", np.zeros(fastest.size))
+            found[f"t{i}_start"] = self._begun(drive, own, scale)
+            fastest = np.maximum(fastest, numbers["fastest" if "fastest" in numbers else "omega"])
+        return found | {"fastest": fastest}
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """All terms at their heights at once."""
+        pairs = [
+            (drive.bounds(own, scale), self._begun(drive, own, scale))
+            for _, drive, own in self._each(columns)
+        ]
+        highest = sum(pair[0] - begun for pair, begun in pairs)
+        return np.asarray(highest), np.asarray(sum(pair[1] for pair, _ in pairs))
+
+    def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """The same of the mirror image."""
+        return np.asarray(
+            sum(
+                drive.mirrored_bounds(own, scale) - self._begun(drive, own, scale)
+                for _, drive, own in self._each(columns)
+            )
+        )
+
+    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """All terms at their hardest at once."""
+        return np.asarray(sum(drive.hardest(own, scale) for _, drive, own in self._each(columns)))
+
+    @classmethod
+    def motion(cls, drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """Displacement from the start (m) and velocity (m/s)."""
+        moved, speed = 0.0, 0.0
+        for i, kind in enumerate(cls.terms, 1):
+            at = argument / drive.omega * getattr(drive, f"t{i}_omega") + getattr(drive, f"t{i}_phase")
+            numbers = kind.numbers_type()(*(getattr(drive, f"t{i}_{name}") for name in kind.number_names))
+            if kind.harmonic:
+                w = numbers.amplitude * math.sin(at), numbers.amplitude * numbers.omega * math.cos(at)
+            else:
+                w = kind.motion(numbers, memory, at)  # type: ignore[attr-defined]
+            moved, speed = moved + w[0] - getattr(drive, f"t{i}_start"), speed + w[1]
+        return moved, speed
+
+
+def _names(kind: type[Drive]) -> list[str]:
+    return [item.name for item in dataclasses.fields(kind)]  # type: ignore[arg-type]
+
+
+def mixture(kinds: tuple[type[Drive], ...]) -> type[Sum]:
+    """The class of the sums of such kinds of drives.
+
+    Raises
+    ------
+    InputError
+        For kinds that cannot be summed.
+    """
+    words = " + ".join(kind.name for kind in kinds)
+    if not 2 <= len(kinds) <= MOST_TERMS:
+        raise InputError(f"{words or 'no drive'}: a sum has 2 to {MOST_TERMS} terms")
+    for kind in kinds:
+        if kind.name in ("recorded", "still") or DRIVES.get(kind.name) is not kind:
+            raise InputError(
+                f"{words}: {kind.name!r} is no term of a sum; a record has a clock of its own, and a stop adds nothing"
+            )
+    name = _SEPARATOR.join(["Sum", *(kind.name for kind in kinds)])
+    if name not in globals():
+        globals()[name] = _made(name, kinds)
+    found: type[Sum] = globals()[name]
+    return found
+
+
+def _made(name: str, kinds: tuple[type[Drive], ...]) -> type[Sum]:
+    fields: list[tuple[str, Any, Any]] = []
+    numbers = ["omega", "fastest"]
+    for i, kind in enumerate(kinds, 1):
+        for item in dataclasses.fields(kind):  # type: ignore[arg-type]
+            own = item.metadata["quantity"]
+            more = dataclasses.replace(
+                own, words=f"{own.words}, of term {i}", short=f"{own.short or item.name}_{i}"
+            )
+            made = dataclasses.field(default=item.default, metadata={"quantity": more})
+            fields.append((f"{item.name}_{i}", item.type, made))
+        numbers += [f"t{i}_{each}" for each in (*kind.number_names, "phase", "start")]
+    body = {
+        "__module__": __name__,
+        "__qualname__": name,
+        "__doc__": f"The sum of {', '.join(kind.name for kind in kinds)}.",
+        "terms": kinds,
+        "number_names": tuple(numbers),
+    }
+    found: Any = dataclasses.make_dataclass(
+        name, fields, bases=(Sum,), namespace=body, frozen=True, kw_only=True
+    )
+    found.name = _JOIN.join(
+        kind.name for kind in kinds
+    )  # later than the class, so that no table of drives has it
+    mixed: type[Sum] = found
+    return mixed
+
+
+def named(name: str) -> type[Sum] | None:
+    """The class of a kind such as ``"sine+burst"``; None if it is none."""
+    words = name.split(_JOIN) if isinstance(name, str) else []
+    if len(words) < 2 or not all(word in DRIVES for word in words):
+        return None
+    return mixture(tuple(DRIVES[word] for word in words))
+
+
+def __getattr__(name: str) -> type[Sum]:
+    """A mixture by its name, as another process knows it."""
+    words = _words(name)
+    if words is None:
+        raise AttributeError(name)
+    return mixture(tuple(DRIVES[word] for word in words))
+
+
+def _words(name: str) -> list[str] | None:
+    first, *words = name.split(_SEPARATOR)
+    return words if first == "Sum" and len(words) > 1 and all(word in DRIVES for word in words) else None

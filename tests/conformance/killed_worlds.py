@@ -1,0 +1,169 @@
+"""Sweeps every parameter of a world, each killed at its second task and resumed; says what was not as it should be.
+
+Run as a program, since forks go before threads: ``python killed_worlds.py WORLD [...] [--only NAME,NAME]``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import pickle
+import signal
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr.storage  # noqa: F401  (loaded before the first fork)
+from worlds import WORLDS
+
+import snapbeam as sb
+from snapbeam.config.parameters import lookup, parameters
+from snapbeam.sweeps.compute.task import PointWork
+from snapbeam.sweeps.stored import Keeping
+
+NOT_SWEPT = {
+    "run.engine": "which engine",
+    "run.threads": "how many threads",
+    "run.tolerance": "steps that follow from a run",
+    "drive.displacement": "a record",
+    "drive.velocity": "a record",
+    "imperfection.profile": "a table",
+}
+VALUES: dict[str, list[Any]] = {
+    "beam.axial_load": [600.0, 620.0],
+    "ends.left": [20.0, 60.0],
+    "ends.right": [20.0, 60.0],
+    "ends.axial": [1e7, 1e8],
+    "striker.gap": [1e-6, 2e-5],
+    "striker.mass": [0.01, 0.03],
+    "striker.spring": [500.0, 900.0],
+    "striker.damper": [0.3, 0.9],
+    "imperfection.rise": [1e-6, 3e-6],
+    "imperfection.skew": [1e-6, 3e-6],
+    "imperfection.point_load": [0.003, 0.006],
+    "imperfection.uniform_load": [0.003, 0.006],
+    "imperfection.gravity": [0.003, 0.006],
+    "model.modes": [2, 4],
+    "model.reference_freq": [80.0, 82.0],
+    "run.cycles": [1, 2],
+    "run.step": [3e-5, 4e-5],
+    "run.max_steps": [10**7, 2 * 10**7],
+    "run.accuracy": ["map", "reference"],
+}
+
+
+def values_of(system: sb.System, name: str) -> list[Any]:
+    """Two values of a parameter, about its own where it has one."""
+    row = lookup(name).quantity
+    if name in VALUES:
+        return VALUES[name]
+    if row.choices:
+        return list(row.choices[:2])
+    if row.kind is bool:
+        return [False, True]
+    own = system.get(name) if not name.startswith("run.") else getattr(sb.Integration(), name[4:])
+    if row.kind is int:
+        return [int(own), int(own) + 1]
+    return [0.1, 0.2] if not own else sorted([float(own), 1.03 * float(own)])
+
+
+def in_child(work: Callable[[], Any], answer: Path | None = None) -> int:
+    """Fork and do *work* there; what it gives is pickled.  Returns the status as ``waitpid`` has it."""
+    child = os.fork()
+    if child == 0:
+        status = 1
+        try:
+            found = work()
+            if answer is not None:
+                answer.write_bytes(pickle.dumps(found))
+            status = 0
+        finally:
+            os._exit(status)
+    return os.waitpid(child, 0)[1]
+
+
+def doomed(sweep: Callable[[Path], Any], store: Path) -> None:
+    """Compute until the second task begins; then SIGKILL."""
+    begin, begun = PointWork.compute, [0]
+
+    def counted(self: Any, *arguments: Any) -> Any:
+        begun[0] += 1
+        if begun[0] == 2:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return begin(self, *arguments)
+
+    PointWork.compute = counted  # type: ignore[method-assign]
+    sweep(store)
+
+
+def plain(ds: Any) -> dict[str, Any]:
+    return {str(name): ds[name].values for name in ds.variables}
+
+
+def try_one(system: sb.System, name: str, folder: Path) -> str:
+    """What went wrong with one parameter; nothing if nothing did."""
+    axes = {name: values_of(system, name)}
+    integration = sb.Integration(cycles=2)
+
+    def sweep(store: Path | None) -> Any:
+        return sb.sweep(system, axes, integration, store=None if store is None else Keeping(store, chunk=1))
+
+    try:
+        whole = plain(sweep(None))
+    except Exception as error:
+        return f"{type(error).__name__}: {error}"
+    status = in_child(lambda: doomed(sweep, folder / "store"))
+    if not os.WIFSIGNALED(status):
+        return "was not killed"
+    done = (folder / "store" / "ledger.jsonl").read_text().count("\n")
+    if done != 1:
+        return f"{done} tasks done when it was killed"
+    if in_child(lambda: plain(sweep(folder / "store")), folder / "found") != 0:
+        return "was not resumed"
+    found = pickle.loads((folder / "found").read_bytes())
+    if set(found) != set(whole):
+        return "other variables"
+    for key, value in whole.items():
+        if not np.array_equal(value, found[key], equal_nan=value.dtype.kind == "f"):
+            return f"{key} differs"
+    same = all(
+        np.array_equal(value[0], value[1], equal_nan=value.dtype.kind == "f")
+        for key, value in whole.items()
+        if value.shape == (2,) and key != lookup(name).short
+    )
+    return "changes nothing" if same and name not in UNSEEN else ""
+
+
+UNSEEN = {"run.max_steps", "run.early_decision", "base.carries_striker", "run.high_frequency_ratio"}
+"""What two cycles may not show."""
+
+
+def main() -> None:
+    """Print what was seen as JSON."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("worlds", nargs="+")
+    parser.add_argument("--only", default="")
+    asked = parser.parse_args()
+    failures: list[str] = []
+    count = 0
+    for world in asked.worlds:
+        system = WORLDS[world].system()
+        names = [name for name in system.parameters if name in parameters()]
+        names += [name for name in parameters() if name.startswith("run.")]
+        chosen = asked.only.split(",") if asked.only else [name for name in names if name not in NOT_SWEPT]
+        for name in chosen:
+            with tempfile.TemporaryDirectory() as folder:
+                said = try_one(system, name, Path(folder))
+            count += 1
+            if said:
+                failures.append(f"{world}, {name}: {said}")
+                print(failures[-1], file=sys.stderr, flush=True)
+    print(json.dumps({"swept": count, "failures": failures}))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,98 @@
+"""Where one world becomes another: a part that no longer matters leaves the run that is without it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from oracle import LEVEL
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.engines.scalar.tip import tip_motion
+from snapbeam.model.drive import Scale
+
+SHAKER = sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.15)
+
+
+def end(striker: sb.Striker | None = None, modes: int = 3, **parts) -> np.ndarray:
+    """Amplitudes after one cycle at level reference, over the first one at rest."""
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+    striker = sb.Striker(drive=SHAKER) if striker is None else striker
+    system = sb.System(model, parts.pop("contact", paper.CONTACT), striker, **parts)
+    run = sb.simulate(system, sb.Integration(cycles=1, accuracy="reference"))
+    return np.asarray(run.end.amplitude / abs(model.equilibrium[0]))
+
+
+@pytest.fixture(scope="module")
+def plain() -> np.ndarray:
+    return end()
+
+
+def recedes(plain: np.ndarray, near, sizes: tuple[float, float, float], last: float) -> None:
+    """The error falls in proportion to what is left of the part."""
+    errors = [float(np.abs(near(size) - plain).max()) for size in sizes]
+    assert errors[0] > 30.0 * errors[1] > 900.0 * errors[2] or errors[1] < last
+    assert errors[2] < last
+
+
+def test_a_gap_that_closes(plain) -> None:
+    """From both sides; none at all is touching, to the bit."""
+    for sign in (1.0, -1.0):
+        recedes(
+            plain,
+            lambda gap, sign=sign: end(sb.Striker(drive=SHAKER, gap=sign * gap * LEVEL)),
+            (1e-4, 1e-6, 1e-8),
+            1e-6,
+        )
+    np.testing.assert_array_equal(end(sb.Striker(drive=SHAKER, gap=0.0)), plain)
+
+
+def test_a_long_start_is_none(plain) -> None:
+    """A burst that rises at once and outlasts the run: the sine."""
+    recedes(
+        plain,
+        lambda rise: end(
+            sb.Striker(
+                drive=sb.Burst(frequency_ratio=1.21, velocity_amplitude=0.15, length=1e4, rise=rise, fall=1.0)
+            )
+        ),
+        (1e-2, 1e-3, 1e-4),
+        1e-3,
+    )
+
+
+@pytest.mark.slow
+def test_a_base_and_a_load_that_hardly_move(plain) -> None:
+    def base(size: float) -> np.ndarray:
+        return end(
+            base=sb.Base(motion=sb.AccelerationSine(frequency_ratio=1.21, acceleration_amplitude=size))
+        )
+
+    def load(size: float) -> np.ndarray:
+        return end(axial=sb.AxialLoad(motion=sb.LoadSine(frequency_ratio=2.0, amplitude=size)))
+
+    recedes(plain, base, (1e-4, 1e-6, 1e-8), 1e-7)
+    recedes(plain, load, (1e-2, 1e-4, 1e-6), 1e-6)
+
+
+@pytest.mark.slow
+def test_a_coil_without_a_magnet(plain) -> None:
+    """K to 0: its force goes with K squared."""
+    errors = [
+        np.abs(end(harvester=sb.Coil(constant=constant, resistance=30.0)) - plain).max()
+        for constant in (0.1, 0.01, 0.0)
+    ]
+    assert errors[0] > 30.0 * errors[1]
+    assert errors[2] < 1e-9
+
+
+def test_noise_is_the_same_compiled_or_not() -> None:
+    """Places and phases to the bit, so that the sum differs by the rounding of sines at most."""
+    drive = sb.Noise(low_ratio=0.5, high_ratio=3.0, velocity_rms=0.2, seed=2**31 - 1, rise=2.0)
+    columns = {name: np.array([value]) for name, value in drive.values().items()}
+    numbers = drive.numbers(columns, Scale(0.335e-3, 514.0))
+    row = drive.numbers_type()(*(float(numbers[name][0]) for name in drive.number_names))
+    for t in (0.0, 1e-3, 0.37, 12.3):
+        own = drive.motion(row, None, row.omega * t)
+        compiled = tip_motion(row, np.empty(0), row.omega * t)
+        np.testing.assert_allclose(compiled, own, rtol=0.0, atol=4e-15 * abs(row.strength) * 32.0 / row.low)

@@ -1,0 +1,187 @@
+"""Several strikers at once: an independent solution, limits to one striker, mirror images, the order, the ledger."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from oracle import CONTACT_STIFFNESS, LEVEL, PaperBeam
+from several_oracle import Tip, strike
+
+import snapbeam as sb
+from snapbeam import paper
+
+FIRST = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.12)
+GAP = 0.1 * LEVEL
+
+
+def model(modes: int) -> sb.ReducedModel:
+    return sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+
+
+def stop(location: float = 0.3, side: str = "above", gap: float = GAP) -> sb.Striker:
+    return sb.Striker(drive=sb.Still(), location=location, side=side, gap=gap)
+
+
+def sine(modes: int, ratio: float, amplitude: float):
+    """The paper's sine by its velocity."""
+    first = float(PaperBeam(modes).omega[0])
+    rate, reach = ratio * first, amplitude * LEVEL / ratio
+    return lambda t: (reach * math.sin(rate * t), reach * rate * math.cos(rate * t))
+
+
+def still(t: float) -> tuple[float, float]:
+    return 0.0, 0.0
+
+
+CASES = [
+    pytest.param("stop", 1, 3),
+    pytest.param("stop", 3, 2),
+    pytest.param("stop", 8, 2, marks=pytest.mark.slow),
+    pytest.param("both move", 1, 3, marks=pytest.mark.slow),
+    pytest.param("both move", 3, 2, marks=pytest.mark.slow),
+    pytest.param("three", 3, 2, marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize(("case", "modes", "cycles"), CASES)
+def test_against_an_independent_solution(case: str, modes: int, cycles: int) -> None:
+    """Displacements, tips and the force of each: 1e-3 b at level *map*, 1e-7 b at level *reference*; the ledger."""
+    tips = [Tip(sine(modes, 1.21, 0.12)), Tip(still, 0.3, -1.0, GAP)]
+    strikers: list[sb.Shaker | sb.Striker] = [FIRST, stop()]
+    laws: list[sb.ContactLaw] = [paper.CONTACT, paper.CONTACT]
+    if case != "stop":
+        tips[1] = Tip(sine(modes, 2.0, 0.05), 0.3, -1.0, GAP)
+        strikers[1] = sb.Striker(
+            drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.05), location=0.3, side="above", gap=GAP
+        )
+    if case == "three":
+        power = sb.PowerLaw.from_stiffness(1e13, 2.0)
+        tips.append(Tip(still, 0.7, 1.0, 0.05 * LEVEL, lambda d: 1e13 * d * d))
+        strikers.append(stop(0.7, "below", 0.05 * LEVEL))
+        laws.append(power)
+    first = float(PaperBeam(modes).omega[0])
+    times = np.linspace(0.0, cycles * 2.0 * math.pi / (1.21 * first), 401) * (1.0 - 1e-13)
+    truth = strike(PaperBeam(modes), tips, times)
+    system = sb.System(model(modes), laws, strikers)
+    for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
+        run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
+        data = run.dataset
+        np.testing.assert_allclose(data.displacement, truth.displacement, rtol=0.0, atol=bound)
+        np.testing.assert_allclose(data.center_displacement, truth.center_displacement, rtol=0.0, atol=bound)
+        np.testing.assert_allclose(data.striker_displacement, truth.tip, rtol=0.0, atol=bound)
+        assert abs(data.attrs["energy_error"]) < 1e-4
+    size = float(truth.force.max())
+    np.testing.assert_allclose(data.striker_force, truth.force, rtol=0.0, atol=1e-3 * size)
+    np.testing.assert_allclose(
+        data.work_shaker, truth.work, rtol=0.0, atol=1e-5 * float(np.abs(truth.work).max())
+    )
+    hit = set(run.impacts.striker.values.astype(int).tolist())
+    assert hit == {j + 1 for j in range(len(tips)) if truth.force[:, j].max() > 0.0}
+    assert len(hit) > 1
+
+
+@pytest.mark.parametrize("early", [False, True])
+def test_one_of_two_out_of_reach_is_none(early: bool) -> None:
+    """Bit for bit the run with one striker, if the other stands still and far away; no run is decided early."""
+    one = sb.System(model(3), paper.CONTACT, FIRST)
+    two = sb.System(model(3), paper.CONTACT, [FIRST, stop(gap=20.0 * LEVEL)])
+    how = sb.Integration(cycles=20)
+    alone, beside = sb.simulate(one, how), sb.simulate(two, how.replace(early_decision=early))
+    for name in alone.dataset.data_vars:
+        np.testing.assert_array_equal(beside.dataset[name], alone.dataset[name], err_msg=name)
+    for name in (
+        "impacts",
+        "crossings",
+        "peak_force",
+        "shaker_work",
+        "impulse",
+        "contact_share",
+        "max_displacement",
+    ):
+        assert getattr(beside.outcome, name) == getattr(alone.outcome, name), name
+    assert not beside.outcome.end_is_final
+    assert np.isnan(beside.outcome.decided_at)
+
+
+def test_mirrored() -> None:
+    """The mirrored system's mirrored run, bit for bit."""
+    below = sb.System(model(3), paper.CONTACT, [FIRST, stop()])
+    above = below.replace(**{"striker.side": "above", "striker_2.side": "below"})
+    how = sb.Integration(cycles=5)
+    one, other = sb.simulate(below, how), sb.simulate(above, how)
+    assert one.outcome.impacts > 5
+    np.testing.assert_array_equal(one.dataset.displacement, -other.dataset.displacement)
+    np.testing.assert_array_equal(one.dataset.striker_displacement, -other.dataset.striker_displacement)
+    np.testing.assert_array_equal(one.dataset.striker_force, other.dataset.striker_force)
+
+
+@pytest.mark.slow
+def test_two_of_half_the_stiffness_are_one() -> None:
+    """Two strikers at one place that move alike share the force of one."""
+    half = sb.HertzContact(0.5 * CONTACT_STIFFNESS)
+    how = sb.Integration(cycles=2, accuracy="reference")
+    one = sb.System(model(3), paper.CONTACT, [FIRST, stop()])
+    tip = sb.Striker(drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.12), gap=0.0)
+    two = sb.System(model(3), [half, half, paper.CONTACT], [FIRST, tip, stop()])
+    times = np.linspace(0.0, 2.0, 301) / (1.21 * model(3).reference_freq) * (1.0 - 1e-12)
+    found, expected = sb.simulate(two, how, sample_times=times), sb.simulate(one, how, sample_times=times)
+    np.testing.assert_allclose(found.dataset.displacement, expected.dataset.displacement, rtol=0.0, atol=1e-7)
+    force = found.dataset.striker_force
+    size = float(expected.dataset.contact_force.max())
+    np.testing.assert_allclose(force[:, 0], force[:, 1], rtol=0.0, atol=1e-4 * size)
+    np.testing.assert_allclose(
+        force[:, 0] + force[:, 1], expected.dataset.contact_force, rtol=0.0, atol=1e-3 * size
+    )
+
+
+@pytest.mark.slow
+def test_order() -> None:
+    """Half the step, impacts of both on the way: order 3.8 measured; a finer one is as good as the reference."""
+    system = sb.System(model(1), paper.CONTACT, [FIRST, stop()])
+    times = np.linspace(0.0, 2.0, 101) / (1.21 * model(1).reference_freq) * (1.0 - 1e-12)
+    exact = sb.simulate(
+        system, sb.Integration(cycles=2, accuracy="reference"), sample_times=times
+    ).dataset.displacement
+    errors = []
+    for step in (1e-4, 5e-5):
+        run = sb.simulate(system, sb.Integration(cycles=2, step=step), sample_times=times)
+        errors.append(float(np.abs(run.dataset.displacement - exact).max()))
+    assert math.log2(errors[0] / errors[1]) > 3.3, errors
+
+
+def test_swept_by_dotted_names() -> None:
+    """A map over the place and the gap of the second striker has the runs of its points."""
+    system = sb.System(model(3), paper.CONTACT, [FIRST, stop()])
+    axes = {"striker_2.location": [0.3, 0.6], "striker_2.gap": [0.1 * LEVEL, 0.3 * LEVEL]}
+    swept = sb.sweep(system, axes, sb.Integration(cycles=5))
+    assert swept.sizes["location_striker_2"] == 2
+    for i, location in enumerate(axes["striker_2.location"]):
+        for j, gap in enumerate(axes["striker_2.gap"]):
+            own = system.replace(**{"striker_2.location": location, "striker_2.gap": gap})
+            alone = sb.simulate(own, sb.Integration(cycles=5)).outcome
+            there = swept.isel(location_striker_2=i, striker_gap_striker_2=j)
+            assert int(there.impacts) == alone.impacts
+            assert float(there.peak_force) == pytest.approx(alone.peak_force, rel=1e-12)
+
+
+def test_refusals() -> None:
+    with pytest.raises(sb.InputError, match="Newton's law"):
+        sb.System(model(1), sb.Restitution(0.5), [FIRST, stop()])
+    with pytest.raises(sb.InputError, match="contact_2"):
+        sb.System(model(1), [paper.CONTACT, sb.HuntCrossley(4e8, 1.0)], [FIRST, stop()])
+    with pytest.raises(sb.InputError, match=r"striker_2\.mass"):
+        sb.System(model(1), paper.CONTACT, [FIRST, dataclasses.replace(stop(), mass=1e-3)])
+    with pytest.raises(sb.InputError, match="one law for all, or one each"):
+        sb.System(model(1), [paper.CONTACT] * 3, [FIRST, stop()])
+    with pytest.raises(sb.InputError, match="at most 4"):
+        sb.System(model(1), paper.CONTACT, [FIRST, *[stop()] * 4])
+    two = sb.System(model(1), paper.CONTACT, [FIRST, stop()])
+    with pytest.raises(sb.InputError, match="several strikers"):
+        sb.advance(two)
+    with pytest.raises(sb.InputError, match="several strikers"):
+        sb.sweep(two, {"striker_2.gap": [1e-5]}, sb.Integration(cycles=1, engine="cuda"))
+    with pytest.raises(sb.InputError, match="2 strikers"):
+        two.replace(**{"striker_3.gap": 1e-5})

@@ -1,0 +1,90 @@
+"""Sums of drives: the motion is that of the terms, begins without a jump, and a run is that of an oracle."""
+
+from __future__ import annotations
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+from oracle import LEVEL, PaperBeam
+from several_oracle import Tip, strike
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.engines.scalar.tip import tip_motion
+
+SINE = sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.1, phase=0.4)
+BURST = sb.Burst(frequency_ratio=2.3, velocity_amplitude=0.08, length=3.0)
+KICK = sb.HalfSine(displacement_amplitude=0.05, duration=0.4)
+
+
+def numbers_of(drive: sb.Drive, scale):
+    columns = {name: np.array([value]) for name, value in drive.values().items()}
+    found = drive.numbers(columns, scale)
+    return drive.numbers_type()(*(float(found[name][0]) for name in drive.number_names))
+
+
+def test_motion_is_the_sum_and_begins_at_zero() -> None:
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
+    total = SINE + BURST + KICK
+    system = sb.System(model, paper.CONTACT, sb.Striker(drive=total))
+    scale = system.scale
+    numbers = numbers_of(total, scale)
+    parts = [(drive, numbers_of(drive, scale)) for drive in (SINE, BURST, KICK)]
+    for t in np.linspace(0.0, 6.0, 61) * 2.0 * math.pi / scale.omega:
+        w, v = tip_motion(numbers, np.empty(0), numbers.omega * t)
+        pairs = [
+            tip_motion(own, np.empty(0), own.omega * t + getattr(drive, "phase", 0.0)) for drive, own in parts
+        ]
+        start = parts[0][1].amplitude * math.sin(0.4)
+        assert w == pytest.approx(sum(pair[0] for pair in pairs) - start, abs=1e-11 * LEVEL)
+        assert v == pytest.approx(sum(pair[1] for pair in pairs), abs=1e-9 * LEVEL * scale.omega)
+    assert tip_motion(numbers, np.empty(0), 0.0)[0] == pytest.approx(0.0, abs=1e-18)
+
+
+def test_kept_and_told() -> None:
+    """A file, another process and a dotted name know it."""
+    total = sb.Sum.of(SINE, BURST)
+    assert pickle.loads(pickle.dumps(total)) == total
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
+    system = sb.System(model, paper.CONTACT, sb.Striker(drive=total))
+    assert sb.System.from_mapping(system.to_mapping()) == system
+    assert system.to_mapping()["drive"]["kind"] == "sine+burst"
+    assert system.replace(**{"drive.length_2": 4.0}).get("drive.length_2") == 4.0
+    with pytest.raises(sb.InputError, match="clock of its own"):
+        SINE + sb.Still()
+    with pytest.raises(sb.InputError, match="2 to 4 terms"):
+        SINE + BURST + KICK + SINE + BURST
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("modes", "cycles"), [(1, 4), (3, 2)])
+def test_against_an_independent_solution(modes: int, cycles: int) -> None:
+    """A sine and a burst over it: 1e-3 b at level *map*, 1e-7 b at level *reference*."""
+    first = float(PaperBeam(modes).omega[0])
+
+    def motion(t: float) -> tuple[float, float]:
+        rate = 1.21 * first
+        reach = 0.1 * LEVEL / 1.21
+        w, v = reach * (math.sin(rate * t + 0.4) - math.sin(0.4)), reach * rate * math.cos(rate * t + 0.4)
+        rate = 2.3 * first
+        cycles, reach, per = rate * t / (2.0 * math.pi), 0.08 * LEVEL / 2.3, rate / (2.0 * math.pi)
+        x, way = (cycles, 1.0) if cycles < 1.0 else (3.0 - cycles, -1.0)
+        x = min(max(x, 0.0), 1.0)
+        e, slope = x**3 * (10.0 + x * (6.0 * x - 15.0)), way * 30.0 * x * x * (1.0 - x) ** 2 * per
+        return (
+            w + reach * e * math.sin(rate * t),
+            v + reach * (slope * math.sin(rate * t) + e * rate * math.cos(rate * t)),
+        )
+
+    times = np.linspace(0.0, cycles * 2.0 * math.pi / (1.21 * first), 301) * (1.0 - 1e-13)
+    truth = strike(PaperBeam(modes), [Tip(motion)], times)
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+    system = sb.System(model, paper.CONTACT, sb.Striker(drive=SINE + BURST))
+    for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
+        run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
+        np.testing.assert_allclose(run.dataset.displacement, truth.displacement, rtol=0.0, atol=bound)
+        np.testing.assert_allclose(run.dataset.shaker_displacement, truth.tip[:, 0], rtol=0.0, atol=bound)
+        assert abs(run.dataset.attrs["energy_error"]) < 1e-4
+    assert run.outcome.impacts > 1

@@ -1,0 +1,120 @@
+"""What is asked of every world: its mirror image, sweeps of all of its parameters, early decisions."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from killed_worlds import NOT_SWEPT
+from worlds import WORLDS, mirror_image
+
+import snapbeam as sb
+from snapbeam.config.parameters import parameters
+from snapbeam.core.codes import RunStatus
+from snapbeam.model.contact import LAWS
+from snapbeam.model.drive import DRIVES
+from snapbeam.model.world import HARVESTERS, LOADS
+
+HERE = Path(__file__).parent
+MIRRORED = {
+    "min_displacement": "max_displacement",
+    "max_displacement": "min_displacement",
+    "min_center_displacement": "max_center_displacement",
+    "max_center_displacement": "min_center_displacement",
+}
+EVERY = [
+    pytest.param(name, marks=pytest.mark.slow if world.own_kernel else ()) for name, world in WORLDS.items()
+]
+
+
+def swept(name: str, count: int, seed: int, *, mirrored: bool = False, modes: int | None = None, **how):
+    world = WORLDS[name]
+    system = world.system(modes)
+    columns = {key: ("point", values) for key, values in world.points(count, seed).items()}
+    system = mirror_image(system) if mirrored else system
+    return sb.sweep(system, xr.Dataset(columns), sb.Integration(**how))
+
+
+def test_none_is_missing() -> None:
+    """Every kind of law, drive, motion of a base, load and harvester, and every parameter but those of runs."""
+    systems = [world.system() for world in WORLDS.values()]
+    there = {(section, type(drive).name) for each in systems for section, drive in each.moving}
+    there |= {("contact", type(each.contact).name) for each in systems}
+    there |= {("harvester", type(each.harvester).name) for each in systems if each.harvester is not None}
+    there |= {("drive", type(each.striker.drive).name) for each in systems}
+    shaking = [name for name, kind in DRIVES.items() if kind.shakes() and name != "still"]
+    known = {"contact": LAWS, "drive": DRIVES, "base": shaking, "axial": LOADS, "harvester": HARVESTERS}
+    for section, names in known.items():
+        missing = {name for name in names if (section, name) not in there}
+        assert not missing, f"{section}: no world has {missing}"
+    own = set().union(*(each.parameters for each in systems))
+    missing = {name for name, row in parameters().items() if row.section not in ("run", "start")} - own
+    assert not missing
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_mirror_image(name) -> None:
+    """The mirrored system's runs are the runs, to the last bit: every statistic of every one of them."""
+    below = swept(name, 16, 1, cycles=8)
+    above = swept(name, 16, 1, cycles=8, mirrored=True)
+    assert set(below.data_vars) == set(above.data_vars)
+    for key in below.data_vars:
+        other = below[MIRRORED.get(key, key)].values
+        wanted = -other if key in MIRRORED or key == "final_well" else other
+        np.testing.assert_array_equal(above[key].values, wanted, err_msg=key)
+    assert (below.status == RunStatus.OK).all()
+    assert float(np.ptp(below.max_center_displacement.values)) > 0.0
+
+
+def killed(*names: str, only: str = "") -> None:
+    command = [sys.executable, str(HERE / "killed_worlds.py"), "--only", only, *names]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=3600)
+    assert done.returncode == 0, done.stderr[-3000:]
+    seen = json.loads(done.stdout.splitlines()[-1])
+    assert seen["failures"] == []
+    assert seen["swept"] > 0
+
+
+def test_swept_killed_and_resumed() -> None:
+    """A few parameters of the paper's world, of structures and of runs."""
+    killed("the paper's", only="beam.thickness,model.modes,contact.stiffness,striker.side,run.cycles")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", list(WORLDS))
+def test_every_parameter_swept_killed_and_resumed(name) -> None:
+    """SIGKILL at the second task, resumed: the file of an undisturbed sweep, bit for bit."""
+    assert set(NOT_SWEPT) <= set(parameters())
+    killed(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("modes", [1, 8])
+@pytest.mark.parametrize("name", [name for name, world in WORLDS.items() if world.decides])
+def test_never_decided_wrongly(name, modes) -> None:
+    """4,000 random runs with and without early decision."""
+    world = WORLDS[name]
+    if modes > 1 and world.modes == 1:
+        pytest.skip("a law of one mode")
+    decided, wrong = early_decisions(name, modes, 4000)
+    assert wrong == 0
+    if not world.system(1).has_surroundings:
+        assert decided > 40
+
+
+def early_decisions(name: str, modes: int, count: int, cycles: int = 60) -> tuple[int, int]:
+    """How many of *count* random runs were decided early, and how many of those have another class than whole."""
+    modes = min(modes, 1) if WORLDS[name].modes == 1 else modes
+    early, whole = (
+        swept(name, count, 7, modes=modes, cycles=cycles, early_decision=flag) for flag in (True, False)
+    )
+    decided = early.status.values == RunStatus.DECIDED
+    wrong = early.response.values != whole.response.values
+    # what is said to be final is where the whole run ends
+    wrong |= early.end_is_final.values & (early.final_well.values != whole.final_well.values)
+    return int(decided.sum()), int(wrong.sum())

@@ -1,0 +1,246 @@
+"""Every world there is, small: a system of each kind of part, its mirror image, and what differs among random runs."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from oracle import LEVEL
+
+import snapbeam as sb
+from snapbeam import paper
+
+SINE = {"drive.frequency_ratio": (0.3, 3.5), "drive.velocity_amplitude": (0.02, 0.6)}
+PLACE = {"striker.location": (0.15, 0.85)}
+SHAKEN = {"base.frequency_ratio": (0.4, 2.0), "base.acceleration_amplitude": (0.05, 0.6)}
+
+
+@dataclass(frozen=True)
+class World:
+    """What is built of a reduced model, by its number of modes, and ranges of what random runs differ in."""
+
+    parts: Callable[[sb.ReducedModel], dict[str, object]]
+    varied: dict[str, tuple[float, float]]
+    beam: sb.Beam = paper.BEAM
+    imperfection: sb.Imperfection | None = None
+    modes: int = 3
+    reference_freq: float | None = None
+    own_kernel: bool = True
+    """Whether no other test of the normal run compiles its kernel."""
+    decides: bool = True
+    """Whether a run of it can be decided early at all."""
+
+    def system(self, modes: int | None = None) -> sb.System:
+        model = sb.ReducedModel.from_beam(
+            self.beam, modes=self.modes if modes is None else modes, imperfection=self.imperfection
+        )
+        if self.reference_freq is not None:
+            model = dataclasses.replace(model, given_reference_freq=self.reference_freq)
+        return sb.System(model, **self.parts(model))  # type: ignore[arg-type]
+
+    def points(self, count: int, seed: int) -> dict[str, NDArray[np.float64]]:
+        rng = np.random.default_rng(seed)
+        return {name: rng.uniform(*span, count) for name, span in self.varied.items()}
+
+
+def mirror_image(system: sb.System) -> sb.System:
+    """Upside down: striker, wells, base and records."""
+    model, striker, base = system.model, system.striker, system.base
+    if model.imperfection is not None:
+        assert model.beam is not None
+        model = sb.ReducedModel.from_beam(
+            model.beam, modes=model.modes, imperfection=model.imperfection.mirrored
+        )
+    if striker is not None:
+        drive = striker.drive
+        if isinstance(drive, sb.Recorded):
+            drive = dataclasses.replace(drive, displacement=-drive.displacement, velocity=-drive.velocity)
+        side = "above" if striker.side == "below" else "below"
+        striker = dataclasses.replace(striker, side=side, drive=drive)
+    if base is not None:
+        base = dataclasses.replace(base, direction="down" if base.direction == "up" else "up")
+    return sb.System(
+        model, system.contact, striker, base=base, axial=system.axial, harvester=system.harvester
+    )
+
+
+def struck(drive: sb.Drive, contact: sb.ContactLaw = paper.CONTACT, **striker: object):
+    return lambda model: {"contact": contact, "striker": sb.Striker(drive=drive, **striker)}
+
+
+def sine(velocity: float = 0.2) -> sb.Sine:
+    return sb.Sine(frequency_ratio=1.3, velocity_amplitude=velocity)
+
+
+def on_a_base(motion: sb.Drive, **more: object):
+    """A stop beside a beam that is shaken."""
+    stop = sb.Striker(drive=sb.Still(), gap=0.05 * LEVEL)
+    return lambda model: {"contact": paper.CONTACT, "striker": stop, "base": sb.Base(motion=motion, **more)}
+
+
+def record(model: sb.ReducedModel) -> dict[str, object]:
+    """A tip that starts up over three cycles, with a second harmonic."""
+    frequency, rate = 1.3 * model.reference_freq, 40_000.0
+    t = np.arange(0.0, 12.0 / frequency, 1.0 / rate)
+    omega, amplitude = 2.0 * math.pi * frequency, 0.25 * LEVEL / 1.3
+    x = np.minimum(t * frequency / 3.0, 1.0)
+    e, slope = x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) * frequency / 3.0
+    s, c = (
+        np.sin(omega * t) + 0.2 * np.sin(2.0 * omega * t),
+        np.cos(omega * t) + 0.4 * np.cos(2.0 * omega * t),
+    )
+    drive = sb.Recorded(
+        displacement=amplitude * e * s,
+        velocity=amplitude * (slope * s + e * omega * c),
+        sampling_freq=rate,
+        frequency=frequency,
+    )
+    return {"contact": paper.CONTACT, "striker": sb.Striker(drive=drive)}
+
+
+def loaded(motion: sb.LoadMotion):
+    return lambda model: {
+        "contact": paper.CONTACT,
+        "striker": sb.Striker(drive=sine()),
+        "axial": sb.AxialLoad(motion=motion),
+    }
+
+
+def harvested(harvester: sb.Harvester):
+    return lambda model: {
+        "contact": paper.CONTACT,
+        "striker": sb.Striker(drive=sine()),
+        "harvester": harvester,
+    }
+
+
+BURST = sb.Burst(frequency_ratio=1.21, velocity_amplitude=0.25, length=4.0, rise=1.0, fall=0.5, retreat=0.3)
+CHIRP = sb.Chirp(start_ratio=0.8, stop_ratio=2.0, velocity_amplitude=0.25, sweep_length=8.0)
+NOISE = sb.Noise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2, seed=3, rise=1.0)
+TWO = sb.TwoSines(frequency_ratio=1.2, velocity_amplitude=0.2, second_ratio=2.4, second_amplitude=0.1)
+SPRUNG = paper.BEAM.replace(ends=sb.Ends(left=40.0, right=5.0, axial=2e7))
+PIEZO = sb.Piezo(coupling=4e-3, capacitance=60e-9, resistance=2e4, start=0.0, stop=0.25)
+UNEVEN = sb.Imperfection(
+    rise=4e-6, skew=3e-6, point_load=0.01, point_location=0.4, uniform_load=0.02, gravity=0.01
+)
+MEASURED = sb.Imperfection(
+    profile=np.array([[0.0, 0.2, 0.5, 0.7, 1.0], [0.0, 3e-6, 6e-6, 4e-6, 0.0]]),
+    rise=2e-6,
+    form="sine",
+)
+
+WORLDS: dict[str, World] = {
+    "the paper's": World(struck(sine()), SINE | PLACE, own_kernel=False),
+    "restitution": World(struck(sine(), sb.Restitution(0.6)), SINE | PLACE, modes=1, own_kernel=False),
+    "power": World(struck(sine(), sb.PowerLaw.from_stiffness(4e11, 2.0)), SINE | PLACE),
+    "hunt_crossley": World(
+        struck(sine(), sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)), SINE | PLACE, own_kernel=False
+    ),
+    "kelvin_voigt": World(struck(sine(), sb.KelvinVoigt(2e6, 20.0)), SINE | PLACE),
+    "a gap": World(struck(sine(), gap=4e-5), SINE | {"striker.gap": (-5e-5, 1e-4)}, own_kernel=False),
+    "a phase": World(
+        struck(sb.DisplacementSine(frequency_ratio=1.3, displacement_amplitude=0.2, phase=0.7)),
+        {"drive.frequency_ratio": (0.3, 3.0), "drive.displacement_amplitude": (0.02, 0.5), "drive.phase": (-3.0, 3.0)},
+        own_kernel=False,
+    ),
+    "acceleration_sine": World(
+        struck(sb.AccelerationSine(frequency_ratio=1.3, acceleration_amplitude=0.3)),
+        {"drive.frequency_ratio": (0.3, 3.0), "drive.acceleration_amplitude": (0.02, 1.2)},
+        own_kernel=False,
+    ),
+    "burst": World(
+        struck(BURST),
+        {"drive.frequency_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.1, 0.8), "drive.length": (2.0, 12.0)},
+        own_kernel=False,
+    ),
+    "chirp": World(
+        struck(CHIRP),
+        {"drive.start_ratio": (0.5, 2.0), "drive.stop_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.02, 0.5)},
+        own_kernel=False,
+    ),
+    "logarithmic chirp": World(
+        struck(dataclasses.replace(CHIRP, spacing="log")),
+        {"drive.start_ratio": (0.5, 2.0), "drive.stop_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.02, 0.5)},
+        own_kernel=False,
+    ),
+    "half_sine": World(
+        struck(sb.HalfSine(displacement_amplitude=0.6, duration=0.5)),
+        {"drive.displacement_amplitude": (0.1, 2.0), "drive.duration": (0.05, 2.0)},
+        own_kernel=False,
+    ),
+    "noise": World(
+        struck(NOISE), {"drive.velocity_rms": (0.02, 0.4), "drive.low_ratio": (0.2, 1.0)}, own_kernel=False
+    ),
+    "two_sines": World(
+        struck(TWO), SINE | {"drive.second_amplitude": (0.0, 0.3), "drive.second_phase": (-3.0, 3.0)}, own_kernel=False
+    ),
+    "recorded": World(record, PLACE, own_kernel=False),
+    "still": World(struck(sb.Still(), gap=-1e-4), {"striker.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
+    "a body": World(
+        struck(sine(), mass=0.02, spring=700.0, damper=0.7), SINE | PLACE, own_kernel=False, decides=False
+    ),
+    "a sphere": World(
+        struck(sb.Flight(speed=0.4), mass=2e-3, gap=5e-5), {"drive.speed": (0.1, 2.0)} | PLACE, decides=False
+    ),
+    "unequal wells": World(struck(sine()), SINE | PLACE, imperfection=UNEVEN, own_kernel=False),
+    "a measured shape": World(struck(sine()), SINE | PLACE, imperfection=MEASURED, own_kernel=False),
+    "other ends": World(struck(sine()), SINE | PLACE, beam=SPRUNG, own_kernel=False),
+    "a given load": World(
+        struck(sine()),
+        SINE | PLACE,
+        beam=paper.BEAM.replace(axial_load=1.5 * paper.BEAM.critical_load),
+        reference_freq=80.0,
+        own_kernel=False,
+    ),
+    "a base": World(
+        on_a_base(sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25, phase=0.3)), SHAKEN,
+        own_kernel=False,
+    ),
+    "a base under a stop in space": World(
+        on_a_base(sb.Sine(frequency_ratio=0.9, velocity_amplitude=0.25), carries_striker=False),
+        {"base.frequency_ratio": (0.4, 2.0), "base.velocity_amplitude": (0.05, 0.5)},
+        own_kernel=False,
+    ),
+    "a base by its displacement": World(
+        on_a_base(sb.DisplacementSine(frequency_ratio=0.9, displacement_amplitude=0.25)),
+        {"base.frequency_ratio": (0.4, 2.0), "base.displacement_amplitude": (0.05, 0.5)},
+        own_kernel=False,
+    ),
+    "a base of two sines": World(on_a_base(TWO), {"base.velocity_amplitude": (0.05, 0.5)}),
+    "a burst of the base": World(on_a_base(BURST), {"base.velocity_amplitude": (0.05, 0.5)}),
+    "a swept base": World(on_a_base(CHIRP), {"base.velocity_amplitude": (0.05, 0.5)}),
+    "a noisy base": World(on_a_base(NOISE), {"base.velocity_rms": (0.02, 0.3)}),
+    "a changing load": World(
+        loaded(sb.LoadSine(frequency_ratio=2.0, amplitude=3.0)), SINE | {"axial.amplitude": (0.0, 20.0)}
+    ),
+    "a load that falls": World(
+        loaded(sb.LoadRamp(change=-5.0, duration=3.0, hold=4.0)), SINE | {"axial.change": (-20.0, 10.0)}
+    ),
+    "a piezo": World(harvested(PIEZO), SINE | {"harvester.resistance": (1e3, 1e6)}, own_kernel=False),
+    "a coil": World(
+        harvested(sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)),
+        SINE | {"harvester.resistance": (1.0, 100.0)},
+        own_kernel=False,
+    ),
+    "a coil with inductance": World(
+        harvested(sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, inductance=0.01)),
+        SINE | {"harvester.resistance": (1.0, 100.0)},
+    ),
+    "a bit of all": World(
+        lambda model: {
+            "contact": paper.CONTACT,
+            "striker": sb.Striker(drive=sine(), mass=0.02, spring=700.0, damper=0.7, gap=1e-5),
+            "base": sb.Base(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1)),
+            "axial": sb.AxialLoad(motion=sb.LoadSine(frequency_ratio=2.0, amplitude=3.0)),
+            "harvester": PIEZO,
+        },
+        SINE | PLACE,
+        beam=SPRUNG,
+        imperfection=UNEVEN,
+    ),
+}  # fmt: skip
+"""By name; a test proves that no kind of part and no parameter is missing."""

@@ -1,0 +1,77 @@
+"""Questions of dynamics to beams whose ends are shaken or whose load changes in time."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.dynamics.flow import Stroboscope
+
+DAMPING = 0.02
+MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=DAMPING)
+STRIKER = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1)
+BASE = sb.Base(motion=sb.AccelerationSine(frequency_ratio=1.2, acceleration_amplitude=0.2, phase=0.7))
+LOAD = sb.AxialLoad(motion=sb.LoadSine(frequency_ratio=2.4, amplitude=1.0, phase=-0.3))
+SHAKEN = {
+    "base": sb.System(MODEL, base=BASE),
+    "load": sb.System(MODEL, axial=LOAD),
+    "both": sb.System(MODEL, base=BASE, axial=LOAD),
+    "struck": sb.System(MODEL, contact=paper.CONTACT, striker=STRIKER, base=BASE),
+    "struck under a load": sb.System(MODEL, contact=paper.CONTACT, striker=STRIKER, axial=LOAD),
+}
+
+
+@pytest.mark.parametrize("name", list(SHAKEN))
+def test_exponents_add_up_to_the_damping(name):
+    """-2 sum zeta omega, whatever shakes the beam."""
+    found = sb.lyapunov(SHAKEN[name], periods=20, transient=5, k=4).exponent.values.ravel()
+    expected = -2.0 * DAMPING * float(MODEL.omega.sum())
+    assert found.sum() == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize("name", ["base", "both"])
+def test_an_orbit_is_one_of_the_run_itself(name):
+    """From the orbit a recorded run comes back to it, period after period; the multipliers' product is known."""
+    system = SHAKEN[name].replace(**{"base.acceleration_amplitude": 0.02})
+    exact = sb.Integration(accuracy="reference")
+    orbit = sb.periodic_orbit(system, integration=exact, transient=300)
+    flow = Stroboscope(system, exact)
+    lost = math.exp(-2.0 * DAMPING * float(MODEL.omega.sum()) * flow.period)
+    assert float(np.prod(orbit.multipliers).real) == pytest.approx(lost, rel=1e-8)
+    start = system.replace(start=flow.state(orbit.coordinates))
+    times = flow.period * np.arange(1, 6) * (1.0 - 1e-13)
+    run = sb.simulate(start, exact.replace(cycles=6), sample_times=times)
+    seen = run.dataset.center_displacement.values
+    assert np.ptp(seen) < 1e-8
+    assert abs(seen[0]) > 0.5
+
+
+def test_periods_one_by_one_are_periods_at_once():
+    """Each begins at the phases of base and load."""
+    flow = Stroboscope(SHAKEN["both"])
+    begun = flow.coordinates()
+    once = flow.march(begun, 6).states
+    here = begun
+    for _ in range(6):
+        here = flow.march(here, 1).states
+    np.testing.assert_allclose(here, once, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("system", "words"),
+    [
+        (sb.System(MODEL, base=BASE, axial=sb.AxialLoad(motion=sb.LoadSine(frequency_ratio=2.0, amplitude=1.0))),
+         "axial.frequency_ratio = 2: must be a whole multiple"),
+        (sb.System(MODEL, axial=sb.AxialLoad(motion=sb.LoadRamp(change=1.0, duration=3.0))), "axial: is no sine"),
+    ],
+)  # fmt: skip
+def test_what_does_not_repeat_is_refused(system, words):
+    """A section needs a common period."""
+    with pytest.raises(sb.InputError, match=words):
+        sb.lyapunov(system, periods=20, transient=5)
+    with pytest.raises(sb.InputError, match="phase = 1"):
+        Stroboscope(SHAKEN["base"], phase=1.0)
