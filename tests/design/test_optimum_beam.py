@@ -8,7 +8,7 @@ from small import small_system
 
 import snapbeam as sb
 
-SPREAD = sb.Spread(of={"velocity_amplitude": sb.Normal(0.02, relative=True)}, phase=True)
+TOLERANCE = {"velocity_amplitude": sb.Normal(0.02, relative=True)}
 BOUNDS = {"location": (0.1, 0.5), "frequency_ratio": (0.5, 2.0), "velocity_amplitude": (0.02, 0.5)}
 LIMIT = sb.Limit(of="snap", at_least=0.8)
 HOW = sb.Integration(cycles=3, threads=1)
@@ -21,7 +21,7 @@ def test_better_than_as_many_random_designs_of_a_beam() -> None:
     wins = kept = 0
     for seed in range(20):
         effort = sb.Effort(generations=DESIGNS // 40, population=40, draws=8, fresh=400, seed=seed)
-        spread = sb.Spread(of=SPREAD.of, phase=True, seed=seed)
+        spread = sb.Spread(of=TOLERANCE, phase=True, seed=seed)
         arguments = (small_system(), BOUNDS, "speed", LIMIT, spread)
         ds = sb.design(*arguments, effort, integration=HOW)
         assert ds.sizes["tried"] == DESIGNS

@@ -107,7 +107,7 @@ def follow_to_grazing(ratio: float, restitution: float, periods: int, longest: f
 
 
 def test_restitution_orbits_are_followed_to_grazing() -> None:
-    branch = follow_to_grazing(3.6, 0.8, 2, 0.02)
+    branch = follow_to_grazing(3.6, 0.8, 2, 0.1)
     assert branch.events[-1].orbit.passage.clearance < 1e-4 and branch.events[-1].error < 1e-4
     ds = branch.to_dataset()
     assert set(ds["event_kind"].values) <= {"fold", "flip", "Neimark-Sacker", "branch point", "grazing"}
