@@ -137,6 +137,7 @@ WORLDS: dict[str, World] = {
     "the paper's": World(struck(sine()), SINE | PLACE, own_kernel=False),
     "restitution": World(struck(sine(), sb.Restitution(0.6)), SINE | PLACE, modes=1, own_kernel=False),
     "power": World(struck(sine(), sb.PowerLaw.from_stiffness(4e11, 2.0)), SINE | PLACE),
+    "layer": World(struck(sine(), sb.LayeredHertz(stiffness=4e8, layer_stiffness=1e10)), SINE | PLACE),
     "hunt_crossley": World(
         struck(sine(), sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)), SINE | PLACE, own_kernel=False
     ),

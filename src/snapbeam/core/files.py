@@ -18,7 +18,12 @@ __all__ = ["NoRoomError", "atomic_path", "check_writable", "lives"]
 
 
 def check_writable(
-    path: str | os.PathLike[str], name: str = "output", suffixes: tuple[str, ...] = (), begin: str = ""
+    path: str | os.PathLike[str],
+    name: str = "output",
+    suffixes: tuple[str, ...] = (),
+    begin: str = "",
+    *,
+    appended: bool = False,
 ) -> Path:
     """Return *path* if a file can be written there; refuse it, before any work, if not.
 
@@ -33,6 +38,8 @@ def check_writable(
         The allowed ends of the name, such as ``(".nc",)``; any if empty.
     begin : str
         What text of this kind begins with, by which a file that snapbeam wrote is known.
+    appended : bool
+        Whether what is there stays, as in a log: then anybody's file will do.
 
     Raises
     ------
@@ -58,7 +65,8 @@ def check_writable(
                 pass
     except OSError as error:
         raise InputError(f"{name} = {str(path)!r}: cannot be written, {error.strerror or error}") from error
-    refuse_foreign(target, name, begin)
+    if not appended:
+        refuse_foreign(target, name, begin)
     return target
 
 

@@ -43,8 +43,9 @@ def _kinds(function: Callable[..., Any]) -> dict[str, Any]:
             continue
         annotation = each.annotation
         if isinstance(annotation, str):
+            holder = type(each.name, (), {"__annotations__": {each.name: annotation}})
             try:
-                annotation = eval(annotation, function.__globals__, _Names())  # the module's own text
+                annotation = typing.get_type_hints(holder, function.__globals__, _Names())[each.name]
             except Exception:
                 continue
         found[each.name] = annotation

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam.core.validate import InputError, file_path, shown
+from snapbeam.core.validate import InputError, InputTypeError, file_path, shown
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
@@ -56,6 +56,8 @@ def read_store(store: str | os.PathLike[str]) -> xr.Dataset:
     StoreError
         If its description is damaged.
     """
+    if not isinstance(store, (str, os.PathLike)):
+        raise InputTypeError(f"store = {shown(store)}: must be a folder")
     folder = file_path("store", store)
     file = folder / "map.json"
     if file.is_symlink() or not file.is_file():

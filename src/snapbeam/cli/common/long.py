@@ -223,7 +223,7 @@ def report(total: int, log: Path | None, store: Path | None) -> Iterator[LongRep
     from snapbeam.core.files import check_writable
 
     if log is not None:
-        check_writable(log, "log")
+        check_writable(log, "log", appended=True)
     with progress(total) as bar:
         said = LongReport(bar, log)
         said.log(f"map of {total} points")

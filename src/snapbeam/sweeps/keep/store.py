@@ -24,7 +24,7 @@ from typing import Any, Self
 import numpy as np
 
 from snapbeam.core.provenance import canonical_json, parameter_hash
-from snapbeam.core.validate import InputError, file_path, integer
+from snapbeam.core.validate import InputError, file_path, integer, shown
 from snapbeam.sweeps.compute.maker import Maker, differences, this_maker
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Stage, chunk_size
@@ -316,6 +316,8 @@ class StoredRows:
 
 
 def _store_folder(path: str | Path) -> Path:
+    if not isinstance(path, (str, Path)):
+        raise InputError(f"store = {shown(path)}: must be a folder")
     folder = file_path("store", path)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"store = {str(path)!r}: must be a folder, not a file")
