@@ -357,8 +357,8 @@ def test_nothing_on_the_way_to_a_number_runs_code_of_a_file():
     """No pickle, eval or other loader that executes what it reads, anywhere in the package.
 
     But for compiled code, which is code: it is read from this user's own folders, and checked before; and for the
-    kernels of few modes, of joined motions and of several laws, whose text is written out by the package itself, mode by
-    mode and number by number.
+    kernels of few modes, of joined motions and of several laws, whose text the package itself writes out, mode by mode
+    and number by number.
     """
     forbidden = re.compile(
         r"\b(pickle|marshal|shelve|dill|joblib)\b|(?<![\w.])(eval|exec)\(|allow_pickle\s*=\s*True|yaml\.load\("
