@@ -74,9 +74,10 @@ ASKED = sb.Integration(cycles=2)
 
 OF_OTHERS = {
     "valid", "energy_striker", "energy_lost_contact", "base_displacement", "base_velocity", "work_base", "load_change",
-    "work_load", "voltage", "power_load", "energy_harvested", "energy_circuit",
+    "work_load", "voltage", "power_load", "energy_harvested", "energy_circuit", "striker", "striker_displacement",
+    "striker_penetration", "striker_force",
 }  # fmt: skip
-"""What only runs with dropouts, strikers with a mass, contacts with loss, bases, loads or harvesters have."""
+"""What runs have with dropouts, strikers with a mass or several, contacts with loss, bases, loads, harvesters only."""
 
 
 def test_runs(tmp_path) -> None:
@@ -86,6 +87,17 @@ def test_runs(tmp_path) -> None:
     run.save(tmp_path / "run.nc")
     assert check(xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="outcome")) == len(STATISTICS)
     check(sb.conditioning(SYSTEM, 1))
+
+
+def test_a_run_of_several_strikers(tmp_path) -> None:
+    """What is told of each striker has units too, as it stands and as it comes back from the file."""
+    stop = sb.Striker(drive=sb.Still(), location=0.3, side="above", gap=2e-5)
+    run = sb.simulate(sb.System(SYSTEM.model, paper.CONTACT, [SYSTEM.striker, stop]), ASKED)
+    told = {"striker", "striker_displacement", "striker_penetration", "striker_force"}
+    assert told <= set(run.dataset.variables)
+    assert check(run.dataset) == len(SCHEMA) - len(OF_OTHERS - told)
+    run.save(tmp_path / "run.nc")
+    check(xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf"))
 
 
 AXES = {

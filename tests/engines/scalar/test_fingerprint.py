@@ -58,6 +58,7 @@ def test_every_file_of_the_engines_and_the_codes_is_in_it(copy) -> None:
         "few",
         "settling",
         "world",
+        "strikers",
         "cuda",
         "scalar",
     }
