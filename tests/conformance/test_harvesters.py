@@ -67,8 +67,9 @@ def test_piezo(modes) -> None:
     compare(modes, 4 if modes == 1 else 2, PIEZO, row, CAPACITANCE, 1.0 / 2e4, 1.0)
 
 
-@pytest.mark.parametrize("modes", [pytest.param(1, marks=SLOW), 3, pytest.param(8, marks=SLOW)])
-@pytest.mark.parametrize("inductance", [0.0, pytest.param(0.01, marks=SLOW)])
+@pytest.mark.slow
+@pytest.mark.parametrize("modes", [1, 3, 8])
+@pytest.mark.parametrize("inductance", [0.0, 0.01])
 def test_coil(modes, inductance) -> None:
     coil = sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, inductance=inductance, location=0.4)
 
@@ -78,6 +79,7 @@ def test_coil(modes, inductance) -> None:
     compare(modes, 4 if modes == 1 else 2, coil, row, inductance, 40.0, -30.0)
 
 
+@pytest.mark.slow
 def test_a_layer_that_does_not_couple_changes_nothing() -> None:
     """theta to 0: the struck beam without a harvester, to the error of the level."""
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)

@@ -30,7 +30,7 @@ class World:
     modes: int = 3
     reference_freq: float | None = None
     own_kernel: bool = True
-    """Whether no other test of the normal run compiles its kernel."""
+    """Whether no other quick test has a use for its kernel of many runs, which takes ten seconds to compile."""
     decides: bool = True
     """Whether a run of it can be decided early at all."""
 
@@ -156,28 +156,24 @@ WORLDS: dict[str, World] = {
     "burst": World(
         struck(BURST),
         {"drive.frequency_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.1, 0.8), "drive.length": (2.0, 12.0)},
-        own_kernel=False,
     ),
     "chirp": World(
         struck(CHIRP),
         {"drive.start_ratio": (0.5, 2.0), "drive.stop_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.02, 0.5)},
-        own_kernel=False,
     ),
     "logarithmic chirp": World(
         struck(dataclasses.replace(CHIRP, spacing="log")),
         {"drive.start_ratio": (0.5, 2.0), "drive.stop_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.02, 0.5)},
-        own_kernel=False,
     ),
     "half_sine": World(
         struck(sb.HalfSine(displacement_amplitude=0.6, duration=0.5)),
         {"drive.displacement_amplitude": (0.1, 2.0), "drive.duration": (0.05, 2.0)},
-        own_kernel=False,
     ),
     "noise": World(
-        struck(NOISE), {"drive.velocity_rms": (0.02, 0.4), "drive.low_ratio": (0.2, 1.0)}, own_kernel=False
+        struck(NOISE), {"drive.velocity_rms": (0.02, 0.4), "drive.low_ratio": (0.2, 1.0)}
     ),
     "two_sines": World(
-        struck(TWO), SINE | {"drive.second_amplitude": (0.0, 0.3), "drive.second_phase": (-3.0, 3.0)}, own_kernel=False
+        struck(TWO), SINE | {"drive.second_amplitude": (0.0, 0.3), "drive.second_phase": (-3.0, 3.0)}
     ),
     "recorded": World(record, PLACE, own_kernel=False),
     "still": World(struck(sb.Still(), gap=-1e-4), {"striker.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
@@ -199,17 +195,14 @@ WORLDS: dict[str, World] = {
     ),
     "a base": World(
         on_a_base(sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25, phase=0.3)), SHAKEN,
-        own_kernel=False,
     ),
     "a base under a stop in space": World(
         on_a_base(sb.Sine(frequency_ratio=0.9, velocity_amplitude=0.25), carries_striker=False),
         {"base.frequency_ratio": (0.4, 2.0), "base.velocity_amplitude": (0.05, 0.5)},
-        own_kernel=False,
     ),
     "a base by its displacement": World(
         on_a_base(sb.DisplacementSine(frequency_ratio=0.9, displacement_amplitude=0.25)),
         {"base.frequency_ratio": (0.4, 2.0), "base.displacement_amplitude": (0.05, 0.5)},
-        own_kernel=False,
     ),
     "a base of two sines": World(on_a_base(TWO), {"base.velocity_amplitude": (0.05, 0.5)}),
     "a burst of the base": World(on_a_base(BURST), {"base.velocity_amplitude": (0.05, 0.5)}),
@@ -221,11 +214,10 @@ WORLDS: dict[str, World] = {
     "a load that falls": World(
         loaded(sb.LoadRamp(change=-5.0, duration=3.0, hold=4.0)), SINE | {"axial.change": (-20.0, 10.0)}
     ),
-    "a piezo": World(harvested(PIEZO), SINE | {"harvester.resistance": (1e3, 1e6)}, own_kernel=False),
+    "a piezo": World(harvested(PIEZO), SINE | {"harvester.resistance": (1e3, 1e6)}),
     "a coil": World(
         harvested(sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)),
         SINE | {"harvester.resistance": (1.0, 100.0)},
-        own_kernel=False,
     ),
     "a coil with inductance": World(
         harvested(sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, inductance=0.01)),

@@ -25,7 +25,13 @@ SHAKEN = {
 }
 
 
-@pytest.mark.parametrize("name", list(SHAKEN))
+LONG = [
+    pytest.param(name, marks=pytest.mark.slow) for name in ("base", "load", "struck", "struck under a load")
+]
+"""Each has two kernels of its own, twenty seconds to compile."""
+
+
+@pytest.mark.parametrize("name", ["both", *LONG])
 def test_exponents_add_up_to_the_damping(name):
     """-2 sum zeta omega, whatever shakes the beam."""
     found = sb.lyapunov(SHAKEN[name], periods=20, transient=5, k=4).exponent.values.ravel()
@@ -33,7 +39,7 @@ def test_exponents_add_up_to_the_damping(name):
     assert found.sum() == pytest.approx(expected, rel=1e-8)
 
 
-@pytest.mark.parametrize("name", ["base", "both"])
+@pytest.mark.parametrize("name", ["both", LONG[0]])
 def test_an_orbit_is_one_of_the_run_itself(name):
     """From the orbit a recorded run comes back to it, period after period; the multipliers' product is known."""
     system = SHAKEN[name].replace(**{"base.acceleration_amplitude": 0.02})

@@ -11,12 +11,26 @@ from mistakes.table import CASES
 ENDS = ("right", "flagged", "refused")
 
 
-LONG = ("with an exposure of 0.9 of a frame", "video with lossy compression")
+QUICK = (
+    "dark striker before a dark background, with a white sticker",
+    "a bright bar, such as a clamp, that crosses the picture and never moves",
+    "12 bits in a file of 16, overexposed by 1.8",
+    "each frame the mean of itself and the one before",
+    "the beam moves in the first frame",
+    "a pixel size twice the true one, beside a gauge",
+    "a striker 40 px off in single frames",
+)
+"""One of each group that is rendered and tracked, at some three seconds each; the group's others are slow."""
+
+
+RENDERED = ("Jumps of the striker", "Half the exposure")
+"""Groups beside those of the scenes that are rendered and tracked too."""
 
 
 def shown(case):
-    """A case as a parameter; those that render many frames are slow."""
-    marks = pytest.mark.slow if case.mistake.endswith(LONG) else ()
+    """A case as a parameter."""
+    rendered = case.look.__module__.endswith("scenes") or case.group in RENDERED
+    marks = pytest.mark.slow if rendered and case.mistake not in QUICK else ()
     return pytest.param(case, marks=marks, id=f"{case.group}: {case.mistake}")
 
 

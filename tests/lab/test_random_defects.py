@@ -70,7 +70,7 @@ def hold(what, folder, *, good, spoiled, seed=20):
     return found
 
 
-@pytest.mark.parametrize(("what", "good", "spoiled"), [("scene", 3, 5), ("drive", 10, 12), ("decay", 10, 12)])
+@pytest.mark.parametrize(("what", "good", "spoiled"), [("scene", 1, 3), ("drive", 10, 12), ("decay", 10, 12)])
 def test_a_few(what, good, spoiled, tmp_path):
     hold(what, tmp_path, good=good, spoiled=spoiled)
 

@@ -202,7 +202,7 @@ def test_an_axis_over(name: str, system) -> None:
             assert_point_is_run(ds.isel({dim: i}), system.replace(**{name: value}))
 
 
-def test_restitution_and_recorded_drives(system) -> None:
+def test_restitution(system) -> None:
     one = system.replace(**{"model.modes": 1}).replace(contact=sb.Restitution(0.5))
     ds = sb.sweep(one, {"restitution_coefficient": [0.0, 0.4, 0.9], "damping_ratio": [0.001, 0.01]}, ASKED)
     for i, j in itertools.product(range(3), range(2)):
@@ -213,6 +213,10 @@ def test_restitution_and_recorded_drives(system) -> None:
             }
         )
         assert_point_is_run(ds.isel(restitution_coefficient=i, damping_ratio=j), changed)
+
+
+@pytest.mark.slow
+def test_recorded_drives(system) -> None:
     t = np.arange(900) / 20_000.0
     record = sb.RecordedDrive(
         displacement=3e-5 * np.sin(600.0 * t), velocity=0.018 * np.cos(600.0 * t), sampling_freq=20_000.0,

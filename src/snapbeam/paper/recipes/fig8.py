@@ -45,9 +45,9 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     """Six maps; the beam is symmetric, so that half of it suffices."""
     found = {}
     for ratio in FREQUENCY_RATIOS:
-        points = results.pick(10, 60)
+        points = results.pick(8, 60)
         locations = np.linspace(0.5 / points, 0.5, points)
-        relative = relative_amplitudes(results.pick(12, 60))
+        relative = relative_amplitudes(results.pick(8, 60))
         for modes in (1, results.pick(4, 32)):
             # slow runs at the smallest frequency need fewer cycles for a sketch
             cycles = results.pick(4 if ratio < 0.1 else 30, CYCLES)
