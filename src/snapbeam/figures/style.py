@@ -106,6 +106,11 @@ def new_figure(width: str = "single", height: float = 75.0) -> Figure:
         return plt.figure(figsize=(millimetres / 25.4, positive("height", height, "mm") / 25.4))
 
 
+def axes_or_new(ax: Axes | None, width: str = "single", height: float = 72.0) -> Axes:
+    """The axes that were given, or those of a new figure."""
+    return new_figure(width, height).add_subplot() if ax is None else ax
+
+
 def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
     """Write a figure, or the one that axes are in, to PNG (300 dots per inch), PDF or SVG, by the suffix.
 

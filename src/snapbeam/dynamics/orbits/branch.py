@@ -71,8 +71,8 @@ class Branch:
         return np.array([orbit.is_stable for orbit in self.orbits])
 
     def to_dataset(self) -> xr.Dataset:
-        """The branch labelled: over ``orbit`` the parameter, the state, the multipliers, stability and impacts; over
-        ``event`` what happens where."""
+        """The branch labelled: over ``orbit`` the parameter, the state, the multipliers, stability, impacts and
+        the centre's displacement, that at every ``return`` too; over ``event`` what happens where."""
         import xarray as xr
 
         from snapbeam.config.parameters import lookup
@@ -142,23 +142,31 @@ class Branch:
             },
         )
         if isinstance(first.flow, Stroboscope):
-            dataset[self._center_name] = (
+            centers = np.array([_centers(orbit) for orbit in self.orbits])
+            dataset["center_displacement"] = (
                 "orbit",
-                self._centers(states),
+                centers[:, 0],
                 _labels("centre displacement there, over b"),
+            )
+            dataset["center_returns"] = (
+                ("orbit", "return"),
+                centers,
+                _labels("centre displacement once a period of the drive, over b"),
             )
         return dataset
 
-    _center_name = "center_displacement"
 
-    def _centers(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
-        rows = []
-        for orbit, x in zip(self.orbits, states, strict=True):
-            flow = orbit.flow
-            assert isinstance(flow, Stroboscope)
-            amplitude = x[: flow.modes] * flow.scales[: flow.modes]
-            rows.append(float(flow.system.model.center_shape @ amplitude) / flow.system.scale.length)
-        return np.array(rows)
+def _centers(orbit: Orbit) -> NDArray[np.float64]:
+    """Centre displacement over b, once a period of the drive."""
+    flow = orbit.flow
+    assert isinstance(flow, Stroboscope)
+    states = orbit.coordinates[np.newaxis]
+    if orbit.period > 1:
+        later = flow.march(states, orbit.period - 1, every=True).every
+        assert later is not None
+        states = np.concatenate([states, later[0]])
+    amplitudes = states[:, : flow.modes] * flow.scales[: flow.modes]
+    return np.asarray(amplitudes @ flow.system.model.center_shape / flow.system.scale.length)
 
 
 def _labels(words: str) -> dict[str, str]:

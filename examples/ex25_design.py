@@ -1,0 +1,70 @@
+"""
+How likely, at which amplitude, and what matters most
+=====================================================
+
+A system that is built is not the one that was drawn: its beam, contact and place are known to a tolerance, and the
+drive begins at any phase.  Every answer is counted over draws of such systems, and none is given without its interval.
+
+This is a sketch with one mode and few runs.
+"""
+
+# %%
+# How likely is it to snap?
+# -------------------------
+# Lines of equal probability; a small cross where the interval is wider than asked for.
+
+import numpy as np
+
+import snapbeam as sb
+from snapbeam import paper
+from snapbeam.figures.design import plot_probability, plot_quantiles, plot_tornado
+
+system = sb.System(
+    sb.ReducedModel.from_beam(paper.BEAM, modes=1),
+    paper.CONTACT,
+    sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
+)
+spread = sb.Spread(
+    of={
+        "beam.buckling_level": sb.Normal(0.01, relative=True),
+        "contact.stiffness": sb.LogNormal(0.2),
+        "location": sb.Normal(0.005),
+        "velocity_amplitude": sb.Normal(0.02, relative=True),
+    },
+    displacement=3.5e-6,
+    phase=True,
+)
+short = sb.Integration(cycles=20)
+probability = sb.probability_map(
+    system,
+    {"frequency_ratio": np.linspace(0.4, 2.4, 17), "velocity_amplitude": np.linspace(0.02, 0.24, 17)},
+    spread,
+    sb.Allocation(half_width=0.12, first=16, most=60),
+    integration=short,
+)
+print(f"{int(probability.runs.sum())} runs")
+plot_probability(probability)
+
+# %%
+# At which amplitude?
+# -------------------
+# Where the probability is 0.05, 0.5 and 0.95, with bands of 95 %; a cross where it is seen to fall again.
+
+threshold = sb.quantile_threshold(
+    system,
+    "velocity_amplitude",
+    (0.005, 0.3),
+    {"frequency_ratio": np.linspace(0.4, 2.4, 9)},
+    spread,
+    sb.Search(runs=200),
+    integration=short,
+)
+plot_quantiles(threshold)
+
+# %%
+# What matters most?
+# ------------------
+# For each parameter one standard score down and up; how much that is in its own unit stands beside it.
+
+sensitivity = sb.sensitivity(system, "peak_force", spread, size=16, integration=sb.Integration(cycles=5))
+plot_tornado(sensitivity)
