@@ -72,3 +72,26 @@ def test_failed_runs_come_with_advice(synthetic_map):
     assert lines[0].startswith("[bold red]3 failed[/] (NOT_FINITE): ") and "smaller step" in lines[0]
     assert lines[1] == "25 of 1000 runs ended early, their class being certain."
     assert ResponseClass.UNKNOWN.label in text(class_table(synthetic_map))
+
+
+def test_what_was_there_before_is_no_part_of_the_rate(monkeypatch) -> None:
+    """Points that a store held, or that came from earlier rounds, do not make the others faster."""
+    import io
+
+    from rich.console import Console
+
+    from snapbeam.cli.common import console
+
+    clock = iter([0.0, 10.0, 50.0])
+    monkeypatch.setattr(console.time, "monotonic", lambda: next(clock))
+    written = io.StringIO()
+    lines = console._Lines(Console(file=written, width=100), None, "runs")
+    for done, total in ((900, 1000), (1000, 1000), (1000, 2000), (1400, 2000)):
+        lines(done, total)
+    assert written.getvalue().splitlines() == [
+        "1000 runs to compute",
+        "900 of 1000 runs",
+        "1000 of 1000 runs, 10 runs/s",
+        "2000 runs in all now",
+        "1400 of 2000 runs, 10 runs/s, 1 min 0 s left",
+    ]

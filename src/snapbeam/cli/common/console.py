@@ -265,13 +265,17 @@ class _RateColumn(ProgressColumn):
     def render(self, task: Task) -> Text:
         if not task.completed or not task.elapsed or task.total is None:
             return Text("starting")
-        return Text(pace(int(task.completed), int(task.total), task.elapsed, self.what))
+        found = int(task.fields.get("found", 0))
+        return Text(pace(int(task.completed), int(task.total), task.elapsed, self.what, found))
 
 
-def pace(done: int, total: int, elapsed: float, what: str = "points") -> str:
-    """Return points, or whatever else is counted, per second and the time left, in words."""
-    rate = done / max(elapsed, 1e-9)
-    left = f", {duration((total - done) / rate)} left" if 0 < done < total else ""
+def pace(done: int, total: int, elapsed: float, what: str = "points", found: int = 0) -> str:
+    """Return points, or whatever else is counted, per second and the time left, in words.
+
+    Of those *done*, *found* were there before the time began.
+    """
+    rate = (done - found) / max(elapsed, 1e-9)
+    left = f", {duration((total - done) / rate)} left" if found < done < total else ""
     return f"{rate:.3g} {what}/s{left}"
 
 
@@ -287,8 +291,8 @@ def progress(
     """Give a function of (points done, points in all) that shows how far it is, how fast, and what is left.
 
     *total* is None where it is not known before, *task* names the work, *what* is counted.  A bar on a terminal;
-    elsewhere a line for each tenth of the work.  The time before the first call, in which an engine may be compiled,
-    is not counted.
+    elsewhere a line for each tenth of the work.  What was done before the first call is not counted, nor its time, in
+    which an engine may be compiled.
     """
     console = errors()
     if _ASKED.get().quiet:
@@ -299,7 +303,9 @@ def progress(
             shown = bar.add_task(task, total=total, start=False)
 
             def update(done: int, all_of_them: int) -> None:
-                bar.start_task(shown)
+                if not bar.tasks[0].started:
+                    bar.start_task(shown)
+                    bar.update(shown, found=done)
                 bar.update(shown, completed=done, total=all_of_them)
 
             yield update
@@ -339,24 +345,24 @@ class _Lines:
     def __init__(self, console: Console, total: int | None, what: str) -> None:
         self.console = console
         self.what = what
-        self.total: int | None = None
-        if total is not None:
-            self._begin(total)
-
-    def _begin(self, total: int) -> None:
         self.total = total
         self.start: float | None = None
-        self.tenths = 0
-        self.console.print(f"{counted(total, self.what)} to compute")
+        self.found = self.tenths = 0
+        if total is not None:
+            self.console.print(f"{counted(total, what)} to compute")
 
     def __call__(self, done: int, total: int) -> None:
         if total != self.total:
-            self._begin(total)
+            begun = self.total is not None
+            self.console.print(f"{counted(total, self.what)} {'in all now' if begun else 'to compute'}")
+            self.total, self.tenths = total, 10 * done // total if begun and total else 0
         if self.start is None:
-            self.start = time.monotonic()
+            self.start, self.found = time.monotonic(), done
         tenths = 10 * done // total if total else 10
         if tenths <= self.tenths:
             return
         self.tenths = tenths
-        spent = pace(done, total, time.monotonic() - self.start, self.what)
-        self.console.print(f"{done} of {counted(total, self.what)}, {spent}")
+        text = f"{done} of {counted(total, self.what)}"
+        if done > self.found:
+            text += f", {pace(done, total, time.monotonic() - self.start, self.what, self.found)}"
+        self.console.print(text)

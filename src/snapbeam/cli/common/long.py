@@ -182,6 +182,7 @@ class LongReport:
         self._bar = bar
         self._log = log
         self._start = self._last = time.monotonic()
+        self._found = 0
         self._before: int | None = None
         self._quiet = True
 
@@ -194,14 +195,17 @@ class LongReport:
         """Say how far the present stage is."""
         now = time.monotonic()
         if self._before is None or done < self._before:
-            self._start = now
+            self._start, self._found = now, done
         finished = done >= total and done != self._before
         self._before = done
         self._bar(done, total)
         if finished or self._quiet or now - self._last >= self._INTERVAL:
             self._last, self._quiet = now, False
             share = 100.0 * done / max(total, 1)
-            self.log(f"{done} of {total} points ({share:.1f} %), {pace(done, total, now - self._start)}")
+            text = f"{done} of {total} points ({share:.1f} %)"
+            if done > self._found:
+                text += f", {pace(done, total, now - self._start, found=self._found)}"
+            self.log(text)
 
     def log(self, text: str) -> None:
         """Append a line with the time to the log file, if there is one."""
