@@ -32,7 +32,7 @@ def lives(last: np.ndarray, failed: int = 0) -> xr.Dataset:
         "snaps": np.isfinite(last).astype(np.int32),
         "late_snaps": (last > CYCLES - QUIET).astype(np.int32),
         "end_well": np.ones(last.shape, dtype=np.int8),
-        "end_is_final": np.zeros(last.shape, dtype=bool),
+        "end_is_final": np.zeros(last.shape, dtype=np.int8),  # as files hold it
         "status": status,
     }
     ds = xr.Dataset(

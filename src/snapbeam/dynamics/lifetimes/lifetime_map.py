@@ -210,7 +210,7 @@ def refit(
     good = np.isin(status, _REACHED)
     snapped = good & np.isfinite(last)
     # what ended early provably snaps no more
-    settled = runs["end_is_final"].values | (status == int(RunStatus.DECIDED))
+    settled = runs["end_is_final"].values.astype(bool) | (status == int(RunStatus.DECIDED))
     observed = cycles - survival.quiet
     lasting = snapped & ~settled & (last > observed)
     time = np.where(snapped, np.where(lasting, np.minimum(last, observed), last), np.nan)
