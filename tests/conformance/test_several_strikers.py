@@ -116,6 +116,13 @@ def test_mirrored() -> None:
     np.testing.assert_array_equal(one.dataset.displacement, -other.dataset.displacement)
     np.testing.assert_array_equal(one.dataset.striker_displacement, -other.dataset.striker_displacement)
     np.testing.assert_array_equal(one.dataset.striker_force, other.dataset.striker_force)
+    for name in (
+        "peak_force_striker_1",
+        "peak_force_striker_2",
+        "shaker_work_striker_1",
+        "impulse_striker_2",
+    ):
+        assert one.outcome[name] == other.outcome[name]
 
 
 @pytest.mark.slow
@@ -152,11 +159,14 @@ def test_order() -> None:
     assert math.log2(errors[0] / errors[1]) > 3.3, errors
 
 
-def test_swept_by_dotted_names() -> None:
-    """A map over the place and the gap of the second striker has the runs of its points."""
+def test_swept_by_dotted_names(tmp_path) -> None:
+    """A map over the place and the gap of the second striker has the runs of its points; its store is read again."""
     system = sb.System(model(3), paper.CONTACT, [FIRST, stop()])
     axes = {"striker_2.location": [0.3, 0.6], "striker_2.gap": [0.1 * LEVEL, 0.3 * LEVEL]}
-    swept = sb.sweep(system, axes, sb.Integration(cycles=5))
+    swept = sb.sweep(system, axes, sb.Integration(cycles=5), store=sb.Keeping(tmp_path / "store"))
+    read = sb.read_store(tmp_path / "store")
+    for name in ("response", "impacts_striker_1", "peak_force_striker_2"):
+        np.testing.assert_array_equal(read[name].transpose(*swept[name].dims), swept[name], err_msg=name)
     assert swept.sizes["location_striker_2"] == 2
     for i, location in enumerate(axes["striker_2.location"]):
         for j, gap in enumerate(axes["striker_2.gap"]):
@@ -165,6 +175,53 @@ def test_swept_by_dotted_names() -> None:
             there = swept.isel(location_striker_2=i, striker_gap_striker_2=j)
             assert int(there.impacts) == alone.impacts
             assert float(there.peak_force) == pytest.approx(alone.peak_force, rel=1e-12)
+            for name in ("impacts", "peak_force", "impulse", "shaker_work"):
+                for number in (1, 2):
+                    each = f"{name}_striker_{number}"
+                    assert there[each].item() == pytest.approx(alone[each], rel=1e-12), each
+    assert swept.peak_force_striker_2.attrs["units"] == "N"
+    assert swept.peak_force_striker_2.long_name == "peak contact force, striker 2"
+
+
+def test_statistics_of_each(tmp_path) -> None:
+    """Against the list of impacts and the samples of the run; together they are the whole; one striker has none."""
+    system = sb.System(model(3), paper.CONTACT, [FIRST, stop()])
+    run = sb.simulate(system, sb.Integration(cycles=5))
+    found, listed = run.outcome, run.impacts
+    assert found.impacts_striker_1 > 0 and found.impacts_striker_2 > 0
+    for number in (1, 2):
+        own = listed.isel(impact=listed.striker.values == number)
+        assert found[f"impacts_striker_{number}"] == own.sizes["impact"]
+        assert found[f"peak_force_striker_{number}"] == pytest.approx(float(own.peak_force.max()), rel=1e-12)
+        assert found[f"impulse_striker_{number}"] == pytest.approx(float(own.impulse.sum()), rel=1e-9)
+    run.save(tmp_path / "run.nc")
+    assert dict(sb.load_run(tmp_path / "run.nc").outcome) == pytest.approx(dict(found), nan_ok=True)
+    assert found.peak_force == max(found.peak_force_striker_1, found.peak_force_striker_2)
+    assert found.shaker_work_striker_2 == 0.0  # a stop that stands still does none
+    assert found.shaker_work_striker_1 == pytest.approx(found.shaker_work, rel=1e-12)
+    assert not any(
+        "_striker_" in name
+        for name in sb.simulate(sb.System(model(3), paper.CONTACT, FIRST), sb.Integration(cycles=2)).outcome
+    )
+
+
+@pytest.mark.slow
+def test_work_of_each() -> None:
+    """Of two that move: the force on the tip's motion, by the samples of the run."""
+    second = sb.Striker(
+        drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.05), location=0.3, side="above", gap=GAP
+    )
+    system = sb.System(model(1), paper.CONTACT, [FIRST, second])
+    length = model(1).length_scale
+    end = 3.0 / (1.21 * model(1).reference_freq)
+    times = np.linspace(0.0, end, 60_001) * (1.0 - 1e-13)
+    run = sb.simulate(system, sb.Integration(cycles=3), sample_times=times)
+    force = run.dataset.striker_force.values
+    for j, push in enumerate((1.0, -1.0)):
+        motion = push * length * run.dataset.striker_displacement.values[:, j]
+        work = float(np.sum(0.5 * (force[1:, j] + force[:-1, j]) * np.diff(motion)))
+        assert abs(work) > 0.0
+        assert run.outcome[f"shaker_work_striker_{j + 1}"] == pytest.approx(work, rel=2e-3)
 
 
 def test_refusals() -> None:

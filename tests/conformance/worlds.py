@@ -28,6 +28,8 @@ class World:
     beam: sb.Beam = paper.BEAM
     imperfection: sb.Imperfection | None = None
     modes: int = 3
+    fewest: int = 1
+    """Modes that it needs."""
     reference_freq: float | None = None
     own_kernel: bool = True
     """Whether no other quick test has a use for its kernel of many runs, which takes ten seconds to compile."""
@@ -183,7 +185,7 @@ WORLDS: dict[str, World] = {
     "a sphere": World(
         struck(sb.Flight(speed=0.4), mass=2e-3, gap=5e-5), {"drive.speed": (0.1, 2.0)} | PLACE, decides=False
     ),
-    "unequal wells": World(struck(sine()), SINE | PLACE, imperfection=UNEVEN, own_kernel=False),
+    "unequal wells": World(struck(sine()), SINE | PLACE, imperfection=UNEVEN, fewest=2, own_kernel=False),
     "a measured shape": World(struck(sine()), SINE | PLACE, imperfection=MEASURED, own_kernel=False),
     "other ends": World(struck(sine()), SINE | PLACE, beam=SPRUNG, own_kernel=False),
     "a given load": World(
@@ -234,6 +236,7 @@ WORLDS: dict[str, World] = {
         SINE | PLACE,
         beam=SPRUNG,
         imperfection=UNEVEN,
+        fewest=2,
     ),
 }  # fmt: skip
 """By name; a test proves that no kind of part and no parameter is missing."""

@@ -81,3 +81,21 @@ def test_what_does_not_repeat_is_refused(system, words):
         sb.lyapunov(system, periods=20, transient=5)
     with pytest.raises(sb.InputError, match="phase = 1"):
         Stroboscope(SHAKEN["base"], phase=1.0)
+
+
+def test_a_start_with_a_tip_of_its_own_keeps_all_parts():
+    """Holding the tip where the start says takes nothing else away: the base goes on moving, the load changing."""
+    start = sb.State(amplitude=MODEL.equilibrium, striker_position=-1.2 * MODEL.length_scale)
+    system = sb.System(MODEL, paper.CONTACT, STRIKER, start, base=BASE, axial=LOAD)
+    held = Stroboscope(system).system
+    assert held.base == BASE and held.axial == LOAD
+    assert np.isnan(held.start.striker_position) and held.get("striker.gap") > 0.0
+
+
+def test_several_strikers_are_refused_by_name():
+    """What is possible with them is said."""
+    stop = sb.Striker(drive=sb.Still(), location=0.3, side="above", gap=5e-5)
+    system = sb.System(MODEL, paper.CONTACT, [STRIKER, stop])
+    for ask in (Stroboscope, sb.lyapunov, sb.attractors, sb.advance):
+        with pytest.raises(sb.InputError, match="of several strikers ask for whole runs"):
+            ask(system)

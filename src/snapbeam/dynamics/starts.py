@@ -133,6 +133,11 @@ def held_in_space(system: System) -> System:
         For a recorded drive, whose periods differ.
     """
     striker = system.striker
+    if system.others:
+        raise InputError(
+            "striker: the tools of dynamics know where one striker stands and since when it touches; of several "
+            "strikers ask for whole runs, by simulate or a sweep"
+        )
     if system.harvester is not None:
         raise InputError(
             "harvester: has a state of its own, which the tools of dynamics do not carry; march such a system by "
@@ -157,7 +162,7 @@ def held_in_space(system: System) -> System:
     if start is None or np.isnan(start.striker_position).all():
         return held
     free = State(amplitude=start.amplitude, velocity=start.velocity, phase=start.phase)
-    return System(held.model, held.contact, held.striker, free)
+    return held.replace(start=free)
 
 
 def _require_common_period(system: System) -> None:

@@ -10,8 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import RunStatus
+from snapbeam.engines.each import rows_for
 from snapbeam.engines.ensemble import Ensemble
-from snapbeam.engines.outcomes import STATISTICS
+from snapbeam.engines.outcomes import (
+    OTHER_IMPACTS,
+    OTHER_IMPULSE,
+    OTHER_PEAK,
+    OTHER_WORK,
+)
 from snapbeam.model.decision import crossing_energy, decidable_energy, passed_heights
 
 __all__ = ["Reading", "statistics_of"]
@@ -81,9 +87,30 @@ class Reading:
         return np.where(self.good, self.book[column], np.nan)
 
     @property
+    def others(self) -> NDArray[np.float64]:
+        """What is kept of each striker beside the first, shape (runs, strikers, kinds)."""
+        if self.ensemble.others is None:
+            return np.zeros((self.book.size, 0, 4))
+        return np.asarray(self.book["others"])
+
+    def one(self, column: int, number: int) -> NDArray[np.float64]:
+        """A column of one of several strikers, the first being 1: its own is what the others leave of the whole."""
+        others = self.others[:, :, column]
+        if number > 1:
+            found = others[:, number - 2]
+        elif column == OTHER_PEAK:
+            found = self.book["peak_force"]
+        else:
+            whole = {OTHER_IMPACTS: "impacts", OTHER_IMPULSE: "total_impulse", OTHER_WORK: "work"}[column]
+            found = self.book[whole] - others.sum(axis=1)
+        return np.asarray(found if column == OTHER_IMPACTS else np.where(self.good, found, np.nan))
+
+    @property
     def peak_force(self) -> NDArray[np.float64]:
-        """Of the law's force; NaN where an impact lasts no time."""
+        """Of the law's force, the greatest of any striker; NaN where an impact lasts no time."""
         force = self.seen("peak_force")
+        if self.ensemble.others is not None:
+            return np.maximum(force, self.others[:, :, OTHER_PEAK].max(axis=1))
         if self.ensemble.law.impulsive:
             return np.where((force == 0.0) & (self.book["impacts"] > 0), np.nan, force)
         return force
@@ -125,7 +152,8 @@ def statistics_of(
     """
     reading = Reading(ensemble, books, ensemble.cycles if cycles is None else cycles)
     found = {}
-    for name, row in STATISTICS.items():
+    strikers = 1 if ensemble.others is None else 1 + len(ensemble.others.laws)
+    for name, row in rows_for(strikers).items():
         values = row.value(reading) if row.update is None else row.value(reading, books[f"own_{name}"])
         found[name] = np.asarray(values).astype(row.dtype)
     return found

@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BOOK",
+    "OTHER_IMPACTS",
+    "OTHER_IMPULSE",
+    "OTHER_PEAK",
+    "OTHER_WORK",
     "STATISTICS",
     "Passed",
     "Statistic",
@@ -95,6 +99,10 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("impulse", np.float64, 0.0),  # of the present contact
     ("decided_at", np.float64, math.nan),
 )
+
+
+OTHER_IMPACTS, OTHER_PEAK, OTHER_IMPULSE, OTHER_WORK = range(4)
+"""What is kept of each striker beside the first."""
 
 
 @dataclass(frozen=True)
@@ -343,9 +351,11 @@ def withdraw(name: str) -> None:
     del STATISTICS[name]
 
 
-def book_dtype() -> np.dtype[Any]:
-    """One record of what kernels keep of a run."""
-    fields = [(name, kind) for name, kind, _ in _KEPT]
+def book_dtype(others: int = 0) -> np.dtype[Any]:
+    """One record of what kernels keep of a run, with *others* strikers beside the first."""
+    # first, so that Numba does not take the record for one of the kind without
+    fields: list[Any] = [("others", np.float64, (others, OTHER_WORK + 1))] if others else []
+    fields += [(name, kind) for name, kind, _ in _KEPT]
     fields += [(f"own_{row.name}", np.float64) for row in updated()]
     return np.dtype(fields, align=True)
 
@@ -354,9 +364,9 @@ BOOK = book_dtype()
 """Of the package's own statistics."""
 
 
-def empty_books(runs: int) -> Any:
-    """Books of runs that have not begun."""
-    books = np.zeros(runs, dtype=book_dtype())
+def empty_books(runs: int, others: int = 0) -> Any:
+    """Books of runs that have not begun, with *others* strikers beside the first."""
+    books = np.zeros(runs, dtype=book_dtype(others))
     for name, _, start in _KEPT:
         books[name] = start
     for row in updated():

@@ -54,6 +54,7 @@ __all__ = [
     "si5",
     "switch",
     "transients",
+    "two_tips",
     "waveforms",
     "windows",
 ]
@@ -83,6 +84,7 @@ disturbances = Recipe(
 harvesting = Recipe(
     "harvesting", "power of a harvester by impact, and its share at high frequencies", "studies"
 )
+two_tips = Recipe("two_tips", "how high a slow pusher with one tip or two is when the beam snaps", "studies")
 switch = Recipe("switch", "the cheapest burst that switches a beam with a bias", "studies")
 notch = Recipe("notch", "how far each thing left out of the model moves the notch of fig6", "studies")
 sensitivity = Recipe("sensitivity", "how the map changes with what the paper leaves open", "studies")
@@ -92,7 +94,7 @@ FIGURES: dict[str, Recipe] = {
     for recipe in (
         fig2, fig3, fig4, fig5, fig6, fig7, fig8, figA9, figB10, si5,
         low_frequency, resonance, waveforms, transients, lifetimes, windows, disturbances, sensitivity,
-        notch, switch, harvesting,
+        notch, two_tips, switch, harvesting,
     )
 }  # fmt: skip
 """Every recipe by name: the figures of the paper, its fifth video, and those that its claims need beside."""

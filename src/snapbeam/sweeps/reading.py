@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from snapbeam.core.validate import InputError, InputTypeError, file_path, shown
-from snapbeam.engines.outcomes import STATISTICS
+from snapbeam.engines.each import rows_for
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
@@ -93,7 +93,8 @@ def _work(described: dict[str, Any], name: str, done: dict[int, Record]) -> Poin
     counted.  Stores of earlier versions do not say it: there the hash of a finished task tells.
     """
     held, chunk = described["parameters"], int(described["chunk"])
-    if held.get("statistics") != list(STATISTICS):
+    strikers = sum(section.split("_")[0] == "striker" for section in held["system"])
+    if held.get("statistics") != list(rows_for(strikers)):
         raise InputError(f"store = {shown(name)}: was written with other statistics than this version has")
     axes = {axis: values for axis, values in held["points"].items() if isinstance(values, list)}
     if len(axes) < len(held["points"]) or not axes:

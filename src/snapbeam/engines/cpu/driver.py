@@ -237,7 +237,7 @@ def _spread_over(
     """Hand the runs to threads, in chunks; *arguments* are those of *march*, whose memory is a thread's own."""
     size = packed.layout.size
     kept = Kept(
-        empty_books(ensemble.size),
+        empty_books(ensemble.size, _beside(ensemble)),
         np.empty((ensemble.size, landings, 2 * size)),
         np.empty((ensemble.size, landings, 2), dtype=np.int64),
         np.zeros(1, dtype=np.int64),
@@ -295,6 +295,11 @@ def _buffers(ensemble: Ensemble, times: _Array, size: int) -> _Buffers:
     return _Buffers(samples, 4096, most + 1)
 
 
+def _beside(ensemble: Ensemble) -> int:
+    """How many strikers there are beside the first."""
+    return 0 if ensemble.others is None else len(ensemble.others.laws)
+
+
 def _impact_rows(ensemble: Ensemble, buffers: _Buffers) -> _Array:
     """Room for impacts, the first striker's number in each row if there are several."""
     return np.ones((buffers.impacts + MOST_STRIKERS, 4 if ensemble.others is None else 5))
@@ -319,7 +324,7 @@ def record(
     """
     packed = _packed(ensemble)
     size, march = packed.layout.size, _kernel(march_one, ensemble)
-    memory, books = lay_out(ensemble, packed), empty_books(1)
+    memory, books = lay_out(ensemble, packed), empty_books(1, _beside(ensemble))
     asked, room = _asked(ensemble, packed, memory), _room(ensemble)
     buffers = _buffers(ensemble, times, size)
     aside = np.zeros(MARKS, dtype=np.int64), np.zeros(REALS)

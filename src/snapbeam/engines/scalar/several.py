@@ -26,7 +26,7 @@ OFFSET, REST, SIGN, SPEED = 0, 1, 2, 3
 # as they stand
 HERE, TOUCHING, ONSET, SAFE, DEPTH, RATE, DEEPEST, PUSHED = 4, 5, 6, 7, 8, 9, 10, 11
 # of the step at hand
-DEPTH1, RATE1, CUT, FORCE, IMPULSE, WORK, GROSS, KEPT = 12, 13, 14, 15, 16, 17, 18, 19
+DEPTH1, RATE1, CUT, FORCE, IMPULSE, WORK, GROSS, KEPT, WORKED = 12, 13, 14, 15, 16, 17, 18, 19, 20
 LAW = 24
 """The law's numbers follow from there on."""
 

@@ -95,7 +95,8 @@ def _resistor(ax: Axes, at: float, edge: float, sign: float, words: str, apart: 
     ax.plot(at - 0.32 + 0.64 * share, top + 0.28 * sign + 0.06 * swing, color=_COLOR, linewidth=0.9)
     for side in (-1.0, 1.0):
         ax.plot([at + side * 0.32] * 2, [top, top + 0.28 * sign], color=_COLOR, linewidth=0.7)
-    ax.text(at + 0.45, top + 0.2 * sign, words, ha="left", va="center", color=_COLOR)
+    # over the resistor, clear of the shape of the other well
+    ax.text(at, top + 0.58 * sign, words, ha="center", va="center", color=_COLOR)
 
 
 def _ohms(value: float) -> str:

@@ -192,11 +192,15 @@ def draw(results: Results) -> Figure:
         for row, name in enumerate(order):
             at, low, high = where[name]
             color = BEAM_COLOR if name == BASE else SHAKER_COLOR
+            if not np.isfinite(at):
+                right.text(base, row, " none", fontsize=6, va="center", color=color)
+                continue
             right.plot([low, high], [row, row], color=color, linewidth=1.0)
             right.plot([at], [row], "o", color=color, markersize=3)
         right.axvline(MEASURED, color="0.4", linewidth=0.6, dashes=(4, 2))
         right.axvline(base, color=BEAM_COLOR, linewidth=0.6, dashes=(1, 2))
         right.set(yticks=range(len(order)), yticklabels=order, xlabel=r"Notch $\Omega$", xlim=WINDOW)
+        right.set_ylim(-0.7, len(order) - 0.3)
         right.tick_params(axis="y", labelsize=6, length=0)
         fix_ticks(left)
         panel_letters([left, right])

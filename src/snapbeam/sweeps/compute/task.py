@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass, RunStatus
 from snapbeam.core.provenance import array_hash, canonical_json, parameter_hash
-from snapbeam.engines.outcomes import STATISTICS
+from snapbeam.engines.each import rows_for
+from snapbeam.engines.outcomes import Statistic
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.runs.save import code_flags
@@ -53,9 +54,14 @@ class PointWork:
     replicas: Replicas | None = None
 
     @cached_property
+    def statistics(self) -> dict[str, Statistic]:
+        """The table's rows, with those of each of several strikers."""
+        return rows_for(1 + len(self.setup.system.others))
+
+    @cached_property
     def integers(self) -> tuple[str, ...]:
         """Names of the columns of whole numbers."""
-        names = [name for name, row in STATISTICS.items() if row.dtype != "float64"]
+        names = [name for name, row in self.statistics.items() if row.dtype != "float64"]
         if self.replicas is not None:
             names += [*_COUNTS, _HALVED] if self.replicas.halve_step else _COUNTS
         return tuple(names)
@@ -63,7 +69,7 @@ class PointWork:
     @cached_property
     def numbers(self) -> tuple[str, ...]:
         """Names of the columns of real numbers."""
-        return tuple(name for name, row in STATISTICS.items() if row.dtype == "float64")
+        return tuple(name for name, row in self.statistics.items() if row.dtype == "float64")
 
     @property
     def runs_per_point(self) -> int:
@@ -73,7 +79,7 @@ class PointWork:
     @cached_property
     def parameters(self) -> dict[str, Any]:
         """Everything the numbers depend on, plain: what two maps must share to be one."""
-        found = self.setup.identity() | {"statistics": list(STATISTICS)}
+        found = self.setup.identity() | {"statistics": list(self.statistics)}
         if self.replicas is not None:
             found["replicas"] = {
                 "count": self.replicas.count,
@@ -147,7 +153,9 @@ class PointWork:
 
     def variables(self) -> dict[str, tuple[str, bool, dict[str, Any]]]:
         """Kind, whether there is one value a class, and attributes of each variable of the map."""
-        variables = {name: (row.dtype, False, variable_attributes(name)) for name, row in STATISTICS.items()}
+        variables = {
+            name: (row.dtype, False, variable_attributes(name)) for name, row in self.statistics.items()
+        }
         if self.replicas is not None:
             labels = {"units": "1", "long_name": "share of the runs of a point, by response class"}
             variables["class_share"] = ("float64", True, labels)

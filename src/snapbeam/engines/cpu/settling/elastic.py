@@ -235,7 +235,7 @@ def settle(memory, blocks, place, run, now, step, done, room, book, asked, outpu
         book.work += done.work
         book.gross_work += done.gross
         book.lost += done.lost
-    count_others(layout.others, touching, done, book)
+    count_others(memory, layout.others, touching, done, book)
     count_given(layout.forced, book, done.given)
     count_circuit(memory, layout, layout.circuit, step.p1, book, done.tap)
     if outputs is not None:

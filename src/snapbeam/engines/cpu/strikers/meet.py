@@ -12,6 +12,7 @@ from snapbeam.engines.cpu.dot import dot
 from snapbeam.engines.cpu.rows import flow_coefficients, glide, speed_bound
 from snapbeam.engines.cpu.strikers.force import block, penetration_of, put_others
 from snapbeam.engines.cpu.world.forced import extra_speed
+from snapbeam.engines.outcomes import OTHER_IMPACTS, OTHER_IMPULSE, OTHER_PEAK, OTHER_WORK
 from snapbeam.engines.scalar.compile import called, inlined
 from snapbeam.engines.scalar.decisions import TRUST, Seen, contact_level, entry_again, safe_for
 from snapbeam.engines.scalar.lanes import WIDTH, lanes_sum, load
@@ -33,6 +34,8 @@ from snapbeam.engines.scalar.several import (
     SIGN,
     SPEED,
     TOUCHING,
+    WORK,
+    WORKED,
     count_of,
     force_of,
     motion_of,
@@ -242,14 +245,16 @@ def keep_others(memory, others):
         return
     for j in range(count_of(others.kinds)):
         at = block(others, j)
-        memory[at + KEPT] = memory[at + IMPULSE]
+        memory[at + KEPT], memory[at + WORKED] = memory[at + IMPULSE], memory[at + WORK]
 
 
 @inlined
-def count_others(others, touching, done, book):
-    """Enter the work of the others in the statistics, of a step in which the first does not touch."""
+def count_others(memory, others, touching, done, book):
+    """Enter the work of each of the others in the statistics, and of all if the first does not touch."""
     if others is None:
         return
+    for j in range(count_of(others.kinds)):
+        book.others[j, OTHER_WORK] += memory[block(others, j) + WORKED]
     if not touching:
         book.work += done.work
         book.gross_work += done.gross
@@ -266,8 +271,10 @@ def _leave(memory, others, j, book, outputs, t, tick):
         _write_impact(outputs, book, onset * tick, duration, force, pushed, j)
         book.impacts += 1
         book.contact_time += duration
-        book.peak_force = max(book.peak_force, force)
+        book.others[j, OTHER_IMPACTS] += 1.0
+        book.others[j, OTHER_PEAK] = max(book.others[j, OTHER_PEAK], force)
     book.total_impulse += memory[at + PUSHED]
+    book.others[j, OTHER_IMPULSE] += memory[at + PUSHED]
     memory[at + TOUCHING], memory[at + DEEPEST], memory[at + PUSHED] = 0.0, 0.0, 0.0
 
 
