@@ -92,14 +92,15 @@ class Page:
         self._system: SystemCard | None = None
         self.layout = framed(self)
         self._version = shared.source.version
-        if shared.source.growing and self.doc is not None:
-            self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
         self._begin()
         pn.state.onload(self._stands)
 
     def _stands(self) -> None:
         """The map is on the screen: now for the rest."""
         self.card.control.wake()
+        if self.shared.source.growing and self.doc is not None:
+            self._look_for_more()
+            self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
         with self._together():
             self.runs[0].stand()
         self.later(self._at_rest, _AFTER)

@@ -9,7 +9,7 @@ from typing import Any
 from bokeh.server.contexts import ApplicationContext
 from bokeh.util.token import generate_jwt_token, generate_session_id
 from panel.io.server import DocHandler
-from tornado.httputil import HTTPServerRequest
+from tornado.httputil import HTTPHeaders, HTTPServerRequest, RequestStartLine
 from tornado.ioloop import IOLoop
 
 from snapbeam.explorer.limits import SESSIONS
@@ -26,6 +26,8 @@ _FRESH = 240.0
 """Seconds for which a page can be given away: the token that leads to it is good for 300."""
 _TAKEN = 60.0
 """Seconds that a browser has to connect to the page that it was given."""
+_LOOK = 2.0
+"""Seconds between two looks whether it has."""
 
 
 class Ready:
@@ -57,8 +59,15 @@ class Ready:
         if self._held is None or self._held[0] != self._theme or time.monotonic() - self._held[1] > _FRESH:
             return None
         session, self._held = self._held[2], None
-        self._loop.call_later(_TAKEN, session.unblock_expiration)
+        self._loop.call_later(_LOOK, self._settled, session, time.monotonic() + _TAKEN)
         return session
+
+    def _settled(self, session: Any, until: float) -> None:
+        """Let a session end as any other does, once a browser is connected to it or none has come."""
+        if session.connection_count > 0 or time.monotonic() > until:
+            session.unblock_expiration()
+        else:
+            self._loop.call_later(_LOOK, self._settled, session, until)
 
     async def _again(self) -> None:
         """Make the next one, when nobody is kept waiting by that."""
@@ -77,7 +86,8 @@ class Ready:
         arguments = {"theme": [self._theme.encode()]} if self._theme else {}
         asked = {"headers": {}, "cookies": {}, "arguments": arguments}
         token = generate_jwt_token(name, secret_key=None, signed=False, extra_payload=asked)
-        request = HTTPServerRequest(method="GET", uri="/")
+        line, headers = RequestStartLine("GET", "/", "HTTP/1.1"), HTTPHeaders({"Host": "127.0.0.1"})
+        request = HTTPServerRequest(start_line=line, headers=headers)
         try:
             session = await self._context.create_session_if_needed(name, request, token)
         except Exception as error:  # whoever comes is told by the page that is made for them
