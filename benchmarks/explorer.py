@@ -153,6 +153,7 @@ def _clicks(browser: Any, url: str, dataset: Any, clicks: int, pause: float) -> 
     page.set_default_timeout(600_000.0)  # of a peer that takes its time
     page.goto(url)
     page.wait_for_function(_STAND)
+    page.wait_for_function("() => Bokeh.documents[0].get_model_by_name('waveform')")
     page.evaluate(_WATCH)
     rng, times = np.random.default_rng(1), []
     x, y = dataset["frequency_ratio"].values, dataset["velocity_amplitude"].values

@@ -12,6 +12,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 from snapbeam.core.validate import InputError, shown
@@ -150,6 +151,12 @@ def _of_class(section: str, kind: type) -> Iterable[Parameter]:
 
 def parameters() -> dict[str, Parameter]:
     """Every parameter by its dotted name, those of registered laws and drives included."""
+    return dict(_table(tuple(tuple(known.items()) for known in (LAWS, DRIVES, LOADS, HARVESTERS))))
+
+
+@lru_cache(maxsize=4)
+def _table(registered: tuple[tuple[tuple[str, type], ...], ...]) -> dict[str, Parameter]:
+    """The table while what is *registered* stays as it is."""
     table: dict[str, Parameter] = {}
     for row in _rows():
         if row.name in table:

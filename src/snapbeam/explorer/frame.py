@@ -42,13 +42,35 @@ document.addEventListener('keydown', (event) => {
   const path = event.composedPath();
   const owns = (e) => ['INPUT', 'SELECT', 'TEXTAREA'].includes(e.tagName)
     || ['slider', 'tab', 'grid'].includes(e.getAttribute('role'))
-    || e.classList.contains('slick-viewport') || e.classList.contains('noUi-handle');
+    || e.classList.contains('bk-tab') || e.classList.contains('slick-viewport') || e.classList.contains('noUi-handle');
   const typing = path.some((e) => e instanceof Element && owns(e));
   if (typing) { return; }
   event.preventDefault();
   keys.data = {key: [event.key], count: [keys.data.count[0] + 1]};
 });
 """
+_TABS = """
+document.addEventListener('keydown', (event) => {
+  const tab = event.composedPath()[0];
+  if (!(tab instanceof Element) || !tab.classList.contains('bk-tab')) { return; }
+  if (event.key === 'Enter' || event.key === ' ') { event.preventDefault(); tab.click(); }
+  const next = {ArrowLeft: tab.previousElementSibling, ArrowRight: tab.nextElementSibling}[event.key];
+  if (next && next.classList.contains('bk-tab')) { event.preventDefault(); next.focus(); next.click(); }
+});
+"""
+_FOCUS = """
+const framed = (event, style) => {
+  const plot = event.composedPath().find((e) => e instanceof HTMLElement && e.classList.contains('bk-events'));
+  if (plot) { plot.style.outline = style; plot.style.outlineOffset = '-2px'; }
+};
+document.addEventListener('keyup', (event) => {
+  if (event.key !== 'Tab') { return; }
+  framed(event, '2px solid ' + getComputedStyle(document.documentElement).getPropertyValue('--sb-accent'));
+});
+document.addEventListener('pointerdown', (event) => framed(event, 'none'), true);
+document.addEventListener('keydown', (event) => { if (event.key === 'Tab') { framed(event, 'none'); } }, true);
+"""
+"""Plots lie where no sheet of the page reaches; one that was clicked needs no frame."""
 _TOO_LARGE = """
 document.addEventListener('input', (event) => {
   const field = event.composedPath()[0];
@@ -120,6 +142,8 @@ def framed(page: Page) -> Any:
     page.bar.js_on_change("data", CustomJS(args={"bar": page.bar}, code=_ADDRESS))
     if doc is not None:
         doc.js_on_event(DocumentReady, CustomJS(args={"keys": page.keys}, code=_KEYS))
+        doc.js_on_event(DocumentReady, CustomJS(code=_TABS))
+        doc.js_on_event(DocumentReady, CustomJS(code=_FOCUS))
         large = CustomJS(args={"refused": page.refused}, code=_TOO_LARGE % UPLOAD)
         doc.js_on_event(DocumentReady, large)
         doc.js_on_event(ConnectionLost, CustomJS(code=_GONE))

@@ -17,8 +17,8 @@ from snapbeam import ResponseClass
 from snapbeam.figures import CLASS_COLORS
 
 __all__ = [
-    "DARK", "LIGHT", "Look", "blend", "class_chip", "colors_of", "columns", "figure", "fit", "inner_size", "legend",
-    "look_of", "sequential", "sheet", "styled",
+    "DARK", "LIGHT", "Look", "blend", "class_chip", "colors_of", "columns", "figure", "fit", "focused", "inner_size",
+    "legend", "look_of", "sequential", "sheet", "styled",
 ]  # fmt: skip
 
 
@@ -85,6 +85,11 @@ def sheet(look: Look) -> str:
     )
 
 
+def focused(look: Look) -> str:
+    """How what has the keyboard's focus is told, where the page's sheet does not reach."""
+    return f":focus-visible {{ outline: 2px solid {look.accent} !important; outline-offset: -2px; }}"
+
+
 def styled(item: Any, look: Look) -> None:
     """Give a part of the page, and all that is in it, the page's style sheet."""
     style = sheet(look)
@@ -116,6 +121,7 @@ def figure(look: Look, **options: Any) -> Any:
         axis.axis_line_color = axis.major_tick_line_color = look.faint
         axis.minor_tick_line_color = None
     plot.grid.grid_line_color = look.grid
+    plot.stylesheets = plot.toolbar.stylesheets = [focused(look)]
     plot.toolbar.logo = None
     plot.toolbar.autohide = False
     plot.title.text_color = look.text

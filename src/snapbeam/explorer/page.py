@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import html
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -36,6 +37,12 @@ _AFTER = 700
 """Milliseconds from the first picture of the page to the building of views that are not seen yet."""
 _QUICK = 4000
 """Samples of a run that is shown at once; all others follow."""
+_PATIENT = 150
+"""Milliseconds after which a run that is still computed is said to be."""
+_SENT = 40
+"""Milliseconds that what was drawn needs to be on its way to the browser."""
+_LONGEST = 1.0
+"""Seconds for which the rest of a run waits until its first look has been sent."""
 
 
 class Page:
@@ -85,10 +92,18 @@ class Page:
         self._system: SystemCard | None = None
         self.layout = framed(self)
         self._version = shared.source.version
-        if shared.source.growing and self.doc is not None:
-            self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
         self._begin()
-        pn.state.onload(lambda: self.later(self._at_rest, _AFTER))
+        pn.state.onload(self._stands)
+
+    def _stands(self) -> None:
+        """The map is on the screen: now for the rest."""
+        self.card.control.wake()
+        if self.shared.source.growing and self.doc is not None:
+            self._look_for_more()
+            self.doc.add_periodic_callback(self._look_for_more, _GROWTH)
+        with self._together():
+            self.runs[0].stand()
+        self.later(self._at_rest, _AFTER)
 
     def _at_rest(self) -> None:
         """Once the page stands: what is not seen yet, and what the first run will need."""
@@ -121,15 +136,27 @@ class Page:
 
         def guarded() -> None:
             if not self.closed:
-                work()
+                with self._together():
+                    work()
 
         with contextlib.suppress(Exception):  # the page was closed between the two lines
             self.doc.add_next_tick_callback(guarded)
 
     def later(self, work: Callable[[], None], milliseconds: int) -> None:
         """Do something a little later."""
+
+        def guarded() -> None:
+            if not self.closed:
+                with self._together():
+                    work()
+
         if not self.closed and self.doc is not None:
-            self.doc.add_timeout_callback(lambda: None if self.closed else work(), milliseconds)
+            self.doc.add_timeout_callback(guarded, milliseconds)
+
+    def _together(self) -> contextlib.AbstractContextManager[None]:
+        """What changes within is told to the browser at once, and drawn once."""
+        held: contextlib.AbstractContextManager[None] = pn.io.hold(self.doc)
+        return held
 
     def close(self) -> None:
         """The tab is closed: compute nothing for it any more."""
@@ -196,8 +223,8 @@ class Page:
         """Compute the run of a point; what was asked for before is not wanted any more."""
         which = self.which
         view, words = self.runs[which], point.words()
-        self._fill_fields(point)
         if self.card.system is None:
+            self._fill_fields(point)
             view.fail(self.shared.why_not)
             return
         before = self._tokens[which]
@@ -205,9 +232,7 @@ class Page:
             before.cancel()
         self._tokens[which] = token = Token(RUN_SECONDS)
         self.points[which] = point
-        self._mark()
-        view.begin(words)
-        self.waiting.begin(which, lambda seconds, why: view.wait(words, seconds, why))
+        self.shared.asked()
         base, how = self.card.system, self.card.integration
 
         def work(token: Token) -> tuple[Run, str, bool, str]:
@@ -216,8 +241,14 @@ class Page:
         def done(found: tuple[Run, str, bool, str] | None, error: str) -> None:
             self.post(lambda: self._done(which, point, token, found, error))
 
-        self.shared.jobs.run(work, done, token)
-        self._write_address()
+        self.shared.jobs.run(work, done, token)  # what follows is said while it is computed
+        view.notes = {}
+        mark = self.waiting.begin(which, lambda seconds, why: view.wait(words, seconds, why))
+        self.later(lambda: view.begin(words) if self.waiting.waits(which, mark) else None, _PATIENT)
+        with self._together():
+            self._fill_fields(point)
+            self._mark()
+            self._write_address()
 
     def _computed(
         self, which: int, point: Point, base: Any, how: Any, token: Token
@@ -227,7 +258,9 @@ class Page:
         check_run(system, integration)
         quick = self._quick(system, integration, token)
         if quick is not None:
-            self.post(lambda: self._look(which, point, token, quick))
+            sent = threading.Event()
+            self.post(lambda: self._look(which, point, token, quick, sent))
+            sent.wait(_LONGEST)  # Python does one thing at a time
         count = samples_of(system, integration)
         times = None if count is None else _even_times(system, integration, count)
         run = sb.simulate(system, integration, sample_times=times, progress=token.check)
@@ -243,17 +276,22 @@ class Page:
         return run, words, same, chances
 
     def _quick(self, system: Any, integration: Any, token: Token) -> Run | None:
+        """The run at a few instants, all that its pictures need made; None where those instants cannot be known."""
         if system.striker is None or not system.striker.drive.harmonic or integration.early_decision:
             return None
         run = sb.simulate(
             system, integration, sample_times=_even_times(system, integration, _QUICK), progress=token.check
         )
-        return run if run.outcome.status is RunStatus.OK else None
+        if run.outcome.status is not RunStatus.OK:
+            return None
+        _ = run.dataset  # made here and not on the page's thread, which others wait for
+        return run
 
-    def _look(self, which: int, point: Point, token: Token, run: Run) -> None:
+    def _look(self, which: int, point: Point, token: Token, run: Run, sent: threading.Event) -> None:
         if not token.cancelled and self.points[which] is point:
             self.waiting.end(which)
             self.runs[which].show(run, point.words(), fresh=True)
+        self.later(sent.set, _SENT)
 
     def _done(
         self, which: int, point: Point, token: Token, found: tuple[Run, str, bool, str] | None, error: str

@@ -62,8 +62,8 @@ class Waiting:
         self._heard, self._later = heard, later
         self._asked: dict[int, object] = {}
 
-    def begin(self, which: int, tell: Callable[[float, str], None]) -> None:
-        """Call ``tell(seconds, words)`` every second until *which* ends, or begins anew."""
+    def begin(self, which: int, tell: Callable[[float, str], None]) -> object:
+        """Call ``tell(seconds, words)`` every second until *which* ends, or begins anew; returns what stands for it."""
         begun, mark = time.monotonic(), object()
         self._asked[which] = mark
 
@@ -73,6 +73,11 @@ class Waiting:
                 self._later(look, _AGAIN)
 
         self._later(look, _FIRST)
+        return mark
+
+    def waits(self, which: int, mark: object) -> bool:
+        """Whether the wait that :meth:`begin` gave *mark* for goes on."""
+        return self._asked.get(which) is mark
 
     def end(self, which: int, computed: bool = True) -> None:
         """There is something to see, or, if nothing was *computed*, no more to wait for."""

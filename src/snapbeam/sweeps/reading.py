@@ -17,8 +17,9 @@ from snapbeam.model.system import System
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Stage
 from snapbeam.sweeps.export import to_dataset
+from snapbeam.sweeps.keep.description import read_description
+from snapbeam.sweeps.keep.growth import BASE, layers_of
 from snapbeam.sweeps.keep.ledger import Ledger, Record
-from snapbeam.sweeps.keep.store import _read_description
 from snapbeam.sweeps.points import Grid
 from snapbeam.sweeps.replicas import Replicas
 from snapbeam.sweeps.setup import SweepSetup
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["read_store"]
 
-_STAGE = "base"
 _TABLES = ("integers", "numbers")
 
 
@@ -62,17 +62,19 @@ def read_store(store: str | os.PathLike[str]) -> xr.Dataset:
     file = folder / "map.json"
     if file.is_symlink() or not file.is_file():
         raise InputError(f"store = {str(store)!r}: holds no map")
-    held = _read_description(file)
+    held = read_description(file)
     ledger = Ledger(folder / "ledger.jsonl")
-    done = {
-        task: record
-        for (stage, task), record in ledger.records.items()
-        if stage == _STAGE and record.state == "done"
-    }
-    work = _work(held, str(store), done)
-    stage = Stage(_STAGE, work.setup.points, int(held["chunk"]))
-    table, points = _rows(folder, work, stage, done)
-    attrs = work.setup.attributes(more={"points_done": points, "points_total": stage.size})
+    done: dict[str, dict[int, Record]] = {}
+    for (name, task), record in ledger.records.items():
+        if record.state == "done":
+            done.setdefault(name, {})[task] = record
+    work = _work(held, str(store), {} if "grown" in held else done.get(BASE, {}))
+    table, points = work.unfinished(work.setup.points.size), 0
+    for layer in layers_of(work, held.get("grown", []), int(held["chunk"])):
+        part, count = _rows(folder, layer.work, layer.stage, done.get(layer.stage.name, {}))
+        points += count
+        table.integers[layer.places], table.numbers[layer.places] = part.integers, part.numbers
+    attrs = work.setup.attributes(more={"points_done": points, "points_total": work.setup.points.size})
     return to_dataset(work, work.setup.points, _Table(table), attrs)
 
 
@@ -117,10 +119,7 @@ def _work(described: dict[str, Any], name: str, done: dict[int, Record]) -> Poin
     for order in orders:
         points = Grid({axis: np.array(axes[axis]) for axis in order})
         work = PointWork(SweepSetup(system, integration, points), repeats)
-        if (
-            record is None
-            or work.task_hash(Stage(_STAGE, points, chunk).columns(number)) == record.parameters
-        ):
+        if record is None or work.task_hash(Stage(BASE, points, chunk).columns(number)) == record.parameters:
             return work
     raise InputError(
         f"store = {shown(name)}: its tasks are not those of its description, or of another version"
@@ -139,7 +138,7 @@ def _rows(folder: Path, work: PointWork, stage: Stage, done: dict[int, Record]) 
         raise InputError("zarr is needed to read a store: install snapbeam[cluster]") from error
     try:
         arrays = [
-            zarr.open_array(folder / "runs.zarr", path=f"{_STAGE}/{name}", mode="r") for name in _TABLES
+            zarr.open_array(folder / "runs.zarr", path=f"{stage.name}/{name}", mode="r") for name in _TABLES
         ]
     except (OSError, ValueError, KeyError):  # it is just being made
         return found, points

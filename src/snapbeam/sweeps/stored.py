@@ -20,6 +20,7 @@ from snapbeam.sweeps.compute.tasks import Keeper, MemoryKeeper, Rows, Stage
 from snapbeam.sweeps.compute.workers import ClusterWorkers, Failure, HereWorkers, Workers
 from snapbeam.sweeps.errors import StoreError
 from snapbeam.sweeps.export import to_dataset, to_netcdf
+from snapbeam.sweeps.keep.growth import BASE, snapped
 from snapbeam.sweeps.keep.store import MapStore
 from snapbeam.sweeps.points import Points
 from snapbeam.sweeps.refine import MAX_LEVELS, RefinedRows, refine
@@ -119,7 +120,19 @@ class StoreKeeper:
         self.only_damaged = keeping.verify
 
     def complete(self, stage: Stage, progress: Progress | None = None) -> Rows:
-        """Compute the tasks of a stage that are not done, committing each."""
+        """Compute the tasks of a stage that are not done, committing each; of a store that has grown, of each layer."""
+        layers = [layer.stage for layer in self.store.layers] if stage.name == BASE else []
+        stages = layers or [stage]
+        missing = sum(
+            [self._complete(each, progress) for each in stages]
+        )  # each of them, whatever is missing
+        if missing:
+            self.tally.missing = missing
+            raise _Incomplete
+        return self.store.reader(stage)
+
+    def _complete(self, stage: Stage, progress: Progress | None) -> int:
+        """Complete one stage; how many of its tasks are missing, if only damaged ones are computed."""
         store, tally = self.store, self.tally
         store.open_stage(stage)
         damaged, pending = store.damaged_in(stage), store.pending(stage)
@@ -155,10 +168,7 @@ class StoreKeeper:
                 tally.runs += sizes[task] * self.work.runs_per_point
             done += sizes[task]
             report(0)
-        if self.only_damaged and (missing := len(store.pending(stage))):
-            tally.missing = missing
-            raise _Incomplete
-        return store.reader(stage)
+        return len(store.pending(stage)) if self.only_damaged else 0
 
 
 def compute_sweep(
@@ -182,6 +192,9 @@ def compute_sweep(
     if keeping.path is None and asked is not None:
         raise InputError("cluster: needs a store")
     _require_room(setup.points.size, keeping)
+    setup, words = snapped(setup, keeping.path)
+    if words and keeping.note is not None:
+        keeping.note(words)
     work = PointWork(setup, replicas)
     with _keeper(work, keeping, asked) as keeper:
         points, rows = _computed(keeper, levels, progress)
@@ -203,7 +216,7 @@ def _require_room(points: int, keeping: Keeping) -> None:
 
 def _computed(keeper: Keeper, levels: int, progress: Progress | None) -> tuple[Points, Rows]:
     points = keeper.work.setup.points
-    base = Stage("base", points, keeper.chunk)
+    base = Stage(BASE, points, keeper.chunk)
     try:
         return refine(keeper, levels, progress) if levels else (points, keeper.complete(base, progress))
     except _Incomplete:
@@ -217,7 +230,8 @@ def _keeper(work: PointWork, keeping: Keeping, cluster: Cluster | None) -> Itera
     if keeping.path is None:
         yield MemoryKeeper(work, threads)
         return
-    with MapStore(Path(keeping.path), work, keeping.chunk, keeping.config) as kept:
+    path, grow = Path(keeping.path), not keeping.verify
+    with MapStore(path, work, keeping.chunk, keeping.config, grow=grow) as kept:
         if cluster is None:
             yield StoreKeeper(kept, HereWorkers(threads), keeping)
             return

@@ -35,7 +35,7 @@ StoreOption = Annotated[
     Path | None,
     typer.Option(
         "--store",
-        help="Folder to keep the map in while it is computed; one that exists is resumed.",
+        help="Folder to keep the map in while it is computed; one that exists is resumed, and grows with longer axes.",
         rich_help_panel=_LONG,
         metavar="DIR",
     ),
@@ -142,7 +142,7 @@ def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config)
     """
     from snapbeam.config import config_from_mapping, override
     from snapbeam.core.validate import InputError
-    from snapbeam.sweeps.keep.store import read_stored_config
+    from snapbeam.sweeps.keep.description import read_stored_config
 
     if keeping["store"] is None:
         return settings

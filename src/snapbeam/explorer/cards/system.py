@@ -146,8 +146,7 @@ class SystemCard:
         elif row.quantity.kind is bool:
             field = pn.widgets.Select(options={"no": False, "yes": True}, value=bool(value), **common)
         else:
-            text = "" if value is None else repr(value) if isinstance(value, (int, float)) else str(value)
-            field = pn.widgets.TextInput(value=text, placeholder=row.limits, **common)
+            field = pn.widgets.TextInput(value=_text(value), placeholder=row.limits, **common)
         self.fields[row.name] = field
         return field
 
@@ -279,3 +278,11 @@ def changed_parameters(
         if one[name] != value and name not in ("engine",) and not cycles:
             found[f"run.{name}"] = value
     return found
+
+
+def _text(value: Any) -> str:
+    """A value as a field holds it: a number as short as it can be and be the same when it is read."""
+    if isinstance(value, float):
+        short = f"{value:.6g}"
+        return short if float(short) == value else repr(value)
+    return "" if value is None else str(value)

@@ -45,10 +45,10 @@ class TakeCard:
         self.text = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["take-text"])
         self.kind = pn.widgets.RadioButtonGroup(options=["png", "pdf", "svg"], value="png")
         self.slow = pn.widgets.FloatInput(
-            name="slow motion at the hardest impact (s)", value=4.0, start=0.0, end=30.0, width=190
+            name="slow motion at the hardest impact (s)", value=4.0, start=0.0, end=30.0, width=260
         )
         self.length = pn.widgets.FloatInput(
-            name="length of the animation (s)", value=8.0, start=1.0, end=60.0, width=190
+            name="length of the animation (s)", value=8.0, start=1.0, end=60.0, width=210
         )
         self.dots = pn.widgets.FileInput(accept=".csv", multiple=False, width=220)
         self.dots.param.watch(lambda event: page.post(lambda: self._dots(event.new)), "value")
@@ -57,10 +57,10 @@ class TakeCard:
             "MP4": lambda: self._animation(".mp4"), "GIF": lambda: self._animation(".gif"),
             "Run as NetCDF": self._run_data, "Map as NetCDF": self._map_data, "Window as NetCDF": self._window_data,
         }  # fmt: skip
-        self.buttons = {name: pn.widgets.Button(name=name, width=110) for name in buttons}
+        self.buttons = {name: pn.widgets.Button(name=name, width=145) for name in buttons}
         for name, work in buttons.items():
             self.buttons[name].on_click(_posted(page, work))
-        self.link = pn.widgets.Button(name="Copy the link", width=110)
+        self.link = pn.widgets.Button(name="Copy the link", width=145)
         self.link.js_on_click(
             args={"holder": self.page.bar}, code="navigator.clipboard.writeText(window.location.href);"
         )

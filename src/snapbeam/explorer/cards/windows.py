@@ -35,10 +35,18 @@ class WindowControl:
         self.card = card
         self._token: Token | None = None
         self._moved, self._pushed = 0, 0.0
+        self._awake = False
         self._waiting = Waiting(card.shared.compiling, card.later)
+
+    def wake(self) -> None:
+        """The page stands in a browser: from now on what is seen is worth computing."""
+        self._awake = True
+        self.view_moved()
 
     def view_moved(self) -> None:
         """Another part is seen; it is looked at once it rests."""
+        if not self._awake:
+            return
         self._moved += 1
         now = self._moved
         self.card.later(lambda: self._rested() if now == self._moved else None, _REST)

@@ -122,7 +122,10 @@ class Source:
         names = dict.fromkeys(layer.variable for layer in self.layers.values())
         part = dataset[list(names)].isel(inside).load()
         return {
-            name: part[layer.variable].isel(layer.where).values.item() for name, layer in self.layers.items()
+            name: (
+                part[layer.variable].isel(layer.where) if layer.where else part[layer.variable]
+            ).values.item()
+            for name, layer in self.layers.items()
         }
 
     def whole(self) -> xr.Dataset:
@@ -157,12 +160,17 @@ class SystemSource(Source):
         return [name for name in STATISTICS if name != "status"]
 
 
+_SMALL = 2**25
+"""Bytes of a map up to which all of it is held, once a point of it has been asked for."""
+
+
 class FileSource(DatasetSource):
     """A map in a NetCDF file, of which a variable is read when it is first shown."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._lock = threading.Lock()
+        self._all: xr.Dataset | None = None
         self._held: dict[str, xr.DataArray] = {}
         with self._open() as dataset:
             self._stamp = self._stamped()
@@ -200,7 +208,15 @@ class FileSource(DatasetSource):
             return self._held[name]
 
     def point(self, where: Mapping[str, int]) -> dict[str, Any]:
-        """All that the file holds of one point; only that is read."""
+        """All that the file holds of one point; of a large file only that is read, each time."""
+        if self.skeleton.nbytes <= _SMALL:
+            if self._all is None:
+                self._all = self.whole()
+            elif not self._path.is_file():
+                raise InputError(f"{self._path.name}: there is no such file any more")
+            elif self._stamped() != self._stamp:
+                raise InputError(f"{self.name}: the file was changed; load the page again")
+            return self._numbers_of(self._all, where)
         with self._lock, self._open() as dataset:
             if self._stamped() != self._stamp:
                 raise InputError(f"{self.name}: the file was changed; load the page again")

@@ -11,7 +11,7 @@ import panel as pn
 from bokeh.models import ColumnDataSource, DataTable, NumberFormatter, TableColumn
 
 from snapbeam import STATISTICS
-from snapbeam.explorer.look import Look
+from snapbeam.explorer.look import Look, sheet
 from snapbeam.explorer.views.cursor import Cursor
 from snapbeam.explorer.views.part import Part
 
@@ -21,6 +21,13 @@ if TYPE_CHECKING:
 __all__ = ["Impacts", "Numbers"]
 
 _MOST = 20_000
+_TABLE = """
+.slick-viewport, .grid-canvas, .slick-pane { background: var(--sb-card); }
+.slick-header-column, .slick-header-columns { background: var(--sb-card) !important; color: var(--sb-text); }
+.slick-row, .slick-cell { background: var(--sb-card) !important; color: var(--sb-text); border-color: var(--sb-grid); }
+.slick-row.odd, .slick-row.odd .slick-cell { background: var(--sb-page) !important; }
+.slick-row .slick-cell.selected { background: var(--sb-grid) !important; }
+"""
 
 
 class Impacts(Part):
@@ -44,7 +51,12 @@ class Impacts(Part):
             for name, (title, digits) in names.items()
         ]
         table = DataTable(
-            source=self.source, columns=shown, sizing_mode="stretch_width", height=400, index_position=None
+            source=self.source,
+            columns=shown,
+            sizing_mode="stretch_width",
+            height=400,
+            index_position=None,
+            stylesheets=[sheet(self.look), _TABLE],
         )
         self.source.selected.on_change("indices", self._chosen)
         self.words = pn.pane.HTML("", sizing_mode="stretch_width")
@@ -87,6 +99,7 @@ class Numbers(Part):
             row = STATISTICS.get(name)
             shown = getattr(value, "label", None) or getattr(value, "name", None) or value
             text = f"{shown:.8g}" if isinstance(shown, float) else str(shown)
+            text = "–" if isinstance(shown, float) and np.isnan(shown) else text
             unit = "" if row is None or row.unit == "1" else row.unit
             words = "" if row is None else row.words
             cells = (
@@ -95,7 +108,7 @@ class Numbers(Part):
                 html.escape(unit),
                 f"<code>{html.escape(name)}</code>",
             )
-            kinds = ("", ' class="num"', "", "")
+            kinds = ("", ' class="num"', ' class="unit"', "")
             row_text = "".join(f"<td{kind}>{cell}</td>" for kind, cell in zip(kinds, cells, strict=True))
             rows.append(f"<tr>{row_text}</tr>")
         self.table.object = f'<table class="numbers">{"".join(rows)}</table>'

@@ -69,7 +69,6 @@ class RunView:
             *((part.title, part.place) for part in self.parts), dynamic=True, sizing_mode="stretch_width", margin=0
         )  # fmt: skip
         self.tabs.param.watch(lambda _: post(self._activated), "active")
-        self.parts[0].activate()
         self._moved = 0
         self._quiet = False
         for edge in ("start", "end"):
@@ -88,7 +87,6 @@ class RunView:
 
     def begin(self, words: str) -> None:
         """Say what is computed, over the run before."""
-        self.notes = {}
         self._write_notes()
         self._head('<span class="busy">computing</span>', words)
 
@@ -112,6 +110,7 @@ class RunView:
     def show(self, run: Run, words: str, fresh: bool) -> None:
         """Show a run; *fresh* if it is not the one before with more samples."""
         self.run = run
+        self._write_notes()
         answer = run.outcome
         if answer.status in (RunStatus.OK, RunStatus.DECIDED):
             well = "upper" if answer.final_well > 0 else "lower"
@@ -140,9 +139,14 @@ class RunView:
         self.note.object = "<br>".join(text for text in self.notes.values() if text)
 
     def _draw(self) -> None:
+        self.active.activate()
         if self.run is not None:
             start, end = float(self.cursor.range.start), float(self.cursor.range.end)
             self.active.show(self.run, min(start, end), max(start, end))
+
+    def stand(self) -> None:
+        """Build the view that is seen."""
+        self.active.activate()
 
     def complete(self) -> None:
         """Build the views that are not seen, one after the other, so that what is asked for meanwhile need not wait."""

@@ -40,8 +40,9 @@ class Waveform(Part):
             **common,
         )
         words = ("beam, centre", "beam, at the striker", "striker")
-        for name, label, color in zip(_CURVES, words, (look.center, look.beam, look.striker), strict=True):
-            top.line("x", "y", source=self.sources[name], color=color, line_width=1.3, legend_label=label)
+        colors, widths = (look.center, look.beam, look.striker), (2.8, 1.1, 1.3)
+        for name, label, color, width in zip(_CURVES, words, colors, widths, strict=True):
+            top.line("x", "y", source=self.sources[name], color=color, line_width=width, legend_label=label)
         legend(top, look)
         low = figure(
             look,

@@ -24,22 +24,28 @@ from typing import Any, Self
 import numpy as np
 
 from snapbeam.core.provenance import canonical_json, parameter_hash
-from snapbeam.core.validate import InputError, file_path, integer, shown
+from snapbeam.core.validate import InputError, integer
 from snapbeam.sweeps.compute.maker import Maker, differences, this_maker
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
-from snapbeam.sweeps.compute.tasks import Stage, chunk_size
+from snapbeam.sweeps.compute.tasks import Rows, Stage, chunk_size
 from snapbeam.sweeps.errors import StoreError
-from snapbeam.sweeps.keep.durable import PARTIAL, StoreLock, durable_write, member, refuse_links
+from snapbeam.sweeps.keep.description import (
+    FORMAT,
+    read_description,
+    refuse_foreign,
+    refuse_other,
+    store_folder,
+)
+from snapbeam.sweeps.keep.durable import StoreLock, durable_write, member, refuse_links
+from snapbeam.sweeps.keep.growth import BASE, JoinedRows, Layer, grown, is_growth, layers_of
 from snapbeam.sweeps.keep.ledger import Ledger, Record
 from snapbeam.sweeps.points import Grid
 
-__all__ = ["MapStore", "StoredRows", "read_stored_config"]
+__all__ = ["MapStore", "StoredRows"]
 
-_FORMAT = {"format": "snapbeam map", "format_version": 3}
 _DATA = "runs.zarr"
 _TABLES = ("integers", "numbers")
 _NOT_HERE = (errno.EROFS, errno.EACCES, errno.EPERM)
-_KNOWN = {"map.json", "ledger.jsonl", "lock", _DATA}
 
 
 class MapStore:
@@ -55,6 +61,8 @@ class MapStore:
         Points of a task of a new store.
     config : dict, optional
         The parameter file that made the map, kept so that it can be resumed without it.
+    grow : bool
+        Whether a map that is there may get more values along its axes.
 
     Raises
     ------
@@ -71,8 +79,9 @@ class MapStore:
         work: PointWork,
         chunk: int | None = None,
         config: dict[str, Any] | None = None,
+        grow: bool = False,
     ) -> None:
-        self.path = _store_folder(path)
+        self.path = store_folder(path)
         self.work = work
         if chunk is not None:
             chunk = integer("chunk", chunk, 1, 10**7)
@@ -80,15 +89,17 @@ class MapStore:
             self.path.mkdir(exist_ok=True)
         except OSError as error:
             raise self._cannot_write(error) from error
-        _refuse_foreign(self.path)
+        refuse_foreign(self.path)
         self._lock = StoreLock(self.path / "lock")
         self.read_only = False
         """Whether it stands where nothing can be written, so that it can only be read."""
         try:
             self._take_lock()
             refuse_links(self.path, sweep=not self.read_only)
-            self.chunk = self._describe(chunk, config)
             self.ledger = Ledger(self.path / "ledger.jsonl")
+            self.layers: list[Layer] = []
+            """What a store that has grown consists of; empty for any other."""
+            self.chunk = self._describe(chunk, config, grow)
         except BaseException:
             self.close()
             raise
@@ -120,27 +131,58 @@ class MapStore:
             if not self.read_only:
                 raise self._cannot_write(error) from error
 
-    def _describe(self, chunk: int | None, config: dict[str, Any] | None) -> int:
+    def _describe(self, chunk: int | None, config: dict[str, Any] | None, grow: bool) -> int:
         file = self.path / "map.json"
         wanted = json.loads(canonical_json(self.work.parameters))
         if file.exists():
-            held = _read_description(file)
-            _refuse_other(self.path, held["parameters"], wanted)
+            held = read_description(file)
+            if grow and type(self.work) is PointWork and is_growth(held["parameters"], wanted):
+                held = self._grown(file, held, wanted, config)
+            refuse_other(self.path, held["parameters"], wanted)
+            if "grown" in held:
+                self.layers = layers_of(self.work, held["grown"], int(held["chunk"]))
             return int(held["chunk"])
         setup = self.work.setup
         chunk = chunk_size(setup.points.size, setup.integration.engine) if chunk is None else chunk
-        held = _FORMAT | {"parameters": wanted, "parameter_hash": parameter_hash(wanted), "chunk": chunk}
+        held = FORMAT | {"parameters": wanted, "parameter_hash": parameter_hash(wanted), "chunk": chunk}
         if isinstance(
             setup.points, Grid
         ):  # the parameters are sorted by name: the order of the axes is said apart
             held["axes"] = list(setup.points.names)
         if config is not None:
             held["config"] = config
+        self._write_description(file, held)
+        return chunk
+
+    def _grown(
+        self, file: Path, held: dict[str, Any], wanted: dict[str, Any], config: dict[str, Any] | None
+    ) -> dict[str, Any]:
+        """Describe a store anew that is asked for more values of its axes."""
+        where = f"store = {str(self.path)!r}"
+        refined = {stage for stage, _ in self.ledger.records if stage.startswith("level-")}
+        if refined:
+            raise InputError(
+                f"{where}: was refined, and the refinement of a longer map is another one: give another folder"
+            )
+        if "axes" not in held:
+            raise InputError(
+                f"{where}: was begun by a version that did not say the order of its axes: give another folder"
+            )
+        now = grown(held, wanted, self.work.setup.points.names) | {"parameter_hash": parameter_hash(wanted)}
+        if config is not None:
+            now["config"] = config
+        self._write_description(file, now)
+        return now
+
+    def _write_description(self, file: Path, held: dict[str, Any]) -> None:
         try:
             durable_write(file, (json.dumps(held, indent=1) + "\n").encode())
         except OSError as error:
             raise self._cannot_write(error) from error
-        return chunk
+
+    def work_of(self, stage: Stage) -> PointWork:
+        """What the tasks of a stage were asked for by: the map that there is, or the one that it has grown from."""
+        return next((layer.work for layer in self.layers if layer.stage.name == stage.name), self.work)
 
     def _warn_of_mixture(self) -> None:
         done = [record for record in self.ledger.records.values() if record.state == "done"]
@@ -160,7 +202,9 @@ class MapStore:
 
         member(stage.name)
         try:
-            self._arrays[stage.name] = open_tables(self.path / _DATA, stage, self.work, self.read_only)
+            self._arrays[stage.name] = open_tables(
+                self.path / _DATA, stage, self.work_of(stage), self.read_only
+            )
         except OSError as error:
             raise self._cannot_write(error) from error
         for task in range(stage.tasks):
@@ -168,7 +212,7 @@ class MapStore:
             if record is None or record.state != "done":
                 continue
             if (
-                record.parameters != self.work.task_hash(stage.columns(task))
+                record.parameters != self.work_of(stage).task_hash(stage.columns(task))
                 or self._load(stage, task) is None
             ):
                 del self.ledger.records[stage.name, task]
@@ -215,7 +259,7 @@ class MapStore:
                 stage=stage.name,
                 task=task,
                 state=state,
-                parameters=self.work.task_hash(stage.columns(task)),
+                parameters=self.work_of(stage).task_hash(stage.columns(task)),
                 content=content,
                 engine=setup.integration.engine,
                 step=setup.plan.step,
@@ -242,8 +286,10 @@ class MapStore:
             return None
         return columns if columns.content_hash() == self.ledger.records[stage.name, task].content else None
 
-    def reader(self, stage: Stage) -> StoredRows:
+    def reader(self, stage: Stage) -> Rows:
         """The results of a stage, read as they are asked for."""
+        if self.layers and stage.name == BASE:
+            return JoinedRows(self.layers, [StoredRows(self, layer.stage) for layer in self.layers])
         return StoredRows(self, stage)
 
     def made_with(self) -> dict[str, str]:
@@ -313,84 +359,3 @@ class StoredRows:
             cut = slice(max(start - first, 0), min(stop, last) - first)
             parts.append(ResultTable(columns.integers[cut], columns.numbers[cut]))
         return store.work.join(parts)
-
-
-def _store_folder(path: str | Path) -> Path:
-    if not isinstance(path, (str, Path)):
-        raise InputError(f"store = {shown(path)}: must be a folder")
-    folder = file_path("store", path)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"store = {str(path)!r}: must be a folder, not a file")
-    if not folder.parent.is_dir():
-        raise InputError(f"store = {str(path)!r}: {str(folder.parent)!r} is not an existing folder")
-    return folder
-
-
-def _refuse_foreign(folder: Path) -> None:
-    """Refuse a folder that holds something and no map, before anything is written into it."""
-    names = {entry.name for entry in folder.iterdir() if not entry.name.endswith(PARTIAL)}
-    if "map.json" not in names and names - _KNOWN:
-        raise InputError(f"store = {str(folder)!r}: is not empty and holds no map")
-
-
-def _read_description(file: Path) -> dict[str, Any]:
-    damaged = StoreError(
-        f"store = {str(file.parent)!r}: map.json is damaged; put it back from a copy, or start another store"
-    )
-    try:
-        held = json.loads(file.read_bytes())
-        sound = (
-            isinstance(held, dict)
-            and isinstance(held["parameters"], dict)
-            and held["parameter_hash"] == parameter_hash(held["parameters"])
-            and isinstance(held["chunk"], int)
-            and held["chunk"] >= 1
-        )
-    except (ValueError, KeyError, RecursionError):
-        raise damaged from None
-    if not sound:
-        raise damaged
-    if {key: held.get(key) for key in _FORMAT} != _FORMAT:
-        raise InputError(
-            f"store = {str(file.parent)!r}: was written in another format ({held.get('format_version')})"
-        )
-    return held
-
-
-def read_stored_config(path: str | Path) -> dict[str, Any] | None:
-    """The parameter file a store keeps, as nested plain values; None if there is none."""
-    file = _store_folder(path) / "map.json"
-    if not file.exists():
-        return None
-    if file.is_symlink():
-        raise InputError(f"store = {str(path)!r}: 'map.json' is a link or no plain file")
-    config = _read_description(file).get("config")
-    return config if isinstance(config, dict) else None
-
-
-def _refuse_other(path: Path, held: dict[str, Any], wanted: dict[str, Any]) -> None:
-    there, here = _flat(held), _flat(wanted)
-    lines = [
-        f"  {name}: {_brief(there.get(name))} in the store, {_brief(here.get(name))} asked for"
-        for name in sorted(there.keys() | here.keys())
-        if there.get(name) != here.get(name)
-    ]
-    if lines:
-        raise InputError(f"store = {str(path)!r}: holds a map of other parameters\n" + "\n".join(lines))
-
-
-def _flat(values: dict[str, Any], before: str = "") -> dict[str, Any]:
-    """Nested parameters by dotted name."""
-    found: dict[str, Any] = {}
-    for name, value in values.items():
-        full = f"{before}{name}"
-        found |= _flat(value, f"{full}.") if isinstance(value, dict) else {full: value}
-    return found
-
-
-def _brief(value: Any) -> str:
-    if isinstance(value, list) and len(value) > 4 and isinstance(value[0], (int, float)):
-        return f"{len(value)} points from {value[0]:g} to {value[-1]:g}"
-    if isinstance(value, list) and len(value) > 4:
-        return f"an array of {len(value)} rows"
-    return "nothing" if value is None else f"{value!r}"
