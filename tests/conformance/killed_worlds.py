@@ -71,6 +71,15 @@ def values_of(system: sb.System, name: str) -> list[Any]:
     return [0.1, 0.2] if not own else sorted([float(own), 1.03 * float(own)])
 
 
+def has_row(name: str) -> bool:
+    """Whether it is a parameter of the table, a further striker's too, and no word for a kind of part."""
+    try:
+        lookup(name)
+    except sb.InputError:
+        return False
+    return True
+
+
 def in_child(work: Callable[[], Any], answer: Path | None = None) -> int:
     """Fork and do *work* there; what it gives is pickled.  Returns the status as ``waitpid`` has it."""
     child = os.fork()
@@ -152,7 +161,7 @@ def main() -> None:
     count = 0
     for world in asked.worlds:
         system = WORLDS[world].system()
-        names = [name for name in system.parameters if name in parameters()]
+        names = [name for name in system.parameters if has_row(name)]
         names += [name for name in parameters() if name.startswith("run.")]
         chosen = asked.only.split(",") if asked.only else [name for name in names if name not in NOT_SWEPT]
         for name in chosen:

@@ -108,11 +108,12 @@ def test_never_decided_wrongly(name, modes) -> None:
         assert decided > 40
 
 
-def early_decisions(name: str, modes: int, count: int, cycles: int = 60) -> tuple[int, int]:
+def early_decisions(name: str, modes: int, count: int) -> tuple[int, int]:
     """How many of *count* random runs were decided early, and how many of those have another class than whole."""
     modes = 1 if WORLDS[name].modes == 1 else max(modes, WORLDS[name].fewest)
     early, whole = (
-        swept(name, count, 7, modes=modes, cycles=cycles, early_decision=flag) for flag in (True, False)
+        swept(name, count, 7, modes=modes, cycles=WORLDS[name].cycles, early_decision=flag)
+        for flag in (True, False)
     )
     decided = early.status.values == RunStatus.DECIDED
     wrong = early.response.values != whole.response.values

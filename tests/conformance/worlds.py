@@ -30,6 +30,8 @@ class World:
     modes: int = 3
     fewest: int = 1
     """Modes that it needs."""
+    cycles: int = 60
+    """How long its runs may be."""
     reference_freq: float | None = None
     own_kernel: bool = True
     """Whether no other quick test has a use for its kernel of many runs, which takes ten seconds to compile."""
@@ -52,6 +54,15 @@ class World:
 def mirror_image(system: sb.System) -> sb.System:
     """Upside down: striker, wells, base and records."""
     model, striker, base = system.model, system.striker, system.base
+    others = tuple(
+        dataclasses.replace(
+            each,
+            striker=dataclasses.replace(
+                each.striker, side="above" if each.striker.side == "below" else "below"
+            ),
+        )
+        for each in system.others
+    )
     if model.imperfection is not None:
         assert model.beam is not None
         model = sb.ReducedModel.from_beam(
@@ -65,9 +76,8 @@ def mirror_image(system: sb.System) -> sb.System:
         striker = dataclasses.replace(striker, side=side, drive=drive)
     if base is not None:
         base = dataclasses.replace(base, direction="down" if base.direction == "up" else "up")
-    return sb.System(
-        model, system.contact, striker, base=base, axial=system.axial, harvester=system.harvester
-    )
+    more = {"base": base, "axial": system.axial, "harvester": system.harvester, "others": others}
+    return sb.System(model, system.contact, striker, **more)  # type: ignore[arg-type]
 
 
 def struck(drive: sb.Drive, contact: sb.ContactLaw = paper.CONTACT, **striker: object):
@@ -177,13 +187,25 @@ WORLDS: dict[str, World] = {
     "two_sines": World(
         struck(TWO), SINE | {"drive.second_amplitude": (0.0, 0.3), "drive.second_phase": (-3.0, 3.0)}
     ),
-    "recorded": World(record, PLACE, own_kernel=False),
+    "recorded": World(record, PLACE, cycles=12, own_kernel=False),
     "still": World(struck(sb.Still(), gap=-1e-4), {"striker.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
     "a body": World(
         struck(sine(), mass=0.02, spring=700.0, damper=0.7), SINE | PLACE, own_kernel=False, decides=False
     ),
     "a sphere": World(
         struck(sb.Flight(speed=0.4), mass=2e-3, gap=5e-5), {"drive.speed": (0.1, 2.0)} | PLACE, decides=False
+    ),
+    "two strikers": World(
+        lambda model: {
+            "contact": [paper.CONTACT, sb.PowerLaw.from_stiffness(4e11, 2.0)],
+            "striker": [
+                sb.Striker(drive=sine()),
+                sb.Striker(drive=sb.DisplacementSine(frequency_ratio=2.6, displacement_amplitude=0.05), location=0.3,
+                    side="above", gap=0.1 * LEVEL),
+            ],
+        },
+        SINE | {"striker_2.gap": (-2e-5, 1e-4), "drive_2.displacement_amplitude": (0.0, 0.2)},
+        decides=False,
     ),
     "unequal wells": World(struck(sine()), SINE | PLACE, imperfection=UNEVEN, fewest=2, own_kernel=False),
     "a measured shape": World(struck(sine()), SINE | PLACE, imperfection=MEASURED, own_kernel=False),
