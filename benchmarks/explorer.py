@@ -45,6 +45,10 @@ _PLACE = """([x, y]) => { const p = Bokeh.index.find_one(Bokeh.documents[0].get_
   return [b.left + p.frame.x_scale.compute(x), b.top + p.frame.y_scale.compute(y)]; }"""
 
 
+_BETWEEN = 8.0
+"""Seconds between two pages, in which the server ends what it still does for the one before."""
+
+
 def run(folder: Path, quick: bool) -> None:
     """Measure, print, and write ``explorer.json``."""
     browser = os.environ.get("CHROMIUM") or shutil.which("chromium") or shutil.which("chromium-browser")
@@ -145,6 +149,7 @@ def _paint(browser: Any, url: str) -> float:
     page.wait_for_function(_STAND, polling="raf")
     spent = float(page.evaluate("() => performance.now()"))
     page.close()
+    time.sleep(_BETWEEN)
     return spent
 
 

@@ -5,6 +5,7 @@ They are read off the program, the table of parameters and the table of statisti
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -118,7 +119,7 @@ def command_line() -> str:
                 flags = f"`{parameter.metavar or parameter.human_readable_name}`"
             elif parameter.metavar:
                 flags += f" *{parameter.metavar}*"
-            panels.setdefault(panel, []).append((flags, parameter.help or ""))
+            panels.setdefault(panel, []).append((flags, _options_as_code(parameter.help or "")))
         for panel, rows in panels.items():
             parts.append(f"**{panel}**\n\n" + _table(("option", "meaning"), rows))
     return "\n".join(parts)
@@ -132,8 +133,13 @@ def _paragraphs(text: str) -> list[str]:
         if plain.startswith("Example: "):
             found.append(f"```\n{plain.removeprefix('Example: ')}\n```")
         elif plain:
-            found.append(plain)
+            found.append(_options_as_code(plain))
     return found
+
+
+def _options_as_code(text: str) -> str:
+    """Words with options set as code; as words their two hyphens would become a dash."""
+    return re.sub(r"(?<![\w`-])(--[a-z][\w-]*)", r"`\1`", text)
 
 
 def write_pages(folder: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 import shlex
 from importlib import import_module
 from pathlib import Path
@@ -117,3 +118,12 @@ def test_every_page_is_in_the_tree():
     }
     pages = {path.stem for path in (ROOT / "docs").glob("*.md")} - {"index"}
     assert pages <= listed, pages - listed
+
+
+def test_options_in_the_page_of_commands_are_code():
+    """As words, ``--store`` would be set with a dash."""
+    text = runpy.run_path(str(ROOT / "docs" / "_ext" / "reference.py"))["command_line"]()
+    words = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    bare = re.findall(r"(?<![\w`-])--[a-z][\w-]*", re.sub(r"`[^`]*`", "", words))
+    assert not bare
+    assert "`--store`" in words and "mathrm" not in words

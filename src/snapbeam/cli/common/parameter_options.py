@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -221,8 +222,12 @@ def _option(name: str, is_axis: bool) -> Any:
     return Annotated[float | None, typer.Option(flag, parser=parse_number, metavar="NUMBER", **options)]
 
 
+_UPRIGHT = re.compile(r"\\mathrm\{([^}]*)\}")
+
+
 def _symbol(symbol: str) -> str:
-    plain = {r"\Omega": "Omega", r"\zeta": "zeta", r"\rho": "rho", r"x_\mathrm{s}": "x_s"}.get(symbol, symbol)
+    """A symbol of a formula as a terminal shows it: ``x_\\mathrm{s}`` is x_s."""
+    plain = _UPRIGHT.sub(r"\1", symbol).replace("\\", "").replace("{", "").replace("}", "")
     return f" ({plain})" if plain else ""
 
 
