@@ -8,23 +8,21 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import panel as pn
 from bokeh.models import ColumnDataSource
 
-import snapbeam as sb
-from snapbeam import InputError, Integration, Run, RunStatus, System
+from snapbeam import InputError, Integration, Run, System
 from snapbeam.explorer.address import Address, number
+from snapbeam.explorer.answer import beside_the_map, quick_run, whole_run
 from snapbeam.explorer.cards.map import MapCard
-from snapbeam.explorer.cards.system import SystemCard, changed_parameters
+from snapbeam.explorer.cards.system import SystemCard, changed_parameters, changed_words
 from snapbeam.explorer.cards.take import TakeCard
 from snapbeam.explorer.downloads import Downloads
 from snapbeam.explorer.frame import framed
 from snapbeam.explorer.jobs import Token
-from snapbeam.explorer.limits import RUN_SECONDS, check_run, samples_of, too_large
+from snapbeam.explorer.limits import RUN_SECONDS, check_run, too_large
 from snapbeam.explorer.look import Look, look_of
-from snapbeam.explorer.maps.layers import chances as chances_of
-from snapbeam.explorer.maps.points import Point, compared
+from snapbeam.explorer.maps.points import Point
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.views.run import RunView
 from snapbeam.explorer.waiting import Waiting
@@ -35,8 +33,6 @@ _GROWTH = 1500
 """Milliseconds between two looks at a store that may be growing."""
 _AFTER = 700
 """Milliseconds from the first picture of the page to the building of views that are not seen yet."""
-_QUICK = 4000
-"""Samples of a run that is shown at once; all others follow."""
 _PATIENT = 150
 """Milliseconds after which a run that is still computed is said to be."""
 _SENT = 40
@@ -256,36 +252,14 @@ class Page:
         """A run, on a thread of the server; a first look at it is shown before it is recorded whole."""
         system, integration = point.system(base, how.replace(engine="auto", threads=None))
         check_run(system, integration)
-        quick = self._quick(system, integration, token)
+        quick = quick_run(system, integration, token)
         if quick is not None:
             sent = threading.Event()
             self.post(lambda: self._look(which, point, token, quick, sent))
             sent.wait(_LONGEST)  # Python does one thing at a time
-        count = samples_of(system, integration)
-        times = None if count is None else _even_times(system, integration, count)
-        run = sb.simulate(system, integration, sample_times=times, progress=token.check)
-        chances = ""
-        try:
-            held = self.card.expected(point)
-            chances = chances_of(self.shared.source.layers, held)
-            same, words = compared(held, run.outcome, str(self.shared.source.attrs.get("engine", "cpu")))
-        except InputError as error:  # the run stands, although its map cannot be read any more
-            same, words = False, str(error)
-        if times is not None:
-            words += f"; recorded at {times.size} instants, the most that a page may ask for"
-        return run, words, same, chances
-
-    def _quick(self, system: Any, integration: Any, token: Token) -> Run | None:
-        """The run at a few instants, all that its pictures need made; None where those instants cannot be known."""
-        if system.striker is None or not system.striker.drive.harmonic or integration.early_decision:
-            return None
-        run = sb.simulate(
-            system, integration, sample_times=_even_times(system, integration, _QUICK), progress=token.check
-        )
-        if run.outcome.status is not RunStatus.OK:
-            return None
-        _ = run.dataset  # made here and not on the page's thread, which others wait for
-        return run
+        run, recorded = whole_run(system, integration, token)
+        same, words, chances = beside_the_map(self.shared, self.card, point, run)
+        return run, words + recorded, same, chances
 
     def _look(self, which: int, point: Point, token: Token, run: Run, sent: threading.Event) -> None:
         if not token.cancelled and self.points[which] is point:
@@ -333,7 +307,7 @@ class Page:
             (self.shared.system, self.shared.integration), (system, integration)
         )
         self.card.use(system, integration, bool(self.changes))
-        names = ", ".join(f"{name} = {_brief(value)}" for name, value in list(self.changes.items())[:6])
+        names = changed_words(self.changes)
         old = f"The map is old: it is of the system before. Changed: {names}" if self.changes else ""
         if not self.shared.source.skeleton.data_vars:
             old = f"Changed: {names}" if self.changes else ""
@@ -422,13 +396,3 @@ class Page:
             self.changes, self.address.theme,
         )  # fmt: skip
         self.bar.data = {"search": [address.write()]}
-
-
-def _even_times(system: Any, integration: Any, count: int) -> np.ndarray:
-    """Instants evenly over a run with a sinusoidal drive."""
-    frequency = system.striker.drive.frequency_ratio * system.model.reference_freq
-    return np.linspace(0.0, integration.cycles_or_default / frequency, count)
-
-
-def _brief(value: Any) -> str:
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
