@@ -8,23 +8,21 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import panel as pn
 from bokeh.models import ColumnDataSource
 
-import snapbeam as sb
-from snapbeam import InputError, Integration, Run, RunStatus, System
+from snapbeam import InputError, Integration, Run, System
 from snapbeam.explorer.address import Address, number
+from snapbeam.explorer.answers import Answer, answer
 from snapbeam.explorer.cards.map import MapCard
 from snapbeam.explorer.cards.system import SystemCard, changed_parameters
 from snapbeam.explorer.cards.take import TakeCard
 from snapbeam.explorer.downloads import Downloads
 from snapbeam.explorer.frame import framed
 from snapbeam.explorer.jobs import Token
-from snapbeam.explorer.limits import RUN_SECONDS, check_run, samples_of, too_large
+from snapbeam.explorer.limits import RUN_SECONDS, check_run, too_large
 from snapbeam.explorer.look import Look, look_of
-from snapbeam.explorer.maps.layers import chances as chances_of
-from snapbeam.explorer.maps.points import Point, compared
+from snapbeam.explorer.maps.points import Point
 from snapbeam.explorer.shared import Shared
 from snapbeam.explorer.views.run import RunView
 from snapbeam.explorer.waiting import Waiting
@@ -35,8 +33,6 @@ _GROWTH = 1500
 """Milliseconds between two looks at a store that may be growing."""
 _AFTER = 700
 """Milliseconds from the first picture of the page to the building of views that are not seen yet."""
-_QUICK = 4000
-"""Samples of a run that is shown at once; all others follow."""
 _PATIENT = 150
 """Milliseconds after which a run that is still computed is said to be."""
 _SENT = 40
@@ -235,10 +231,12 @@ class Page:
         self.shared.asked()
         base, how = self.card.system, self.card.integration
 
-        def work(token: Token) -> tuple[Run, str, bool, str]:
-            return self._computed(which, point, base, how, token)
+        def work(token: Token) -> Answer:
+            return answer(
+                self.card, point, base, how, token, lambda run: self._first(which, point, token, run)
+            )
 
-        def done(found: tuple[Run, str, bool, str] | None, error: str) -> None:
+        def done(found: Answer | None, error: str) -> None:
             self.post(lambda: self._done(which, point, token, found, error))
 
         self.shared.jobs.run(work, done, token)  # what follows is said while it is computed
@@ -250,42 +248,11 @@ class Page:
             self._mark()
             self._write_address()
 
-    def _computed(
-        self, which: int, point: Point, base: Any, how: Any, token: Token
-    ) -> tuple[Run, str, bool, str]:
-        """A run, on a thread of the server; a first look at it is shown before it is recorded whole."""
-        system, integration = point.system(base, how.replace(engine="auto", threads=None))
-        check_run(system, integration)
-        quick = self._quick(system, integration, token)
-        if quick is not None:
-            sent = threading.Event()
-            self.post(lambda: self._look(which, point, token, quick, sent))
-            sent.wait(_LONGEST)  # Python does one thing at a time
-        count = samples_of(system, integration)
-        times = None if count is None else _even_times(system, integration, count)
-        run = sb.simulate(system, integration, sample_times=times, progress=token.check)
-        chances = ""
-        try:
-            held = self.card.expected(point)
-            chances = chances_of(self.shared.source.layers, held)
-            same, words = compared(held, run.outcome, str(self.shared.source.attrs.get("engine", "cpu")))
-        except InputError as error:  # the run stands, although its map cannot be read any more
-            same, words = False, str(error)
-        if times is not None:
-            words += f"; recorded at {times.size} instants, the most that a page may ask for"
-        return run, words, same, chances
-
-    def _quick(self, system: Any, integration: Any, token: Token) -> Run | None:
-        """The run at a few instants, all that its pictures need made; None where those instants cannot be known."""
-        if system.striker is None or not system.striker.drive.harmonic or integration.early_decision:
-            return None
-        run = sb.simulate(
-            system, integration, sample_times=_even_times(system, integration, _QUICK), progress=token.check
-        )
-        if run.outcome.status is not RunStatus.OK:
-            return None
-        _ = run.dataset  # made here and not on the page's thread, which others wait for
-        return run
+    def _first(self, which: int, point: Point, token: Token, run: Run) -> None:
+        """Show a first look, asked on a thread of the server, and wait until it is on its way to the browser."""
+        sent = threading.Event()
+        self.post(lambda: self._look(which, point, token, run, sent))
+        sent.wait(_LONGEST)  # Python does one thing at a time
 
     def _look(self, which: int, point: Point, token: Token, run: Run, sent: threading.Event) -> None:
         if not token.cancelled and self.points[which] is point:
@@ -293,9 +260,7 @@ class Page:
             self.runs[which].show(run, point.words(), fresh=True)
         self.later(sent.set, _SENT)
 
-    def _done(
-        self, which: int, point: Point, token: Token, found: tuple[Run, str, bool, str] | None, error: str
-    ) -> None:
+    def _done(self, which: int, point: Point, token: Token, found: Answer | None, error: str) -> None:
         if token.cancelled or self.points[which] is not point:
             return
         self.waiting.end(which)
@@ -303,12 +268,11 @@ class Page:
         if found is None:
             view.fail(f"{point.words()}: {error}")
             return
-        run, words, same, chances = found
-        shown = view.run
+        run, shown = found.run, view.run
         fresh = shown is None or shown.system.hash != run.system.hash
         view.show(run, point.words(), fresh=fresh)
-        view.say("map", words, bad=not same)
-        view.say("chances", chances)
+        view.say("map", found.words, bad=not found.same)
+        view.say("chances", found.chances)
         view.say("conditioning", "")
         if self._take is not None:
             self._take.refresh()
@@ -422,12 +386,6 @@ class Page:
             self.changes, self.address.theme,
         )  # fmt: skip
         self.bar.data = {"search": [address.write()]}
-
-
-def _even_times(system: Any, integration: Any, count: int) -> np.ndarray:
-    """Instants evenly over a run with a sinusoidal drive."""
-    frequency = system.striker.drive.frequency_ratio * system.model.reference_freq
-    return np.linspace(0.0, integration.cycles_or_default / frequency, count)
 
 
 def _brief(value: Any) -> str:
