@@ -13,9 +13,9 @@ from bokeh.models import ColumnDataSource
 
 from snapbeam import InputError, Integration, Run, System
 from snapbeam.explorer.address import Address, number
-from snapbeam.explorer.answer import beside_the_map, quick_run, whole_run
+from snapbeam.explorer.answers import Answer, answer
 from snapbeam.explorer.cards.map import MapCard
-from snapbeam.explorer.cards.system import SystemCard, changed_parameters, changed_words
+from snapbeam.explorer.cards.system import SystemCard, changed_parameters
 from snapbeam.explorer.cards.take import TakeCard
 from snapbeam.explorer.downloads import Downloads
 from snapbeam.explorer.frame import framed
@@ -231,10 +231,12 @@ class Page:
         self.shared.asked()
         base, how = self.card.system, self.card.integration
 
-        def work(token: Token) -> tuple[Run, str, bool, str]:
-            return self._computed(which, point, base, how, token)
+        def work(token: Token) -> Answer:
+            return answer(
+                self.card, point, base, how, token, lambda run: self._first(which, point, token, run)
+            )
 
-        def done(found: tuple[Run, str, bool, str] | None, error: str) -> None:
+        def done(found: Answer | None, error: str) -> None:
             self.post(lambda: self._done(which, point, token, found, error))
 
         self.shared.jobs.run(work, done, token)  # what follows is said while it is computed
@@ -246,20 +248,11 @@ class Page:
             self._mark()
             self._write_address()
 
-    def _computed(
-        self, which: int, point: Point, base: Any, how: Any, token: Token
-    ) -> tuple[Run, str, bool, str]:
-        """A run, on a thread of the server; a first look at it is shown before it is recorded whole."""
-        system, integration = point.system(base, how.replace(engine="auto", threads=None))
-        check_run(system, integration)
-        quick = quick_run(system, integration, token)
-        if quick is not None:
-            sent = threading.Event()
-            self.post(lambda: self._look(which, point, token, quick, sent))
-            sent.wait(_LONGEST)  # Python does one thing at a time
-        run, recorded = whole_run(system, integration, token)
-        same, words, chances = beside_the_map(self.shared, self.card, point, run)
-        return run, words + recorded, same, chances
+    def _first(self, which: int, point: Point, token: Token, run: Run) -> None:
+        """Show a first look, asked on a thread of the server, and wait until it is on its way to the browser."""
+        sent = threading.Event()
+        self.post(lambda: self._look(which, point, token, run, sent))
+        sent.wait(_LONGEST)  # Python does one thing at a time
 
     def _look(self, which: int, point: Point, token: Token, run: Run, sent: threading.Event) -> None:
         if not token.cancelled and self.points[which] is point:
@@ -267,9 +260,7 @@ class Page:
             self.runs[which].show(run, point.words(), fresh=True)
         self.later(sent.set, _SENT)
 
-    def _done(
-        self, which: int, point: Point, token: Token, found: tuple[Run, str, bool, str] | None, error: str
-    ) -> None:
+    def _done(self, which: int, point: Point, token: Token, found: Answer | None, error: str) -> None:
         if token.cancelled or self.points[which] is not point:
             return
         self.waiting.end(which)
@@ -277,12 +268,11 @@ class Page:
         if found is None:
             view.fail(f"{point.words()}: {error}")
             return
-        run, words, same, chances = found
-        shown = view.run
+        run, shown = found.run, view.run
         fresh = shown is None or shown.system.hash != run.system.hash
         view.show(run, point.words(), fresh=fresh)
-        view.say("map", words, bad=not same)
-        view.say("chances", chances)
+        view.say("map", found.words, bad=not found.same)
+        view.say("chances", found.chances)
         view.say("conditioning", "")
         if self._take is not None:
             self._take.refresh()
@@ -307,7 +297,7 @@ class Page:
             (self.shared.system, self.shared.integration), (system, integration)
         )
         self.card.use(system, integration, bool(self.changes))
-        names = changed_words(self.changes)
+        names = ", ".join(f"{name} = {_brief(value)}" for name, value in list(self.changes.items())[:6])
         old = f"The map is old: it is of the system before. Changed: {names}" if self.changes else ""
         if not self.shared.source.skeleton.data_vars:
             old = f"Changed: {names}" if self.changes else ""
@@ -396,3 +386,7 @@ class Page:
             self.changes, self.address.theme,
         )  # fmt: skip
         self.bar.data = {"search": [address.write()]}
+
+
+def _brief(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

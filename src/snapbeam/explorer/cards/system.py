@@ -19,7 +19,7 @@ from snapbeam.explorer.lines import plain, system_toml
 from snapbeam.explorer.look import Look, styled
 from snapbeam.explorer.maps.source import integration_mapping
 
-__all__ = ["SystemCard", "changed_parameters", "changed_words"]
+__all__ = ["SystemCard", "changed_parameters"]
 
 _SECTIONS = {
     "beam": "Beam", "model": "Reduced model", "contact": "Contact", "striker": "Striker", "drive": "Drive",
@@ -278,12 +278,6 @@ def changed_parameters(
         if one[name] != value and name not in ("engine",) and not cycles:
             found[f"run.{name}"] = value
     return found
-
-
-def changed_words(changes: dict[str, Any]) -> str:
-    """The first six of them, named with their values."""
-    values = {n: f"{v:.6g}" if isinstance(v, float) else str(v) for n, v in list(changes.items())[:6]}
-    return ", ".join(f"{name} = {value}" for name, value in values.items())
 
 
 def _text(value: Any) -> str:

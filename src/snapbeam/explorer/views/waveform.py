@@ -40,7 +40,7 @@ class Waveform(Part):
             **common,
         )
         words = ("beam, centre", "beam, at the striker", "striker")
-        colors, widths = (look.center, look.beam, look.striker), (2.8, 1.1, 1.3)
+        colors, widths = (look.center, look.beam, look.striker), (2.0, 1.0, 1.3)
         for name, label, color, width in zip(_CURVES, words, colors, widths, strict=True):
             top.line("x", "y", source=self.sources[name], color=color, line_width=width, legend_label=label)
         legend(top, look)
