@@ -15,6 +15,7 @@ import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.codes import RunStatus
 from snapbeam.core.validate import InputError
+from snapbeam.engines.assemble import make_ensemble
 from snapbeam.engines.registry import resolve
 
 HERTZ = 4e8
@@ -143,6 +144,22 @@ def test_mirror_image() -> None:
         np.testing.assert_array_equal(above.amplitude, -below.amplitude)
         np.testing.assert_array_equal(above.velocity, -below.velocity)
         np.testing.assert_array_equal(above.passed["crossings"], below.passed["crossings"])
+
+
+def test_a_run_knows_nothing_of_the_others_of_its_batch() -> None:
+    """Where the tip is at rest, to the last bit, whichever other places are asked for with it."""
+    model = sb.ReducedModel.from_beam(
+        paper.BEAM,
+        modes=3,
+        imperfection=sb.Imperfection(rise=4e-6, skew=3e-6, point_load=0.01, uniform_load=0.02),
+    )
+    system = sb.System(model, paper.CONTACT, sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.2))
+    places = np.linspace(0.15, 0.85, 41)
+    together = make_ensemble(system, sb.Integration(), {"striker.location": places})
+    for i, place in enumerate(places):
+        alone = make_ensemble(system, sb.Integration(), {"striker.location": np.array([place])})
+        assert together.runs["rest_contact"][i] == alone.runs["rest_contact"][0]
+        assert together.highest[i] == alone.highest[0]
 
 
 def test_going_on_loses_no_bit() -> None:

@@ -187,7 +187,7 @@ WORLDS: dict[str, World] = {
     "two_sines": World(
         struck(TWO), SINE | {"drive.second_amplitude": (0.0, 0.3), "drive.second_phase": (-3.0, 3.0)}
     ),
-    "recorded": World(record, PLACE, cycles=12, own_kernel=False),
+    "recorded": World(record, PLACE, cycles=11, own_kernel=False),
     "still": World(struck(sb.Still(), gap=-1e-4), {"striker.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
     "a body": World(
         struck(sine(), mass=0.02, spring=700.0, damper=0.7), SINE | PLACE, own_kernel=False, decides=False

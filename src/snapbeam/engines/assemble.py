@@ -272,7 +272,7 @@ def _places(structure: Structure, table: NDArray[Any], location: _Array) -> _Pla
     different, which = np.unique(location, return_inverse=True)
     shapes = np.array([structure.model.shape_at(float(x)) for x in different])
     table["contact_row"] = which
-    table["rest_contact"] = structure.sign * (shapes @ structure.equilibrium)[which]
+    table["rest_contact"] = structure.sign * structure.rests(shapes)[which]
     table["rest_center"] = structure.center_rest
     return _Places(location, np.array([structure.row(shape) for shape in shapes]))
 

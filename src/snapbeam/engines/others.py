@@ -41,7 +41,7 @@ def others_of(
         shapes = np.array([structure.model.shape_at(float(x)) for x in different])
         places[:, j] = len(rows) + which
         rows += [sign * _without_body(structure, structure.row(shape)) for shape in shapes]
-        numbers[:, j, REST] = sign * structure.sign * (shapes @ structure.equilibrium)[which]
+        numbers[:, j, REST] = sign * structure.sign * structure.rests(shapes)[which]
         begun = _begun(striker.drive, columns, f"drive_{number}", system, runs)
         gap = columns.get(f"striker_{number}.gap", np.full(runs, np.nan))
         numbers[:, j, OFFSET] = np.where(np.isnan(gap), -begun, -gap)

@@ -84,6 +84,10 @@ class Structure:
     body_mass: float | None = None
     """Of a striker that is a body, whose own mode is then the last one; kg."""
 
+    def rests(self, shapes: _Array) -> _Array:
+        """Displacement at rest of points with these *shapes*, m: each by itself, so that none depends on the others."""
+        return np.array([(shape[None, :] @ self.equilibrium)[0] for shape in shapes])
+
     def row(self, shape: _Array) -> _Array:
         """V^T shape, seen from the striker's side."""
         row: _Array = self.sign * (self.model.linear_modes.T @ shape)
