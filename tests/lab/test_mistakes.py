@@ -11,7 +11,13 @@ from mistakes.table import CASES
 ENDS = ("right", "flagged", "refused")
 
 
-LONG = ("with an exposure of 0.9 of a frame", "video with lossy compression")
+LONG = (
+    "with an exposure of 0.9 of a frame",
+    "video with lossy compression",
+    "a frame made of each field, each row twice",
+    "the rows between made of their neighbours",
+    "differences from a blur of a pixel added once",
+)
 
 
 def shown(case):
