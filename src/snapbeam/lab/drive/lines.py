@@ -118,7 +118,9 @@ def _left(part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_
     design = _design(part.time, frequencies)
     used = design[sound]
     gram = used.T @ used
-    solution: _Array = np.linalg.lstsq(gram, used.T @ part.values[sound], rcond=1e-12)[0]
+    solution: _Array = np.asarray(
+        np.linalg.lstsq(gram, used.T @ part.values[sound], rcond=1e-12)[0], dtype=np.float64
+    )
     left: _Array = np.asarray(part.values - design @ solution, dtype=np.float64)
     left[~sound] = 0.0
     return left, solution
