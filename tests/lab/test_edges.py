@@ -93,5 +93,32 @@ def test_faint_light_that_lasts_shows_in_the_mean_thickness():
     thickness = 16.0 + 0.1 * rng.standard_normal(count)
     thickness[40:96] += 0.15
     miss, odd = distortion(thickness, plain, plain + 1.3, 1.3)
-    assert odd[44:92].all() and not odd[130:].any()
+    assert odd[44:92].all() and not odd[170:].any()
     assert (miss[44:92] > 0.1).all()
+
+
+def test_light_over_half_of_the_frames_does_not_hide_behind_the_scatter_that_it_makes():
+    """Three standard deviations, over 70 of 150 frames: the scatter of all frames is twice that of the noise."""
+    from snapbeam.lab.tracking.measure.series import distortion
+
+    thickness = 16.0 + 0.035 * np.random.default_rng(5).standard_normal(150)
+    thickness[40:110] += 0.1
+    plain = np.zeros(150)
+    miss, odd = distortion(thickness, plain, plain + 1.3, 1.3)
+    assert odd[44:106].all() and (miss[44:106] > 0.03).all()
+
+
+def test_a_frame_whose_columns_agree_by_chance_is_not_surer_than_the_others():
+    """Of 14 columns with a noise of 0.34 px none but outliers is left out, and no error is less than the usual one."""
+    from snapbeam.lab.tracking.measure.series import pooled
+
+    rng = np.random.default_rng(3)
+    x = np.arange(14.0) - 6.5
+    y = 0.34 * rng.standard_normal((40_000, 14))
+    good = np.ones_like(y, bool)
+    value, error, *_ = fit_line(x, y, good, 1.5, 0.3)
+    assert np.abs(value / pooled(error)).max() < 5.0
+    # without a word of the noise, lines are drawn through those few that agree
+    freely, error_of_these, *_ = fit_line(x, y, good, 1.5)
+    assert np.abs(freely).max() > np.abs(value).max()
+    assert np.abs(freely / error_of_these).max() > 8.0

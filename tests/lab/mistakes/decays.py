@@ -102,6 +102,43 @@ def only_hum(folder):
     return judged(np.cos(2.0 * np.pi * 100.0 * TIME), frequencies=[FREQ])
 
 
+def windowed(constant, **options):
+    """A record that an analyser has multiplied by an exponential window, its noise too."""
+
+    def look(folder):
+        noisy = ringing() + 0.02 * np.random.default_rng(3).standard_normal(TIME.size)
+        return judged(noisy * np.exp(-TIME / constant), noise=0.0, **options)
+
+    return look
+
+
+def softened(freq, share, zeta):
+    """A mode whose frequency lies lower by *share* of itself at the start."""
+    fall = np.exp(-zeta * 2.0 * np.pi * freq * TIME)
+    phase = 2.0 * np.pi * freq * np.cumsum(1.0 - share * fall**2) / RATE
+    return fall * np.cos(phase + 0.3)
+
+
+def folded(folder):
+    """3000 Hz sampled at 5000: all that is in the record is 2000 Hz."""
+    outcome = judged(softened(3000.0, 0.005, 81.0 * ZETA / 3000.0), freq=3000.0)
+    return Outcome(outcome.findings)
+
+
+def just_folded(folder):
+    return Outcome(judged(ringing(2600.0, 81.0 * ZETA / 2600.0), freq=2600.0).findings)
+
+
+def warming(share):
+    """A frequency that changes at a steady rate, by *share* over the second of the record."""
+
+    def look(folder):
+        phase = 2.0 * np.pi * FREQ * (TIME + 0.5 * share * TIME**2)
+        return judged(np.exp(-ZETA * 2.0 * np.pi * FREQ * TIME) * np.cos(phase + 0.3))
+
+    return look
+
+
 def drifting(folder):
     return judged(ringing() + 1.5 * np.exp(-TIME / 0.4))
 
@@ -130,6 +167,14 @@ CASES = (
     decay("a second hit after 0.3 s", second_hit, "flagged", "decay.disturbed"),
     decay("hum of 100 Hz half as large as the decay", hum(0.5), "right", "decay.hum", "a line that does not decay"),
     decay("the same, with --frequencies 81", hum(0.5, frequencies=[FREQ]), "right", "decay.hum", "the same"),
+    decay("an exponential window of half a second", windowed(0.5), "flagged", "decay.window"),
+    decay("the same, and its time constant is given", windowed(0.5, exponential_window=0.5), "right",
+          "", "exponential_window (--exponential-window) undoes it"),
+    decay("a frequency that falls by 1 % in a second, as in the sun", warming(-0.01), "flagged",
+          "decay.frequency_drift"),
+    decay("a frequency that rises by 0.3 % in a second", warming(0.003), "flagged", "decay.frequency_drift"),
+    decay("a softening mode of 3000 Hz, sampled at 5000 Hz", folded, "flagged", "decay.hardening"),
+    decay("a mode of 2600 Hz, sampled at 5000 Hz", just_folded, "flagged", "decay.above_band"),
     decay("nothing but hum, with --frequencies 81", only_hum, "refused", sees="a line that does not decay",
           words="does not decay"),
 )  # fmt: skip

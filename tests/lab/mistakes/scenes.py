@@ -131,6 +131,72 @@ def begun_late():
     return time[first:] - time[first], beam[first:], shaker[first:]
 
 
+def sharpened(amount):
+    """Edges enhanced by the camera: what a blur of a pixel takes away is added *amount* times."""
+
+    def change(frames):
+        from scipy.ndimage import gaussian_filter
+
+        blurred = gaussian_filter(frames, (0.0, 1.0, 1.0))
+        return np.clip(np.rint(frames + amount * (frames - blurred)), 0, 4095).astype(np.uint16), PIXEL
+
+    return change
+
+
+def fields(folder, make):
+    """Interlaced video: odd rows of half a frame later, made frames by *make*; held against each field's own time."""
+    time, beam, shaker, *_ = impacts(4)
+    half = round(0.5 / FRAME_RATE / (time[1] - time[0]))
+    drawn, later = (
+        render_recording(
+            time,
+            np.concatenate([np.full(wait, beam[0]), beam])[: time.size],
+            np.concatenate([np.full(wait, shaker[0]), shaker])[: time.size],
+            camera=SyntheticCamera(**CAMERA),
+            stage=SyntheticStage(shaker_width=0.8e-3),
+            rest_frames=24,
+            seed=wait,
+        )
+        for wait in (half, 0)
+    )
+    frames, instants = make(np.stack(list(drawn)), np.stack(list(later)))
+    np.save(folder / "fields.npy", frames)
+    with open_recording(folder / "fields.npy", frame_rate=FRAME_RATE, pixel_size=PIXEL) as recording:
+        tracked = track(recording, rest_displacement=-BUCKLING_LEVEL)
+    ratio = 0.0
+    for value, error in (("displacement_mm", "displacement_stderr_mm"),
+                         ("shaker_displacement_mm", "shaker_stderr_mm")):  # fmt: skip
+        true = drawn.truth[value].values
+        if instants == 2:
+            true = np.stack([true, later.truth[value].values], 1).ravel()
+        ratio = max(ratio, off(tracked[value], true, tracked[error].values))
+    assert ratio < 5.0, ratio
+    return Outcome(tuple(findings_of(tracked)), "", ratio)
+
+
+def woven(first, second):
+    """Frames that hold the even rows of the first instant and the odd ones of the second."""
+    first[:, 1::2] = second[:, 1::2]
+    return first, 1
+
+
+def doubled(first, second):
+    """A frame for each field, each of its rows twice."""
+    pairs = zip(first, second, strict=True)
+    return np.stack([np.repeat(one, 2, axis=0) for a, b in pairs for one in (a[0::2], b[1::2])]), 2
+
+
+def between(first, second):
+    """A frame for each field, the rows between made of their neighbours."""
+    out = []
+    for a, b in zip(first.astype(float), second.astype(float), strict=True):
+        rows = np.arange(a.shape[0])
+        for one, parity in ((a, 0), (b, 1)):
+            field = one[parity::2]
+            out.append(np.stack([np.interp(rows, rows[parity::2], line) for line in field.T], 1))
+    return np.rint(np.array(out)).astype(np.uint16), 2
+
+
 def case(group, mistake, end, code="", words="", sees="", **of_the_scene):
     return Case(group, mistake, lambda folder: scene(folder, **of_the_scene), end, code, words, sees)
 
@@ -225,6 +291,16 @@ CASES = (
     Case(AFTERWARDS, "pictures enlarged to twice as many pixels", changed(enlarged), "flagged", "camera.smoothed"),
     Case(AFTERWARDS, "so little light that the beam stands out by a few grey levels", changed(dim), "flagged",
          "camera.few_levels"),
+    Case(AFTERWARDS, "interlaced video: odd rows half a frame later than even ones",
+         lambda folder: fields(folder, woven), "flagged", "camera.interlaced"),
+    Case(AFTERWARDS, "a frame made of each field, each row twice", lambda folder: fields(folder, doubled), "flagged",
+         "camera.fields"),
+    Case(AFTERWARDS, "a frame made of each field, the rows between made of their neighbours",
+         lambda folder: fields(folder, between), "flagged", "camera.smoothed"),
+    Case(AFTERWARDS, "edges enhanced by the camera: differences from a blur of a pixel added once",
+         changed(sharpened(1.0)), "right", sees="the mean shape of an edge; what it differs from a blurred step by is "
+         "in the standard errors"),
+    Case(AFTERWARDS, "the same, added twice", changed(sharpened(2.0)), "flagged", "camera.edge_shape"),
     case(REST, "the beam moves in the first frame", "flagged", "camera.no_rest", motion=begun_late(), rest=0),
     case(
         "Pixel size",

@@ -20,6 +20,7 @@ def identify(
     stop: asked.Stop = None,
     soften: asked.Soften = True,
     buckling_level: asked.BucklingLevel = None,
+    exponential_window: asked.ExponentialWindow = None,
     mirror_channel: asked.MirrorChannel = None,
     channel: lab.Channel = None,
     units: lab.Units = None,
@@ -57,7 +58,7 @@ def identify(
     fits = {
         name: identify_decay(
             data, modes=modes, frequencies=rough, method=name, start=start, stop=stop, soften=soften,
-            buckling_level=buckling_level,
+            buckling_level=buckling_level, exponential_window=exponential_window,
         )
         for name in (METHODS if method == "all" else (method,))
     }  # fmt: skip

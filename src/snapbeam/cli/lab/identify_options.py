@@ -11,6 +11,7 @@ from snapbeam.cli.common import options as opt
 
 __all__ = [
     "BucklingLevel",
+    "ExponentialWindow",
     "Frequencies",
     "Method",
     "MirrorChannel",
@@ -43,6 +44,10 @@ Soften = Annotated[
 BucklingLevel = Annotated[
     float | None,
     opt.number_option("b, m: hold the softening near that of one mode, 0.75 (a/b)^2.", _DECAY),
+]
+ExponentialWindow = Annotated[
+    float | None,
+    opt.number_option("T, s: undo a window exp(-t/T) by which an analyser multiplied the record.", _DECAY),
 ]
 MirrorChannel = Annotated[
     str | None,

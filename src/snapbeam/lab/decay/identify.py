@@ -17,11 +17,13 @@ from snapbeam.core.validate import InputError, choice, integer, positive
 from snapbeam.lab.decay.centres import find_centres, unexplained
 from snapbeam.lab.decay.cycles import Cycles, backbone, noise_level, regress
 from snapbeam.lab.decay.fit import FitResult, explain
-from snapbeam.lab.decay.judge import findings_about, judged, misfit_of
+from snapbeam.lab.decay.judge import findings_about, judged, misfit_of, sampled_findings, widened
 from snapbeam.lab.decay.model import DecayFit, ModeEstimate
+from snapbeam.lab.decay.noise_fall import noise_fall, undone
 from snapbeam.lab.decay.poles import without_poles
 from snapbeam.lab.decay.together import fit_modes, mode_by_cycles
 from snapbeam.lab.decay.window import prepared
+from snapbeam.lab.plausibility.decay import KINDS
 from snapbeam.lab.signals.signal import SignalSamples, check_signal
 from snapbeam.lab.signals.sine_fit import white_variance
 
@@ -47,6 +49,7 @@ def identify_decay(
     stop: float | None = None,
     soften: bool = True,
     buckling_level: float | None = None,
+    exponential_window: float | None = None,
 ) -> DecayFit:
     """Identify the modes of a free decay.
 
@@ -71,6 +74,8 @@ def identify_decay(
     buckling_level : float, optional
         b [m], for the centre's displacement or velocity: the softening is then held near 0.75 (a/b)^2, that
         of one mode, within 10 %, which narrows the frequency of a short decay.
+    exponential_window : float, optional
+        Time constant T [s] of a window exp(-t/T) by which an analyser has multiplied the record; undone.
 
     Returns
     -------
@@ -94,7 +99,10 @@ def identify_decay(
         if frequencies is None
         else [positive(f"frequencies[{i}]", float(f), "Hz") for i, f in enumerate(np.atleast_1d(frequencies))]
     )
-    decay = prepared(check_signal(signal), start, stop)
+    samples = check_signal(signal)
+    if exponential_window is not None:
+        samples = undone(samples, positive("exponential_window", exponential_window, "s"))
+    decay = prepared(samples, start, stop)
     centres = find_centres(decay, count, asked)
     told = list(centres.told)
     known = _known_softening(buckling_level, units, centres.wanted[0])
@@ -115,6 +123,15 @@ def identify_decay(
     estimates, doubts = judged(samples, result, cycles, misfit, soften)
     wanted = tuple(estimates[: len(centres.wanted)])
     doubts += findings_about(samples, wanted, result.noise_near, soften)
+    doubts += sampled_findings(wanted, decay.samples.sampling_freq)
+    left = SignalSamples(result.residual, samples.time, samples.sampling_freq)
+    falls = noise_fall(left, wanted[0].natural_freq)
+    if falls is not None:
+        added = 100.0 * falls.rate / (2.0 * math.pi * wanted[0].natural_freq)
+        doubts.append(
+            KINDS["window"].found(factor=falls.factor, constant=1.0 / falls.rate, added_percent=added)
+        )
+    wanted = widened(wanted, decay.drift, falls.rate if falls is not None else 0.0)
     free = [mode.natural_freq for mode in wanted]
     lines = [0.0, *free, *(2.0 * f for f in free)]
     near = white_variance(result.residual, samples.sampling_freq, free[0], lines, 3 * len(free))

@@ -18,11 +18,14 @@ from snapbeam.lab.decay.model import ModeEstimate
 from snapbeam.lab.plausibility.decay import KINDS
 from snapbeam.lab.signals.signal import SignalSamples
 
-__all__ = ["Misfit", "findings_about", "judged", "misfit_of"]
+__all__ = ["Misfit", "findings_about", "judged", "misfit_of", "sampled_findings", "widened"]
 
 _Array = NDArray[np.float64]
 _RATIO = 1.6  # of what is left to what the noise explains, from which the fit is in doubt
 _MATTERS = 0.003  # of the amplitude; what is left below that is of no matter
+_HARDENS = 6.0  # standard errors
+_RISE = 3e-4  # share of the frequency
+_BAND = 2.56  # of an analyser: its sampling frequency over its highest line
 _APART = 6.0  # standard errors by which two halves of a decay may differ
 
 
@@ -141,6 +144,38 @@ def _halves(
     return out[0], out[1]
 
 
+def sampled_findings(modes: tuple[ModeEstimate, ...], sampling_freq: float) -> list[Finding]:
+    """What is to be said of modes above the band that filters against aliasing keep clean."""
+    limit = sampling_freq / _BAND
+    return [
+        KINDS["above_band"].found(
+            frequency=mode.natural_freq, limit_hz=limit, folded=sampling_freq - mode.natural_freq
+        )
+        for mode in modes
+        if mode.natural_freq > limit
+    ]
+
+
+def widened(modes: tuple[ModeEstimate, ...], drift: float, added: float) -> tuple[ModeEstimate, ...]:
+    """Modes whose errors hold a *drift* of the frequency, a share of it, and a rate [1/s] *added* by a window."""
+    if drift == 0.0 and added == 0.0:
+        return modes
+    first = modes[0].amplitude ** 2
+    return tuple(
+        dataclasses.replace(
+            mode,
+            natural_freq_se=math.hypot(mode.natural_freq_se, drift * mode.natural_freq),
+            damping_ratio_se=math.hypot(
+                mode.damping_ratio_se,
+                added / (2.0 * math.pi * mode.natural_freq),
+                drift * mode.damping_ratio,
+            ),
+            softening_se=math.hypot(mode.softening_se, drift / first if mode.softening_se > 0.0 else 0.0),
+        )
+        for mode in modes
+    )
+
+
 def findings_about(
     samples: SignalSamples, modes: tuple[ModeEstimate, ...], noise: float, soften: bool
 ) -> list[Finding]:
@@ -154,6 +189,11 @@ def findings_about(
     change = abs(first.softening) * first.amplitude**2
     if soften and change > 0.1:
         told.append(KINDS["large"].found(change_percent=100.0 * change))
+    rise = -first.softening * first.amplitude**2
+    certain = -first.softening / first.softening_se if first.softening_se > 0.0 else 0.0
+    if soften and certain > _HARDENS and rise > _RISE:
+        half = 0.5 * samples.sampling_freq
+        told.append(KINDS["hardening"].found(rise_percent=100.0 * rise, certain=certain, half_hz=half))
     if first.amplitude < 5.0 * noise:
         told.append(KINDS["faint"].found())
     if first.damping_ratio < 2.0 * first.damping_ratio_se:

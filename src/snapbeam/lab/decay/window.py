@@ -13,6 +13,7 @@ from snapbeam.core.validate import InputError, finite
 from snapbeam.lab.decay.cycles import hilbert_cycles, noise_level, regress
 from snapbeam.lab.decay.drift import Line, find_drift, find_lines, without_lines
 from snapbeam.lab.decay.release import find_ceiling, find_jump, find_release
+from snapbeam.lab.decay.wandering import frequency_drift, steadied
 from snapbeam.lab.plausibility.decay import KINDS
 from snapbeam.lab.signals.signal import SignalSamples
 
@@ -24,11 +25,15 @@ _LEAST_CYCLES = 8.0
 
 @dataclass(frozen=True)
 class Decay:
-    """The free part of a record, cleaned; what was taken out of it, and what was found on the way."""
+    """The free part of a record, cleaned; what was taken out of it, and what was found on the way.
+
+    ``drift`` is the share by which the frequency changes with time over it; ``samples`` are without.
+    """
 
     samples: SignalSamples
     lines: tuple[Line, ...]
     findings: tuple[Finding, ...]
+    drift: float
 
 
 def dominant(samples: SignalSamples, low: float = 0.0, high: float | None = None) -> float:
@@ -106,7 +111,10 @@ def prepared(samples: SignalSamples, start: float | None, stop: float | None) ->
         )
         frequency = dominant(clean)
     clean, told = _undisturbed(clean, frequency)
-    return Decay(clean, tuple(lines), (*findings, *told))
+    clean, share = _steady(clean, frequency)
+    if share:
+        told.append(KINDS["frequency_drift"].found(share_percent=100.0 * share))
+    return Decay(clean, tuple(lines), (*findings, *told), share)
 
 
 def _cut(samples: SignalSamples, start: float | None, stop: float | None) -> SignalSamples:
@@ -151,6 +159,19 @@ def _decay_rate(samples: SignalSamples, frequency: float) -> float:
     except InputError:
         return 0.0
     return max(2.0 * math.pi * mode.natural_freq * mode.damping_ratio, 0.0)
+
+
+def _steady(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, float]:
+    """The decay on a clock that drifts as its frequency does, and by what share that is; 0 where it does not."""
+    try:
+        cycles = hilbert_cycles(samples, frequency, noise_level(samples))
+    except InputError:
+        return samples, 0.0
+    within = frequency_drift(cycles, frequency)
+    if not within:
+        return samples, 0.0
+    share = within * float((samples.time[-1] - samples.time[0]) / (cycles.time[-1] - cycles.time[0]))
+    return steadied(samples, share), share
 
 
 def _undisturbed(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, list[Finding]]:

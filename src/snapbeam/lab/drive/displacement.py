@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.lab.drive.lines import without_hum
 from snapbeam.lab.drive.vibrometer import DriveMeasurement, measure_drive
 from snapbeam.lab.signals.flaws import sound_samples
 from snapbeam.lab.signals.signal import SignalSamples, check_signal, make_signal
@@ -73,11 +74,12 @@ def displacement_from_velocity(
 
 
 def mended(samples: SignalSamples, drive: DriveMeasurement) -> SignalSamples:
-    """A record whose flaws and cut tops are replaced by the motion about them; the same where it has none.
+    """A record without hum, whose flaws and cut tops are replaced by the motion about them; the same without any.
 
     In steady motion that is the steady sine; in the start-up cut tops follow from a sine of changing amplitude
     through what is left of the two cycles about them.
     """
+    samples = without_hum(samples, drive.lines)
     if not drive.flaws and not drive.clipping.found:
         return samples
     values = samples.values.copy()

@@ -15,7 +15,8 @@ from snapbeam.lab.signals.sine_fit import SineFit, fit_sine
 __all__ = ["robust_fit", "settled_cycles", "steady_fit", "with_wander"]
 
 _Array = NDArray[np.float64]
-_PULLED = 4.0  # times the noise by which phases off a line are no chance
+_PULLED = 1.8  # times the noise by which phases off a line are no chance
+_SMOOTH = 0.6  # of twice the variance, which the square of steps has on average where parts are by chance
 _IN_A_ROW = 5  # steady cycles that end a start-up
 
 
@@ -97,7 +98,7 @@ def with_wander(
     if used.sum() < 16:
         return steady, 0.0
     parts = [np.abs(part).mean() for part in np.array_split(cycles[used], 8)]
-    spread = float(np.std(parts, ddof=1)) / math.sqrt(8.0)
+    spread = float(np.std(parts, ddof=1)) / math.sqrt(_counts(np.array(parts)))
     wander = float(np.std(np.abs(cycles[used]))) / steady.amplitude
     return dataclasses.replace(
         steady,
@@ -123,4 +124,16 @@ def _pulling(times: _Array, cycles: NDArray[np.complex128]) -> float:
     off = mean - np.polyval(np.polyfit(at, mean, 1), at)
     if float(np.sqrt(np.mean(off**2))) < _PULLED * float(np.sqrt(np.mean(np.square(own)))):
         return 0.0
-    return float(np.std(np.diff(mean) / np.diff(at), ddof=1)) / math.sqrt(7.0)
+    rates = np.diff(mean) / np.diff(at)
+    return float(np.std(rates, ddof=1)) / math.sqrt(_counts(rates))
+
+
+def _counts(parts: _Array) -> float:
+    """How many of the parts of a record count for their mean: all, or one where they follow each other smoothly.
+
+    A slow change, as the beat of two lines too close to be parted, is no scatter that a mean evens out.
+    """
+    about = parts - parts.mean()
+    total = float((about * about).sum())
+    steps = float((np.diff(parts) ** 2).sum())
+    return 1.0 if total > 0.0 and steps < _SMOOTH * total else float(parts.size)

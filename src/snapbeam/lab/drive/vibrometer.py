@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from snapbeam.core.findings import Finding, doubtful
 from snapbeam.core.validate import InputError, finite, positive, within
+from snapbeam.lab.drive.lines import DriveLines, beside_lines, find_drive_lines, without_hum
 from snapbeam.lab.drive.onset import find_onset, moves_outside, moving_part
 from snapbeam.lab.drive.steady import robust_fit, settled_cycles, steady_fit, with_wander
 from snapbeam.lab.plausibility.vibrometer import KINDS
@@ -68,8 +69,9 @@ class DriveMeasurement:
     ``steady`` is the sine fitted after the start-up; ``startup`` is None where the record begins in motion;
     ``stop`` [s] is the end of the motion or of the record; ``cycle_time`` [s] and ``cycle_amplitude`` follow
     the amplitude cycle by cycle; ``accepted`` says whether ``steady.sinad`` exceeds ``snr_limit`` [dB].
-    ``flaws`` are samples (first, one past the last) that are no part of the motion, ``clipping`` the levels
-    at which tops are cut off; ``findings`` what makes the result doubtful.
+    ``flaws`` are samples (first, one past the last) that are no part of the motion, ``lines`` hum, which is taken
+    out, and lines beside the sine; ``clipping`` the levels at which tops are cut off; ``findings`` what makes the
+    result doubtful.
     """
 
     steady: SineFit
@@ -78,6 +80,7 @@ class DriveMeasurement:
     snr_limit: float
     units: str
     flaws: tuple[Flaw, ...]
+    lines: DriveLines
     clipping: Clipping
     findings: tuple[Finding, ...]
     cycle_time: _Array = field(repr=False)
@@ -180,6 +183,12 @@ def measure_drive(
             f"signal: the shaker moves for {span:.1f} cycles of {guess:g} Hz: must be at least 8"
         )
     rough = robust_fit(_slice(moving, moving.values.size // 3, None), guess, 3)
+    lines = find_drive_lines(samples, first, last, rough)
+    if lines.hum:
+        samples = without_hum(samples, lines)
+        first, last = moving_part(samples, rough.frequency)
+        moving = _slice(samples, first, last)
+        rough = robust_fit(_slice(moving, moving.values.size // 3, None), rough.frequency, 3)
     onset, uncertainty = find_onset(samples, first, rough)
     start = float(samples.time[0]) if onset is None else onset
     period = 1.0 / rough.frequency
@@ -197,6 +206,7 @@ def measure_drive(
     shift = int(np.searchsorted(samples.time, part.time[0] - 0.25 / samples.sampling_freq))
     everywhere = [Flaw(flaw.first + shift, flaw.last + shift) for flaw in flaws]
     steady, wander = with_wander(steady, times, cycles, everywhere, samples, begin)
+    steady = beside_lines(steady, lines)
     startup = None
     amplitudes = np.abs(cycles)
     broken: list[Flaw] = []
@@ -207,6 +217,7 @@ def measure_drive(
         *_flaw_findings(samples, everywhere, broken, clipping),
         *_doubts(steady, limit, wander, stray, frequency, stated),
         *_start_findings(startup, period),
+        *_line_findings(lines, steady),
         *([KINDS["interrupted"].found(outside_ms=1e3 * outside)] if outside > 3.0 * period else []),
     ]
     return DriveMeasurement(
@@ -216,6 +227,7 @@ def measure_drive(
         snr_limit=limit,
         units=str(signal.attrs["units"]),
         flaws=(*broken, *everywhere),
+        lines=lines,
         clipping=clipping,
         findings=tuple(findings),
         cycle_time=times,
@@ -306,6 +318,15 @@ def _doubts(
     if steady.sinad <= limit:
         cause = "noisy" if steady.snr <= limit else "distorted"
         told.append(KINDS[cause].found(sinad_db=steady.sinad, limit_db=limit))
+    return told
+
+
+def _line_findings(lines: DriveLines, steady: SineFit) -> list[Finding]:
+    told = []
+    for name, some in (("hum", lines.hum), ("second_line", lines.beside)):
+        for line in some:
+            share = 100.0 * line.amplitude / steady.amplitude
+            told.append(KINDS[name].found(frequency=line.frequency, share_percent=share))
     return told
 
 

@@ -76,6 +76,34 @@ KINDS = table(
         "{damping_se:.1f} in damping; standard errors are raised by that",
     ),
     Kind(
+        "decay.frequency_drift", DOUBT,
+        "the phase cycle by cycle, against the changes that softening makes",
+        "the frequency changes by {share_percent:+.2f} % over the decay in a way that its amplitude does not: the "
+        "temperature, or a clamp that creeps; the frequency is that of the start, and the change is in its standard "
+        "error",
+    ),
+    Kind(
+        "decay.window", DOUBT,
+        "the noise of the sensor in each eighth of the record, which does not decay",
+        "the noise falls with the decay, {factor:.1f} times over the record, as under an exponential window of "
+        "{constant:.3g} s: such a window adds {added_percent:.3g} % to the damping ratio, which is in its standard "
+        "error; save the record without a window, or give its exponential_window (--exponential-window)",
+        ("exponential_window",),
+    ),
+    Kind(
+        "decay.hardening", DOUBT,
+        "the sign of the change of the frequency with amplitude",
+        "the frequency rises with amplitude, by {rise_percent:.2g} % at the start ({certain:.0f} standard errors); "
+        "about a well a buckled beam softens: the beam is not buckled, or the mode lies above half the sampling "
+        "frequency, {half_hz:.5g} Hz, and is seen folded",
+    ),
+    Kind(
+        "decay.above_band", DOUBT,
+        "the frequency of a mode against the sampling frequency",
+        "a mode at {frequency:.5g} Hz lies above {limit_hz:.5g} Hz, the sampling frequency over 2.56, where filters "
+        "against aliasing still let pass what lies above half of it: it may be {folded:.5g} Hz; record faster",
+    ),
+    Kind(
         "decay.short", DOUBT,
         "the amplitude left at the end",
         "the record ends with {left_percent:.0f} % of the amplitude left: damping is read from little decay",

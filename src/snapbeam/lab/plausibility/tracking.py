@@ -11,7 +11,7 @@ from snapbeam.lab.plausibility.kinds import Kind, table
 from snapbeam.lab.tracking.flags import FrameFlag
 from snapbeam.lab.tracking.measure.follower import TrackedRows
 from snapbeam.lab.tracking.measure.series import Rest, Touch
-from snapbeam.lab.tracking.scene import BeamView, EdgeShape, Scene
+from snapbeam.lab.tracking.scene import BeamView, EdgeShape, Fields, Scene
 from snapbeam.lab.tracking.settings import TrackingSettings
 from snapbeam.lab.tracking.survey.edge_shape import CLIPPED
 
@@ -99,9 +99,22 @@ KINDS = table(
     Kind(
         "camera.smoothed", DOUBT,
         "noise of pixels, against that of their neighbours",
-        "noise of neighbouring pixels is alike (correlation {correlation:.2f}): pictures were enlarged, smoothed or "
-        "compressed, so that edges are known {factor:.1f} times less well than they seem, which is in the standard "
-        "errors; keep the frames as they were taken",
+        "noise of neighbouring pixels is alike (correlation {correlation:.2f}): pictures were enlarged, smoothed, "
+        "compressed or made of fields, so that edges are known {factor:.1f} times less well than they seem and lie "
+        "{made_px:.2f} px off, which is in the standard errors; keep the frames as they were taken",
+    ),
+    Kind(
+        "camera.interlaced", DOUBT,
+        "the edge in odd rows of fast frames, against that in even ones",
+        "odd and even rows differ by {share:.2f} of the step from frame to frame: interlaced video, whose rows are of "
+        "two instants; positions are of an instant up to half a frame off, which is in their standard errors; record "
+        "progressive frames, or part the fields into frames of their own",
+    ),
+    Kind(
+        "camera.fields", DOUBT,
+        "each frame against the mean of its neighbours, with turning sign",
+        "every other frame is shifted by {shift_px:.2f} px: fields of an interlaced video, made frames by repeating "
+        "rows; the shift is in the standard errors; take a program that puts each field's rows where they belong",
     ),
     Kind(
         "camera.few_levels", DOUBT,
@@ -180,7 +193,7 @@ class SeenMotion:
     """What the findings of a tracked recording are drawn from, beside the scene.
 
     ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
-    [mm/px]; ``drift`` [px] of the camera, the largest.
+    [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video.
     """
 
     rows: TrackedRows
@@ -189,6 +202,7 @@ class SeenMotion:
     touch: Touch
     scale: float
     drift: float
+    fields: Fields
 
 
 def tracking_findings(
@@ -197,7 +211,7 @@ def tracking_findings(
     """What a tracked recording says against itself; *offset_mm* is the error of the rest position."""
     told = [*_of_the_beam(scene, seen, settings), *_of_the_rest(seen, settings, offset_mm)]
     told += _of_the_edges(scene.shape, settings)
-    told += _of_the_pixels(scene)
+    told += _of_the_pixels(scene, seen.fields)
     told += _of_the_frames(seen.rows)
     if scene.shaker is not None:
         told += _of_the_tip(scene, seen)
@@ -277,13 +291,18 @@ def _of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Finding]
     return []
 
 
-def _of_the_pixels(scene: Scene) -> list[Finding]:
+def _of_the_pixels(scene: Scene, fields: Fields) -> list[Finding]:
     told = []
+    if fields.apart > 0.0:
+        told.append(KINDS["interlaced"].found(share=fields.apart))
+    if fields.shift > 0.0:
+        told.append(KINDS["fields"].found(shift_px=fields.shift))
     noise = scene.noise
     if noise.lag > 0.0:
         told.append(KINDS["averaged"].found(correlation=noise.in_time, lag=noise.lag))
-    if noise.factor > 1.0:
-        told.append(KINDS["smoothed"].found(correlation=noise.along, factor=noise.factor))
+    if noise.factor > 1.0 or noise.across > 0.0:
+        alike = max(noise.along, noise.across)
+        told.append(KINDS["smoothed"].found(correlation=alike, factor=noise.factor, made_px=noise.made_up))
     shift = rounding_shift(scene.beam)
     if shift > 0.0:
         told.append(KINDS["few_levels"].found(levels=scene.beam.contrast, shift_px=shift))

@@ -45,6 +45,19 @@ KINDS = table(
         "is that of its parts",
     ),
     Kind(
+        "vibrometer.hum", NOTE,
+        "lines that are in the rest before the start as they are in the motion",
+        "a line of {frequency:.3f} Hz with {share_percent:.1f} % of the amplitude is there at rest too (mains); taken "
+        "out",
+    ),
+    Kind(
+        "vibrometer.second_line", DOUBT,
+        "lines beside the drive and its harmonics that are not in the rest before the start",
+        "beside the drive there is a line of {frequency:.4g} Hz with {share_percent:.1f} % of its amplitude: the "
+        "shaker moves at two frequencies, or the record holds hum and no rest to tell it by; what it may pull is in "
+        "the standard errors",
+    ),
+    Kind(
         "vibrometer.interrupted", WRONG,
         "motion at the same frequency before or after the longest stretch of it",
         "the motion stops and begins again: {outside_ms:.3g} ms of it lie outside the longest stretch, and are not in "

@@ -18,7 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
-__all__ = ["EdgeFit", "Floats", "edge_profile", "fit_edges", "fit_line", "masked_median", "width_calibration"]
+__all__ = [
+    "EdgeFit",
+    "Floats",
+    "edge_noise",
+    "edge_profile",
+    "fit_edges",
+    "fit_line",
+    "masked_median",
+    "width_calibration",
+]
 
 Floats = NDArray[np.floating]
 MIN_WIDTH = 0.05
@@ -143,6 +152,20 @@ def width_calibration(width: float, rows: int) -> tuple[Floats, Floats]:
     return np.maximum.accumulate(apparent) + 1e-9 * np.arange(true.size), true
 
 
+def edge_noise(width: float, noise: float, contrast: float) -> float:
+    """Least standard deviation [px] of the row of one edge in white noise: sqrt(2 sqrt(pi) s) n/c; 0 if not known.
+
+    Parameters
+    ----------
+    width
+        Blur s of the edge [px].
+    noise, contrast
+        Standard deviation n of a pixel, and step c at the edge, in grey levels.
+    """
+    least = math.sqrt(2.0 * math.sqrt(math.pi) * max(width, MIN_WIDTH)) * noise / max(contrast, 1e-12)
+    return least if math.isfinite(least) else 0.0
+
+
 def masked_median(values: Floats, kept: NDArray[np.bool_]) -> Floats:
     """Median of the kept values along the last axis, NaN where none is."""
     count = kept.sum(-1)
@@ -153,17 +176,20 @@ def masked_median(values: Floats, kept: NDArray[np.bool_]) -> Floats:
 
 
 def fit_line(
-    x: Floats, y: Floats, good: NDArray[np.bool_], limit: float
+    x: Floats, y: Floats, good: NDArray[np.bool_], limit: float, noise: float = 0.0
 ) -> tuple[Floats, Floats, Floats, NDArray[np.bool_]]:
     """Robust straight lines through columns: y = value + slope x, one line for each row of *y*.
 
-    Points further than *limit* or four robust standard deviations from the line are left out, in two passes.
+    Points further than *limit* or four robust standard deviations from the line are left out, in two passes.  Of a
+    few points the nearest may lie on a line by chance, so the deviation is never taken as less than the *noise*
+    that each point has.
 
     Returns
     -------
     tuple
         Value at x = 0, its standard error, the slope, and the points kept; NaN where fewer than three are.
     """
+    least = min(max(0.1, 4.0 * noise), limit)
     kept = good & np.isfinite(y)
     values = np.where(kept, y, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -178,7 +204,7 @@ def fit_line(
             miss = np.abs(values - my[:, None] - slope[:, None] * (x - mx[:, None]))
             spread = masked_median(miss, kept) / 0.6745
             if trial < 2:
-                kept = kept & (miss <= np.clip(4.0 * spread, 0.1, limit)[:, None])
+                kept = kept & (miss <= np.clip(4.0 * spread, least, limit)[:, None])
         value = my - slope * mx
         variance = (np.where(kept, miss, 0.0) ** 2).sum(-1) / np.maximum(n - 2.0, 1.0)
         error = np.sqrt(variance * (1.0 / n + np.where(sxx > 0.0, mx * mx / sxx, 0.0)))

@@ -15,6 +15,7 @@ from snapbeam.lab.camera.recording import Recording
 from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.geometry import Orientation
 from snapbeam.lab.tracking.measure.beam import measure_beam
+from snapbeam.lab.tracking.measure.fields import seen_fields
 from snapbeam.lab.tracking.measure.follower import Drift, Follower
 from snapbeam.lab.tracking.measure.shaker import measure_shaker
 from snapbeam.lab.tracking.settings import TrackingSettings
@@ -106,7 +107,9 @@ def track(
         done += batch.shape[0]
         if progress is not None:
             progress(done, len(recording))
-    return tracked_dataset(follower.result(recording.numbers), recording, scene, wanted, marks.largest)
+    rows = follower.result(recording.numbers)
+    fields = seen_fields(recording, prepare, scene.beam, rows, wanted.side in ("below", "above"))
+    return tracked_dataset(rows, recording, scene, wanted, marks.largest, fields)
 
 
 def _sample(recording: Recording) -> tuple[NDArray[np.integer], int]:

@@ -24,7 +24,7 @@ from snapbeam.lab.tracking.flags import FrameFlag
 from snapbeam.lab.tracking.geometry import Orientation
 from snapbeam.lab.tracking.measure.follower import TrackedRows
 from snapbeam.lab.tracking.measure.series import Rest, find_rest, touching
-from snapbeam.lab.tracking.scene import NoiseShape, Scene
+from snapbeam.lab.tracking.scene import Fields, NoiseShape, Scene
 from snapbeam.lab.tracking.settings import TrackingSettings
 from snapbeam.lab.tracking.survey.edge_shape import CLIPPED
 from snapbeam.runs.schema import trajectory_dataset
@@ -38,13 +38,18 @@ _CLIPPED_ERROR = 0.05  # px; an overexposed edge is sharper than pixels can foll
 
 
 def tracked_dataset(
-    rows: TrackedRows, recording: Recording, scene: Scene, settings: TrackingSettings, drift: float
+    rows: TrackedRows,
+    recording: Recording,
+    scene: Scene,
+    settings: TrackingSettings,
+    drift: float,
+    fields: Fields,
 ) -> xr.Dataset:
     """The dataset of a tracked recording; see :func:`snapbeam.lab.track` for its variables.
 
-    *drift* [px] is the largest shift of the camera that was taken out.
+    *drift* [px] is the largest shift of the camera that was taken out, *fields* what is seen of interlaced video.
     """
-    rows = _as_filtered(rows, scene.noise)
+    rows = _as_filtered(rows, scene.noise, fields)
     rest = find_rest(rows.row, rows.error, rows.shaker, settings.rest_range(rows.row.size))
     if not rest.indices.size:
         raise InputError(
@@ -60,7 +65,7 @@ def tracked_dataset(
     offset = _offset_error(rows.row, rest)
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
-    seen = SeenMotion(rows, rest, penetration, touch, scale, drift)
+    seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields)
     findings = (*recording.findings, *tracking_findings(scene, seen, settings, scale * offset))
     # a shift of the edges by the camera's curve moves the shaker against the beam, not the beam against itself
     placed = scene.placed_error
@@ -70,7 +75,8 @@ def tracked_dataset(
     misfit = 0.7 * float(np.nan_to_num(scene.shape.misfit))
     if scene.shape.clipped > CLIPPED:
         misfit = max(misfit, _CLIPPED_ERROR)
-    common = math.hypot(offset, recording.edge_error, misfit, 0.5 * rounding_shift(scene.beam))
+    rounded = 0.5 * rounding_shift(scene.beam)
+    common = math.hypot(offset, recording.edge_error, misfit, rounded, scene.noise.made_up)
     beam_error = np.hypot(rows.error, common)
     shaker_error = np.hypot(rows.shaker_error, math.hypot(common, bent))
     valid = np.isfinite(beam_mm) & (np.isfinite(shaker_mm) if shaker is not None else True)
@@ -109,15 +115,16 @@ def tracked_dataset(
     return dataset
 
 
-def _as_filtered(rows: TrackedRows, noise: NoiseShape) -> TrackedRows:
-    """The rows with errors of pictures that were averaged over frames or smoothed, where their noise says so."""
+def _as_filtered(rows: TrackedRows, noise: NoiseShape, fields: Fields) -> TrackedRows:
+    """The rows with errors of pictures that were averaged over frames, smoothed or interlaced, where that is seen."""
+    lag = noise.lag + fields.lag
 
     def widened(row: Floats, error: Floats) -> Floats:
         step = np.abs(np.diff(row, prepend=np.nan, append=np.nan))
         most = np.nan_to_num(np.fmax(step[1:], step[:-1]))
-        return np.hypot(noise.factor * error, noise.lag * most)
+        return np.hypot(np.hypot(noise.factor * error, lag * most), fields.shift)
 
-    if noise.lag == 0.0 and noise.factor == 1.0:
+    if lag == 0.0 and noise.factor == 1.0 and fields.shift == 0.0:
         return rows
     return dataclasses.replace(
         rows, error=widened(rows.row, rows.error), shaker_error=widened(rows.shaker, rows.shaker_error)

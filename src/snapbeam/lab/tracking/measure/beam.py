@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.lab.tracking.edges import Floats, fit_edges, fit_line, masked_median
+from snapbeam.lab.tracking.edges import Floats, edge_noise, fit_edges, fit_line, masked_median
 from snapbeam.lab.tracking.geometry import HALF, HOT, gather
 from snapbeam.lab.tracking.scene import BeamView
 
@@ -67,7 +67,8 @@ def measure_beam(view: BeamView, frames: NDArray[np.floating]) -> BeamRows:
     for first, last in view.fixtures:
         with np.errstate(invalid="ignore"):
             good &= (rows < first - half) | (rows >= last + half)
-    row, error, slope, kept = fit_line(view.columns - view.contact_column, edges, good, 1.5)
+    noise = edge_noise(view.edge_width, view.noise, view.contrast)
+    row, error, slope, kept = fit_line(view.columns - view.contact_column, edges, good, 1.5, noise)
     share = kept.mean(1)
     width = np.interp(masked_median(fit.width, kept), *view.width_table)
     saturated = ((windows >= view.saturated) & inside[..., None]).mean((1, 2))

@@ -170,7 +170,7 @@ def distortion(
         spread = 1.4826 * float(np.median(np.abs(thickness[known] - usual)))
         miss[known] = np.abs(thickness[known] - usual)
         odd = miss > max(_FAR * spread, 0.06)
-        faint = _lasting(thickness[known] - usual, spread)
+        faint = _lasting(thickness[known] - usual)
         miss[known] = np.maximum(miss[known], faint)
         odd[known] |= faint > 0.0
     sound = np.isfinite(residual)
@@ -181,29 +181,34 @@ def distortion(
     return miss, odd
 
 
-def _lasting(miss: Floats, spread: float) -> Floats:
-    """How far off the thickness is on average over any stretch that a frame is in, where that is no chance; else 0."""
+def _lasting(miss: Floats) -> Floats:
+    """How far off the thickness is on average over any stretch that a frame is in, where that is no chance; else 0.
+
+    What chance does is told by the steps from frame to frame: light that lasts over a good part of the recording
+    widens the scatter of all frames together, but not these.
+    """
     out = np.zeros(miss.size)
     if miss.size < 4 * _STRETCH:
         return out
+    noise = 1.4826 * float(np.median(np.abs(np.diff(miss)))) / math.sqrt(2.0)
     mean = np.convolve(miss, np.full(_STRETCH, 1.0 / _STRETCH), "valid")
-    for first in np.flatnonzero(np.abs(mean) > max(_FAR * spread / math.sqrt(_STRETCH), _FAINT)):
+    for first in np.flatnonzero(np.abs(mean) > max(_FAR * noise / math.sqrt(_STRETCH), _FAINT)):
         inside = slice(int(first), int(first) + _STRETCH)
         out[inside] = np.maximum(out[inside], abs(mean[first]))
     return out
 
 
 def pooled(error: Floats) -> Floats:
-    """Standard errors of single frames, each from few columns, drawn up towards the usual one.
+    """Standard errors of single frames, each from few columns, none less than the usual one.
 
-    A frame whose columns scatter less than usual does so by chance: its variance is averaged with the median.
+    A frame whose columns scatter less than usual does so by chance: no frame is better lit or sharper than most.
     """
     known = np.isfinite(error)
     if not known.any():
         return error
     usual = float(np.median(error[known]))
     with np.errstate(invalid="ignore"):
-        return np.where(error < usual, np.sqrt(0.5 * (error**2 + usual**2)), error)
+        return np.where(error < usual, usual, error)
 
 
 def unexplained_blur(row: Floats, width: Floats, usual: float) -> Floats:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.lab.tracking.edges import Floats, fit_edges, fit_line, masked_median
+from snapbeam.lab.tracking.edges import Floats, edge_noise, fit_edges, fit_line, masked_median
 from snapbeam.lab.tracking.geometry import HALF, HOT, gather
 from snapbeam.lab.tracking.scene import BeamView, Sticker
 
@@ -42,7 +43,8 @@ def sticker_rows(
     """
     both = _both_edges(view, sticker, frames, near, tip_offset)
     middle = 0.5 * (both.upper + both.lower)
-    row, error, _, kept = fit_line(sticker.columns - view.contact_column, middle, both.good, 1.5)
+    noise = math.sqrt(0.5) * edge_noise(view.edge_width, view.noise, sticker.contrast)
+    row, error, _, kept = fit_line(sticker.columns - view.contact_column, middle, both.good, 1.5, noise)
     share = kept.mean(1)
     return ShakerRows(
         row=np.where((share >= 0.5) & (both.saturated <= view.hot_share + HOT), row, np.nan),

@@ -22,7 +22,7 @@ _CERTAIN = 0.2  # correlation that is no chance, and more than a sensor's own
 
 
 def noise_shape(head: NDArray[np.floating]) -> NoiseShape:
-    """Correlation of the noise with that of the next frame and of the next pixel along the beam.
+    """Correlation of the noise with that of the next frame, and of the next pixel along the beam and across it.
 
     The difference of two frames holds the noise of both and no scene.  Neighbours in time differ by
     2 sigma^2 (1 - r), frames further apart by 2 sigma^2, r the correlation.  Only pixels count about which the
@@ -33,7 +33,7 @@ def noise_shape(head: NDArray[np.floating]) -> NoiseShape:
     head
         Turned frames that follow each other, (n, height, width).
     """
-    none = NoiseShape(0.0, 0.0)
+    none = NoiseShape(0.0, 0.0, 0.0)
     if head.shape[0] < _APART + 3:
         return none
     mean = head.mean(0)
@@ -50,9 +50,16 @@ def noise_shape(head: NDArray[np.floating]) -> NoiseShape:
         return none
     near = [_noise_of(after, before, mean) for before, after in itertools.pairwise(head)]
     in_time = 1.0 - float(np.median([np.var(one[even]) for one in near])) / far
-    both = even[:, 1:] & even[:, :-1]
-    along = float(np.median([np.mean(one[:, 1:][both] * one[:, :-1][both]) for one in apart])) / far
-    return NoiseShape(*(value if value > _CERTAIN else 0.0 for value in (min(in_time, 0.9), min(along, 0.9))))
+    along, across = (_alike(apart, even, axis) / far for axis in (1, 0))
+    return NoiseShape(*(min(value, 0.9) if value > _CERTAIN else 0.0 for value in (in_time, along, across)))
+
+
+def _alike(apart: list[Floats], even: NDArray[np.bool_], axis: int) -> float:
+    """Mean product of neighbouring pixels, both of them even, along an axis."""
+    here, there = slice(1, None), slice(None, -1)
+    first, second = ((slice(None), one) if axis else (one, slice(None)) for one in (here, there))
+    both = even[first] & even[second]
+    return float(np.median([np.mean(one[first][both] * one[second][both]) for one in apart]))
 
 
 def _noise_of(after: NDArray[np.floating], before: NDArray[np.floating], mean: Floats) -> Floats:
