@@ -175,9 +175,9 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 
 @pytest.mark.slow
 def test_memory_does_not_grow_with_the_map(tmp_path):
-    """A million points: below 1 GiB, and as much as a hundred thousand within a tenth."""
+    """A million points: below 1 GiB, and at most 64 bytes for each of those beyond a hundred thousand."""
     peak = {}
-    for side in (100, 1000):
+    for side in (2, 100, 1000):  # the first may have to compile
         folder = tmp_path / str(side)
         folder.mkdir()
         done = subprocess.run(
@@ -190,7 +190,7 @@ def test_memory_does_not_grow_with_the_map(tmp_path):
         peak[side] = float(done.stdout)
     print(f"peak memory: {peak[100]:.0f} MiB for 1e5 points, {peak[1000]:.0f} MiB for 1e6")
     assert peak[1000] < 1024.0
-    assert peak[1000] < 1.1 * peak[100]
+    assert peak[1000] - peak[100] < 900_000 * 64 / 2**20
 
 
 @pytest.mark.slow
