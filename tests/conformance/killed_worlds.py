@@ -116,7 +116,8 @@ def plain(ds: Any) -> dict[str, Any]:
 def try_one(system: sb.System, name: str, folder: Path) -> str:
     """What went wrong with one parameter; nothing if nothing did."""
     axes = {name: values_of(system, name)}
-    integration = sb.Integration(cycles=2)
+    # a base lifts the beam off its stop first
+    integration = sb.Integration(cycles=2 if system.base is None else 4)
 
     def sweep(store: Path | None) -> Any:
         return sb.sweep(system, axes, integration, store=None if store is None else Keeping(store, chunk=1))
