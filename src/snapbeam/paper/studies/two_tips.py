@@ -223,11 +223,12 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
             lowest, shapes, places = found.height, [found.amplitude], [first[i], first[j]]
         results.progress("two_tips")(i + 1, first.size)
     levels = results.pick(np.array([0.8375, 3.0]), np.array([0.8375, 1.1, 1.3, 1.6, 2.0, 2.5, 3.0]))
+    left, right = results.pick((_LEFT[::3], _RIGHT[::3]), (_LEFT, _RIGHT))
     best: list[list[float]] = []
     for level in levels:
         own = beam_of(float(level), modes)
         alone = [push(own, np.array([x]), step).height for x in _ALONE]
-        pairs = [push(own, np.array([x, y]), step).height for x in _LEFT for y in _RIGHT]
+        pairs = [push(own, np.array([x, y]), step).height for x in left for y in right]
         best.append([min(alone), min(pairs)])
     shapes.insert(0, push(model, np.array(places[:1]), step).amplitude)
     units = {"units": "1", "long_name": "height of the tips over b at the snap"}
