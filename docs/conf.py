@@ -47,6 +47,7 @@ exclude_patterns += [f"gallery/**/*.{kind}" for kind in ("ipynb", "py", "json")]
 templates_path: list[str] = []
 
 myst_enable_extensions = ["amsmath", "deflist", "dollarmath"]
+smartquotes_action = "qe"  # two hyphens are an option's, not a dash
 myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"

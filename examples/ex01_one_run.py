@@ -13,9 +13,13 @@ import snapbeam as sb
 from snapbeam import paper
 
 system = sb.System(
-    sb.ReducedModel.from_beam(paper.BEAM, modes=32, damping_ratio=paper.DAMPING_RATIO),
+    sb.ReducedModel.from_beam(
+        paper.BEAM, modes=32, damping_ratio=paper.DAMPING_RATIO
+    ),
     contact=paper.CONTACT,
-    striker=sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18, location=paper.LOCATION),
+    striker=sb.Shaker(
+        frequency_ratio=1.21, velocity_amplitude=0.18, location=paper.LOCATION
+    ),
 )
 run = sb.simulate(system, sb.Integration(cycles=40))
 
@@ -23,7 +27,10 @@ run = sb.simulate(system, sb.Integration(cycles=40))
 # What it did, from statistics that are kept while it runs:
 
 print(run.outcome.response.label)
-print(f"{run.outcome.crossings} crossings, the last at {1e3 * run.outcome.last_crossing:.1f} ms")
+print(
+    f"{run.outcome.crossings} crossings, "
+    f"the last at {1e3 * run.outcome.last_crossing:.1f} ms"
+)
 print(f"{run.outcome.impacts} impacts, the hardest {run.outcome.peak_force:.2f} N")
 
 # %%
@@ -36,6 +43,11 @@ ax = run.plot(window=(0.0, 20.0))
 # damping:
 
 energy = run.dataset
-balance = energy.energy_beam - energy.energy_beam[0] + energy.energy_contact + energy.energy_dissipated
+balance = (
+    energy.energy_beam
+    - energy.energy_beam[0]
+    + energy.energy_contact
+    + energy.energy_dissipated
+)
 residual = abs(balance - energy.work_shaker).max() / energy.attrs["gross_work"]
 print(f"energy residual over gross work: {float(residual):.1e}")

@@ -16,9 +16,14 @@ from snapbeam.figures import plot_response_map
 system = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=4, damping_ratio=paper.DAMPING_RATIO),
     contact=paper.CONTACT,
-    striker=sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, location=paper.LOCATION),
+    striker=sb.Shaker(
+        frequency_ratio=1.0, velocity_amplitude=0.1, location=paper.LOCATION
+    ),
 )
-axes = {"frequency_ratio": np.linspace(0.1, 4.0, 16), "velocity_amplitude": np.linspace(0.02, 0.65, 12)}
+axes = {
+    "frequency_ratio": np.linspace(0.1, 4.0, 16),
+    "velocity_amplitude": np.linspace(0.02, 0.65, 12),
+}
 ds = sb.sweep(system, axes, sb.Integration(cycles=80))
 
 # %%
@@ -32,4 +37,7 @@ ax = plot_response_map(ds, threshold_line=True)
 
 snapped = ds.response >= sb.ResponseClass.TRANSIENT_1
 threshold = ds.velocity_amplitude.where(snapped).min("velocity_amplitude")
-print(f"lowest at Omega = {float(threshold.idxmin('frequency_ratio')):.2f}: V = {float(threshold.min()):.3f}")
+print(
+    f"lowest at Omega = {float(threshold.idxmin('frequency_ratio')):.2f}: "
+    f"V = {float(threshold.min()):.3f}"
+)

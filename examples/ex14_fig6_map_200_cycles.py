@@ -20,6 +20,11 @@ figure = paper.fig6(results=results)
 # The notch of the interwell threshold, its lowest point between :math:`\Omega` = 0.8 and 2.2:
 
 for ds in results["fig6"].values():
-    ratio, step = ds.frequency_ratio.values, float(np.diff(ds.velocity_amplitude).max())
+    ratio, step = (
+        ds.frequency_ratio.values,
+        float(np.diff(ds.velocity_amplitude).max()),
+    )
     notch = threshold_notch(ratio, interwell_threshold(ds), step, (0.8, 2.2))
-    print(f"N = {ds.attrs['modes']}: Omega = {notch.position:.2f}, V = {notch.height:.3f}")
+    print(
+        f"N = {ds.attrs['modes']}: Omega = {notch.position:.2f}, V = {notch.height:.3f}"
+    )

@@ -18,6 +18,10 @@ figure = paper.fig7(results=results)
 for name, long in results["fig7"].items():
     for ds in (results["fig6"][name], long):
         shares = [
-            f"{kind.label} {100 * float((ds.response == kind).mean()):.1f} %" for kind in sb.ResponseClass
+            f"{kind.label} {100 * float((ds.response == kind).mean()):.1f} %"
+            for kind in sb.ResponseClass
         ]
-        print(f"N = {ds.attrs['modes']}, {ds.attrs['cycles']} cycles: {', '.join(shares[1:])}")
+        print(
+            f"N = {ds.attrs['modes']}, {ds.attrs['cycles']} cycles:",
+            ", ".join(shares[1:]),
+        )

@@ -20,5 +20,6 @@ data = results["sensitivity"]
 for name in ("perturbed", "half_step", "soft_contact", "buckling_damping"):
     difference = compare_maps(data["base"], data[name])
     print(
-        f"{name}: {100 * difference.changed:.1f} % change class, threshold times {difference.threshold:.3f}"
+        f"{name}: {100 * difference.changed:.1f} % change class, "
+        f"threshold times {difference.threshold:.3f}"
     )

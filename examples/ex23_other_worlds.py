@@ -19,7 +19,14 @@ from snapbeam.figures import plot_run, plot_system
 model = sb.ReducedModel.from_beam(paper.BEAM, modes=8)
 level = paper.BEAM.buckling_level
 lossy = sb.HuntCrossley.from_restitution(stiffness=4e8, restitution=0.6, speed=0.05)
-burst = sb.Burst(frequency_ratio=1.21, velocity_amplitude=0.2, length=5, rise=2, fall=1, retreat=0.4)
+burst = sb.Burst(
+    frequency_ratio=1.21,
+    velocity_amplitude=0.2,
+    length=5,
+    rise=2,
+    fall=1,
+    retreat=0.4,
+)
 shaker = sb.Striker(drive=burst, mass=0.02, spring=700.0, damper=0.7)
 system = sb.System(model, lossy, shaker)
 plot_system(system)
@@ -28,15 +35,20 @@ plot_system(system)
 # Of the work that the striker does, part is lost in contact and part in the beam.
 
 run = sb.simulate(system, sb.Integration(cycles=8))
-print(f"work {run.outcome.shaker_work:.3e} J, lost in contact {run.outcome.contact_loss:.3e} J")
+print(
+    f"work {1e6 * run.outcome.shaker_work:.1f} µJ, "
+    f"lost in contact {1e6 * run.outcome.contact_loss:.1f} µJ"
+)
 plot_run(run.dataset)
 
 # %%
 # A sphere of 2 g
 # ---------------
-# Thrown at the middle of the beam from above, at 0.4 of b omega_1.
+# Thrown at the middle of the beam from above, at :math:`0.4\,b\,\omega_1`.
 
-sphere = sb.Striker(drive=sb.Flight(speed=0.4), mass=2e-3, gap=0.5 * level, side="above", location=0.5)
+sphere = sb.Striker(
+    drive=sb.Flight(speed=0.4), mass=2e-3, gap=0.5 * level, side="above", location=0.5
+)
 thrown = sb.System(model, paper.CONTACT, sphere)
 plot_system(thrown)
 
@@ -44,7 +56,8 @@ plot_system(thrown)
 
 run = sb.simulate(thrown, sb.Integration(cycles=3))
 print(
-    f"impacts {run.outcome.impacts}, peak force {run.outcome.peak_force:.1f} N, {run.outcome.response.label}"
+    f"impacts {run.outcome.impacts}, peak force {run.outcome.peak_force:.1f} N, "
+    f"{run.outcome.response.label}"
 )
 plot_run(run.dataset)
 
@@ -55,13 +68,20 @@ plot_run(run.dataset)
 
 soft = paper.BEAM.replace(ends=sb.Ends(left=20.0, right=5.0))
 uneven = sb.ReducedModel.from_beam(
-    soft, modes=8, imperfection=sb.Imperfection(rise=8e-6, point_load=0.02, point_location=0.3)
+    soft,
+    modes=8,
+    imperfection=sb.Imperfection(rise=8e-6, point_load=0.02, point_location=0.3),
 )
 print(
-    f"first frequency about the lower well {uneven.well_freq[0, 0]:.1f} Hz, upper {uneven.well_freq[1, 0]:.1f} Hz"
+    f"first frequency about the lower well {uneven.well_freq[0, 0]:.1f} Hz, "
+    f"upper {uneven.well_freq[1, 0]:.1f} Hz"
 )
 plot_system(
-    sb.System(uneven, paper.CONTACT, sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2)))
+    sb.System(
+        uneven,
+        paper.CONTACT,
+        sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2)),
+    )
 )
 
 # %%
@@ -71,8 +91,12 @@ plot_system(
 
 motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25)
 stop = sb.Striker(drive=sb.Still(), gap=0.2 * level)
-piezo = sb.Piezo(coupling=4e-3, capacitance=60e-9, resistance=2e4, start=0.0, stop=0.25)
-shaken = sb.System(model, paper.CONTACT, stop, base=sb.Base(motion=motion), harvester=piezo)
+piezo = sb.Piezo(
+    coupling=4e-3, capacitance=60e-9, resistance=2e4, start=0.0, stop=0.25
+)
+shaken = sb.System(
+    model, paper.CONTACT, stop, base=sb.Base(motion=motion), harvester=piezo
+)
 plot_system(shaken)
 
 # %%

@@ -26,13 +26,17 @@ two = sb.System(
     sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.25),
 )
 points = xr.Dataset(
-    {"frequency_ratio": ("point", [1.21, 2.5]), "velocity_amplitude": ("point", [0.25, 0.55])}
+    {
+        "frequency_ratio": ("point", [1.21, 2.5]),
+        "velocity_amplitude": ("point", [0.25, 0.55]),
+    }
 )
 lifetimes = sb.lifetime_map(two, points, sb.Integration(cycles=300), starts=120)
 for i in range(2):
     one = lifetimes.isel(point=i)
     print(
-        f"{float(one.lifetime):.0f} cycles ({float(one.lifetime_low):.0f} to {float(one.lifetime_high):.0f})"
+        f"{float(one.lifetime):.0f} cycles "
+        f"({float(one.lifetime_low):.0f} to {float(one.lifetime_high):.0f})"
     )
 plot_survival(lifetimes, labels=["1.21, 0.25", "2.5, 0.55"])
 
@@ -47,7 +51,9 @@ one = sb.System(
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.05),
 )
-diagram = sb.bifurcation_diagram(one, "velocity_amplitude", np.linspace(0.02, 0.3, 113))
+diagram = sb.bifurcation_diagram(
+    one, "velocity_amplitude", np.linspace(0.02, 0.3, 113)
+)
 limits = ("velocity_amplitude", (0.02, 0.3))
 orbit = sb.periodic_orbit(one, transient=300)
 branches = [
@@ -57,11 +63,15 @@ branches = [
 flip = next(event for event in branches[0].events if event.kind == "flip")
 doubled = sb.switch_branch(flip, *limits)
 branches.append(sb.continue_orbit(doubled, "velocity_amplitude", (0.02, 0.17)))
-weak = sb.periodic_orbit(one.replace(**{"drive.velocity_amplitude": 0.03}), transient=300)
+weak = sb.periodic_orbit(
+    one.replace(**{"drive.velocity_amplitude": 0.03}), transient=300
+)
 branches.append(sb.continue_orbit(weak, *limits))
 for branch in branches:
     for event in branch.events:
-        print(f"{event.kind:12s} V = {event.value:.6f}, period {branch.orbits[0].period}")
+        print(
+            f"{event.kind:12s} V = {event.value:.6f}, period {branch.orbits[0].period}"
+        )
 plot_diagram(diagram, branches=[branch.to_dataset() for branch in branches])
 
 # %%
@@ -70,8 +80,14 @@ plot_diagram(diagram, branches=[branch.to_dataset() for branch in branches])
 # States of the mode in the plane of displacement and velocity, from the tip's mid-position on, which stays where it is.
 
 found = sb.attractors(one, 100)
-plane = {"amplitude[1]": np.linspace(-0.98, 2.0, 80), "velocity[1]": np.linspace(-1.5, 1.5, 80)}
+plane = {
+    "amplitude[1]": np.linspace(-0.98, 2.0, 80),
+    "velocity[1]": np.linspace(-1.5, 1.5, 80),
+}
 basins = sb.basins(found, plane)
 entropy = sb.basin_entropy(basins.basin, 5)
-print(f"{len(found.found)} attractors, basin entropy {entropy.basin:.3f} ± {entropy.basin_error:.3f}")
+print(
+    f"{len(found.found)} attractors, "
+    f"basin entropy {entropy.basin:.3f} ± {entropy.basin_error:.3f}"
+)
 plot_basins(basins)

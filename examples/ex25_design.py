@@ -37,7 +37,10 @@ spread = sb.Spread(
 short = sb.Integration(cycles=20)
 probability = sb.probability_map(
     system,
-    {"frequency_ratio": np.linspace(0.4, 2.4, 17), "velocity_amplitude": np.linspace(0.02, 0.24, 17)},
+    {
+        "frequency_ratio": np.linspace(0.4, 2.4, 17),
+        "velocity_amplitude": np.linspace(0.02, 0.24, 17),
+    },
     spread,
     sb.Allocation(half_width=0.12, first=16, most=60),
     integration=short,
@@ -66,5 +69,7 @@ plot_quantiles(threshold)
 # ------------------
 # For each parameter one standard score down and up; how much that is in its own unit stands beside it.
 
-sensitivity = sb.sensitivity(system, "peak_force", spread, size=16, integration=sb.Integration(cycles=5))
+sensitivity = sb.sensitivity(
+    system, "peak_force", spread, size=16, integration=sb.Integration(cycles=5)
+)
 plot_tornado(sensitivity)

@@ -33,7 +33,9 @@ rng = np.random.default_rng(0)
 
 def on_the_bench(buckling_level):
     """The beam on the bench, with eight modes."""
-    beam = dataclasses.replace(paper.BEAM, buckling_level=buckling_level, axial_load=None)
+    beam = dataclasses.replace(
+        paper.BEAM, buckling_level=buckling_level, axial_load=None
+    )
     return sb.ReducedModel.from_beam(beam, modes=8, damping_ratio=0.005)
 
 
@@ -56,14 +58,22 @@ for well, level in (("lower", 0.3323e-3), ("upper", 0.3289e-3)):
         initial_state=(deflected, np.zeros(model.modes)),
         sample_times=np.arange(int(0.5 * rate)) / rate,
     )
-    noise = 0.1 / np.sqrt(2.0) * 10.0 ** (-20.0 / 20.0) * rng.standard_normal(free.dataset.sizes["time"])
-    signal = lab.make_signal(level * (free.dataset.center_displacement.values + noise), "m", rate)
+    noise = (
+        0.1
+        / np.sqrt(2.0)
+        * 10.0 ** (-20.0 / 20.0)
+        * rng.standard_normal(free.dataset.sizes["time"])
+    )
+    signal = lab.make_signal(
+        level * (free.dataset.center_displacement.values + noise), "m", rate
+    )
     lab.write_signal(files / f"decay_{well}.csv", signal)
     wells[well] = lab.identify_decay(lab.read_signal(files / f"decay_{well}.csv"))
     mode = wells[well].modes[0]
     print(
-        f"{well} well: {mode.natural_freq:.3f} +- {mode.natural_freq_se:.3f} Hz (truth {model.natural_freq[0]:.3f}), "
-        f"damping ratio {mode.damping_ratio:.5f} +- {mode.damping_ratio_se:.5f} (truth 0.005)"
+        f"{well} well: {mode.natural_freq:.3f} ± {mode.natural_freq_se:.3f} Hz "
+        f"(truth {model.natural_freq[0]:.3f}), damping ratio "
+        f"{mode.damping_ratio:.5f} ± {mode.damping_ratio_se:.5f} (truth 0.005)"
     )
 print(lab.compare_wells(wells["lower"], wells["upper"]).statement)
 
@@ -106,7 +116,10 @@ frequency = 1.21 * first
 velocity = 0.18 * 0.3306e-3 * 2.0 * np.pi * first
 record = {"duration": 0.1 + (cycles + 2) / frequency, "start_up": 0.015}
 true_velocity = lab.render_vibrometer(frequency, velocity, snr_db=100.0, **record)
-lab.write_signal(files / "velocity.csv", lab.render_vibrometer(frequency, velocity, snr_db=30.0, **record))
+lab.write_signal(
+    files / "velocity.csv",
+    lab.render_vibrometer(frequency, velocity, snr_db=30.0, **record),
+)
 
 signal = lab.read_signal(files / "velocity.csv")
 drive = lab.measure_drive(signal)
@@ -114,9 +127,13 @@ print(
     "accepted" if drive.accepted else "not accepted",
     f"({drive.steady.sinad:.1f} dB, at least {drive.snr_limit:g})",
 )
-print(f"{drive.steady.frequency:.3f} +- {drive.steady.frequency_se:.3f} Hz (truth {frequency:.3f})")
 print(
-    f"{1e3 * drive.steady.amplitude:.3f} +- {1e3 * drive.steady.amplitude_se:.3f} mm/s (truth {1e3 * velocity:.3f})"
+    f"{drive.steady.frequency:.3f} ± {drive.steady.frequency_se:.3f} Hz "
+    f"(truth {frequency:.3f})"
+)
+print(
+    f"{1e3 * drive.steady.amplitude:.3f} ± {1e3 * drive.steady.amplitude_se:.3f} mm/s "
+    f"(truth {1e3 * velocity:.3f})"
 )
 print(drive.startup.description)
 figure = plot_drive(signal, drive)
@@ -128,7 +145,9 @@ figure = plot_drive(signal, drive)
 # contrast of the edges and the noise, written as a Photron header with 12-bit pixels. The recording begins 30 ms, or
 # three cycles, before the shaker: without some rest nobody can tell the first cycle from the second.
 
-motion = sb.RecordedDrive.from_dataset(lab.recorded_drive(true_velocity, 1e5), location=paper.LOCATION)
+motion = sb.RecordedDrive.from_dataset(
+    lab.recorded_drive(true_velocity, 1e5), location=paper.LOCATION
+)
 truth = sb.simulate(truth_model, motion, paper.CONTACT, cycles=cycles)
 camera = lab.SyntheticCamera(shape=(192, 64), snr_db=30.0)
 stage = lab.SyntheticStage(shaker_width=0.4e-3)
@@ -136,13 +155,22 @@ rendered = lab.render_run(truth, camera=camera, stage=stage, rest_frames=300)
 path = rendered.write(files / "test.cihx")
 
 recording = lab.open_recording(path)
-print(len(recording), "frames of", recording.shape, "pixels at", recording.frame_rate, "Hz")
+print(
+    len(recording),
+    "frames of",
+    recording.shape,
+    "pixels at",
+    recording.frame_rate,
+    "Hz",
+)
 
 # %%
 # Tracking knows the calibrated buckling level, because a camera cannot know where the middle between the wells is.
 # A frame with the edges that were found:
 
-tracked = lab.track(recording, buckling_level=calibration.beam.buckling_level, location=paper.LOCATION)
+tracked = lab.track(
+    recording, buckling_level=calibration.beam.buckling_level, location=paper.LOCATION
+)
 figure = plot_frame(recording, tracked, 450)
 
 # %%
@@ -178,21 +206,32 @@ with house_style():
 # The measured velocity, start-up included, drives the calibrated model; what results stands beside what the camera
 # saw. The response class is counted in both by the same rules.
 
-model = sb.ReducedModel.from_beam(calibration.beam, modes=8, damping_ratio=calibration.damping_ratio)
+model = sb.ReducedModel.from_beam(
+    calibration.beam, modes=8, damping_ratio=calibration.damping_ratio
+)
 recorded = sb.RecordedDrive.from_dataset(
     lab.recorded_drive(signal, 1e5, measurement=drive), location=paper.LOCATION
 )
 simulated = sb.simulate(model, recorded, paper.CONTACT, cycles=cycles)
 
 shaker_seen = lab.make_signal(
-    tracked.shaker_displacement_mm.values, "mm", time=tracked.time.values, name="shaker"
+    tracked.shaker_displacement_mm.values,
+    "mm",
+    time=tracked.time.values,
+    name="shaker",
 )
 alignment = lab.align(shaker_seen, signal, drive.steady.frequency)
 print(alignment.description, f"(truth {0.03 - 0.1:.4f} s)")
 start = drive.startup.onset + alignment.delay
-seen = lab.measure_response(tracked, drive.steady.frequency, cycles=cycles, start=start)
+seen = lab.measure_response(
+    tracked, drive.steady.frequency, cycles=cycles, start=start
+)
 print("measured: ", seen.description)
-print("simulated:", simulated.outcome.response.label, f"({simulated.outcome.crossings} crossings)")
+print(
+    "simulated:",
+    simulated.outcome.response.label,
+    f"({simulated.outcome.crossings} crossings)",
+)
 
 onsets = lab.contact_onsets(tracked).onset.values
 comparison = lab.compare_waveforms(
@@ -212,7 +251,9 @@ figure = plot_waveform_comparison(comparison, window=(0.0, 20.0))
 
 for last in (2, 5, 10, 22):
     part = comparison.waveforms.sel(cycle=slice(0.0, last))
-    difference = np.sqrt(((part.measured_displacement - part.simulated_displacement) ** 2).mean())
+    difference = np.sqrt(
+        ((part.measured_displacement - part.simulated_displacement) ** 2).mean()
+    )
     print(f"first {last} cycles: RMS difference {float(difference):.3f} b")
 
 # %%
@@ -224,25 +265,38 @@ for last in (2, 5, 10, 22):
 omega, speed = [], []
 classes = []
 for ratio, amplitude in (
-    (0.6, 0.1), (0.6, 0.3), (0.9, 0.08), (0.9, 0.3), (1.3, 0.06), (1.3, 0.35), (1.8, 0.1), (1.8, 0.3), (1.8, 0.5),
-    (2.4, 0.15), (2.4, 0.45), (3.0, 0.2), (3.0, 0.5), (3.6, 0.3), (3.6, 0.55),
+    (0.6, 0.1), (0.6, 0.3), (0.9, 0.08), (0.9, 0.3), (1.3, 0.06), (1.3, 0.35),
+    (1.8, 0.1), (1.8, 0.3), (1.8, 0.5), (2.4, 0.15), (2.4, 0.45), (3.0, 0.2),
+    (3.0, 0.5), (3.6, 0.3), (3.6, 0.55),
 ):  # fmt: skip
-    shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=amplitude, location=paper.LOCATION)
+    shaker = sb.Shaker(
+        frequency_ratio=ratio, velocity_amplitude=amplitude, location=paper.LOCATION
+    )
     times = np.arange(int(cycles / (ratio * first) * 1e4)) / 1e4
-    test = sb.simulate(truth_model, shaker, paper.CONTACT, cycles=cycles, sample_times=times).dataset
+    test = sb.simulate(
+        truth_model, shaker, paper.CONTACT, cycles=cycles, sample_times=times
+    ).dataset
     error = scatter * camera.pixel_size / 0.3306e-3 * rng.standard_normal(times.size)
     found = lab.measure_response(
-        test[["displacement"]].assign(displacement=test.displacement + error), ratio * first, cycles=cycles
+        test[["displacement"]].assign(displacement=test.displacement + error),
+        ratio * first,
+        cycles=cycles,
     )
     omega.append(ratio * first / calibration.well_freq)
-    speed.append(amplitude * 0.3306e-3 * first / (calibration.beam.buckling_level * calibration.well_freq))
+    speed.append(
+        amplitude
+        * 0.3306e-3
+        * first
+        / (calibration.beam.buckling_level * calibration.well_freq)
+    )
     classes.append(found.response)
 dots = Dots(
     np.array([*omega, drive.steady.frequency / calibration.well_freq]),
     np.array(
         [
             *speed,
-            drive.steady.amplitude / (2.0 * np.pi * calibration.well_freq * calibration.beam.buckling_level),
+            drive.steady.amplitude
+            / (2.0 * np.pi * calibration.well_freq * calibration.beam.buckling_level),
         ]
     ),
     np.full(len(omega) + 1, paper.LOCATION),
@@ -255,7 +309,9 @@ dots = Dots(
 # level.
 
 ds = sb.response_map(
-    sb.ReducedModel.from_beam(calibration.beam, modes=4, damping_ratio=calibration.damping_ratio),
+    sb.ReducedModel.from_beam(
+        calibration.beam, modes=4, damping_ratio=calibration.damping_ratio
+    ),
     paper.CONTACT,
     frequency_ratio=np.linspace(0.3, 3.9, 13),
     velocity_amplitude=np.linspace(0.05, 0.6, 12),
@@ -265,7 +321,8 @@ ds = sb.response_map(
 )
 agreement = lab.compare_dots(dots, ds)
 print(
-    f"{100 * agreement.agreement:.0f} % of {agreement.used} dots agree; on snapping at all, "
+    f"{100 * agreement.agreement:.0f} % of {agreement.used} dots agree; "
+    f"on snapping at all, "
     f"{100 * agreement.snap_agreement:.0f} %"
 )
 for note in agreement.notes:

@@ -65,7 +65,9 @@ print(shell(f"snapbeam frequencies --config {beam} --count 4"))
 # %%
 # Then the map, and its picture at the width of a column, as PDF for the journal.
 
-said = shell(f"snapbeam map --config {beam} -o {files}/mems.nc --plot {files}/mems.pdf")
+said = shell(
+    f"snapbeam map --config {beam} -o {files}/mems.nc --plot {files}/mems.pdf"
+)
 print(said.replace(f"{files}/", ""))
 
 # %%
@@ -74,6 +76,7 @@ print(said.replace(f"{files}/", ""))
 for line in re.findall(r"^  .*?(snapbeam (?:simulate|plot).*)$", said, re.MULTILINE):
     command = re.sub(r"(--plot|-o) (\S+)", rf"\1 {files}/\2", line)
     print(shell(command).replace(f"{files}/", ""))
+plt.close("all")  # their pictures are in files
 
 # %%
 # The run that it chose, as it drew it:

@@ -11,17 +11,27 @@ import numpy as np
 import snapbeam as sb
 
 beam = sb.Beam(
-    length=0.300, thickness=0.8e-3, width=20e-3, density=7850.0, young_modulus=205e9, buckling_level=0.9e-3
+    length=0.300,
+    thickness=0.8e-3,
+    width=20e-3,
+    density=7850.0,
+    young_modulus=205e9,
+    buckling_level=0.9e-3,
 )
 contact = sb.HertzContact.from_materials(5e-3, (210e9, 205e9), (0.3, 0.3))
 model = sb.ReducedModel.from_beam(beam, modes=6, damping_ratio=0.004)
 print(model.natural_freq[:3], sb.exact_natural_freq(beam, count=3), "Hz")
 print(
-    f"b/r = {beam.buckling_level / beam.radius_of_gyration:.2f}; above 6.2 the first mode would be antisymmetric"
+    f"b/r = {beam.buckling_level / beam.radius_of_gyration:.2f}; "
+    "above 6.2 the first mode would be antisymmetric"
 )
 
-system = sb.System(model, contact, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2, location=0.47))
-print(system.findings())
+system = sb.System(
+    model,
+    contact,
+    sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2, location=0.47),
+)
+print(system.findings() or "nothing is doubtful")
 
 # %%
 # The threshold over frequency, for three thicknesses at one buckling level.
@@ -30,7 +40,10 @@ found = sb.threshold(
     system,
     "velocity_amplitude",
     np.linspace(0.02, 0.6, 30),
-    {"beam.thickness": [0.7e-3, 0.8e-3, 0.9e-3], "frequency_ratio": np.linspace(0.8, 2.0, 13)},
+    {
+        "beam.thickness": [0.7e-3, 0.8e-3, 0.9e-3],
+        "frequency_ratio": np.linspace(0.8, 2.0, 13),
+    },
     sb.Integration(cycles=60),
 )
 low = found.first_interwell.min("frequency_ratio")
@@ -41,7 +54,9 @@ for thickness, value in zip(found.beam_thickness.values, low.values, strict=True
 # How sure is a point near it? Repeats from slightly different starts say.
 
 near = {"velocity_amplitude": np.linspace(0.05, 0.35, 7)}
-sure = sb.sweep(system, near, sb.Integration(cycles=60), replicas=sb.Replicas(5, halve_step=True))
+sure = sb.sweep(
+    system, near, sb.Integration(cycles=60), replicas=sb.Replicas(5, halve_step=True)
+)
 print(sure.class_share.max("response_class").values)
 
 # %%

@@ -21,7 +21,9 @@ files = Path(folder.name)
 def shell(*words: str) -> str:
     """What a command prints; an error if it fails."""
     print("$ snapbeam", *words)
-    done = CliRunner().invoke(app, [word.replace("OUT", str(files)) for word in words])
+    done = CliRunner().invoke(
+        app, [word.replace("OUT", str(files)) for word in words]
+    )
     assert done.exit_code == 0, done.output
     return done.stdout.replace(f"{files}/", "")
 
@@ -40,9 +42,27 @@ print(shell("paper", "figA9", "-o", "OUT"))
 # %%
 # The run of Fig. 5, as numbers for a script and as a picture for the eye:
 
-run = ["simulate", "--frequency-ratio", "1.21", "--velocity-amplitude", "0.18", "--cycles", "40"]
+run = [
+    "simulate",
+    "--frequency-ratio",
+    "1.21",
+    "--velocity-amplitude",
+    "0.18",
+    "--cycles",
+    "40",
+]
 found = json.loads(
-    shell(*run, "-o", "OUT/run.nc", "--plot", "OUT/run.png", "--window", "0:20", "--json", "-")
+    shell(
+        *run,
+        "-o",
+        "OUT/run.nc",
+        "--plot",
+        "OUT/run.png",
+        "--window",
+        "0:20",
+        "--json",
+        "-",
+    )
 )
 print(found["outcome"]["response"], f"{found['outcome']['peak_force']:.2f} N")
 picture = plt.imread(files / "run.png")
@@ -53,4 +73,6 @@ figure.axes[0].axis("off")
 # %%
 # The file is enough to go on from: here with another striker's location, everything else the same.
 
-print(shell("simulate", "--from", "OUT/run.nc", "--location", "0.3", "--cycles", "40"))
+print(
+    shell("simulate", "--from", "OUT/run.nc", "--location", "0.3", "--cycles", "40")
+)

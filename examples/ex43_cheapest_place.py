@@ -21,13 +21,20 @@ system = sb.System(
     sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1).striker(),
 )
 spread = sb.Spread(
-    of={"velocity_amplitude": sb.Normal(0.02, relative=True), "location": sb.Normal(0.005)},
+    of={
+        "velocity_amplitude": sb.Normal(0.02, relative=True),
+        "location": sb.Normal(0.005),
+    },
     displacement=3.5e-6,
     phase=True,
 )
 found = sb.design(
     system,
-    {"location": (0.1, 0.48), "frequency_ratio": (0.3, 2.6), "velocity_amplitude": (0.01, 0.6)},
+    {
+        "location": (0.1, 0.48),
+        "frequency_ratio": (0.3, 2.6),
+        "velocity_amplitude": (0.01, 0.6),
+    },
     ["speed", sb.Goal(of="peak_force", quantile=0.5)],
     sb.Limit(of="snap", at_least=0.95),
     spread,

@@ -14,8 +14,16 @@ system = sb.System(
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1).striker(),
 )
-spread = sb.Spread(of={"velocity_amplitude": sb.Normal(0.02, relative=True)}, displacement=3.5e-6, phase=True)
-variables = {"location": (0.1, 0.48), "frequency_ratio": (0.3, 2.6), "velocity_amplitude": (0.01, 0.6)}
+spread = sb.Spread(
+    of={"velocity_amplitude": sb.Normal(0.02, relative=True)},
+    displacement=3.5e-6,
+    phase=True,
+)
+variables = {
+    "location": (0.1, 0.48),
+    "frequency_ratio": (0.3, 2.6),
+    "velocity_amplitude": (0.01, 0.6),
+}
 problem = sb.design_problem(
     system,
     variables,
@@ -29,7 +37,10 @@ problem = sb.design_problem(
 
 def speed(trial: optuna.Trial) -> float:
     """Peak speed of the tip, m/s; by how much the limit is missed is the constraint."""
-    x = [trial.suggest_float(name, low, high) for name, (low, high) in variables.items()]
+    x = [
+        trial.suggest_float(name, low, high)
+        for name, (low, high) in variables.items()
+    ]
     goals, violation, _ = problem.evaluate([x])
     trial.set_constraint("limit", float(violation[0]))
     return float(goals[0, 0])
@@ -39,5 +50,8 @@ optuna.logging.set_verbosity(optuna.logging.WARNING)
 study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=1))
 study.optimize(speed, n_trials=60)
 best = study.best_trial
-print(f"{best.value:.4f} m/s at", {name: round(value, 3) for name, value in best.params.items()})
+print(
+    f"{best.value:.4f} m/s at",
+    {name: round(value, 3) for name, value in best.params.items()},
+)
 print("the limit is missed by", max(0.0, best.constraints["limit"]))

@@ -16,8 +16,16 @@ system = sb.System(
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1).striker(),
 )
-spread = sb.Spread(of={"velocity_amplitude": sb.Normal(0.02, relative=True)}, displacement=3.5e-6, phase=True)
-variables = {"location": (0.1, 0.48), "frequency_ratio": (0.3, 2.6), "velocity_amplitude": (0.01, 0.6)}
+spread = sb.Spread(
+    of={"velocity_amplitude": sb.Normal(0.02, relative=True)},
+    displacement=3.5e-6,
+    phase=True,
+)
+variables = {
+    "location": (0.1, 0.48),
+    "frequency_ratio": (0.3, 2.6),
+    "velocity_amplitude": (0.01, 0.6),
+}
 problem = sb.design_problem(
     system,
     variables,
@@ -34,16 +42,29 @@ class Strike(Problem):
 
     def __init__(self) -> None:
         low, high = np.array(list(variables.values())).T
-        super().__init__(n_var=len(variables), n_obj=2, n_ieq_constr=1, xl=low, xu=high)
+        super().__init__(
+            n_var=len(variables), n_obj=2, n_ieq_constr=1, xl=low, xu=high
+        )
 
-    def _evaluate(self, x: np.ndarray, out: dict[str, np.ndarray], *args: object, **kwargs: object) -> None:
+    def _evaluate(
+        self,
+        x: np.ndarray,
+        out: dict[str, np.ndarray],
+        *args: object,
+        **kwargs: object,
+    ) -> None:
         out["F"], violation, _ = problem.evaluate(x)
         out["G"] = violation[:, None]
 
 
 found = minimize(Strike(), NSGA2(pop_size=16), ("n_gen", 8), seed=1)
-for x, (speed, force) in sorted(zip(found.X, found.F, strict=True), key=lambda member: member[1][0]):
+for x, (speed, force) in sorted(
+    zip(found.X, found.F, strict=True), key=lambda member: member[1][0]
+):
     print(
         f"{speed:.4f} m/s, {force:.3f} N at",
-        {name: round(float(value), 3) for name, value in zip(variables, x, strict=True)},
+        {
+            name: round(float(value), 3)
+            for name, value in zip(variables, x, strict=True)
+        },
     )

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 import snapbeam as sb
 from snapbeam import figures, paper
 from snapbeam.core.validate import InputError
-from snapbeam.figures.captions import caption, prefixed, prefixed_range, scale_of
+from snapbeam.core.prefixes import prefixed, prefixed_range, scale_of
+from snapbeam.figures.captions import caption
 
 
 @pytest.fixture(autouse=True)

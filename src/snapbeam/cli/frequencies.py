@@ -24,6 +24,7 @@ def frequencies(
     """
     from rich.table import Table
 
+    from snapbeam.core.prefixes import prefixed
     from snapbeam.core.validate import integer
     from snapbeam.model.galerkin.frequencies import exact_natural_freq
 
@@ -34,13 +35,13 @@ def frequencies(
     reduced = model.natural_freq
     exact = exact_natural_freq(beam, count=count)
     straight = exact_natural_freq(beam.replace(axial_load=0.0), count=count)
-    state = f"buckled by b = {1e3 * beam.buckling_level:.4g} mm" if beam.is_buckled else "not buckled"
+    state = f"buckled by b = {prefixed(beam.buckling_level, 'm', 4)}" if beam.is_buckled else "not buckled"
     answer(
         axial_load=beam.axial_load, critical_load=beam.critical_load, buckling_level=beam.buckling_level,
         modes=model.modes, reduced=reduced[:count], exact=exact, without_load=straight,
     )  # fmt: skip
     console = out()
-    load = f"P = {beam.axial_load:.4f} N, P_cr = {beam.critical_load:.4f} N"
+    load = f"P = {prefixed(beam.axial_load, 'N', 4)}, P_cr = {prefixed(beam.critical_load, 'N', 4)}"
     console.print(f"{load}: {state}; {model.modes} modes")
     table = Table(box=None, pad_edge=False)
     for title in ("", "reduced (Hz)", "exact (Hz)", "error (%)", "without load (Hz)"):

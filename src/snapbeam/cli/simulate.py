@@ -197,6 +197,7 @@ def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | Non
 
 def _told(answer: Any, elapsed: float) -> str:
     from snapbeam.core.codes import RunStatus
+    from snapbeam.core.prefixes import prefixed
 
     kind, status = answer.response, answer.status
     if status not in (RunStatus.OK, RunStatus.DECIDED):
@@ -206,7 +207,10 @@ def _told(answer: Any, elapsed: float) -> str:
     crossings = f"{answer.crossings}, {answer.crossings_last_quarter} of them in the last quarter"
     contact = f"{answer.impacts}, in contact {100.0 * answer.contact_share:.3g} % of the time"
     center = f"{answer.min_center_displacement:.4g} to {answer.max_center_displacement:.4g} b"
-    force = "no finite force" if answer.peak_force != answer.peak_force else f"{answer.peak_force:.4g} N"
+    force = (
+        "no finite force" if answer.peak_force != answer.peak_force else prefixed(answer.peak_force, "N", 4)
+    )
+    work, lost = (prefixed(each, "J", 4) for each in (answer.shaker_work, answer.dissipated_energy))
     lines = [
         f"[bold]{kind.label}[/] (in {duration(elapsed)}; {status.advice})",
         f"  zero crossings        {crossings}",
@@ -215,8 +219,8 @@ def _told(answer: Any, elapsed: float) -> str:
         f"  at the striker        {answer.min_displacement:.4g} to {answer.max_displacement:.4g} b",
         f"  impacts               {contact}",
         f"  peak contact force    {force}",
-        f"  striker's work        {answer.shaker_work:.4g} J, {answer.dissipated_energy:.4g} J dissipated",
+        f"  striker's work        {work}, {lost} dissipated",
     ]
     if answer.crossings:
-        lines.insert(2, f"  last crossing         at {answer.last_crossing:.5g} s")
+        lines.insert(2, f"  last crossing         at {prefixed(answer.last_crossing, 's', 5)}")
     return "\n".join(lines)

@@ -5,37 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.ticker import EngFormatter
+
+from snapbeam.core.prefixes import prefixed
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["beam_text", "caption", "prefixed", "prefixed_range", "scale_of"]
-
-
-def prefixed(value: float, unit: str, digits: int = 3) -> str:
-    """A number with a prefix of the SI: ``16.1 cm`` is not one, ``161 mm`` is."""
-    if value == 0.0 or not np.isfinite(value):
-        return f"{value:g} {unit}"
-    step = int(np.floor(np.log10(abs(value)) / 3.0 + 1e-12))
-    step = max(-8, min(8, step))
-    prefix = EngFormatter.ENG_PREFIXES[3 * step]
-    return f"{value / 1000.0**step:.{digits}g} {prefix}{unit}"
-
-
-def scale_of(values: Any, unit: str) -> tuple[float, str]:
-    """What to divide numbers by so that their axis is short, and the unit that makes; ``(1e-3, "mN")``."""
-    most = float(np.nanmax(np.abs(np.asarray(values, dtype=float)))) if np.size(values) else 0.0
-    if most == 0.0 or not np.isfinite(most):
-        return 1.0, unit
-    step = max(-8, min(8, int(np.floor(np.log10(most) / 3.0 + 1e-12))))
-    return 1000.0**step, f"{EngFormatter.ENG_PREFIXES[3 * step]}{unit}"
-
-
-def prefixed_range(low: float, high: float, unit: str) -> str:
-    """Two numbers with one prefix."""
-    factor, scaled = scale_of([low, high], unit)
-    return f"{low / factor:.3g} to {high / factor:.3g} {scaled}"
+__all__ = ["beam_text", "caption"]
 
 
 def beam_text(attrs: Any) -> str:

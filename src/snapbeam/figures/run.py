@@ -11,7 +11,8 @@ from matplotlib.gridspec import GridSpec
 
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, finite
-from snapbeam.figures.captions import caption, scale_of
+from snapbeam.core.prefixes import scale_of
+from snapbeam.figures.captions import caption
 from snapbeam.figures.series import across as across_of
 from snapbeam.figures.series import dataset_of
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure

@@ -15,6 +15,7 @@ from rich.table import Table
 from snapbeam.cli.common.console import duration, file_line
 from snapbeam.cli.common.source import point_text
 from snapbeam.core.codes import ResponseClass, RunStatus
+from snapbeam.core.prefixes import prefixed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -170,7 +171,8 @@ def _where(point: dict[str, Any], raised: str, attrs: dict[str, Any]) -> str:
     freq, level = attrs.get("reference_freq"), attrs.get("beam_buckling_level")
     if freq and level and {"frequency_ratio", "velocity_amplitude"} <= point.keys():
         velocity, omega = point["velocity_amplitude"], point["frequency_ratio"]
-        text += f" ({2e3 * np.pi * freq * level * velocity:.3g} mm/s at {omega * freq:.4g} Hz)"
+        speed = prefixed(2.0 * np.pi * freq * level * velocity, "m/s")
+        text += f" ({speed} at {prefixed(omega * freq, 'Hz', 4)})"
     return text
 
 

@@ -22,6 +22,7 @@ _POSITIONS = 121
 _CONTROLS = """
 .bk-btn, .bk-input { background: var(--sb-card); color: var(--sb-text); border-color: var(--sb-faint); }
 .bk-btn.bk-active, .bk-btn:hover { background: var(--sb-grid); color: var(--sb-text); }
+.bk-btn.bk-active { box-shadow: inset 0 -3px 0 var(--sb-accent); }
 .bk-slider-title, .bk-slider-value { color: var(--sb-text); }
 .noUi-target { background: var(--sb-grid); }
 """
