@@ -79,6 +79,40 @@ def test_coil(modes, inductance) -> None:
     compare(modes, 4 if modes == 1 else 2, coil, row, inductance, 40.0, -30.0)
 
 
+@pytest.mark.parametrize(
+    ("modes", "ratio", "velocity", "resistance", "cycles"),
+    [
+        (3, 2.782, 0.333, 9.06e5, 3),
+        pytest.param(1, 0.4038, 0.473, 3.27e5, 1, marks=pytest.mark.slow),
+        pytest.param(3, 1.3, 0.4, 3e5, 2, marks=pytest.mark.slow),
+        pytest.param(8, 2.0, 0.3, 5e5, 1, marks=pytest.mark.slow),
+    ],
+)
+def test_struck_with_a_nearly_open_circuit(modes, ratio, velocity, resistance, cycles) -> None:
+    """The layers stiffen the beam, so that it comes back to the tip sooner than without: no contact is missed."""
+    beam, gap = PaperBeam(modes), 1e-6
+    omega = ratio * float(beam.omega[0])
+    amplitude = velocity * LEVEL * float(beam.omega[0]) / omega
+
+    def away(t: float) -> tuple[float, float, float]:
+        return -amplitude * math.sin(omega * t), 0.0, 0.0
+
+    around = Surroundings(
+        away, coupling=THETA * (slopes(beam, 0.25 * LENGTH) - slopes(beam, 0.0)), inertia=CAPACITANCE,
+        loss=1.0 / resistance, gap=gap, carried=False,
+    )  # fmt: skip
+    times = np.linspace(0.0, cycles * 2.0 * math.pi / omega, 801) * (1.0 - 1e-13)
+    truth = live(beam, around, times)
+    drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
+    layers = sb.Piezo(coupling=THETA, capacitance=CAPACITANCE, resistance=resistance, start=0.0, stop=0.25)
+    system = sb.System(model(modes), paper.CONTACT, sb.Striker(drive=drive, gap=gap), harvester=layers)
+    for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
+        run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
+        assert run.outcome.impacts > 2
+        np.testing.assert_allclose(run.dataset.displacement, truth.displacement, rtol=0.0, atol=bound)
+        assert ledger(run) < 1e-4
+
+
 @pytest.mark.slow
 def test_a_layer_that_does_not_couple_changes_nothing() -> None:
     """theta to 0: the struck beam without a harvester, to the error of the level."""

@@ -19,7 +19,7 @@ from snapbeam.engines.cpu.rows import (
 )
 from snapbeam.engines.cpu.strikers.force import given_by_others, gross_of_others, press
 from snapbeam.engines.cpu.world.around import around_kick
-from snapbeam.engines.cpu.world.circuit import Tap, kick_source, no_tap
+from snapbeam.engines.cpu.world.circuit import Tap, kick_source, no_tap, tapped_rows
 from snapbeam.engines.cpu.world.forced import Given, changed_load, enter_forces, no_given
 from snapbeam.engines.scalar.compile import called, compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS
@@ -29,7 +29,7 @@ from snapbeam.engines.scalar.lanes import WIDTH, load, store
 from snapbeam.engines.scalar.physics import sincos, tension_factors
 from snapbeam.engines.scalar.tip import tip_motion, turned_motion
 
-__all__ = ["Done", "Step", "observe", "prepare", "take_step", "take_two"]
+__all__ = ["Done", "Step", "observe", "prepare", "take_step", "take_two", "tapped_step"]
 
 
 class Step(NamedTuple):
@@ -177,6 +177,15 @@ def _done(memory, layout, gq, qr, push, dissipated, given):
     work = given_by_others(memory, layout.others, push.work)
     gross = gross_of_others(memory, layout.others, push.gross)
     return Done(gq, qr, push.impulse, work, gross, push.lost, dissipated, given[0], given[1])
+
+
+@inlined
+def tapped_step(memory, layout, spare, step):
+    """A free step as it is looked into: with the circuit's part in the accelerations of its ends, if there is one."""
+    k, k1 = tapped_rows(memory, layout.size, layout.circuit, spare, step)
+    return Step(
+        step.ticks, step.at, step.length, step.phase, step.touching, step.q, step.p, k, step.q1, step.p1, k1, step.r
+    )  # fmt: skip
 
 
 @called

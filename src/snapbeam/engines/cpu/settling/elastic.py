@@ -11,7 +11,7 @@ from snapbeam.engines.cpu.rows import dot, flow_coefficients, modal_energies, mo
 from snapbeam.engines.cpu.settling.hardest import hardest_point
 from snapbeam.engines.cpu.settling.look import look_inside
 from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot, look_slot
-from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
+from snapbeam.engines.cpu.step import Step, observe, prepare, take_step, tapped_step
 from snapbeam.engines.cpu.strikers.meet import (
     count_others,
     entry_of_others,
@@ -23,7 +23,7 @@ from snapbeam.engines.cpu.strikers.meet import (
 )
 from snapbeam.engines.cpu.uneven import about_level, above_own_well, at_center, lifted, second_well
 from snapbeam.engines.cpu.world.around import count_given
-from snapbeam.engines.cpu.world.circuit import calm, count_circuit
+from snapbeam.engines.cpu.world.circuit import calm, count_circuit, known_for, passed_by, tapped_speed
 from snapbeam.engines.cpu.world.forced import extra_speed
 from snapbeam.engines.scalar.compile import inlined
 from snapbeam.engines.scalar.contact import jumps, slack_at
@@ -41,7 +41,7 @@ from snapbeam.engines.scalar.decisions import (
 )
 from snapbeam.engines.scalar.extras import observe as observe_extras
 from snapbeam.engines.scalar.physics import tension_energy
-from snapbeam.engines.scalar.signals import first_fall
+from snapbeam.engines.scalar.signals import first_fall, first_rise
 from snapbeam.engines.scalar.tip import seen_from
 
 __all__ = ["settle"]
@@ -93,18 +93,24 @@ def meets(memory, layout, run, now, tip, step, seen1, room):
             # the force has an edge there, though the contact goes on
             event, cut = False, int(slack * step.ticks) + 1
         return Met(event, cut, entry, safe_gap, safe_center, pieces, piece)
-    size = layout.size
+    size, known = layout.size, known_for(layout.circuit, run.step_time)
     if after > safe_gap:
         bound = speed_bound(memory, layout, layout.contact, step.q, step.p)
+        bound = tapped_speed(
+            memory, size, layout.omega, layout.circuit, layout.contact, step.q, step.p, bound, TRUST * known
+        )
         bound += extra_speed(layout.forced, memory, size, tip.drive, layout.contact, TRUST * run.step_time)
         push = dot(memory, size, layout.contact, step.k)
-        safe_gap = now.t + int(safe_for(-seen.d, bound, run.tip_speed, push, run.step_time) / tick)
+        safe_gap = now.t + int(safe_for(-seen.d, bound, run.tip_speed, push, known) / tick)
     if after > safe_center:
         bound = speed_bound(memory, layout, layout.center, step.q, step.p)
+        bound = tapped_speed(
+            memory, size, layout.omega, layout.circuit, layout.center, step.q, step.p, bound, TRUST * known
+        )
         bound += extra_speed(layout.forced, memory, size, tip.drive, layout.center, TRUST * run.step_time)
         push = dot(memory, size, layout.center, step.k)
         safe_center = now.t + int(
-            safe_for(abs(at_center(layout.uneven, seen.c)), bound, 0.0, push, run.step_time) / tick
+            safe_for(abs(at_center(layout.uneven, seen.c)), bound, 0.0, push, known) / tick
         )
     safe_gap = trusted(memory, layout.others, now.t, safe_gap)
     safe_center = trusted(memory, layout.others, now.t, safe_center)
@@ -117,11 +123,15 @@ def meets(memory, layout, run, now, tip, step, seen1, room):
             pieces = max(2, math.ceil(step.length / run.finest_look))
             flow_coefficients(memory, layout, step.length / pieces, look)
         piece = step.length / pieces
-        look_inside(memory, layout, tip, look, pieces, piece, step, after > safe_center, room)
+        free = tapped_step(memory, layout, run.spare, step)
+        look_inside(memory, layout, tip, look, pieces, piece, free, after > safe_center, room)
         if after > safe_gap:
             entry = first_entry(room.looked, pieces, piece)
             if entry >= 0.0:
                 event, cut = True, min(step.ticks, int(entry / tick))
+    if passed_by(layout.circuit, event, seen.d, seen1.d):
+        entry = first_rise(seen.d, seen.dv, seen1.d, seen1.dv, step.length) * step.length
+        event, cut = True, min(step.ticks, int(entry / tick))
     return Met(event, cut, entry, safe_gap, safe_center, pieces, piece)
 
 

@@ -10,7 +10,9 @@ import math
 
 from snapbeam.engines.cpu.dot import dot
 from snapbeam.engines.cpu.rows import flow_coefficients, glide, speed_bound
+from snapbeam.engines.cpu.step import tapped_step
 from snapbeam.engines.cpu.strikers.force import block, penetration_of, put_others
+from snapbeam.engines.cpu.world.circuit import known_for, tapped_speed
 from snapbeam.engines.cpu.world.forced import extra_speed
 from snapbeam.engines.outcomes import OTHER_IMPACTS, OTHER_IMPULSE, OTHER_PEAK, OTHER_WORK
 from snapbeam.engines.scalar.compile import called, inlined
@@ -164,7 +166,8 @@ def _looked_for(memory, layout, others, slot, run, drive, step, j, room):
         look += 4 * layout.size
         pieces = max(2, math.ceil(step.length / run.finest_look))
         flow_coefficients(memory, layout, step.length / pieces, look)
-    return _entry(memory, layout, others, drive, look, pieces, step.length / pieces, step, j, room)
+    free = tapped_step(memory, layout, run.spare, step)
+    return _entry(memory, layout, others, drive, look, pieces, step.length / pieces, free, j, room)
 
 
 @called
@@ -188,10 +191,16 @@ def _edge(memory, layout, others, slot, run, t, drive, step, room):
             if busy:
                 memory[at + SAFE] = t
             elif after > memory[at + SAFE]:
-                bound = speed_bound(memory, layout, row, step.q, step.p)
+                bound, known = (
+                    speed_bound(memory, layout, row, step.q, step.p),
+                    known_for(layout.circuit, run.step_time),
+                )
+                bound = tapped_speed(
+                    memory, size, layout.omega, layout.circuit, row, step.q, step.p, bound, TRUST * known
+                )
                 bound += extra_speed(layout.forced, memory, size, drive, row, TRUST * run.step_time)
                 push = dot(memory, size, row, step.k)
-                safe = safe_for(-depth, bound, memory[at + SPEED], push, run.step_time)
+                safe = safe_for(-depth, bound, memory[at + SPEED], push, known)
                 memory[at + SAFE] = t + int(safe / tick)
             entry = -1.0
             if after > memory[at + SAFE]:

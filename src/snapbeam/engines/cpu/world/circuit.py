@@ -14,10 +14,11 @@ the velocity of one more mode, of frequency 0.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from snapbeam.engines.scalar.compile import inlined
-from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, splat, store
+from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, splat, store, vabs
 
 __all__ = [
     "Circuit",
@@ -26,10 +27,14 @@ __all__ = [
     "calm",
     "count_circuit",
     "kick_source",
+    "known_for",
     "lean_kick",
     "no_tap",
+    "passed_by",
     "put_rate",
     "tap_of",
+    "tapped_rows",
+    "tapped_speed",
 ]
 
 _TERMS = 15
@@ -184,6 +189,62 @@ def _state(memory, size, circuit, own, p):
     for row in range(0, size, WIDTH):
         along = fma(load(memory, circuit.coupling + row), load(memory, p + row), along)
     return -memory[circuit.rate] * lanes_sum(along)
+
+
+@inlined
+def tapped_rows(memory, size, circuit, spare, step):
+    """Where the accelerations of a free step's ends stand, the circuit's part included: in *spare*, if there is one."""
+    if circuit is None:
+        return step.k, step.k1
+    y, y1 = (
+        _state(memory, size, circuit, circuit.own, step.p),
+        _state(memory, size, circuit, circuit.own, step.p1),
+    )
+    for row in range(0, size, WIDTH):
+        t = load(memory, circuit.coupling + row)
+        store(memory, spare + row, fma(y, t, load(memory, step.k + row)))
+        store(memory, spare + size + row, fma(y1, t, load(memory, step.k1 + row)))
+    return spare, spare + size
+
+
+@inlined
+def tapped_speed(memory, size, omega, circuit, along, q, p, bound, horizon):
+    """A speed that c.q cannot exceed within a time, c the row *along*; *bound* is that of the linear flow alone.
+
+    The energy of linear modes and circuit together, Y^2/2 = (sum p^2 + omega^2 q^2 + y^2)/2, only falls, so that
+    c.p <= |c| Y.  What the circuit adds to c.p is the integral of sum c_j t_j cos(omega_j s) y, no more than
+    sum |c_j t_j| |y| times the horizon, with |y| <= Y, or rate |t| Y without inertia.
+    """
+    if circuit is None:
+        return bound
+    energy, square, length, gain = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+    for row in range(0, size, WIDTH):
+        v, oq = load(memory, p + row), load(memory, omega + row) * load(memory, q + row)
+        c, t = load(memory, along + row), load(memory, circuit.coupling + row)
+        energy = fma(v, v, fma(oq, oq, energy))
+        length, square = fma(c, c, length), fma(t, t, square)
+        gain = fma(vabs(c), vabs(t), gain)
+    most = math.sqrt(lanes_sum(energy))
+    y = most
+    if circuit.own is None:
+        y = memory[circuit.rate] * math.sqrt(lanes_sum(square)) * most
+    return min(bound + lanes_sum(gain) * y * horizon, math.sqrt(lanes_sum(length)) * most)
+
+
+@inlined
+def known_for(circuit, horizon):
+    """For how long what is seen of a free flight is relied on: a circuit stiffens the beam, and changes it soon."""
+    if circuit is None:
+        return horizon
+    return 0.25 * horizon
+
+
+@inlined
+def passed_by(circuit, event, depth, depth1):
+    """Whether a free step ended in the contact unseen: the tension changed more than was foreseen."""
+    if circuit is None:
+        return False
+    return not event and depth1 > 0.0 and depth <= 0.0
 
 
 @inlined
