@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 
 import snapbeam as sb
 from snapbeam import figures, paper
-from snapbeam.core.validate import InputError
 from snapbeam.core.prefixes import prefixed, prefixed_range, scale_of
+from snapbeam.core.validate import InputError
 from snapbeam.figures.captions import caption
 
 

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 
 from snapbeam.core.kinds import checked
-from snapbeam.core.validate import InputError, finite
 from snapbeam.core.prefixes import scale_of
+from snapbeam.core.validate import InputError, finite
 from snapbeam.figures.captions import caption
 from snapbeam.figures.series import across as across_of
 from snapbeam.figures.series import dataset_of

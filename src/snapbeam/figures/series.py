@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from snapbeam.core.kinds import checked
-from snapbeam.core.validate import InputError, choice, integer
 from snapbeam.core.prefixes import scale_of
+from snapbeam.core.validate import InputError, choice, integer
 from snapbeam.figures.captions import caption
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
 from snapbeam.runs.run import Run

@@ -11,10 +11,10 @@ from matplotlib.colors import LogNorm, Normalize
 from numpy.typing import NDArray
 
 from snapbeam.core.kinds import checked
+from snapbeam.core.prefixes import scale_of
 from snapbeam.core.validate import InputError, instance, shown
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.figures.axes import dress, edges_of, positions
-from snapbeam.core.prefixes import scale_of
 from snapbeam.figures.response_map import UPWARD, subtitle
 from snapbeam.figures.style import BEAM_COLOR, fix_ticks, house_style, new_figure
 
