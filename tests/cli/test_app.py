@@ -172,7 +172,7 @@ def test_simulate(cli, tmp_path):
 
 def test_frequencies(cli):
     lines = cli("frequencies", "--count", "3").stdout.splitlines()
-    assert lines[0].startswith("P = 37.18")
+    assert lines[0].startswith("P = 37.19 N, P_cr = 24.37 N: buckled by b = 335 µm")
     numbers = [[float(word) for word in line.split()] for line in lines[2:]]
     assert numbers[0] == pytest.approx([1, 81.853, 81.852, 0.001, 80.32], abs=6e-3)
     assert numbers[1][1:3] == pytest.approx([159.268, 159.266], abs=1e-3)

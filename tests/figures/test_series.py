@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 
 import snapbeam as sb
 from snapbeam import figures, paper
-from snapbeam.core.prefixes import prefixed, prefixed_range, scale_of
 from snapbeam.core.validate import InputError
 from snapbeam.figures.captions import caption
 
@@ -29,21 +28,6 @@ def run():
         striker=sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
     )
     return sb.simulate(system, sb.Integration(cycles=12))
-
-
-@pytest.mark.parametrize(
-    ("value", "unit", "text"),
-    [(0.161, "m", "161 mm"), (3.35e-4, "m", "335 µm"), (2e-6, "m", "2 µm"), (1.0, "m", "1 m"), (0.0, "N", "0 N"),
-     (81853.0, "Hz", "81.9 kHz"), (-4e-9, "J", "-4 nJ"), (999.9, "N", "1e+03 N")],
-)  # fmt: skip
-def test_prefixes(value, unit, text):
-    assert prefixed(value, unit) == text
-
-
-def test_one_prefix_for_many():
-    assert scale_of([1e-5, 0.0, -2e-4], "N") == (pytest.approx(1e-6), "µN")
-    assert scale_of([0.0], "N") == (1.0, "N") and scale_of([], "N") == (1.0, "N")
-    assert prefixed_range(1e-5, 2e-4, "N") == "10 to 200 µN"
 
 
 def test_captions(run):

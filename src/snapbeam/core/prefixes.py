@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["prefixed", "prefixed_range", "scale_of"]
+__all__ = ["prefixed", "scale_of"]
 
 _PREFIXES = ("y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P", "E", "Z", "Y")
 
@@ -36,12 +36,6 @@ def scale_of(values: Any, unit: str) -> tuple[float, str]:
         return 1.0, unit
     step = _step(most)
     return 1000.0**step, f"{_PREFIXES[step + 8]}{unit}"
-
-
-def prefixed_range(low: float, high: float, unit: str) -> str:
-    """Two numbers with one prefix."""
-    factor, scaled = scale_of([low, high], unit)
-    return f"{low / factor:.3g} to {high / factor:.3g} {scaled}"
 
 
 def _step(value: float) -> int:

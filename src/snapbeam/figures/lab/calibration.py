@@ -81,4 +81,5 @@ def _regions(ax: Axes, result: Calibration, first: str, second: str) -> None:
     )  # fmt: skip
     ax.set(xlabel=label_x, ylabel=label_y)
     ax.margins(0.12)
+    ax.locator_params(axis="x", nbins=5)
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, columnspacing=0.9, borderaxespad=0.2)

@@ -42,8 +42,8 @@ def plot_dot_comparison(dataset: xr.Dataset, dots: Dots, result: DotComparison) 
         ax.set(xlabel="Simulated", ylabel="Measured")
         low, high = result.agreement_interval
         ax.set_title(
-            f"{100 * result.agreement:.0f} % of {result.used} agree "
-            f"(95 %: {100 * low:.0f} to {100 * high:.0f} %), × do not"
+            f"{100 * result.agreement:.0f} % of {result.used} agree, × do not\n"
+            f"(95 %: {100 * low:.0f} to {100 * high:.0f} %)"
             if result.used
             else "No measured point counts",
             loc="left",

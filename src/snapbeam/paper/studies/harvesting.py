@@ -98,8 +98,8 @@ def draw(results: Results) -> Figure:
             mesh = ax.pcolormesh(
                 ds.frequency_ratio, ds.velocity_amplitude, values.T, shading="nearest", rasterized=True, **how
             )
-            figure.colorbar(mesh, ax=ax, label=words)
-            ax.set(xlabel=r"Excitation frequency $\Omega$", ylabel="Velocity amplitude $V$")
+            figure.colorbar(mesh, ax=ax)
+            ax.set(title=words, xlabel=r"Excitation frequency $\Omega$", ylabel="Velocity amplitude $V$")
         for kind in np.unique(ds.kind.values):
             own = ds.kind.values == kind
             response = ResponseClass(int(kind))

@@ -290,7 +290,8 @@ def draw(results: Results) -> Figure:
         axes[1].plot(*ds.first_tip.values[two_steps.T], ".", color="black", markersize=1.2)
         axes[1].plot(*tips[1:], "o", color="black", markersize=4, markerfacecolor="white")
         axes[1].set(xlabel="Left tip $x_1/L$", ylabel="Right tip $x_2/L$", aspect="equal")
-        figure.colorbar(mesh, ax=axes[1], label="Height at the snap $/b$", shrink=0.85)
+        figure.colorbar(mesh, ax=axes[1], shrink=0.85)
+        axes[1].set_title("Height at the snap $/b$")
         for which, color, marker in ((0, SHAKER_COLOR, "s"), (1, BEAM_COLOR, "o")):
             label = f"best of {('one tip', 'two tips')[which]}"
             axes[2].plot(ds.level, ds.best[:, which], color=color, marker=marker, markersize=2.5, label=label)
