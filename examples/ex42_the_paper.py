@@ -42,28 +42,10 @@ print(shell("paper", "figA9", "-o", "OUT"))
 # %%
 # The run of Fig. 5, as numbers for a script and as a picture for the eye:
 
-run = [
-    "simulate",
-    "--frequency-ratio",
-    "1.21",
-    "--velocity-amplitude",
-    "0.18",
-    "--cycles",
-    "40",
-]
-found = json.loads(
-    shell(
-        *run,
-        "-o",
-        "OUT/run.nc",
-        "--plot",
-        "OUT/run.png",
-        "--window",
-        "0:20",
-        "--json",
-        "-",
-    )
-)
+run = "simulate --frequency-ratio 1.21 --velocity-amplitude 0.18 --cycles 40"
+files_of_it = "-o OUT/run.nc --plot OUT/run.png --window 0:20 --json -"
+found = json.loads(shell(*run.split(), *files_of_it.split()))
+plt.close("all")  # the picture is in its file
 print(found["outcome"]["response"], f"{found['outcome']['peak_force']:.2f} N")
 picture = plt.imread(files / "run.png")
 figure = plt.figure(figsize=(7.5, 7.5 * picture.shape[0] / picture.shape[1]))

@@ -34,6 +34,7 @@ NOT_SWEPT = {
     "imperfection.profile": "a table",
 }
 VALUES: dict[str, list[Any]] = {
+    "drive.fall": [0.5, 1.5],
     "beam.axial_load": [600.0, 620.0],
     "ends.left": [20.0, 60.0],
     "ends.right": [20.0, 60.0],
@@ -116,8 +117,9 @@ def plain(ds: Any) -> dict[str, Any]:
 def try_one(system: sb.System, name: str, folder: Path) -> str:
     """What went wrong with one parameter; nothing if nothing did."""
     axes = {name: values_of(system, name)}
-    # a base lifts the beam off its stop first
-    integration = sb.Integration(cycles=2 if system.base is None else 4)
+    # a base lifts the beam off its stop first, and a burst has to end
+    bursts = any(type(drive).name == "burst" for _, drive in system.moving)
+    integration = sb.Integration(cycles=6 if bursts else 2 if system.base is None else 4)
 
     def sweep(store: Path | None) -> Any:
         return sb.sweep(system, axes, integration, store=None if store is None else Keeping(store, chunk=1))
@@ -164,6 +166,10 @@ def main() -> None:
         system = WORLDS[world].system()
         names = [name for name in system.parameters if has_row(name)]
         names += [name for name in parameters() if name.startswith("run.")]
+        if WORLDS[world].modes == 1:
+            names.remove("model.modes")
+        if "striker.damper" in names and not system.get("striker.spring"):
+            names.remove("striker.damper")  # of a suspension, which a mass in flight has not
         chosen = asked.only.split(",") if asked.only else [name for name in names if name not in NOT_SWEPT]
         for name in chosen:
             with tempfile.TemporaryDirectory() as folder:
