@@ -16,6 +16,7 @@ _COLORS = {
     "snapbeam": "#000000",
     "scipy": "#B03A27",
     "numbalsoda": "#16245E",
+    "Boost.odeint": "#6B8E23",
     "heyoka": "#3D9BE0",
     "diffrax": "#8A8A8A",
 }
@@ -27,6 +28,9 @@ _MARKS = {
     "scipy odeint": ("x", ":"),
     "numbalsoda dop853": ("v", "-"),
     "numbalsoda lsoda": ("^", "--"),
+    "Boost.odeint dopri5": ("v", "-"),
+    "Boost.odeint fehlberg78": ("^", "--"),
+    "Boost.odeint Bulirsch-Stoer": ("x", ":"),
     "heyoka Taylor": ("D", "-"),
     "diffrax Tsit5": ("<", "-"),
     "diffrax Dopri8": (">", "--"),

@@ -1,0 +1,102 @@
+"""Boost.odeint (C++): Dormand-Prince 5, Fehlberg 7(8) and Bulirsch-Stoer, compiled with the machine's own compiler."""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import tempfile
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numba import carray, cfunc, types
+from numpy.typing import NDArray
+
+from benchmarks.cases import Case
+from benchmarks.peers import Method, Solver
+from benchmarks.rhs import compiled_system
+
+__all__ = ["METHODS"]
+
+_Array = NDArray[np.float64]
+_SOURCE = Path(__file__).with_suffix(".cpp")
+_OPTIONS = ("-std=c++14", "-O3", "-march=native", "-DNDEBUG", "-shared", "-fPIC")
+_SIGNATURE = types.void(types.double, *3 * (types.CPointer(types.double),))
+
+
+def _library() -> ctypes.CDLL:
+    compiler = os.environ.get("CXX") or shutil.which("g++") or shutil.which("c++")
+    if compiler is None:
+        raise ImportError("no C++ compiler")
+    text = _SOURCE.read_bytes() + " ".join((compiler, *_OPTIONS)).encode()
+    folder = (
+        Path(tempfile.gettempdir()) / f"snapbeam-boost-{os.getuid()}-{hashlib.sha256(text).hexdigest()[:12]}"
+    )
+    folder.mkdir(mode=0o700, exist_ok=True)
+    built = folder / "peer.so"
+    if not built.exists():
+        made = folder / f"{os.getpid()}.so"
+        done = subprocess.run(
+            [compiler, *_OPTIONS, str(_SOURCE), "-o", str(made)], capture_output=True, text=True
+        )
+        if done.returncode != 0:
+            raise ImportError((re.findall(r"error: .*", done.stderr) or ["it does not compile"])[0])
+        made.replace(built)
+    return ctypes.CDLL(str(built))
+
+
+_LIBRARY = _library()
+_LIBRARY.version.restype = ctypes.c_char_p
+_VERSION = _LIBRARY.version().decode().replace("_", ".")
+_SOLVE = _LIBRARY.solve
+_SOLVE.argtypes = [
+    ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p, ctypes.c_int,
+    ctypes.c_double, ctypes.c_void_p,
+]  # fmt: skip
+
+
+def _prepare(method: int, weight: float, case: Case, tolerance: float) -> Solver:
+    system = compiled_system(case, weight)
+    function, size, room = system.function, system.start.size, system.memory.size
+
+    @cfunc(_SIGNATURE)
+    def slope(t, u, du, data):  # type: ignore[no-untyped-def]
+        function(t, carray(u, (size,)), carray(du, (size,)), carray(data, (room,)))
+
+    address = slope.address
+
+    def solve(times: _Array, out: _Array | None) -> bool:
+        when = np.ascontiguousarray(times, dtype=np.float64)
+        failed = _SOLVE(
+            method, address, system.memory.ctypes.data, system.start.ctypes.data, size, when.ctypes.data, when.size,
+            tolerance, None if out is None else out.ctypes.data,
+        )  # fmt: skip
+        return not failed
+
+    def sample(times: _Array) -> _Array:
+        states = np.empty((times.size, size))
+        if not solve(times, states):
+            states[:] = np.nan
+        return np.asarray(system.coordinates(states) @ case.at_contact)
+
+    def advance(end: float) -> None:
+        assert slope is not None  # the compiled function must outlive its address
+        solve(np.array([0.0, end]), None)
+
+    return Solver(sample, advance)
+
+
+_LEVELS = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-10)
+METHODS = tuple(
+    Method(
+        f"Boost.odeint {name}",
+        _LEVELS,
+        partial(_prepare, number, 10.0),
+        f"Boost {_VERSION}, -O3 -march=native",
+    )
+    for number, name in enumerate(("dopri5", "fehlberg78", "Bulirsch-Stoer"))
+)
