@@ -29,7 +29,7 @@ def shell(*words: str) -> str:
 
 
 # %%
-# Its beam has 81.8, 159 and 380 Hz:
+# The paper states 81.8, 159 and 380 Hz for its beam:
 
 found = json.loads(shell("frequencies", "--count", "3", "--json", "-"))
 print([f"{each:.1f} Hz" for each in found["reduced"]])

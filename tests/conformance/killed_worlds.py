@@ -168,6 +168,8 @@ def main() -> None:
         names += [name for name in parameters() if name.startswith("run.")]
         if WORLDS[world].modes == 1:
             names.remove("model.modes")
+        if system.base is not None and type(system.base.motion).name == "chirp":
+            names.remove("base.carries_striker")  # a sweep is refused under a striker in space
         if "striker.damper" in names and not system.get("striker.spring"):
             names.remove("striker.damper")  # of a suspension, which a mass in flight has not
         chosen = asked.only.split(",") if asked.only else [name for name in names if name not in NOT_SWEPT]
