@@ -35,6 +35,7 @@ NOT_SWEPT = {
 }
 VALUES: dict[str, list[Any]] = {
     "drive.fall": [0.5, 1.5],
+    "axial.hold": [0.2, 0.6],
     "beam.axial_load": [600.0, 620.0],
     "ends.left": [20.0, 60.0],
     "ends.right": [20.0, 60.0],
@@ -117,9 +118,9 @@ def plain(ds: Any) -> dict[str, Any]:
 def try_one(system: sb.System, name: str, folder: Path) -> str:
     """What went wrong with one parameter; nothing if nothing did."""
     axes = {name: values_of(system, name)}
-    # a base lifts the beam off its stop first, and a burst has to end
-    bursts = any(type(drive).name == "burst" for _, drive in system.moving)
-    integration = sb.Integration(cycles=6 if bursts else 2 if system.base is None else 4)
+    # a base lifts the beam off its stop first; a burst and a ramp have to end
+    ends = any(type(drive).name in ("burst", "ramp") for _, drive in system.moving)
+    integration = sb.Integration(cycles=6 if ends else 2 if system.base is None else 4)
 
     def sweep(store: Path | None) -> Any:
         return sb.sweep(system, axes, integration, store=None if store is None else Keeping(store, chunk=1))
