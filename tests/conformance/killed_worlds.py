@@ -153,6 +153,8 @@ def try_one(system: sb.System, name: str, folder: Path) -> str:
 
 UNSEEN = {"run.max_steps", "run.early_decision", "base.carries_striker", "run.high_frequency_ratio"}
 """What two cycles may not show."""
+NOTHING = {("still", "striker.gap"), ("a measured shape", "imperfection.point_location")}
+"""What changes nothing: nothing moves there from rest, and a load of zero stands nowhere."""
 
 
 def main() -> None:
@@ -178,7 +180,7 @@ def main() -> None:
             with tempfile.TemporaryDirectory() as folder:
                 said = try_one(system, name, Path(folder))
             count += 1
-            if said:
+            if said and not ((world, name) in NOTHING and said == "changes nothing"):
                 failures.append(f"{world}, {name}: {said}")
                 print(failures[-1], file=sys.stderr, flush=True)
     print(json.dumps({"swept": count, "failures": failures}))
