@@ -14,6 +14,7 @@ from world_oracle import Tip, follow
 
 import snapbeam as sb
 from snapbeam import paper
+from snapbeam.engines.cpu.world.edges import edge_times
 
 HERTZ = 4e8
 Motion = Callable[[float], tuple[float, float]]
@@ -167,3 +168,49 @@ def test_against_an_independent_solution(name, modes) -> None:
         ledger = data.energy_beam + data.energy_contact + data.energy_dissipated - data.work_shaker
         assert np.ptp(ledger.values) < 1e-4 * data.attrs["gross_work"]
     assert run.outcome.impacts > 0
+
+
+SINE = sb.Sine(frequency_ratio=0.9442, velocity_amplitude=0.2631)
+ENDS = {
+    "alone": (sb.HalfSine(displacement_amplitude=1.50934, duration=0.427379), 10),
+    "over a sine": (SINE + sb.HalfSine(displacement_amplitude=1.941, duration=1.8616), 4),
+}
+
+
+@pytest.mark.parametrize("name", ["alone", pytest.param("over a sine", marks=pytest.mark.slow)])
+def test_a_shock_that_ends_in_touch(name) -> None:
+    """Its velocity jumps while it presses: no step goes across, or the ledger would miss a hundredth of its work."""
+    drive, cycles = ENDS[name]
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
+    run = sb.simulate(sb.System(model, paper.CONTACT, sb.Striker(drive=drive)), sb.Integration(cycles=cycles))
+    data = run.dataset
+    ends = (drive.parts_of_sum[1] if isinstance(drive, sb.Sum) else drive).duration / model.reference_freq
+    at = int(np.searchsorted(data.time.values, ends))
+    assert data.penetration.values[at] > 0.0
+    np.testing.assert_allclose(data.time.values[at - 1 : at + 1], ends, rtol=0.0, atol=1e-8)
+    ledger = data.energy_beam + data.energy_contact + data.energy_dissipated - data.work_shaker
+    assert np.ptp(ledger.values) < 1e-4 * data.attrs["gross_work"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["one of two", "under a base"])
+def test_a_shock_beside_other_motions_ends_with_a_step(name) -> None:
+    """Whatever else moves, its time is its own."""
+    model = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+    sine = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2, phase=0.3)
+    shock = sb.HalfSine(displacement_amplitude=0.3, duration=0.7)
+    if name == "one of two":
+        strikers = [sb.Striker(drive=sine), sb.Striker(drive=shock, location=0.3)]
+        system = sb.System(model, [paper.CONTACT, paper.CONTACT], strikers)
+    else:
+        base = sb.Base(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.2))
+        system = sb.System(model, paper.CONTACT, sb.Striker(drive=shock), base=base)
+    data = sb.simulate(system, sb.Integration(cycles=2)).dataset
+    near = np.abs(data.time.values - 0.7 / model.reference_freq)
+    assert near.min() < 1e-8
+
+
+def test_one_kind_of_drive_tells_its_jumps_and_the_others_none() -> None:
+    shock = sb.HalfSine(displacement_amplitude=0.3, duration=0.7)
+    assert edge_times(type(shock)) is not None and edge_times(type(SINE + shock)) is not None
+    assert edge_times(type(SINE)) is None and edge_times(type(SINE + SINE)) is None

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass, RunStatus
+from snapbeam.core.validate import InputError
+from snapbeam.engines.each import rows_for
+from snapbeam.engines.outcomes import STATISTICS
+from snapbeam.model.system import System
 
-__all__ = ["OUTCOMES", "Event", "reached"]
+__all__ = ["OUTCOMES", "Event", "reached", "require_held"]
 
 Statistics = dict[str, NDArray[Any]]
 _REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
@@ -42,3 +46,20 @@ OUTCOMES: dict[str, Event] = {
 def reached(found: Statistics) -> NDArray[np.bool_]:
     """Whether runs came to an end that says their class."""
     return np.isin(found["status"], _REACHED)
+
+
+def require_held(names: Iterable[str], system: System) -> None:
+    """Refuse statistics that runs of a system do not have: those of one of several strikers, if it is not there.
+
+    Raises
+    ------
+    InputError
+    """
+    strikers = 0 if system.striker is None else 1 + len(system.others)
+    held = rows_for(strikers)
+    for name in names:
+        if name in STATISTICS and name not in held:
+            raise InputError(
+                f"{name}: the system has {strikers} striker{'s' * (strikers != 1)}; each has its own "
+                "statistics where there are several"
+            )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -170,9 +170,12 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     A striker with a mass meets the beam for a shorter time, as the two masses together do: m_s m/(m_s + m).
     """
     plans, striker = _plans_of(system, integration, columns), system.striker
-    for number, each in enumerate(system.others, 2):
-        further = _plans_of(system, integration, columns, f"contact_{number}", each.contact)
-        plans = [_finer(one, other) for one, other in zip(plans, further, strict=True)]
+    further = [
+        _plans_of(system, integration, columns, f"contact_{number}", each.contact)
+        for number, each in enumerate(system.others, 2)
+    ]
+    if further:
+        plans = [_serving(each) for each in zip(plans, *further, strict=True)]
     if integration.step is None and (system.base is not None or system.axial is not None):
         fastest = fastest_of(system, columns, len(plans))
         plans = [
@@ -198,7 +201,7 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
 
 def _fastest_open(system: System) -> float:
     """Greatest angular frequency of the beam in its well, rad/s, while no current flows: theta^2/C stiffens it."""
-    model, harvester = system.model, system.harvester
+    model, harvester = _struck(system), system.harvester
     assert harvester is not None
     stiffness = np.diag(model.omega**2)
     if harvester.inertia > 0.0:
@@ -213,13 +216,13 @@ def _struck(system: System) -> ReducedModel:
     return system.model.mirrored if above else system.model
 
 
-def _finer(one: Plan, other: Plan) -> Plan:
-    """Steps that serve two contacts: as short as the shorter ones of both, in flight and in contact."""
-    step = min(one.step, other.step)
-    longest = min(each.step * 0.5**each.coarsest for each in (one, other))
-    shortest = min(each.step * 0.5**each.finest for each in (one, other))
+def _serving(plans: Sequence[Plan]) -> Plan:
+    """Steps that serve several contacts: as short as the shortest of them, in flight and in contact."""
+    step = min(each.step for each in plans)
+    longest = min(each.step * 0.5**each.coarsest for each in plans)
+    shortest = min(each.step * 0.5**each.finest for each in plans)
     coarsest, finest = (math.ceil(math.log2(step / each) - 1e-9) for each in (longest, shortest))
-    return one._replace(step=step, coarsest=max(0, coarsest), finest=max(0, coarsest, finest))
+    return plans[0]._replace(step=step, coarsest=max(0, coarsest), finest=max(0, coarsest, finest))
 
 
 def _plans_of(

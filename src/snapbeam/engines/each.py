@@ -10,8 +10,9 @@ from snapbeam.engines.outcomes import (
     STATISTICS,
     Statistic,
 )
+from snapbeam.model.drive.joined import MOST_STRIKERS
 
-__all__ = ["rows_for", "statistic_named"]
+__all__ = ["of_one_named", "rows_for"]
 
 _EACH = {
     "impacts": (OTHER_IMPACTS, "impacts"),
@@ -20,6 +21,7 @@ _EACH = {
     "shaker_work": (OTHER_WORK, "work done"),
 }
 """What each of several has: where the others' is kept, and words."""
+_NUMBERS = {str(number) for number in range(1, MOST_STRIKERS + 1)}
 
 
 def rows_for(strikers: int) -> dict[str, Statistic]:
@@ -28,19 +30,11 @@ def rows_for(strikers: int) -> dict[str, Statistic]:
     return STATISTICS | {row.name: row for row in rows}
 
 
-def statistic_named(name: str) -> Statistic:
-    """The row of a variable of any map: one of the table's, or of one of several strikers.
-
-    Raises
-    ------
-    KeyError
-        If no map has it.
-    """
-    if name in STATISTICS:
-        return STATISTICS[name]
+def of_one_named(name: str) -> Statistic | None:
+    """The row of one of several strikers by its name; None if there is no such row."""
     whole, _, number = name.rpartition("_striker_")
-    if whole not in _EACH or not number.isdecimal():
-        raise KeyError(name)
+    if whole not in _EACH or number not in _NUMBERS:
+        return None
     return _of_one(whole, int(number))
 
 

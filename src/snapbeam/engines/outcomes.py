@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass, RunStatus, class_of
+from snapbeam.core.named import NamedTable
 from snapbeam.core.validate import InputError
 
 if TYPE_CHECKING:
@@ -314,8 +315,15 @@ _ROWS = (
     Statistic("peak_voltage", "float64", "V", "greatest voltage across the load at the end of a step", _peak_voltage),
 )  # fmt: skip
 
-STATISTICS: dict[str, Statistic] = {row.name: row for row in _ROWS}
-"""Variables of a map and attributes of an outcome, by name."""
+
+def _of_one_striker(name: str) -> Statistic | None:
+    from snapbeam.engines.each import of_one_named
+
+    return of_one_named(name)
+
+
+STATISTICS: dict[str, Statistic] = NamedTable(_of_one_striker, ((row.name, row) for row in _ROWS))
+"""Variables of a map and attributes of an outcome, by name; ``peak_force_striker_2`` is found too, not listed."""
 
 
 def updated() -> tuple[Statistic, ...]:
@@ -346,7 +354,7 @@ def withdraw(name: str) -> None:
     InputError
         If there is none of that name, or it is one of the package's own.
     """
-    if name not in STATISTICS or STATISTICS[name] in _ROWS:
+    if name not in list(STATISTICS) or STATISTICS[name] in _ROWS:
         raise InputError(f"statistic {name!r}: was not registered")
     del STATISTICS[name]
 

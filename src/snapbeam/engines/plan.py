@@ -22,7 +22,7 @@ _FREE_TURN = 4.0
 """Of the fastest mode in a flight step of level "reference", rad."""
 _MOST_DECAY = 1.8
 """Of the mode that decays fastest, in a flight step."""
-# Contact: longest step over the duration of an impact at the speed 0.2 b omega_1, by level, and how many
+# Contact: longest step over the time of an impact at the speed 0.2 b omega_1, by level, and how many
 # halvings below it the shortest step is, by order.
 _CONTACT_SHARE = {"map": 1.0 / 8.0, "reference": 1.0 / 32.0}
 _CONTACT_SPEED = 0.2
@@ -80,7 +80,7 @@ def plan_steps(
     if contact is not None and not contact.impulsive:
         mass = model.lightest_contact_mass
         speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_freq
-        duration = contact.impact_duration(mass, speed)
+        duration = contact.resolved_time(mass, speed)
     if duration > 0.0:
         impact = _CONTACT_SHARE[accuracy] * duration
         flight = min(flight, impact * 2 ** _MOST_HALVINGS[accuracy])

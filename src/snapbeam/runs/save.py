@@ -12,7 +12,7 @@ from snapbeam.core.codes import ResponseClass, RunStatus
 from snapbeam.core.files import check_writable
 from snapbeam.core.netcdf import read_netcdf, write_netcdf
 from snapbeam.core.validate import InputError, file_path
-from snapbeam.engines.each import statistic_named
+from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import quantities
 from snapbeam.model.state import State
@@ -95,7 +95,7 @@ def outcome_dataset(outcome: Outcome) -> xr.Dataset:
 
     variables: dict[str, Any] = {}
     for name, value in outcome.items():
-        row = statistic_named(name)
+        row = STATISTICS[name]
         labels: dict[str, Any] = {"units": row.unit, "long_name": row.words}
         kinds: type[ResponseClass] | type[RunStatus] | None = None
         if name in ("response", "status"):

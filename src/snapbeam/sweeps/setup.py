@@ -16,7 +16,7 @@ from snapbeam.core.findings import tell
 from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble, plans_of, run_columns
-from snapbeam.engines.each import statistic_named
+from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.engines.plan import Plan
 from snapbeam.engines.registry import resolve
 from snapbeam.model.drive import Recorded
@@ -321,7 +321,7 @@ def _alike(system: System, state: State | None, runs: int) -> list[NDArray[np.in
 
 def variable_attributes(name: str) -> dict[str, Any]:
     """Unit and name in words of one variable of a map; for codes, what they mean."""
-    row = statistic_named(name)
+    row = STATISTICS[name]
     labels: dict[str, Any] = {"units": row.unit, "long_name": row.words}
     if name == "response":
         labels |= code_flags(ResponseClass)

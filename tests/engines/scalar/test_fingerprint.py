@@ -147,6 +147,16 @@ def test_a_law_of_somebody_is_marked_by_what_it_computes(tmp_path, monkeypatch) 
     assert None not in found and len(set(found)) == 5
 
 
+def test_the_names_that_a_law_gives_are_part_of_it(tmp_path, monkeypatch) -> None:
+    """As the times at which a drive jumps: kernels read numbers by them."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    marks = [
+        fingerprint((law_of(tmp_path, LAW.format(factor="1.0", more=f"edges = ({names})")), Sine))
+        for names in ("", "'stiffness',", "'other',")
+    ]
+    assert None not in marks and len(set(marks)) == 3
+
+
 def test_a_statistic_of_somebody_is_never_kept() -> None:
     """It stands for functions from anywhere; two of them must not share a kernel."""
     from snapbeam.engines.outcomes import Statistic, register, withdraw

@@ -115,8 +115,9 @@ class Goal:
     Parameters
     ----------
     of : str
-        An outcome (its probability), a statistic of the runs, a parameter, ``"speed"``, ``"stroke"``,
-        ``"acceleration"`` or ``"cycles_to_settle"``.
+        An outcome (its probability), a statistic of the runs, of one of several strikers too, as
+        ``"peak_force_striker_2"``, a parameter, ``"speed"``, ``"stroke"``, ``"acceleration"`` or
+        ``"cycles_to_settle"``.
     quantile : float, optional
         Of a statistic, in (0, 1): what is exceeded by no more than the rest of the runs; its mean by default.
     largest : bool

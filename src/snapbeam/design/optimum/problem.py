@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.parameters import lookup
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, shown
-from snapbeam.design.events import reached
+from snapbeam.design.events import reached, require_held
 from snapbeam.design.optimum.measures import CYCLE, Goal, Limit, require_kinds
 from snapbeam.design.proportion import wilson
 from snapbeam.design.trials import Trials
@@ -250,6 +250,7 @@ def problem_of(
             raise InputError(f"{name}: stands twice among the variables")
         bounds[row.name] = (low, high)
     made, kept = require_kinds(goals, limits)
+    require_held([*(goal.of for goal in made), *(limit.of for limit in kept)], trials.system)
     integer("draws", draws, 8, 10**6)
     if trials.spread.is_empty:
         raise InputError("spread: nothing differs, so no probability can be promised; give tolerances")

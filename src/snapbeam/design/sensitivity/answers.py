@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.parameters import lookup
 from snapbeam.core.validate import InputError, axis, choice, integer, shown
-from snapbeam.design.events import OUTCOMES, reached
+from snapbeam.design.events import OUTCOMES, reached, require_held
 from snapbeam.design.trials import Trials
 from snapbeam.dynamics.lifetimes.lifetime_map import lifetime_map
 from snapbeam.dynamics.lifetimes.survival import Survival
 from snapbeam.dynamics.starts import Starts
+from snapbeam.engines.each import of_one_named
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.sweeps.points import PointList
 
@@ -46,14 +47,16 @@ class StatisticOf:
     Parameters
     ----------
     name : str
-        Of :data:`snapbeam.STATISTICS`, or an outcome such as ``"snap"``: 1 where it happens, else 0.
+        Of :data:`snapbeam.STATISTICS`, of one of several strikers, such as ``"peak_force_striker_2"``, or an outcome
+        such as ``"snap"``: 1 where it happens, else 0.
     """
 
     name: str
 
     def __post_init__(self) -> None:
         known = [name for name, row in STATISTICS.items() if row.dtype in ("float64", "int32")]
-        choice("statistic", self.name, (*known, *OUTCOMES))
+        if not isinstance(self.name, str) or of_one_named(self.name) is None:
+            choice("statistic", self.name, (*known, *OUTCOMES))
 
     @property
     def unit(self) -> str:
@@ -67,6 +70,7 @@ class StatisticOf:
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
         """One run a draw."""
+        require_held([self.name], trials.system)
         found = trials.statistics({}, numbers, scores=scores)
         values = found[self.name] if self.name in STATISTICS else OUTCOMES[self.name].happened(found)
         return np.where(reached(found), values.astype(np.float64), np.nan)

@@ -33,6 +33,7 @@ from snapbeam.engines.cpu.strikers.force import press, put_others
 from snapbeam.engines.cpu.strikers.meet import close_others, level_of_others
 from snapbeam.engines.cpu.uneven import turn_over
 from snapbeam.engines.cpu.world.circuit import Tap
+from snapbeam.engines.cpu.world.edges import up_to_edge
 from snapbeam.engines.cpu.world.forced import Given, enter_forces
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import released_at
@@ -77,10 +78,11 @@ def choose(memory, blocks, place, run, now, book):
     if watch.touching:
         left = released_at(run.struck.law, seen.d, seen.dv)
         level = max(level, contact_level(clock, (t - book.onset) * clock.tick, left, seen.dv))
-    level = level_of_others(memory, layout.others, clock, t, level)
+    level = level_of_others(memory, layout.others, clock, t, watch.touching, level)
     ticks, at = ticks_of(clock, level), run.coefficients + (level + 1) * run.slot
-    # up to the next state that is handed out, or to the end
+    # up to the next state that is handed out, to a jump of the drive's velocity, or to the end
     limit = min((now.landed + 1) * clock.landing, clock.end)
+    limit = up_to_edge(run.struck.drive, run.phase, clock.period, t, limit)
     if t + ticks > limit:
         ticks, at = limit - t, cut_slot(run)
         prepare(memory, layout, place.stages, run.struck.drive, ticks * clock.tick, at)

@@ -66,8 +66,13 @@ def _marks_of_class(kind: type) -> Iterable[str]:
             if isinstance(value, staticmethod):
                 yield name
                 yield from _marks(value.__func__, seen)
-            elif name == "__annotations__" or isinstance(value, (bool, int, float)):
+            elif name == "__annotations__" or isinstance(value, (bool, int, float)) or _is_names(value):
                 yield f"{name} {value!r}"
+
+
+def _is_names(value: Any) -> bool:
+    """Whether it is a tuple of names, as those of a drive's numbers and of the times of its jumps."""
+    return isinstance(value, tuple) and all(isinstance(name, str) for name in value)
 
 
 def _marks(value: Any, seen: set[int]) -> Iterable[str]:

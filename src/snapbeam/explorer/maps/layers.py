@@ -84,12 +84,13 @@ def layers_of(skeleton: xr.Dataset) -> dict[str, Layer]:
                     str(name), {further[0]: at}, f"{words}: {label}", unit, shown=not limit
                 )
     order = list(STATISTICS)
-    return dict(
-        sorted(
-            found.items(),
-            key=lambda each: (each[0] != "response", order.index(each[0]) if each[0] in order else -1),
-        )
-    )
+
+    def place(name: str) -> tuple[bool, int, str]:
+        # those of one of several strikers after those of all
+        whole = name.partition("_striker_")[0] if name in STATISTICS else name
+        return name != "response", order.index(whole) if whole in order else -1, name if whole != name else ""
+
+    return dict(sorted(found.items(), key=lambda each: place(each[0])))
 
 
 def _entry(dimension: str, value: Any) -> str:

@@ -154,10 +154,15 @@ class SystemSource(Source):
     def __init__(self, system: System, axes: Mapping[str, Any], integration: Integration, name: str) -> None:
         self.skeleton = axes_dataset(system, axes, integration)
         self.name = name
+        self.strikers = 1 + len(system.others)
 
     def variables(self) -> list[str]:
         """All that a sweep gives."""
-        return [name for name in STATISTICS if name != "status"]
+        names = [name for name in STATISTICS if name != "status"]
+        if self.strikers == 1:
+            return names
+        each = [f"{name}_striker_{number}" for number in range(1, self.strikers + 1) for name in names]
+        return names + [name for name in each if name in STATISTICS]
 
 
 _SMALL = 2**25

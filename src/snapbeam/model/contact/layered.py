@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from snapbeam.core.validate import positive, within
-from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.contact.base import ContactLaw, hertzian_time
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.quantity import RUN, quantity
 
@@ -111,3 +111,9 @@ class LayeredHertz(ContactLaw):
             left = velocity**2 - 2.0 * self.energy(law, most * (1.0 - node * node)) / mass
             total += float(weight * 2.0 * most * node / math.sqrt(max(left, 1e-300)))
         return 2.0 * total
+
+    def resolved_time(self, mass: float, velocity: float) -> float:
+        """The duration, or that of Hertz's contact with the same greatest slope, which is less."""
+        law = self.numbers_type()(self.stiffness, self.layer_stiffness)
+        slope = self.slope(law, self.max_penetration(mass, velocity))
+        return min(self.impact_duration(mass, velocity), hertzian_time(slope, mass))

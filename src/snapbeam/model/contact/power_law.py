@@ -8,7 +8,7 @@ from typing import Any
 
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import positive, within
-from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.contact.base import ContactLaw, hertzian_time
 from snapbeam.model.quantity import RUN, quantity
 
 __all__ = ["PowerLaw"]
@@ -76,3 +76,9 @@ class PowerLaw(ContactLaw):
         n = self.exponent + 1.0
         beta = math.sqrt(math.pi) * math.gamma(1.0 / n) / math.gamma(1.0 / n + 0.5)
         return 2.0 * self.max_penetration(mass, velocity) / velocity * beta / n
+
+    def resolved_time(self, mass: float, velocity: float) -> float:
+        """The duration, or, of an exponent above 3/2, that of Hertz's contact with the same greatest slope."""
+        law = self.numbers_type()(self.force_at_micrometre, self.exponent)
+        slope = self.slope(law, self.max_penetration(mass, velocity))
+        return min(self.impact_duration(mass, velocity), hertzian_time(slope, mass))

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.core.named import NamedTable
 from snapbeam.model.numbers import numbers_type
 from snapbeam.model.quantity import check_fields
 
@@ -17,33 +18,14 @@ __all__ = ["DRIVES", "Drive", "Scale"]
 _Array = NDArray[np.float64]
 
 
-class _Drives(dict[str, "type[Drive]"]):
-    """Drives by name; a name such as ``sine+burst`` is found too, though it is in no list."""
+def _sum_named(name: str) -> type[Drive] | None:
+    from snapbeam.model.drive.sum import named
 
-    def __missing__(self, name: str) -> type[Drive]:
-        from snapbeam.model.drive.sum import named
-
-        found = named(name)
-        if found is None:
-            raise KeyError(name)
-        return found
-
-    def __contains__(self, name: object) -> bool:
-        if super().__contains__(name):
-            return True
-        if not isinstance(name, str) or "+" not in name:
-            return False
-        from snapbeam.model.drive.sum import named
-
-        return named(name) is not None
-
-    def get(self, name: str, default: Any = None) -> Any:
-        """As of any mapping."""
-        return self[name] if name in self else default
+    return named(name) if "+" in name else None
 
 
-DRIVES: dict[str, type[Drive]] = _Drives()
-"""Every drive by the name it has in parameter files."""
+DRIVES: dict[str, type[Drive]] = NamedTable(_sum_named)
+"""Every drive by the name it has in parameter files; one such as ``sine+burst`` is found too, though not listed."""
 
 
 class Scale(NamedTuple):
@@ -77,6 +59,8 @@ class Drive:
     """What moves, by name, of several motions that are marched as one: :mod:`snapbeam.model.drive.joined`."""
     terms: ClassVar[tuple[type[Drive], ...]] = ()
     """The kinds that it is a sum of."""
+    edges: ClassVar[tuple[str, ...]] = ()
+    """Numbers that are times at which the velocity jumps, s since the drive began: steps end there."""
     registry: ClassVar[dict[str, type[Drive]]] = DRIVES
     """Where it is entered by its name."""
 

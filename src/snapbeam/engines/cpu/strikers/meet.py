@@ -105,15 +105,23 @@ def trusted(memory, others, t, until):
 
 
 @inlined
-def level_of_others(memory, others, clock, t, level):
-    """The level of a step, made finer for those that touch."""
+def level_of_others(memory, others, clock, t, touching, level):
+    """The level of a step, made finer for those that touch, and finer still where more than one contact lasts.
+
+    A beam that is pressed from several sides has the stiffness of all contacts, whose rates add as squares: of two
+    to four that is one halving.
+    """
     if others is None:
         return level
+    count = int(touching)
     for j in range(count_of(others.kinds)):
         at = block(others, j)
         if memory[at + TOUCHING] != 0.0:
+            count += 1
             elapsed = (t - memory[at + ONSET]) * clock.tick
             level = max(level, contact_level(clock, elapsed, memory[at + DEPTH], memory[at + RATE]))
+    if count > 1:
+        level = max(level, min(clock.coarsest + 1, clock.finest))
     return level
 
 
