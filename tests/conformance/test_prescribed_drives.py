@@ -14,7 +14,7 @@ from world_oracle import Tip, follow
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.cpu.world.edges import edge_times
+from snapbeam.engines.cpu.world.edges import Jump, jumps_of
 
 HERTZ = 4e8
 Motion = Callable[[float], tuple[float, float]]
@@ -212,5 +212,7 @@ def test_a_shock_beside_other_motions_ends_with_a_step(name) -> None:
 
 def test_one_kind_of_drive_tells_its_jumps_and_the_others_none() -> None:
     shock = sb.HalfSine(displacement_amplitude=0.3, duration=0.7)
-    assert edge_times(type(shock)) is not None and edge_times(type(SINE + shock)) is not None
-    assert edge_times(type(SINE)) is None and edge_times(type(SINE + SINE)) is None
+    begun = (("t2_phase", "t2_omega"),)
+    assert jumps_of(type(shock)) == [Jump("duration", ())]
+    assert jumps_of(type(SINE + shock)) == [Jump("t2_duration", begun)]
+    assert jumps_of(type(SINE)) == [] and jumps_of(type(SINE + SINE)) == []

@@ -69,44 +69,65 @@ def has_room(now, book, outputs):
     return rows and book.impacts - outputs.marks[1] < outputs.impacts.shape[0] - MOST_STRIKERS
 
 
+class _Instant(NamedTuple):
+    """What a sample is of."""
+
+    when: float
+    """s."""
+    q: int
+    """Where the state stands in memory."""
+    p: int
+    seen: Seen
+    energy: float
+    """Of the beam, J."""
+
+
+class _Sums(NamedTuple):
+    """Energies since the beginning of the run, J."""
+
+    work: float
+    dissipated: float
+    lost: float
+    base: float
+    load: float
+    circuit: float
+
+
 @inlined
-def _write(
-    memory,
-    layout,
-    home,
-    q,
-    p,
-    outputs,
-    sample,
-    when,
-    tip,
-    seen,
-    energy,
-    work,
-    dissipated,
-    lost,
-    base,
-    load,
-    tapped,
-):
+def _sums(book):
+    """As a run's book has them."""
+    return _Sums(book.work, book.dissipated, book.lost, book.base_work, book.load_work, book.circuit_energy)
+
+
+@inlined
+def _sums_with(book, done):
+    """The same with what a part of a step gave."""
+    return _Sums(
+        book.work + done.work, book.dissipated + done.dissipated + done.lost, book.lost + done.lost,
+        book.base_work + done.given.base, book.load_work + done.given.load, book.circuit_energy + done.tap.energy,
+    )  # fmt: skip
+
+
+@inlined
+def _write(memory, layout, home, law, outputs, sample, instant, sums):
     """One sample, about the first well."""
-    size = layout.size
+    size, seen = layout.size, instant.seen
     for row in range(size):
-        outputs.rows[sample, row] = memory[q + row]
+        outputs.rows[sample, row] = memory[instant.q + row]
         if home < 0.0:
             outputs.rows[sample, row] += memory[layout.shift + row]
-        outputs.rows[sample, size + row] = memory[p + row]
-    outputs.at[sample] = when
+        outputs.rows[sample, size + row] = memory[instant.p + row]
+    outputs.at[sample] = instant.when
     outputs.values[sample, 0] = seen.d
-    outputs.values[sample, 1] = felt_force(tip.law, seen.d, seen.dv)
-    outputs.values[sample, 2] = energy
-    outputs.values[sample, 3] = contact_energy(tip.law, seen.d)
-    outputs.values[sample, 4] = work
-    outputs.values[sample, 5] = dissipated
-    outputs.values[sample, 6] = lost
-    outputs.values[sample, 7] = base
-    outputs.values[sample, 8] = load
-    outputs.values[sample, 9] = tapped
+    outputs.values[sample, 1] = felt_force(law, seen.d, seen.dv)
+    outputs.values[sample, 2] = instant.energy
+    outputs.values[sample, 3] = contact_energy(law, seen.d)
+    outputs.values[sample, 4] = sums.work
+    outputs.values[sample, 5] = sums.dissipated
+    outputs.values[sample, 6] = sums.lost
+    outputs.values[sample, 7] = sums.base
+    outputs.values[sample, 8] = sums.load
+    outputs.values[sample, 9] = sums.circuit
 
 
 @compiled
@@ -128,12 +149,8 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, book, o
         about = observe(memory, layout, tip, step.phase + tip.drive.omega * part, q2, p2)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, here.gq, here.qr)
         energy = lifted(memory, size, layout.uneven, q2, energy)
-        _write(
-            memory, layout, now.home, q2, p2, outputs, sample, times[done], tip, about, energy,
-            book.work + here.work, book.dissipated + here.dissipated + here.lost, book.lost + here.lost,
-            book.base_work + here.given.base, book.load_work + here.given.load,
-            book.circuit_energy + here.tap.energy,
-        )  # fmt: skip
+        instant = _Instant(times[done], q2, p2, about, energy)
+        _write(memory, layout, now.home, tip.law, outputs, sample, instant, _sums_with(book, here))
         sample, done = sample + 1, done + 1
     outputs.marks[0] = done
     # the slot for steps of any length holds the present step again, should it be a cut one
@@ -156,11 +173,17 @@ def record_held(memory, blocks, layout, run, tip, now, step, book, outputs):
         force, gq, qr = hold(memory, blocks, layout, tip, phase, q2, p2, run.spare + 2 * size)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, gq, qr)
         energy = lifted(memory, size, layout.uneven, q2, energy)
-        _write(
-            memory, layout, now.home, q2, p2, outputs, sample, times[done], tip, _TOGETHER, energy,
-            book.work + work, book.dissipated + dissipated, book.lost, book.base_work, book.load_work,
-            book.circuit_energy,
-        )  # fmt: skip
+        so_far = _sums(book)
+        sums = _Sums(
+            so_far.work + work,
+            so_far.dissipated + dissipated,
+            so_far.lost,
+            so_far.base,
+            so_far.load,
+            so_far.circuit,
+        )
+        instant = _Instant(times[done], q2, p2, _TOGETHER, energy)
+        _write(memory, layout, now.home, tip.law, outputs, sample, instant, sums)
         outputs.values[sample, 1] = force
         sample, done = sample + 1, done + 1
     outputs.marks[0] = done
@@ -174,12 +197,8 @@ def record_aside(memory, layout, tip, now, short, here, when, about, sample, boo
         return sample
     energy = modal_energy(memory, layout, short.q1, short.p1) + tension_energy(layout.gamma, here.gq, here.qr)
     energy = lifted(memory, layout.size, layout.uneven, short.q1, energy)
-    _write(
-        memory, layout, now.home, short.q1, short.p1, outputs, sample, when, tip, about, energy,
-        book.work + here.work, book.dissipated + here.dissipated + here.lost, book.lost + here.lost,
-        book.base_work + here.given.base, book.load_work + here.given.load,
-        book.circuit_energy + here.tap.energy,
-    )  # fmt: skip
+    instant = _Instant(when, short.q1, short.p1, about, energy)
+    _write(memory, layout, now.home, tip.law, outputs, sample, instant, _sums_with(book, here))
     return sample + 1
 
 
@@ -197,10 +216,8 @@ def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, boo
     outputs.marks[2] += 1
     energy = modal_energy(memory, layout, step.q1, step.p1) + tension_energy(layout.gamma, done.gq, done.qr)
     energy = lifted(memory, layout.size, layout.uneven, step.q1, energy)
-    _write(
-        memory, layout, now.home, step.q1, step.p1, outputs, sample, when, tip, seen1, energy, book.work,
-        book.dissipated, book.lost, book.base_work, book.load_work, book.circuit_energy,
-    )  # fmt: skip
+    instant = _Instant(when, step.q1, step.p1, seen1, energy)
+    _write(memory, layout, now.home, tip.law, outputs, sample, instant, _sums(book))
     return sample + 1
 
 

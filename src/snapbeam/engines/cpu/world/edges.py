@@ -7,41 +7,83 @@ paper's, nothing of this is compiled.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba.extending import overload
 
 from snapbeam.engines.scalar.compile import INLINE_HERE, inlined
 
-__all__ = ["edge_times", "up_to_edge"]
+__all__ = ["Jump", "jumps_of", "up_to_edge"]
 
 _TWO_PI = 2.0 * math.pi
 _MARGIN = 2
 """Ticks on either side of a jump, between which one step goes across it: far less than any error of a run."""
 
 
-def _terms_of(kind: Any, prefix: str) -> list[str]:
-    """The times of the jumps, s since the whole drive began, as formulas of its numbers."""
+class Jump(NamedTuple):
+    """A time at which a velocity jumps."""
+
+    time: str
+    """The number that holds it, s since what jumps began."""
+    begun: tuple[tuple[str, str], ...]
+    """Of each motion that it is part of, its argument's phase and rate: what jumps may have begun before the whole."""
+
+
+def jumps_of(kind: Any, prefix: str = "") -> list[Jump]:
+    """The times at which the velocity of a drive jumps, as numbers of it, those of its parts and terms included."""
     parts = [(f"{prefix}{part}_", each, kind.alone) for part, each in kind.parts]
     parts += [(f"{prefix}t{i}_", each, False) for i, each in enumerate(kind.terms, 1)]
-    found = [f"drive.{prefix}{name}" for name in kind.edges]
+    found = [Jump(f"{prefix}{name}", ()) for name in kind.edges]
     for own, each, alone in parts:
-        begun = "" if alone else f" - drive.{own}phase / drive.{own}omega"
-        found += [f"{time}{begun}" for time in _terms_of(each, own)]
+        begun = () if alone else ((f"{own}phase", f"{own}omega"),)
+        found += [Jump(jump.time, jump.begun + begun) for jump in jumps_of(each, own)]
     return found
 
 
-def edge_times(kind: Any) -> Any:
-    """A function of the numbers of a drive: the times at which its velocity jumps, s since it began, a tuple.
+def _time_of(jump: Jump, fields: tuple[str, ...]) -> Any:
+    """A function of the numbers of a drive: when it jumps, s since the whole of it began."""
+    at = fields.index(jump.time)
 
-    None if there are none.
-    """
-    terms = _terms_of(kind, "")
-    if not terms:
-        return None
-    made: dict[str, Any] = {}
-    exec(f"def times(drive):\n    return ({', '.join(terms)},)", made)
-    return inlined(made["times"])
+    @inlined
+    def own(drive):
+        return drive[at]
+
+    for phase, omega in jump.begun:
+        own = _later(own, fields.index(phase), fields.index(omega))
+    return own
+
+
+def _later(own: Any, phase: int, omega: int) -> Any:
+    @inlined
+    def later(drive):
+        return own(drive) - drive[phase] / drive[omega]
+
+    return later
+
+
+def _limited(jumps: list[Jump], fields: tuple[str, ...]) -> Any:
+    """A function that ends a step at the first border of any jump."""
+    time, rest = _time_of(jumps[0], fields), _limited(jumps[1:], fields) if len(jumps) > 1 else None
+
+    @inlined
+    def one(drive, phase, period, t, limit):
+        ticks = (time(drive) * drive.omega - phase) / _TWO_PI * period
+        if ticks > t - _MARGIN and ticks < limit + _MARGIN:
+            before, behind = int(ticks) - _MARGIN, int(ticks) + 1 + _MARGIN
+            if before > t:
+                return min(limit, before)
+            if behind > t:
+                return min(limit, behind)
+        return limit
+
+    if rest is None:
+        return one
+
+    @inlined
+    def all_of_them(drive, phase, period, t, limit):
+        return rest(drive, phase, period, t, one(drive, phase, period, t, limit))
+
+    return all_of_them
 
 
 def up_to_edge(drive: Any, phase: float, period: int, t: int, limit: int) -> int:
@@ -62,19 +104,8 @@ def up_to_edge(drive: Any, phase: float, period: int, t: int, limit: int) -> int
 
 @overload(up_to_edge, jit_options=INLINE_HERE)
 def _up_to_edge(drive, phase, period, t, limit):
-    times = edge_times(drive.instance_class.owner)
-    if times is None:
+    jumps = jumps_of(drive.instance_class.owner)
+    if not jumps:
         return lambda drive, phase, period, t, limit: limit
-
-    def implementation(drive, phase, period, t, limit):
-        for time in times(drive):
-            ticks = (time * drive.omega - phase) / _TWO_PI * period
-            if ticks > t - _MARGIN and ticks < limit + _MARGIN:
-                before, behind = int(ticks) - _MARGIN, int(ticks) + 1 + _MARGIN
-                if before > t:
-                    limit = min(limit, before)
-                elif behind > t:
-                    limit = min(limit, behind)
-        return limit
-
-    return implementation
+    limited = _limited(jumps, tuple(drive.fields))
+    return lambda drive, phase, period, t, limit: limited(drive, phase, period, t, limit)
