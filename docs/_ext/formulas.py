@@ -12,12 +12,14 @@ from typing import Any
 __all__ = ["displayed", "setup", "to_latex"]
 
 _GREEK = set(
-    "alpha beta gamma delta chi kappa lambda mu nu omega phi pi rho sigma tau xi zeta Lambda Omega Phi".split()
+    "alpha beta gamma delta chi kappa lambda mu nu omega phi pi rho sigma tau theta xi zeta "
+    "Lambda Omega Phi Theta".split()
 )
 _FUNCTIONS = {"sin", "cos", "exp", "ln", "max", "arccos"}
-_WORDS = {"integral of": r"\int ", "sum_j": r"\sum_j ", "sum": r"\sum ", "for": r"\text{ for }"}
+_WORDS = {"integral of": r"\int ", "integral": r"\int ", "sum": r"\sum ", "for": r"\text{ for }"}
 _TOKEN = re.compile(
-    r"integral of|sum_j|sum\b|sqrt\(|\^\(|\^[0-9.]+|\^[A-Za-z0-9]|[A-Za-z]+[0-9]*(?:_[A-Za-z0-9]+)?'*|\s{2,}|."
+    r"integral of|integral\b|sum_[a-z]\b|sum\b|sqrt\(|\^\(|\^[0-9]+(?:\.[0-9]+)?|\^[A-Za-z0-9]|"
+    r"[A-Za-z]+[0-9]*(?:_[A-Za-z0-9]+)?'*|\s{2,}|."
 )
 
 
@@ -36,6 +38,8 @@ def to_latex(text: str) -> str:
             at = end + 1
         elif token.startswith("^"):
             found.append(f"^{{{token[1:]}}}")
+        elif token.startswith("sum_"):
+            found.append(rf"\sum_{token[-1]} ")
         elif token in _WORDS:
             found.append(_WORDS[token])
         elif token[0].isalpha():

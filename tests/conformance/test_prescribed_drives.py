@@ -215,4 +215,5 @@ def test_one_kind_of_drive_tells_its_jumps_and_the_others_none() -> None:
     begun = (("t2_phase", "t2_omega"),)
     assert jumps_of(type(shock)) == [Jump("duration", ())]
     assert jumps_of(type(SINE + shock)) == [Jump("t2_duration", begun)]
+    assert jumps_of(sb.Chirp) == [Jump("duration", ())]
     assert jumps_of(type(SINE)) == [] and jumps_of(type(SINE + SINE)) == []

@@ -45,6 +45,8 @@ def test_every_displayed_formula_can_be_set():
         ("v'''' + Lambda v''", r"v'''' + \Lambda  v''"),
         ("nu_1^2", r"\nu_{1}^{2}"),
         ("rho S (delta_ij + c_ij)", r"\rho  S (\delta_{ij} + c_{ij})"),
+        ("k_c d^(3/2) = k_l d^2.", r"k_{c} d^{3/2} = k_{l} d^{2}."),
+        ("sum_i theta_i - integral(phi)", r"\sum_i \theta_{i} - \int (\phi)"),
     ],
 )  # fmt: skip
 def test_plain_text_becomes_latex(plain, latex):

@@ -135,13 +135,7 @@ class Config:
 
     @cached_property
     def system(self) -> System:
-        """The system; what is not given is the paper's.
-
-        Raises
-        ------
-        InputError
-            For values that do not go together.
-        """
+        """The system; what is not given is the paper's.  Refused (InputError) if values do not go together."""
         sections: dict[str, Any] = {
             name: values | self.section(name) for name, values in self._defaults().items()
         }

@@ -15,6 +15,13 @@ class _Room(ModuleType):
         return design(*args, **options)
 
     @property
+    def __doc__(self) -> str | None:  # type: ignore[override]
+        """What the function does: the words above are for who reads this file."""
+        from snapbeam.design.optimum.design import design
+
+        return design.__doc__
+
+    @property
     def __signature__(self) -> Signature:
         from snapbeam.design.optimum.design import design
 

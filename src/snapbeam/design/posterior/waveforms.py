@@ -118,13 +118,7 @@ class Waveform:
 
     @cached_property
     def horizon(self) -> float:
-        """Up to when it counts, s.
-
-        Raises
-        ------
-        InputError
-            If that is before its second sample.
-        """
+        """Up to when it counts, s.  Refused (InputError) if that is before its second sample."""
         cycles = int(np.ceil(np.asarray(self.time)[-1] / self.period - 1e-9)) or 1
         with _untold():
             change = conditioning(self.system, cycles)

@@ -45,6 +45,7 @@ class Allocation:
     Raises
     ------
     InputError
+        For values out of range, and names of outcomes or intervals that there are not.
     """
 
     half_width: float | None = 0.05

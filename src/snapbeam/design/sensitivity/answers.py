@@ -162,7 +162,7 @@ class NotchOf:
     """
 
     over: str = "frequency_ratio"
-    values: ArrayLike = tuple(np.linspace(1.0, 1.8, 9))
+    values: ArrayLike = tuple(np.linspace(1.0, 1.8, 9).tolist())
     threshold: ThresholdOf = field(default_factory=ThresholdOf)
     depth: bool = False
 

@@ -364,10 +364,7 @@ class ReducedModel(Wells):
     def reference_freq(self) -> float:
         """Frequency that normalises the excitation, Hz: the first natural one unless one was given.
 
-        Raises
-        ------
-        InputError
-            If that frequency is 0 (a free mass, or a beam at its critical load) and none was given.
+        Refused (InputError) if that frequency is 0, of a free mass or a beam at its critical load, and none was given.
         """
         if self.given_reference_freq is not None:
             return self.given_reference_freq

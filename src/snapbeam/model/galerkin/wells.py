@@ -149,11 +149,7 @@ class Wells:
         Every equilibrium lies along an eigenvector of K0 with an eigenvalue kappa < 0, at the energy
         -kappa^2/(4 gamma), or at 0.  The wells belong to the lowest eigenvalue and the lowest saddle
         to the second, E I k_2^2 - P, if it is negative; otherwise it is the straight state, at 0.
-
-        Raises
-        ------
-        InputError
-            If the structure has no second well.
+        Refused (InputError) if the structure has no second well.
         """
         self.require_bistable("barrier_energy")
         if self.landscape is not None and self.landscape.saddle is not None:

@@ -200,9 +200,9 @@ class Piezo(Harvester):
 class Coil(Harvester):
     """A magnet on the beam and a coil on the frame, on a load resistor,
 
-        L_c i' = K w'(x_c) - (R + R_c) i,     a force -K i on the beam at x_c,
+        L_c i' = K w'(x_c) - (R + R_c) i,     f_c = -K i,
 
-    w' in the frame of the ends.  The magnet's mass is left out.
+    w' in the frame of the ends and f_c the force on the beam at x_c.  The magnet's mass is left out.
 
     Parameters
     ----------
