@@ -101,6 +101,7 @@ def design_problem(
     Raises
     ------
     InputError
+        For variables, goals and limits that cannot be, and a spread in which nothing differs.
     """
     trials = trials_of(system, spread, integration, store=store, early=_early(goals, limits))
     return problem_of(trials, variables, goals, limits, draws)

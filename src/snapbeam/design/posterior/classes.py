@@ -73,6 +73,7 @@ def class_likelihood(
     Raises
     ------
     InputError
+        For bad input, a spread that draws a parameter of the posterior, and dots without a class.
     """
     integer("runs", runs, 2, 10**6)
     shared = sorted(set(posterior.parameters) & set(spread.of))

@@ -185,6 +185,7 @@ def posterior(
     Raises
     ------
     InputError
+        For values out of range, nothing measured, and parameters that cannot be sought.
 
     Notes
     -----

@@ -55,8 +55,8 @@ class TrackingSettings:
         "bright" or "dark" against the background, or "auto": unlike the rows beyond the beam.
     threshold
         Grey level for binarising; Otsu's from the sample unless given.
-    background
-        A picture of the scene without beam and shaker, shape (height, width), to subtract.
+    background : array of shape (height, width), optional
+        A picture of the scene without beam and shaker, to subtract.
     gamma
         Exponent of grey level over light, to be undone; 1 for a linear camera.
     shaker, marker
