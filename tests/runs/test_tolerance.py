@@ -12,8 +12,9 @@ import snapbeam as sb
 from snapbeam import paper
 from snapbeam.engines.assemble import make_ensemble, plans_of
 from snapbeam.engines.cpu import driver as cpu_engine
+from snapbeam.engines.scalar.tip import tip_motion
 from snapbeam.runs.samples import joined
-from snapbeam.runs.tolerance import PERTURBATION
+from snapbeam.runs.tolerance import PERTURBATION, _perturbed
 
 CONTACT = sb.HertzContact(stiffness=4e8)
 CYCLES = 4
@@ -154,3 +155,69 @@ def test_tolerance_excludes_a_step(given: dict) -> None:
 def test_refuses_tolerances_out_of_range(tolerance) -> None:
     with pytest.raises(sb.InputError, match="tolerance"):
         sb.simulate(model_of(1), shaker_at(1.21, 0.18), CONTACT, 1, tolerance=tolerance)
+
+
+MOTIONS: dict[str, sb.Drive] = {
+    "sine": sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2, phase=0.4),
+    "by its displacement": sb.DisplacementSine(frequency_ratio=1.2, displacement_amplitude=0.2),
+    "two sines": sb.TwoSines(
+        frequency_ratio=1.2, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.1
+    ),
+    "burst": sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.2, length=3.0, retreat=0.1),
+    "chirp": sb.Chirp(start_ratio=0.8, stop_ratio=1.5, velocity_amplitude=0.2, sweep_length=5.0),
+    "shock": sb.HalfSine(displacement_amplitude=0.3, duration=0.5),
+    "noise": sb.Noise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
+    "flight": sb.Flight(speed=0.1),
+    "sum": sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2, phase=0.4)
+    + sb.HalfSine(displacement_amplitude=0.3, duration=0.5),
+}
+
+
+def moved(system: sb.System, size: float | None, times: np.ndarray) -> np.ndarray:
+    """Displacements of the tip, its drive changed by a relative *size*."""
+    ensemble = make_ensemble(system, sb.Integration(cycles=1))
+    ensemble = ensemble if size is None else _perturbed(ensemble, size)
+    numbers = ensemble.drive.numbers_type()(*map(float, ensemble.drive_numbers[0]))
+    phase, omega = float(ensemble.runs["phase"][0]), numbers.omega
+    return np.array([tip_motion(numbers, ensemble.samples, phase + omega * t)[0] for t in times])
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+@pytest.mark.parametrize("beside", [False, True])
+def test_every_motion_is_changed(name: str, beside: bool) -> None:
+    """What a run makes of a change of its drive is asked of every drive, alone and beside others; some stood still."""
+    base = sb.Base(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1))
+    striker = sb.Striker(drive=MOTIONS[name], gap=0.0)
+    system = sb.System(model_of(1), CONTACT, striker, base=base if beside else None)
+    times = np.linspace(0.0, 0.012, 25)
+    before, after = moved(system, None, times), moved(system, 0.5, times)
+    assert np.ptp(before) > 0.0
+    np.testing.assert_allclose(after, 1.5 * before, rtol=1e-12, atol=1e-18)
+
+
+def test_all_that_drives_is_changed() -> None:
+    """A base under a stop, a load, a second striker: the numbers of each."""
+    stop = sb.Striker(drive=sb.Still(), gap=1e-4)
+    around = {
+        "base": sb.Base(motion=MOTIONS["chirp"]),
+        "axial": sb.AxialLoad(motion=sb.LoadRamp(change=2.0, duration=3.0)),
+    }
+    second = sb.Striker(drive=MOTIONS["noise"], location=0.3, gap=1e-4)
+    ensemble = make_ensemble(
+        sb.System(model_of(1), CONTACT, [stop, second], **around), sb.Integration(cycles=1)
+    )
+    names, changed = ensemble.drive.number_names, _perturbed(ensemble, 0.5)
+    told = {
+        name
+        for name, a, b in zip(names, ensemble.drive_numbers[0], changed.drive_numbers[0], strict=True)
+        if a != b
+    }
+    assert told == {"tip1_strength", "base_speed", "load_change"}
+    np.testing.assert_array_equal(changed.starts, ensemble.starts)
+
+
+def test_what_drives_nothing_changes_the_start() -> None:
+    stop = sb.Striker(drive=sb.Still(), gap=1e-4)
+    start = sb.State(amplitude=[-1e-4])
+    ensemble = make_ensemble(sb.System(model_of(1), CONTACT, stop, start), sb.Integration(cycles=1))
+    np.testing.assert_array_equal(_perturbed(ensemble, 0.5).starts, 1.5 * ensemble.starts)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.provenance import made_by
-from snapbeam.core.validate import choice, positive
+from snapbeam.core.validate import InputError, choice, positive
 from snapbeam.engines.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.plan import Plan
@@ -99,7 +99,7 @@ def conditioning(
     accuracy : {"map", "reference"}
         Steps of the two runs compared.
     perturbation : float
-        Relative change of the striker's amplitude, or of the start if there is no striker.
+        Relative change of every motion that drives the system, or of the start if nothing does.
 
     Returns
     -------
@@ -197,11 +197,17 @@ def _instants(system: System, ensemble: Ensemble) -> _Array:
 
 
 def _perturbed(ensemble: Ensemble, size: float) -> Ensemble:
-    """The same run with its drive, or its start if nothing drives it, changed by a relative *size*."""
+    """The same run with all that drives it, or its start if nothing does, changed by a relative *size*."""
     factor, numbers = 1.0 + size, ensemble.drive_numbers.copy()
-    driven = bool((ensemble.runs["tip_speed"] != 0.0).any())
-    if "amplitude" in ensemble.drive.number_names:
-        numbers[:, ensemble.drive.number_names.index("amplitude")] *= factor
+    names = ensemble.drive.number_names
+    scaled = [names.index(name) for name in ensemble.drive.amplitudes if name in names]
+    numbers[:, scaled] *= factor
+    driven = bool(numbers[:, scaled].any() or ensemble.samples.any())
+    if not driven and (ensemble.runs["tip_speed"] != 0.0).any():
+        raise InputError(
+            f"the drive {ensemble.drive.name!r}: names no number in its amplitudes that its motion is proportional to, "
+            "so that nothing can be said of how a run responds to a change of it"
+        )
     starts = ensemble.starts if driven else ensemble.starts * factor
     return replace(ensemble, drive_numbers=numbers, starts=starts, samples=ensemble.samples * factor)
 

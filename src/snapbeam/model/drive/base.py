@@ -59,6 +59,8 @@ class Drive:
     """What moves, by name, of several motions that are marched as one: :mod:`snapbeam.model.drive.joined`."""
     terms: ClassVar[tuple[type[Drive], ...]] = ()
     """The kinds that it is a sum of."""
+    amplitudes: ClassVar[tuple[str, ...]] = ("amplitude",)
+    """Numbers that the motion is proportional to, all together."""
     edges: ClassVar[tuple[str, ...]] = ()
     """Numbers that are times at which the velocity jumps, s since the drive began: steps end there."""
     registry: ClassVar[dict[str, type[Drive]]] = DRIVES

@@ -66,6 +66,7 @@ class Burst(Timed):
 
     name = "burst"
     number_names = ("omega", "fastest", "rate", "amplitude", "length", "rise", "fall", "retreat")
+    amplitudes = ("amplitude", "retreat")
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -52,6 +52,7 @@ class Chirp(Timed):
 
     name = "chirp"
     number_names = ("omega", "fastest", "first", "last", "speed", "duration", "logarithmic")
+    amplitudes = ("speed",)
     edges = ("duration",)
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:

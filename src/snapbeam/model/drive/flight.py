@@ -38,6 +38,7 @@ class Flight(Timed):
 
     name = "flight"
     number_names = ("omega", "fastest", "speed")
+    amplitudes = ("speed",)
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A period of the first mode."""

@@ -65,6 +65,7 @@ def _made(name: str, named: list[tuple[str, type[Drive]]]) -> type[Joined]:
         "alone": alone,
         "repeats": alone and named[0][1].repeats,
         "number_names": tuple(numbers),
+        "amplitudes": tuple(f"{part}_{each}" for part, kind in named for each in kind.amplitudes),
     }
     return type(name, (Joined,), body)
 

@@ -77,6 +77,7 @@ class Noise(Timed):
 
     name = "noise"
     number_names = ("omega", "fastest", "low", "high", "strength", "rise", "seed")
+    amplitudes = ("strength",)
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -47,6 +47,7 @@ class Recorded(Drive):
 
     name = "recorded"
     number_names = ("omega", "table", "samples", "interval")
+    amplitudes = ()
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -189,6 +189,9 @@ def _made(name: str, kinds: tuple[type[Drive], ...]) -> type[Sum]:
         "__doc__": f"The sum of {', '.join(kind.name for kind in kinds)}.",
         "terms": kinds,
         "number_names": tuple(numbers),
+        "amplitudes": tuple(
+            f"t{i}_{each}" for i, kind in enumerate(kinds, 1) for each in (*kind.amplitudes, "start")
+        ),
     }
     found: Any = dataclasses.make_dataclass(
         name, fields, bases=(Sum,), namespace=body, frozen=True, kw_only=True

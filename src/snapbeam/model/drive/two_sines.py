@@ -69,6 +69,7 @@ class TwoSines(Timed):
         "second_amplitude",
         "second_phase",
     )
+    amplitudes = ("amplitude", "second_amplitude")
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """One period of the first."""

@@ -110,6 +110,7 @@ class LoadRamp(LoadMotion, Timed):
     )  # fmt: skip
     name = "ramp"
     number_names = ("omega", "fastest", "change", "duration", "hold")
+    amplitudes = ("change",)
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A period of the first mode."""
