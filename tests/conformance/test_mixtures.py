@@ -216,3 +216,18 @@ def test_a_mixture(seed: int, modes: int) -> None:
     assert found["map"] < 1e-3 * allowed, mixed.words
     assert found["reference"] < 1e-7 * allowed, mixed.words
     assert found["ledger"] < 1e-4, mixed.words
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_a_request_for_a_mixture(seed: int) -> None:
+    """What is asked of the displacements is kept, up to the horizon that is told."""
+    mixed, cycles, wanted = mixture(seed, 3), 2, 1e-5
+    end = float(sb.simulate(mixed.system, sb.Integration(cycles=cycles)).dataset.time.values[-1])
+    times = np.linspace(0.0, end, 201) * (1.0 - 1e-9)
+    truth = solve(mixed.beam, mixed.tips, mixed.around, times)
+    run = sb.simulate(mixed.system, sb.Integration(cycles=cycles, tolerance=wanted), sample_times=times)
+    assert run.accuracy is not None and run.accuracy.reached and run.accuracy.conditioning > 0.0
+    within = times <= run.accuracy.horizon
+    for name, values in (("displacement", truth[:, 0]), ("center_displacement", truth[:, 1])):
+        assert np.abs(run.dataset[name].values - values)[within].max() < wanted
