@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,3 +130,15 @@ def follow(beam: PaperBeam, tip: Tip, times: Array, rtol: float = 1e-11) -> Foll
 
 def _above(pair: tuple[float, float]) -> tuple[float, float]:
     return max(pair[0], 0.0), pair[1]
+
+
+def differences(data: Any, truth: Followed) -> dict[str, float]:
+    """Greatest differences of a run's dataset, over b, by name."""
+    names = ("displacement", "center_displacement", "penetration")
+    return {name: float(np.abs(data[name].values - getattr(truth, name)).max()) for name in names}
+
+
+def missing(data: Any) -> float:
+    """What the ledger of a run with one striker misses at its worst, over the gross work."""
+    ledger = data.energy_beam + data.energy_contact + data.energy_dissipated - data.work_shaker
+    return float(np.ptp(ledger.values)) / float(data.attrs["gross_work"])
