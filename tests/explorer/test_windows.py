@@ -105,3 +105,26 @@ def test_the_papers_beam_is_mapped_while_one_looks(tab, serve, folder):
     page.wait(lambda: any(words in page.state() for words in finer), "the coarsest level")
     page.click(1.2, 0.3)
     page.wait(lambda: "crossings" in page.head() and "bit for bit" in page.notes(), "a run")
+
+
+def test_what_each_of_two_strikers_does_is_shown_and_kept(one_mode, jobs) -> None:
+    """A map to be computed offers it, a window has it with unit and words, after what all of them do together."""
+    from snapbeam.explorer.cards.take import window_dataset
+    from snapbeam.explorer.maps.layers import layers_of
+    from snapbeam.explorer.maps.source import SystemSource
+
+    stop = sb.Striker(drive=sb.Still(), location=0.3, side="above", gap=2e-5)
+    two = sb.System(one_mode.model, one_mode.contact, [one_mode.striker, stop])
+    axes = {NAMES[0]: np.linspace(0.9, 1.4, 3), NAMES[1]: np.linspace(0.1, 0.4, 3)}
+    offered = SystemSource(two, axes, sb.Integration(cycles=4), "two").variables()
+    assert {"peak_force_striker_1", "peak_force_striker_2"} <= set(offered)
+    assert not any(
+        "_striker_" in name for name in SystemSource(one_mode, axes, sb.Integration(), "one").variables()
+    )
+    window = compute(_window(two, (30, 30), 10), jobs, Token(), lambda _: None)
+    found = window_dataset(window)
+    assert found.peak_force_striker_2.attrs == {"units": "N", "long_name": "peak contact force, striker 2"}
+    order = list(layers_of(found))
+    assert order[0] == "response"
+    at = order.index("peak_force")
+    assert order[at : at + 3] == ["peak_force", "peak_force_striker_1", "peak_force_striker_2"]

@@ -82,7 +82,7 @@ def demand(found, within: float, cover: float) -> None:
     assert (found[:, 2:] > 0.97).mean(axis=0).min() > 0.18
 
 
-@pytest.mark.parametrize(("law", "draws"), [pytest.param(one_well, 100, marks=pytest.mark.slow), (chirp, 20)])
+@pytest.mark.parametrize(("law", "draws"), [pytest.param(one_well, 100, marks=pytest.mark.slow), (chirp, 50)])
 def test_a_hundred_noisy_decays(law, draws):
     demand(scores(law(0.12), draws), 0.97, 0.90)
 

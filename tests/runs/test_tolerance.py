@@ -221,3 +221,12 @@ def test_what_drives_nothing_changes_the_start() -> None:
     start = sb.State(amplitude=[-1e-4])
     ensemble = make_ensemble(sb.System(model_of(1), CONTACT, stop, start), sb.Integration(cycles=1))
     np.testing.assert_array_equal(_perturbed(ensemble, 0.5).starts, 1.5 * ensemble.starts)
+
+
+def test_a_drive_that_does_not_say_what_it_scales_with_is_refused(monkeypatch) -> None:
+    """Nothing would be changed, and the response would be said to be 0."""
+    system = sb.System(model_of(1), CONTACT, sb.Striker(drive=MOTIONS["shock"], gap=0.0))
+    ensemble = make_ensemble(system, sb.Integration(cycles=1))
+    monkeypatch.setattr(sb.HalfSine, "amplitudes", ())
+    with pytest.raises(sb.InputError, match="'half_sine': names no number in its amplitudes"):
+        _perturbed(ensemble, 0.5)
