@@ -122,9 +122,7 @@ def test_lists_and_thresholds() -> None:
     points = xr.Dataset({"beam_thickness": ("point", [4e-4, 4.1e-4]), "location": ("point", [0.4, 0.5])})
     check(sb.sweep(SYSTEM, points, ASKED))
     check(
-        sb.threshold(
-            SYSTEM, "velocity_amplitude", np.linspace(0.1, 0.6, 6), {"location": [0.4, 0.5]}, ASKED, share=1.0
-        )
+        sb.threshold(SYSTEM, "velocity_amplitude", np.linspace(0.1, 0.6, 6), {"location": [0.4, 0.5]}, ASKED)
     )
     check(sb.sweep(SYSTEM, {"frequency_ratio": [1.0, 1.1, 1.3]}, ASKED, refine_levels=1))
 

@@ -1,4 +1,4 @@
-"""Threshold curves against full maps: what is promised, what is missed, what is saved."""
+"""Threshold bands: exact on the grid, failed runs unknown, columns without an answer marked as such."""
 
 from __future__ import annotations
 
@@ -7,157 +7,128 @@ import itertools
 import numpy as np
 import pytest
 import xarray as xr
+from threshold_grids import AMPLITUDE, SYSTEM, stand_in, thresholds_of
 from typer.testing import CliRunner
 
 import snapbeam as sb
 from snapbeam.cli import app
 from snapbeam.core.validate import InputError
-from snapbeam.model.paper_values import BEAM, CONTACT
-from snapbeam.sweeps.search import Responses, search_everything_below, search_fast
+from snapbeam.model.paper_values import BEAM
+
+RUNNER = CliRunner()
 
 
-def samples_of(classes):
-    asked = []
-
-    def ask(columns, rows):
-        asked.extend(zip(columns.tolist(), rows.tolist(), strict=True))
-        return classes[columns, rows]
-
-    samples = Responses(*classes.shape, ask)
-    return samples, asked
-
-
-def bands(columns=48, rows=128, seed=0):
-    """Classes with a wavy threshold, holes above it and isolated interwell points below it."""
-    rng = np.random.default_rng(seed)
-    x = np.linspace(0.0, 4.0, columns)
-    level = 35.0 + 14.0 * np.sin(2.3 * x) - 18.0 * np.exp(-(((x - 1.2) / 0.2) ** 2))
-    height = np.arange(rows) - level[:, None]
-    interwell = height >= 0.0
-    interwell &= ~((height < 8.0) & (rng.random(height.shape) < 0.3))
-    interwell |= (height < 0.0) & (height > -3.0) & (rng.random(height.shape) < 0.2)
-    return np.where(interwell, 2, 0).astype(np.int8)
+def brute_force(full: xr.Dataset, along: str) -> tuple[np.ndarray, np.ndarray]:
+    """Both curves of a full map, column by column in plain Python."""
+    values = full[along].values
+    table = full["response"].transpose(..., along).values
+    curves = np.full((2, *table.shape[:-1]), np.nan)
+    for at in np.ndindex(table.shape[:-1]):
+        column = [kind > 0 for kind in table[at]]
+        for row in reversed(range(len(column))):
+            if column[row]:
+                curves[(0, *at)] = values[row]
+                if all(column[row:]):
+                    curves[(1, *at)] = values[row]
+    return curves[0], curves[1]
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_fast_search_of_drawn_maps(seed):
-    classes = bands(seed=seed)
-    samples, asked = samples_of(classes)
-    search_fast(samples, classes.size // 10)
-    assert len(asked) == len(set(asked)) == samples.runs <= classes.size // 10
-    true = np.where((classes > 0).any(axis=1), (classes > 0).argmax(axis=1), classes.shape[1])
-    error = samples.first() - true
-    assert (error >= 0).all()
-    assert np.mean(error <= 1) >= 0.9
+@pytest.mark.parametrize(
+    ("along", "values", "over", "modes", "cycles"),
+    [
+        # a coarse grid: 12 columns of 10 amplitudes
+        ("velocity_amplitude", np.linspace(0.02, 0.6, 10), {"frequency_ratio": np.linspace(0.8, 1.6, 12)}, 2, 20),
+        # the grid of docs/sweeps.md: two axes beside the one that is raised, one of few points
+        (
+            "velocity_amplitude",
+            np.linspace(0.02, 0.6, 30),
+            {"striker.gap": [0.0, 5e-5], "frequency_ratio": np.linspace(0.8, 2.0, 7)},
+            2,
+            12,
+        ),
+        ("frequency_ratio", np.linspace(0.2, 3.0, 14), {"location": [0.3, 0.47]}, 1, 12),
+        ("location", np.linspace(0.2, 0.5, 9), {"frequency_ratio": [0.9, 1.3, 1.8]}, 3, 12),
+        ("striker.gap", np.linspace(-5e-5, 1e-4, 7), {"model.damping_ratio": [0.002, 0.01]}, 1, 12),
+        ("velocity_amplitude", [0.1, 0.3, 0.5], {"frequency_ratio": np.linspace(0.8, 1.6, 5)}, 1, 12),
+    ],
+    ids=["coarse", "documentation", "along frequency", "along location", "along gap", "three values"],
+)  # fmt: skip
+def test_thresholds_are_those_of_the_full_map(along, values, over, modes, cycles):
+    system = SYSTEM.replace(**{"model.modes": modes})
+    asked = sb.Integration(cycles=cycles, early_decision=True)
+    full = sb.sweep(system, {**over, along: values}, asked)
+    found = sb.threshold(system, along, values, over, sb.Integration(cycles=cycles))
+    short = found.attrs["along"]
+    first, always = brute_force(full, short)
+    np.testing.assert_array_equal(found["first_interwell"], first)
+    np.testing.assert_array_equal(found["always_interwell"], always)
+    np.testing.assert_array_equal(found["first_interwell_min"], first)
+    np.testing.assert_array_equal(found["always_interwell_max"], always)
+    np.testing.assert_array_equal(found["response"], full["response"].transpose(*found["response"].dims))
+    assert found.attrs["runs"] == full["response"].size and not found["failed_runs"].any()
+    assert set(np.unique(found["outcome"])) <= {0, 1, 2, 3}
+    np.testing.assert_array_equal(found["outcome"] == 1, np.isnan(first))
+    assert np.isfinite(first).any()
 
 
-@pytest.mark.parametrize("share", [0.005, 0.02, 0.05])
-def test_fast_search_never_spends_more(share):
-    classes = bands()
-    samples, asked = samples_of(classes)
-    budget = int(share * classes.size)
-    search_fast(samples, budget)
-    assert len(asked) <= budget
+KINDS = [
+    # column, outcome, first, always, first_min, always_max, last intrawell
+    ("iiXXX", "band_found", 0.3, 0.3, 0.3, 0.3, 0.2),
+    ("iXiXX", "band_found", 0.2, 0.4, 0.2, 0.4, 0.1),
+    ("iiiii", "no_interwell_in_range", np.nan, np.nan, np.nan, np.nan, 0.5),
+    ("XiXXX", "lowest_value_is_interwell", 0.1, 0.3, 0.1, 0.3, np.nan),
+    ("iXXXi", "highest_run_is_intrawell", 0.2, np.nan, 0.2, np.nan, 0.1),
+    ("i?XXX", "band_found", 0.3, 0.3, 0.2, 0.3, 0.1),
+    ("?iXXX", "band_found", 0.3, 0.3, 0.1, 0.3, 0.2),
+    ("iX?XX", "band_found", 0.2, 0.2, 0.2, 0.4, 0.1),
+    ("iiXX?", "band_found", 0.3, 0.3, 0.3, np.nan, 0.2),
+    ("iii?i", "undecided", np.nan, np.nan, 0.4, np.nan, 0.5),
+    ("?????", "not_searched", np.nan, np.nan, 0.1, np.nan, np.nan),
+]
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_exhaustive_search_misses_nothing_below(seed):
-    classes = bands(seed=seed)
-    samples, asked = samples_of(classes)
-    search_everything_below(samples, 8, 16)
-    true = (classes > 0).argmax(axis=1)
-    np.testing.assert_array_equal(samples.first(), true)
-    assert all(samples.known[column, : row + 1].all() for column, row in enumerate(true))
-    assert len(asked) < 0.7 * classes.size
+def test_what_failed_runs_leave_open(monkeypatch):
+    found = thresholds_of(monkeypatch, " ".join(row[0] for row in KINDS))
+    names = "first_interwell always_interwell first_interwell_min always_interwell_max last_intrawell".split()
+    for name, expected in zip(names, np.array([row[2:] for row in KINDS]).T, strict=True):
+        np.testing.assert_array_equal(found[name], expected, err_msg=name)
+    flags = found["outcome"].attrs["flag_meanings"].split()
+    assert [flags[code] for code in found["outcome"].values] == [row[1] for row in KINDS]
+    assert found["failed_runs"].values.tolist() == [row[0].count("?") for row in KINDS]
+    np.testing.assert_array_equal(found["status"] == sb.RunStatus.NOT_FINITE, found["response"] < 0)
 
 
-def test_columns_without_a_boundary():
-    classes = np.zeros((6, 40), dtype=np.int8)
-    classes[1] = 2
-    classes[2, 17:] = 3
-    classes[4, 39] = 1
-    for search in (lambda s: search_fast(s, 200), lambda s: search_everything_below(s, 5, 5)):
-        samples, _ = samples_of(classes)
-        search(samples)
-        assert samples.first().tolist() == [40, 0, 17, 40, 39, 40]
-        assert samples.top().tolist() == [40, 0, 17, 40, 39, 40]
-
-
-AXES = {"frequency_ratio": np.linspace(0.3, 3.5, 20), "velocity_amplitude": np.linspace(0.005, 0.64, 128)}
-
-
-def compare(model, cycles, axes, minimum):
-    """Both searches beside the full map: agreement, misses, savings."""
-    full = sb.response_map(model, CONTACT, cycles=cycles, early_decision=True, **axes)
-    interwell = (full["response"] > 0).transpose(..., "velocity_amplitude").values
-    amplitude = axes["velocity_amplitude"]
-    true = np.where(interwell.any(axis=1), amplitude[interwell.argmax(axis=1)], np.nan)
-    resolution = float(np.diff(amplitude).max()) * (1.0 + 1e-9)
-    fast = sb.threshold_curve(model, CONTACT, cycles=cycles, **axes)
-    slow = sb.threshold_curve(model, CONTACT, cycles=cycles, search="exhaustive", **axes)
-    np.testing.assert_array_equal(slow["first_interwell"], true)
-    assert fast.attrs["runs"] <= 0.1 * interwell.size == 0.1 * fast.attrs["runs_of_full_map"]
-    missed = ~(np.isclose(fast["first_interwell"], true, rtol=0.0, atol=resolution, equal_nan=True))
-    print(
-        f"N = {model.modes}, {cycles} cycles, {missed.size} columns: fast agrees in "
-        f"{100.0 * (1.0 - missed.mean()):.0f} % ({int(missed.sum())} missed) with "
-        f"{100.0 * fast.attrs['runs'] / interwell.size:.1f} % of the runs; exhaustive in 100 % with "
-        f"{100.0 * slow.attrs['runs'] / interwell.size:.1f} %"
+def test_runs_of_an_engine_that_fail():
+    """A start far outside the finite range fails; it is neither intrawell nor interwell."""
+    asked = sb.Integration(cycles=12)
+    far = {"start.amplitude[1]": [-1.0, 1e103]}
+    found = sb.threshold(SYSTEM, "velocity_amplitude", AMPLITUDE, far, asked)
+    assert found["outcome"].values.tolist() == [0, 5]
+    assert found["failed_runs"].values.tolist() == [0, 5]
+    assert (found["status"][1] == sb.RunStatus.NOT_FINITE).all() and (found["response"][1] == -1).all()
+    found = sb.threshold(
+        SYSTEM, "start.amplitude[1]", [-1.1, -0.9, 1e103], {"velocity_amplitude": [0.1, 0.3]}, asked
     )
-    assert missed.mean() <= 1.0 - minimum
-    for curve in (fast, slow):
-        known = curve["computed"].transpose(..., "velocity_amplitude").values
-        found = curve["response"].transpose(..., "velocity_amplitude").values
-        np.testing.assert_array_equal(
-            found[known], full["response"].transpose(..., "velocity_amplitude").values[known]
-        )
-        assert (found[~known] == -1).all()
-        above = (curve["velocity_amplitude"] >= curve["always_interwell"]).transpose(
-            ..., "velocity_amplitude"
-        )
-        assert (found[known & above.values] > 0).all()
-    return fast, slow
-
-
-def test_one_mode_against_the_full_map():
-    fast, _ = compare(sb.ReducedModel.from_beam(BEAM, modes=1), 10, AXES, 0.9)
-    assert fast.attrs["search"] == "fast" and "isolated interwell points below" in fast.attrs["may_miss"]
-    assert set(np.unique(fast["outcome"])) <= {0, 1, 2, 3}
-    assert (fast["last_intrawell"] < fast["first_interwell"]).all()
-
-
-def test_along_location():
-    axes = {"location": np.linspace(0.1, 0.5, 12), "frequency_ratio": 0.8}
-    compare(
-        sb.ReducedModel.from_beam(BEAM, modes=2),
-        6,
-        axes | {"velocity_amplitude": AXES["velocity_amplitude"]},
-        0.75,
-    )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("modes", [1, 32])
-def test_two_hundred_cycles_against_the_full_map(modes):
-    axes = {
-        "frequency_ratio": np.linspace(0.13, 3.97, 40),
-        "velocity_amplitude": np.linspace(0.005, 0.64, 128),
-    }
-    compare(sb.ReducedModel.from_beam(BEAM, modes=modes), 200, axes, 0.9)
+    assert found["outcome"].values.tolist() == [4, 2]
+    np.testing.assert_array_equal(found["first_interwell"], [np.nan, -1.1])
+    np.testing.assert_array_equal(found["first_interwell_min"], [1e103, -1.1])
+    np.testing.assert_array_equal(found["always_interwell"], [np.nan, -1.1])
+    np.testing.assert_array_equal(found["always_interwell_max"], [np.nan, np.nan])
 
 
 def test_several_numbers_of_modes(contact):
     models = [sb.ReducedModel.from_beam(BEAM, modes=n) for n in (1, 2)]
-    axes = {"frequency_ratio": np.linspace(0.5, 1.5, 4), "velocity_amplitude": np.linspace(0.02, 0.6, 40)}
+    axes = {"frequency_ratio": np.linspace(0.5, 1.5, 4), "velocity_amplitude": np.linspace(0.02, 0.6, 8)}
     seen = []
     both = sb.threshold_curve(
-        models, contact, cycles=4, **axes, share=0.2, progress=lambda done, total: seen.append((done, total))
+        models, contact, cycles=4, **axes, progress=lambda done, total: seen.append((done, total))
     )
     assert both["first_interwell"].dims == ("modes", "frequency_ratio")
     assert both["modes"].values.tolist() == [1, 2]
     assert both["reference_freq"].values == pytest.approx([83.93, 83.93], abs=0.01)
+    assert both.attrs["runs"] == 64
     assert seen[-1] == (64, 64) and all(a[0] <= b[0] for a, b in itertools.pairwise(seen))
-    alone = sb.threshold_curve(models[1], contact, cycles=4, **axes, share=0.2)
+    alone = sb.threshold_curve(models[1], contact, cycles=4, **axes)
     np.testing.assert_array_equal(both["first_interwell"].sel(modes=2), alone["first_interwell"])
 
 
@@ -167,8 +138,6 @@ def test_what_is_refused(model, contact):
         ({"frequency_ratio": 1.0, "velocity_amplitude": amplitude}, "one of them must be an array"),
         ({"frequency_ratio": ratio, "velocity_amplitude": amplitude, "location": [0.3, 0.4]}, "not 2 arrays"),
         ({"frequency_ratio": ratio, "velocity_amplitude": 0.3}, "at least two amplitudes"),
-        ({"frequency_ratio": ratio, "velocity_amplitude": amplitude, "search": "best"}, "search = 'best'"),
-        ({"frequency_ratio": ratio, "velocity_amplitude": amplitude, "share": 0.0}, "share = 0.0"),
     ):
         with pytest.raises(InputError, match=message):
             sb.threshold_curve(model, contact, **arguments)
@@ -181,15 +150,50 @@ def test_what_is_refused(model, contact):
 def test_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     command = ["threshold", "--modes", "1,2", "--cycles", "3", "--frequency-ratio", "0.5:2:5"]
-    done = CliRunner().invoke(app, [*command, "--velocity-amplitude", "0.02:0.6:30", "--plot", "t.png"])
+    done = RUNNER.invoke(app, [*command, "--velocity-amplitude", "0.02:0.6:30", "--plot", "t.png"])
     assert done.exit_code == 0, done.output
-    assert "30 runs" in done.stdout and "10.0 % of a full map's 300" in done.stdout
-    assert (
-        "N = 2: lowest threshold V = " in done.stdout
-        and "It may miss isolated interwell points" in done.stdout
-    )
+    assert "300 runs in" in done.stdout and "N = 2: lowest threshold V = " in done.stdout
     curve = xr.load_dataset("threshold.nc", engine="h5netcdf")
-    assert curve["first_interwell"].shape == (2, 5) and curve.attrs["search"] == "fast"
+    assert curve["first_interwell"].shape == (2, 5) and curve.attrs["runs"] == 300
     assert (tmp_path / "t.png").stat().st_size > 10_000
-    refused = CliRunner().invoke(app, ["threshold", "--modes", "1,x"])
+    refused = RUNNER.invoke(app, ["threshold", "--modes", "1,x"])
     assert refused.exit_code == 2 and "whole numbers separated by commas, such as 1,32" in refused.stderr
+
+
+def test_command_on_a_coarse_grid(tmp_path, monkeypatch):
+    """The former default search ran one point a column here and called most columns not interwell."""
+    monkeypatch.chdir(tmp_path)
+    axes = ["--frequency-ratio", "0.8:1.6:12", "--velocity-amplitude", "0.02:0.6:10"]
+    done = RUNNER.invoke(app, ["threshold", "--modes", "2", "--cycles", "30", *axes])
+    assert done.exit_code == 0, done.output
+    curve = xr.load_dataset("threshold.nc", engine="h5netcdf")
+    full = sb.sweep(
+        SYSTEM.replace(**{"model.modes": 2}),
+        {"frequency_ratio": curve["frequency_ratio"].values, "velocity_amplitude": curve["velocity_amplitude"].values},
+        sb.Integration(cycles=30),
+    )  # fmt: skip
+    first, _ = brute_force(full, "velocity_amplitude")
+    np.testing.assert_array_equal(curve["first_interwell"], first)
+    assert np.isfinite(first).all(), "every column has interwell runs"
+    assert "no interwell response" not in done.stdout
+    assert f"lowest threshold V = {first.min():.4g} at Omega = " in done.stdout
+
+
+def test_command_counts_only_what_was_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    stand_in(monkeypatch, "iiXXX iXiXX iiiii iXXXi i?XXX iiXX? iii?i ?????")
+    axes = ["--frequency-ratio", "1:2:8", "--velocity-amplitude", "0.1:0.5:5"]
+    done = RUNNER.invoke(app, ["threshold", "--modes", "1", "--cycles", "1", *axes, "--plot", "t.png"])
+    assert done.exit_code == 0, done.output
+    for text in (
+        "lowest threshold V = 0.2 at Omega = 1.143; band 0.05 wide on average over 4 points, in steps of 0.1",
+        "no interwell response in range: extend the values of velocity_amplitude, at 1 of 8 points",
+        "undecided: no run is interwell, but runs failed, at 1 of 8 points",
+        "not searched: no run has a response class, at 1 of 8 points",
+        "highest run is intrawell, at 1 of 8 points",
+        "failed runs leave the threshold open, down to V = 0.2, at 1 of 8 points",
+        "failed runs leave the top of the band open, at 1 of 8 points",
+        "8 failed (NOT_FINITE)",
+    ):
+        assert text in " ".join(done.stdout.split()), text
+    assert (tmp_path / "t.png").stat().st_size > 10_000

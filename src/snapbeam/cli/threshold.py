@@ -21,7 +21,7 @@ from snapbeam.cli.common.parameter_options import (
     configured,
     with_parameters,
 )
-from snapbeam.cli.common.summary import coordinate_text
+from snapbeam.cli.common.summary import coordinate_text, status_lines
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +34,6 @@ _AXES = (
     "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
     "striker.location", "striker.location_m", "model.modes",
 )  # fmt: skip
-_SEARCH = "Search"
 _VALUES = "0.005:0.64:128"
 
 
@@ -43,20 +42,8 @@ _VALUES = "0.005:0.64:128"
 def threshold(
     given: Any,
     along: Annotated[
-        str, typer.Option(help="Parameter to raise (velocity_amplitude).", rich_help_panel=_SEARCH)
+        str, typer.Option(help="Parameter to raise (velocity_amplitude).", rich_help_panel="Threshold")
     ] = "velocity_amplitude",
-    search: Annotated[
-        str,
-        typer.Option(
-            help="fast: a tenth of a full map's runs, may miss isolated interwell points below the band; "
-            "exhaustive: finds the first interwell point of the grid.",
-            rich_help_panel=_SEARCH,
-            metavar="KIND",
-        ),
-    ] = "fast",
-    share: Annotated[
-        float | None, opt.number_option("Runs of the fast search over a full map's (0.1).", _SEARCH)
-    ] = None,
     output: Annotated[
         Path,
         typer.Option(
@@ -69,7 +56,7 @@ def threshold(
     """Find the threshold of the interwell response over frequency ratio, location or any parameters, as a band.
 
     The boundary is fractal in places, so two curves are written: the lowest amplitude that snaps the beam
-    through, and the one above which every run does.
+    through, and the one above which every run does.  Every point of the grid is run.
 
     Example: snapbeam threshold --modes 1,32 --frequency-ratio 0.1:4:64 --velocity-amplitude 0.005:0.64:128
     -o threshold.nc --plot threshold.png
@@ -92,18 +79,20 @@ def threshold(
     start = time.monotonic()
     with progress(None, "threshold", "runs") as report:
         dataset = find(
-            system, name, values, axes, settings.integration.replace(threads=threads), search=search,
-            share=0.1 if share is None else share, progress=report,
-        )  # fmt: skip
+            system, name, values, axes, settings.integration.replace(threads=threads), progress=report
+        )
     elapsed = time.monotonic() - start
     files = [write_map(dataset, output)]
     if plot is not None:
         files.append(draw_threshold(dataset, plot))
-    names = ("first_interwell", "always_interwell")
+    names = (
+        "first_interwell", "always_interwell", "first_interwell_min", "always_interwell_max", "failed_runs",
+    )  # fmt: skip
     answer(
         along=dataset.attrs["along"],
         axes={str(each): dataset[each].values for each in dataset["first_interwell"].dims},
         **{each: dataset[each].values for each in names},
+        outcome=np.array(_kinds(dataset))[dataset["outcome"].values],
         runs=dataset.attrs["runs"], seconds=elapsed, files=files,
     )  # fmt: skip
     out().print(*_summary(dataset, elapsed), *(f"Written: {file_line(path)}" for path in files), sep="\n")
@@ -127,35 +116,63 @@ def _axes_of(settings: Config, along: str) -> dict[str, Any]:
 
 
 def _summary(dataset: xr.Dataset, elapsed: float) -> list[str]:
-    runs, full = dataset.attrs["runs"], dataset.attrs["runs_of_full_map"]
-    lines = [f"{runs} runs in {duration(elapsed)}, {100.0 * runs / full:.1f} % of a full map's {full}"]
+    lines = [f"{dataset.attrs['runs']} runs in {duration(elapsed)}"]
     along = dataset.attrs["along"]
     first = dataset["first_interwell"]
     across = str(first.dims[-1])
     for at in np.ndindex(first.shape[:-1]):
         chosen = dict(zip(map(str, first.dims[:-1]), at, strict=True))
-        curve = dataset.isel(chosen)
-        lines += _curve(curve, along, across, chosen)
-    lines.append(f"It may miss {dataset.attrs['may_miss']}.")
-    return lines
+        lines += _curve(dataset.isel(chosen), along, across, chosen)
+    return lines + status_lines(dataset)
+
+
+def _kinds(dataset: xr.Dataset) -> list[str]:
+    """Return the meanings of the values of ``outcome``, in their order."""
+    return str(dataset["outcome"].attrs["flag_meanings"]).split()
 
 
 def _curve(curve: xr.Dataset, along: str, across: str, chosen: dict[str, int]) -> list[str]:
-    """What one curve shows."""
-    first = curve["first_interwell"]
+    """Return the lines that describe one curve."""
+    first, always = curve["first_interwell"], curve["always_interwell"]
     named = [coordinate_text(name, curve[name].item()) for name in chosen]
     if "modes" in curve.attrs and "modes" not in chosen:
         named.append(coordinate_text("modes", int(curve.attrs["modes"])))
     head = f"{', '.join(named)}: " if named else ""
     if bool(first.isnull().all()):
-        return [f"{head}no interwell response; raise {along}"]
-    at = first.isel({across: int(np.nanargmin(first.values))})
-    width = float((curve["always_interwell"] - first).mean())
-    lines = [
-        f"{head}lowest threshold {coordinate_text(along, float(at))} at {coordinate_text(across, at[across].item())}; "
-        f"band {width:.2g} wide on average"
-    ]
-    none = int(first.isnull().sum())
-    if none:
-        lines.append(f"  no interwell response in range at {none} of {first.size} points")
+        line = f"{head}no interwell response found"
+    else:
+        at = first.isel({across: int(np.nanargmin(first.values))})
+        line = (
+            f"{head}lowest threshold {coordinate_text(along, float(at))} "
+            f"at {coordinate_text(across, at[across].item())}"
+        )
+        width = always - first
+        if bool(width.notnull().any()):
+            of = f" over {int(width.notnull().sum())} points" if bool(width.isnull().any()) else ""
+            step = float(np.max(np.diff(curve[along].values)))
+            line += f"; band {float(width.mean()):.2g} wide on average{of}, in steps of {step:.2g}"
+    lines = [line]
+    for kind, text in (
+        ("no_interwell_in_range", f"no interwell response in range: extend the values of {along}"),
+        ("undecided", "undecided: no run is interwell, but runs failed"),
+        ("not_searched", "not searched: no run has a response class"),
+    ):
+        count = int((curve["outcome"] == _kinds(curve).index(kind)).sum())
+        if count:
+            lines.append(f"  {text}, at {count} of {first.size} points")
+    open_above = int((first.notnull() & always.isnull()).sum())
+    if open_above:
+        lines.append(f"  highest run is intrawell, at {open_above} of {first.size} points")
+    lower = first.notnull() & (curve["first_interwell_min"] < first)
+    if bool(lower.any()):
+        lowest = float(curve["first_interwell_min"].where(lower).min())
+        lines.append(
+            f"  failed runs leave the threshold open, down to {coordinate_text(along, lowest)}, "
+            f"at {int(lower.sum())} of {first.size} points"
+        )
+    higher = always.notnull() & ~(curve["always_interwell_max"] == always)
+    if bool(higher.any()):
+        lines.append(
+            f"  failed runs leave the top of the band open, at {int(higher.sum())} of {first.size} points"
+        )
     return lines

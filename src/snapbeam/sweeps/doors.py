@@ -223,8 +223,6 @@ def threshold_curve(
     frequency_ratio: ArrayLike,
     velocity_amplitude: ArrayLike,
     location: ArrayLike = 1.0 / 2.1,
-    search: str = "fast",
-    share: float = 0.1,
     progress: Callable[[int, int], object] | bool | None = None,
     **options: Any,
 ) -> xr.Dataset:
@@ -241,7 +239,7 @@ def threshold_curve(
         One of the two is an array, along which the threshold is found.
     velocity_amplitude : array_like
         The amplitudes to choose from, strictly increasing: the range and the resolution.
-    search, share, progress
+    progress
         As in :func:`snapbeam.threshold`.
     **options
         ``cycles``, ``side``, ``reference_freq``, ``step``, ``accuracy``, ``engine``, ``threads`` as in
@@ -286,10 +284,14 @@ def threshold_curve(
 
         curves.append(
             threshold(
-                setup.system, "velocity_amplitude", velocity_amplitude, over, setup.integration,
-                search=search, share=share, progress=report,
+                setup.system,
+                "velocity_amplitude",
+                velocity_amplitude,
+                over,
+                setup.integration,
+                progress=report,
             )
-        )  # fmt: skip
+        )
     if isinstance(model, ReducedModel):
         return curves[0]
     words = {"units": "Hz", "long_name": "frequency that Omega and V are normalised by"}
@@ -299,8 +301,7 @@ def threshold_curve(
     labels = {"units": "1", "long_name": "number of modes N"}
     coordinate = xr.DataArray([each.modes for each in models], dims="modes", attrs=labels)
     result = xr.concat(curves, coordinate.rename("modes"), combine_attrs="drop_conflicts")
-    result.attrs["runs"] = int(result["runs"].sum())
-    result.attrs["runs_of_full_map"] = sum(curve.attrs["runs_of_full_map"] for curve in curves)
+    result.attrs["runs"] = sum(curve.attrs["runs"] for curve in curves)
     return result
 
 

@@ -1,4 +1,4 @@
-"""Thresholds: the smallest value of a parameter that makes a beam snap through, over any others."""
+"""Thresholds: the values of a parameter between which a beam begins to snap through, over any other parameters."""
 
 from __future__ import annotations
 
@@ -9,31 +9,29 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.parameters import lookup
+from snapbeam.core.codes import ResponseClass
 from snapbeam.core.reporting import counting
-from snapbeam.core.validate import InputError, choice, shown, within
+from snapbeam.core.validate import InputError, shown
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.sweeps.points import Grid, points_of
-from snapbeam.sweeps.search import Responses, search_everything_below, search_fast
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup, variable_attributes
+from snapbeam.sweeps.stored import Keeping, compute_sweep
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["KINDS_OF_SEARCH", "threshold"]
+__all__ = ["threshold"]
 
-KINDS_OF_SEARCH = ("fast", "exhaustive")
-_BLOCKS = 16
-"""Blocks that the exhaustive search cuts the values into."""
-_CONFIRM = 8
-"""It stops in a column when the interwell rows that follow each other are this share of all, 1/8."""
-_MISSES = {
-    "fast": "isolated interwell points below first_interwell and intrawell points above always_interwell, "
-    "between the values that were run (computed)",
-    "exhaustive": "nothing below first_interwell on the grid; intrawell points above the run of interwell "
-    "ones that ended the search of a column",
-}
-_OUTCOMES = "band_found no_interwell_in_range lowest_value_is_interwell highest_run_is_intrawell"
+_OUTCOMES = (
+    "band_found",
+    "no_interwell_in_range",
+    "lowest_value_is_interwell",
+    "highest_run_is_intrawell",
+    "undecided",
+    "not_searched",
+)
+"""Meanings of the values 0 to 5 of the variable ``outcome``."""
 
 
 def threshold(
@@ -43,51 +41,55 @@ def threshold(
     over: Mapping[str, ArrayLike],
     integration: Integration | None = None,
     *,
-    search: str = "fast",
-    share: float = 0.1,
     progress: Progress | bool | None = None,
 ) -> xr.Dataset:
-    """The threshold of interwell response, sought along one parameter over any others, as a band.
+    """Find the threshold of the interwell response along one parameter, over any other parameters, as a band.
 
-    The boundary is fractal in places: interwell values may lie below intrawell ones.  So two
-    curves are given, the lowest value found to snap through and the one above which every value that
-    was run does.
+    The boundary is fractal in places: interwell values may lie below intrawell values.  The result has
+    therefore two curves: the lowest interwell value, and the value from which every run is interwell.  snapbeam runs
+    every point of the grid, so both curves are exact on that grid.
 
     Parameters
     ----------
     system : System
+        The model; parameters that are not in `over` keep their values.
     along : str
         Parameter to raise, such as ``"velocity_amplitude"``: one that may differ between the runs of an ensemble.
     values : array_like
-        What to choose from, strictly increasing: the range and the resolution.
+        Values of that parameter, strictly increasing, in its unit: the range and the resolution of the threshold.
     over : mapping of str to array_like
-        Axes, as of :func:`snapbeam.sweep`; neighbours along the last one guide the fast search.
+        Axes of the threshold, as in :func:`snapbeam.sweep`.
     integration : Integration, optional
-        Runs end once their class is certain, whatever it says.
-    search : {"fast", "exhaustive"}
-        ``"fast"``: at most *share* of the runs of the full map; may miss isolated interwell points below
-        the band.
-        ``"exhaustive"``: every value up to the first interwell one, which is so the first of the grid.
-    share : float
-        Runs of the fast search over those of the full map.
+        Solver settings.  Every run ends as soon as its response class is certain, whatever `early_decision` is.
     progress : callable, optional
-        Called as ``progress(done, total)`` with runs, of which the total is what the search may take at most; True
-        writes a line to standard error.
+        Function that receives ``(done, total)``, numbers of runs; True writes a line to standard error.
 
     Returns
     -------
     xarray.Dataset
-        ``first_interwell`` and ``always_interwell`` over the axes; NaN where no value of the range is, as ``outcome``
-        says.  ``last_intrawell``, the highest value known not to snap below the first; ``runs``; and what was
-        run: ``response`` with ``computed`` along the values too.
+        Over the axes:
+
+        - ``first_interwell``: lowest value with an interwell run; NaN if no run is interwell.
+        - ``always_interwell``: lowest value from which every run with a response class is interwell; NaN if the
+          highest such run is intrawell.
+        - ``last_intrawell``: highest value with an intrawell run below ``first_interwell``.
+        - ``failed_runs``: number of runs without a response class.  Such a run is neither interwell nor
+          intrawell.
+        - ``first_interwell_min``, ``always_interwell_max``: lower limit of the first curve if every failed run were
+          interwell, and upper limit of the second if every failed run were intrawell.  They differ from the
+          curves only where a failed run leaves the threshold open; NaN where no value of the range is the limit.
+        - ``outcome``: one of the flags ``band_found``, ``no_interwell_in_range``, ``lowest_value_is_interwell``,
+          ``highest_run_is_intrawell``, ``undecided`` (no run is known to be interwell, but runs failed) and
+          ``not_searched`` (no run has a response class).
+
+        Over the axes and the values: ``response`` and ``status`` of every run.
 
     Raises
     ------
     InputError
-        For bad input, such as a parameter that needs another structure to be raised along.
+        For bad input, such as a parameter that belongs to the model and cannot differ between the runs of an
+        ensemble.
     """
-    choice("search", search, KINDS_OF_SEARCH)
-    within("share", share, 0.0, 1.0, closed="right")
     row = lookup(along)
     if not row.is_run or row.quantity.kind is not float:
         raise InputError(
@@ -103,117 +105,90 @@ def threshold(
     points = points_of({**over, row.name: values})
     assert isinstance(points, Grid)
     setup = sweep_setup(system, points, asked.replace(early_decision=True))
-    return _searched(setup, row.name, search, share, counting(progress, "threshold", "runs"))
+    computed = compute_sweep(setup, Keeping(), progress=counting(progress, "threshold", "runs"))
+    return _dataset(setup, row.name, computed)
 
 
-def _searched(
-    setup: SweepSetup, along: str, search: str, share: float, progress: Progress | None
-) -> xr.Dataset:
-    points = setup.points
-    assert isinstance(points, Grid)
-    axes = {name: values for name, values in points.axes.items() if name != along}
-    lines = list(axes)[:-1]
-    rows = points.axes[along].size
-    columns = axes[list(axes)[-1]].size
-    shape = tuple(axes[name].size for name in lines)
-    count = int(np.prod(shape, dtype=np.int64))
-    most = max(1, int(share * columns * rows)) if search == "fast" else columns * rows
-    classes = np.full((*shape, columns, rows), -1, dtype=np.int8)
-    known = np.zeros(classes.shape, dtype=bool)
-    found = []
-    for number, at in enumerate(np.ndindex(shape)):
-        fixed = {name: axes[name][i] for name, i in zip(lines, at, strict=True)}
-        responses = _line(
-            setup, along, list(axes)[-1], fixed, search, most, progress, (number * most, count * most)
-        )
-        classes[at], known[at] = responses.classes, responses.known
-        found.append(responses)
-    return _dataset(setup, along, list(axes), found, classes, known, search, share)
-
-
-def _line(
-    setup: SweepSetup,
-    along: str,
-    across: str,
-    fixed: dict[str, Any],
-    search: str,
-    most: int,
-    progress: Progress | None,
-    counted: tuple[int, int],
-) -> Responses:
-    """Search the columns of one line of the grid."""
-    axes = setup.points.axes
-
-    def ask(columns: NDArray[np.int64], rows: NDArray[np.int64]) -> NDArray[np.int8]:
-        points = {name: np.full(columns.size, value) for name, value in fixed.items()}
-        points |= {across: axes[across][columns], along: axes[along][rows]}
-        before = counted[0] + responses.runs
-
-        def report(done: int, _: int) -> None:
-            if progress is not None:
-                progress(before + done, counted[1])
-
-        return setup.march(points, setup.integration.threads, report)["response"].astype(np.int8)
-
-    rows = axes[along].size
-    responses = Responses(axes[across].size, rows, ask)
-    if search == "fast":
-        search_fast(responses, most)
-    else:
-        search_everything_below(responses, max(1, -(-rows // _BLOCKS)), max(1, -(-rows // _CONFIRM)))
-    if progress is not None:
-        progress(counted[0] + most, counted[1])
-    return responses
-
-
-def _dataset(
-    setup: SweepSetup,
-    along: str,
-    over: list[str],
-    found: list[Responses],
-    classes: NDArray[np.int8],
-    known: NDArray[np.bool_],
-    search: str,
-    share: float,
-) -> xr.Dataset:
+def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
+    """Reduce the response classes of a whole grid to thresholds."""
     import xarray as xr
 
-    values = setup.points.axes[along]
+    assert isinstance(setup.points, Grid)
     row = lookup(along)
-    shape = classes.shape[:-1]
-    dims = tuple(lookup(name).short for name in over)
-    padded = np.append(values, np.nan)
-    first = np.array([responses.first() for responses in found]).reshape(shape)
-    top = np.array([responses.top() for responses in found]).reshape(shape)
-    below = known & ~(classes > 0) & (np.arange(values.size) < first[..., None])
-    last = np.where(below.any(axis=-1), values.size - 1 - below[..., ::-1].argmax(axis=-1), values.size)
-    outcome = np.where(first == values.size, 1, np.where(first == 0, 2, np.where(top == values.size, 3, 0)))
+    values = setup.points.axes[along]
+    dims = tuple(lookup(name).short for name in setup.points.axes if name != along)
+    whole = (*dims, row.short)
+    response = computed["response"].transpose(*whole).values
+    rows = _thresholds(response)
     attrs = setup.attributes("threshold of the interwell response of a struck bistable beam")
     attrs.pop("early_decision")
-    attrs |= {"along": row.short, "search": search, "may_miss": _MISSES[search], "runs": int(known.sum())}
-    attrs["runs_of_full_map"] = int(known.size)
-    if search == "fast":
-        attrs["share"] = float(share)
+    attrs |= {"along": row.short, "runs": int(response.size)}
     dataset = xr.Dataset(coords=setup.coordinates(), attrs=attrs)
     words = row.quantity.words
     symbol = f" {row.quantity.symbol}" if row.quantity.symbol else ""
-
-    def curve(name: str, data: NDArray[Any], text: str, **more: Any) -> None:
-        dataset[name] = (dims, data, {"units": "1", "long_name": text} | more)
-
-    unit = {"units": row.quantity.unit}
-    curve(
-        "first_interwell", padded[first], f"lowest {words}{symbol} that makes an interwell response", **unit
-    )
-    curve("always_interwell", padded[top], f"{words}{symbol} above which all runs are interwell", **unit)
-    curve(
-        "last_intrawell", padded[last], f"highest {words}{symbol} run below that without snap-through", **unit
-    )
-    curve("runs", known.sum(axis=-1), "runs made")
-    flags = {"flag_values": np.arange(4, dtype=np.int8), "flag_meanings": _OUTCOMES}
-    curve("outcome", outcome.astype(np.int8), "what was found", **flags)
-    whole = (*dims, row.short)
-    dataset["response"] = (whole, classes, variable_attributes("response"))
-    labels = {"units": "1", "long_name": "whether the point was run"}
-    dataset["computed"] = (whole, known, labels)
+    padded = np.append(values, np.nan)
+    for name, text in (
+        ("first_interwell", f"lowest {words}{symbol} that makes an interwell response"),
+        ("always_interwell", f"{words}{symbol} above which all runs are interwell"),
+        ("last_intrawell", f"highest {words}{symbol} run below that without snap-through"),
+        ("first_interwell_min", f"lowest {words}{symbol} that may be interwell, failed runs included"),
+        ("always_interwell_max", f"{words}{symbol} above which no run failed or is intrawell"),
+    ):
+        dataset[name] = (dims, padded[rows[name]], {"units": row.quantity.unit, "long_name": text})
+    failed = {"units": "1", "long_name": "runs without a response class"}
+    dataset["failed_runs"] = (dims, rows["failed_runs"], failed)
+    flags = {
+        "units": "1",
+        "long_name": "kind of result",
+        "flag_values": np.arange(len(_OUTCOMES), dtype=np.int8),
+        "flag_meanings": " ".join(_OUTCOMES),
+    }
+    dataset["outcome"] = (dims, rows["outcome"].astype(np.int8), flags)
+    for name in ("response", "status"):
+        dataset[name] = (whole, computed[name].transpose(*whole).values, variable_attributes(name))
     return dataset
+
+
+def _thresholds(response: NDArray[np.int8]) -> dict[str, NDArray[Any]]:
+    """Return the rows of the thresholds of columns of response classes, the rows along the last axis.
+
+    A row equal to the number of rows means that no row of the column is the threshold.
+    """
+    interwell, intrawell = response >= ResponseClass.TRANSIENT_1, response == ResponseClass.INTRAWELL
+    failed = ~(interwell | intrawell)
+    count = response.shape[-1]
+    first, first_min = _lowest(interwell), _lowest(interwell | failed)
+    always = _lowest(interwell & _above_all(intrawell))
+    always_max = _lowest(interwell & _above_all(intrawell | failed))
+    below = intrawell & (np.arange(count) < first[..., None])
+    outcome = np.select(
+        [
+            failed.all(axis=-1),
+            (first == count) & failed.any(axis=-1),
+            first == count,
+            first == 0,
+            always == count,
+        ],
+        [5, 4, 1, 2, 3],
+        0,
+    )
+    return {
+        "first_interwell": first,
+        "always_interwell": always,
+        "last_intrawell": np.where(below.any(axis=-1), count - 1 - _lowest(below[..., ::-1]), count),
+        "first_interwell_min": first_min,
+        "always_interwell_max": always_max,
+        "failed_runs": failed.sum(axis=-1),
+        "outcome": outcome,
+    }
+
+
+def _lowest(chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the lowest chosen row of each column; the number of rows if none is chosen."""
+    return np.where(chosen.any(axis=-1), chosen.argmax(axis=-1), chosen.shape[-1])
+
+
+def _above_all(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return whether no chosen row of the column lies at a row or above it."""
+    later: NDArray[np.bool_] = np.logical_or.accumulate(chosen[..., ::-1], axis=-1)[..., ::-1]
+    return ~later

@@ -117,7 +117,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
         system = VARIANTS[name][1](modes)
         found = sb.threshold(
             system, "velocity_amplitude", drives, {"location": _PLACES, "frequency_ratio": ratio},
-            sb.Integration(cycles=cycles), search="exhaustive", progress=results.progress(f"notch, {name}"),
+            sb.Integration(cycles=cycles), progress=results.progress(f"notch, {name}"),
         )  # fmt: skip
         columns.append(found.first_interwell.transpose("location", "frequency_ratio").values)
         freq.append(system.model.reference_freq)
