@@ -6,12 +6,22 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Rectangle
 
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
 from snapbeam.figures import CLASS_COLORS, plot_response_map, plot_threshold, save_figure
+
+_KINDS = (
+    "band_found",
+    "no_interwell_in_range",
+    "lowest_value_is_interwell",
+    "highest_run_is_intrawell",
+    "undecided",
+    "not_searched",
+)
 
 
 @pytest.fixture(autouse=True)
@@ -26,8 +36,15 @@ def curve():
     first = np.stack((0.2 + 0.05 * np.sin(ratio), 0.25 + 0.02 * ratio))
     first[0, 4] = np.nan
     dims = ("modes", "frequency_ratio")
+    flags = {"flag_meanings": " ".join(_KINDS)}
     return xr.Dataset(
-        {"first_interwell": (dims, first), "always_interwell": (dims, first + 0.03)},
+        {
+            "first_interwell": (dims, first),
+            "always_interwell": (dims, first + 0.03),
+            "first_interwell_min": (dims, first),
+            "always_interwell_max": (dims, first + 0.03),
+            "outcome": (dims, np.where(np.isnan(first), 1, 0), flags),
+        },
         {
             "modes": [1, 32],
             "frequency_ratio": ratio,
@@ -48,10 +65,68 @@ def test_band(curve):
     )
     assert ax.get_xlabel().startswith("Excitation frequency") and "V" in ax.get_ylabel()
     assert ax.get_title("left") == "200 cycles, steps of 0.01 in $V$"
-    assert len(ax.collections) == 2
+    assert len([each for each in ax.collections if isinstance(each, PolyCollection)]) == 2
     assert ax.get_ylim() == pytest.approx((0.0, 1.4 * 0.34))
+    (none,) = [line for line in ax.lines if line.get_marker() == "^"]
+    assert none.get_xdata().tolist() == [curve["frequency_ratio"].values[4]]
     one = plot_threshold(curve.isel(modes=1), quasi_static=False)
-    assert len(one.lines) == 1
+    assert [line.get_xdata().size for line in one.lines] == [15, 0], "the curve and no isolated point"
+
+
+def texts_of(ax):
+    return [text.get_text() for text in ax.get_legend().get_texts()]
+
+
+def test_columns_without_an_answer_are_hatched(curve):
+    one = curve.isel(modes=1).copy(deep=True)
+    hatched = {"undecided": (2, "...."), "not searched": (7, "////")}
+    assert not {"undecided: runs failed", "not searched"} & set(texts_of(plot_threshold(one)))
+    for name in ("first_interwell", "always_interwell", "always_interwell_max"):
+        one[name][[2, 7]] = np.nan
+    one["outcome"][2], one["outcome"][7] = 4, 5
+    ax = plot_threshold(one)
+    assert {"undecided: runs failed", "not searched"} <= set(texts_of(ax))
+    assert "no interwell response in range" not in texts_of(ax)
+    spans = {patch.get_hatch(): patch for patch in ax.patches}
+    for at, hatch in hatched.values():
+        centre = float(one["frequency_ratio"][at])
+        assert spans[hatch].get_x() + 0.5 * spans[hatch].get_width() == pytest.approx(centre)
+
+
+def test_isolated_points_are_markers(curve, tmp_path):
+    """A point whose neighbours have no threshold was invisible: a line needs two points."""
+    one = curve.isel(modes=1).copy(deep=True)
+    gaps = np.array([1, 2, 3, 5, 6, 7, 8, 9, 10, 11, 12, 13])
+    for name in curve.data_vars:
+        if name != "outcome":
+            one[name][gaps] = np.nan
+    one["outcome"][gaps] = 1
+    ax = plot_threshold(one, quasi_static=False)
+    (alone,) = [line for line in ax.lines if line.get_marker() == "o"]
+    assert alone.get_xdata().tolist() == one["frequency_ratio"].values[[0, 4, 14]].tolist()
+    np.testing.assert_array_equal(alone.get_ydata(), one["first_interwell"].values[[0, 4, 14]])
+    empty = plot_threshold(one.assign(first_interwell=one["first_interwell"] * np.nan), quasi_static=False)
+    with_points, without = (
+        plt.imread(save_figure(each.figure, tmp_path / f"{number}.png"))[..., :3]
+        for number, each in enumerate((ax, empty))
+    )
+    red = np.array(to_rgb("#B03A27"))
+    counts = [int((np.abs(image - red).max(axis=-1) < 0.02).sum()) for image in (with_points, without)]
+    assert counts[0] > counts[1] + 100
+
+
+def test_bands_that_are_open(curve):
+    """A band whose highest run is intrawell reaches the end of the range; failed runs widen it by dotted lines."""
+    one = curve.isel(modes=1).copy(deep=True)
+    one["always_interwell"][9] = one["always_interwell_max"][9] = np.nan
+    one["outcome"][9] = 3
+    one["first_interwell_min"][5] = 0.1
+    ax = plot_threshold(one)
+    assert ax.get_ylim()[1] == pytest.approx(0.6)
+    band = next(each for each in ax.collections if isinstance(each, PolyCollection))
+    assert band.get_datalim(ax.transData).y1 == pytest.approx(0.6)
+    assert "left open by failed runs" in texts_of(ax)
+    assert "left open by failed runs" not in texts_of(plot_threshold(curve))
 
 
 def test_what_is_no_threshold(curve):

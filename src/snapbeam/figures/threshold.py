@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, instance
-from snapbeam.figures.axes import dress, positions, symbol_of
+from snapbeam.figures.axes import dress, edges_of, positions, symbol_of
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
 from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
 
@@ -19,6 +20,10 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_threshold"]
 
+_Array = NDArray[np.float64]
+_OPEN = "left open by failed runs"
+_NEEDED = ("first_interwell", "always_interwell", "first_interwell_min", "always_interwell_max", "outcome")
+
 _STYLES = (("#B03A27", "-"), ("#16245E", "-"), ("#4C97C8", "--"), ("#6E8B2F", "-."), ("#000000", ":"))
 
 
@@ -26,15 +31,18 @@ _STYLES = (("#B03A27", "-"), ("#16245E", "-"), ("#4C97C8", "--"), ("#6E8B2F", "-
 def plot_threshold(
     dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static: bool = True, legend: bool = True
 ) -> Axes:
-    """Draw what :func:`snapbeam.threshold_curve` found.
+    """Draw the result of :func:`snapbeam.threshold`.
 
-    The line is the lowest velocity amplitude that makes an interwell response, the shade reaches up to the
-    one above which every run is interwell.
+    The line is the lowest value that makes an interwell response.  The shade reaches up to the value above which
+    every run is interwell, or to the end of the range if the highest run is intrawell.  A point without drawn
+    neighbours has a marker.  A triangle at the top means that no run is interwell.  Hatching marks the points
+    whose outcome is ``not_searched`` or ``undecided``.  A dotted line at a point shows how far failed runs
+    leave the threshold open.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        ``first_interwell`` and ``always_interwell`` along frequency ratio or location.
+        Result of :func:`snapbeam.threshold` along one axis, or a curve for each point of a second axis.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
     quasi_static : bool
@@ -50,7 +58,7 @@ def plot_threshold(
     import xarray as xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
-    if "first_interwell" not in dataset or "always_interwell" not in dataset:
+    if not set(_NEEDED) <= set(dataset.variables):
         raise InputError(f"no threshold curve among {list(map(str, dataset.variables))}")
     dims = [str(name) for name in dataset["first_interwell"].squeeze().dims]
     if not 1 <= len(dims) <= 2:
@@ -61,6 +69,7 @@ def plot_threshold(
     others = [name for name in dims if name != along]
     raised = str(dataset.attrs.get("along", "velocity_amplitude"))
     x, _ = positions(dataset, along)
+    edges = edges_of(dataset, along)
     curves = (
         [dataset.isel({others[0]: at}) for at in range(dataset.sizes[others[0]])] if others else [dataset]
     )
@@ -71,10 +80,7 @@ def plot_threshold(
         if ax is None:
             ax = new_figure("single", 70.0).add_subplot()
         for curve, (color, dashes) in zip(curves, _STYLES, strict=False):
-            first, always = (curve[name].values for name in ("first_interwell", "always_interwell"))
-            label = _label(dataset, curve, others, raised)
-            ax.fill_between(x, first, always, color=color, alpha=0.25, linewidth=0.0)
-            ax.plot(x, first, dashes, color=color, linewidth=1.1, label=label)
+            _draw_curve(ax, curve, x, (color, dashes), _label(dataset, curve, others, raised))
         quasi_static = (
             quasi_static and raised == "velocity_amplitude" and along in ("frequency_ratio", "location")
         )
@@ -82,13 +88,15 @@ def plot_threshold(
             ax.plot(x, _quasi_static(dataset, along, x), color="black", linewidth=0.8, dashes=(4, 2),
                     label=r"quasi-static, $V_\mathrm{QS1}$")  # fmt: skip
         amplitude = dataset[raised].values
-        found = float(dataset["always_interwell"].max())
-        top = min(amplitude[-1], 1.4 * found) if np.isfinite(found) else amplitude[-1]
+        upper = dataset["always_interwell_max"].where(dataset["first_interwell"].notnull(), -np.inf)
+        closed = bool(upper.notnull().all()) and bool(np.isfinite(upper).any())
+        top = min(amplitude[-1], 1.4 * float(upper.max())) if closed else amplitude[-1]
         fix_ticks(ax)
         dress(ax.xaxis, dataset, along)
         dress(ax.yaxis, dataset, raised)
         low = amplitude[0] if ax.get_yscale() == "log" else min(0.0, amplitude[0])
         ax.set(xlim=x[[0, -1]], ylim=(low, top))
+        marks = _mark_no_threshold(ax, curves, x, edges)
         if "cycles" in dataset.attrs:
             step = float(np.max(np.diff(amplitude)))
             ax.set_title(
@@ -98,8 +106,59 @@ def plot_threshold(
         if legend:
             shade = Patch(facecolor="0.75", label="up to where all runs are interwell")
             handles, _ = ax.get_legend_handles_labels()
-            ax.legend(handles=[*handles, shade], loc="best")
+            ax.legend(handles=[*handles, shade, *marks], loc="best", frameon=True, edgecolor="none")
     return ax
+
+
+def _draw_curve(ax: Axes, curve: xr.Dataset, x: _Array, style: tuple[str, str], label: str) -> None:
+    """Draw one band, its isolated points and the intervals that failed runs leave open."""
+    color, dashes = style
+    end = float(curve[str(curve.attrs.get("along", "velocity_amplitude"))][-1])
+    first, always, least, most = (np.atleast_1d(curve[name].values) for name in _NEEDED[:4])
+    found = np.isfinite(first)
+    always = np.where(found & ~np.isfinite(always), end, always)
+    most = np.where(found & ~np.isfinite(most), end, most)
+    ax.fill_between(x, first, always, color=color, alpha=0.25, linewidth=0.0)
+    ax.plot(x, first, dashes, color=color, linewidth=1.1, label=label)
+    alone = found & ~np.append(found[1:], False) & ~np.append(False, found[:-1])
+    ax.plot(x[alone], first[alone], "o", color=color, markersize=3.0, clip_on=False)
+    ax.vlines(x[alone], first[alone], always[alone], color=color, alpha=0.25, linewidth=3.0)
+    for low, high in ((least, first), (always, most)):
+        wide = found & (low < high)
+        if wide.any():
+            known = _OPEN in ax.get_legend_handles_labels()[1]
+            ax.vlines(
+                x[wide], low[wide], high[wide], color=color, linewidth=0.9, linestyle=":",
+                label="" if known else _OPEN,
+            )  # fmt: skip
+
+
+def _mark_no_threshold(ax: Axes, curves: list[xr.Dataset], x: _Array, edges: _Array) -> list[Patch]:
+    """Mark the points without a threshold, and return the legend handles of the hatching."""
+    labelled = False
+    above = ax.get_xaxis_transform()
+    codes = np.array([np.atleast_1d(curve["outcome"].values) for curve in curves])
+    kinds = str(curves[0]["outcome"].attrs["flag_meanings"]).split()
+    for number, (color, _) in zip(range(len(curves)), _STYLES, strict=False):
+        none = codes[number] == kinds.index("no_interwell_in_range")
+        if none.any():
+            ax.plot(
+                x[none], np.full(int(none.sum()), 0.98), "^", color=color, markersize=3.5, transform=above,
+                clip_on=False, label="" if labelled else "no interwell response in range",
+            )  # fmt: skip
+            labelled = True
+    handles = []
+    for kind, hatch, label in (
+        ("undecided", "....", "undecided: runs failed"),
+        ("not_searched", "////", "not searched"),
+    ):
+        chosen = (codes == kinds.index(kind)).any(axis=0)
+        look: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.5", "hatch": hatch, "linewidth": 0.0}
+        for at in np.flatnonzero(chosen):
+            ax.axvspan(edges[at], edges[at + 1], zorder=0.5, **look)
+        if chosen.any():
+            handles.append(Patch(label=label, **look))
+    return handles
 
 
 def _label(dataset: xr.Dataset, curve: xr.Dataset, others: list[str], raised: str) -> str:
