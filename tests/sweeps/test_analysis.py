@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.core.codes import ResponseClass
+from snapbeam.core.codes import ResponseClass, RunStatus
 from snapbeam.core.validate import InputError
 from snapbeam.sweeps.analysis import compare_maps, interwell_threshold, threshold_notch
 
@@ -27,6 +27,19 @@ def test_no_threshold_where_nothing_snaps(synthetic_map):
     calm = synthetic_map.copy(deep=True)
     calm.response[0] = ResponseClass.INTRAWELL
     assert np.isnan(interwell_threshold(calm)[0])
+
+
+def test_a_failed_run_below_leaves_the_threshold_open(synthetic_map):
+    found = interwell_threshold(synthetic_map)
+    failed = synthetic_map.copy(deep=True)
+    failed.response[4, 0] = ResponseClass.UNKNOWN  # below the threshold
+    failed.response[6, -1] = ResponseClass.UNKNOWN  # above it
+    expected = found.copy()
+    expected[4] = np.nan
+    np.testing.assert_array_equal(interwell_threshold(failed), expected)
+    status = np.where(failed.response == ResponseClass.UNKNOWN, RunStatus.NOT_RUN, RunStatus.OK)
+    never_started = failed.assign(status=(failed.response.dims, status))
+    np.testing.assert_array_equal(interwell_threshold(never_started), found)
 
 
 def test_comparing_maps(synthetic_map):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.codes import ResponseClass
+from snapbeam.core.codes import ResponseClass, RunStatus
 from snapbeam.core.validate import InputError
 
 if TYPE_CHECKING:
@@ -33,13 +33,22 @@ def is_interwell(response: NDArray[np.int8]) -> NDArray[np.bool_]:
 
 
 def interwell_threshold(ds: xr.Dataset, amplitude: str = "velocity_amplitude") -> _Array:
-    """Smallest amplitude that is interwell at each point of the other axis of a map; NaN where none is."""
+    """Return the smallest interwell amplitude at each point of the other axis of a map.
+
+    The threshold is NaN where no run is interwell, and where a failed run at a smaller amplitude leaves it open.
+    Points that were never started (status ``NOT_RUN``) are left out.
+    """
     response = ds["response"].transpose(..., amplitude)
     if response.ndim != 2:
         raise InputError(f"map over {response.dims}: must have {amplitude!r} and one more axis")
     snapped = is_interwell(response.values)
+    failed = response.values == ResponseClass.UNKNOWN
+    if "status" in ds:
+        failed &= ds["status"].transpose(*response.dims).values != RunStatus.NOT_RUN
     values = ds[amplitude].values.astype(float)
-    return np.where(snapped.any(axis=1), values[np.argmax(snapped, axis=1)], np.nan)
+    lowest = np.argmax(snapped, axis=1)
+    known = snapped.any(axis=1) & (np.argmax(snapped | failed, axis=1) == lowest)
+    return np.where(known, values[lowest], np.nan)
 
 
 @dataclass(frozen=True)
