@@ -25,7 +25,7 @@ from snapbeam.runs.schema import check_trajectory
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["ANIMATION_SUFFIXES", "animate_run", "frame_times", "write_frames"]
+__all__ = ["ANIMATION_SUFFIXES", "animate_run", "frame_times", "write_frames", "write_mp4"]
 
 _Array = NDArray[np.float64]
 
@@ -134,7 +134,7 @@ def write_frames(
         if target.suffix.lower() == ".gif":
             _write_gif(pictures, temporary, rate)
         else:
-            _write_mp4(pictures, temporary, rate)
+            write_mp4(pictures, temporary, rate)
     return target
 
 
@@ -159,7 +159,11 @@ def _pictures(frames: Iterable[Figure], dots_per_inch: float) -> Iterator[NDArra
         plt.close(last)
 
 
-def _write_mp4(pictures: Iterator[NDArray[np.uint8]], path: Path, rate: float) -> None:
+def write_mp4(pictures: Iterable[NDArray[np.uint8]], path: Path, rate: float) -> None:
+    """Write pictures of one size (height, width, 3), both sides even, as H.264 video of *rate* pictures a second.
+
+    The container (MP4, MOV, AVI) follows from the suffix of *path*.  Below 5 Hz each picture is written several times.
+    """
     try:
         import imageio_ffmpeg
     except ImportError as error:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.foreign import MADE_BY
 from snapbeam.core.validate import InputError, integer, positive
+from snapbeam.figures.animation import write_mp4
 from snapbeam.figures.lab.tracking import flag_words, found_edges
 from snapbeam.lab.tracking.quality import check_tracked
 
@@ -44,7 +44,7 @@ def annotated_video(
     path
         File to write, ``.mp4``, ``.mov`` or ``.avi`` (H.264).
     play_rate
-        Frames shown per second [Hz].
+        Frames shown per second [Hz]; below 5 Hz each is written several times.
     every
         Show every so many-th frame.
     progress
@@ -52,7 +52,7 @@ def annotated_video(
     """
     try:
         import cv2  # noqa: F401
-        import imageio_ffmpeg
+        import imageio_ffmpeg  # noqa: F401
     except ImportError as error:
         raise InputError(
             f"path = {str(path)!r}: a video needs {error.name} (pip install 'snapbeam[lab,video]')"
@@ -68,23 +68,19 @@ def annotated_video(
         )
     low, high = (float(level) for level in np.percentile(recording.frame(0), (0.2, 99.8)))
     canvas = _Canvas(recording.shape, dataset, low, max(high, low + 1.0))
+
+    def pictures() -> Iterator[NDArray[np.uint8]]:
+        done = 0
+        for batch in recording.batches(32):
+            for picture in batch:
+                if done % every == 0:
+                    yield canvas.draw(picture, int(recording.numbers[done]))
+                done += 1
+            if progress is not None:
+                progress(done, len(recording))
+
     with atomic_path(target) as temporary:
-        writer: Any = imageio_ffmpeg.write_frames(
-            str(temporary), canvas.size, fps=rate, codec="libx264", quality=7, macro_block_size=2,
-            ffmpeg_log_level="error", output_params=["-metadata", f"comment={MADE_BY}"],
-        )  # fmt: skip
-        writer.send(None)
-        try:
-            done = 0
-            for batch in recording.batches(32):
-                for picture in batch:
-                    if done % every == 0:
-                        writer.send(canvas.draw(picture, int(recording.numbers[done])))
-                    done += 1
-                if progress is not None:
-                    progress(done, len(recording))
-        finally:
-            writer.close()
+        write_mp4(pictures(), temporary, rate)
     return target
 
 
