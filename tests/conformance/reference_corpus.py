@@ -24,6 +24,7 @@ from __future__ import annotations
 
 import contextlib
 import difflib
+import enum
 import hashlib
 import inspect
 import json
@@ -34,7 +35,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -554,9 +555,10 @@ def printed() -> dict[str, list[str]]:
 def interface() -> dict[str, Any]:
     """Schemas, signatures, commands and printed results."""
     public = {name: getattr(sb, name) for name in sorted(sb.__all__)}
+    unsigned = (enum.Enum, BaseException)
     signatures = {
         name: str(inspect.signature(each))
-        if inspect.isfunction(each) or is_dataclass(each)
+        if inspect.isfunction(each) or (inspect.isclass(each) and not issubclass(each, unsigned))
         else type(each).__name__
         for name, each in public.items()
     }
