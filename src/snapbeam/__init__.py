@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from snapbeam.core.validate import InputError, InputTypeError
     from snapbeam.core.version import __version__
     from snapbeam.design.distributions import Between, LogNormal, Normal, Uniform
-    from snapbeam.design.optimum.design import Effort, design, design_problem
+    from snapbeam.design.optimum.design import Effort, design_problem, optimize_design
     from snapbeam.design.optimum.evolution import Evolution
     from snapbeam.design.optimum.measures import Goal, Limit
     from snapbeam.design.plan import Cost, plan
@@ -195,7 +195,6 @@ __all__ = [
     "classify",
     "conditioning",
     "continue_orbit",
-    "design",
     "design_problem",
     "edge_state",
     "exact_natural_freq",
@@ -209,6 +208,7 @@ __all__ = [
     "load_run",
     "long_map",
     "lyapunov",
+    "optimize_design",
     "periodic_orbit",
     "plan",
     "poincare",
@@ -239,7 +239,7 @@ _NAMES = {
     "core.validate": "InputError InputTypeError",
     "core.version": "__version__",
     "design.distributions": "Between LogNormal Normal Uniform",
-    "design.optimum.design": "Effort design design_problem",
+    "design.optimum.design": "Effort design_problem optimize_design",
     "design.optimum.evolution": "Evolution",
     "design.optimum.measures": "Goal Limit",
     "design.plan": "Cost plan",
@@ -304,7 +304,6 @@ _NAMES = {
 }
 _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 _ROOMS = frozenset(module.partition(".")[0] for module in _NAMES) | {"figures", "lab", "paper"}
-_ROOMS -= {"design"}  # a function of that name; its room can be called too
 
 register_accessor()
 del register_accessor
