@@ -7,8 +7,6 @@ is classed, and sweeps show where it snaps.
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from snapbeam.core.showing import register_accessor
-
 if TYPE_CHECKING:
     from snapbeam.core.codes import ResponseClass, RunStatus, classify
     from snapbeam.core.findings import Finding, PlausibilityWarning
@@ -304,9 +302,6 @@ _NAMES = {
 }
 _HOMES = {name: module for module, names in _NAMES.items() for name in names.split()}
 _ROOMS = frozenset(module.partition(".")[0] for module in _NAMES) | {"figures", "lab", "paper"}
-
-register_accessor()
-del register_accessor
 
 
 def __getattr__(name: str) -> Any:
