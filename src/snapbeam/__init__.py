@@ -99,8 +99,6 @@ if TYPE_CHECKING:
     from snapbeam.sweeps.sweep import sweep
     from snapbeam.sweeps.threshold import threshold
 
-    Response = Outcome
-
 __all__ = [
     "STATISTICS",
     "AccelerationSine",
@@ -158,7 +156,6 @@ __all__ = [
     "RecordedDrive",
     "ReducedModel",
     "Replicas",
-    "Response",
     "ResponseClass",
     "Restitution",
     "Run",
@@ -308,12 +305,12 @@ def __getattr__(name: str) -> Any:
     """A public name, or a room, when it is first asked for."""
     if name in _ROOMS:
         return import_module(f"snapbeam.{name}")
-    home = _HOMES.get("Outcome" if name == "Response" else name)
+    home = _HOMES.get(name)
     if name == "explore":
         home = "explorer"
     if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = getattr(import_module(f"snapbeam.{home}"), "Outcome" if name == "Response" else name)
+    found = getattr(import_module(f"snapbeam.{home}"), name)
     globals()[name] = found
     return found
 
