@@ -83,11 +83,8 @@ def _simulate(case: Case, tolerance: float) -> tuple[np.ndarray, sb.Accuracy]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         run = sb.simulate(
-            case.model,
-            case.shaker,
-            CONTACT,
-            ERROR_CYCLES,
-            tolerance=tolerance,
+            sb.System(case.model, CONTACT, case.shaker),
+            sb.Integration(cycles=ERROR_CYCLES, tolerance=tolerance),
             sample_times=case.times,
         )
     assert run.accuracy is not None

@@ -53,9 +53,10 @@ for well, level in (("lower", 0.3323e-3), ("upper", 0.3289e-3)):
     deflected = np.array(model.equilibrium)
     deflected[0] *= 0.9
     free = sb.simulate(
-        model,
-        cycles=41,
-        initial_state=(deflected, np.zeros(model.modes)),
+        sb.System(
+            model, start=sb.State(amplitude=deflected, velocity=np.zeros(model.modes))
+        ),
+        sb.Integration(cycles=41),
         sample_times=np.arange(int(0.5 * rate)) / rate,
     )
     noise = (
@@ -148,7 +149,9 @@ figure = plot_drive(signal, drive)
 motion = sb.RecordedDrive.from_dataset(
     lab.recorded_drive(true_velocity, 1e5), location=paper.LOCATION
 )
-truth = sb.simulate(truth_model, motion, paper.CONTACT, cycles=cycles)
+truth = sb.simulate(
+    sb.System(truth_model, paper.CONTACT, motion), sb.Integration(cycles=cycles)
+)
 camera = lab.SyntheticCamera(shape=(192, 64), snr_db=30.0)
 stage = lab.SyntheticStage(shaker_width=0.4e-3)
 rendered = lab.render_run(truth, camera=camera, stage=stage, rest_frames=300)
@@ -212,7 +215,9 @@ model = sb.ReducedModel.from_beam(
 recorded = sb.RecordedDrive.from_dataset(
     lab.recorded_drive(signal, 1e5, measurement=drive), location=paper.LOCATION
 )
-simulated = sb.simulate(model, recorded, paper.CONTACT, cycles=cycles)
+simulated = sb.simulate(
+    sb.System(model, paper.CONTACT, recorded), sb.Integration(cycles=cycles)
+)
 
 shaker_seen = lab.make_signal(
     tracked.shaker_displacement_mm.values,
@@ -274,7 +279,9 @@ for ratio, amplitude in (
     )
     times = np.arange(int(cycles / (ratio * first) * 1e4)) / 1e4
     test = sb.simulate(
-        truth_model, shaker, paper.CONTACT, cycles=cycles, sample_times=times
+        sb.System(truth_model, paper.CONTACT, shaker),
+        sb.Integration(cycles=cycles),
+        sample_times=times,
     ).dataset
     error = scatter * camera.pixel_size / 0.3306e-3 * rng.standard_normal(times.size)
     found = lab.measure_response(

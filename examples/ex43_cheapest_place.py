@@ -28,7 +28,7 @@ spread = sb.Spread(
     displacement=3.5e-6,
     phase=True,
 )
-found = sb.design(
+found = sb.optimize_design(
     system,
     {
         "location": (0.1, 0.48),

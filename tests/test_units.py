@@ -86,7 +86,7 @@ def test_runs(tmp_path) -> None:
     assert check(run.impacts) == 5
     run.save(tmp_path / "run.nc")
     assert check(xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="outcome")) == len(STATISTICS)
-    check(sb.conditioning(SYSTEM, 1))
+    check(sb.conditioning(SYSTEM, sb.Integration(cycles=1)))
 
 
 def test_a_run_of_several_strikers(tmp_path) -> None:

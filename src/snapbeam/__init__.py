@@ -6,10 +6,5 @@ is classed, and sweeps show where it snaps.
 
 import lazy_loader
 
-from snapbeam.core.showing import register_accessor
-
 # The stub __init__.pyi lists the public names; each is loaded when it is first used.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
-
-register_accessor()
-del register_accessor

@@ -17,7 +17,7 @@ from .design.distributions import LogNormal as LogNormal
 from .design.distributions import Normal as Normal
 from .design.distributions import Uniform as Uniform
 from .design.optimum.design import Effort as Effort
-from .design.optimum.design import design as design
+from .design.optimum.design import optimize_design as optimize_design
 from .design.optimum.design import design_problem as design_problem
 from .design.optimum.evolution import Evolution as Evolution
 from .design.optimum.measures import Goal as Goal

@@ -131,12 +131,12 @@ def answer_with_own_steps(case: dict[str, Any]) -> sb.Run:
         more["accuracy"] = "reference"
     elif case["kind"] == "early":
         more["early_decision"] = True
-    return sb.simulate(model, drive, contact, sample_times=[0.0], **more)
+    return sb.simulate(sb.System(model, contact, drive), sb.Integration(**more), sample_times=[0.0])
 
 
 def numbers(run: sb.Run) -> dict[str, Any]:
     """Every statistic of a run to the last bit, and a hash of its table of impacts."""
-    response = run.response
+    response = run.outcome
     found: dict[str, Any] = {}
     for name in NAMES:
         value = getattr(response, name)

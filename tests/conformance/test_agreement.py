@@ -54,7 +54,9 @@ def test_trajectory(modes, pair, cycles, measured) -> None:
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1])
     # the two ends of the run differ by rounding
     times = truth.time * (1.0 - 1e-13)
-    run = sb.simulate(model, shaker, paper.CONTACT, cycles, sample_times=times)
+    run = sb.simulate(
+        sb.System(model, paper.CONTACT, shaker), sb.Integration(cycles=cycles), sample_times=times
+    )
     bound = min(1e-3, 3.0 * measured)
     np.testing.assert_allclose(run.dataset.displacement, truth.displacement, rtol=0.0, atol=bound)
     np.testing.assert_allclose(
@@ -76,7 +78,11 @@ def test_reference_accuracy(modes, pair, cycles, measured) -> None:
     model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1])
     times = truth.time * (1.0 - 1e-13)
-    run = sb.simulate(model, shaker, paper.CONTACT, cycles, sample_times=times, accuracy="reference")
+    run = sb.simulate(
+        sb.System(model, paper.CONTACT, shaker),
+        sb.Integration(cycles=cycles, accuracy="reference"),
+        sample_times=times,
+    )
     error = np.abs(run.dataset.displacement.values - truth.displacement).max()
     assert error < max(measured / 100.0, 1e-9)
 

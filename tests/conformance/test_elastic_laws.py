@@ -58,7 +58,11 @@ def test_against_an_independent_solution(name: str, modes: int) -> None:
     model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
     shaker = sb.Shaker(frequency_ratio=RATIO, velocity_amplitude=VELOCITY)
     for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
-        run = sb.simulate(model, shaker, law, cycles, sample_times=times, accuracy=accuracy)
+        run = sb.simulate(
+            sb.System(model, law, shaker),
+            sb.Integration(cycles=cycles, accuracy=accuracy),
+            sample_times=times,
+        )
         data = run.dataset
         worst = differences(data, truth)
         print(name, modes, accuracy, worst)

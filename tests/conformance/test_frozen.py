@@ -69,7 +69,7 @@ def compare_closely(run: sb.Run, found: dict[str, Any], stored: dict[str, Any]) 
     """Every statistic of a run that its conditioning lets compare; rounding decides the others."""
     cycles = round(float(run.dataset.attrs["cycles"]), 6)
     whole = int(cycles)
-    apart = sb.conditioning(run.system, whole if whole else 1)
+    apart = sb.conditioning(run.system, sb.Integration(cycles=whole if whole else 1))
     if float(apart.separation[-1]) > 1e-9:
         return
     for name, value in stored.items():

@@ -112,7 +112,11 @@ def test_trajectory(name, modes, cycles, at_map, at_reference) -> None:
     model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
     for accuracy, measured in (("map", at_map), ("reference", at_reference)):
-        run = sb.simulate(model, shaker, law, cycles, sample_times=times, accuracy=accuracy)
+        run = sb.simulate(
+            sb.System(model, law, shaker),
+            sb.Integration(cycles=cycles, accuracy=accuracy),
+            sample_times=times,
+        )
         bound = max(3.0 * measured, 1e-10)
         np.testing.assert_allclose(run.dataset.displacement, truth.displacement, rtol=0.0, atol=bound)
         np.testing.assert_allclose(

@@ -193,7 +193,7 @@ def compared(seed: int, modes: int) -> tuple[dict[str, float], Mixture]:
             float(np.abs(data[name].values - truth[:, i]).max()) for i, name in enumerate(names)
         )
         found.setdefault("ledger", abs(float(data.attrs["energy_error"])))
-    found["response"] = float(sb.conditioning(system, cycles).separation.max())
+    found["response"] = float(sb.conditioning(system, sb.Integration(cycles=cycles)).separation.max())
     return found, mixed
 
 

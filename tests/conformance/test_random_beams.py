@@ -68,7 +68,7 @@ def solved(rng: np.random.Generator) -> Drawn | None:
         error[accuracy] = float(np.abs(found - truth).max())
     return Drawn(
         float(np.abs(model.omega / own.omega - 1.0).max()),
-        float(sb.conditioning(system, cycles).separation[-1]),
+        float(sb.conditioning(system, sb.Integration(cycles=cycles)).separation[-1]),
         error,
         str(given),
     )

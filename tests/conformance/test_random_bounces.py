@@ -75,7 +75,7 @@ def bounced(of: Drawn) -> Bounced:
         error[level] = off.reshape(cycles, _A_CYCLE).max(axis=1)
         impulse = run.impacts.impulse.values
         assert not impulse.size or np.nanmin(impulse) >= 0.0, words
-    change = sb.conditioning(system, cycles)
+    change = sb.conditioning(system, sb.Integration(cycles=cycles))
     ends = np.searchsorted(change.cycle.values, np.arange(1, cycles + 1) - 1e-6)
     return Bounced(change.separation.values[ends], error, words)
 

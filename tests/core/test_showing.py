@@ -2,21 +2,11 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import pytest
 
 import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.reporting import counting, sharing
-
-
-@pytest.mark.parametrize("lines", ["import xarray, snapbeam", "import snapbeam, xarray"])
-def test_datasets_have_the_accessor_whichever_is_loaded_first(lines):
-    script = f"{lines}; print(xarray.Dataset().snapbeam.plot.__name__); import sys; print('matplotlib' in sys.modules)"
-    said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
-    assert said.split() == ["plot", "False"]
 
 
 @pytest.fixture(scope="module")

@@ -58,7 +58,9 @@ def test_who_is_not_there_is_refused() -> None:
     with pytest.raises(InputError, match="1 striker;"):
         sb.sensitivity(small_system(), "peak_force_striker_2", SPREAD, integration=HOW)
     with pytest.raises(InputError, match="2 strikers"):
-        sb.design(between_two(), {"velocity_amplitude": (0.1, 0.3)}, "peak_force_striker_3", [], SPREAD)
+        sb.optimize_design(
+            between_two(), {"velocity_amplitude": (0.1, 0.3)}, "peak_force_striker_3", [], SPREAD
+        )
     with pytest.raises(InputError, match="no quantity"):
         sb.Goal(of="peak_force_striker_5")
     with pytest.raises(InputError, match="statistic"):

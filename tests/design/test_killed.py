@@ -30,7 +30,9 @@ def optimum(store):
     effort = sb.Effort(generations=6, population=6, draws=16, fresh=100, candidates=3)
     variables = {"velocity_amplitude": (0.05, 0.4), "location": (0.3, 0.5)}
     limit = sb.Limit(of="snap", at_least=0.8)
-    return sb.design(small_system(), variables, "speed", limit, SPREAD, effort, integration=HOW, store=store)
+    return sb.optimize_design(
+        small_system(), variables, "speed", limit, SPREAD, effort, integration=HOW, store=store
+    )
 
 
 def tornado(store):

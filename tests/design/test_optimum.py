@@ -83,13 +83,13 @@ def test_the_quasi_static_optimum(tmp_path) -> None:
         system, {"velocity_amplitude": (0.005, 0.03)}, "velocity_amplitude",
         sb.Limit(of="snap", at_least=0.9), SPREAD, effort,
     )  # fmt: skip
-    ds = sb.design(*arguments, integration=HOW, store=tmp_path / "store")
+    ds = sb.optimize_design(*arguments, integration=HOW, store=tmp_path / "store")
     expected = float(sb.quasi_static_threshold(0.3, 0.02)) * 1.026
     assert float(ds["velocity_amplitude"][0]) == pytest.approx(expected, rel=0.08)
     assert int(ds["holds"][0]) in (1, 2)
     assert float(ds["kept_snap_low"][0]) >= 0.85 and float(ds["kept_snap"][0]) > 0.9
     tally = sb.Tally()
-    again = sb.design(*arguments, integration=HOW, store=sb.Keeping(tmp_path / "store", tally=tally))
+    again = sb.optimize_design(*arguments, integration=HOW, store=sb.Keeping(tmp_path / "store", tally=tally))
     assert tally.runs == 0 and again.equals(ds)
     fresh = sb.design_problem(*arguments[:5], integration=HOW).estimate(
         [float(ds["velocity_amplitude"][0])], np.arange(5 * 10**9, 5 * 10**9 + 200)
@@ -126,8 +126,10 @@ def test_limits_of_the_design_itself_cost_no_run() -> None:
     stroke = sb.Goal(of="stroke").quantity.of(system, {"drive.velocity_amplitude": np.array([0.2])})
     assert float(stroke[0]) == pytest.approx(0.2 * scale.length / 1.21)
     with pytest.raises(InputError, match="no design"):
-        sb.design(system, {"velocity_amplitude": (0.05, 0.4)}, "speed", sb.Limit(of="stroke", at_most=1e-9), SPREAD,
-                  sb.Effort(generations=2, population=6))  # fmt: skip
+        sb.optimize_design(
+            system, {"velocity_amplitude": (0.05, 0.4)}, "speed", sb.Limit(of="stroke", at_most=1e-9), SPREAD,
+            sb.Effort(generations=2, population=6),
+        )  # fmt: skip
 
 
 def test_intervals_of_goals_cover() -> None:
@@ -149,11 +151,17 @@ def test_intervals_of_goals_cover() -> None:
         (lambda: sb.Limit(of="peak_force"), "at_least or at_most"),
         (lambda: sb.Limit(of="snap", at_most=0.5), "at_least"),
         (lambda: sb.Effort(population=2), "population"),
-        (lambda: sb.design(small_system(), {}, "speed", [], SPREAD), "variables"),
-        (lambda: sb.design(small_system(), {"modes": (1, 2)}, "speed", [], SPREAD), "cannot be chosen"),
-        (lambda: sb.design(small_system(), {"location": (0.5, 0.2)}, "speed", [], SPREAD), "less than high"),
+        (lambda: sb.optimize_design(small_system(), {}, "speed", [], SPREAD), "variables"),
         (
-            lambda: sb.design(small_system(), {"location": (0.2, 0.5)}, "speed", [], sb.Spread()),
+            lambda: sb.optimize_design(small_system(), {"modes": (1, 2)}, "speed", [], SPREAD),
+            "cannot be chosen",
+        ),
+        (
+            lambda: sb.optimize_design(small_system(), {"location": (0.5, 0.2)}, "speed", [], SPREAD),
+            "less than high",
+        ),
+        (
+            lambda: sb.optimize_design(small_system(), {"location": (0.2, 0.5)}, "speed", [], sb.Spread()),
             "nothing differs",
         ),
     ],

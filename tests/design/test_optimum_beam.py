@@ -23,7 +23,7 @@ def test_better_than_as_many_random_designs_of_a_beam() -> None:
         effort = sb.Effort(generations=DESIGNS // 40, population=40, draws=8, fresh=400, seed=seed)
         spread = sb.Spread(of=TOLERANCE, phase=True, seed=seed)
         arguments = (small_system(), BOUNDS, "speed", LIMIT, spread)
-        ds = sb.design(*arguments, effort, integration=HOW)
+        ds = sb.optimize_design(*arguments, effort, integration=HOW)
         assert ds.sizes["tried"] == DESIGNS
         problem = sb.design_problem(*arguments, draws=8, integration=HOW)
         low, high = np.array(list(problem.bounds.values())).T
@@ -42,7 +42,7 @@ def test_the_quasi_static_threshold_is_the_optimum(place: float) -> None:
     """One mode at Omega = 0.02: the least V that snaps nearly always is V_QS1(x_s), at more places than one."""
     spread = sb.Spread(of={"velocity_amplitude": sb.Normal(0.001, relative=True)})
     effort = sb.Effort(generations=10, population=6, draws=8, fresh=40, candidates=3)
-    ds = sb.design(
+    ds = sb.optimize_design(
         small_system(frequency_ratio=0.02, location=place), {"velocity_amplitude": (0.005, 0.03)},
         "velocity_amplitude", sb.Limit(of="snap", at_least=0.8), spread, effort,
         integration=sb.Integration(cycles=1, threads=1),

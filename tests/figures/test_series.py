@@ -46,7 +46,6 @@ def test_every_plotter_takes_axes_and_returns_them(run, kind):
     ax = plt.figure().add_subplot()
     assert plotter(run.dataset, ax=ax) is ax and ax.has_data() and ax.get_xlabel() and ax.get_ylabel()
     assert isinstance(run.plot(kind), Axes)
-    assert isinstance(run.dataset.snapbeam.plot(None if kind == "run" else kind), Axes)
 
 
 def test_what_is_drawn(run):
@@ -81,20 +80,20 @@ def test_statistics_of_a_map(synthetic_map):
         dims=synthetic_map.response.dims, attrs={"units": "N", "long_name": "peak contact force"},
     )  # fmt: skip
     ds = synthetic_map.assign(peak_force=force)
-    ax = ds.snapbeam.plot("peak_force")
+    ax = figures.plot_statistic(ds, "peak_force")
     mesh = ax.collections[0]
     assert mesh.norm.vmin == pytest.approx(1e-2) and mesh.norm.vmax == pytest.approx(100.0), (
         "mN, by powers of ten"
     )
     assert "(mN)" in ax.figure.axes[1].get_ylabel()
-    line = ds.isel(frequency_ratio=3).snapbeam.plot("peak_force", ax=plt.figure().add_subplot())
+    line = figures.plot_statistic(ds.isel(frequency_ratio=3), "peak_force", ax=plt.figure().add_subplot())
     assert line.lines[0].get_ydata().size == ds.sizes["velocity_amplitude"]
     with pytest.raises(InputError, match="nosuch"):
-        ds.snapbeam.plot("nosuch")
+        figures.plot_statistic(ds, "nosuch")
 
 
 def test_a_map_over_one_axis(synthetic_map):
-    ax = synthetic_map.isel(frequency_ratio=3).snapbeam.plot()
+    ax = figures.plot_response_map(synthetic_map.isel(frequency_ratio=3))
     assert ax.get_xlabel() == "Velocity amplitude $V$" and "Centre displacement" in ax.get_ylabel()
     with pytest.raises(InputError, match="are drawn over two axes"):
         figures.plot_response_map(synthetic_map.isel(frequency_ratio=3), threshold_line=True)

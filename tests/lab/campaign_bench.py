@@ -31,8 +31,8 @@ def write_test(folder, name, ratio, velocity, *, seed=0, spoiled=None):
     lasting = {"duration": 0.1 + (CYCLES + 2) / frequency, "start_up": 0.01}
     true = lab.render_vibrometer(frequency, speed, snr_db=100.0, **lasting)
     motion = sb.RecordedDrive.from_dataset(lab.recorded_drive(true, 1e5), location=LOCATION)
-    run = sb.simulate(MODEL, motion, CONTACT, cycles=CYCLES)
-    clean = ResponseClass(run.response.response).label
+    run = sb.simulate(sb.System(MODEL, CONTACT, motion), sb.Integration(cycles=CYCLES))
+    clean = ResponseClass(run.outcome.response).label
     if spoiled == "begins in motion":
         run = run.dataset.isel(time=run.dataset.time.values > 3.3 / frequency)
         run = run.assign_coords(time=("time", run.time.values - run.time.values[0], run.time.attrs))

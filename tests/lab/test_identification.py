@@ -161,7 +161,9 @@ def test_a_simulated_beam():
     first = model.natural_freq[0]
     times = np.arange(int(0.45 * RATE)) / RATE
     run = sb.simulate(
-        model, cycles=40, initial_state=(state, np.zeros(state.size)), sample_times=times[times * first < 40]
+        sb.System(model, start=sb.State(amplitude=state, velocity=np.zeros(state.size))),
+        sb.Integration(cycles=40),
+        sample_times=times[times * first < 40],
     )
     wanted = run.dataset["center_displacement"].values
     noise = 0.07 * 10.0 ** (-40.0 / 20.0) * np.random.default_rng(0).standard_normal(wanted.size)

@@ -1,4 +1,4 @@
-"""Readers and writers of time series, SEP 5, and what is refused."""
+"""Readers and writers of time series, and what is refused."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from snapbeam.core.validate import InputError
 from snapbeam.lab.signals.files import read_channels, read_signal, write_signal
-from snapbeam.lab.signals.sep5 import from_sep5, to_sep5
 from snapbeam.lab.signals.signal import check_signal, even_sampling, make_signal
 from snapbeam.lab.signals.units import parse_sensitivity, si_unit
 
@@ -45,33 +44,6 @@ def test_round_trip(tmp_path, kind):
 def test_uff_keeps_a_rate_whose_step_does_not_fit_six_digits(tmp_path):
     back = read(write(tmp_path, "uff", velocity(rate=44_100.0)))
     assert check_signal(back).sampling_freq == pytest.approx(44_100.0, rel=1e-12)
-
-
-def test_sep5_both_ways():
-    signal = velocity()
-    channel = to_sep5(signal)
-    assert {"data", "name", "unit_str", "fs"} <= set(channel) and channel["unit_str"] == "m/s"
-    xr.testing.assert_allclose(from_sep5(channel), signal, rtol=1e-14)
-    uneven = {"data": signal.values, "time": signal["time"].values, "name": "v", "unit_str": "mm/s"}
-    np.testing.assert_allclose(from_sep5(uneven).values, 1e-3 * signal.values)
-
-
-@pytest.mark.parametrize(
-    ("change", "word"),
-    [
-        ({"unit_str": None}, "unit_str is empty"),
-        ({"Fs": 12e3}, "prohibited"),
-        ({"unit": "m/s"}, "prohibited"),
-        ({"unit_str": "furlong"}, "furlong"),
-        ({"fs": -1.0}, "sampling_freq"),
-        ({"time": np.arange(400) / 6e3}, "fs"),
-        ({"data": np.full(400, np.nan)}, "must be finite"),
-        ({"data": np.zeros((20, 20))}, "1 dimension"),
-    ],
-)
-def test_sep5_refusals(change, word):
-    with pytest.raises(InputError, match=word):
-        from_sep5({**to_sep5(velocity(start=0.0)), **change})
 
 
 def test_units():

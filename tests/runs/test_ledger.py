@@ -56,6 +56,8 @@ def test_energy_out_of_nothing_is_no_result() -> None:
 def test_free_vibration_is_balanced() -> None:
     model = sb.ReducedModel.from_beam(paper.BEAM, 4)
     start = (0.9 * np.asarray(model.equilibrium), np.zeros(4))
-    run = sb.simulate(model, cycles=3, initial_state=start)
+    run = sb.simulate(
+        sb.System(model, start=sb.State(amplitude=start[0], velocity=start[1])), sb.Integration(cycles=3)
+    )
     assert run.outcome.status == sb.RunStatus.OK
     assert abs(run.dataset.attrs["energy_error"]) < 1e-4

@@ -34,26 +34,26 @@ def sine_record(model, ratio, amplitude, cycles, side="below"):
 def test_a_recorded_sine_is_the_sinusoidal_shaker(model, side):
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.05, side=side)
     times = np.linspace(0.0, 7.9 / (1.21 * model.reference_freq), 900)
-    exact = sb.simulate(model, shaker, paper.CONTACT, cycles=8, sample_times=times)
+    exact = sb.simulate(sb.System(model, paper.CONTACT, shaker), sb.Integration(cycles=8), sample_times=times)
     drive = sine_record(model, 1.21, 0.05, 8, side)
-    run = sb.simulate(model, drive, paper.CONTACT, cycles=8, sample_times=times)
-    assert run.response.impacts == exact.response.impacts
+    run = sb.simulate(sb.System(model, paper.CONTACT, drive), sb.Integration(cycles=8), sample_times=times)
+    assert run.outcome.impacts == exact.outcome.impacts
     for name, bound in (("displacement", 1e-5), ("shaker_displacement", 1e-8)):
         assert float(abs(run.dataset[name] - exact.dataset[name]).max()) < bound
 
 
 def test_the_whole_record_is_the_default_and_more_is_refused(model):
     drive = sine_record(model, 1.0, 0.05, 3)
-    run = sb.simulate(model, drive, paper.CONTACT)
+    run = sb.simulate(sb.System(model, paper.CONTACT, drive))
     assert run.dataset.attrs["cycles"] == pytest.approx(drive.duration * drive.frequency)
     assert run.dataset.attrs["drive"] == "recorded"
     with pytest.raises(sb.InputError, match=r"cycles = 9.*at most the 3\.\d cycles"):
-        sb.simulate(model, drive, paper.CONTACT, cycles=9)
+        sb.simulate(sb.System(model, paper.CONTACT, drive), sb.Integration(cycles=9))
 
 
 def test_the_ledger_closes(model):
     drive = sine_record(model, 1.21, 0.18, 6)
-    ds = sb.simulate(model, drive, paper.CONTACT, cycles=6).dataset
+    ds = sb.simulate(sb.System(model, paper.CONTACT, drive), sb.Integration(cycles=6)).dataset
     residual = ds.energy_beam + ds.energy_contact + ds.energy_dissipated - ds.work_shaker
     assert float(abs(residual).max()) < 1e-4 * ds.attrs["gross_work"]
 

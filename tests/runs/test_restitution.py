@@ -25,7 +25,12 @@ def test_free_mass_rebounds_with_its_coefficient():
     )
     wall = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0)
     for coefficient in (0.25, 0.5, 1.0):
-        run = sb.simulate(model, wall, sb.Restitution(coefficient), cycles=1, initial_state=([0.0], [-speed]))
+        run = sb.simulate(
+            sb.System(
+                model, sb.Restitution(coefficient), wall, start=sb.State(amplitude=[0.0], velocity=[-speed])
+            ),
+            sb.Integration(cycles=1),
+        )
         assert run.impacts.impulse.values == pytest.approx([(1.0 + coefficient) * mass * speed], rel=1e-12)
         last = run.dataset.displacement.values * 1e-3
         slope = np.diff(last)[-1] / np.diff(run.dataset.time.values)[-1]
@@ -36,16 +41,16 @@ def test_free_mass_rebounds_with_its_coefficient():
 @pytest.mark.parametrize(("ratio", "amplitude"), [(1.21, 0.18), (0.5, 0.3)])
 def test_ledger_closes_and_the_tip_stays_outside(one_mode, coefficient, ratio, amplitude):
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=amplitude)
-    run = sb.simulate(one_mode, shaker, sb.Restitution(coefficient), cycles=20)
-    assert run.response.status is sb.RunStatus.OK
+    run = sb.simulate(sb.System(one_mode, sb.Restitution(coefficient), shaker), sb.Integration(cycles=20))
+    assert run.outcome.status is sb.RunStatus.OK
     assert ledger(run) < 1e-4
     assert float(run.dataset.penetration.max()) < 2e-3  # of b: one cubic against the exact flow inside a step
 
 
 def test_a_plastic_impact_sticks_until_the_force_would_pull(one_mode):
     shaker = sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05)
-    run = sb.simulate(one_mode, shaker, sb.Restitution(0.0), cycles=4)
-    assert run.response.contact_share > 0.3
+    run = sb.simulate(sb.System(one_mode, sb.Restitution(0.0), shaker), sb.Integration(cycles=4))
+    assert run.outcome.contact_share > 0.3
     together = run.impacts.duration.values > 0.0
     assert together.any()
     assert (run.impacts.peak_force.values[together] > 0.0).all()
@@ -58,23 +63,27 @@ def test_a_plastic_impact_sticks_until_the_force_would_pull(one_mode):
 def test_mirror_image_is_exact(one_mode):
     runs = [
         sb.simulate(
-            one_mode,
-            sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18, side=side),
-            sb.Restitution(0.6),
-            cycles=20,
+            sb.System(
+                one_mode,
+                sb.Restitution(0.6),
+                sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18, side=side),
+            ),
+            sb.Integration(cycles=20),
         )
         for side in ("below", "above")
     ]
     below, above = (run.dataset.modal_amplitude.values for run in runs)
     assert np.array_equal(below, -above)
-    assert runs[0].response.crossings == runs[1].response.crossings
+    assert runs[0].outcome.crossings == runs[1].outcome.crossings
 
 
 @pytest.mark.parametrize("coefficient", [0.0, 0.6, 1.0])
 def test_one_mode_has_one_shape(one_mode, coefficient):
     """Extremes at the striker and at the centre are in the ratio of the shape, exactly: no hit is passed over."""
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3, location=0.3)
-    outcome = sb.simulate(one_mode, shaker, sb.Restitution(coefficient), cycles=30).outcome
+    outcome = sb.simulate(
+        sb.System(one_mode, sb.Restitution(coefficient), shaker), sb.Integration(cycles=30)
+    ).outcome
     ratio = float(one_mode.center_shape[0] / one_mode.shape_at(0.3)[0])
     for name in ("min", "max"):
         at_striker, at_center = outcome[f"{name}_displacement"], outcome[f"{name}_center_displacement"]
@@ -84,11 +93,12 @@ def test_one_mode_has_one_shape(one_mode, coefficient):
 def test_no_force_is_told_of_an_impact_that_lasts_no_time(one_mode):
     """As the table of impacts says of each; where the bodies stay together there is one."""
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
-    run = sb.simulate(one_mode, shaker, sb.Restitution(0.6), cycles=10)
+    run = sb.simulate(sb.System(one_mode, sb.Restitution(0.6), shaker), sb.Integration(cycles=10))
     assert run.outcome.impacts > 0 and np.isnan(run.outcome.peak_force)
     assert np.isnan(run.impacts.peak_force.values).all()
     held = sb.simulate(
-        one_mode, sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05), sb.Restitution(0.0), cycles=2
+        sb.System(one_mode, sb.Restitution(0.0), sb.Shaker(frequency_ratio=0.1, velocity_amplitude=0.05)),
+        sb.Integration(cycles=2),
     )
     assert held.outcome.peak_force == pytest.approx(float(np.nanmax(held.impacts.peak_force)), rel=1e-9)
 
@@ -101,11 +111,8 @@ def test_early_decision_is_kept_and_told(one_mode, coefficient):
         shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=float(amplitude))
         full, early = (
             sb.simulate(
-                one_mode,
-                shaker,
-                sb.Restitution(coefficient),
-                cycles=60,
-                early_decision=flag,
+                sb.System(one_mode, sb.Restitution(coefficient), shaker),
+                sb.Integration(cycles=60, early_decision=flag),
                 sample_times=[0.0],
             )
             for flag in (False, True)
@@ -123,16 +130,17 @@ def test_a_map_takes_the_law(one_mode):
     assert ds.attrs["restitution_coefficient"] == 0.6
     assert (ds.response >= 0).all()
     run = sb.simulate(
-        one_mode, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.3), sb.Restitution(0.6), cycles=10
+        sb.System(one_mode, sb.Restitution(0.6), sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.3)),
+        sb.Integration(cycles=10),
     )
-    assert int(ds.crossings[1, 1]) == run.response.crossings
+    assert int(ds.crossings[1, 1]) == run.outcome.crossings
 
 
 def test_many_modes_are_refused_and_the_reason_is_true():
     model = sb.ReducedModel.from_beam(paper.BEAM, modes=8)
     shaker = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1)
     with pytest.raises(sb.InputError, match=r"modes = 8.*one mode.*falls to zero"):
-        sb.simulate(model, shaker, sb.Restitution(0.5), cycles=1)
+        sb.simulate(sb.System(model, sb.Restitution(0.5), shaker), sb.Integration(cycles=1))
     beam = paper.BEAM
     total = beam.mass_per_length * beam.length
     masses = {

@@ -27,7 +27,9 @@ def model_of(modes: int, damping_ratio: float = 0.005) -> sb.ReducedModel:
 def simulate(modes: int, ratio: float, velocity: float, cycles: int, **options: Any) -> sb.Run:
     drive = {name: options.pop(name) for name in ("location", "side") if name in options}
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, **drive)
-    return sb.simulate(model_of(modes), shaker, paper.CONTACT, cycles, **options)
+    sample_times, start = options.pop("sample_times", None), options.pop("start", None)
+    system = sb.System(model_of(modes), paper.CONTACT, shaker, start)
+    return sb.simulate(system, sb.Integration(cycles=cycles, **options), sample_times=sample_times)
 
 
 def kick(modes: int, share: float) -> np.ndarray:
@@ -78,7 +80,9 @@ def test_energy_of_the_dataset_is_that_of_its_amplitudes() -> None:
     """Without damping the velocity follows from the energy: zero at a turning point of one mode."""
     model = model_of(1, 0.0)
     start = (model.equilibrium, kick(1, 0.5) * 1.0)
-    data = sb.simulate(model, initial_state=start, cycles=3).dataset
+    data = sb.simulate(
+        sb.System(model, start=sb.State(amplitude=start[0], velocity=start[1])), sb.Integration(cycles=3)
+    ).dataset
     energy = model.kinetic_energy(start[1]) + model.potential_energy(start[0]) - model.well_energy
     np.testing.assert_allclose(data.energy_beam, energy, rtol=1e-6)
     potential = model.potential_energy(data.modal_amplitude.values) - model.well_energy
@@ -91,7 +95,10 @@ def test_energy_of_the_dataset_is_that_of_its_amplitudes() -> None:
 def test_free_decay_dissipates_what_the_beam_loses(modes: int, bound: float) -> None:
     """Measured over eight cycles: below 3e-7; for N = 32 5.4e-5, and 2e-8 at a quarter of the step."""
     data = sb.simulate(
-        model_of(modes), initial_state=(model_of(modes).equilibrium, kick(modes, 0.6)), cycles=8
+        sb.System(
+            model_of(modes), start=sb.State(amplitude=model_of(modes).equilibrium, velocity=kick(modes, 0.6))
+        ),
+        sb.Integration(cycles=8),
     )
     total = (data.dataset.energy_beam + data.dataset.energy_dissipated).values
     assert np.abs(total / total[0] - 1.0).max() < bound
@@ -157,18 +164,24 @@ def test_mirror_image(modes: int) -> None:
             assert other[name] == -value
         else:
             np.testing.assert_equal(other[name], value)
-    assert below.response.crossings > 0
+    assert below.outcome.crossings > 0
 
 
 def test_negated_start() -> None:
     model = model_of(8)
     alpha, velocity = model.equilibrium * 1.1, kick(8, 1.6)
-    below = simulate(8, 1.1, 0.2, 3, initial_state=(alpha, velocity))
-    above = simulate(8, 1.1, 0.2, 3, initial_state=(-alpha, -velocity), side="above")
+    below = simulate(8, 1.1, 0.2, 3, start=sb.State(amplitude=alpha, velocity=velocity))
+    above = simulate(8, 1.1, 0.2, 3, start=sb.State(amplitude=-alpha, velocity=-velocity), side="above")
     np.testing.assert_array_equal(above.dataset.modal_amplitude, -below.dataset.modal_amplitude)
     np.testing.assert_array_equal(above.dataset.contact_force, below.dataset.contact_force)
     # a free beam has no shaker to say which well the arithmetic begins in: equal but for rounding
-    free = [sb.simulate(model, initial_state=(s * alpha, s * velocity), cycles=3) for s in (1.0, -1.0)]
+    free = [
+        sb.simulate(
+            sb.System(model, start=sb.State(amplitude=s * alpha, velocity=s * velocity)),
+            sb.Integration(cycles=3),
+        )
+        for s in (1.0, -1.0)
+    ]
     np.testing.assert_allclose(free[1].dataset.displacement, -free[0].dataset.displacement, atol=1e-11)
 
 
@@ -233,7 +246,7 @@ def test_default_sampling_shows_every_contact(modes: int, pair: tuple[float, flo
     ],
 )
 def test_response_agrees_with_the_dataset(modes: int, pair: tuple[float, float], cycles: int) -> None:
-    response = (run := simulate(modes, *pair, cycles)).response
+    response = (run := simulate(modes, *pair, cycles)).outcome
     end = cycles / (pair[0] * model_of(modes).reference_freq)
     shown = simulate(modes, *pair, cycles, sample_times=np.linspace(0.0, end, 60_001)).dataset
     center = shown.center_displacement.values
@@ -312,7 +325,10 @@ def test_nothing_is_final_of_a_beam_that_is_still_struck() -> None:
     model, changed = model_of(1), 0
     for velocity in np.linspace(0.05, 0.4, 36):
         shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=float(velocity))
-        short, long = (sb.simulate(model, shaker, paper.CONTACT, n, sample_times=[0.0]) for n in (10, 200))
+        short, long = (
+            sb.simulate(sb.System(model, paper.CONTACT, shaker), sb.Integration(cycles=n), sample_times=[0.0])
+            for n in (10, 200)
+        )
         if short.outcome.final_well < 0:
             assert not short.outcome.end_is_final
             changed += long.outcome.crossings != short.outcome.crossings
@@ -326,28 +342,31 @@ def test_class_is_told_by_the_end(start: float) -> None:
     """A beam thrown over the barrier once, from the lower well, is transient; it rests where it is seen."""
     model = model_of(2, 0.05)
     velocity = -start * model.linear_modes[:, 0] * math.sqrt(3.5 * (model.barrier_energy - model.well_energy))
-    run = sb.simulate(model, initial_state=(-start * model.equilibrium, velocity), cycles=60)
-    assert run.response.final_well == np.sign(run.dataset.center_displacement.values[-1])
-    assert run.response.end_is_final
+    run = sb.simulate(
+        sb.System(model, start=sb.State(amplitude=-start * model.equilibrium, velocity=velocity)),
+        sb.Integration(cycles=60),
+    )
+    assert run.outcome.final_well == np.sign(run.dataset.center_displacement.values[-1])
+    assert run.outcome.end_is_final
     if start < 0.0:
-        assert run.response.response == (
-            ResponseClass.TRANSIENT_2 if run.response.crossings % 2 else ResponseClass.TRANSIENT_1
+        assert run.outcome.response == (
+            ResponseClass.TRANSIENT_2 if run.outcome.crossings % 2 else ResponseClass.TRANSIENT_1
         )
 
 
 def test_early_decision_ends_the_recording() -> None:
     full, early = (simulate(1, 1.21, 0.36, 60, early_decision=flag) for flag in (False, True))
-    assert early.response.status == RunStatus.DECIDED
-    assert early.response.response == full.response.response
-    assert early.response.decided_at < full.dataset.time[-1]
-    assert early.dataset.time[-1] <= early.response.decided_at
+    assert early.outcome.status == RunStatus.DECIDED
+    assert early.outcome.response == full.outcome.response
+    assert early.outcome.decided_at < full.dataset.time[-1]
+    assert early.dataset.time[-1] <= early.outcome.decided_at
 
 
 def test_instants_after_an_early_decision() -> None:
     full = simulate(1, 1.21, 0.36, 60, early_decision=True)
-    late = [full.response.decided_at + 0.01]
+    late = [full.outcome.decided_at + 0.01]
     run = simulate(1, 1.21, 0.36, 60, early_decision=True, sample_times=late)
-    assert run.response.decided_at == full.response.decided_at
+    assert run.outcome.decided_at == full.outcome.decided_at
     assert run.dataset.time.values.tolist() == late
     assert run.dataset.valid.values.tolist() == [0]
     assert np.isnan(run.dataset.displacement.values).all()
@@ -358,16 +377,21 @@ def test_instants_after_an_early_decision() -> None:
 
 def test_a_run_that_overflows_says_so() -> None:
     """A failed run does not raise: its class is unknown and its status says why."""
-    run = sb.simulate(model_of(2), initial_state=([1e200, 0.0], [0.0, 0.0]), cycles=2)
-    assert run.response.response == ResponseClass.UNKNOWN
-    assert run.response.status == RunStatus.NOT_FINITE
-    assert math.isnan(run.response.max_displacement)
+    run = sb.simulate(
+        sb.System(model_of(2), start=sb.State(amplitude=[1e200, 0.0], velocity=[0.0, 0.0])),
+        sb.Integration(cycles=2),
+    )
+    assert run.outcome.response == ResponseClass.UNKNOWN
+    assert run.outcome.status == RunStatus.NOT_FINITE
+    assert math.isnan(run.outcome.max_displacement)
     assert run.dataset.attrs["status"].startswith("NOT_FINITE: ")
     assert run.dataset.time.values.tolist() == [0.0]
     assert run.dataset.valid.values.tolist() == [0]
     assert run.end is None
     some = sb.simulate(
-        model_of(2), initial_state=([1e200, 0.0], [0.0, 0.0]), cycles=2, sample_times=[0.0, 0.01]
+        sb.System(model_of(2), start=sb.State(amplitude=[1e200, 0.0], velocity=[0.0, 0.0])),
+        sb.Integration(cycles=2),
+        sample_times=[0.0, 0.01],
     )
     assert some.dataset.valid.values.tolist() == [0, 0]
 
@@ -376,6 +400,9 @@ def test_transient_2_from_the_upper_well() -> None:
     """classify() takes +1 for the well opposite to the one the run began in: one crossing is transient 2."""
     model = model_of(2, 0.05)
     velocity = model.linear_modes[:, 0] * math.sqrt(3.75 * (model.barrier_energy - model.well_energy))
-    response = sb.simulate(model, initial_state=(-model.equilibrium, velocity), cycles=40).response
+    response = sb.simulate(
+        sb.System(model, start=sb.State(amplitude=-model.equilibrium, velocity=velocity)),
+        sb.Integration(cycles=40),
+    ).outcome
     assert (response.crossings, response.final_well) == (1, -1)
     assert response.response == ResponseClass.TRANSIENT_2

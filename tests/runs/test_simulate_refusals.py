@@ -23,13 +23,17 @@ SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
             sb.InputError,
             r"needs a buckled beam: axial_load = 0 N must exceed .* 24.3685 N",
         ),
-        ({"model": paper.BEAM}, sb.InputTypeError, r"model = Beam\(.*: must be a System or a ReducedModel"),
+        ({"model": paper.BEAM}, sb.InputTypeError, r"model = Beam\(.*: must be a ReducedModel"),
         (
-            {"shaker": 1.21},
+            {"striker": 1.21},
             sb.InputTypeError,
             "striker = 1.21: must be a Striker, a Shaker or a RecordedDrive",
         ),
-        ({"shaker": None}, sb.InputError, r"striker = None: .* needs a start to move from \(initial_state\)"),
+        (
+            {"striker": None},
+            sb.InputError,
+            r"striker = None: .* needs a start to move from \(initial_state\)",
+        ),
         (
             {"contact": None},
             sb.InputError,
@@ -50,27 +54,6 @@ SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
         ({"step": "1e-6"}, sb.InputTypeError, "step = '1e-6': must be .* not str"),
         ({"accuracy": "best"}, sb.InputError, "accuracy = 'best': must be one of 'map', 'reference'"),
         ({"engine": "abacus"}, sb.InputError, "engine = 'abacus': must be one of 'auto', 'cpu'"),
-        (
-            {"reference_freq": -80.0},
-            sb.InputError,
-            "reference_freq = -80.0: must be a finite number greater than 0",
-        ),
-        ({"initial_state": 5}, sb.InputTypeError, "initial_state: must be a pair of arrays"),
-        (
-            {"initial_state": ([0.0], [0.0])},
-            sb.InputError,
-            r"amplitudes of shape \(1,\): must have shape \(2,\)",
-        ),
-        (
-            {"initial_state": ([0, 0], [0, math.nan])},
-            sb.InputError,
-            r"velocities\[1\] = .*nan.*: must be finite",
-        ),
-        (
-            {"initial_state": ("ab", "cd")},
-            sb.InputTypeError,
-            "amplitudes = 'ab': must be an array of numbers",
-        ),
         ({"sample_times": []}, sb.InputError, r"sample_times = \[\]: must hold at least one instant"),
         ({"sample_times": [0.0, 0.0]}, sb.InputError, "sample_times: must be strictly increasing"),
         ({"sample_times": [-1.0, 0.0]}, sb.InputError, "from -1 to 0 s: must lie within the run, 0 to"),
@@ -80,9 +63,17 @@ SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
     ],
 )
 def test_refusals(changes: dict[str, Any], error: type[Exception], message: str) -> None:
-    given: dict[str, Any] = {"model": BUCKLED, "shaker": SHAKER, "contact": paper.CONTACT, "cycles": 1}
+    given: dict[str, Any] = {
+        "model": BUCKLED,
+        "striker": SHAKER,
+        "contact": paper.CONTACT,
+        "cycles": 1,
+        **changes,
+    }
+    system = {name: given.pop(name) for name in ("model", "striker", "contact")}
+    times = given.pop("sample_times", None)
     with pytest.raises(error, match=message):
-        sb.simulate(**(given | changes))
+        sb.simulate(sb.System(**system), sb.Integration(**given), sample_times=times)
 
 
 SYSTEM = sb.System(BUCKLED, paper.CONTACT, SHAKER)
@@ -92,25 +83,11 @@ SYSTEM = sb.System(BUCKLED, paper.CONTACT, SHAKER)
     ("call", "error", "message"),
     [
         (lambda: sb.simulate(SYSTEM, 200), sb.InputTypeError, "integration = 200: must be an Integration"),
-        (
-            lambda: sb.simulate(SYSTEM, cycles=3),
-            sb.InputTypeError,
-            "cycles: with a System, what is left is one Integration",
-        ),
-        (
-            lambda: sb.simulate(SYSTEM, sb.Integration(), sb.Integration()),
-            sb.InputTypeError,
-            "arguments: with a System, what is left is one Integration",
-        ),
+        (lambda: sb.simulate(BUCKLED), sb.InputTypeError, "system = .*: must be a System"),
         (
             lambda: sb.simulate(sb.System(BUCKLED)),
             sb.InputError,
             r"striker = None: a beam that nothing strikes needs a start to move from \(initial_state\)",
-        ),
-        (
-            lambda: sb.simulate(BUCKLED, SHAKER, paper.CONTACT, 3, speed=1),
-            sb.InputTypeError,
-            "speed: no parameter of a run",
         ),
         (
             lambda: sb.simulate(SYSTEM, sb.Integration(cycles=10**6)),

@@ -65,7 +65,9 @@ def test_every_point_is_its_run(modes: int) -> None:
     for i, ratio in enumerate(RATIO):
         for j in (0, 2):
             shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=VELOCITY[j])
-            response = sb.simulate(model_of(modes), shaker, paper.CONTACT, 4).response
+            response = sb.simulate(
+                sb.System(model_of(modes), paper.CONTACT, shaker), sb.Integration(cycles=4)
+            ).outcome
             point = {name: ds[name].values[i, j].item() for name in STATISTICS}
             np.testing.assert_equal(point, dict(response))
 

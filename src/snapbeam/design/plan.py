@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, positive
 from snapbeam.design.events import OUTCOMES
-from snapbeam.design.optimum.design import Effort, design
+from snapbeam.design.optimum.design import Effort, optimize_design
 from snapbeam.design.probability.allocation import Allocation
 from snapbeam.design.probability.probability_map import allocation_of, probability_map
 from snapbeam.design.proportion import wilson
@@ -83,7 +83,7 @@ def plan(question: Callable[..., Any], *arguments: Any, trial: float = 10.0, **o
     ----------
     question : callable
         :func:`snapbeam.sweep`, :func:`snapbeam.probability_map`, :func:`snapbeam.quantile_threshold` or
-        :func:`snapbeam.design`.
+        :func:`snapbeam.optimize_design`.
     *arguments, **options
         As it would be called with; nothing is written to its store.
     trial : float
@@ -105,9 +105,9 @@ def plan(question: Callable[..., Any], *arguments: Any, trial: float = 10.0, **o
         return _of_probability(trial, *arguments, **options)
     if question is quantile_threshold:
         return _of_threshold(trial, *arguments, **options)
-    if question is design:
+    if question is optimize_design:
         return _of_design(trial, *arguments, **options)
-    raise InputError("question: must be sweep, probability_map, quantile_threshold or design")
+    raise InputError("question: must be sweep, probability_map, quantile_threshold or optimize_design")
 
 
 def _of_sweep(

@@ -228,7 +228,6 @@ class Page:
             before.cancel()
         self._tokens[which] = token = Token(RUN_SECONDS)
         self.points[which] = point
-        self.shared.asked()
         base, how = self.card.system, self.card.integration
 
         def work(token: Token) -> Answer:

@@ -16,7 +16,6 @@ from tornado.web import RequestHandler
 
 from snapbeam import InputError
 from snapbeam.explorer.limits import BODY, SESSIONS
-from snapbeam.explorer.ready import keep_ready
 from snapbeam.explorer.shared import Shared
 
 __all__ = ["Gate", "is_loopback", "make_server"]
@@ -146,7 +145,6 @@ def make_server(
         )  # fmt: skip
     except OSError as error:
         raise InputError(f"port = {port}: cannot be used, {error.strerror or error}") from None
-    keep_ready(server, shared)
     shown = "127.0.0.1" if address == "0.0.0.0" else address
     return server, f"http://{shown}:{taken}/" + (f"?token={token}" if token else ""), token
 

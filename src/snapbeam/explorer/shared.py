@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections import OrderedDict
 from pathlib import Path
 from typing import Any
@@ -40,7 +39,6 @@ class Shared:
         self.compiling = Compiling()
         self._warm = False
         self.pages = 0
-        self._asked = 0.0
         self._lock = threading.Lock()
         self._windows: OrderedDict[Any, Window] = OrderedDict()
         self.system: System | None = None
@@ -64,14 +62,6 @@ class Shared:
             return sb.simulate(system, short, progress=token.check).dataset
 
         self.jobs.run(work, lambda *_: self.compiling.over(), Token())
-
-    def asked(self) -> None:
-        """Somebody asks for a run."""
-        self._asked = time.monotonic()
-
-    def rests(self, seconds: float) -> bool:
-        """Whether nobody has asked for a run for so long."""
-        return time.monotonic() - self._asked > seconds
 
     def window(self, made: Window) -> Window:
         """The window that was computed for the same question, or *made*, kept from now on."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -43,12 +44,18 @@ def paper_model(modes: int, damping_ratio: ArrayLike = DAMPING_RATIO) -> sb.Redu
 def paper_run(
     modes: int, frequency_ratio: float, velocity_amplitude: float, cycles: int, **more: Any
 ) -> sb.Run:
-    """One run of the paper's beam and shaker; *more* is for :func:`snapbeam.simulate`, and the location."""
-    location = more.pop("location", LOCATION)
+    """Simulate the paper's beam and shaker.
+
+    *more* may hold the location, the reference frequency, the sample times, and options of an
+    :class:`~snapbeam.Integration`.
+    """
+    location, sample_times = more.pop("location", LOCATION), more.pop("sample_times", None)
+    model = replace(paper_model(modes), given_reference_freq=more.pop("reference_freq", None))
     shaker = sb.Shaker(
         frequency_ratio=frequency_ratio, velocity_amplitude=velocity_amplitude, location=location
     )
-    return sb.simulate(paper_model(modes), shaker, CONTACT, cycles=cycles, **more)
+    integration = sb.Integration(cycles=cycles, **more)
+    return sb.simulate(sb.System(model, CONTACT, shaker.striker()), integration, sample_times=sample_times)
 
 
 def class_map(results: Results, what: str, model: sb.ReducedModel, **axes: Any) -> xr.Dataset:

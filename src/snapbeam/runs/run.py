@@ -84,11 +84,6 @@ class Run:
     def __getstate__(self) -> dict[str, Any]:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
-    @property
-    def response(self) -> Outcome:
-        """The outcome, by the name it had in version 0.1."""
-        return self.outcome
-
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the run to a NetCDF file, whole or not at all; :func:`snapbeam.load_run` reads it back.
 

@@ -15,10 +15,7 @@ from snapbeam.core.validate import InputTypeError, shown
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.cpu.driver import usable_cores
 from snapbeam.engines.registry import resolve
-from snapbeam.model.contact import ContactLaw
-from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import Integration
-from snapbeam.model.striker import RecordedDrive, Shaker, Striker
 from snapbeam.model.system import System
 from snapbeam.runs.outcome import Outcome
 from snapbeam.runs.recording import check_memory, end_state, prepared, reached_by, said_of
@@ -33,7 +30,6 @@ __all__ = ["simulate"]
 def simulate(
     system: System,
     integration: Integration | None = None,
-    /,
     *,
     sample_times: ArrayLike | None = None,
     progress: Callable[[float], object] | bool | None = None,
@@ -44,48 +40,24 @@ def simulate(
 def simulate(
     system: Sequence[System],
     integration: Integration | None = None,
-    /,
     *,
     sample_times: ArrayLike | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> list[Run]: ...
 
 
-@overload
 def simulate(
-    model: ReducedModel,
-    shaker: Striker | Shaker | RecordedDrive | None = None,
-    contact: ContactLaw | None = None,
-    cycles: int | None = None,
+    system: System | Sequence[System],
+    integration: Integration | None = None,
     *,
-    step: float | None = None,
-    tolerance: float | None = None,
-    accuracy: str = "map",
-    engine: str = "auto",
-    initial_state: tuple[ArrayLike, ArrayLike] | None = None,
-    sample_times: ArrayLike | None = None,
-    early_decision: bool = False,
-    reference_freq: float | None = None,
-    progress: Callable[[float], object] | bool | None = None,
-) -> Run: ...
-
-
-def simulate(
-    model: System | Sequence[System] | ReducedModel,
-    *parts: Any,
     sample_times: ArrayLike | None = None,
     progress: Any = None,
-    **options: Any,
 ) -> Run | list[Run]:
     """Integrate one run and record it.
 
     The beam starts at rest in the well that the striker pushes it out of (the lower one for a striker below), the tip
     touching it (Eqs. 11-18), or where the system says.  Without a striker the beam vibrates freely from the system's
     start, and a cycle is one of the first mode.
-
-    Called as ``simulate(system, integration)``, or, as in version 0.1, with the parts and options by themselves:
-    ``simulate(model, shaker, contact, cycles, step=..., tolerance=..., accuracy=..., engine=..., initial_state=...,
-    early_decision=..., reference_freq=...)``.
 
     Parameters
     ----------
@@ -111,9 +83,9 @@ def simulate(
         For bad input, and for a run whose samples would take more than 4 GiB.  A run that fails numerically does not
         raise: ``run.outcome.status`` says why.
     """
-    if isinstance(model, (list, tuple)):
-        return _several(model, parts, options, sample_times, progress)
-    system, integration = asked(model, parts, options)
+    if isinstance(system, (list, tuple)):
+        return _several(system, integration, sample_times, progress)
+    system, integration = asked(system, integration)
     report = sharing(progress, "run")
     run = prepared(system, integration, sample_times)
     times, ensemble = run.times, run.ensemble
@@ -142,14 +114,14 @@ def simulate(
 
 
 def _several(
-    systems: Sequence[Any], parts: Any, options: Any, sample_times: ArrayLike | None, progress: Any
+    systems: Sequence[Any], integration: Integration | None, sample_times: ArrayLike | None, progress: Any
 ) -> list[Run]:
     """Runs of several systems, on all cores: kernels give up the interpreter's lock."""
     report = counting(progress, "simulate", "runs")
     for at, system in enumerate(systems):
         if not isinstance(system, System):
             raise InputTypeError(f"system[{at}] = {shown(system)}: must be a System")
-    checked = [asked(system, parts, dict(options)) for system in systems]
+    checked = [asked(system, integration) for system in systems]
     threads = next((each.threads for _, each in checked), None) or usable_cores()
     with ThreadPoolExecutor(max_workers=max(1, min(threads, len(systems) or 1))) as pool:
         waiting = [pool.submit(simulate, system, each, sample_times=sample_times) for system, each in checked]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,22 +80,19 @@ class Accuracy:
 
 
 def conditioning(
-    model: System | Any,
-    *parts: Any,
+    system: System,
+    integration: Integration | None = None,
+    *,
     accuracy: str = "reference",
     perturbation: float = PERTURBATION,
-    **options: Any,
 ) -> xr.Dataset:
     """How far a tiny change of the drive moves a run: what no integrator can promise to undercut.
-
-    Called as ``conditioning(system, cycles)``, or, as in version 0.1, with the parts:
-    ``conditioning(model, shaker, contact, cycles, initial_state=..., reference_freq=...)``.
 
     Parameters
     ----------
     system : System
-    cycles : int, optional
-        As for an :class:`~snapbeam.Integration`.
+    integration : Integration, optional
+        The number of cycles and the solver settings.  ``accuracy`` takes the place of its accuracy and tolerance.
     accuracy : {"map", "reference"}
         Steps of the two runs compared.
     perturbation : float
@@ -116,9 +113,7 @@ def conditioning(
 
     size = positive("perturbation", perturbation)
     level = choice("accuracy", accuracy, ACCURACIES)
-    if isinstance(model, System) and len(parts) == 1 and not isinstance(parts[0], Integration):
-        parts = (Integration(cycles=parts[0]),)
-    system, integration = asked(model, parts, options)
+    system, integration = asked(system, integration)
     integration = integration.replace(accuracy=level, tolerance=None, early_decision=False)
     plan = plans_of(system, integration, run_columns(system, {}))[0]
     ensemble = make_ensemble(system, integration, plan=plan)

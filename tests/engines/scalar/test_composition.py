@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -34,12 +35,9 @@ def state_after(model: sb.ReducedModel, accuracy: str, steps: int) -> np.ndarray
         velocity = velocity + model.linear_modes[:, 1] * math.sqrt(0.1 * energy)
     period = 1.0 / model.reference_freq
     return sb.simulate(
-        model,
-        initial_state=(model.equilibrium, velocity),
-        cycles=2,
+        sb.System(model, start=sb.State(amplitude=model.equilibrium, velocity=velocity)),
+        sb.Integration(cycles=2, accuracy=accuracy, step=period / steps),
         sample_times=np.linspace(0.0, 2.0 * period * (1.0 - 1e-12), 5)[1:],
-        accuracy=accuracy,
-        step=period / steps,
     ).dataset.modal_amplitude.values
 
 
@@ -66,13 +64,16 @@ def test_measured_order_with_contact(modes: int, pair: tuple[float, float]) -> N
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1])
     end = 2.0 / (pair[0] * model.reference_freq)
     times = np.linspace(0.0, end, 401)[1:] * (1.0 - 1e-12)
-    given = {"model": model, "shaker": shaker, "contact": paper.CONTACT, "cycles": 2, "sample_times": times}
-    coarse = sb.simulate(**given).dataset
-    step = coarse.attrs["step"]
-    truth = sb.simulate(**given, accuracy="reference", step=step / 32).dataset.displacement
+    system = sb.System(model, paper.CONTACT, shaker)
+
+    def run(**options: Any) -> Any:
+        return sb.simulate(system, sb.Integration(cycles=2, **options), sample_times=times).dataset
+
+    step = run().attrs["step"]
+    truth = run(accuracy="reference", step=step / 32).displacement
     errors = []
     for halvings in range(5):
-        fine = sb.simulate(**given, step=step / 2**halvings).dataset.displacement
+        fine = run(step=step / 2**halvings).displacement
         errors.append(float(np.sqrt(((fine - truth) ** 2).mean())))
     assert math.log2(errors[0] / errors[-1]) / 4.0 > 2.2, errors
     slope = -np.polyfit(np.arange(5), np.log2(errors), 1)[0]

@@ -35,7 +35,7 @@ def design(
     """
     from snapbeam.cli.common.results import check_pictures
     from snapbeam.core.files import check_writable
-    from snapbeam.design.optimum.design import design as find
+    from snapbeam.design.optimum.design import optimize_design
     from snapbeam.design.plan import plan as plan_of
     from snapbeam.figures.design import plot_designs
 
@@ -45,12 +45,12 @@ def design(
     variables, goals, limits, effort = _question(asked)
     how = settings.integration.replace(threads=threads)
     arguments = (settings.system, variables, goals, limits, spread, effort)
-    cost = plan_of(find, *arguments, integration=how, trial=10.0 if plan else 2.0)
+    cost = plan_of(optimize_design, *arguments, integration=how, trial=10.0 if plan else 2.0)
     if not agreed(cost, yes, plan):
         return
     begun = time.monotonic()
     with progress(None, "design", "generations") as report:
-        dataset = find(*arguments, integration=how, store=store, progress=report)
+        dataset = optimize_design(*arguments, integration=how, store=store, progress=report)
     answer(
         designs={
             str(name): each.values for name, each in dataset.data_vars.items() if "tried" not in each.dims

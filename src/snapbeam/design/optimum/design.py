@@ -27,7 +27,7 @@ from snapbeam.sweeps.stored import Keeping
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Effort", "design", "design_problem"]
+__all__ = ["Effort", "design_problem", "optimize_design"]
 
 _Array = NDArray[np.float64]
 CHECK, REPORT = 10**9, 2 * 10**9
@@ -108,7 +108,7 @@ def design_problem(
 
 
 @checked
-def design(
+def optimize_design(
     system: System,
     variables: Mapping[str, tuple[float, float]],
     goals: Any,
@@ -160,7 +160,7 @@ def design(
 
     Examples
     --------
-    >>> ds = sb.design(  # doctest: +SKIP
+    >>> ds = sb.optimize_design(  # doctest: +SKIP
     ...     system,
     ...     {"location": (0.2, 0.5), "frequency_ratio": (0.5, 2.0), "velocity_amplitude": (0.05, 0.5)},
     ...     "peak_force",

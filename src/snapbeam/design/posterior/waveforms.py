@@ -121,7 +121,7 @@ class Waveform:
         """Up to when it counts, s.  Refused (InputError) if that is before its second sample."""
         cycles = int(np.ceil(np.asarray(self.time)[-1] / self.period - 1e-9)) or 1
         with _untold():
-            change = conditioning(self.system, cycles)
+            change = conditioning(self.system, Integration(cycles=cycles))
         moved = change["separation"].values * self.system.scale.length * (self.drive_error / _TINY)
         late = np.flatnonzero(moved > self.standard_error)
         until = float(change["time"][late[0] - 1]) if late.size and late[0] else float(change["time"][-1])

@@ -23,7 +23,7 @@ _DECADE = 10.0
 
 
 def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None = None) -> Axes:
-    """Draw what :func:`snapbeam.design` found: the first goal over the second, or over a variable.
+    """Draw what :func:`snapbeam.optimize_design` found: the first goal over the second, or over a variable.
 
     Designs that kept their limits while they were sought are small dots; those reported have the intervals of fresh
     draws, and a sign that says whether their limits hold there.

@@ -31,7 +31,7 @@ __all__ = ["read_channels", "read_signal", "write_signal"]
 def read_channels(
     path: str | os.PathLike[str], sampling_freq: float | None = None, columns: str | None = None
 ) -> list[Channel]:
-    """Return every channel of a file as a SEP 5 dictionary, in the units of the file.
+    """Return every channel of a file as a dictionary, in the units of the file.
 
     Parameters
     ----------
@@ -45,7 +45,8 @@ def read_channels(
     Returns
     -------
     list of dict
-        ``unit_str`` is None where the file states no unit.
+        Keys ``data``, ``name``, ``unit_str``, and ``fs`` [Hz] or ``time`` [s].  ``unit_str`` is None
+        where the file states no unit.
 
     Raises
     ------

@@ -116,7 +116,7 @@ def _swings(modes: int, omega: float, drive: float) -> int:
     A well is reached half way from the straight beam, so that grazing zero is no snap-through.
     """
     run = paper_run(modes, float(omega), float(drive), _SHOWN, accuracy="reference")
-    response = run.response
+    response = run.outcome
     if not response.end_is_final or response.last_crossing > 0.8 * float(run.dataset.time[-1]):
         return 0
     centre = run.dataset.center_displacement.values

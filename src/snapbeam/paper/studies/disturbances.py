@@ -55,9 +55,11 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     for at, (omega, drive) in enumerate(points):
         for name, given in _variants(model, float(omega), float(drive), cycles).items():
             run = sb.simulate(
-                model, contact=CONTACT, cycles=cycles, early_decision=True, sample_times=[0.0], **given
+                sb.System(model, CONTACT, **given),
+                sb.Integration(cycles=cycles, early_decision=True),
+                sample_times=[0.0],
             )
-            kinds[name].append(int(run.response.response))
+            kinds[name].append(int(run.outcome.response))
         border.append(_at_border(model, float(omega), float(drive), cycles))
         results.progress("disturbances, classes")(at + 1, count)
     impacts = _impacts(results, model, points)
@@ -71,10 +73,10 @@ def _variants(model: sb.ReducedModel, omega: float, drive: float, cycles: int) -
     rest = model.equilibrium
     steady = _record(model, omega, drive, cycles)
     return {
-        "base": {"shaker": steady},
-        "perturbed": {"shaker": _record(model, omega, drive * (1.0 + 1e-9), cycles)},
-        "offset": {"shaker": steady, "initial_state": (rest * (1.0 - OFFSET), np.zeros_like(rest))},
-        "startup": {"shaker": _record(model, omega, drive, cycles, EXCESS)},
+        "base": {"striker": steady},
+        "perturbed": {"striker": _record(model, omega, drive * (1.0 + 1e-9), cycles)},
+        "offset": {"striker": steady, "start": sb.State(amplitude=rest * (1.0 - OFFSET))},
+        "startup": {"striker": _record(model, omega, drive, cycles, EXCESS)},
     }
 
 
@@ -127,7 +129,11 @@ def _repeat(model: sb.ReducedModel, omega: float, drive: float) -> list[float] |
     first = 1.0 / model.reference_freq
     shaker = sb.Shaker(frequency_ratio=omega, velocity_amplitude=drive, location=LOCATION)
     cycles = max(math.ceil(8.0 * omega), 2)
-    run = sb.simulate(model, shaker, CONTACT, cycles, accuracy="reference", sample_times=[0.0])
+    run = sb.simulate(
+        sb.System(model, CONTACT, shaker.striker()),
+        sb.Integration(cycles=cycles, accuracy="reference"),
+        sample_times=[0.0],
+    )
     onset, impulse = run.impacts.onset.values, run.impacts.impulse.values
     near = 1e-7 * first
     late = np.flatnonzero((onset > 4.0 * first) & (onset < (cycles / omega - 1.5) * first))
@@ -135,7 +141,9 @@ def _repeat(model: sb.ReducedModel, omega: float, drive: float) -> list[float] |
         return None
     at = float(onset[late[np.argmax(impulse[late])]])
     around = sb.simulate(
-        model, shaker, CONTACT, cycles, accuracy="reference", sample_times=[at - near, at, at + near]
+        sb.System(model, CONTACT, shaker.striker()),
+        sb.Integration(cycles=cycles, accuracy="reference"),
+        sample_times=[at - near, at, at + near],
     ).dataset.modal_amplitude.values
     alpha, velocity = around[1], (around[2] - around[0]) / (2.0 * near)
     record = _record(model, omega, drive, cycles, phase=2.0 * math.pi * ((at / first * omega) % 1.0))
@@ -143,10 +151,12 @@ def _repeat(model: sb.ReducedModel, omega: float, drive: float) -> list[float] |
     within = (onset >= at - near) & (onset <= at + 0.25 * first)
     found = [omega, drive, at, float(impulse[within].sum())]
     for kept in (np.ones_like(alone), alone):
+        start = sb.State(amplitude=alpha * kept, velocity=velocity * kept)
         again = sb.simulate(
-            model, record, CONTACT, cycles, accuracy="reference",
-            initial_state=(alpha * kept, velocity * kept), sample_times=[0.25 * first],
-        )  # fmt: skip
+            sb.System(model, CONTACT, record.striker(), start),
+            sb.Integration(cycles=cycles, accuracy="reference"),
+            sample_times=[0.25 * first],
+        )
         hits, impulses = again.impacts.onset.values, again.impacts.impulse.values
         later = hits[hits > 0.25 * first]
         found += [

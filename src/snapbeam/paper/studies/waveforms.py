@@ -121,7 +121,7 @@ def _shares(run: sb.Run, modes: int) -> tuple[dict[str, Any], _Array]:
         "higher_exceed": np.histogram(first[higher > first], BIN_EDGES)[0],
         "antisymmetric_exceed": np.histogram(first[uneven > first], BIN_EDGES)[0],
         "peak_amplitude": np.abs(alpha).max(axis=0),
-        "response": int(run.response.response),
+        "response": int(run.outcome.response),
     }
     return counted, passages(alpha, run.dataset.time.values)
 
@@ -172,7 +172,7 @@ def _strobed(results: Results, modes: int, points: _Array, attrs: dict[str, Any]
         run = paper_run(
             modes, float(omega), float(drive), cycles, sample_times=steps * period / _STROBE_PHASES
         )  # fmt: skip
-        if run.response.response == sb.ResponseClass.INTRAWELL:
+        if run.outcome.response == sb.ResponseClass.INTRAWELL:
             found.append(run.dataset.displacement.values.reshape(-1, _STROBE_PHASES))
             kept.append((omega, drive))
         results.progress(f"waveforms, {cycles} cycles")(at + 1, len(points))

@@ -12,7 +12,7 @@ from snapbeam.lab.signals.units import si_unit
 __all__ = ["RATE_NAMES", "TIME_NAMES", "UNIT_NAMES", "Channel", "Told", "is_time", "numbered", "with_time"]
 
 Channel = dict[str, Any]
-"""A SEP 5 dictionary in the units of the file: ``data``, ``name``, ``unit_str`` (None where the file states
+"""One channel in the units of the file: ``data``, ``name``, ``unit_str`` (None where the file states
 none), and ``fs`` [Hz] or ``time`` [s] where it has them."""
 
 RATE_NAMES = ("sampling_freq", "sampling_frequency", "fs", "sample_rate", "samplerate", "wf_samplerate")
