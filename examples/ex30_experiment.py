@@ -146,8 +146,9 @@ figure = plot_drive(signal, drive)
 # contrast of the edges and the noise, written as a Photron header with 12-bit pixels. The recording begins 30 ms, or
 # three cycles, before the shaker: without some rest nobody can tell the first cycle from the second.
 
-motion = sb.RecordedDrive.from_dataset(
-    lab.recorded_drive(true_velocity, 1e5), location=paper.LOCATION
+motion = sb.Striker(
+    drive=sb.Recorded.from_dataset(lab.recorded_drive(true_velocity, 1e5)),
+    location=paper.LOCATION,
 )
 truth = sb.simulate(
     sb.System(truth_model, paper.CONTACT, motion), sb.Integration(cycles=cycles)
@@ -212,8 +213,11 @@ with house_style():
 model = sb.ReducedModel.from_beam(
     calibration.beam, modes=8, damping_ratio=calibration.damping_ratio
 )
-recorded = sb.RecordedDrive.from_dataset(
-    lab.recorded_drive(signal, 1e5, measurement=drive), location=paper.LOCATION
+recorded = sb.Striker(
+    drive=sb.Recorded.from_dataset(
+        lab.recorded_drive(signal, 1e5, measurement=drive)
+    ),
+    location=paper.LOCATION,
 )
 simulated = sb.simulate(
     sb.System(model, paper.CONTACT, recorded), sb.Integration(cycles=cycles)

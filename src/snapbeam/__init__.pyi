@@ -17,8 +17,8 @@ from .design.distributions import LogNormal as LogNormal
 from .design.distributions import Normal as Normal
 from .design.distributions import Uniform as Uniform
 from .design.optimum.design import Effort as Effort
-from .design.optimum.design import optimize_design as optimize_design
 from .design.optimum.design import design_problem as design_problem
+from .design.optimum.design import optimize_design as optimize_design
 from .design.optimum.evolution import Evolution as Evolution
 from .design.optimum.measures import Goal as Goal
 from .design.optimum.measures import Limit as Limit
@@ -98,7 +98,6 @@ from .model.imperfection import Imperfection as Imperfection
 from .model.imperfection.fitted import fit_wells as fit_wells
 from .model.integration import Integration as Integration
 from .model.state import State as State
-from .model.striker import RecordedDrive as RecordedDrive
 from .model.striker import Shaker as Shaker
 from .model.striker import Striker as Striker
 from .model.striker.another import Another as Another

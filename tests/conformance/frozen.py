@@ -54,7 +54,7 @@ def cases() -> list[dict[str, Any]]:
     return found
 
 
-def recorded(case: dict[str, Any], model: sb.ReducedModel) -> sb.RecordedDrive:
+def recorded(case: dict[str, Any], model: sb.ReducedModel) -> sb.Striker:
     """A start-up over three cycles to a sine of two harmonics, as a record would hold it."""
     freq = case["frequency_ratio"] * model.reference_freq
     rate = 60.0 * freq
@@ -65,11 +65,13 @@ def recorded(case: dict[str, Any], model: sb.ReducedModel) -> sb.RecordedDrive:
     rise, slope = grown**2 * (3.0 - 2.0 * grown), 6.0 * grown * (1.0 - grown) * freq / 3.0
     wave = np.sin(omega * t) + 0.1 * np.sin(2.0 * omega * t)
     rate_of = omega * np.cos(omega * t) + 0.2 * omega * np.cos(2.0 * omega * t)
-    return sb.RecordedDrive(
-        displacement=stroke * rise * wave,
-        velocity=stroke * (rise * rate_of + slope * wave),
-        sampling_freq=rate,
-        frequency=freq,
+    return sb.Striker(
+        drive=sb.Recorded(
+            displacement=stroke * rise * wave,
+            velocity=stroke * (rise * rate_of + slope * wave),
+            sampling_freq=rate,
+            frequency=freq,
+        ),
         location=case["location"],
     )
 

@@ -457,7 +457,7 @@ ANALYSES: dict[str, Callable[[], xr.Dataset]] = {
     "sensitivity": lambda: sb.sensitivity(
         small_system(), "peak_force", sb.Spread(of=SPREAD.of), size=8, integration=SHORT
     ),
-    "design": lambda: sb.design(
+    "design": lambda: sb.optimize_design(
         small_system(), {"velocity_amplitude": (0.05, 0.4), "location": (0.3, 0.5)}, "speed",
         sb.Limit(of="snap", at_least=0.8), SPREAD,
         sb.Effort(generations=2, population=6, draws=8, fresh=100, candidates=2), integration=SHORT,

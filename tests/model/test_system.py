@@ -17,13 +17,18 @@ SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
 PLAIN = sb.System(MODEL, paper.CONTACT, SHAKER)
 
 
-def record(samples: int = 400, last: float = 0.0) -> sb.RecordedDrive:
+def record(samples: int = 400, last: float = 0.0) -> sb.Striker:
     """A sine of 600 rad/s, its last sample shifted a little."""
     t = np.arange(samples) / 20_000.0
     displacement = 1e-4 * np.sin(600.0 * t)
     displacement[-1] += last
-    return sb.RecordedDrive(
-        displacement=displacement, velocity=0.06 * np.cos(600.0 * t), sampling_freq=20_000.0, frequency=95.0
+    return sb.Striker(
+        drive=sb.Recorded(
+            displacement=displacement,
+            velocity=0.06 * np.cos(600.0 * t),
+            sampling_freq=20_000.0,
+            frequency=95.0,
+        ),
     )
 
 
@@ -364,7 +369,7 @@ def test_another_number_of_modes_keeps_the_start() -> None:
         ({"contact": sb.Restitution(0.5)}, "with modes = 3: Newton's law needs one mode"),
         ({"model": 3}, "model = 3: must be a ReducedModel"),
         ({"drive": 3}, "drive = 3: must be a drive"),
-        ({"striker": 3}, "striker = 3: must be a Striker, a Shaker or a RecordedDrive"),
+        ({"striker": 3}, "striker = 3: must be a Striker or a Shaker"),
         ({"start": 3}, "start = 3: must be a State"),
         ({"start": sb.State(amplitude=np.zeros(2))}, "start of 2 modes: must have the 3 modes of the model"),
         (

@@ -272,14 +272,18 @@ def test_progress() -> None:
 # ---------------------------------------------------------------------- recorded drives
 
 
-def record(model: sb.ReducedModel) -> sb.RecordedDrive:
+def record(model: sb.ReducedModel) -> sb.Striker:
     """Eight cycles and a half of a sine of 100 Hz."""
     t = np.arange(int(8.5 * 200)) / 20_000.0
     omega = 2.0 * math.pi * 100.0
-    return sb.RecordedDrive(
-        displacement=5e-5 * np.sin(omega * t), velocity=5e-5 * omega * np.cos(omega * t), sampling_freq=20_000.0,
-        frequency=100.0,
-    )  # fmt: skip
+    return sb.Striker(
+        drive=sb.Recorded(
+            displacement=5e-5 * np.sin(omega * t),
+            velocity=5e-5 * omega * np.cos(omega * t),
+            sampling_freq=20_000.0,
+            frequency=100.0,
+        ),
+    )
 
 
 def test_a_record_goes_on_where_it_was_and_ends() -> None:

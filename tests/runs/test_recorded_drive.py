@@ -21,11 +21,13 @@ def sine_record(model, ratio, amplitude, cycles, side="below"):
     stroke = amplitude * model.length_scale * first / frequency
     sign = 1.0 if side == "below" else -1.0
     t = np.arange(int((cycles + 0.5) / frequency * RATE)) / RATE
-    return sb.RecordedDrive(
-        displacement=sign * stroke * np.sin(omega * t),
-        velocity=sign * stroke * omega * np.cos(omega * t),
-        sampling_freq=RATE,
-        frequency=frequency,
+    return sb.Striker(
+        drive=sb.Recorded(
+            displacement=sign * stroke * np.sin(omega * t),
+            velocity=sign * stroke * omega * np.cos(omega * t),
+            sampling_freq=RATE,
+            frequency=frequency,
+        ),
         side=side,
     )
 
@@ -45,7 +47,7 @@ def test_a_recorded_sine_is_the_sinusoidal_shaker(model, side):
 def test_the_whole_record_is_the_default_and_more_is_refused(model):
     drive = sine_record(model, 1.0, 0.05, 3)
     run = sb.simulate(sb.System(model, paper.CONTACT, drive))
-    assert run.dataset.attrs["cycles"] == pytest.approx(drive.duration * drive.frequency)
+    assert run.dataset.attrs["cycles"] == pytest.approx(drive.drive.duration * drive.drive.frequency)
     assert run.dataset.attrs["drive"] == "recorded"
     with pytest.raises(sb.InputError, match=r"cycles = 9.*at most the 3\.\d cycles"):
         sb.simulate(sb.System(model, paper.CONTACT, drive), sb.Integration(cycles=9))
@@ -62,8 +64,14 @@ def test_bad_records_are_refused():
     wave = np.sin(np.linspace(0.0, 6.0, 50))
     good = {"sampling_freq": 100.0, "frequency": 1.0}
     with pytest.raises(sb.InputError, match="does not belong to displacement"):
-        sb.RecordedDrive(displacement=wave, velocity=wave, **good)
+        sb.Striker(
+            drive=sb.Recorded(displacement=wave, velocity=wave, **good),
+        )
     with pytest.raises(sb.InputError, match="at least 4 samples"):
-        sb.RecordedDrive(displacement=wave, velocity=wave[:-1], **good)
+        sb.Striker(
+            drive=sb.Recorded(displacement=wave, velocity=wave[:-1], **good),
+        )
     with pytest.raises(sb.InputError, match="must be finite"):
-        sb.RecordedDrive(displacement=np.full(9, np.nan), velocity=np.zeros(9), **good)
+        sb.Striker(
+            drive=sb.Recorded(displacement=np.full(9, np.nan), velocity=np.zeros(9), **good),
+        )

@@ -27,7 +27,7 @@ SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
         (
             {"striker": 1.21},
             sb.InputTypeError,
-            "striker = 1.21: must be a Striker, a Shaker or a RecordedDrive",
+            "striker = 1.21: must be a Striker or a Shaker",
         ),
         (
             {"striker": None},

@@ -218,10 +218,14 @@ def test_restitution(system) -> None:
 @pytest.mark.slow
 def test_recorded_drives(system) -> None:
     t = np.arange(900) / 20_000.0
-    record = sb.RecordedDrive(
-        displacement=3e-5 * np.sin(600.0 * t), velocity=0.018 * np.cos(600.0 * t), sampling_freq=20_000.0,
-        frequency=95.0,
-    )  # fmt: skip
+    record = sb.Striker(
+        drive=sb.Recorded(
+            displacement=3e-5 * np.sin(600.0 * t),
+            velocity=0.018 * np.cos(600.0 * t),
+            sampling_freq=20_000.0,
+            frequency=95.0,
+        ),
+    )
     shaken = system.replace(striker=record)
     ds = sb.sweep(shaken, {"location": [0.3, 0.5], "modes": [1, 2]}, sb.Integration())
     assert ds.attrs["cycles"] == pytest.approx(record.duration * 95.0)

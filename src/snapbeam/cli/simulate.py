@@ -104,8 +104,10 @@ def simulate(
         if named:
             raise sb.InputError(f"{', '.join(named)}: must be left out with a recorded drive")
         assert system.striker is not None
-        recorded = sb.RecordedDrive.from_dataset(
-            _recorded(drive), location=system.striker.location, side=system.striker.side
+        recorded = sb.Striker(
+            drive=sb.Recorded.from_dataset(_recorded(drive)),
+            location=system.striker.location,
+            side=system.striker.side,
         )
         system = system.replace(striker=recorded)
     start = time.monotonic()

@@ -24,7 +24,7 @@ from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.mapping import parts_from_mapping, parts_to_mapping
 from snapbeam.model.replacing import replaced
 from snapbeam.model.state import State
-from snapbeam.model.striker import RecordedDrive, Shaker, Striker
+from snapbeam.model.striker import Shaker, Striker
 from snapbeam.model.striker.another import Another, check_others, parted
 from snapbeam.model.world import AxialLoad, Base, Harvester
 from snapbeam.model.world.check import check_world
@@ -41,7 +41,7 @@ class System:
     model : ReducedModel
     contact : ContactLaw, or a sequence of them, optional
         Needed with a striker.  Of several strikers, one law each or one for all.
-    striker : Striker, Shaker or RecordedDrive, or a sequence of them, optional
+    striker : Striker or Shaker, or a sequence of them, optional
         Without one the structure vibrates freely from *start*.  Several strike at once, each with its own place, side,
         law and drive; runs begin in the well that the first one pushes away from.
     base : Base, optional
@@ -91,13 +91,11 @@ class System:
         model, contact, striker, start = self.model, self.contact, self.striker, self.start
         if not isinstance(model, ReducedModel):
             raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")
-        if isinstance(striker, (Shaker, RecordedDrive)):
+        if isinstance(striker, Shaker):
             striker = striker.striker()
             object.__setattr__(self, "striker", striker)
         if striker is not None and not isinstance(striker, Striker):
-            raise InputTypeError(
-                f"striker = {shown(striker)}: must be a Striker, a Shaker or a RecordedDrive"
-            )
+            raise InputTypeError(f"striker = {shown(striker)}: must be a Striker or a Shaker")
         if contact is not None and not isinstance(contact, ContactLaw):
             raise InputTypeError(
                 f"contact = {shown(contact)}: must be a law of contact, such as HertzContact(stiffness)"

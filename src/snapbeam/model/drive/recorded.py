@@ -5,14 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError, finite_array
+from snapbeam.core.validate import InputError, finite_array, instance, shown
 from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.quantity import check_fields, quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["Recorded"]
 
@@ -54,6 +57,39 @@ class Recorded(Drive):
         displacement, velocity = checked_record(self.displacement, self.velocity, self.sampling_freq)
         object.__setattr__(self, "displacement", displacement)
         object.__setattr__(self, "velocity", velocity)
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset) -> Recorded:
+        """A drive from what :func:`snapbeam.lab.recorded_drive` returns, or from a file of it.
+
+        *dataset* has ``displacement`` (m) and ``velocity`` (m/s) over an even ``time`` (s), and the nominal
+        ``frequency`` (Hz) among its attributes.
+        """
+        import xarray as xr
+
+        instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+        missing = [name for name in ("time", "displacement", "velocity") if name not in dataset.variables]
+        if missing or "frequency" not in dataset.attrs:
+            raise InputError(
+                f"dataset without {', '.join(missing) or 'attribute frequency'}: must be a recorded drive with "
+                "time, displacement, velocity and frequency"
+            )
+        for name, unit in (("time", "s"), ("displacement", "m"), ("velocity", "m/s")):
+            given = dataset[name].attrs.get("units", unit)
+            if given != unit:
+                raise InputError(f"{name} with units {shown(given)}: must be in {unit!r}")
+        time = finite_array("time", dataset["time"].values, 1)
+        if time.size < 4:
+            raise InputError(f"time of {time.size} samples: must hold at least 4")
+        interval = (time[-1] - time[0]) / (time.size - 1)
+        if not interval > 0.0 or np.abs(np.diff(time) - interval).max() > 1e-6 * interval:
+            raise InputError("time: must be evenly spaced and increasing")
+        return cls(
+            displacement=dataset["displacement"].values,
+            velocity=dataset["velocity"].values,
+            sampling_freq=1.0 / interval,
+            frequency=float(dataset.attrs["frequency"]),
+        )
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Recorded):

@@ -82,7 +82,7 @@ def _variants(model: sb.ReducedModel, omega: float, drive: float, cycles: int) -
 
 def _record(
     model: sb.ReducedModel, omega: float, drive: float, cycles: int, excess: float = 0.0, phase: float = 0.0
-) -> sb.RecordedDrive:
+) -> sb.Striker:
     """w_s' = V b omega_1 cos(omega t + phase), its displacement first (1 + *excess*) times as large, as samples."""
     angular = 2.0 * math.pi * omega * model.reference_freq
     height = drive * float(model.length_scale or 0.0) / omega
@@ -91,11 +91,13 @@ def _record(
     size = 1.0 + excess * np.exp(-cycle)
     slope = -excess * np.exp(-cycle) / (2.0 * math.pi)  # by the angle
     offset = math.sin(phase) * size[0]
-    return sb.RecordedDrive(
-        displacement=height * (size * np.sin(angle) - offset),
-        velocity=height * angular * (size * np.cos(angle) + slope * np.sin(angle)),
-        sampling_freq=_PER_CYCLE * omega * model.reference_freq,
-        frequency=omega * model.reference_freq,
+    return sb.Striker(
+        drive=sb.Recorded(
+            displacement=height * (size * np.sin(angle) - offset),
+            velocity=height * angular * (size * np.cos(angle) + slope * np.sin(angle)),
+            sampling_freq=_PER_CYCLE * omega * model.reference_freq,
+            frequency=omega * model.reference_freq,
+        ),
         location=LOCATION,
     )
 
@@ -153,7 +155,7 @@ def _repeat(model: sb.ReducedModel, omega: float, drive: float) -> list[float] |
     for kept in (np.ones_like(alone), alone):
         start = sb.State(amplitude=alpha * kept, velocity=velocity * kept)
         again = sb.simulate(
-            sb.System(model, CONTACT, record.striker(), start),
+            sb.System(model, CONTACT, record, start),
             sb.Integration(cycles=cycles, accuracy="reference"),
             sample_times=[0.25 * first],
         )
