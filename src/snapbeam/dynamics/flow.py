@@ -21,8 +21,10 @@ from snapbeam.core.findings import Finding
 from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.dynamics.starts import held_in_space
 from snapbeam.engines.answer import statistics_of
-from snapbeam.engines.assemble import make_ensemble
+from snapbeam.engines.assemble import make_ensemble, run_columns
+from snapbeam.engines.driven import phases_of
 from snapbeam.engines.registry import resolve
+from snapbeam.model.drive.joined import HORIZON
 from snapbeam.model.integration import Integration
 from snapbeam.model.start import amplitude_scale, rest_state
 from snapbeam.model.state import State
@@ -34,6 +36,8 @@ __all__ = ["Flow", "Marched", "Stroboscope", "flow_of"]
 
 _Array = NDArray[np.float64]
 _REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
+_SAME_PHASE = 1e-6
+"""Difference of two phases, rad, that rounding can make."""
 _BYTES = 2**27
 """Of the states that are held on the way at most."""
 
@@ -109,7 +113,8 @@ class Stroboscope:
     system : System
     integration : Integration, optional
     phase : float, optional
-        Of the drive at which the system is seen, rad; that of the drive at the start by default.
+        Phase of the striker's drive at which the map takes states, rad.  By default each motion has the phase at
+        which a run of the system begins.
     """
 
     system: System
@@ -185,16 +190,44 @@ class Stroboscope:
         return np.repeat([size, speed], self.modes)
 
     @property
-    def striker_phase(self) -> float:
-        """Phase of the drive at which the system is seen."""
+    def given_phase(self) -> float:
+        """The ``phase`` of a state that begins a period, rad; NaN: every motion begins at its own phase."""
         if self.phase is not None:
             return self.phase
-        drive = None if self.system.striker is None else self.system.striker.drive
-        return float(getattr(drive, "phase", 0.0))
+        return math.nan if self.system.start is None else float(self.system.start.phase)
+
+    @property
+    def striker_phase(self) -> float:
+        """Phase at the beginning of a period, rad, of the motion whose cycle is the period; 0 if nothing moves."""
+        if self.system.leads is None:
+            return 0.0
+        own, given = float(getattr(self.system.leads[1], "phase", 0.0)), self.given_phase
+        if math.isnan(given):
+            return own
+        # several motions share one clock, which counts from the time at which all have their own phases
+        return given if len(self.system.moving) == 1 else own + HORIZON * given
+
+    def starting(self, state: State) -> System:
+        """The system with *state* as its start, at the phase at which the map takes states."""
+        changes: dict[str, Any] = {"start": state}
+        if self.phase is not None and self.system.striker is not None:
+            changes["drive.phase"] = self.phase
+        return self.system.replace(**changes)
 
     def neighbour(self, name: str, value: float) -> Stroboscope:
         """The flow of the system with one parameter changed, by dotted name or the name in datasets."""
+        self._require_free(name)
         return Stroboscope(self.system.replace(**{lookup(name).name: value}), self.integration, self.phase)
+
+    def _require_free(self, name: str) -> None:
+        """Refuse to change a phase that another value would override."""
+        section, _, field = lookup(name).name.partition(".")
+        alone = len(self.system.moving) == 1 and section == self.system.moving[0][0]
+        if field == "phase" and alone and not math.isnan(self.given_phase):
+            source = "phase" if self.phase is not None else "start.phase"
+            raise InputError(
+                f"{source} = {self.given_phase:g}: must not be given if {section}.phase changes; leave {source} out"
+            )
 
     def value(self, name: str) -> float:
         """A parameter of the system."""
@@ -204,10 +237,23 @@ class Stroboscope:
         """A state, or a batch of them, in the coordinates of the flow, shape (runs, d); the start by default."""
         if state is None:
             state = self.system.start or rest_state(self.system.model, self.system.striker)
+        else:
+            self._require_phase(state)
         if state.modes != self.modes:
             raise InputError(f"state of {state.modes} modes: must have the {self.modes} modes of the model")
         flat = state.flat()
         return np.concatenate([flat.amplitude, flat.velocity], axis=1) / self.scales
+
+    def _require_phase(self, state: State) -> None:
+        """Refuse a state at another phase of the motions than the one at which the map takes states."""
+        turns = 1 if len(self.system.moving) < 2 else HORIZON
+        apart = (state.phase - self._clock_phase) * turns
+        apart = np.abs(apart - 2.0 * math.pi * np.rint(apart / (2.0 * math.pi)))
+        if self.system.leads is not None and (apart > _SAME_PHASE).any():
+            raise InputError(
+                f"state phase = {shown(state.phase)}: must be the phase at which the system is observed, "
+                f"{self._clock_phase:g} rad, or NaN; advance the state to that phase with sb.advance"
+            )
 
     def state(self, coordinates: ArrayLike) -> State:
         """States of coordinates of shape (..., d), at the phase at which the system is seen."""
@@ -215,9 +261,15 @@ class Stroboscope:
         return State(
             amplitude=full[..., : self.modes],
             velocity=full[..., self.modes :],
-            phase=np.array(self.striker_phase),
+            phase=np.array(self._clock_phase),
             striker_position=np.array(self.striker_position),
         )
+
+    @cached_property
+    def _clock_phase(self) -> float:
+        """The argument of the engine's clock at the beginning of a period, rad."""
+        own = phases_of(self.system, run_columns(self.system, {}), 1)
+        return float(own[0]) if math.isnan(self.given_phase) else self.given_phase
 
     @cached_property
     def striker_position(self) -> float:
@@ -267,7 +319,7 @@ class Stroboscope:
         return State(
             amplitude=full[:, : self.modes],
             velocity=full[:, self.modes :],
-            phase=np.array(self.striker_phase),
+            phase=np.array(self.given_phase),
             passed=passed,
         )
 
@@ -281,6 +333,8 @@ class Stroboscope:
     ) -> Marched:
         lost = None if begun.passed is None else ~np.isin(begun.passed["status"], _REACHED)
         own = {lookup(name).name: np.asarray(values) for name, values in (points or {}).items()}
+        for name in own:
+            self._require_free(name)
         ensemble = make_ensemble(
             self.system,
             self.integration.replace(early_decision=False),
@@ -310,7 +364,8 @@ class Stroboscope:
         ticks = ensemble.runs["end"]
         hidden = states_of(ensemble, q, p, landings.home[:, -1], landings.contact_ticks[:, -1], ticks)
         status = np.where(failed, np.where(landings.books["status"] == 0, 3, landings.books["status"]), 0)
-        hidden = replace(hidden, phase=np.full(failed.size, self.striker_phase), passed={"status": status})
+        # after a period every motion is where it began
+        hidden = replace(hidden, phase=ensemble.runs["phase"].copy(), passed={"status": status})
         return Marched(last, whole, moved, statistics_of(ensemble, landings.books), hidden)
 
     def _rows(self, ensemble: Any, q: _Array, p: _Array, home: NDArray[np.int64]) -> _Array:

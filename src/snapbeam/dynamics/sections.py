@@ -79,9 +79,7 @@ def poincare(
         begun = flow.march(begun, before).states
     if not np.isfinite(begun).all():
         raise InputError("transient: the run failed before the section; use a smaller step")
-    held = flow.system.replace(start=flow.state(begun[0]))
-    if held.striker is not None:
-        held = held.replace(**{"drive.phase": flow.striker_phase})
+    held = flow.starting(flow.state(begun[0]))
     how = flow.integration.replace(cycles=total, early_decision=False)
     end = total * flow.period
     if section == "stroboscopic":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -79,11 +80,8 @@ class Starts:
             return found
         generator = np.random.Generator(np.random.Philox(key=[self.seed, number]).jumped())
         phase = math.pi * (1.0 + generator.random())
-        return State(
-            amplitude=found.amplitude,
-            velocity=found.velocity,
-            phase=np.array(phase),
-            striker_position=found.striker_position,
+        return dataclasses.replace(
+            found, phase=np.array(phase), contact_time=np.array(np.nan), tangent=None, passed=None, modal=None
         )
 
 
@@ -100,11 +98,14 @@ def leaving(system: System, rest: State, begun: State, location: ArrayLike | Non
     away = 1.0 if striker.side == "below" else -1.0
     reach = np.sum(system.model.shape_at(place) * change[0], axis=-1)
     turn = np.where(away * reach < 0.0, -1.0, 1.0)[..., None]
-    return State(
+    return dataclasses.replace(
+        begun,
         amplitude=rest.amplitude + turn * change[0],
         velocity=rest.velocity + turn * change[1],
-        phase=begun.phase,
-        striker_position=begun.striker_position,
+        contact_time=np.array(np.nan),
+        tangent=None,
+        passed=None,
+        modal=None,
     )
 
 

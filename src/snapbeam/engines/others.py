@@ -40,7 +40,7 @@ def others_of(
         different, which = np.unique(location, return_inverse=True)
         shapes = np.array([structure.model.shape_at(float(x)) for x in different])
         places[:, j] = len(rows) + which
-        rows += [sign * _without_body(structure, structure.row(shape)) for shape in shapes]
+        rows += [sign * structure.row_of_beam(structure.row(shape)) for shape in shapes]
         numbers[:, j, REST] = sign * structure.sign * structure.rests(shapes)[which]
         begun = _begun(striker.drive, columns, f"drive_{number}", system, runs)
         gap = columns.get(f"striker_{number}.gap", np.full(runs, np.nan))
@@ -51,14 +51,6 @@ def others_of(
         for k, name in enumerate(names):
             numbers[:, j, LAW + k] = columns[f"contact_{number}.{name}"]
     return OtherStrikers(tuple(type(each.contact) for each in system.others), numbers, places, np.array(rows))
-
-
-def _without_body(structure: Structure, row: _Array) -> _Array:
-    """A contact row that has no part in the first striker's own mode."""
-    if structure.body_mass is not None:
-        row = row.copy()
-        row[structure.equilibrium.size] = 0.0
-    return row
 
 
 def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:

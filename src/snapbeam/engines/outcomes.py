@@ -48,7 +48,7 @@ class Passed(NamedTuple):
     """At its beginning, s."""
     length: float
     displacement: tuple[float, float]
-    """Of the contact point, at its two ends."""
+    """Of the beam at the striker's location, at the two ends of the step."""
     velocity: tuple[float, float]
     center_displacement: tuple[float, float]
     center_velocity: tuple[float, float]

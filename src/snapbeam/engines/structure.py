@@ -95,6 +95,18 @@ class Structure:
             row = np.append(row, -1.0 / math.sqrt(self.body_mass))
         return np.append(row, 0.0) if self.circuit else row
 
+    def row_of_beam(self, row: _Array) -> _Array:
+        """A contact row without the part of the striker's own mode: the beam's displacement at that location."""
+        if self.body_mass is None:
+            return row
+        beam = row.copy()
+        beam[self.equilibrium.size] = 0.0
+        return beam
+
+    def high_modes(self, omega: float) -> NDArray[np.bool_]:
+        """Which modes are vibration modes of the beam above an angular frequency, rad/s; shape (N,)."""
+        return (self.omega > omega) & (np.arange(self.omega.size) < self.equilibrium.size)
+
     def body_of(self, values: _Array) -> _Array:
         """The striker's own part of q or p of shape (..., N), in space and SI units; NaN if it is no body."""
         if self.body_mass is None:

@@ -208,9 +208,10 @@ def _perturbed(ensemble: Ensemble, size: float) -> Ensemble:
 
 
 def _watch(system: System, ensemble: Ensemble, times: _Array) -> _Array:
-    """Displacements of the contact point and of the centre, over b, shape (times, 2)."""
+    """Displacements of the beam at the striker's location and at the centre, over b, shape (times, 2)."""
     recorded = joined(list(resolve("cpu")[1].record(ensemble, times, False)))
-    read_out = np.column_stack((ensemble.contact_rows[0], ensemble.structure.center))
+    beam = ensemble.structure.row_of_beam(ensemble.contact_rows[0])
+    read_out = np.column_stack((beam, ensemble.structure.center))
     found = np.full((times.size, 2), np.nan)
     found[: recorded.times.size] = recorded.q @ read_out / system.scale.length
     return found

@@ -6,6 +6,7 @@ is a property of the system.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,9 +79,12 @@ def perturbed_start(system: System, replicas: Replicas, repeat: int, state: Stat
     speed = replicas.size / reach
     generator = np.random.Generator(np.random.Philox(key=[replicas.seed, repeat]))
     q, velocity = generator.standard_normal((2, model.modes)) * speed
-    return State(
+    return dataclasses.replace(
+        rest,
         amplitude=rest.amplitude + sign * (model.linear_modes @ (q * per_unit)),
         velocity=rest.velocity + sign * (model.linear_modes @ velocity),
-        phase=rest.phase,
-        striker_position=rest.striker_position,
+        contact_time=np.array(np.nan),
+        tangent=None,
+        passed=None,
+        modal=None,
     )

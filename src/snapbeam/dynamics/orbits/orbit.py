@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -93,11 +93,7 @@ class Orbit:
     @property
     def system(self) -> System:
         """The system, starting on the orbit."""
-        flow = self._stroboscope
-        changes: dict[str, Any] = {"start": self.state}
-        if flow.system.striker is not None:
-            changes["drive.phase"] = flow.striker_phase
-        return flow.system.replace(**changes)
+        return self._stroboscope.starting(self.state)
 
     @cached_property
     def passage(self) -> Passage:

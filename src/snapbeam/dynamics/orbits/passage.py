@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,10 +34,7 @@ class Passage(NamedTuple):
 
 def passage_of(flow: Stroboscope, coordinates: _Array, periods: int) -> Passage:
     """Follow one state for some periods and look at every approach."""
-    changes: dict[str, Any] = {"start": flow.state(coordinates)}
-    if flow.system.striker is not None:
-        changes["drive.phase"] = flow.striker_phase
-    system = flow.system.replace(**changes)
+    system = flow.starting(flow.state(coordinates))
     integration = flow.integration.replace(cycles=periods, early_decision=False)
     run = simulate(
         system, integration, sample_times=np.linspace(0.0, periods * flow.period, _SAMPLES * periods + 1)

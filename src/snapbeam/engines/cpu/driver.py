@@ -83,7 +83,7 @@ def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> Asked:
         other_rows=None if ensemble.others is None else packed.spread(ensemble.others.rows),
         extras=extras_of_table(),
         max_steps=ensemble.max_steps,
-        high=bool((ensemble.structure.omega > ensemble.high_omega).any()),
+        high=bool(ensemble.structure.high_modes(ensemble.high_omega).any()),
     )
 
 

@@ -115,7 +115,7 @@ def pack(
         "contact": np.zeros(size),
         "center": padded(structure.center),
         "shift": padded(structure.shift),
-        "high": padded((omega > high_omega).astype(np.float64)),
+        "high": padded(structure.high_modes(high_omega).astype(np.float64)),
         "tension": np.concatenate(strips),
     }
     away = structure.uneven
@@ -158,6 +158,7 @@ def pack(
         forced=forces,
         circuit=circuit,
         others=others,
+        body=None if structure.body_mass is None else int(rows[structure.equilibrium.size]),
     )
     return Packed(
         np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows, tuple(held)

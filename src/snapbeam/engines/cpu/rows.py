@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from snapbeam.engines.cpu.dot import dot
 from snapbeam.engines.cpu.strikers.force import struck
 from snapbeam.engines.cpu.uneven import pushed
+from snapbeam.engines.cpu.world.circuit import without_circuit
 from snapbeam.engines.cpu.world.forced import shaken
 from snapbeam.engines.scalar.compile import called, inlined
 from snapbeam.engines.scalar.lanes import (
@@ -38,6 +39,8 @@ from snapbeam.engines.scalar.physics import (
 __all__ = [
     "Layout",
     "acceleration_rows",
+    "beam_energy",
+    "beam_signals",
     "dot",
     "flow_coefficients",
     "flow_rows",
@@ -91,6 +94,8 @@ class Layout(NamedTuple):
     """Of a harvester, a :class:`~snapbeam.engines.cpu.world.circuit.Circuit`; else None."""
     others: Any
     """Of several strikers, an :class:`~snapbeam.engines.cpu.strikers.force.Others`; else None."""
+    body: Any
+    """Element of a row that holds the mode of a striker with mass; None without one."""
 
 
 @inlined
@@ -306,6 +311,37 @@ def signals(memory, layout, q, p):
         cq, cp = fma(c_row, q_row, cq), fma(c_row, p_row, cp)
         eq, ep = fma(e_row, q_row, eq), fma(e_row, p_row, ep)
     return lanes_sum(cq), lanes_sum(cp), lanes_sum(eq), lanes_sum(ep)
+
+
+@inlined
+def beam_signals(memory, layout, q, p, w, rate):
+    """Displacement and velocity of the beam at the striker, of the products *w* and *rate* with the contact row.
+
+    With a striker that has mass, these products are of the beam minus the striker's own displacement.
+    """
+    return _without_body(memory, layout.body, layout.contact, q, p, w, rate)
+
+
+@inlined
+def _without_body(memory, body, contact, q, p, w, rate):
+    if body is None:
+        return w, rate
+    c = memory[contact + body]
+    return w - c * memory[q + body], rate - c * memory[p + body]
+
+
+@inlined
+def beam_energy(memory, layout, q, p, energy):
+    """The part of the modal *energy* that is in the beam: neither in a striker's mass nor in a circuit."""
+    beam = _without_energy_of(memory, layout.body, layout.omega, q, p, energy)
+    return without_circuit(memory, layout.circuit, p, beam)
+
+
+@inlined
+def _without_energy_of(memory, body, omega, q, p, energy):
+    if body is None:
+        return energy
+    return energy - mode_energy(memory[omega + body], memory[q + body], memory[p + body])
 
 
 @inlined

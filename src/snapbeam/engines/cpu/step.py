@@ -7,6 +7,7 @@ from typing import NamedTuple
 from snapbeam.engines.cpu.push import Push, damped, no_push
 from snapbeam.engines.cpu.rows import (
     acceleration_rows,
+    beam_signals,
     dot,
     flow_coefficients,
     flow_rows,
@@ -85,10 +86,11 @@ def prepare(memory, layout, stages, drive, length, at):
 
 @compiled
 def observe(memory, layout, tip, phase, q, p):
-    """Contact point from rest and its rate; penetration and its rate; centre from rest and its rate."""
+    """Beam at the striker from rest and its rate; penetration and its rate; centre from rest and its rate."""
     motion, velocity = tip_motion(tip.drive, memory, phase)
     w, rate, c, c_rate = signals(memory, layout, q, p)
-    return Seen(w, rate, tip.offset + motion - w, velocity - rate, c, c_rate)
+    beam, beam_rate = beam_signals(memory, layout, q, p, w, rate)
+    return Seen(beam, beam_rate, tip.offset + motion - w, velocity - rate, c, c_rate)
 
 
 @inlined

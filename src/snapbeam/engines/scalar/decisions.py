@@ -65,7 +65,7 @@ class Seen(NamedTuple):
     """What is seen of a run at an instant, from the striker's side."""
 
     w: float
-    """Displacement of the contact point, m, and its rate."""
+    """Displacement of the beam at the striker, m, and its rate."""
     wv: float
     d: float
     """Penetration, and its rate."""
@@ -263,7 +263,7 @@ def count_in_step(book, clock, start, length, seen, seen1, looked, rest, pieces,
 
 @compiled
 def track(book, seen, seen1, length):
-    """Widen the extremes of the contact point and of the centre by a step, and add to their mean squares."""
+    """Widen the extremes of the beam at the striker and at the centre by a step, and add to their mean squares."""
     book.min_displacement, book.max_displacement = widened(
         book.min_displacement, book.max_displacement, seen.w, seen.wv, seen1.w, seen1.wv, length
     )

@@ -9,6 +9,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.core.codes import RunStatus
+from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import make_ensemble
 from snapbeam.engines.cpu import driver
 from snapbeam.engines.cpu.few.memory import suits
@@ -73,6 +74,28 @@ def test_decided_and_given_up_runs_are_the_same(monkeypatch):
 
 def test_a_gap_and_a_striker_above(monkeypatch):
     assert_same(monkeypatch, ensemble(1, striker={"side": "above", "gap": 2e-5}))
+
+
+def test_a_striker_with_mass(monkeypatch):
+    """Extremes and the share of high modes are those of the beam in both layouts, as recorded runs have them."""
+    body = {"mass": 0.02, "spring": 700.0, "damper": 0.1}
+    made = ensemble(2, runs=16, cycles=8, striker=body, high_frequency_ratio=1.2)
+    found = statistics_of(made, assert_same(monkeypatch, made))
+    assert (found["impacts"] > 0).all() and (found["high_frequency_share"] > 0.0).any()
+    model = made.structure.model
+    for i in range(3):
+        numbers = dict(zip(made.drive.number_names, made.drive_numbers[i], strict=True))
+        first = 2.0 * np.pi * model.reference_freq
+        drive = sb.Sine(
+            frequency_ratio=float(numbers["omega"] / first),
+            velocity_amplitude=float(numbers["amplitude"] * numbers["omega"] / (model.length_scale * first)),
+        )
+        striker = sb.Striker(drive=drive, location=float(made.location[i]), **body)
+        how = sb.Integration(cycles=8)
+        times = np.linspace(0.0, 8 * 2.0 * np.pi / numbers["omega"] * (1.0 - 1e-12), 20001)
+        w = sb.simulate(sb.System(model, CONTACT, striker), how, sample_times=times).dataset.displacement
+        assert found["min_displacement"][i] == pytest.approx(float(w.min()), abs=1e-3)
+        assert found["max_displacement"][i] == pytest.approx(float(w.max()), abs=1e-3)
 
 
 def test_neighbours_order_and_threads_do_not_matter(monkeypatch):

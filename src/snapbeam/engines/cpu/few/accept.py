@@ -7,9 +7,9 @@ from snapbeam.engines.cpu.few.meet import look_at
 from snapbeam.engines.cpu.few.modes import modal_energy, modes_of
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.decisions import Seen, clock_of, count_in_step, finish_impact, quiet_energy
-from snapbeam.engines.scalar.lanes import WIDTH, load, splat, store, vabs, vfloor
+from snapbeam.engines.scalar.lanes import WIDTH, load, splat, spread_at, store, vabs, vfloor
 from snapbeam.engines.scalar.masks import bits, less, lowest, mask_of, pick, vmax, vmin
-from snapbeam.engines.scalar.physics import tension_energy
+from snapbeam.engines.scalar.physics import mode_energy, tension_energy
 from snapbeam.engines.scalar.signals import bulge, widened
 from snapbeam.engines.scalar.tip import numbers_of
 
@@ -127,6 +127,15 @@ def _events(m, n, asked, books, which):
 
 
 @inlined
+def _beam_energy(m, body, energy):
+    """As :func:`~snapbeam.engines.cpu.rows.beam_energy` of the other layout, at the ends of the steps."""
+    if body is None:
+        return energy
+    omega = spread_at(m, body + at.OMEGA_I)
+    return energy - mode_energy(omega, load(m, body + at.Q1), load(m, body + at.P1))
+
+
+@inlined
 def _weigh(m, n, shape, world, seen1, released, events, which):
     """After some steps, or a release, look at the energy; returns the lanes whose future is certain."""
     beat = load(m, at.BEAT)
@@ -137,7 +146,7 @@ def _weigh(m, n, shape, world, seen1, released, events, which):
     mask, t = mask_of(due), load(m, at.T)
     linear, high = modal_energy(m, shape, at.Q1, at.P1)
     span = (t - load(m, at.WEIGHED)) * load(m, at.TICK)
-    _add(m, at.ENERGY_TIME, mask, linear * span)
+    _add(m, at.ENERGY_TIME, mask, _beam_energy(m, world.body, linear) * span)
     _add(m, at.HIGH_TIME, mask, high * span)
     store(m, at.WEIGHED, pick(mask, t, load(m, at.WEIGHED)))
     apart = due & ~n[at.TOUCHING]

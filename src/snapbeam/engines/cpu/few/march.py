@@ -16,7 +16,7 @@ from snapbeam.engines.cpu.few.accept import accept, end_contact
 from snapbeam.engines.cpu.few.choose import choose, fetch
 from snapbeam.engines.cpu.few.meet import About, cut_again, meet, probe
 from snapbeam.engines.cpu.few.modes import modal_energy, signals, take, tension
-from snapbeam.engines.cpu.few.seat import seat
+from snapbeam.engines.cpu.few.seat import beam_signals, seat
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import contact_energy
 from snapbeam.engines.scalar.decisions import leave_contact_open
@@ -32,7 +32,7 @@ _NOT_FINITE, _STEP_LIMIT = int(RunStatus.NOT_FINITE), int(RunStatus.STEP_LIMIT)
 
 
 @inlined
-def _observe(m, shape):
+def _observe(m, shape, world):
     """What is seen at the ends of the steps."""
     home = load(m, at.HOME)
     offset = load(m, at.OFFSET) + (1.0 - home) * load(m, at.REST_CONTACT)
@@ -40,7 +40,8 @@ def _observe(m, shape):
     sine, cosine = sincos(load(m, at.PHASE) + omega * load(m, at.LENGTH))
     motion, velocity = shaker_motion(load(m, at.AMPLITUDE), omega, sine, cosine)
     w, wv, c, cv = signals(m, shape, at.Q1, at.P1)
-    return About(w, wv, offset + motion - w, velocity - wv, c, cv)
+    beam, beam_rate = beam_signals(m, world.body, at.Q1, at.P1, w, wv)
+    return About(beam, beam_rate, offset + motion - w, velocity - wv, c, cv)
 
 
 @compiled
@@ -94,7 +95,7 @@ def _pass(m, n, shape, world, asked, books, looked):
     touching = n[at.TOUCHING] & live
     law = lanes_tuple(asked.law, m, at.LAW)
     given = take(m, shape, world.stages, world.gamma, touching != 0, mask_of(touching), law)
-    about = _observe(m, shape)
+    about = _observe(m, shape, world)
     going = live
     aside = n[at.ASIDE] & live
     if aside:

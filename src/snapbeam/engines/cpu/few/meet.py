@@ -17,7 +17,7 @@ __all__ = ["About", "cut_again", "look_at", "meet", "probe"]
 
 
 class About(NamedTuple):
-    """What is seen at the ends of the steps, eight of each: contact point and centre from rest, the penetration."""
+    """What is seen at the ends of the steps, eight of each: beam at striker and centre from rest, the penetration."""
 
     w: Any
     wv: Any

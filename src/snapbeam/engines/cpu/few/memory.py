@@ -80,7 +80,7 @@ def lay_out_few(ensemble: Ensemble, packed: Packed, pieces: int) -> FewMemory:
         at.DAMPING: zeta * omega,
         at.CENTER: structure.center,
         at.SHIFT: structure.shift,
-        at.HIGH: (omega > ensemble.high_omega).astype(np.float64),
+        at.HIGH: structure.high_modes(ensemble.high_omega).astype(np.float64),
         at.WELL: structure.well,
     }
     for i, mode in enumerate(order):
@@ -94,7 +94,10 @@ def lay_out_few(ensemble: Ensemble, packed: Packed, pieces: int) -> FewMemory:
         distinct,
     )
     blocks = tuple(int(size) for size in packed.members)
-    world = World(stages, structure.tension_stiffness, structure.stretch, slot, look)
+    body = None
+    if structure.body_mass is not None:
+        body = at.MODE + int(np.flatnonzero(order == structure.equilibrium.size)[0]) * at.MODE_ROWS
+    world = World(stages, structure.tension_stiffness, structure.stretch, slot, look, body)
     return FewMemory(m, np.zeros(at.RUNS + 8, dtype=np.int64), shape_of(blocks, stages.flows), world)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from snapbeam.core.codes import RunStatus
 from snapbeam.engines.cpu.few import places as at
@@ -24,7 +24,7 @@ from snapbeam.engines.scalar.physics import (
 )
 from snapbeam.engines.scalar.tip import drive_rate, numbers_of
 
-__all__ = ["TWO_PI", "World", "flows_over", "prepare", "seat", "slot_of", "stand"]
+__all__ = ["TWO_PI", "World", "beam_signals", "flows_over", "prepare", "seat", "slot_of", "stand"]
 
 TWO_PI = 2.0 * math.pi
 _OK, _RUNNING = int(RunStatus.OK), int(RunStatus.RUNNING)
@@ -41,6 +41,17 @@ class World(NamedTuple):
     """Plain numbers of a prepared step."""
     look: int
     """Where in memory what a look inside a step sees begins."""
+    body: Any
+    """Where in memory the mode of a striker with mass begins; None without one."""
+
+
+@inlined
+def beam_signals(m, body, q, p, w, wv):
+    """As :func:`~snapbeam.engines.cpu.rows.beam_signals` of the other layout."""
+    if body is None:
+        return w, wv
+    c = load(m, body + at.CONTACT)
+    return w - c * load(m, body + q), wv - c * load(m, body + p)
 
 
 @inlined
@@ -106,8 +117,9 @@ def stand(m, shape, world, lane):
     motion, velocity = shaker_motion(load(m, at.AMPLITUDE), load(m, at.OMEGA), sine, cosine)
     home, rest = load(m, at.HOME), load(m, at.REST_CONTACT)
     offset = load(m, at.OFFSET) + (1.0 - home) * rest
-    store(m, at.W, pick(which, w + home * rest, load(m, at.W)))
-    store(m, at.WV, pick(which, wv, load(m, at.WV)))
+    beam, beam_rate = beam_signals(m, world.body, at.Q, at.P, w, wv)
+    store(m, at.W, pick(which, beam + home * rest, load(m, at.W)))
+    store(m, at.WV, pick(which, beam_rate, load(m, at.WV)))
     store(m, at.D, pick(which, offset + motion - w, load(m, at.D)))
     store(m, at.DV, pick(which, velocity - wv, load(m, at.DV)))
     store(m, at.C, pick(which, c + home * load(m, at.REST_CENTER), load(m, at.C)))

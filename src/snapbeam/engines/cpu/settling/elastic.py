@@ -7,7 +7,14 @@ from typing import NamedTuple
 
 from snapbeam.core.codes import RunStatus
 from snapbeam.engines.cpu.recording import record_contact, record_instants
-from snapbeam.engines.cpu.rows import dot, flow_coefficients, modal_energies, modal_energy, speed_bound
+from snapbeam.engines.cpu.rows import (
+    beam_energy,
+    dot,
+    flow_coefficients,
+    modal_energies,
+    modal_energy,
+    speed_bound,
+)
 from snapbeam.engines.cpu.settling.hardest import hardest_point
 from snapbeam.engines.cpu.settling.look import look_inside
 from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot, look_slot
@@ -157,7 +164,7 @@ def weighed(memory, layout, run, now, t, state, seen1, watch, event, status, boo
             linear, high = modal_energies(memory, layout, near, p)
         else:
             linear = modal_energy(memory, layout, near, p)
-        track_energy(book, linear, high, (t - last) * clock.tick)
+        track_energy(book, beam_energy(memory, layout, near, p, linear), high, (t - last) * clock.tick)
         last = t
         if not watch.touching:
             energy = linear + tension_energy(layout.gamma, gq, qr)

@@ -35,6 +35,7 @@ __all__ = [
     "tap_of",
     "tapped_rows",
     "tapped_speed",
+    "without_circuit",
 ]
 
 _TERMS = 15
@@ -83,6 +84,21 @@ def calm(circuit, quiet):
     if circuit is None:
         return quiet
     return False
+
+
+@inlined
+def without_circuit(memory, circuit, p, energy):
+    """The modal *energy* without the energy that a circuit with inertia stores."""
+    if circuit is None:
+        return energy
+    return _without_element(memory, circuit.own, p, energy)
+
+
+@inlined
+def _without_element(memory, own, p, energy):
+    if own is None:
+        return energy
+    return energy - 0.5 * memory[p + own] * memory[p + own]
 
 
 @inlined
