@@ -14,7 +14,7 @@ from snapbeam import paper
 from snapbeam.engines.assemble import make_ensemble
 from snapbeam.engines.cpu import driver as cpu_engine
 from snapbeam.engines.ensemble import Ensemble
-from snapbeam.engines.plan import Plan, plan_steps
+from snapbeam.engines.plan import Plan, choose_base_step
 from snapbeam.runs.samples import joined
 
 __all__ = [
@@ -76,7 +76,7 @@ class Case:
     @property
     def period(self) -> float:
         """Of the excitation, s."""
-        return 1.0 / (self.frequency_ratio * self.model.reference_freq)
+        return 1.0 / (self.frequency_ratio * self.model.reference_frequency)
 
     @cached_property
     def times(self) -> _Array:
@@ -94,7 +94,7 @@ class Case:
     def at_rest(self) -> float:
         """Displacement of the contact point in the well that the run begins in, b."""
         model = self.model
-        return float(model.equilibrium @ model.shape_at(self.location) / model.length_scale)
+        return float(model.well_amplitude @ model.shape_at(self.location) / model.length_scale)
 
     def system(self, factor: float = 1.0) -> sb.System:
         """What is run; the drive is multiplied by *factor*."""
@@ -106,10 +106,10 @@ class Case:
         return sb.System(self.model, CONTACT, shaker)
 
     def ensemble(
-        self, plan: Plan, cycles: int, *, factor: float = 1.0, early_decision: bool = False
+        self, plan: Plan, cycles: int, *, factor: float = 1.0, early_termination: bool = False
     ) -> Ensemble:
         """This run, for an engine."""
-        integration = sb.Integration(cycles=cycles, early_decision=early_decision)
+        integration = sb.Integration(cycles=cycles, early_termination=early_termination)
         return make_ensemble(self.system(factor), integration, plan=plan)
 
     def displacement(self, plan: Plan, factor: float = 1.0) -> _Array:
@@ -121,9 +121,9 @@ class Case:
         shape = self.model.shape_at(self.location)
         return np.asarray(alpha @ shape / self.model.length_scale) - self.at_rest
 
-    def default_plan(self, accuracy: str = "map") -> Plan:
+    def default_plan(self, accuracy: str = "standard") -> Plan:
         """snapbeam's own choice of steps."""
-        return plan_steps(self.model, CONTACT, accuracy=accuracy)
+        return choose_base_step(self.model, CONTACT, accuracy=accuracy)
 
     @cached_property
     def reference(self) -> _Array:

@@ -79,8 +79,8 @@ def requests_chart(data: dict[str, Any], path: Path) -> None:
         ax = figure.subplots()
         for shift, (modes, (marker, color)) in enumerate(marks.items()):
             mine = [r for r in data["records"] if r["modes"] == modes and r["error"] is not None]
-            met, short = [r for r in mine if r["reached"]], [r for r in mine if not r["reached"]]
-            for group, face in ((met, color), (short, "none")):
+            contact_event, short = [r for r in mine if r["reached"]], [r for r in mine if not r["reached"]]
+            for group, face in ((contact_event, color), (short, "none")):
                 ax.plot(
                     [r["tolerance"] * 1.25 ** (shift - 1) for r in group],
                     [max(r["error"], _FLOOR) for r in group],

@@ -85,7 +85,7 @@ def _branch(share: float) -> Cost:
     orbit = sb.periodic_orbit(system, period=2, transient=2000)
     most = round(_ORBITS * share)
     seconds, branch = _seconds(
-        lambda: sb.continue_orbit(orbit, "velocity_amplitude", (0.005, 0.6), most=most, longest=2e-4)
+        lambda: sb.continuation(orbit, "velocity_amplitude", (0.005, 0.6), max_points=most, max_step=2e-4)
     )
     return Cost(f"branch of {_ORBITS} orbits, N = 32", len(branch.orbits), _ORBITS, seconds, 0.0, 60.0)
 
@@ -93,10 +93,10 @@ def _branch(share: float) -> Cost:
 def _basins(share: float) -> Cost:
     """States of one mode that tap or rest, or go on for 200 cycles."""
     side = round(_SIDE * share**0.5)
-    found = sb.attractors(_system(1, 1.6, 0.03, 0.05), 40, transient=300)
+    found = sb.find_attractors(_system(1, 1.6, 0.03, 0.05), 40, transient=300)
     plane = {"amplitude[1]": np.linspace(-1.6, 1.6, side), "velocity[1]": np.linspace(-1.0, 1.0, side)}
-    sb.basins(found, {name: values[:2] for name, values in plane.items()}, periods=2)
-    seconds, _ = _seconds(lambda: sb.basins(found, plane, periods=200))
+    sb.basins_of_attraction(found, {name: values[:2] for name, values in plane.items()}, periods=2)
+    seconds, _ = _seconds(lambda: sb.basins_of_attraction(found, plane, periods=200))
     return Cost(
         f"basins of {_SIDE} x {_SIDE} states, N = 1, 200 cycles", side**2, _SIDE**2, seconds, 0.0, 120.0
     )
@@ -118,7 +118,9 @@ def _lifetimes(share: float) -> Cost:
                 "velocity_amplitude": ("point", velocity[k : k + 1]),
             }
         )
-        times.append(_seconds(lambda at=point: sb.lifetime_map(system, at, how, starts=_STARTS))[0])
+        times.append(
+            _seconds(lambda at=point: sb.lifetime_map(system, at, how, initial_conditions=_STARTS))[0]
+        )
     cpu = np.array([each.cpu for each in times])
     error = float(np.std(cpu, ddof=1)) * count**0.5
     total = Seconds(float(cpu.sum()), sum(each.wall for each in times), times[-1].load)

@@ -35,14 +35,14 @@ def sample(size: int) -> dict[str, np.ndarray]:
 def ensemble_of(
     modes: int, points: dict[str, np.ndarray], early: bool, cycles: int = paper.CYCLES
 ) -> Ensemble:
-    """The runs of *points* at level "map"."""
+    """The runs of *points* at level standard."""
     system = sb.System(model_of(modes), CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))
     columns = {
         "drive.frequency_ratio": points["frequency_ratio"],
         "drive.velocity_amplitude": points["velocity_amplitude"],
         "striker.location": points["location"],
     }
-    return make_ensemble(system, sb.Integration(cycles=cycles, early_decision=early), columns)
+    return make_ensemble(system, sb.Integration(cycles=cycles, early_termination=early), columns)
 
 
 def run(folder: Path, quick: bool) -> None:
@@ -55,7 +55,7 @@ def run(folder: Path, quick: bool) -> None:
     rows = [
         [
             r["modes"],
-            "on" if r["early_decision"] else "off",
+            "on" if r["early_termination"] else "off",
             r["runs"],
             f"{r['milliseconds']:.3g} (+{100 * r['spread']:.0f} %)",
             f"{100 * r['decided']:.0f} %",
@@ -73,15 +73,15 @@ def run(folder: Path, quick: bool) -> None:
 def _throughput(modes: int, size: int, early: bool, repeats: int) -> dict[str, Any]:
     ensemble = ensemble_of(modes, sample(size), early)
     timing = measure(lambda: cpu_engine.run_ensemble(ensemble, 1), repeats)
-    books = cpu_engine.run_ensemble(ensemble, 1)
+    accumulators_of_runs = cpu_engine.run_ensemble(ensemble, 1)
     whole = ensemble.runs["tick"] * ensemble.runs["end"]
-    decided = books["status"] == RunStatus.DECIDED
-    lasted = np.where(decided, books["decided_at"], whole)
+    decided = accumulators_of_runs["status"] == RunStatus.EARLY_STOP
+    lasted = np.where(decided, accumulators_of_runs["early_stop_time"], whole)
     work = ensemble.work
     return {
         "modes": modes,
         "runs": size,
-        "early_decision": early,
+        "early_termination": early,
         "milliseconds": 1e3 * timing.seconds / size,
         "spread": timing.spread,
         "decided": float(decided.mean()),

@@ -38,8 +38,8 @@ from snapbeam.engines.scalar.composition import COMPOSITIONS
 CONTACT = sb.HertzContact(stiffness=4e8)
 LOCATION = 1 / 2.1
 PAIRS = ((0.3, 0.2), (0.625, 0.1), (1.21, 0.05), (1.21, 0.18), (1.625, 0.3), (3.0, 0.4))
-COMPARED = ("max_displacement", "min_displacement", "gross_work", "contact_share")
-COUNTED = ("steps", "crossings", "impacts")
+COMPARED = ("max_displacement", "min_displacement", "gross_work", "contact_time_fraction")
+COUNTED = ("steps", "zero_crossings", "impacts")
 SEED = 20240118
 AIM_SECONDS = 60.0
 # Double-precision multiply-adds a multiprocessor ends per clock, by compute capability; 2 elsewhere.
@@ -52,7 +52,7 @@ def model_of(modes: int) -> sb.ReducedModel:
 
 
 def ensemble_of(
-    modes: int, ratio: Any, velocity: Any, cycles: int, *, early_decision: bool = False
+    modes: int, ratio: Any, velocity: Any, cycles: int, *, early_termination: bool = False
 ) -> Ensemble:
     """Runs at points of the plane of frequency ratio and velocity amplitude."""
     shaker = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, location=LOCATION)
@@ -62,7 +62,7 @@ def ensemble_of(
     }
     return make_ensemble(
         sb.System(model_of(modes), CONTACT, shaker),
-        sb.Integration(cycles=cycles, early_decision=early_decision),
+        sb.Integration(cycles=cycles, early_termination=early_termination),
         points,
     )
 
@@ -84,13 +84,13 @@ def march(ensemble: Ensemble, warps: int | None = None) -> tuple[float, dict[str
     """Seconds and statistics of a march on the device; the kernel must have been compiled before."""
     simulated = cuda_engine.simulated()
     options = Options(warps=warps) if not simulated else Options(most_blocks=1, fewest_threads=1)
-    seconds, books = timed(lambda: cuda_engine.run_ensemble(ensemble, options=options))
-    return seconds, measured(ensemble, books)
+    seconds, accumulators_of_runs = timed(lambda: cuda_engine.run_ensemble(ensemble, options=options))
+    return seconds, measured(ensemble, accumulators_of_runs)
 
 
-def measured(ensemble: Ensemble, books: Any) -> dict[str, Any]:
+def measured(ensemble: Ensemble, accumulators_of_runs: Any) -> dict[str, Any]:
     """Statistics of runs, and their steps."""
-    return {**statistics_of(ensemble, books), "steps": books["steps"]}
+    return {**statistics_of(ensemble, accumulators_of_runs), "steps": accumulators_of_runs["steps"]}
 
 
 def device_facts() -> dict[str, Any]:
@@ -146,10 +146,10 @@ def conformance(smoke: bool) -> dict[str, Any]:
     if smoke:
         return {"first_cycle": rows}
     ratio, velocity = (x.ravel() for x in np.meshgrid(np.linspace(0.1, 4, 40), np.linspace(0.01, 0.65, 26)))
-    ensemble = ensemble_of(32, ratio, velocity, 200, early_decision=True)
+    ensemble = ensemble_of(32, ratio, velocity, 200, early_termination=True)
     shares = []
     for found in (march(ensemble)[1], statistics_of(ensemble, cpu_engine.run_ensemble(ensemble))):
-        classes = found["response"]
+        classes = found["response_class"]
         shares.append([float(np.mean(classes == kind)) for kind in ResponseClass])
     table = []
     for kind, gpu, cpu in zip(ResponseClass, *shares, strict=True):
@@ -168,13 +168,13 @@ def throughput(smoke: bool, facts: dict[str, Any]) -> dict[str, Any]:
     rows, slowest = [], 3.0 if smoke else 0.1
     for early in (False,) if smoke else (False, True):
         for warps in (None,) if smoke else (8, 12, 16):
-            ensemble = ensemble_of(modes, *sample(runs, slowest), cycles, early_decision=early)
+            ensemble = ensemble_of(modes, *sample(runs, slowest), cycles, early_termination=early)
             compiling, _ = timed(lambda warps=warps: march(ensemble_of(modes, [4.0], [0.1], 1), warps))
             seconds, found = march(ensemble, warps)
             steps = float(found["steps"].sum())
             rate = steps * flops_per_step(ensemble) / seconds
             row = {
-                "early_decision": early, "warps": warps, "compile_s": compiling, "seconds": seconds,
+                "early_termination": early, "warps": warps, "compile_s": compiling, "seconds": seconds,
                 "ms_per_run": 1e3 * seconds / runs, "steps_per_second": steps / seconds, "flops": rate,
             }  # fmt: skip
             if "fp64_limit_flops" in facts:
@@ -224,13 +224,13 @@ def fig_7b(smoke: bool, output: Path) -> dict[str, Any]:
                 location=LOCATION,
                 cycles=cycles,
                 engine="cuda",
-                early_decision=early,
+                early_termination=early,
                 progress=_progress,
             )
         )
-        classes = np.asarray(dataset["response"])
+        classes = np.asarray(dataset["response_class"])
         results.append(
-            {"early_decision": early, "points": int(classes.size), "cycles": cycles, "seconds": seconds,
+            {"early_termination": early, "points": int(classes.size), "cycles": cycles, "seconds": seconds,
              "aim_seconds": AIM_SECONDS, "within_aim": seconds <= AIM_SECONDS,
              "shares": {kind.label: float(np.mean(classes == kind)) for kind in ResponseClass}}
         )  # fmt: skip

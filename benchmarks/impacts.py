@@ -2,7 +2,7 @@
 
 DynamicalSystems.jl and its like integrate the flight by an adaptive Runge-Kutta method and find each impact as an event
 of it; that is SciPy's ``solve_ivp`` with an event here, which is interpreted.  Beside it stands the most that any
-event-driven program can reach: the flight in closed form, compiled, so that nothing but finding impacts is left.
+event-driven program can reach: the flight in closed form, compiled, so that nothing but diagnostic impacts is left.
 """
 
 from __future__ import annotations

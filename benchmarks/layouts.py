@@ -45,15 +45,19 @@ def run(folder: Path, quick: bool) -> None:
 
 def _in_turns(modes: int, early: bool, ensemble: Ensemble, repeats: int) -> dict[str, Any]:
     """Each layout in turn, so that what else the machine does meets both."""
-    books, times = {}, {False: np.inf, True: np.inf}
+    accumulators_of_runs, times = {}, {False: np.inf, True: np.inf}
     for few in (False, True) * (repeats + 1):
         driver.FEWEST_STEPS, driver.FEW_MODES = 0.0, MOST if few else 0
-        timing = measure(lambda: driver.run_ensemble(ensemble, 1), 1, warm=few not in books)
-        books[few] = driver.run_ensemble(ensemble, 1) if few not in books else books[few]
+        timing = measure(lambda: driver.run_ensemble(ensemble, 1), 1, warm=few not in accumulators_of_runs)
+        accumulators_of_runs[few] = (
+            driver.run_ensemble(ensemble, 1) if few not in accumulators_of_runs else accumulators_of_runs[few]
+        )
         times[few] = min(times[few], timing.seconds)
-    for name in books[False].dtype.names:
-        np.testing.assert_array_equal(books[True][name], books[False][name], err_msg=name)
-    steps = float(books[False]["steps"].sum())
+    for name in accumulators_of_runs[False].dtype.names:
+        np.testing.assert_array_equal(
+            accumulators_of_runs[True][name], accumulators_of_runs[False][name], err_msg=name
+        )
+    steps = float(accumulators_of_runs[False]["steps"].sum())
     return {
         "modes": modes,
         "early": early,

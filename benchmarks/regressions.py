@@ -21,8 +21,8 @@ def test_single_run(benchmark: Any, modes: int) -> None:
     """50 cycles at (1.21, 0.18), statistics only."""
     case = Case(modes, 1.21, 0.18)
     ensemble = case.ensemble(case.default_plan(), 50)
-    books = benchmark(cpu_engine.run_ensemble, ensemble, 1)
-    assert books["steps"][0] > 0
+    accumulators_of_runs = benchmark(cpu_engine.run_ensemble, ensemble, 1)
+    assert accumulators_of_runs["steps"][0] > 0
 
 
 def test_recorded_run(benchmark: Any) -> None:

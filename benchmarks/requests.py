@@ -62,7 +62,7 @@ def _measured(case: Case, tolerance: float) -> dict[str, Any]:
     reference = case.default_plan("reference")
     finer = reference._replace(step=min(reference.step, accuracy.step / 3.0))
     truth = case.displacement(finer) + case.at_rest
-    until = case.times <= accuracy.horizon
+    until = case.times <= accuracy.predictability_horizon
     error = float(np.abs(run - truth)[until].max())
     return {
         "modes": case.modes,
@@ -70,8 +70,8 @@ def _measured(case: Case, tolerance: float) -> dict[str, Any]:
         "tolerance": tolerance,
         "error": error if math.isfinite(error) else None,
         "estimate": accuracy.estimated_error,
-        "horizon": accuracy.horizon / case.times[-1],
-        "conditioning": accuracy.conditioning,
+        "horizon": accuracy.predictability_horizon / case.times[-1],
+        "conditioning": accuracy.perturbation_growth,
         "reached": accuracy.reached,
         "order": accuracy.order,
         "step": accuracy.step,
@@ -79,7 +79,7 @@ def _measured(case: Case, tolerance: float) -> dict[str, Any]:
     }
 
 
-def _simulate(case: Case, tolerance: float) -> tuple[np.ndarray, sb.Accuracy]:
+def _simulate(case: Case, tolerance: float) -> tuple[np.ndarray, sb.ErrorEstimate]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         run = sb.simulate(
@@ -88,4 +88,4 @@ def _simulate(case: Case, tolerance: float) -> tuple[np.ndarray, sb.Accuracy]:
             sample_times=case.times,
         )
     assert run.accuracy is not None
-    return run.dataset["displacement"].values, run.accuracy
+    return run.dataset["displacement_at_striker"].values, run.accuracy

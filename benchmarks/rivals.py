@@ -36,8 +36,8 @@ def chosen_points(count: int, cycles: int) -> tuple[dict[str, np.ndarray], np.nd
     """Points at equal steps of the share of time in contact, and that share."""
     points = sample(_CANDIDATES)
     ensemble = ensemble_of(_MODES, points, False, cycles)
-    books = cpu_engine.run_ensemble(ensemble, 1)
-    share = books["contact_time"] / (ensemble.runs["tick"] * ensemble.runs["end"])
+    accumulators_of_runs = cpu_engine.run_ensemble(ensemble, 1)
+    share = accumulators_of_runs["contact_time"] / (ensemble.runs["tick"] * ensemble.runs["end"])
     order = np.argsort(share)[((np.arange(count) + 0.5) / count * _CANDIDATES).astype(int)]
     return {name: values[order] for name, values in points.items()}, share[order]
 
@@ -78,7 +78,7 @@ def run(folder: Path, quick: bool) -> None:
         text += f"The fastest rival is {best['method']}: {best['seconds'] / own:.2g} times snapbeam's time.\n"
     data: dict[str, Any] = {
         "modes": _MODES, "cycles": cycles, "repeats": repeats, "limit": LIMIT,
-        "points": {name: values.tolist() for name, values in points.items()}, "contact_share": share.tolist(),
+        "points": {name: values.tolist() for name, values in points.items()}, "contact_time_fraction": share.tolist(),
         "records": records,
     }  # fmt: skip
     save(folder, "rivals", quick, data, text)
@@ -102,7 +102,7 @@ def _snapbeam(cases: list[Case], points: dict[str, np.ndarray], cycles: int, rep
     errors = [case.error(case.displacement(case.default_plan())) for case in cases]
     ensemble = ensemble_of(_MODES, points, False, cycles)
     timing = measure(lambda: cpu_engine.run_ensemble(ensemble, 1), repeats)
-    return _record("snapbeam", "level map, default step", errors, timing)
+    return _record("snapbeam", "level standard, default step", errors, timing)
 
 
 def _rival(method: Method, cases: list[Case], cycles: int, repeats: int, quick: bool) -> dict[str, Any]:

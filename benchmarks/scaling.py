@@ -91,8 +91,8 @@ def _modes(count: int, repeats: int) -> dict[str, Any]:
     plan = case.default_plan()
     ensemble = case.ensemble(plan, 200)
     timing = measure(lambda: cpu_engine.run_ensemble(ensemble, 1), repeats)
-    books = cpu_engine.run_ensemble(ensemble, 1)
-    kicks = int(books["steps"][0]) * COMPOSITIONS[plan.order].flow.size
+    accumulators_of_runs = cpu_engine.run_ensemble(ensemble, 1)
+    kicks = int(accumulators_of_runs["steps"][0]) * COMPOSITIONS[plan.order].flow.size
     rank_one, modal = _acceleration_times(count)
     odd, even = (count + 1) // 2, count // 2
     return {
@@ -112,7 +112,7 @@ def _acceleration_times(count: int) -> tuple[float, float]:
     """ns of one acceleration without damping: by the rank-one mass matrix, and in linear modes."""
     model = model_of(count)
     assert model.beam is not None
-    gamma, inertia = model.tension_stiffness, 1.0 / model.beam.mass_per_length
+    gamma, inertia = model.nonlinear_stiffness, 1.0 / model.beam.mass_per_length
     packed = pack(structure_of(model, "below"))
     layout, blocks = packed.layout, packed.blocks
     size, work = layout.size, layout.work

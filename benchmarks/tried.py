@@ -126,7 +126,10 @@ def _ledger(step: float, cycles: int) -> dict[str, float]:
         recorded = joined(list(cpu_engine.record(ensemble, times, False)))
         beam, contact, work, dissipated = recorded.values[:, 2:6].T
         residual = beam + contact + dissipated - work
-        worst = max(worst, float(np.abs(residual - residual[0]).max() / recorded.books["gross_work"][0]))
+        worst = max(
+            worst,
+            float(np.abs(residual - residual[0]).max() / recorded.accumulators_of_runs["gross_work"][0]),
+        )
     return {"step": step, "residual": worst}
 
 

@@ -18,7 +18,7 @@ from snapbeam.engines.cpu import driver as cpu_engine
 __all__ = ["LIMIT", "run"]
 
 LIMIT = 1e-3
-"""e5 that level "map" stands for."""
+"""e5 that level standard stands for."""
 _CYCLES = 200
 
 

@@ -21,8 +21,10 @@ __all__ = ["WORLDS", "run"]
 _SEED = 20240118
 _MODES = 8
 SINE = sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.2)
-PIEZO = sb.Piezo(coupling=4e-3, capacitance=60e-9, resistance=2e4, start=0.0, stop=0.25)
-COIL = sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)
+PIEZO = sb.PiezoelectricHarvester(
+    moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_start=0.0, patch_end=0.25
+)
+COIL = sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)
 Parts = Mapping[str, Any]
 
 
@@ -47,20 +49,20 @@ WORLDS: dict[str, Parts] = {
     "`hunt_crossley`": {"contact": sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)},
     "`kelvin_voigt`": {"contact": sb.KelvinVoigt(2e6, 20.0)},
     "a gap": {"striker": {"gap": 4e-5}},
-    "`burst`": {"drive": sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.2, length=1e6, rise=2.0, fall=1.0)},
-    "`chirp`": {"drive": sb.Chirp(start_ratio=0.5, stop_ratio=3.0, velocity_amplitude=0.2, sweep_length=40.0)},
-    "`two_sines`": {
-        "drive": sb.TwoSines(frequency_ratio=1.0, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.1)
+    "`burst`": {"drive": sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.2, duration_cycles=1e6, ramp_up_cycles=2.0, ramp_down_cycles=1.0)},
+    "`chirp`": {"drive": sb.Chirp(start_ratio=0.5, stop_ratio=3.0, velocity_amplitude=0.2, sweep_cycles=40.0)},
+    "`two_tone`": {
+        "drive": sb.TwoTone(frequency_ratio=1.0, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.1)
     },
-    "`noise`": {"drive": sb.Noise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2)},
+    "`noise`": {"drive": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2)},
     "a body of 20 g": {"striker": {"mass": 0.02, "spring": 700.0, "damper": 0.7}},
-    "a stop above, too": {"striker": [{}, {"drive": sb.Still(), "location": 0.3, "side": "above", "gap": 4e-5}]},
-    "unequal wells": {"imperfection": sb.Imperfection(rise=4e-6)},
-    "other ends": {"beam": paper.BEAM.replace(ends=sb.Ends(left=40.0, right=40.0))},
+    "a stop above, too": {"striker": [{}, {"drive": sb.FixedStop(), "location": 0.3, "side": "above", "gap": 4e-5}]},
+    "unequal wells": {"imperfection": sb.Imperfection(midspan_amplitude=4e-6)},
+    "other ends": {"beam": paper.BEAM.replace(boundary=sb.BoundaryConditions(left_rotational_stiffness=40.0, right_rotational_stiffness=40.0))},
     "a moving base": {
-        "base": sb.Base(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1))
+        "base": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1))
     },
-    "a changing load": {"axial": sb.AxialLoad(motion=sb.LoadSine(frequency_ratio=2.0, amplitude=3.0))},
+    "a changing load": {"axial": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))},
     "a piezo": {"harvester": PIEZO},
     "a coil": {"harvester": COIL},
 }  # fmt: skip
@@ -92,9 +94,9 @@ def _time(ensemble: Ensemble, repeats: int) -> tuple[float, float]:
     for _ in range(1 + int(cpu_engine.FEWEST_STEPS / ensemble.work.sum())):
         march()
     seconds = measure(march, repeats).seconds
-    books = march()
+    accumulators_of_runs = march()
     simulated = float(np.sum(ensemble.runs["tick"] * ensemble.runs["end"]))
-    return seconds / simulated, seconds / float(books["steps"].sum())
+    return seconds / simulated, seconds / float(accumulators_of_runs["steps"].sum())
 
 
 def run(folder: Path, quick: bool) -> None:

@@ -26,12 +26,12 @@ run = sb.simulate(system, sb.Integration(cycles=40))
 # %%
 # What it did, from statistics that are kept while it runs:
 
-print(run.outcome.response.label)
+print(run.summary.response_class.label)
 print(
-    f"{run.outcome.crossings} crossings, "
-    f"the last at {1e3 * run.outcome.last_crossing:.1f} ms"
+    f"{run.summary.zero_crossings} crossings, "
+    f"the last at {1e3 * run.summary.last_zero_crossing:.1f} ms"
 )
-print(f"{run.outcome.impacts} impacts, the hardest {run.outcome.peak_force:.2f} N")
+print(f"{run.summary.impacts} impacts, the hardest {run.summary.peak_force:.2f} N")
 
 # %%
 # The waveform, and the hardest impact closer:
@@ -49,5 +49,5 @@ balance = (
     + energy.energy_contact
     + energy.energy_dissipated
 )
-residual = abs(balance - energy.work_shaker).max() / energy.attrs["gross_work"]
+residual = abs(balance - energy.striker_work).max() / energy.attrs["gross_work"]
 print(f"energy residual over gross work: {float(residual):.1e}")

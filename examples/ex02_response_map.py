@@ -35,7 +35,7 @@ ax = plot_response_map(ds, threshold_line=True)
 # %%
 # The interwell threshold is one line of xarray:
 
-snapped = ds.response >= sb.ResponseClass.TRANSIENT_1
+snapped = ds.response_class >= sb.ResponseClass.TRANSIENT_1
 threshold = ds.velocity_amplitude.where(snapped).min("velocity_amplitude")
 print(
     f"lowest at Omega = {float(threshold.idxmin('frequency_ratio')):.2f}: "

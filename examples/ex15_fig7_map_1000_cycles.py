@@ -18,7 +18,7 @@ figure = paper.fig7(results=results)
 for name, long in results["fig7"].items():
     for ds in (results["fig6"][name], long):
         shares = [
-            f"{kind.label} {100 * float((ds.response == kind).mean()):.1f} %"
+            f"{kind.label} {100 * float((ds.response_class == kind).mean()):.1f} %"
             for kind in sb.ResponseClass
         ]
         print(

@@ -22,12 +22,12 @@ lossy = sb.HuntCrossley.from_restitution(stiffness=4e8, restitution=0.6, speed=0
 burst = sb.Burst(
     frequency_ratio=1.21,
     velocity_amplitude=0.2,
-    length=5,
-    rise=2,
-    fall=1,
-    retreat=0.4,
+    duration_cycles=5,
+    ramp_up_cycles=2,
+    ramp_down_cycles=1,
+    retraction=0.4,
 )
-shaker = sb.Striker(drive=burst, mass=0.02, spring=700.0, damper=0.7)
+shaker = sb.Striker(drive=burst, mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7)
 system = sb.System(model, lossy, shaker)
 plot_system(system)
 
@@ -36,8 +36,8 @@ plot_system(system)
 
 run = sb.simulate(system, sb.Integration(cycles=8))
 print(
-    f"work {1e6 * run.outcome.shaker_work:.1f} µJ, "
-    f"lost in contact {1e6 * run.outcome.contact_loss:.1f} µJ"
+    f"work {1e6 * run.summary.striker_work:.1f} µJ, "
+    f"lost in contact {1e6 * run.summary.energy_lost_contact:.1f} µJ"
 )
 plot_run(run.dataset)
 
@@ -47,7 +47,7 @@ plot_run(run.dataset)
 # Thrown at the middle of the beam from above, at :math:`0.4\,b\,\omega_1`.
 
 sphere = sb.Striker(
-    drive=sb.Flight(speed=0.4), mass=2e-3, gap=0.5 * level, side="above", location=0.5
+    drive=sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=0.5 * level, side="above", location=0.5
 )
 thrown = sb.System(model, paper.CONTACT, sphere)
 plot_system(thrown)
@@ -56,8 +56,8 @@ plot_system(thrown)
 
 run = sb.simulate(thrown, sb.Integration(cycles=3))
 print(
-    f"impacts {run.outcome.impacts}, peak force {run.outcome.peak_force:.1f} N, "
-    f"{run.outcome.response.label}"
+    f"impacts {run.summary.impacts}, peak force {run.summary.peak_force:.1f} N, "
+    f"{run.summary.response_class.label}"
 )
 plot_run(run.dataset)
 
@@ -66,15 +66,15 @@ plot_run(run.dataset)
 # --------------------------------
 # An initial shape and a side load make the wells unequal; each end may turn on a spring of its own.
 
-soft = paper.BEAM.replace(ends=sb.Ends(left=20.0, right=5.0))
+soft = paper.BEAM.replace(boundary=sb.BoundaryConditions(left_rotational_stiffness=20.0, right_rotational_stiffness=5.0))
 uneven = sb.ReducedModel.from_beam(
     soft,
     modes=8,
-    imperfection=sb.Imperfection(rise=8e-6, point_load=0.02, point_location=0.3),
+    imperfection=sb.Imperfection(midspan_amplitude=8e-6, point_load=0.02, point_location=0.3),
 )
 print(
-    f"first frequency about the lower well {uneven.well_freq[0, 0]:.1f} Hz, "
-    f"upper {uneven.well_freq[1, 0]:.1f} Hz"
+    f"first frequency about the lower well {uneven.well_frequencies[0, 0]:.1f} Hz, "
+    f"upper {uneven.well_frequencies[1, 0]:.1f} Hz"
 )
 plot_system(
     sb.System(
@@ -90,12 +90,12 @@ plot_system(
 # Nothing strikes but a stop that is carried along; layers next to the clamp feed a resistor.
 
 motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25)
-stop = sb.Striker(drive=sb.Still(), gap=0.2 * level)
-piezo = sb.Piezo(
-    coupling=4e-3, capacitance=60e-9, resistance=2e4, start=0.0, stop=0.25
+stop = sb.Striker(drive=sb.FixedStop(), gap=0.2 * level)
+piezo = sb.PiezoelectricHarvester(
+    moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_start=0.0, patch_end=0.25
 )
 shaken = sb.System(
-    model, paper.CONTACT, stop, base=sb.Base(motion=motion), harvester=piezo
+    model, paper.CONTACT, stop, base_excitation=sb.BaseExcitation(motion=motion), harvester=piezo
 )
 plot_system(shaken)
 
@@ -103,14 +103,14 @@ plot_system(shaken)
 # A coil, under a load that changes
 # ---------------------------------
 
-coil = sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)
-load = sb.AxialLoad(motion=sb.LoadSine(frequency_ratio=2.0, amplitude=3.0))
+coil = sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)
+load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))
 plot_system(
     sb.System(
         model,
         paper.CONTACT,
         sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.2),
-        axial=load,
+        axial_load=load,
         harvester=coil,
     )
 )

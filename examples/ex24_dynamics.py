@@ -31,7 +31,7 @@ points = xr.Dataset(
         "velocity_amplitude": ("point", [0.25, 0.55]),
     }
 )
-lifetimes = sb.lifetime_map(two, points, sb.Integration(cycles=300), starts=120)
+lifetimes = sb.lifetime_map(two, points, sb.Integration(cycles=300), initial_conditions=120)
 for i in range(2):
     one = lifetimes.isel(point=i)
     print(
@@ -57,18 +57,18 @@ diagram = sb.bifurcation_diagram(
 limits = ("velocity_amplitude", (0.02, 0.3))
 orbit = sb.periodic_orbit(one, transient=300)
 branches = [
-    sb.continue_orbit(orbit, *limits, longest=0.06),
-    sb.continue_orbit(orbit, *limits, direction="down"),
+    sb.continuation(orbit, *limits, max_step=0.06),
+    sb.continuation(orbit, *limits, direction="down"),
 ]
-flip = next(event for event in branches[0].events if event.kind == "flip")
+flip = next(event for event in branches[0].special_points if event.kind == "flip")
 doubled = sb.switch_branch(flip, *limits)
-branches.append(sb.continue_orbit(doubled, "velocity_amplitude", (0.02, 0.17)))
+branches.append(sb.continuation(doubled, "velocity_amplitude", (0.02, 0.17)))
 weak = sb.periodic_orbit(
     one.replace(**{"drive.velocity_amplitude": 0.03}), transient=300
 )
-branches.append(sb.continue_orbit(weak, *limits))
+branches.append(sb.continuation(weak, *limits))
 for branch in branches:
-    for event in branch.events:
+    for event in branch.special_points:
         print(
             f"{event.kind:12s} V = {event.value:.6f}, period {branch.orbits[0].period}"
         )
@@ -79,15 +79,15 @@ plot_diagram(diagram, branches=[branch.to_dataset() for branch in branches])
 # ------------------------------------
 # States of the mode in the plane of displacement and velocity, from the tip's mid-position on, which stays where it is.
 
-found = sb.attractors(one, 100)
+found = sb.find_attractors(one, 100)
 plane = {
     "amplitude[1]": np.linspace(-0.98, 2.0, 80),
     "velocity[1]": np.linspace(-1.5, 1.5, 80),
 }
-basins = sb.basins(found, plane)
+basins = sb.basins_of_attraction(found, plane)
 entropy = sb.basin_entropy(basins.basin, 5)
 print(
-    f"{len(found.found)} attractors, "
+    f"{len(found.attractors)} attractors, "
     f"basin entropy {entropy.basin:.3f} ± {entropy.basin_error:.3f}"
 )
 plot_basins(basins)

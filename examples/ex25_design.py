@@ -24,7 +24,7 @@ system = sb.System(
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
 )
-spread = sb.Spread(
+spread = sb.ParameterUncertainty(
     of={
         "beam.buckling_level": sb.Normal(0.01, relative=True),
         "contact.stiffness": sb.LogNormal(0.2),
@@ -42,7 +42,7 @@ probability = sb.probability_map(
         "velocity_amplitude": np.linspace(0.02, 0.24, 17),
     },
     spread,
-    sb.Allocation(half_width=0.12, first=16, most=60),
+    sb.SamplingPlan(half_width=0.12, initial_runs=16, max_runs=60),
     integration=short,
 )
 print(f"{int(probability.runs.sum())} runs")
@@ -59,7 +59,7 @@ threshold = sb.quantile_threshold(
     (0.005, 0.3),
     {"frequency_ratio": np.linspace(0.4, 2.4, 9)},
     spread,
-    sb.Search(runs=200),
+    sb.QuantileSearchSettings(runs=200),
     integration=short,
 )
 plot_quantiles(threshold)
@@ -70,6 +70,6 @@ plot_quantiles(threshold)
 # For each parameter one standard score down and up; how much that is in its own unit stands beside it.
 
 sensitivity = sb.sensitivity(
-    system, "peak_force", spread, size=16, integration=sb.Integration(cycles=5)
+    system, "peak_force", spread, samples=16, integration=sb.Integration(cycles=5)
 )
 plot_tornado(sensitivity)

@@ -24,7 +24,7 @@ from snapbeam.figures.lab.tracking import plot_frame, plot_tracking_quality
 from snapbeam.figures.lab.vibrometer import plot_drive
 from snapbeam.figures.lab.waveform_comparison import plot_waveform_comparison
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
-from snapbeam.lab.compare.dots import Dots
+from snapbeam.lab.compare.dots import MeasuredPoints
 
 folder = tempfile.TemporaryDirectory()
 files = Path(folder.name)
@@ -50,11 +50,11 @@ def on_the_bench(buckling_level):
 rate, wells = 5e3, {}
 for well, level in (("lower", 0.3323e-3), ("upper", 0.3289e-3)):
     model = on_the_bench(level)
-    deflected = np.array(model.equilibrium)
+    deflected = np.array(model.well_amplitude)
     deflected[0] *= 0.9
     free = sb.simulate(
         sb.System(
-            model, start=sb.State(amplitude=deflected, velocity=np.zeros(model.modes))
+            model, initial_state=sb.State(amplitude=deflected, velocity=np.zeros(model.modes))
         ),
         sb.Integration(cycles=41),
         sample_times=np.arange(int(0.5 * rate)) / rate,
@@ -66,14 +66,14 @@ for well, level in (("lower", 0.3323e-3), ("upper", 0.3289e-3)):
         * rng.standard_normal(free.dataset.sizes["time"])
     )
     signal = lab.make_signal(
-        level * (free.dataset.center_displacement.values + noise), "m", rate
+        level * (free.dataset.midspan_displacement.values + noise), "m", rate
     )
     lab.write_signal(files / f"decay_{well}.csv", signal)
     wells[well] = lab.identify_decay(lab.read_signal(files / f"decay_{well}.csv"))
     mode = wells[well].modes[0]
     print(
-        f"{well} well: {mode.natural_freq:.3f} ± {mode.natural_freq_se:.3f} Hz "
-        f"(truth {model.natural_freq[0]:.3f}), damping ratio "
+        f"{well} well: {mode.natural_frequencies:.3f} ± {mode.natural_freq_se:.3f} Hz "
+        f"(truth {model.natural_frequencies[0]:.3f}), damping ratio "
         f"{mode.damping_ratio:.5f} ± {mode.damping_ratio_se:.5f} (truth 0.005)"
     )
 print(lab.compare_wells(wells["lower"], wells["upper"]).statement)
@@ -93,9 +93,9 @@ figure = plot_decay(lab.read_signal(files / "decay_upper.csv"), wells["upper"])
 # the wells differ by far more than the errors of their decays, and the symmetric model cannot follow that.
 
 measured = lab.Measurements(
-    straight_freq=(80.0, 221.0),
-    lower_well_freq=(round(wells["lower"].natural_freq, 2),),
-    upper_well_freq=(round(wells["upper"].natural_freq, 2),),
+    straight_frequency=(80.0, 221.0),
+    lower_well_frequencies=(round(wells["lower"].natural_frequencies, 2),),
+    upper_well_frequencies=(round(wells["upper"].natural_frequencies, 2),),
     damping_ratio=[fit.damping_ratio for fit in wells.values()],
     thickness=0.44e-3,
     buckling_level=0.5e-3,
@@ -112,7 +112,7 @@ figure = plot_calibration(calibration)
 # cause of disagreement with simulations that start at once. The vibrometer records its velocity.
 
 truth_model = on_the_bench(0.3306e-3)
-first, cycles = truth_model.natural_freq[0], 22
+first, cycles = truth_model.natural_frequencies[0], 22
 frequency = 1.21 * first
 velocity = 0.18 * 0.3306e-3 * 2.0 * np.pi * first
 record = {"duration": 0.1 + (cycles + 2) / frequency, "start_up": 0.015}
@@ -147,7 +147,7 @@ figure = plot_drive(signal, drive)
 # three cycles, before the shaker: without some rest nobody can tell the first cycle from the second.
 
 motion = sb.Striker(
-    drive=sb.Recorded.from_dataset(lab.recorded_drive(true_velocity, 1e5)),
+    drive=sb.RecordedMotion.from_dataset(lab.recorded_drive(true_velocity, 1e5)),
     location=paper.LOCATION,
 )
 truth = sb.simulate(
@@ -214,7 +214,7 @@ model = sb.ReducedModel.from_beam(
     calibration.beam, modes=8, damping_ratio=calibration.damping_ratio
 )
 recorded = sb.Striker(
-    drive=sb.Recorded.from_dataset(
+    drive=sb.RecordedMotion.from_dataset(
         lab.recorded_drive(signal, 1e5, measurement=drive)
     ),
     location=paper.LOCATION,
@@ -238,8 +238,8 @@ seen = lab.measure_response(
 print("measured: ", seen.description)
 print(
     "simulated:",
-    simulated.outcome.response.label,
-    f"({simulated.outcome.crossings} crossings)",
+    simulated.summary.response_class.label,
+    f"({simulated.summary.zero_crossings} crossings)",
 )
 
 onsets = lab.contact_onsets(tracked).onset.values
@@ -293,21 +293,21 @@ for ratio, amplitude in (
         ratio * first,
         cycles=cycles,
     )
-    omega.append(ratio * first / calibration.well_freq)
+    omega.append(ratio * first / calibration.well_frequencies)
     speed.append(
         amplitude
         * 0.3306e-3
         * first
-        / (calibration.beam.buckling_level * calibration.well_freq)
+        / (calibration.beam.buckling_level * calibration.well_frequencies)
     )
-    classes.append(found.response)
-dots = Dots(
-    np.array([*omega, drive.steady.frequency / calibration.well_freq]),
+    classes.append(found.response_class)
+dots = MeasuredPoints(
+    np.array([*omega, drive.steady.frequency / calibration.well_frequencies]),
     np.array(
         [
             *speed,
             drive.steady.amplitude
-            / (2.0 * np.pi * calibration.well_freq * calibration.beam.buckling_level),
+            / (2.0 * np.pi * calibration.well_frequencies * calibration.beam.buckling_level),
         ]
     ),
     np.full(len(omega) + 1, paper.LOCATION),
@@ -328,7 +328,7 @@ ds = sb.response_map(
     velocity_amplitude=np.linspace(0.05, 0.6, 12),
     location=paper.LOCATION,
     cycles=cycles,
-    reference_freq=calibration.well_freq,
+    reference_frequency=calibration.well_frequencies,
 )
 agreement = lab.compare_dots(dots, ds)
 print(

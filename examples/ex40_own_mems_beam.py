@@ -40,11 +40,11 @@ poisson_ratio = [0.22, 0.22]
 [striker]
 location = 0.47
 
-[axes]
+[sweep]
 frequency_ratio = "0.6:2:15"
 velocity_amplitude = "0.05:0.6:12"
 
-[run]
+[integration]
 cycles = 60
 """)
 

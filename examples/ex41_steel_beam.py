@@ -20,7 +20,7 @@ beam = sb.Beam(
 )
 contact = sb.HertzContact.from_materials(5e-3, (210e9, 205e9), (0.3, 0.3))
 model = sb.ReducedModel.from_beam(beam, modes=6, damping_ratio=0.004)
-print(model.natural_freq[:3], sb.exact_natural_freq(beam, count=3), "Hz")
+print(model.natural_frequencies[:3], sb.exact_natural_frequencies(beam, count=3), "Hz")
 print(
     f"b/r = {beam.buckling_level / beam.radius_of_gyration:.2f}; "
     "above 6.2 the first mode would be antisymmetric"
@@ -31,7 +31,7 @@ system = sb.System(
     contact,
     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2, location=0.47),
 )
-print(system.findings() or "nothing is doubtful")
+print(system.diagnostics() or "nothing is doubtful")
 
 # %%
 # The threshold over frequency, for three thicknesses at one buckling level.
@@ -46,7 +46,7 @@ found = sb.threshold(
     },
     sb.Integration(cycles=60),
 )
-low = found.first_interwell.min("frequency_ratio")
+low = found.lower_threshold.min("frequency_ratio")
 for thickness, value in zip(found.beam_thickness.values, low.values, strict=True):
     print(f"h = {1e3 * thickness:.1f} mm: snaps through from V = {value:.2f}")
 
@@ -55,13 +55,13 @@ for thickness, value in zip(found.beam_thickness.values, low.values, strict=True
 
 near = {"velocity_amplitude": np.linspace(0.05, 0.35, 7)}
 sure = sb.sweep(
-    system, near, sb.Integration(cycles=60), replicas=sb.Replicas(5, halve_step=True)
+    system, near, sb.Integration(cycles=60), replicates=sb.Replicates(5, check_half_step=True)
 )
-print(sure.class_share.max("response_class").values)
+print(sure.class_fraction.max("response_class").values)
 
 # %%
 # And one run, with everything that it did:
 
 run = sb.simulate(system, sb.Integration(cycles=60))
-print(run.outcome.table())
+print(run.summary.to_text())
 ax = run.plot(window=(0.0, 20.0))

@@ -20,7 +20,7 @@ system = sb.System(
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1).striker(),
 )
-spread = sb.Spread(
+spread = sb.ParameterUncertainty(
     of={
         "velocity_amplitude": sb.Normal(0.02, relative=True),
         "location": sb.Normal(0.005),
@@ -35,10 +35,10 @@ found = sb.optimize_design(
         "frequency_ratio": (0.3, 2.6),
         "velocity_amplitude": (0.01, 0.6),
     },
-    ["speed", sb.Goal(of="peak_force", quantile=0.5)],
-    sb.Limit(of="snap", at_least=0.95),
+    ["speed", sb.Objective(quantity="peak_force", quantile=0.5)],
+    sb.Constraint(quantity="snap", lower=0.95),
     spread,
-    sb.Effort(generations=8, population=12, draws=40, fresh=100),
+    sb.OptimizerSettings(generations=8, population=12, samples=40, validation_samples=100),
     integration=sb.Integration(cycles=10),
 )
 plot_designs(found)

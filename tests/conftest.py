@@ -31,13 +31,13 @@ def synthetic_map():
     kinds = np.where((x < 0.8) & (y > 0.9 * x + 0.15), ResponseClass.CONTINUOUS, kinds)
     kinds[-1, -1] = ResponseClass.UNKNOWN
     return xr.Dataset(
-        {"response": (("frequency_ratio", "velocity_amplitude"), kinds.astype(np.int8))},
+        {"response_class": (("frequency_ratio", "velocity_amplitude"), kinds.astype(np.int8))},
         {
             "frequency_ratio": ("frequency_ratio", ratio, {"units": "1"}),
             "velocity_amplitude": ("velocity_amplitude", velocity, {"units": "1"}),
             "location": 1.0 / 2.1,
         },
-        {"modes": 32, "cycles": 200, "reference_freq": 81.853, "beam_buckling_level": 0.335e-3},
+        {"modes": 32, "cycles": 200, "reference_frequency": 81.853, "beam_buckling_level": 0.335e-3},
     )
 
 
@@ -54,8 +54,8 @@ def synthetic_run():
         cycle / freq,
         cycle,
         displacement=beam,
-        center_displacement=1.02 * beam,
-        shaker_displacement=shaker,
+        midspan_displacement=1.02 * beam,
+        striker_displacement=shaker,
         penetration=shaker - beam,
         contact_force=4e8 * np.maximum(0.335e-3 * depth, 0.0) ** 1.5,
     )

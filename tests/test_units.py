@@ -73,9 +73,9 @@ ASKED = sb.Integration(cycles=2)
 
 
 OF_OTHERS = {
-    "valid", "energy_striker", "energy_lost_contact", "base_displacement", "base_velocity", "work_base", "load_change",
-    "work_load", "voltage", "power_load", "energy_harvested", "energy_circuit", "striker", "striker_displacement",
-    "striker_penetration", "striker_force",
+    "valid", "energy_striker", "energy_lost_contact", "base_displacement", "base_velocity", "base_work", "load_change",
+    "load_work", "voltage", "power_load", "energy_harvested", "energy_circuit", "striker", "striker_displacements",
+    "striker_penetrations", "striker_forces",
 }  # fmt: skip
 """What runs have with dropouts, strikers with a mass or several, contacts with loss, bases, loads, harvesters only."""
 
@@ -86,15 +86,15 @@ def test_runs(tmp_path) -> None:
     assert check(run.impacts) == 5
     run.save(tmp_path / "run.nc")
     assert check(xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="outcome")) == len(STATISTICS)
-    check(sb.conditioning(SYSTEM, sb.Integration(cycles=1)))
+    check(sb.perturbation_growth(SYSTEM, sb.Integration(cycles=1)))
 
 
 def test_a_run_of_several_strikers(tmp_path) -> None:
     """What is told of each striker has units too, as it stands and as it comes back from the file."""
-    stop = sb.Striker(drive=sb.Still(), location=0.3, side="above", gap=2e-5)
+    stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=2e-5)
     model = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
     run = sb.simulate(sb.System(model, paper.CONTACT, [SYSTEM.striker, stop]), ASKED)
-    told = {"striker", "striker_displacement", "striker_penetration", "striker_force"}
+    told = {"striker", "striker_displacements", "striker_penetrations", "striker_forces"}
     assert told <= set(run.dataset.variables)
     assert check(run.dataset) == len(SCHEMA) - len(OF_OTHERS - told)
     run.save(tmp_path / "run.nc")
@@ -104,8 +104,8 @@ def test_a_run_of_several_strikers(tmp_path) -> None:
 AXES = {
     "structure and run": {"beam.buckling_level": [3e-4, 3.5e-4], "frequency_ratio": [1.0, 1.2]},
     "contact": {"contact.stiffness": [1e8, 4e8], "striker.gap": [0.0, 1e-5]},
-    "start": {"start.amplitude[1]": [-1.0, 1.0], "start.striker_position": [-4e-4, -3.5e-4]},
-    "words": {"striker.side": ["below", "above"], "run.cycles": [2, 3]},
+    "start": {"initial_state.amplitude[1]": [-1.0, 1.0], "initial_state.striker_position": [-4e-4, -3.5e-4]},
+    "words": {"striker.side": ["below", "above"], "integration.cycles": [2, 3]},
 }
 
 
@@ -113,7 +113,7 @@ AXES = {
 def test_maps(name: str, tmp_path) -> None:
     check(sb.sweep(SYSTEM, AXES[name], ASKED))
     stored = sb.sweep(
-        SYSTEM, AXES[name], ASKED, store=tmp_path / "store", output=tmp_path / "map.nc", replicas=1
+        SYSTEM, AXES[name], ASKED, checkpoint=tmp_path / "store", output=tmp_path / "map.nc", replicates=1
     )
     assert check(stored) > len(STATISTICS)
 

@@ -61,18 +61,18 @@ _SOLVE.argtypes = [
 
 def _prepare(method: int, weight: float, case: Case, tolerance: float) -> Solver:
     system = compiled_system(case, weight)
-    function, size, room = system.function, system.start.size, system.memory.size
+    function, size, scratch = system.function, system.initial_state.size, system.memory.size
 
     @cfunc(_SIGNATURE)
     def slope(t, u, du, data):  # type: ignore[no-untyped-def]
-        function(t, carray(u, (size,)), carray(du, (size,)), carray(data, (room,)))
+        function(t, carray(u, (size,)), carray(du, (size,)), carray(data, (scratch,)))
 
     address = slope.address
 
     def solve(times: _Array, out: _Array | None) -> bool:
         when = np.ascontiguousarray(times, dtype=np.float64)
         failed = _SOLVE(
-            method, address, system.memory.ctypes.data, system.start.ctypes.data, size, when.ctypes.data, when.size,
+            method, address, system.memory.ctypes.data, system.initial_state.ctypes.data, size, when.ctypes.data, when.size,
             tolerance, None if out is None else out.ctypes.data,
         )  # fmt: skip
         return not failed

@@ -45,17 +45,17 @@ def equations_of(case: Case) -> Equations:
     row = model.linear_modes.T @ model.shape_at(case.location)
     assert model.length_scale is not None
     scale = float(model.length_scale / np.abs(row).max())
-    omega = 2.0 * np.pi * shaker.frequency_ratio * model.reference_freq
-    speed = shaker.velocity_amplitude * model.length_scale * 2.0 * np.pi * model.reference_freq
+    omega = 2.0 * np.pi * shaker.frequency_ratio * model.reference_frequency
+    speed = shaker.velocity_amplitude * model.length_scale * 2.0 * np.pi * model.reference_frequency
     return Equations(
         omega=np.asarray(model.omega),
         damping_ratio=np.asarray(model.damping_ratio),
         tension=np.asarray(model.tension_matrix),
         parity=model.parity,
-        g=np.asarray(model.linear_modes.T @ model.equilibrium) / scale,
+        g=np.asarray(model.linear_modes.T @ model.well_amplitude) / scale,
         contact=row * scale,
         push=row / scale,
-        gamma=model.tension_stiffness * scale**2,
+        gamma=model.nonlinear_stiffness * scale**2,
         stiffness=CONTACT.stiffness,
         amplitude=speed / omega,
         drive=omega,

@@ -22,17 +22,23 @@ _MOST_STEPS = 10**8
 
 def _prepare(solver: Any, weight: float, case: Case, tolerance: float) -> Solver:
     system = compiled_system(case, weight)
-    function, size, room = system.function, system.start.size, system.memory.size
+    function, size, scratch = system.function, system.initial_state.size, system.memory.size
 
     @cfunc(lsoda_sig)
     def slope(t, u, du, data):  # type: ignore[no-untyped-def]
-        function(t, carray(u, (size,)), carray(du, (size,)), carray(data, (room,)))
+        function(t, carray(u, (size,)), carray(du, (size,)), carray(data, (scratch,)))
 
     address = slope.address
 
     def solve(times: _Array) -> _Array:
         states, success = solver(
-            address, system.start, times, system.memory, rtol=tolerance, atol=tolerance, mxstep=_MOST_STEPS
+            address,
+            system.initial_state,
+            times,
+            system.memory,
+            rtol=tolerance,
+            atol=tolerance,
+            mxstep=_MOST_STEPS,
         )
         return np.asarray(states) if success else np.full_like(states, np.nan)
 

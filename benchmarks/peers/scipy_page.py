@@ -75,9 +75,9 @@ def page(dataset: xr.Dataset, modes: int, cycles: int) -> Any:
     """The map beside the waveform of the point that was clicked."""
     hv.extension("bokeh")
     x, y = dataset["frequency_ratio"].values, dataset["velocity_amplitude"].values
-    kinds = dataset["response"].transpose("velocity_amplitude", "frequency_ratio").values
-    image = hv.Image((x, y, kinds.astype(float)), ["frequency ratio", "velocity amplitude"], "response")
-    tap = hv.streams.Tap(source=image, x=None, y=None)
+    kinds = dataset["response_class"].transpose("velocity_amplitude", "frequency_ratio").values
+    image = hv.Image((x, y, kinds.astype(float)), ["frequency ratio", "velocity amplitude"], "response_class")
+    tap = hv.streams.CircuitIncrement(source=image, x=None, y=None)
 
     def run(x: float | None, y: float | None) -> Any:
         found = (

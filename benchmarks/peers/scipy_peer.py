@@ -37,7 +37,7 @@ def _prepare(solver: str, weight: float, case: Case, tolerance: float) -> Solver
                 return np.asarray(
                     odeint(
                         slope,
-                        system.start,
+                        system.initial_state,
                         times,
                         (system.memory,),
                         rtol=tolerance,
@@ -46,7 +46,7 @@ def _prepare(solver: str, weight: float, case: Case, tolerance: float) -> Solver
                         mxstep=10**8,
                     )
                 )
-        result = solve_ivp(slope, (0.0, times[-1]), system.start, solver, t_eval=times, **options)
+        result = solve_ivp(slope, (0.0, times[-1]), system.initial_state, solver, t_eval=times, **options)
         return np.asarray(result.y.T)
 
     def sample(times: _Array) -> _Array:

@@ -58,7 +58,7 @@ def parameter_tables() -> str:
             symbol = f"${row.quantity.symbol}$" if row.quantity.symbol else ""
             limits = row.limits.replace("inf", "∞")
             key = name.partition(".")[2]
-            meaning = row.quantity.words + (f", {symbol}" if symbol else "")
+            meaning = row.quantity.long_name + (f", {symbol}" if symbol else "")
             meaning += f"; in datasets `{row.short}`" if row.short != key else ""
             scope = "run" if row.is_run else "structure"
             rows.append((f"`{key}`", meaning, unit, limits, shown or "–", scope))
@@ -82,7 +82,7 @@ def variable_tables() -> str:
 
     runs = [(f"`{name}`", ", ".join(row.dims), row.units, row.long_name) for name, row in SCHEMA.items()]
     impacts = [(f"`{name}`", unit, words) for name, unit, words in IMPACT_COLUMNS]
-    statistics = [(f"`{row.name}`", row.dtype, row.unit, row.words) for row in STATISTICS.values()]
+    statistics = [(f"`{row.name}`", row.dtype, row.unit, row.long_name) for row in STATISTICS.values()]
     classes = [(int(kind), kind.name, kind.label) for kind in ResponseClass]
     statuses = [(int(kind), kind.name, kind.advice) for kind in RunStatus]
     return "\n".join((

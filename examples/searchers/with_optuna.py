@@ -14,7 +14,7 @@ system = sb.System(
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1).striker(),
 )
-spread = sb.Spread(
+spread = sb.ParameterUncertainty(
     of={"velocity_amplitude": sb.Normal(0.02, relative=True)},
     displacement=3.5e-6,
     phase=True,
@@ -28,9 +28,9 @@ problem = sb.design_problem(
     system,
     variables,
     "speed",
-    sb.Limit(of="snap", at_least=0.95),
+    sb.Constraint(quantity="snap", lower=0.95),
     spread,
-    draws=40,
+    samples=40,
     integration=sb.Integration(cycles=10),
 )
 

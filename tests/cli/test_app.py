@@ -53,7 +53,7 @@ def test_version_and_help(cli):
 
 REFUSALS = [
     (("map", "--modes", "0"), "modes = 0: must be an integer in [1, 256]"),
-    (("map", "--cycles", "0"), "[run] cycles = 0: must be an integer in [1, 10000000]"),
+    (("map", "--cycles", "0"), "[integration] cycles = 0: must be an integer in [1, 10000000]"),
     (("map", "--frequency-ratio", "0.1:4"), "or start:stop:count, such as 0.1:4:64"),
     (("map", "--frequency-ratio", "-1:4:8"), "frequency_ratio"),
     (("map", "--location", "1.5"), "location"),
@@ -62,7 +62,7 @@ REFUSALS = [
     (("map", "-o", "map.txt"), "must end in .nc"),
     (("map", "--plot", "map.gif"), "must end in .png or .pdf or .svg"),
     (("map", "--plot", "map.png", "--location", "0.2:0.5:3"), "drawn over two axes, not 3"),
-    (("map", "--dots", "none.csv"), "dots = 'none.csv': cannot be read"),
+    (("map", "--measurements", "none.csv"), "dots = 'none.csv': cannot be read"),
     (("map", "--config", "none.toml"), "cannot be read, No such file"),
     (("map", "--axial-load", "1.0"), "axial_load"),
     (("simulate", "--window", "3"), "window = '3': must be first:last"),
@@ -100,20 +100,20 @@ def test_unknown_key_of_a_file(cli, tmp_path):
 
 
 def test_map_writes_what_it_says(cli, tmp_path):
-    result = cli(*MAP, "-o", str(tmp_path / "map.nc"), "--plot", "map.png", "--threshold-line")
+    result = cli(*MAP, "-o", str(tmp_path / "map.nc"), "--plot", "map.png", "--quasi-static-line")
     assert result.exit_code == 0, result.output
     assert sorted(file.name for file in tmp_path.iterdir()) == ["map.nc", "map.png"]
     dataset = xr.load_dataset(tmp_path / "map.nc", engine="h5netcdf")
-    assert dataset["response"].dims == ("frequency_ratio", "velocity_amplitude")
-    assert dataset["response"].shape == (4, 3)
-    assert dataset["response"].dtype == "int8"
+    assert dataset["response_class"].dims == ("frequency_ratio", "velocity_amplitude")
+    assert dataset["response_class"].shape == (4, 3)
+    assert dataset["response_class"].dtype == "int8"
     assert dataset.attrs["modes"] == 1 and dataset.attrs["cycles"] == 8
     assert dataset.attrs["command"] == " ".join(
-        ("snapbeam", *MAP, "-o", "map.nc", "--plot", "map.png", "--threshold-line")
+        ("snapbeam", *MAP, "-o", "map.nc", "--plot", "map.png", "--quasi-static-line")
     )
     assert not any(str(tmp_path) in str(value) for value in dataset.attrs.values())
     assert "12 runs of 1 mode over 8 cycles" in result.stdout
-    counts = {int(k): int((dataset["response"] == k).sum()) for k in range(4)}
+    counts = {int(k): int((dataset["response_class"] == k).sum()) for k in range(4)}
     assert re.search(rf"intrawell +{counts[0]} ", result.stdout)
     assert f"Written: {tmp_path / 'map.nc'} (" in result.stdout and "Written: map.png" in result.stdout
     assert "snapbeam simulate" in result.stdout
@@ -123,7 +123,7 @@ def test_map_writes_what_it_says(cli, tmp_path):
     assert "frequency_ratio 4, velocity_amplitude 3" in told
     assert "contact_stiffness" in told and __version__ in told
 
-    again = cli("plot", "map.nc", "-o", "map.pdf", "--threshold-line")
+    again = cli("plot", "map.nc", "-o", "map.pdf", "--quasi-static-line")
     assert again.exit_code == 0 and (tmp_path / "map.pdf").read_bytes().startswith(b"%PDF")
     refused = cli("plot", "map.nc", "-o", "b.png", "--location", "0.3")
     assert refused.exit_code == 2 and "location: is no axis of this map" in refused.stderr
@@ -131,7 +131,7 @@ def test_map_writes_what_it_says(cli, tmp_path):
 
 def test_file_and_options_together(cli, tmp_path):
     (tmp_path / "beam.toml").write_text(
-        "[model]\nmodes = 2\n[run]\ncycles = 4\n"
+        "[model]\nmodes = 2\n[integration]\ncycles = 4\n"
         "[map]\nfrequency_ratio = [0.5, 1.0]\nvelocity_amplitude = 0.3\n"
         "[contact]\nstiffness = 1e8\n"
     )

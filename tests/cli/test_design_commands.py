@@ -17,13 +17,13 @@ modes = 1
 frequency_ratio = 0.02
 [striker]
 location = 0.3
-[run]
+[integration]
 cycles = 1
 [spread]
 "drive.velocity_amplitude" = {normal = 0.02, relative = true}
 """
 PROBABILITY = """
-[axes]
+[sweep]
 "drive.velocity_amplitude" = [0.01, 0.0131, 0.016]
 [probability]
 half_width = 0.2

@@ -17,8 +17,8 @@ def run(*arguments: object):
 def test_draws_what_was_asked_for(tmp_path) -> None:
     picture = tmp_path / "system.png"
     answer = run(
-        "draw", "-o", picture, "--modes", 3, "--contact-restitution", 0.6, "--restitution-speed", 0.05,
-        "--striker-mass", 0.02, "--striker-spring", 700, "--striker-damper", 0.7,
+        "draw", "-o", picture, "--modes", 3, "--hunt-crossley-restitution", 0.6, "--hunt-crossley-speed", 0.05,
+        "--striker-mass", 0.02, "--striker-suspension-stiffness", 700, "--striker-suspension-damping", 0.7,
     )  # fmt: skip
     assert answer.exit_code == 0, answer.output
     assert picture.read_bytes()[:4] == b"\x89PNG"
@@ -27,7 +27,7 @@ def test_draws_what_was_asked_for(tmp_path) -> None:
 
 
 def test_refused_by_name(tmp_path) -> None:
-    answer = run("draw", "-o", tmp_path / "a.png", "--striker-spring", 700)
+    answer = run("draw", "-o", tmp_path / "a.png", "--striker-suspension-stiffness", 700)
     assert answer.exit_code != 0
     assert "give its mass" in " ".join(answer.output.split())
 
@@ -39,9 +39,9 @@ def test_worlds_in_a_parameter_file(tmp_path) -> None:
         "frequency_ratio = 1.2\nvelocity_amplitude = 0.2\nlength = 5.0\n[striker]\nmass = 0.02\n"
     )
     system = load_config(file).system
-    assert system.get("contact.damper") == 20.0
-    assert system.get("drive.length") == 5.0
-    assert system.replace(**{"drive.rise": 2.0}).get("drive.rise") == 2.0
+    assert system.get("contact.linear_damping") == 20.0
+    assert system.get("drive.duration_cycles") == 5.0
+    assert system.replace(**{"drive.ramp_up_cycles": 2.0}).get("drive.ramp_up_cycles") == 2.0
     lossy = config_from_mapping({"contact": {"restitution": 0.5, "speed": 0.05}}).system
     assert lossy.contact.restitution(0.05) == pytest.approx(0.5, abs=1e-12)
     assert lossy.contact.stiffness == 4e8

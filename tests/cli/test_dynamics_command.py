@@ -10,8 +10,8 @@ from snapbeam.cli.app import app
 
 BEAM = ["--modes", "1", "--damping-ratio", "0.05", "--frequency-ratio", "1.6", "--velocity-amplitude", "0.03"]
 CASES = {
-    "lifetimes": (["--starts", "4", "--cycles", "120", "--quiet-cycles", "20"], "lifetime"),
-    "diagram": (["--values", "0.02:0.04:3", "--leave", "40", "--keep", "8"], "center_displacement"),
+    "lifetimes": (["--starts", "4", "--cycles", "120", "--settling-cycles", "20"], "lifetime"),
+    "diagram": (["--values", "0.02:0.04:3", "--leave", "40", "--keep", "8"], "midspan_displacement"),
     "exponents": (["--periods", "40", "--transient", "10"], "exponent"),
     "section": (["--at", "impact", "--periods", "20"], "drive_phase"),
     "branch": (["--between", "0.02:0.05", "--most", "6"], "multiplier_real"),

@@ -27,15 +27,15 @@ MAPS = {
                       "1.3"],
     "one axis": [*SMALL, "--velocity-amplitude", "0.1:0.6:6", "--frequency-ratio", "1.3"],
     "one point": [*SMALL, "--velocity-amplitude", "0.5", "--frequency-ratio", "1.3"],
-    "any axes": ["--cycles", "12", "--modes", "2", "--axis", "beam.thickness=3.8e-4:4.2e-4:3", "--axis",
+    "any axes": ["--cycles", "12", "--modes", "2", "--sweep", "beam.thickness=3.8e-4:4.2e-4:3", "--sweep",
                  "velocity_amplitude=0.1:0.6:4", "--side", "above"],
     "numbers of modes": ["--modes", "1,2", "--cycles", "12", "--frequency-ratio", "1:1.5:2", "--velocity-amplitude",
                          "0.1:0.6:4"],
     "a beam of its own": [*SMALL, "--length", "0.1", "--thickness", "3e-4", "--buckling-level", "2e-4",
                           "--contact-stiffness", "1e8", "--damping-ratio", "0.01", "--frequency-ratio", "0.6:1.8:4",
                           "--velocity-amplitude", "0.05:0.6:4"],
-    "refined, repeated": [*SMALL, "--frequency-ratio", "0.6:1.8:3", "--velocity-amplitude", "0.1:0.6:3", "--refine",
-                          "1", "--replicas", "2"],
+    "refined, repeated": [*SMALL, "--frequency-ratio", "0.6:1.8:3", "--velocity-amplitude", "0.1:0.6:3", "--refine-levels",
+                          "1", "--replicates", "2"],
 }  # fmt: skip
 
 
@@ -71,7 +71,7 @@ def test_every_suggestion_runs_and_is_of_the_same_system(name, tmp_path, monkeyp
             words = [re.sub(r":40$", ":2", word) for word in words] + ["--cycles", "4"]
         run(*words[1:])
     see = [words for words in commands if words[1] == "simulate"]
-    assert len(see) == (1 if (ds.response >= 1).any() else 0)
+    assert len(see) == (1 if (ds.response_class >= 1).any() else 0)
     for words in see:
         told = json.loads(run(*[w for w in words[1:] if w not in ("--plot", "run.png")], "--json", "-"))
         at = (
@@ -84,8 +84,8 @@ def test_every_suggestion_runs_and_is_of_the_same_system(name, tmp_path, monkeyp
             assert float(value) in ds[axis].values, "to the last digit"
             point = point.sel({axis: float(value)})
         point = point.squeeze()
-        assert told["outcome"]["response"] == sb.ResponseClass(int(point.response)).label
-        assert told["outcome"]["crossings"] == int(point.crossings)
+        assert told["outcome"]["response_class"] == sb.ResponseClass(int(point.response_class)).label
+        assert told["outcome"]["zero_crossings"] == int(point.zero_crossings)
         assert told["outcome"]["peak_force"] == pytest.approx(float(point.peak_force), rel=1e-6)
 
 
@@ -117,7 +117,7 @@ def test_json_goes_to_standard_output_alone(tmp_path):
     words = ["simulate", *SMALL]
     result = RUNNER.invoke(app, [*words, "--json", "-"])
     found = json.loads(result.stdout)
-    assert found["outcome"]["response"] in {kind.label for kind in sb.ResponseClass}
+    assert found["outcome"]["response_class"] in {kind.label for kind in sb.ResponseClass}
     assert set(found["outcome"]) == set(sb.STATISTICS)
     assert RUNNER.invoke(app, [*words, "--quiet"]).output == ""
     said = RUNNER.invoke(app, [*words, "--json", str(tmp_path / "a.json")])
@@ -134,13 +134,13 @@ def test_frequencies_and_thresholds_as_json(tmp_path, monkeypatch):
     axes = ["--frequency-ratio", "0.8:1.6:3", "--velocity-amplitude", "0.05:0.6:12"]
     found = json.loads(run("threshold", *SMALL, *axes, "--json", "-"))
     ds = xr.load_dataset("threshold.nc")
-    np.testing.assert_array_equal(found["first_interwell"], ds.first_interwell.values)
+    np.testing.assert_array_equal(found["lower_threshold"], ds.lower_threshold.values)
     assert found["axes"]["frequency_ratio"] == pytest.approx([0.8, 1.2, 1.6])
 
 
 @pytest.mark.parametrize("words", [
     ["map", *MAPS["numbers of modes"]], ["map", *MAPS["any axes"]], ["map", "--modes", "1"],
-    ["simulate", "--frequency-hz", "100", "--velocity", "0.03", "--location-m", "0.07", "--gap", "1e-5"],
+    ["simulate", "--frequency-hz", "100", "--velocity-m-s", "0.03", "--location-m", "0.07", "--gap", "1e-5"],
     ["threshold", "--modes", "1,2"], ["simulate", "--modes", "3", "--damping-ratio", "0.01,0.02,0.03"],
     ["simulate", "--contact-radius", "2.5e-3", "--contact-young-modulus", "3.5e9,2e11", "--contact-poisson-ratio",
      "0.36,0.3"],
@@ -161,7 +161,7 @@ def test_printed_config_is_the_same_system(words, tmp_path):
 
 def test_what_the_paper_lent_is_told(tmp_path):
     file = tmp_path / "beam.toml"
-    file.write_text("[beam]\nlength = 0.2\n[model]\nmodes = 1\n[run]\ncycles = 4\n", encoding="utf-8")
+    file.write_text("[beam]\nlength = 0.2\n[model]\nmodes = 1\n[integration]\ncycles = 4\n", encoding="utf-8")
     told = RUNNER.invoke(app, ["simulate", "--config", str(file)]).stderr
     for text in (
         "beam.thickness = 0.0004 m",
@@ -188,7 +188,7 @@ def test_damping_of_each_mode_and_samples(tmp_path):
         "-o",
         file,
     )
-    read = sb.load_run(file)
+    read = sb.load(file)
     np.testing.assert_array_equal(read.system.model.damping_ratio, [0.01, 0.02])
     assert read.dataset.sizes["time"] == 4 * 50 + 1
     np.testing.assert_allclose(np.diff(read.dataset.cycle), 0.02, rtol=1e-9)
@@ -197,8 +197,8 @@ def test_damping_of_each_mode_and_samples(tmp_path):
 
 
 @pytest.mark.parametrize("words", [
-    ["paper", "fig6", "--dots", "nosuch.csv"], ["paper", "fig4", "--measured", "nosuch.nc"],
-    ["paper", "fig2", "--dots", "nosuch.csv"], ["simulate", "--window", "5:2"], ["map", "--threads", "0"],
+    ["paper", "fig6", "--measurements", "nosuch.csv"], ["paper", "fig4", "--measured", "nosuch.nc"],
+    ["paper", "fig2", "--measurements", "nosuch.csv"], ["simulate", "--window", "5:2"], ["map", "--threads", "0"],
     ["simulate", "--samples", "0"], ["simulate", "--json", "nosuch/a.json"],
 ])  # fmt: skip
 def test_refusals_come_before_computing(words, tmp_path, monkeypatch):
@@ -225,7 +225,9 @@ def test_a_point_of_a_list_is_gone_on_from(tmp_path):
     done = RUNNER.invoke(app, command)
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)["outcome"]
-    assert told["peak_force"] == float(found.peak_force[3]) and told["crossings"] == int(found.crossings[3])
+    assert told["peak_force"] == float(found.peak_force[3]) and told["zero_crossings"] == int(
+        found.zero_crossings[3]
+    )
     refused = RUNNER.invoke(app, ["simulate", "--from", str(tmp_path / "list.nc"), "--point", "location=0.3"])
     assert refused.exit_code == 2
 
@@ -233,11 +235,11 @@ def test_a_point_of_a_list_is_gone_on_from(tmp_path):
 def test_what_is_given_beside_a_store_is_compared_with_the_store(tmp_path, monkeypatch):
     """Not with the paper's beam: only what is asked for otherwise is told to differ."""
     monkeypatch.chdir(tmp_path)
-    run("map", *MAPS["a beam of its own"], "--store", "kept")
+    run("map", *MAPS["a beam of its own"], "--checkpoint", "kept")
     before = xr.load_dataset("map.nc").response
-    run("map", "--store", "kept", "--cycles", "12", "--length", "0.1", "-o", "again.nc")
+    run("map", "--checkpoint", "kept", "--cycles", "12", "--length", "0.1", "-o", "again.nc")
     np.testing.assert_array_equal(xr.load_dataset("again.nc").response, before)
-    refused = RUNNER.invoke(app, ["map", "--store", "kept", "--cycles", "13"])
+    refused = RUNNER.invoke(app, ["map", "--checkpoint", "kept", "--cycles", "13"])
     assert refused.exit_code == 2
     differences = [line for line in refused.stderr.splitlines() if "in the store" in line]
     assert len(differences) == 1 and "cycles: 12 in the store, 13 asked for" in differences[0]

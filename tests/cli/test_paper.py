@@ -31,7 +31,7 @@ def test_a_figure_with_its_data(cli, tmp_path):
     [
         (("fig1",), "figure = 'fig1': must be one of 'fig2'"),
         (("figA9", "--data", "none"), "read = 'none': must be an existing folder"),
-        (("fig2", "--dots", "a.csv"), "fig2 shows no measured responses"),
+        (("fig2", "--measurements", "a.csv"), "fig2 shows no measured responses"),
     ],
 )
 def test_refusals(cli, args, words):

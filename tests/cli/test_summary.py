@@ -27,7 +27,7 @@ def text(*renderables):
 
 
 def test_shares(synthetic_map):
-    kinds = synthetic_map["response"].values
+    kinds = synthetic_map["response_class"].values
     rows = text(class_table(synthetic_map)).splitlines()
     assert rows[1].split() == ["intrawell", str((kinds == 0).sum()), f"{100 * (kinds == 0).mean():.1f}", "%"]
     assert rows[-1].split() == ["unknown", "1", "0.1", "%"]
@@ -35,7 +35,7 @@ def test_shares(synthetic_map):
 
 
 def test_lowest_interwell_and_notch(synthetic_map):
-    kinds, velocity = synthetic_map["response"].values, synthetic_map["velocity_amplitude"].values
+    kinds, velocity = synthetic_map["response_class"].values, synthetic_map["velocity_amplitude"].values
     low = lowest_interwell(synthetic_map)
     assert low["velocity_amplitude"] == velocity[(kinds >= 1).any(axis=0)].min()
     assert low["location"] == pytest.approx(1.0 / 2.1)
@@ -59,16 +59,16 @@ def test_what_is_said(synthetic_map, tmp_path):
     file = shlex.quote(str(path))
     assert f"snapbeam simulate --from {file} --point {point} --plot run.png" in said
     assert f"snapbeam map --from {file} --point {point} --frequency-ratio " in said
-    assert f"snapbeam plot {file} --threshold-line" in said
+    assert f"snapbeam plot {file} --quasi-static-line" in said
     quiet = text(map_summary(xr.zeros_like(synthetic_map).assign_attrs(synthetic_map.attrs), []))
     assert "No run snapped through: raise the velocity amplitude." in quiet
 
 
 def test_failed_runs_come_with_advice(synthetic_map):
-    status = np.zeros(synthetic_map["response"].shape, dtype=np.int8)
-    status[0, :3] = RunStatus.NOT_FINITE
-    status[1] = RunStatus.DECIDED
-    lines = status_lines(synthetic_map.assign(status=(synthetic_map["response"].dims, status)))
+    status = np.zeros(synthetic_map["response_class"].shape, dtype=np.int8)
+    status[0, :3] = RunStatus.DIVERGED
+    status[1] = RunStatus.EARLY_STOP
+    lines = status_lines(synthetic_map.assign(status=(synthetic_map["response_class"].dims, status)))
     assert lines[0].startswith("[bold red]3 failed[/] (NOT_FINITE): ") and "smaller step" in lines[0]
     assert lines[1] == "25 of 1000 runs ended early, their class being certain."
     assert ResponseClass.UNKNOWN.label in text(class_table(synthetic_map))

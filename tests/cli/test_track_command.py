@@ -50,7 +50,7 @@ def test_the_whole_command(recorded, tmp_path):
         assert file.stat().st_size > 1000 and file.name in result.output
     with xr.open_dataset(out, engine="h5netcdf") as dataset:
         assert rms(errors_px(dataset, recording.truth, "displacement_mm")) < 0.1
-        assert dataset["displacement"].attrs["units"] == "1"
+        assert dataset["displacement_at_striker"].attrs["units"] == "1"
         assert dataset.attrs["source"] == "test.cihx"
         np.testing.assert_array_equal(dataset["flags"].values.nonzero()[0], [40])
 

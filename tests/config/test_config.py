@@ -86,16 +86,16 @@ REFUSALS = [
     ({"map": {"location": "0.1:1:5"}}, "[map] location = 1.0: must be a number in (0, 1)"),
     ({"map": {"location": []}}, "location = []: must hold at least one point"),
     ({"map": {"location": True}}, "[map] location = True: must be a number"),
-    ({"run": {"cycles": 0}}, "[run] cycles = 0: must be an integer in [1, 10000000]"),
+    ({"run": {"cycles": 0}}, "[integration] cycles = 0: must be an integer in [1, 10000000]"),
     (
         {"map": {"cycles": 20}},
         "[map] cycles: unknown key; must be one of frequency_ratio, velocity_amplitude, location",
     ),
-    ({"run": {"step": "fast"}}, "[run] step = 'fast': must be a number in s"),
+    ({"run": {"step": "fast"}}, "[integration] step = 'fast': must be a number in s"),
     ({"run": {"step": 0.0}}, "step = 0.0: must be a finite number greater than 0 s"),
-    ({"run": {"tolerance": 1e-3, "step": 1e-5}}, "[run] tolerance = 0.001 with step = 1e-05"),
-    ({"run": {"engine": "gpu"}}, "[run] engine = 'gpu': must be one of 'auto', 'cpu', 'cuda'"),
-    ({"run": {"early_decision": 1}}, "[run] early_decision = 1: must be True or False"),
+    ({"run": {"tolerance": 1e-3, "step": 1e-5}}, "[integration] tolerance = 0.001 with step = 1e-05"),
+    ({"run": {"engine": "gpu"}}, "[integration] engine = 'gpu': must be one of 'auto', 'cpu', 'cuda'"),
+    ({"run": {"early_termination": 1}}, "[integration] early_termination = 1: must be True or False"),
     (
         {"model": {"damping_ratio": [0.1, 0.2]}},
         "[model] damping_ratio of shape (2,): must have the shape (32,)",
@@ -108,7 +108,7 @@ REFUSALS = [
         {"contact": {"law": "spring"}},
         "[contact] law = 'spring': must be one of 'hertz', 'hunt_crossley'",
     ),
-    ({"contact": {"law": "restitution"}}, "[contact] coefficient: missing for law = 'restitution'"),
+    ({"contact": {"type": "restitution"}}, "[contact] coefficient: missing for law = 'restitution'"),
     (
         {"contact": {"coefficient": 0.5}},
         "modes = 32: Newton's law needs one mode, since the mass met by an impulse at a point falls to zero",
@@ -119,8 +119,8 @@ REFUSALS = [
     ),
     ({"drive": {"kind": "triangle"}}, "[drive] kind = 'triangle': must be one of 'burst', 'chirp'"),
     (
-        {"drive": {"kind": "recorded"}},
-        "[drive] displacement, velocity, sampling_freq, frequency: missing for kind = 'recorded'",
+        {"drive": {"type": "recorded_motion"}},
+        "[drive] displacement, velocity, sampling_frequency, frequency: missing for kind = 'recorded'",
     ),
     (
         {"drive": {"frequency_hz": -100.0}},
@@ -145,37 +145,40 @@ REFUSALS = [
         {"shaker": {"frequency_ratio": 1.0}, "drive": {"frequency_ratio": 2.0}},
         "[drive] frequency_ratio: is given in two sections",
     ),
-    ({"start": {"amplitude[1]": "much"}}, "[start] amplitude[1] = 'much': must be a number"),
+    ({"start": {"amplitude[1]": "much"}}, "[initial_state] amplitude[1] = 'much': must be a number"),
     (
         {"start": {"amplitude[0]": 1.0}},
-        "[start] amplitude[0]: unknown key; must be amplitude[i], velocity[i]",
+        "[initial_state] amplitude[0]: unknown key; must be amplitude[i], velocity[i]",
     ),
-    ({"start": {"amplitude[40]": 1.0}}, "start.amplitude[40]: mode = 40: must be an integer in [1, 32]"),
+    (
+        {"start": {"amplitude[40]": 1.0}},
+        "initial_state.amplitude[40]: mode = 40: must be an integer in [1, 32]",
+    ),
     (
         {"axes": {"beam.thicknes": "1e-4:2e-4:3"}},
-        "[axes] beam.thicknes: no parameter; did you mean 'beam.thickness'",
+        "[sweep] beam.thicknes: no parameter; did you mean 'beam.thickness'",
     ),
     (
         {"axes": {"beam.thickness": "0.4:0.5:3"}},
-        "[axes] thickness = 0.5 m: must be less than length = 0.161 m; is it given in mm?",
+        "[sweep] thickness = 0.5 m: must be less than length = 0.161 m; is it given in mm?",
     ),
     (
         {"axes": {"beam.density": "7.5:8:3"}},
-        "[axes] density = 7.5: must be 10 to 30000 kg/m^3; is it given in g/cm^3?",
+        "[sweep] density = 7.5: must be 10 to 30000 kg/m^3; is it given in g/cm^3?",
     ),
     (
         {"axes": {"modes": "1,x"}},
-        "[axes] modes = '1,x': must be a whole number, whole numbers separated by commas",
+        "[sweep] modes = '1,x': must be a whole number, whole numbers separated by commas",
     ),
-    ({"axes": {"model.modes": "1:32:3"}}, "[axes] modes = 16.5: must be an integer in [1, 256]"),
-    ({"axes": {"striker.side": "below,left"}}, "[axes] side = 'left': must be one of 'below', 'above'"),
+    ({"axes": {"model.modes": "1:32:3"}}, "[sweep] modes = 16.5: must be an integer in [1, 256]"),
+    ({"axes": {"striker.side": "below,left"}}, "[sweep] side = 'left': must be one of 'below', 'above'"),
     (
         {"axes": {"velocity_m_s": "-0.1:0.2:4"}},
-        "[axes] drive.velocity_m_s = -0.1 m/s: is velocity_amplitude = -0.580416, which must",
+        "[sweep] drive.velocity_m_s = -0.1 m/s: is velocity_amplitude = -0.580416, which must",
     ),
     (
         {"axes": {"frequency_ratio": "0.1:2:3", "frequency_hz": "10:200:3"}},
-        "[axes] frequency_hz: the same axis is given as drive.frequency_ratio",
+        "[sweep] frequency_hz: the same axis is given as drive.frequency_ratio",
     ),
     (
         {"axes": {"frequency_hz": "10:200:3", "beam.thickness": "3e-4:4e-4:2"}},
@@ -210,7 +213,7 @@ def test_round_trip(tmp_path):
             "model": {"modes": 8},
             "contact": {"radius": 0.005, "young_modulus": [3.5e9, 2e11], "poisson_ratio": [0.36, 0.3]},
             "map": {"frequency_ratio": "0.1:4:3", "location": [0.25, 0.5]},
-            "run": {"early_decision": True},
+            "run": {"early_termination": True},
         }
     )
     path = tmp_path / "beam.toml"
@@ -243,7 +246,7 @@ def test_an_option_takes_a_contradicting_value_or_axis_away():
             "drive": {"velocity_m_s": 0.05},
             "striker": {"location_m": 0.05},
             "contact": {"stiffness": 1e8},
-            "model": {"reference_freq": 80.0},
+            "model": {"reference_frequency": 80.0},
         }
     )
 
@@ -270,7 +273,7 @@ def test_physical_units_are_ratios_of_the_system():
         {"drive": {"frequency_hz": 100.0, "velocity_m_s": 0.031}, "striker": {"location_m": 0.04}}
     )
     system = config.system
-    freq, level = system.model.reference_freq, BEAM.buckling_level
+    freq, level = system.model.reference_frequency, BEAM.buckling_level
     assert system.get("drive.frequency_ratio") == pytest.approx(100.0 / freq, rel=1e-14)
     assert system.get("drive.velocity_amplitude") == pytest.approx(
         0.031 / (2.0 * np.pi * freq * level), rel=1e-14
@@ -288,7 +291,7 @@ def test_physical_units_are_ratios_of_the_system():
         )
     # the frequency that is normalised by is given, so that no number of modes changes it
     fixed = config_from_mapping(
-        {"axes": {"modes": [1, 8]}, "drive": {"frequency_hz": 100.0}, "model": {"reference_freq": 80.0}}
+        {"axes": {"modes": [1, 8]}, "drive": {"frequency_hz": 100.0}, "model": {"reference_frequency": 80.0}}
     )
     assert fixed.system.get("drive.frequency_ratio") == 1.25
 
@@ -298,10 +301,10 @@ def test_a_file_of_version_0_1_means_what_it_meant():
         {
             "shaker": {"frequency_ratio": 1.1, "velocity_amplitude": 0.2, "location": 0.3, "side": "above"},
             "map": {"frequency_ratio": "0.5:2:4", "velocity_amplitude": 0.25},
-            "run": {"cycles": 20, "reference_freq": 80.0},
+            "run": {"cycles": 20, "reference_frequency": 80.0},
         }
     )
-    assert old.system.get("model.reference_freq") == 80.0
+    assert old.system.get("model.reference_frequency") == 80.0
     assert old.integration == Integration(cycles=20)
     assert old.system.get("drive.frequency_ratio") == 1.1
     assert old.system.get("striker.location") == 0.3
@@ -318,9 +321,9 @@ def test_a_start_by_name():
     config = config_from_mapping(
         {"model": {"modes": 3}, "start": {"amplitude[1]": -1.0, "velocity[2]": 0.1, "striker_position": 1e-3}}
     )
-    model, start = config.system.model, config.system.start
-    np.testing.assert_allclose(start.amplitude, model.equilibrium, rtol=1e-15)
-    well = abs(model.equilibrium[0])
+    model, start = config.system.model, config.system.initial_state
+    np.testing.assert_allclose(start.amplitude, model.well_amplitude, rtol=1e-15)
+    well = abs(model.well_amplitude[0])
     np.testing.assert_allclose(start.velocity, [0.0, 0.1 * well * model.omega[0], 0.0], rtol=1e-12)
     assert float(start.striker_position) == 1e-3
 

@@ -22,13 +22,13 @@ from snapbeam.model.world import HARVESTERS, LOADS
 TABLE = parameters()
 CLASSES = {
     "beam": [sb.Beam],
-    "ends": [sb.Ends],
+    "ends": [sb.BoundaryConditions],
     "imperfection": [sb.Imperfection],
     "striker": [sb.Striker],
     "run": [sb.Integration],
     "contact": list(LAWS.values()),
     "drive": list(DRIVES.values()),
-    "base": [sb.Base, *(kind for kind in DRIVES.values() if kind.shakes())],
+    "base": [sb.BaseExcitation, *(kind for kind in DRIVES.values() if kind.can_excite_base())],
     "axial": list(LOADS.values()),
     "harvester": list(HARVESTERS.values()),
 }
@@ -41,9 +41,9 @@ def test_every_quantity_of_every_class_is_in_it(section: str) -> None:
     for kind in CLASSES[section]:
         for name, item in quantities(kind).items():
             own = TABLE[f"{section}.{name}"].quantity
-            if section == "base" and kind is not sb.Base:
-                assert own.words == f"{item.words}, of the base"
-                own = dataclasses.replace(own, words=item.words)
+            if section == "base" and kind is not sb.BaseExcitation:
+                assert own.long_name == f"{item.long_name}, of the base"
+                own = dataclasses.replace(own, words=item.long_name)
             assert own == item
             if section in ("contact", "drive", "axial", "harvester"):
                 assert kind.name in TABLE[f"{section}.{name}"].kinds
@@ -54,7 +54,7 @@ def test_every_field_of_every_class_is_a_quantity(section: str) -> None:
     """What a person can give to a class is in the table; but for the one of two that the other follows from."""
     for kind in CLASSES[section]:
         fields = {item.name for item in dataclasses.fields(kind) if item.init}
-        parts = {sb.Striker: {"drive"}, sb.Beam: {"ends"}, sb.Base: {"motion"}}.get(kind, set())
+        parts = {sb.Striker: {"drive"}, sb.Beam: {"ends"}, sb.BaseExcitation: {"motion"}}.get(kind, set())
         assert fields - parts == set(quantities(kind)), kind
 
 
@@ -70,7 +70,7 @@ def test_a_system_has_no_parameter_beside_it() -> None:
         paper.CONTACT,
         sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-4),
     )
-    words = {"contact.law", "drive.kind"}
+    words = {"contact.type", "drive.type"}
     assert set(system.parameters) - words <= set(TABLE)
 
 
@@ -86,11 +86,11 @@ def test_names_are_unique() -> None:
 
 def test_every_row_is_said_in_words() -> None:
     for name, row in TABLE.items():
-        assert len(row.quantity.words) > 5, name
-        assert row.quantity.words[0].islower() or row.quantity.words.startswith("Young"), name
-        assert not row.quantity.words.endswith("."), name
+        assert len(row.quantity.long_name) > 5, name
+        assert row.quantity.long_name[0].islower() or row.quantity.long_name.startswith("Young"), name
+        assert not row.quantity.long_name.endswith("."), name
         assert row.quantity.unit, name
-        assert row.label.startswith(row.quantity.words[0].upper()), name
+        assert row.label.startswith(row.quantity.long_name[0].upper()), name
         assert row.quantity.scope in (RUN, STRUCTURE)
         assert row.limits or row.quantity.kind is object, name
         if row.default is not None:
@@ -109,7 +109,11 @@ def test_every_row_is_said_in_words() -> None:
         ("contact.stiffness", "Contact stiffness $k_c$ (N/m$^{1.5}$)", "(0, inf)"),
         ("beam.density", r"Mass density $\rho$ (kg/m$^{3}$)", "(0, inf)"),
         ("contact.coefficient", "Coefficient of restitution $e$", "[0, 1]"),
-        ("run.early_decision", "Whether a run ends once its response class is certain", "true or false"),
+        (
+            "integration.early_termination",
+            "Whether a run ends once its response class is certain",
+            "true or false",
+        ),
     ],
 )
 def test_label_and_limits(name: str, label: str, limits: str) -> None:
@@ -128,11 +132,11 @@ def test_label_and_limits(name: str, label: str, limits: str) -> None:
         ("stiffness", "contact.stiffness"),
         ("restitution_coefficient", "contact.coefficient"),
         ("location", "striker.location"),
-        ("step", "run.step"),
+        ("step", "integration.step"),
         ("frequency", "drive.frequency"),
-        ("start.amplitude[3]", "start.amplitude[3]"),
-        ("start.velocity[1]", "start.velocity[1]"),
-        ("start_striker_position", "start.striker_position"),
+        ("initial_state.amplitude[3]", "initial_state.amplitude[3]"),
+        ("initial_state.velocity[1]", "initial_state.velocity[1]"),
+        ("start_striker_position", "initial_state.striker_position"),
     ],
 )
 def test_looked_up_by_any_of_its_names(asked: str, name: str) -> None:
@@ -146,19 +150,19 @@ def test_looked_up_by_its_own_and_its_short_name(name: str) -> None:
 
 
 def test_starts_are_parameters_of_runs() -> None:
-    row = lookup("start.amplitude[2]")
+    row = lookup("initial_state.amplitude[2]")
     assert isinstance(row, Parameter)
     assert row.is_run
     assert row.short == "start_amplitude_2"
     assert "mode 2" in row.label
-    assert lookup("start.striker_position").quantity.unit == "m"
+    assert lookup("initial_state.striker_position").quantity.unit == "m"
 
 
 @pytest.mark.parametrize(
     ("name", "message"),
     [
         ("beam.thicknes", "did you mean 'beam.thickness'"),
-        ("start.amplitude[0]", "no parameter"),
+        ("initial_state.amplitude[0]", "no parameter"),
         ("", "no parameter"),
         (3, "must be a name, such as 'drive.frequency_ratio'"),
     ],
@@ -181,23 +185,25 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
     }
     pair = {"frequency_ratio": 1.0, "velocity_amplitude": 0.1}
     drives = {
-        "burst": sb.Burst(**pair, length=5.0),
-        "chirp": sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_length=20.0),
+        "burst": sb.Burst(**pair, duration_cycles=5.0),
+        "chirp": sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_cycles=20.0),
         "half_sine": sb.HalfSine(displacement_amplitude=0.1, duration=0.5),
-        "noise": sb.Noise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
-        "two_sines": sb.TwoSines(**pair, second_ratio=2.0, second_amplitude=0.1),
-        "flight": sb.Flight(speed=0.4),
+        "noise": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
+        "two_tone": sb.TwoTone(**pair, second_ratio=2.0, second_amplitude=0.1),
+        "flight": sb.ConstantVelocity(speed=0.4),
         "displacement_sine": sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=0.1),
         "acceleration_sine": sb.AccelerationSine(frequency_ratio=1.0, acceleration_amplitude=0.1),
     }
     loads = {
         "ramp": sb.LoadRamp(change=1.0, duration=1.0),
-        "sine": sb.LoadSine(frequency_ratio=2.0, amplitude=1.0),
+        "sine": sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0),
     }
     around = {
-        "base": lambda kind: sb.Base(motion=drives.get(kind, sb.Sine(**pair))),
-        "axial": lambda kind: sb.AxialLoad(motion=loads[kind]),
-        "harvester": lambda kind: sb.Piezo(coupling=1e-3, capacitance=1e-8, resistance=1e4),
+        "base": lambda kind: sb.BaseExcitation(motion=drives.get(kind, sb.Sine(**pair))),
+        "axial": lambda kind: sb.AxialLoadModulation(motion=loads[kind]),
+        "harvester": lambda kind: sb.PiezoelectricHarvester(
+            moment_per_volt=1e-3, capacitance=1e-8, resistance=1e4
+        ),
     }
     for name, row in TABLE.items():
         if not row.is_run:

@@ -176,7 +176,7 @@ class AnyBeam:
         return np.stack((alpha @ phi, alpha @ center), axis=1) / given.level
 
 
-def drawn(rng: np.random.Generator, most_modes: int = 8) -> Numbers:
+def drawn(rng: np.random.Generator, max_modes: int = 8) -> Numbers:
     """A beam from the size of a microswitch to that of a girder, and a way to strike it."""
     length = 10.0 ** rng.uniform(-3.5, 1.0)
     thickness = length * 10.0 ** rng.uniform(-3.0, -2.0)
@@ -192,7 +192,7 @@ def drawn(rng: np.random.Generator, most_modes: int = 8) -> Numbers:
         density=10.0 ** rng.uniform(3.0, 3.95),
         young=young,
         level=level_over_r * thickness / math.sqrt(12.0),
-        modes=int(rng.integers(1, most_modes + 1)),
+        modes=int(rng.integers(1, max_modes + 1)),
         damping_ratio=10.0 ** rng.uniform(-3.0, -1.5),
         contact_stiffness=4.0 / 3.0 * math.sqrt(radius) * young / (2.0 * (1.0 - 0.09)),
         location=rng.uniform(0.15, 0.85),

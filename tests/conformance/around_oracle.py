@@ -44,7 +44,7 @@ class Surroundings:
     loss: float = 1.0
     gap: float | None = None
     """Of a stop, m, from below, at LOCATION; None: there is none."""
-    carried: bool = True
+    integrate_sticking_run: bool = True
     """Whether the stop moves with the base."""
 
 
@@ -53,7 +53,7 @@ class Found:
     """At the times asked for: displacements over b, z, work of base and load, energy lost in the circuit."""
 
     displacement: Array
-    center_displacement: Array
+    midspan_displacement: Array
     z: Array
     base_work: Array
     load_work: Array
@@ -98,7 +98,7 @@ def live(beam: PaperBeam, around: Surroundings, times: Array, rtol: float = 1e-1
     def depth(t: float, y: Array, pressing: bool = False) -> float:
         if around.gap is None:
             return -1.0
-        at = start - around.gap - (0.0 if around.carried else around.base(t)[0])
+        at = start - around.gap - (0.0 if around.integrate_sticking_run else around.base(t)[0])
         return at - float(phi @ y[:n])
 
     def rate(t: float, y: Array, pressing: bool) -> Array:

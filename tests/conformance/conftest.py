@@ -27,16 +27,18 @@ class Marched:
     """What an engine answered."""
 
     ensemble: Ensemble
-    books: NDArray[Any]
+    accumulators_of_runs: NDArray[Any]
 
     @property
     def statistics(self) -> dict[str, NDArray[Any]]:
-        return statistics_of(self.ensemble, self.books)
+        return statistics_of(self.ensemble, self.accumulators_of_runs)
 
     def assert_is(self, other: Marched, which: Any = slice(None)) -> None:
         """Every column is that of the runs *which* of another ensemble, to the last bit."""
-        for name in self.books.dtype.names:
-            np.testing.assert_array_equal(self.books[name], other.books[name][which], err_msg=name)
+        for name in self.accumulators_of_runs.dtype.names:
+            np.testing.assert_array_equal(
+                self.accumulators_of_runs[name], other.accumulators_of_runs[name][which], err_msg=name
+            )
 
 
 class March:
@@ -65,9 +67,9 @@ class March:
     ) -> Marched:
         # a limit that a march meets on its way; one that it cannot but meet is refused before
         limit = integration.pop("max_steps", None)
-        asked = sb.Integration(**({"cycles": 1} | integration))
+        kernel_input = sb.Integration(**({"cycles": 1} | integration))
         if contact is None:
-            ensemble = make_ensemble(sb.System(model, start=start), asked)
+            ensemble = make_ensemble(sb.System(model, initial_state=start), kernel_input)
             return Marched(ensemble, self.engine.run_ensemble(ensemble, threads, None))
         own = {"drive.frequency_ratio": frequency_ratio, "drive.velocity_amplitude": velocity_amplitude}
         striker = sb.Striker(
@@ -80,7 +82,7 @@ class March:
         given = (own if drive is None else {}) | {"striker.location": location}
         columns = np.broadcast_arrays(*map(np.atleast_1d, given.values()))
         points = {name: np.array(column, dtype=float) for name, column in zip(given, columns, strict=True)}
-        ensemble = make_ensemble(sb.System(model, contact, striker, start), asked, points)
+        ensemble = make_ensemble(sb.System(model, contact, striker, start), kernel_input, points)
         if limit is not None:
             ensemble = dataclasses.replace(ensemble, max_steps=limit)
         return Marched(ensemble, self.engine.run_ensemble(ensemble, threads, None))
@@ -105,11 +107,11 @@ def model_of():
 
 def start_up(
     model: sb.ReducedModel, ratio: float = 1.3, velocity: float = 0.3, cycles: int = 8
-) -> sb.Recorded:
+) -> sb.RecordedMotion:
     """A record of a tip that starts up over three cycles, to a sine and its second harmonic."""
     case = {"frequency_ratio": ratio, "velocity_amplitude": velocity, "cycles": cycles, "location": 0.5}
     drive = frozen.recorded(case, model).striker().drive
-    assert isinstance(drive, sb.Recorded)
+    assert isinstance(drive, sb.RecordedMotion)
     return drive
 
 

@@ -43,7 +43,7 @@ def cases() -> list[dict[str, Any]]:
         found.append(
             {
                 "modes": 1,
-                "kind": "restitution",
+                "type": "restitution",
                 "coefficient": float(rng.uniform(0.5, 1.0)),
                 "frequency_ratio": float(rng.uniform(0.8, 4.0)),
                 "velocity_amplitude": float(rng.uniform(0.05, 0.65)),
@@ -56,20 +56,20 @@ def cases() -> list[dict[str, Any]]:
 
 def recorded(case: dict[str, Any], model: sb.ReducedModel) -> sb.Striker:
     """A start-up over three cycles to a sine of two harmonics, as a record would hold it."""
-    freq = case["frequency_ratio"] * model.reference_freq
+    freq = case["frequency_ratio"] * model.reference_frequency
     rate = 60.0 * freq
     t = np.arange(int(case["cycles"] * 60) + 1) / rate
     omega = 2.0 * np.pi * freq
-    stroke = case["velocity_amplitude"] * model.length_scale * 2.0 * np.pi * model.reference_freq / omega
+    stroke = case["velocity_amplitude"] * model.length_scale * 2.0 * np.pi * model.reference_frequency / omega
     grown = np.minimum(t * freq / 3.0, 1.0)
     rise, slope = grown**2 * (3.0 - 2.0 * grown), 6.0 * grown * (1.0 - grown) * freq / 3.0
     wave = np.sin(omega * t) + 0.1 * np.sin(2.0 * omega * t)
     rate_of = omega * np.cos(omega * t) + 0.2 * omega * np.cos(2.0 * omega * t)
     return sb.Striker(
-        drive=sb.Recorded(
+        drive=sb.RecordedMotion(
             displacement=stroke * rise * wave,
             velocity=stroke * (rise * rate_of + slope * wave),
-            sampling_freq=rate,
+            sampling_frequency=rate,
             frequency=freq,
         ),
         location=case["location"],
@@ -79,23 +79,25 @@ def recorded(case: dict[str, Any], model: sb.ReducedModel) -> sb.Striker:
 def model_hash(model: sb.ReducedModel) -> str:
     """Of the model's numbers, which linear algebra may round otherwise on another processor."""
     digest = hashlib.sha256()
-    for values in (model.mass, model.stiffness, model.omega, model.linear_modes, model.equilibrium):
+    for values in (model.mass, model.stiffness, model.omega, model.linear_modes, model.well_amplitude):
         digest.update(np.ascontiguousarray(values).tobytes())
     return digest.hexdigest()
 
 
 def plan_0_1(
-    model: sb.ReducedModel, contact: Any, *, step: float | None = None, accuracy: str = "map"
+    model: sb.ReducedModel, contact: Any, *, step: float | None = None, accuracy: str = "standard"
 ) -> Any:
     """The steps of version 0.1, by the constants that it had for the paper's beam."""
     from snapbeam.engines.plan import Plan
 
     fastest = float(model.omega.max())
-    stretch = float(model.equilibrium @ model.equilibrium)
-    detuning = float(model.tension_stiffness * stretch * (np.diag(model.tension_matrix) / model.omega).max())
+    stretch = float(model.well_amplitude @ model.well_amplitude)
+    detuning = float(
+        model.nonlinear_stiffness * stretch * (np.diag(model.tension_matrix) / model.omega).max()
+    )
     flight = impact = max(0.2 / fastest, 0.0248 / detuning)
     if not contact.impulsive:
-        speed = 0.2 * model.length_scale * 2.0 * math.pi * model.reference_freq
+        speed = 0.2 * model.length_scale * 2.0 * math.pi * model.reference_frequency
         impact = contact.impact_duration(model.lightest_contact_mass, speed) / 6.0
         flight = min(flight, impact * 32)
         impact = min(impact, math.pi / fastest)
@@ -132,13 +134,13 @@ def answer_with_own_steps(case: dict[str, Any]) -> sb.Run:
     elif case["kind"] == "reference":
         more["accuracy"] = "reference"
     elif case["kind"] == "early":
-        more["early_decision"] = True
+        more["early_termination"] = True
     return sb.simulate(sb.System(model, contact, drive), sb.Integration(**more), sample_times=[0.0])
 
 
 def numbers(run: sb.Run) -> dict[str, Any]:
     """Every statistic of a run to the last bit, and a hash of its table of impacts."""
-    response = run.outcome
+    response = run.summary
     found: dict[str, Any] = {}
     for name in NAMES:
         value = getattr(response, name)
@@ -152,9 +154,9 @@ def numbers(run: sb.Run) -> dict[str, Any]:
 
 
 NAMES = (
-    "response", "status", "crossings", "crossings_last_quarter", "last_crossing", "final_well", "end_is_final",
-    "min_displacement", "max_displacement", "min_center_displacement", "max_center_displacement", "peak_force",
-    "impacts", "contact_share", "decided_at",
+    "response_class", "status", "zero_crossings", "zero_crossings_last_quarter", "last_zero_crossing", "final_well", "final_well_proven",
+    "min_displacement", "max_displacement", "min_midspan_displacement", "max_midspan_displacement", "peak_force",
+    "impacts", "contact_time_fraction", "early_stop_time",
 )  # fmt: skip
 
 

@@ -23,38 +23,38 @@ from worlds import WORLDS
 import snapbeam as sb
 from snapbeam.config.parameters import lookup, parameters
 from snapbeam.sweeps.compute.task import PointWork
-from snapbeam.sweeps.stored import Keeping
+from snapbeam.sweeps.stored import CheckpointOptions
 
 NOT_SWEPT = {
-    "run.engine": "which engine",
-    "run.threads": "how many threads",
-    "run.tolerance": "steps that follow from a run",
+    "integration.engine": "which engine",
+    "integration.threads": "how many threads",
+    "integration.tolerance": "steps that follow from a run",
     "drive.displacement": "a record",
     "drive.velocity": "a record",
     "imperfection.profile": "a table",
 }
 VALUES: dict[str, list[Any]] = {
-    "drive.fall": [0.5, 1.5],
-    "axial.hold": [0.2, 0.6],
+    "drive.ramp_down_cycles": [0.5, 1.5],
+    "axial_load.hold_periods": [0.2, 0.6],
     "beam.axial_load": [600.0, 620.0],
-    "ends.left": [20.0, 60.0],
-    "ends.right": [20.0, 60.0],
-    "ends.axial": [1e7, 1e8],
+    "boundary.left_rotational_stiffness": [20.0, 60.0],
+    "boundary.right_rotational_stiffness": [20.0, 60.0],
+    "boundary.axial_support_stiffness": [1e7, 1e8],
     "striker.gap": [1e-6, 2e-5],
     "striker.mass": [0.01, 0.03],
-    "striker.spring": [500.0, 900.0],
-    "striker.damper": [0.3, 0.9],
-    "imperfection.rise": [1e-6, 3e-6],
-    "imperfection.skew": [1e-6, 3e-6],
+    "striker.suspension_stiffness": [500.0, 900.0],
+    "striker.suspension_damping": [0.3, 0.9],
+    "imperfection.midspan_amplitude": [1e-6, 3e-6],
+    "imperfection.antisymmetric_amplitude": [1e-6, 3e-6],
     "imperfection.point_load": [0.003, 0.006],
     "imperfection.uniform_load": [0.003, 0.006],
     "imperfection.gravity": [0.003, 0.006],
     "model.modes": [2, 4],
-    "model.reference_freq": [80.0, 82.0],
-    "run.cycles": [1, 2],
-    "run.step": [3e-5, 4e-5],
-    "run.max_steps": [10**7, 2 * 10**7],
-    "run.accuracy": ["map", "reference"],
+    "model.reference_frequency": [80.0, 82.0],
+    "integration.cycles": [1, 2],
+    "integration.step": [3e-5, 4e-5],
+    "integration.max_steps": [10**7, 2 * 10**7],
+    "integration.accuracy": ["map", "reference"],
 }
 
 
@@ -120,10 +120,15 @@ def try_one(system: sb.System, name: str, folder: Path) -> str:
     axes = {name: values_of(system, name)}
     # a base lifts the beam off its stop first; a burst and a ramp have to end
     ends = any(type(drive).name in ("burst", "ramp") for _, drive in system.moving)
-    integration = sb.Integration(cycles=6 if ends else 2 if system.base is None else 4)
+    integration = sb.Integration(cycles=6 if ends else 2 if system.base_excitation is None else 4)
 
     def sweep(store: Path | None) -> Any:
-        return sb.sweep(system, axes, integration, store=None if store is None else Keeping(store, chunk=1))
+        return sb.sweep(
+            system,
+            axes,
+            integration,
+            checkpoint=None if store is None else CheckpointOptions(store, points_per_task=1),
+        )
 
     try:
         whole = plain(sweep(None))
@@ -151,7 +156,12 @@ def try_one(system: sb.System, name: str, folder: Path) -> str:
     return "changes nothing" if same and name not in UNSEEN else ""
 
 
-UNSEEN = {"run.max_steps", "run.early_decision", "base.carries_striker", "run.high_frequency_ratio"}
+UNSEEN = {
+    "integration.max_steps",
+    "integration.early_termination",
+    "base_excitation.striker_on_base",
+    "integration.high_frequency_ratio",
+}
 """What two cycles may not show."""
 NOTHING = {("still", "striker.gap"), ("a measured shape", "imperfection.point_location")}
 """What changes nothing: nothing moves there from rest, and a load of zero stands nowhere."""
@@ -162,20 +172,24 @@ def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("worlds", nargs="+")
     parser.add_argument("--only", default="")
-    asked = parser.parse_args()
+    kernel_input = parser.parse_args()
     failures: list[str] = []
     count = 0
-    for world in asked.worlds:
+    for world in kernel_input.worlds:
         system = WORLDS[world].system()
         names = [name for name in system.parameters if has_row(name)]
         names += [name for name in parameters() if name.startswith("run.")]
         if WORLDS[world].modes == 1:
             names.remove("model.modes")
-        if system.base is not None and type(system.base.motion).name == "chirp":
-            names.remove("base.carries_striker")  # a sweep is refused under a striker in space
-        if "striker.damper" in names and not system.get("striker.spring"):
-            names.remove("striker.damper")  # of a suspension, which a mass in flight has not
-        chosen = asked.only.split(",") if asked.only else [name for name in names if name not in NOT_SWEPT]
+        if system.base_excitation is not None and type(system.base_excitation.motion).name == "chirp":
+            names.remove("base_excitation.striker_on_base")  # a sweep is refused under a striker in space
+        if "striker.suspension_damping" in names and not system.get("striker.suspension_stiffness"):
+            names.remove("striker.suspension_damping")  # of a suspension, which a mass in flight has not
+        chosen = (
+            kernel_input.only.split(",")
+            if kernel_input.only
+            else [name for name in names if name not in NOT_SWEPT]
+        )
         for name in chosen:
             with tempfile.TemporaryDirectory() as folder:
                 said = try_one(system, name, Path(folder))

@@ -27,7 +27,7 @@ class Solution:
 
     time: Array
     displacement: Array
-    center_displacement: Array
+    midspan_displacement: Array
     impacts: Array
     """Onset s, duration s, peak force N; the last one may still be going on."""
 

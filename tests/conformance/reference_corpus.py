@@ -86,15 +86,15 @@ def model_arrays(model: sb.ReducedModel) -> list[NDArray[Any]]:
         np.asarray(values)
         for each in (model, model.mirrored)
         for values in (
-            each.mass, each.stiffness, each.tension_matrix, each.omega, each.linear_modes, each.equilibrium
+            each.mass, each.stiffness, each.tension_matrix, each.omega, each.linear_modes, each.well_amplitude
         )
     ]  # fmt: skip
 
 
 def solver_fingerprint() -> str:
-    from snapbeam.engines.mark import engine_mark
+    from snapbeam.engines.mark import solver_fingerprint
 
-    return engine_mark()
+    return solver_fingerprint()
 
 
 def command_app() -> Any:
@@ -204,13 +204,13 @@ def run_row(system: sb.System, integration: sb.Integration, times: Any = None) -
         warnings.simplefilter("ignore")
         run = sb.simulate(system, integration, sample_times=times)
     row = dataset_row(run.dataset) | dataset_row(run.impacts, "impact.")
-    row |= {f"statistic.{name}": word(value) for name, value in run.outcome.items()}
+    row |= {f"statistic.{name}": word(value) for name, value in run.summary.items()}
     if run.accuracy is not None:
         row |= {
             f"accuracy.{each.name}": word(getattr(run.accuracy, each.name)) for each in fields(run.accuracy)
         }
-    if run.end is not None:
-        row |= state_row(run.end, (), "end.")
+    if run.final_state is not None:
+        row |= state_row(run.final_state, (), "end.")
     return row
 
 
@@ -233,23 +233,24 @@ def advanced_rows(system: sb.System, order: str, periods: int, tangents: int = 0
     """Four states, an equilibrium and three random ones, advanced; the hashes cover every period."""
     rng = np.random.default_rng(5)
     modes = system.model.modes
-    scale = float(np.abs(system.model.equilibrium).max())
-    amplitude = np.array([-1.0, -0.9, 0.8, 1.0])[:, None] * system.model.equilibrium
+    scale = float(np.abs(system.model.well_amplitude).max())
+    amplitude = np.array([-1.0, -0.9, 0.8, 1.0])[:, None] * system.model.well_amplitude
     amplitude[1:] += 0.02 * scale * rng.standard_normal((3, modes))
     velocity = 0.1 * scale * float(system.model.omega.min()) * rng.standard_normal((4, modes))
     tangent = scale * rng.standard_normal((4, tangents, 2, modes)) if tangents else None
     start = sb.State(amplitude=amplitude, velocity=velocity)
     how = sb.Integration(accuracy=ACCURACY[order], threads=1)
     try:
-        found = sb.advance(system, start, periods, tangent, integration=how, every=not tangents)
+        found = sb.advance(system, start, periods, tangent, integration=how, save_every_period=not tangents)
     except sb.InputError:
         return None
-    assert found.passed is not None
+    assert found.statistics is not None
     rows = []
     for i in range(4):
         row = state_row(found, (i,) if tangents else (slice(None), i))
         row |= {
-            f"statistic.{name}": digest(np.asarray(values)[..., i]) for name, values in found.passed.items()
+            f"statistic.{name}": digest(np.asarray(values)[..., i])
+            for name, values in found.statistics.items()
         }
         if found.tangent is not None:
             row["tangent"] = digest(found.tangent[i])
@@ -287,7 +288,7 @@ def ensemble_cases() -> Iterator[Case]:
             settings += [(modes, "order 4", True, 16, 40) for modes in (1, 16)]
             settings += [(1, "order 6", False, 16, 6), (32, "order 6", False, 2, 1)]
         for at, (modes, order, early, runs, cycles) in enumerate(settings):
-            how = {"cycles": cycles, "accuracy": ACCURACY[order], "early_decision": early}
+            how = {"cycles": cycles, "accuracy": ACCURACY[order], "early_termination": early}
             for layout in LAYOUTS:
                 title = f"ensemble {at}: {name}, {modes} modes, {order}{', early' if early else ''}, {layout}"
                 # the kernel of run lanes is compiled for each number of modes and order
@@ -324,7 +325,7 @@ def run_cases() -> Iterator[Case]:
         if name == "the paper's":
             settings += [(16, "order 4", 5, False), (32, "order 4", 3, False), (8, "order 4", 30, True)]
         for at, (modes, order, cycles, early) in enumerate(settings):
-            how = sb.Integration(cycles=cycles, accuracy=ACCURACY[order], early_decision=early)
+            how = sb.Integration(cycles=cycles, accuracy=ACCURACY[order], early_termination=early)
 
             def system(world: World = world, modes: int = modes, seed: int = 10 * number + at) -> sb.System:
                 return world.system(modes) if seed % 10 == 0 else moved(world, modes, seed)
@@ -391,7 +392,9 @@ def small_system(modes: int = 1, damping_ratio: float = 0.005, **drive: float) -
 
 
 PLANE = {"frequency_ratio": [0.8, 1.4], "velocity_amplitude": [0.06, 0.15, 0.3]}
-SPREAD = sb.Spread(of={"location": sb.Normal(0.01), "contact.stiffness": sb.LogNormal(0.2)}, phase=True)
+SPREAD = sb.ParameterUncertainty(
+    of={"location": sb.Normal(0.01), "contact.stiffness": sb.LogNormal(0.2)}, phase=True
+)
 SHORT = sb.Integration(cycles=6, threads=1)
 
 
@@ -402,12 +405,12 @@ def quiet_system() -> sb.System:
 
 @cache
 def found_attractors() -> Any:
-    return sb.attractors(quiet_system(), 12, transient=300, integration=sb.Integration(threads=1))
+    return sb.find_attractors(quiet_system(), 12, transient=300, integration=sb.Integration(threads=1))
 
 
 def basins() -> xr.Dataset:
     grid = {"amplitude[1]": np.linspace(-1.6, 1.6, 6), "velocity[1]": np.linspace(-1.0, 1.0, 5)}
-    return sb.basins(found_attractors(), grid, periods=100)
+    return sb.basins_of_attraction(found_attractors(), grid, periods=100)
 
 
 @cache
@@ -416,7 +419,7 @@ def orbit() -> Any:
 
 
 def branch() -> xr.Dataset:
-    return sb.continue_orbit(orbit(), "velocity_amplitude", (0.02, 0.04), most=12).to_dataset()
+    return sb.continuation(orbit(), "velocity_amplitude", (0.02, 0.04), max_points=12).to_dataset()
 
 
 def a_run() -> Any:
@@ -428,39 +431,39 @@ ANALYSES: dict[str, Callable[[], xr.Dataset]] = {
     "impacts of a run": lambda: a_run().impacts,
     "run with everything": lambda: sb.simulate(WORLDS["a bit of all"].system(), SHORT).dataset,
     "run with two strikers, impacts": lambda: sb.simulate(WORLDS["two strikers"].system(), SHORT).impacts,
-    "conditioning": lambda: sb.conditioning(small_system(3), 4),
+    "conditioning": lambda: sb.perturbation_growth(small_system(3), 4),
     "sweep": lambda: sb.sweep(small_system(3), PLANE, SHORT),
     "sweep with two strikers": lambda: sb.sweep(
         WORLDS["two strikers"].system(), {"velocity_amplitude": [0.1, 0.2]}, SHORT
     ),
-    "sweep with replicates": lambda: sb.sweep(small_system(), PLANE, SHORT, replicas=sb.Replicas(3, halve_step=True)),
+    "sweep with replicates": lambda: sb.sweep(small_system(), PLANE, SHORT, replicates=sb.Replicates(3, check_half_step=True)),
     "sweep with refinement": lambda: sb.sweep(small_system(), PLANE, SHORT, refine_levels=1),
     "threshold": lambda: sb.threshold(
         small_system(), "velocity_amplitude", np.linspace(0.05, 0.4, 8), {"frequency_ratio": [0.8, 1.4]}, SHORT
     ),
     "lifetimes": lambda: sb.lifetime_map(
-        small_system(), PLANE, sb.Integration(cycles=60, threads=1), starts=6, after=[3, 10]
+        small_system(), PLANE, sb.Integration(cycles=60, threads=1), initial_conditions=6, after=[3, 10]
     ),
     "attractors": lambda: found_attractors().to_dataset(),
     "basins": basins,
     "bifurcation diagram": lambda: sb.bifurcation_diagram(
         quiet_system(), "velocity_amplitude", [0.03, 0.05], sb.Integration(threads=1), periods=(20, 4), grazing=True
     ),
-    "Poincare section": lambda: sb.poincare(quiet_system(), periods=20, transient=10),
-    "Lyapunov exponents": lambda: sb.lyapunov(small_system(3), 3, periods=20, transient=10),
-    "separation exponent": lambda: sb.separation_exponent(small_system(3), periods=20, transient=10),
+    "Poincare section": lambda: sb.poincare_section(quiet_system(), periods=20, transient=10),
+    "Lyapunov exponents": lambda: sb.lyapunov_spectrum(small_system(3), 3, periods=20, transient=10),
+    "separation exponent": lambda: sb.largest_lyapunov(small_system(3), periods=20, transient=10),
     "branch": branch,
     "probability map": lambda: sb.probability_map(small_system(), PLANE, SPREAD, 12, integration=SHORT),
     "quantile threshold": lambda: sb.quantile_threshold(
-        small_system(), "velocity_amplitude", (0.05, 0.4), spread=SPREAD, how=sb.Search(runs=120), integration=SHORT
+        small_system(), "velocity_amplitude", (0.05, 0.4), uncertainty=SPREAD, options=sb.QuantileSearchSettings(runs=120), integration=SHORT
     ),
     "sensitivity": lambda: sb.sensitivity(
-        small_system(), "peak_force", sb.Spread(of=SPREAD.of), size=8, integration=SHORT
+        small_system(), "peak_force", sb.ParameterUncertainty(of=SPREAD.of), samples=8, integration=SHORT
     ),
     "design": lambda: sb.optimize_design(
         small_system(), {"velocity_amplitude": (0.05, 0.4), "location": (0.3, 0.5)}, "speed",
-        sb.Limit(of="snap", at_least=0.8), SPREAD,
-        sb.Effort(generations=2, population=6, draws=8, fresh=100, candidates=2), integration=SHORT,
+        sb.Constraint(quantity="snap", lower=0.8), SPREAD,
+        sb.OptimizerSettings(generations=2, population=6, samples=8, validation_samples=100, candidates=2), integration=SHORT,
     ),
 }  # fmt: skip
 

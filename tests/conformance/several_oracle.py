@@ -42,13 +42,13 @@ class Struck:
     """At the times asked for: displacements over b, forces (N) and tips over b of shape (times, strikers), work (J)."""
 
     displacement: Array
-    center_displacement: Array
+    midspan_displacement: Array
     force: Array
     tip: Array
     work: Array
 
 
-def strike(
+def apply_impact_law(
     beam: PaperBeam, tips: Sequence[Tip], times: Array, rtol: float = 1e-11, start: Array | None = None
 ) -> Struck:
     """Integrate from rest in the lower well, or from amplitudes *start* at rest."""

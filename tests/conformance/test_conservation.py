@@ -17,16 +17,16 @@ ELSEWHERE = [(1.21, 0.18), (1.625, 0.3), (3.0, 0.5), (0.5, 0.4)]
 
 def energy_errors(march, model, share: float, cycles: list[int]) -> tuple[list[float], list[int]]:
     """Relative error of an energy, at first a *share* of the barrier, after so many cycles; and crossings."""
-    energy = share * (model.barrier_energy - model.well_energy)
+    energy = share * (model.saddle_energy - model.well_energy)
     velocity = model.linear_modes[:, 0] * math.sqrt(2.0 * energy)
     if model.modes > 3:
         velocity = velocity + model.linear_modes[:, 3] * math.sqrt(0.02 * energy)
-    start = State(amplitude=model.equilibrium, velocity=velocity)
+    start = State(amplitude=model.well_amplitude, velocity=velocity)
     first = float(model.kinetic_energy(velocity))
     ends = [march(model, None, cycles=count, start=start) for count in cycles]
-    assert all(end.books["status"][0] == RunStatus.OK for end in ends)
-    errors = [abs(float(end.books["energy"][0]) / first - 1.0) for end in ends]
-    return errors, [int(end.books["crossings"][0]) for end in ends]
+    assert all(end.accumulators_of_runs["status"][0] == RunStatus.OK for end in ends)
+    errors = [abs(float(end.accumulators_of_runs["energy"][0]) / first - 1.0) for end in ends]
+    return errors, [int(end.accumulators_of_runs["zero_crossings"][0]) for end in ends]
 
 
 @pytest.mark.parametrize(
@@ -48,16 +48,16 @@ def test_no_drift_within_a_well(march, model_of, modes, cycles, share, bound) ->
 def test_energy_of_a_random_motion_stays_within_the_reserve_of_decisions(march, model_of, modes) -> None:
     """Motion in every mode up to the fastest, far more than an impact gives them: measured, 5e-4 of the barrier."""
     model = model_of(modes, 0.0)
-    barrier = model.barrier_energy - model.well_energy
+    barrier = model.saddle_energy - model.well_energy
     velocity = model.linear_modes @ np.random.default_rng(0).standard_normal(modes)
     velocity *= math.sqrt(barrier / float(model.kinetic_energy(velocity)))
     steps = {}
     for share in (0.1, 0.19, 0.9):
-        start = State(amplitude=model.equilibrium, velocity=math.sqrt(share) * velocity)
+        start = State(amplitude=model.well_amplitude, velocity=math.sqrt(share) * velocity)
         for cycles in (3, 30, 100):
             end = march(model, None, cycles=cycles, start=start)
-            assert abs(float(end.books["energy"][0]) / barrier - share) < 0.5 * RESERVE
-        steps[share] = int(end.books["steps"][0])
+            assert abs(float(end.accumulators_of_runs["energy"][0]) / barrier - share) < 0.5 * RESERVE
+        steps[share] = int(end.accumulators_of_runs["steps"][0])
     # below a fifth of the barrier steps are twice as long
     assert steps[0.1] == steps[0.19] == pytest.approx(0.5 * steps[0.9], rel=1e-2)
 
@@ -79,8 +79,8 @@ def test_undamped_beam_gains_the_work_of_the_shaker(march, model_of, modes) -> N
     """
     ratio, velocity = np.array(REGULAR + ELSEWHERE).T
     end = march(model_of(modes, 0.0), frequency_ratio=ratio, velocity_amplitude=velocity, cycles=8)
-    missing = end.books["energy"] - end.books["work"]
-    share = np.abs(missing) / end.books["gross_work"]
-    assert (end.books["impacts"] > 3).all()
+    missing = end.accumulators_of_runs["energy"] - end.accumulators_of_runs["work"]
+    share = np.abs(missing) / end.accumulators_of_runs["gross_work"]
+    assert (end.accumulators_of_runs["impacts"] > 3).all()
     assert (share[: len(REGULAR)] < (5e-4 if modes == 32 else 1e-4)).all(), share
     assert (share < 1.5e-3).all(), share

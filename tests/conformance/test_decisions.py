@@ -11,27 +11,29 @@ from snapbeam.core.codes import ResponseClass, RunStatus
 def compare(march, model, given, cycles: int) -> tuple[int, set[int]]:
     """Check runs with and without early decisions; returns how many were decided, and the classes."""
     full = march(model, **given, cycles=cycles).statistics
-    early = march(model, **given, cycles=cycles, early_decision=True).statistics
+    early = march(model, **given, cycles=cycles, early_termination=True).statistics
     assert (full["status"] == RunStatus.OK).all()
-    np.testing.assert_array_equal(early["response"], full["response"])
+    np.testing.assert_array_equal(early["response_class"], full["response_class"])
 
-    odd = full["crossings"] % 2 == 1
-    continuous = full["response"] == ResponseClass.CONTINUOUS
+    odd = full["zero_crossings"] % 2 == 1
+    continuous = full["response_class"] == ResponseClass.CONTINUOUS
     np.testing.assert_array_equal(full["final_well"] == 1, odd)
     np.testing.assert_array_equal(
-        (full["response"] == ResponseClass.TRANSIENT_2) & ~continuous, odd & ~continuous
+        (full["response_class"] == ResponseClass.TRANSIENT_2) & ~continuous, odd & ~continuous
     )
-    np.testing.assert_array_equal(full["response"] == ResponseClass.INTRAWELL, full["crossings"] == 0)
-    np.testing.assert_array_equal(continuous, full["crossings_last_quarter"] * 20 > cycles)
+    np.testing.assert_array_equal(
+        full["response_class"] == ResponseClass.INTRAWELL, full["zero_crossings"] == 0
+    )
+    np.testing.assert_array_equal(continuous, full["zero_crossings_last_quarter"] * 20 > cycles)
 
-    decided = early["status"] == RunStatus.DECIDED
-    np.testing.assert_array_equal(np.isfinite(early["decided_at"]), decided)
+    decided = early["status"] == RunStatus.EARLY_STOP
+    np.testing.assert_array_equal(np.isfinite(early["early_stop_time"]), decided)
     for name in full:
         np.testing.assert_array_equal(early[name][~decided], full[name][~decided], err_msg=name)
-    second = decided & (full["response"] == ResponseClass.TRANSIENT_2)
-    np.testing.assert_array_equal(early["crossings"][second], full["crossings"][second])
+    second = decided & (full["response_class"] == ResponseClass.TRANSIENT_2)
+    np.testing.assert_array_equal(early["zero_crossings"][second], full["zero_crossings"][second])
     np.testing.assert_array_equal(full["final_well"][second], 1)
-    return int(decided.sum()), set(full["response"].tolist())
+    return int(decided.sum()), set(full["response_class"].tolist())
 
 
 @pytest.mark.parametrize(

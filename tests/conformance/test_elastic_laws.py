@@ -68,4 +68,4 @@ def test_against_an_independent_solution(name: str, modes: int) -> None:
         print(name, modes, accuracy, worst)
         assert max(worst.values()) < bound, worst
         assert missing(data) < 1e-4
-    assert run.outcome.impacts > 0
+    assert run.summary.impacts > 0

@@ -15,18 +15,29 @@ from snapbeam import paper
 from snapbeam.core.validate import InputError
 
 THETA, CAPACITANCE = 4e-3, 60e-9
-PIEZO = sb.Piezo(coupling=THETA, capacitance=CAPACITANCE, resistance=2e4, start=0.0, stop=0.25)
+PIEZO = sb.PiezoelectricHarvester(
+    moment_per_volt=THETA, capacitance=CAPACITANCE, resistance=2e4, patch_start=0.0, patch_end=0.25
+)
 
 
-def shaken(
-    modes: int, harvester: sb.Piezo | sb.Coil, ratio: float = 0.9, strength: float = 0.25
+def add_base_acceleration(
+    modes: int,
+    harvester: sb.PiezoelectricHarvester | sb.ElectromagneticHarvester,
+    ratio: float = 0.9,
+    strength: float = 0.25,
 ) -> sb.System:
     motion = sb.AccelerationSine(frequency_ratio=ratio, acceleration_amplitude=strength)
-    return sb.System(model(modes), base=sb.Base(motion=motion), harvester=harvester)
+    return sb.System(model(modes), base_excitation=sb.BaseExcitation(motion=motion), harvester=harvester)
 
 
 def compare(
-    modes: int, cycles: int, harvester: sb.Piezo | sb.Coil, row, inertia: float, loss: float, volts: float
+    modes: int,
+    cycles: int,
+    harvester: sb.PiezoelectricHarvester | sb.ElectromagneticHarvester,
+    row,
+    inertia: float,
+    loss: float,
+    volts: float,
 ) -> None:
     beam, ratio, strength = PaperBeam(modes), 0.9, 0.25
     omega, hardest = ratio * float(beam.omega[0]), strength * LEVEL * float(beam.omega[0]) ** 2
@@ -39,13 +50,17 @@ def compare(
     truth = live(beam, around, times)
     free = live(beam, Surroundings(base), times)
     # the circuit matters: what is met is not the beam without it
-    assert np.abs(truth.center_displacement - free.center_displacement).max() > 3e-3
+    assert np.abs(truth.midspan_displacement - free.midspan_displacement).max() > 3e-3
     for accuracy, bound, slack in (("map", 1e-3, 1e-2), ("reference", 1e-7, 1e-5)):
         run = sb.simulate(
-            shaken(modes, harvester), sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times
+            add_base_acceleration(modes, harvester),
+            sb.Integration(cycles=cycles, accuracy=accuracy),
+            sample_times=times,
         )
         data = run.dataset
-        np.testing.assert_allclose(data.center_displacement, truth.center_displacement, rtol=0.0, atol=bound)
+        np.testing.assert_allclose(
+            data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
+        )
         size = float(np.abs(truth.z).max())
         np.testing.assert_allclose(
             data.voltage, volts * truth.z, rtol=0.0, atol=10 * bound * abs(volts) * size
@@ -53,9 +68,9 @@ def compare(
         share = float(harvester.share(np.array([harvester.resistance]))[0])
         given = share * truth.circuit
         np.testing.assert_allclose(data.energy_harvested, given, rtol=0.0, atol=slack * given[-1])
-        assert run.outcome.harvested_energy == pytest.approx(given[-1], rel=slack)
-        assert run.outcome.harvested_power == pytest.approx(given[-1] / times[-1], rel=slack)
-        assert run.outcome.harvested_per_cycle == pytest.approx(given[-1] / cycles, rel=slack)
+        assert run.summary.energy_harvested == pytest.approx(given[-1], rel=slack)
+        assert run.summary.harvested_power == pytest.approx(given[-1] / times[-1], rel=slack)
+        assert run.summary.harvested_per_cycle == pytest.approx(given[-1] / cycles, rel=slack)
         assert ledger(run) < 1e-4
 
 
@@ -71,7 +86,9 @@ def test_piezo(modes) -> None:
 @pytest.mark.parametrize("modes", [1, 3, 8])
 @pytest.mark.parametrize("inductance", [0.0, 0.01])
 def test_coil(modes, inductance) -> None:
-    coil = sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, inductance=inductance, location=0.4)
+    coil = sb.ElectromagneticHarvester(
+        force_factor=1.5, resistance=30.0, coil_resistance=10.0, inductance=inductance, location=0.4
+    )
 
     def row(beam):
         return 1.5 * beam.shape(0.4 * LENGTH)
@@ -99,17 +116,21 @@ def test_struck_with_a_nearly_open_circuit(modes, ratio, velocity, resistance, c
 
     around = Surroundings(
         away, coupling=THETA * (slopes(beam, 0.25 * LENGTH) - slopes(beam, 0.0)), inertia=CAPACITANCE,
-        loss=1.0 / resistance, gap=gap, carried=False,
+        loss=1.0 / resistance, gap=gap, integrate_sticking_run=False,
     )  # fmt: skip
     times = np.linspace(0.0, cycles * 2.0 * math.pi / omega, 801) * (1.0 - 1e-13)
     truth = live(beam, around, times)
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
-    layers = sb.Piezo(coupling=THETA, capacitance=CAPACITANCE, resistance=resistance, start=0.0, stop=0.25)
+    layers = sb.PiezoelectricHarvester(
+        moment_per_volt=THETA, capacitance=CAPACITANCE, resistance=resistance, patch_start=0.0, patch_end=0.25
+    )
     system = sb.System(model(modes), paper.CONTACT, sb.Striker(drive=drive, gap=gap), harvester=layers)
     for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
-        assert run.outcome.impacts > 2
-        np.testing.assert_allclose(run.dataset.displacement, truth.displacement, rtol=0.0, atol=bound)
+        assert run.summary.impacts > 2
+        np.testing.assert_allclose(
+            run.dataset.displacement_at_striker, truth.displacement, rtol=0.0, atol=bound
+        )
         assert ledger(run) < 1e-4
 
 
@@ -118,12 +139,12 @@ def test_a_layer_that_does_not_couple_changes_nothing() -> None:
     """theta to 0: the struck beam without a harvester, to the error of the level."""
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
     steps = sb.Integration(cycles=1, accuracy="reference")
-    bare = sb.simulate(sb.System(model(3), paper.CONTACT, shaker), steps).end.amplitude
+    bare = sb.simulate(sb.System(model(3), paper.CONTACT, shaker), steps).final_state.amplitude
     errors = []
     for coupling in (1e-4, 1e-5, 0.0):
         system = sb.System(model(3), paper.CONTACT, shaker, harvester=PIEZO.__class__(
-            coupling=coupling, capacitance=CAPACITANCE, resistance=2e4))  # fmt: skip
-        errors.append(np.abs(sb.simulate(system, steps).end.amplitude - bare).max() / abs(bare[0]))
+            moment_per_volt=coupling, capacitance=CAPACITANCE, resistance=2e4))  # fmt: skip
+        errors.append(np.abs(sb.simulate(system, steps).final_state.amplitude - bare).max() / abs(bare[0]))
     assert errors[0] > 30.0 * errors[1]
     assert errors[2] < 1e-9
 
@@ -135,7 +156,7 @@ def test_sweep_of_the_load() -> None:
     The start rings down within the run, which is long against 1/(zeta omega).
     """
     ratio, strength = 0.6, 1e-3
-    system = shaken(1, PIEZO, ratio, strength)
+    system = add_base_acceleration(1, PIEZO, ratio, strength)
     beam = system.model
     loads = np.geomspace(2e3, 2e6, 7)
     found = sb.sweep(system, {"harvester.resistance": loads}, sb.Integration(cycles=150))
@@ -158,7 +179,9 @@ def test_sweep_of_the_load() -> None:
 
 def test_refusals() -> None:
     with pytest.raises(InputError, match=r"start = 0.5: must be less than stop"):
-        sb.Piezo(coupling=1e-3, capacitance=1e-9, resistance=1e4, start=0.5, stop=0.4)
+        sb.PiezoelectricHarvester(
+            moment_per_volt=1e-3, capacitance=1e-9, resistance=1e4, patch_start=0.5, patch_end=0.4
+        )
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
     with pytest.raises(InputError, match=r"use a HertzContact"):
         sb.System(model(1), sb.HuntCrossley(4e8, 1.0), shaker, harvester=PIEZO)
@@ -175,7 +198,12 @@ def test_layers_by_their_material() -> None:
         "stress_constant": -16.6, "permittivity": 25.55e-9, "layer_thickness": 0.2e-3, "layer_width": 15e-3,
         "beam": paper.BEAM, "resistance": 1e4,
     }  # fmt: skip
-    series, parallel = (sb.Piezo.from_material(wiring=wiring, **parts) for wiring in ("series", "parallel"))
-    assert series.coupling == pytest.approx(-16.6 * 15e-3 * 0.3e-3)
+    series, parallel = (
+        sb.PiezoelectricHarvester.from_material(wiring=wiring, **parts) for wiring in ("series", "parallel")
+    )
+    assert series.moment_per_volt == pytest.approx(-16.6 * 15e-3 * 0.3e-3)
     assert series.capacitance == pytest.approx(0.5 * 25.55e-9 * 15e-3 * 0.25 * 0.161 / 0.2e-3)
-    assert parallel.coupling == 2.0 * series.coupling and parallel.capacitance == 4.0 * series.capacitance
+    assert (
+        parallel.moment_per_volt == 2.0 * series.moment_per_volt
+        and parallel.capacitance == 4.0 * series.capacitance
+    )

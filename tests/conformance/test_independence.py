@@ -56,37 +56,37 @@ def test_runs_of_different_contact_are_what_they_are_alone(march, model_of) -> N
 
     stiffness = np.array([1e7, 4e8, 3e9])
     shaker = sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.25)
-    asked = sb.Integration(cycles=3)
+    kernel_input = sb.Integration(cycles=3)
     whole = make_ensemble(
-        sb.System(model_of(2), paper.CONTACT, shaker), asked, {"contact.stiffness": stiffness}
+        sb.System(model_of(2), paper.CONTACT, shaker), kernel_input, {"contact.stiffness": stiffness}
     )
-    books = march.engine.run_ensemble(whole, None, None)
-    assert len(set(books["steps"].tolist())) == 3
+    accumulators_of_runs = march.engine.run_ensemble(whole, None, None)
+    assert len(set(accumulators_of_runs["steps"].tolist())) == 3
     for i, value in enumerate(stiffness):
-        alone = make_ensemble(sb.System(model_of(2), sb.HertzContact(float(value)), shaker), asked)
+        alone = make_ensemble(sb.System(model_of(2), sb.HertzContact(float(value)), shaker), kernel_input)
         assert alone.runs["tick"][0] == whole.runs["tick"][i]
         assert alone.runs["finest"][0] == whole.runs["finest"][i]
         found = march.engine.run_ensemble(alone, None, None)
-        for name in books.dtype.names:
-            np.testing.assert_array_equal(found[name][0], books[name][i], err_msg=name)
+        for name in accumulators_of_runs.dtype.names:
+            np.testing.assert_array_equal(found[name][0], accumulators_of_runs[name][i], err_msg=name)
 
 
 def test_cycles_beyond_the_last_do_not_change_the_first(march, model_of) -> None:
     """Statistics that only accumulate are those of the longer run's beginning: time comes from ticks."""
     model = model_of(2)
     short, long = (march(model, frequency_ratio=1.4, velocity_amplitude=0.02, cycles=c) for c in (5, 10))
-    for name in ("time", "crossings", "impacts", "steps", "contact_time", "total_impulse", "gross_work"):
-        assert (long.books[name] >= short.books[name]).all(), name
+    for name in ("time", "zero_crossings", "impacts", "steps", "contact_time", "total_impulse", "gross_work"):
+        assert (long.accumulators_of_runs[name] >= short.accumulators_of_runs[name]).all(), name
     assert long.statistics["peak_force"] >= short.statistics["peak_force"]
     assert long.statistics["min_displacement"] <= short.statistics["min_displacement"]
 
 
 def test_time_does_not_drift(march) -> None:
     """Time comes from integers: after 10^5 cycles of a linear oscillator the run ends where it should."""
-    oscillator = ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], reference_freq=1.0)
+    oscillator = ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[1.0], reference_frequency=1.0)
     cycles = 100_000
     start = State(amplitude=np.zeros(1), velocity=np.ones(1))
     end = march(oscillator, None, cycles=cycles, start=start, step=0.25)
-    seconds = end.books["time"][0] * end.ensemble.runs["tick"][0]
+    seconds = end.accumulators_of_runs["time"][0] * end.ensemble.runs["tick"][0]
     assert seconds == pytest.approx(cycles, rel=1e-15)
-    assert end.books["energy"][0] == pytest.approx(0.5, rel=1e-9)
+    assert end.accumulators_of_runs["energy"][0] == pytest.approx(0.5, rel=1e-9)

@@ -20,7 +20,7 @@ def end(striker: sb.Striker | None = None, modes: int = 3, **parts) -> np.ndarra
     striker = sb.Striker(drive=SHAKER) if striker is None else striker
     system = sb.System(model, parts.pop("contact", paper.CONTACT), striker, **parts)
     run = sb.simulate(system, sb.Integration(cycles=1, accuracy="reference"))
-    return np.asarray(run.end.amplitude / abs(model.equilibrium[0]))
+    return np.asarray(run.final_state.amplitude / abs(model.well_amplitude[0]))
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,13 @@ def test_a_long_start_is_none(plain) -> None:
         plain,
         lambda rise: end(
             sb.Striker(
-                drive=sb.Burst(frequency_ratio=1.21, velocity_amplitude=0.15, length=1e4, rise=rise, fall=1.0)
+                drive=sb.Burst(
+                    frequency_ratio=1.21,
+                    velocity_amplitude=0.15,
+                    duration_cycles=1e4,
+                    ramp_up_cycles=rise,
+                    ramp_down_cycles=1.0,
+                )
             )
         ),
         (1e-2, 1e-3, 1e-4),
@@ -65,11 +71,13 @@ def test_a_long_start_is_none(plain) -> None:
 def test_a_base_and_a_load_that_hardly_move(plain) -> None:
     def base(size: float) -> np.ndarray:
         return end(
-            base=sb.Base(motion=sb.AccelerationSine(frequency_ratio=1.21, acceleration_amplitude=size))
+            base=sb.BaseExcitation(
+                motion=sb.AccelerationSine(frequency_ratio=1.21, acceleration_amplitude=size)
+            )
         )
 
     def load(size: float) -> np.ndarray:
-        return end(axial=sb.AxialLoad(motion=sb.LoadSine(frequency_ratio=2.0, amplitude=size)))
+        return end(axial=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=size)))
 
     recedes(plain, base, (1e-4, 1e-6, 1e-8), 1e-7)
     recedes(plain, load, (1e-2, 1e-4, 1e-6), 1e-6)
@@ -79,7 +87,9 @@ def test_a_base_and_a_load_that_hardly_move(plain) -> None:
 def test_a_coil_without_a_magnet(plain) -> None:
     """K to 0: its force goes with K squared."""
     errors = [
-        np.abs(end(harvester=sb.Coil(constant=constant, resistance=30.0)) - plain).max()
+        np.abs(
+            end(harvester=sb.ElectromagneticHarvester(force_factor=constant, resistance=30.0)) - plain
+        ).max()
         for constant in (0.1, 0.01, 0.0)
     ]
     assert errors[0] > 30.0 * errors[1]
@@ -88,7 +98,9 @@ def test_a_coil_without_a_magnet(plain) -> None:
 
 def test_noise_is_the_same_compiled_or_not() -> None:
     """Places and phases to the bit, so that the sum differs by the rounding of sines at most."""
-    drive = sb.Noise(low_ratio=0.5, high_ratio=3.0, velocity_rms=0.2, seed=2**31 - 1, rise=2.0)
+    drive = sb.BandLimitedNoise(
+        low_ratio=0.5, high_ratio=3.0, velocity_rms=0.2, seed=2**31 - 1, ramp_up_cycles=2.0
+    )
     columns = {name: np.array([value]) for name, value in drive.values().items()}
     numbers = drive.numbers(columns, Scale(0.335e-3, 514.0))
     row = drive.numbers_type()(*(float(numbers[name][0]) for name in drive.number_names))

@@ -25,7 +25,7 @@ def ledger(run: sb.Run) -> float:
     """What the ledger misses at its worst, over the gross work."""
     data = run.dataset
     stored = sum(data[name] for name in ("energy_beam", "energy_contact", "energy_striker") if name in data)
-    given = sum(data[name] for name in ("work_shaker", "work_base", "work_load") if name in data)
+    given = sum(data[name] for name in ("striker_work", "base_work", "load_work") if name in data)
     taken = sum(
         data[name] for name in ("energy_dissipated", "energy_harvested", "energy_circuit") if name in data
     )
@@ -45,25 +45,32 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
         s, c = math.sin(omega * t), math.cos(omega * t)
         return hardest / omega**2 * s, hardest / omega * c, -hardest * s
 
-    around = Surroundings(base, gap=None if stop == "none" else gap, carried=stop != "in space")
+    around = Surroundings(
+        base, gap=None if stop == "none" else gap, integrate_sticking_run=stop != "in space"
+    )
     times = np.linspace(0.0, cycles * 2.0 * math.pi / omega, 801) * (1.0 - 1e-13)
     truth = live(PaperBeam(modes), around, times)
     motion = sb.AccelerationSine(frequency_ratio=ratio, acceleration_amplitude=strength)
-    own = {"base": sb.Base(motion=motion, carries_striker=stop != "in space")}
+    own = {"base": sb.BaseExcitation(motion=motion, striker_on_base=stop != "in space")}
     if stop != "none":
-        own |= {"contact": paper.CONTACT, "striker": sb.Striker(drive=sb.Still(), gap=gap, location=LOCATION)}
+        own |= {
+            "contact": paper.CONTACT,
+            "striker": sb.Striker(drive=sb.FixedStop(), gap=gap, location=LOCATION),
+        }
     system = sb.System(model(modes), **own)
     for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         data = run.dataset
-        name = "displacement" if stop != "none" else "center_displacement"
+        name = "displacement" if stop != "none" else "midspan_displacement"
         np.testing.assert_allclose(data[name], getattr(truth, name), rtol=0.0, atol=bound)
-        np.testing.assert_allclose(data.center_displacement, truth.center_displacement, rtol=0.0, atol=bound)
+        np.testing.assert_allclose(
+            data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
+        )
         size = float(np.abs(truth.base_work).max())
-        np.testing.assert_allclose(data.work_base, truth.base_work, rtol=0.0, atol=max(bound, 1e-6) * size)
+        np.testing.assert_allclose(data.base_work, truth.base_work, rtol=0.0, atol=max(bound, 1e-6) * size)
         assert ledger(run) < 1e-4
     if stop != "none":
-        assert run.outcome.impacts > 1
+        assert run.summary.impacts > 1
 
 
 def test_mirrored_and_going_on() -> None:
@@ -72,8 +79,13 @@ def test_mirrored_and_going_on() -> None:
     parts = {"contact": paper.CONTACT}
 
     def system(side: str, direction: str) -> sb.System:
-        striker = sb.Striker(drive=sb.Still(), gap=0.05 * LEVEL, side=side)
-        return sb.System(model(3), striker=striker, base=sb.Base(motion=motion, direction=direction), **parts)
+        striker = sb.Striker(drive=sb.FixedStop(), gap=0.05 * LEVEL, side=side)
+        return sb.System(
+            model(3),
+            striker=striker,
+            base_excitation=sb.BaseExcitation(motion=motion, direction=direction),
+            **parts,
+        )
 
     once, mirrored = (
         sb.advance(system("below", "up"), periods=3),
@@ -90,15 +102,18 @@ def test_small_motions_follow_the_linear_response() -> None:
     """Gently shaken, the first mode rings at |H| = Omega^2 m_1/sqrt((1 - Omega^2)^2 + (2 zeta Omega)^2)."""
     beam, ratio, strength = model(8), 0.5, 1e-6
     system = sb.System(
-        beam, base=sb.Base(motion=sb.AccelerationSine(frequency_ratio=ratio, acceleration_amplitude=strength))
+        beam,
+        base_excitation=sb.BaseExcitation(
+            motion=sb.AccelerationSine(frequency_ratio=ratio, acceleration_amplitude=strength)
+        ),
     )
     run = sb.simulate(system, sb.Integration(cycles=400, accuracy="reference"))
     data = run.dataset.isel(time=run.dataset.cycle.values > 395)
-    swing = float(np.ptp(data.center_displacement.values)) / 2.0
+    swing = float(np.ptp(data.midspan_displacement.values)) / 2.0
     from snapbeam.model.world.base import rigid_mass
 
     omega = beam.omega
-    rows = (beam.linear_modes.T @ rigid_mass(beam)) * (beam.linear_modes.T @ beam.center_shape)
+    rows = (beam.linear_modes.T @ rigid_mass(beam)) * (beam.linear_modes.T @ beam.midspan_shape)
     at = ratio * omega[0]
     gain = np.abs(np.sum(rows / (omega**2 - at**2 + 2j * beam.damping_ratio * omega * at)))
     assert swing == pytest.approx(strength * omega[0] ** 2 * gain, rel=2e-3)
@@ -107,41 +122,51 @@ def test_small_motions_follow_the_linear_response() -> None:
 def test_never_decided_by_energy() -> None:
     """A shaken beam may cross at any time: nothing is final, and only a continuous response is certain early."""
     system = sb.System(
-        model(1), base=sb.Base(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3))
+        model(1),
+        base_excitation=sb.BaseExcitation(
+            motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3)
+        ),
     )
     early, whole = (
         sb.sweep(
             system,
-            {"base.acceleration_amplitude": np.linspace(0.05, 0.6, 24)},
-            sb.Integration(cycles=60, early_decision=decided),
+            {"base_excitation.acceleration_amplitude": np.linspace(0.05, 0.6, 24)},
+            sb.Integration(cycles=60, early_termination=decided),
         )
         for decided in (True, False)
     )
-    assert not early.end_is_final.any() and not whole.end_is_final.any()
-    np.testing.assert_array_equal(early.response, whole.response)
-    assert (early.decided_at.notnull() <= (early.response == int(sb.ResponseClass.CONTINUOUS))).all()
+    assert not early.final_well_proven.any() and not whole.final_well_proven.any()
+    np.testing.assert_array_equal(early.response_class, whole.response)
+    assert (
+        early.early_stop_time.notnull() <= (early.response_class == int(sb.ResponseClass.CONTINUOUS))
+    ).all()
     assert len(np.unique(whole.response)) > 1
 
 
 def test_refusals_and_the_way_there_and_back() -> None:
     motion = sb.AccelerationSine(frequency_ratio=1.0, acceleration_amplitude=0.2)
-    base = sb.Base(motion=motion)
-    striker = sb.Striker(drive=sb.Still(), gap=0.0)
+    base = sb.BaseExcitation(motion=motion)
+    striker = sb.Striker(drive=sb.FixedStop(), gap=0.0)
     with pytest.raises(InputError, match="a base needs a motion with a known bound"):
-        sb.Base(motion=sb.HalfSine(displacement_amplitude=0.1, duration=0.5))
+        sb.BaseExcitation(motion=sb.HalfSine(displacement_amplitude=0.1, duration=0.5))
     with pytest.raises(InputError, match="direction = 'left'"):
-        sb.Base(motion=motion, direction="left")
+        sb.BaseExcitation(motion=motion, direction="left")
     with pytest.raises(InputError, match="use a HertzContact"):
-        sb.System(model(1), sb.Restitution(0.5), striker, base=base)
+        sb.System(model(1), sb.Restitution(0.5), striker, base_excitation=base)
     plain = sb.ReducedModel.from_matrices(
-        [[1.0]], [-1.0], contact_shape=[1.0], tension_stiffness=1.0, equilibrium=[-1.0]
+        [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, equilibrium=[-1.0]
     )
     with pytest.raises(InputError, match="given by matrices is not known"):
-        sb.System(plain, base=base)
+        sb.System(plain, base_excitation=base)
     with pytest.raises(InputError, match="marched by the CPU engine alone"):
         resolve("cuda", around=True)
-    system = sb.System(model(2), paper.CONTACT, striker, base=base)
+    system = sb.System(model(2), paper.CONTACT, striker, base_excitation=base)
     assert sb.System.from_mapping(system.to_mapping()) == system
-    changed = system.replace(**{"base.acceleration_amplitude": 0.3, "base.direction": "down"})
-    assert changed.get("base.acceleration_amplitude") == 0.3 and changed.get("base.direction") == "down"
+    changed = system.replace(
+        **{"base_excitation.acceleration_amplitude": 0.3, "base_excitation.direction": "down"}
+    )
+    assert (
+        changed.get("base_excitation.acceleration_amplitude") == 0.3
+        and changed.get("base_excitation.direction") == "down"
+    )
     assert changed != system

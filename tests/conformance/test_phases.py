@@ -40,10 +40,10 @@ def system_of(names: tuple[str, ...], **phases: float) -> sb.System:
         parts |= {"contact": paper.CONTACT, "striker": sb.Striker(drive=drive, location=LOCATION)}
     if "base" in names:
         motion = sb.AccelerationSine(frequency_ratio=RATIO, acceleration_amplitude=HARDEST, phase=at["base"])
-        parts["base"] = sb.Base(motion=motion)
+        parts["base"] = sb.BaseExcitation(motion=motion)
     if "load" in names:
-        motion = sb.LoadSine(frequency_ratio=2.0 * RATIO, amplitude=load_amplitude(), phase=at["load"])
-        parts["axial"] = sb.AxialLoad(motion=motion)
+        motion = sb.HarmonicLoad(frequency_ratio=2.0 * RATIO, amplitude=load_amplitude(), phase=at["load"])
+        parts["axial"] = sb.AxialLoadModulation(motion=motion)
     return sb.System(MODEL, **parts)
 
 
@@ -100,15 +100,15 @@ def test_against_an_independent_solution(names) -> None:
         truth = solve(beam, tips, Around(base=base, load=load), times)[:, 1]
     else:
         own = {name: motion for name, motion in (("base", base), ("load", load)) if name in names}
-        truth = live(PaperBeam(2), Surroundings(**own), times).center_displacement
+        truth = live(PaperBeam(2), Surroundings(**own), times).midspan_displacement
     every = flow.march(flow.coordinates(), PERIODS, every=True).every[0] * flow.scales
-    found = every[:, :2] @ MODEL.center_shape / MODEL.length_scale
+    found = every[:, :2] @ MODEL.midspan_shape / MODEL.length_scale
     np.testing.assert_allclose(found, truth[40::40], rtol=0.0, atol=2e-6)
 
 
 def test_sections_orbits_and_diagrams_begin_at_the_phase() -> None:
     """Of a base alone: a section, the states on an orbit, and phases that differ between the runs."""
-    system = system_of(("base",)).replace(**{"base.acceleration_amplitude": 0.02})
+    system = system_of(("base",)).replace(**{"base_excitation.acceleration_amplitude": 0.02})
     exact = sb.Integration(accuracy="reference")
     flow = Stroboscope(system, exact)
     section = sb.poincare(system, periods=PERIODS, transient=0, integration=exact)
@@ -124,16 +124,16 @@ def test_sections_orbits_and_diagrams_begin_at_the_phase() -> None:
 
     phases = np.array([0.0, 0.7, 0.5 * math.pi])
     rows = np.repeat(flow.coordinates(), 3, axis=0)
-    found = flow.march(rows, PERIODS, points={"base.phase": phases}).states
+    found = flow.march(rows, PERIODS, points={"base_excitation.phase": phases}).states
     for phase, row in zip(phases, found, strict=True):
-        one = flow.neighbour("base.phase", float(phase))
+        one = flow.neighbour("base_excitation.phase", float(phase))
         np.testing.assert_allclose(one.march(one.coordinates(), PERIODS).states[0], row, atol=1e-12)
     assert np.abs(np.diff(found, axis=0)).max(axis=1).min() > 1e-3
 
 
 def test_the_phase_of_a_start_counts() -> None:
     start = sb.State(amplitude=0.9 * MODEL.mirrored.equilibrium, phase=0.4)
-    system = system_of(("base",)).replace(start=start)
+    system = system_of(("base",)).replace(initial_state=start)
     flow = Stroboscope(system)
     found = flow.march(flow.coordinates(), PERIODS, every=True).every[0]
     np.testing.assert_allclose(found, advanced(system, flow), atol=1e-12)

@@ -85,8 +85,8 @@ def test_coverage() -> None:
 def test_early_termination_and_snap_through_occur() -> None:
     """The recorded ensembles contain runs that ended early, and crossings, impacts and their absence."""
     table, names = corpus().tables["ensembles"], corpus().variables["ensembles"]
-    crossings, impacts = (table[names.index(f"statistic.{name}")] for name in ("crossings", "impacts"))
-    ended_early = ~np.isnan(table[names.index("record.decided_at")].view(np.float64))
+    crossings, impacts = (table[names.index(f"statistic.{name}")] for name in ("zero_crossings", "impacts"))
+    ended_early = ~np.isnan(table[names.index("record.early_stop_time")].view(np.float64))
     assert 100 < ended_early.sum() < ended_early.size / 2
     assert 0.1 < (crossings > 0).mean() < 0.95
     assert (impacts > 0).mean() > 0.5

@@ -15,13 +15,13 @@ from bouncing import Bouncer
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.plan import plan_steps
+from snapbeam.engines.plan import choose_base_step
 
 FINER = 16.0
 """Steps of level "reference" over those of the run that is taken for the truth."""
 
 
-class Kept(NamedTuple):
+class KernelOutput(NamedTuple):
     """What came of one request."""
 
     tolerance: float
@@ -32,7 +32,7 @@ class Kept(NamedTuple):
     words: str
 
 
-def request_of(rng: np.random.Generator) -> Kept:
+def request_of(rng: np.random.Generator) -> KernelOutput:
     """One request, kept or not."""
     tolerance = float(10.0 ** rng.uniform(-9.0, -2.0))
     ratio, velocity = float(rng.uniform(0.1, 4.0)), float(rng.uniform(0.02, 0.65))
@@ -44,37 +44,39 @@ def request_of(rng: np.random.Generator) -> Kept:
     model = sb.ReducedModel.from_beam(paper.BEAM, modes, damping_ratio=0.005)
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, location=location)
     system = sb.System(model, contact=contact, striker=shaker)
-    end = cycles / (ratio * model.reference_freq)
+    end = cycles / (ratio * model.reference_frequency)
     times = np.linspace(0.0, end, 200 * cycles + 1)[1:] * (1.0 - 1e-12)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # not reached: the accuracy says so, and up to where
         run = sb.simulate(system, sb.Integration(cycles=cycles, tolerance=tolerance), sample_times=times)
-    found = np.stack((run.dataset.displacement.values, run.dataset.center_displacement.values), axis=1)
+    found = np.stack(
+        (run.dataset.displacement_at_striker.values, run.dataset.midspan_displacement.values), axis=1
+    )
     if newton:
         truth = Bouncer(ratio, velocity, coefficient, location).run(times).displacement[:, None]
         found = found[:, :1]
     else:
         whole = sb.Integration(cycles=cycles, accuracy="reference")
-        step = plan_steps(model, contact, accuracy="reference").step / FINER
+        step = choose_base_step(model, contact, accuracy="reference").step / FINER
         finest = sb.simulate(system, whole.replace(step=step), sample_times=times).dataset
-        truth = np.stack((finest.displacement.values, finest.center_displacement.values), axis=1)
+        truth = np.stack((finest.displacement.values, finest.midspan_displacement.values), axis=1)
     assert run.accuracy is not None
-    promised = times <= run.accuracy.horizon
+    promised = times <= run.accuracy.predictability_horizon
     error = float(np.abs(found - truth)[promised].max()) if promised.any() else 0.0
     law = f"e {coefficient:.2f}" if newton else f"{modes} modes"
     words = f"{law}, Omega {ratio:.3f}, V {velocity:.3f}, x {location:.3f}, {cycles} cycles"
-    return Kept(tolerance, run.accuracy.estimated_error, error, run.accuracy.reached, words)
+    return KernelOutput(tolerance, run.accuracy.estimated_error, error, run.accuracy.reached, words)
 
 
-def judge(kept: list[Kept]) -> None:
+def judge(kernel_output: list[KernelOutput]) -> None:
     """No request broken, and the estimate a bound; the figures are printed."""
-    broken = [each for each in kept if each.error > each.tolerance]
-    below = [each for each in kept if each.error > each.estimate + 1e-13]
-    print(f"{len(broken)} of {len(kept)} broken: {broken}")
+    broken = [each for each in kernel_output if each.error > each.tolerance]
+    below = [each for each in kernel_output if each.error > each.estimate + 1e-13]
+    print(f"{len(broken)} of {len(kernel_output)} broken: {broken}")
     print(f"{len(below)} estimates below the error: {below}")
-    print(f"not reached: {sum(not each.reached for each in kept)}")
+    print(f"not reached: {sum(not each.reached for each in kernel_output)}")
     assert not broken
-    assert len(below) <= 0.05 * len(kept)
+    assert len(below) <= 0.05 * len(kernel_output)
 
 
 def test_some_requests() -> None:

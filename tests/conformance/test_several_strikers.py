@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 from oracle import CONTACT_STIFFNESS, LEVEL, PaperBeam
-from several_oracle import Tip, strike
+from several_oracle import Tip, apply_impact_law
 
 import snapbeam as sb
 from snapbeam import paper
@@ -22,7 +22,7 @@ def model(modes: int) -> sb.ReducedModel:
 
 
 def stop(location: float = 0.3, side: str = "above", gap: float = GAP) -> sb.Striker:
-    return sb.Striker(drive=sb.Still(), location=location, side=side, gap=gap)
+    return sb.Striker(drive=sb.FixedStop(), location=location, side=side, gap=gap)
 
 
 def sine(modes: int, ratio: float, amplitude: float):
@@ -64,19 +64,21 @@ def test_against_an_independent_solution(case: str, modes: int, cycles: int) -> 
         laws.append(power)
     first = float(PaperBeam(modes).omega[0])
     times = np.linspace(0.0, cycles * 2.0 * math.pi / (1.21 * first), 401) * (1.0 - 1e-13)
-    truth = strike(PaperBeam(modes), tips, times)
+    truth = apply_impact_law(PaperBeam(modes), tips, times)
     system = sb.System(model(modes), laws, strikers)
     for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         data = run.dataset
         np.testing.assert_allclose(data.displacement, truth.displacement, rtol=0.0, atol=bound)
-        np.testing.assert_allclose(data.center_displacement, truth.center_displacement, rtol=0.0, atol=bound)
-        np.testing.assert_allclose(data.striker_displacement, truth.tip, rtol=0.0, atol=bound)
+        np.testing.assert_allclose(
+            data.midspan_displacement, truth.midspan_displacement, rtol=0.0, atol=bound
+        )
+        np.testing.assert_allclose(data.striker_displacements, truth.tip, rtol=0.0, atol=bound)
         assert abs(data.attrs["energy_error"]) < 1e-4
     size = float(truth.force.max())
-    np.testing.assert_allclose(data.striker_force, truth.force, rtol=0.0, atol=1e-3 * size)
+    np.testing.assert_allclose(data.striker_forces, truth.force, rtol=0.0, atol=1e-3 * size)
     np.testing.assert_allclose(
-        data.work_shaker, truth.work, rtol=0.0, atol=1e-5 * float(np.abs(truth.work).max())
+        data.striker_work, truth.work, rtol=0.0, atol=1e-5 * float(np.abs(truth.work).max())
     )
     hit = set(run.impacts.striker.values.astype(int).tolist())
     assert hit == {j + 1 for j in range(len(tips)) if truth.force[:, j].max() > 0.0}
@@ -89,21 +91,21 @@ def test_one_of_two_out_of_reach_is_none(early: bool) -> None:
     one = sb.System(model(3), paper.CONTACT, FIRST)
     two = sb.System(model(3), paper.CONTACT, [FIRST, stop(gap=20.0 * LEVEL)])
     how = sb.Integration(cycles=20)
-    alone, beside = sb.simulate(one, how), sb.simulate(two, how.replace(early_decision=early))
+    alone, beside = sb.simulate(one, how), sb.simulate(two, how.replace(early_termination=early))
     for name in alone.dataset.data_vars:
         np.testing.assert_array_equal(beside.dataset[name], alone.dataset[name], err_msg=name)
     for name in (
         "impacts",
-        "crossings",
+        "zero_crossings",
         "peak_force",
-        "shaker_work",
+        "striker_work",
         "impulse",
-        "contact_share",
+        "contact_time_fraction",
         "max_displacement",
     ):
-        assert getattr(beside.outcome, name) == getattr(alone.outcome, name), name
-    assert not beside.outcome.end_is_final
-    assert np.isnan(beside.outcome.decided_at)
+        assert getattr(beside.summary, name) == getattr(alone.summary, name), name
+    assert not beside.summary.final_well_proven
+    assert np.isnan(beside.summary.early_stop_time)
 
 
 def test_mirrored() -> None:
@@ -112,17 +114,17 @@ def test_mirrored() -> None:
     above = below.replace(**{"striker.side": "above", "striker_2.side": "below"})
     how = sb.Integration(cycles=5)
     one, other = sb.simulate(below, how), sb.simulate(above, how)
-    assert one.outcome.impacts > 5
-    np.testing.assert_array_equal(one.dataset.displacement, -other.dataset.displacement)
-    np.testing.assert_array_equal(one.dataset.striker_displacement, -other.dataset.striker_displacement)
-    np.testing.assert_array_equal(one.dataset.striker_force, other.dataset.striker_force)
+    assert one.summary.impacts > 5
+    np.testing.assert_array_equal(one.dataset.displacement_at_striker, -other.dataset.displacement_at_striker)
+    np.testing.assert_array_equal(one.dataset.striker_displacements, -other.dataset.striker_displacements)
+    np.testing.assert_array_equal(one.dataset.striker_forces, other.dataset.striker_forces)
     for name in (
         "peak_force_striker_1",
         "peak_force_striker_2",
         "shaker_work_striker_1",
         "impulse_striker_2",
     ):
-        assert one.outcome[name] == other.outcome[name]
+        assert one.summary[name] == other.summary[name]
 
 
 @pytest.mark.slow
@@ -133,10 +135,12 @@ def test_two_of_half_the_stiffness_are_one() -> None:
     one = sb.System(model(3), paper.CONTACT, [FIRST, stop()])
     tip = sb.Striker(drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.12), gap=0.0)
     two = sb.System(model(3), [half, half, paper.CONTACT], [FIRST, tip, stop()])
-    times = np.linspace(0.0, 2.0, 301) / (1.21 * model(3).reference_freq) * (1.0 - 1e-12)
+    times = np.linspace(0.0, 2.0, 301) / (1.21 * model(3).reference_frequency) * (1.0 - 1e-12)
     found, expected = sb.simulate(two, how, sample_times=times), sb.simulate(one, how, sample_times=times)
-    np.testing.assert_allclose(found.dataset.displacement, expected.dataset.displacement, rtol=0.0, atol=1e-7)
-    force = found.dataset.striker_force
+    np.testing.assert_allclose(
+        found.dataset.displacement_at_striker, expected.dataset.displacement_at_striker, rtol=0.0, atol=1e-7
+    )
+    force = found.dataset.striker_forces
     size = float(expected.dataset.contact_force.max())
     np.testing.assert_allclose(force[:, 0], force[:, 1], rtol=0.0, atol=1e-4 * size)
     np.testing.assert_allclose(
@@ -148,14 +152,14 @@ def test_two_of_half_the_stiffness_are_one() -> None:
 def test_order() -> None:
     """Half the step, impacts of both on the way: order 3.8 measured; a finer one is as good as the reference."""
     system = sb.System(model(1), paper.CONTACT, [FIRST, stop()])
-    times = np.linspace(0.0, 2.0, 101) / (1.21 * model(1).reference_freq) * (1.0 - 1e-12)
+    times = np.linspace(0.0, 2.0, 101) / (1.21 * model(1).reference_frequency) * (1.0 - 1e-12)
     exact = sb.simulate(
         system, sb.Integration(cycles=2, accuracy="reference"), sample_times=times
-    ).dataset.displacement
+    ).dataset.displacement_at_striker
     errors = []
     for step in (1e-4, 5e-5):
         run = sb.simulate(system, sb.Integration(cycles=2, step=step), sample_times=times)
-        errors.append(float(np.abs(run.dataset.displacement - exact).max()))
+        errors.append(float(np.abs(run.dataset.displacement_at_striker - exact).max()))
     assert math.log2(errors[0] / errors[1]) > 3.3, errors
 
 
@@ -163,19 +167,21 @@ def test_swept_by_dotted_names(tmp_path) -> None:
     """A map over the place and the gap of the second striker has the runs of its points; its store is read again."""
     system = sb.System(model(3), paper.CONTACT, [FIRST, stop()])
     axes = {"striker_2.location": [0.3, 0.6], "striker_2.gap": [0.1 * LEVEL, 0.3 * LEVEL]}
-    swept = sb.sweep(system, axes, sb.Integration(cycles=5), store=sb.Keeping(tmp_path / "store"))
-    read = sb.read_store(tmp_path / "store")
-    for name in ("response", "impacts_striker_1", "peak_force_striker_2"):
+    swept = sb.sweep(
+        system, axes, sb.Integration(cycles=5), checkpoint=sb.CheckpointOptions(tmp_path / "store")
+    )
+    read = sb.read_checkpoint(tmp_path / "store")
+    for name in ("response_class", "impacts_striker_1", "peak_force_striker_2"):
         np.testing.assert_array_equal(read[name].transpose(*swept[name].dims), swept[name], err_msg=name)
     assert swept.sizes["location_striker_2"] == 2
     for i, location in enumerate(axes["striker_2.location"]):
         for j, gap in enumerate(axes["striker_2.gap"]):
             own = system.replace(**{"striker_2.location": location, "striker_2.gap": gap})
-            alone = sb.simulate(own, sb.Integration(cycles=5)).outcome
+            alone = sb.simulate(own, sb.Integration(cycles=5)).summary
             there = swept.isel(location_striker_2=i, striker_gap_striker_2=j)
             assert int(there.impacts) == alone.impacts
             assert float(there.peak_force) == pytest.approx(alone.peak_force, rel=1e-12)
-            for name in ("impacts", "peak_force", "impulse", "shaker_work"):
+            for name in ("impacts", "peak_force", "impulse", "striker_work"):
                 for number in (1, 2):
                     each = f"{name}_striker_{number}"
                     assert there[each].item() == pytest.approx(alone[each], rel=1e-12), each
@@ -187,7 +193,7 @@ def test_statistics_of_each(tmp_path) -> None:
     """Against the list of impacts and the samples of the run; together they are the whole; one striker has none."""
     system = sb.System(model(3), paper.CONTACT, [FIRST, stop()])
     run = sb.simulate(system, sb.Integration(cycles=5))
-    found, listed = run.outcome, run.impacts
+    found, listed = run.summary, run.impacts
     assert found.impacts_striker_1 > 0 and found.impacts_striker_2 > 0
     for number in (1, 2):
         own = listed.isel(impact=listed.striker.values == number)
@@ -195,13 +201,13 @@ def test_statistics_of_each(tmp_path) -> None:
         assert found[f"peak_force_striker_{number}"] == pytest.approx(float(own.peak_force.max()), rel=1e-12)
         assert found[f"impulse_striker_{number}"] == pytest.approx(float(own.impulse.sum()), rel=1e-9)
     run.save(tmp_path / "run.nc")
-    assert dict(sb.load_run(tmp_path / "run.nc").outcome) == pytest.approx(dict(found), nan_ok=True)
+    assert dict(sb.load(tmp_path / "run.nc").summary) == pytest.approx(dict(found), nan_ok=True)
     assert found.peak_force == max(found.peak_force_striker_1, found.peak_force_striker_2)
     assert found.shaker_work_striker_2 == 0.0  # a stop that stands still does none
-    assert found.shaker_work_striker_1 == pytest.approx(found.shaker_work, rel=1e-12)
+    assert found.shaker_work_striker_1 == pytest.approx(found.striker_work, rel=1e-12)
     assert not any(
         "_striker_" in name
-        for name in sb.simulate(sb.System(model(3), paper.CONTACT, FIRST), sb.Integration(cycles=2)).outcome
+        for name in sb.simulate(sb.System(model(3), paper.CONTACT, FIRST), sb.Integration(cycles=2)).summary
     )
 
 
@@ -213,15 +219,15 @@ def test_work_of_each() -> None:
     )
     system = sb.System(model(1), paper.CONTACT, [FIRST, second])
     length = model(1).length_scale
-    end = 3.0 / (1.21 * model(1).reference_freq)
+    end = 3.0 / (1.21 * model(1).reference_frequency)
     times = np.linspace(0.0, end, 60_001) * (1.0 - 1e-13)
     run = sb.simulate(system, sb.Integration(cycles=3), sample_times=times)
-    force = run.dataset.striker_force.values
+    force = run.dataset.striker_forces.values
     for j, push in enumerate((1.0, -1.0)):
-        motion = push * length * run.dataset.striker_displacement.values[:, j]
+        motion = push * length * run.dataset.striker_displacements.values[:, j]
         work = float(np.sum(0.5 * (force[1:, j] + force[:-1, j]) * np.diff(motion)))
         assert abs(work) > 0.0
-        assert run.outcome[f"shaker_work_striker_{j + 1}"] == pytest.approx(work, rel=2e-3)
+        assert run.summary[f"shaker_work_striker_{j + 1}"] == pytest.approx(work, rel=2e-3)
 
 
 def test_refusals() -> None:

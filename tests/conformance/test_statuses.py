@@ -12,18 +12,18 @@ from snapbeam.model.state import State
 NOT_GIVEN = (
     "min_displacement",
     "max_displacement",
-    "min_center_displacement",
-    "max_center_displacement",
+    "min_midspan_displacement",
+    "max_midspan_displacement",
     "peak_force",
-    "contact_share",
-    "decided_at",
+    "contact_time_fraction",
+    "early_stop_time",
 )
 
 
 def assert_unknown(statistics, at: int, status: RunStatus) -> None:
     assert statistics["status"][at] == status
-    assert statistics["response"][at] == ResponseClass.UNKNOWN
-    assert not statistics["end_is_final"][at]
+    assert statistics["response_class"][at] == ResponseClass.UNKNOWN
+    assert not statistics["final_well_proven"][at]
     for name in NOT_GIVEN:
         assert np.isnan(statistics[name][at]), name
     assert len(RunStatus(status).advice) > 20
@@ -35,8 +35,10 @@ def test_step_limit(march, model_of) -> None:
     free = march(model, frequency_ratio=slow_and_fast, velocity_amplitude=0.1, cycles=4)
     bound = march(model, frequency_ratio=slow_and_fast, velocity_amplitude=0.1, cycles=4, max_steps=1500)
     assert_unknown(bound.statistics, 0, RunStatus.STEP_LIMIT)
-    for name in free.books.dtype.names:
-        np.testing.assert_array_equal(bound.books[name][1], free.books[name][1], err_msg=name)
+    for name in free.accumulators_of_runs.dtype.names:
+        np.testing.assert_array_equal(
+            bound.accumulators_of_runs[name][1], free.accumulators_of_runs[name][1], err_msg=name
+        )
     assert (free.statistics["status"] == RunStatus.OK).all()
 
 
@@ -46,9 +48,9 @@ def test_not_finite(march, model_of, modes) -> None:
     model = model_of(modes)
     start = State(amplitude=np.full(modes, 1e200), velocity=np.zeros(modes))
     lost = march(model, None, cycles=2, start=start)
-    assert_unknown(lost.statistics, 0, RunStatus.NOT_FINITE)
+    assert_unknown(lost.statistics, 0, RunStatus.DIVERGED)
     again = march(model, frequency_ratio=1.21, velocity_amplitude=[0.1, 0.2], cycles=2, start=start)
-    assert_unknown(again.statistics, 1, RunStatus.NOT_FINITE)
+    assert_unknown(again.statistics, 1, RunStatus.DIVERGED)
 
 
 def test_a_run_too_long_for_its_ticks_is_not_called_finished(march, model_of) -> None:

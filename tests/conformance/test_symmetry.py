@@ -11,7 +11,7 @@ from snapbeam.model.state import State
 
 MIRRORED = {
     "min_displacement": "max_displacement",
-    "min_center_displacement": "max_center_displacement",
+    "min_midspan_displacement": "max_midspan_displacement",
     "final_well": "final_well",
 }
 
@@ -23,7 +23,7 @@ def assert_mirrored(below, above) -> None:
         other = MIRRORED.get(name) or {v: k for k, v in MIRRORED.items()}.get(name)
         expected = values if other is None else -first[other]
         np.testing.assert_array_equal(second[name], expected, err_msg=name)
-    assert (first["crossings"] > 0).any()
+    assert (first["zero_crossings"] > 0).any()
 
 
 @pytest.mark.parametrize(("modes", "runs", "cycles"), [(1, 40, 20), (2, 20, 10), (8, 12, 6), (32, 8, 5)])
@@ -51,10 +51,10 @@ def test_every_law_and_drive_from_the_other_side(march, model_of, draw, kind) ->
 def test_negated_start(march, model_of, draw, modes) -> None:
     model, given = model_of(modes), draw(6, 7)
     rng = np.random.default_rng(modes)
-    alpha = model.equilibrium + 0.02 * np.abs(model.equilibrium[0]) * rng.standard_normal(modes) / np.arange(
-        1, modes + 1
-    )
-    velocity = model.linear_modes[:, 0] * np.sqrt(1.5 * (model.barrier_energy - model.well_energy))
+    alpha = model.well_amplitude + 0.02 * np.abs(model.well_amplitude[0]) * rng.standard_normal(
+        modes
+    ) / np.arange(1, modes + 1)
+    velocity = model.linear_modes[:, 0] * np.sqrt(1.5 * (model.saddle_energy - model.well_energy))
     below = march(model, **given, cycles=4, start=State(amplitude=alpha, velocity=velocity))
     above = march(model, **given, cycles=4, start=State(amplitude=-alpha, velocity=-velocity), side="above")
     assert_mirrored(below, above)

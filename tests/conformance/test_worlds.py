@@ -24,8 +24,8 @@ HERE = Path(__file__).parent
 MIRRORED = {
     "min_displacement": "max_displacement",
     "max_displacement": "min_displacement",
-    "min_center_displacement": "max_center_displacement",
-    "max_center_displacement": "min_center_displacement",
+    "min_midspan_displacement": "max_midspan_displacement",
+    "max_midspan_displacement": "min_midspan_displacement",
 }
 EVERY = [
     pytest.param(name, marks=pytest.mark.slow if world.own_kernel else ()) for name, world in WORLDS.items()
@@ -47,7 +47,7 @@ def test_none_is_missing() -> None:
     there |= {("contact", type(each.contact).name) for each in systems}
     there |= {("harvester", type(each.harvester).name) for each in systems if each.harvester is not None}
     there |= {("drive", type(each.striker.drive).name) for each in systems}
-    shaking = [name for name, kind in DRIVES.items() if kind.shakes() and name != "still"]
+    shaking = [name for name, kind in DRIVES.items() if kind.can_excite_base() and name != "still"]
     known = {"contact": LAWS, "drive": DRIVES, "base": shaking, "axial": LOADS, "harvester": HARVESTERS}
     for section, names in known.items():
         missing = {name for name in names if (section, name) not in there}
@@ -68,7 +68,7 @@ def test_mirror_image(name) -> None:
         wanted = -other if key in MIRRORED or key == "final_well" else other
         np.testing.assert_array_equal(above[key].values, wanted, err_msg=key)
     assert (below.status == RunStatus.OK).all()
-    assert float(np.ptp(below.max_center_displacement.values)) > 0.0
+    assert float(np.ptp(below.max_midspan_displacement.values)) > 0.0
 
 
 def killed(*names: str, only: str = "") -> None:
@@ -82,7 +82,7 @@ def killed(*names: str, only: str = "") -> None:
 
 def test_swept_killed_and_resumed() -> None:
     """A few parameters of the paper's world, of structures and of runs."""
-    killed("the paper's", only="beam.thickness,model.modes,contact.stiffness,striker.side,run.cycles")
+    killed("the paper's", only="beam.thickness,model.modes,contact.stiffness,striker.side,integration.cycles")
 
 
 @pytest.mark.slow
@@ -104,7 +104,7 @@ def test_never_decided_wrongly(name, modes) -> None:
     decided, wrong = early_decisions(name, modes, 4000)
     print(f"{name}, N = {modes}: {decided} of 4000 decided early, {wrong} wrongly")
     assert wrong == 0
-    if not world.system(world.fewest).has_surroundings:
+    if not world.system(world.fewest).has_environment:
         assert decided > 40
 
 
@@ -112,11 +112,11 @@ def early_decisions(name: str, modes: int, count: int) -> tuple[int, int]:
     """How many of *count* random runs were decided early, and how many of those have another class than whole."""
     modes = 1 if WORLDS[name].modes == 1 else max(modes, WORLDS[name].fewest)
     early, whole = (
-        swept(name, count, 7, modes=modes, cycles=WORLDS[name].cycles, early_decision=flag)
+        swept(name, count, 7, modes=modes, cycles=WORLDS[name].cycles, early_termination=flag)
         for flag in (True, False)
     )
-    decided = early.status.values == RunStatus.DECIDED
-    wrong = early.response.values != whole.response.values
+    decided = early.status.values == RunStatus.EARLY_STOP
+    wrong = early.response_class.values != whole.response.values
     # what is said to be final is where the whole run ends
-    wrong |= early.end_is_final.values & (early.final_well.values != whole.final_well.values)
+    wrong |= early.final_well_proven.values & (early.final_well.values != whole.final_well.values)
     return int(decided.sum()), int(wrong.sum())

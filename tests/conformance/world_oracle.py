@@ -44,7 +44,7 @@ class Followed:
     """What was found at the times asked for, displacements over b."""
 
     displacement: Array
-    center_displacement: Array
+    midspan_displacement: Array
     penetration: Array
     own: Array
     """State of the body, shape (times, numbers)."""
@@ -134,11 +134,11 @@ def _above(pair: tuple[float, float]) -> tuple[float, float]:
 
 def differences(data: Any, truth: Followed) -> dict[str, float]:
     """Greatest differences of a run's dataset, over b, by name."""
-    names = ("displacement", "center_displacement", "penetration")
+    names = ("displacement", "midspan_displacement", "penetration")
     return {name: float(np.abs(data[name].values - getattr(truth, name)).max()) for name in names}
 
 
 def missing(data: Any) -> float:
     """What the ledger of a run with one striker misses at its worst, over the gross work."""
-    ledger = data.energy_beam + data.energy_contact + data.energy_dissipated - data.work_shaker
+    ledger = data.energy_beam + data.energy_contact + data.energy_dissipated - data.striker_work
     return float(np.ptp(ledger.values)) / float(data.attrs["gross_work"])

@@ -16,7 +16,10 @@ from snapbeam import paper
 
 SINE = {"drive.frequency_ratio": (0.3, 3.5), "drive.velocity_amplitude": (0.02, 0.6)}
 PLACE = {"striker.location": (0.15, 0.85)}
-SHAKEN = {"base.frequency_ratio": (0.4, 2.0), "base.acceleration_amplitude": (0.05, 0.6)}
+SHAKEN = {
+    "base_excitation.frequency_ratio": (0.4, 2.0),
+    "base_excitation.acceleration_amplitude": (0.05, 0.6),
+}
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class World:
     """Modes that it needs."""
     cycles: int = 60
     """How long its runs may be."""
-    reference_freq: float | None = None
+    reference_frequency: float | None = None
     own_kernel: bool = True
     """Whether no other quick test has a use for its kernel of many runs, which takes ten seconds to compile."""
     decides: bool = True
@@ -42,8 +45,8 @@ class World:
         model = sb.ReducedModel.from_beam(
             self.beam, modes=self.modes if modes is None else modes, imperfection=self.imperfection
         )
-        if self.reference_freq is not None:
-            model = dataclasses.replace(model, given_reference_freq=self.reference_freq)
+        if self.reference_frequency is not None:
+            model = dataclasses.replace(model, given_reference_frequency=self.reference_frequency)
         return sb.System(model, **self.parts(model))  # type: ignore[arg-type]
 
     def points(self, count: int, seed: int) -> dict[str, NDArray[np.float64]]:
@@ -53,7 +56,7 @@ class World:
 
 def mirror_image(system: sb.System) -> sb.System:
     """Upside down: striker, wells, base and records."""
-    model, striker, base = system.model, system.striker, system.base
+    model, striker, base = system.model, system.striker, system.base_excitation
     others = tuple(
         dataclasses.replace(
             each,
@@ -61,7 +64,7 @@ def mirror_image(system: sb.System) -> sb.System:
                 each.striker, side="above" if each.striker.side == "below" else "below"
             ),
         )
-        for each in system.others
+        for each in system.further_contacts
     )
     if model.imperfection is not None:
         assert model.beam is not None
@@ -70,13 +73,13 @@ def mirror_image(system: sb.System) -> sb.System:
         )
     if striker is not None:
         drive = striker.drive
-        if isinstance(drive, sb.Recorded):
+        if isinstance(drive, sb.RecordedMotion):
             drive = dataclasses.replace(drive, displacement=-drive.displacement, velocity=-drive.velocity)
         side = "above" if striker.side == "below" else "below"
         striker = dataclasses.replace(striker, side=side, drive=drive)
     if base is not None:
         base = dataclasses.replace(base, direction="down" if base.direction == "up" else "up")
-    more = {"base": base, "axial": system.axial, "harvester": system.harvester, "others": others}
+    more = {"base": base, "axial": system.axial_load, "harvester": system.harvester, "others": others}
     return sb.System(model, system.contact, striker, **more)  # type: ignore[arg-type]
 
 
@@ -90,13 +93,17 @@ def sine(velocity: float = 0.2) -> sb.Sine:
 
 def on_a_base(motion: sb.Drive, **more: object):
     """A stop beside a beam that is shaken."""
-    stop = sb.Striker(drive=sb.Still(), gap=0.05 * LEVEL)
-    return lambda model: {"contact": paper.CONTACT, "striker": stop, "base": sb.Base(motion=motion, **more)}
+    stop = sb.Striker(drive=sb.FixedStop(), gap=0.05 * LEVEL)
+    return lambda model: {
+        "contact": paper.CONTACT,
+        "striker": stop,
+        "base": sb.BaseExcitation(motion=motion, **more),
+    }
 
 
 def record(model: sb.ReducedModel) -> dict[str, object]:
     """A tip that starts up over three cycles, with a second harmonic."""
-    frequency, rate = 1.3 * model.reference_freq, 40_000.0
+    frequency, rate = 1.3 * model.reference_frequency, 40_000.0
     t = np.arange(0.0, 12.0 / frequency, 1.0 / rate)
     omega, amplitude = 2.0 * math.pi * frequency, 0.25 * LEVEL / 1.3
     x = np.minimum(t * frequency / 3.0, 1.0)
@@ -105,10 +112,10 @@ def record(model: sb.ReducedModel) -> dict[str, object]:
         np.sin(omega * t) + 0.2 * np.sin(2.0 * omega * t),
         np.cos(omega * t) + 0.4 * np.cos(2.0 * omega * t),
     )
-    drive = sb.Recorded(
+    drive = sb.RecordedMotion(
         displacement=amplitude * e * s,
         velocity=amplitude * (slope * s + e * omega * c),
-        sampling_freq=rate,
+        sampling_frequency=rate,
         frequency=frequency,
     )
     return {"contact": paper.CONTACT, "striker": sb.Striker(drive=drive)}
@@ -118,7 +125,7 @@ def loaded(motion: sb.LoadMotion):
     return lambda model: {
         "contact": paper.CONTACT,
         "striker": sb.Striker(drive=sine()),
-        "axial": sb.AxialLoad(motion=motion),
+        "axial": sb.AxialLoadModulation(motion=motion),
     }
 
 
@@ -130,19 +137,37 @@ def harvested(harvester: sb.Harvester):
     }
 
 
-BURST = sb.Burst(frequency_ratio=1.21, velocity_amplitude=0.25, length=4.0, rise=1.0, fall=0.5, retreat=0.3)
-CHIRP = sb.Chirp(start_ratio=0.8, stop_ratio=2.0, velocity_amplitude=0.25, sweep_length=8.0)
-NOISE = sb.Noise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2, seed=3, rise=1.0)
-TWO = sb.TwoSines(frequency_ratio=1.2, velocity_amplitude=0.2, second_ratio=2.4, second_amplitude=0.1)
-SPRUNG = paper.BEAM.replace(ends=sb.Ends(left=40.0, right=5.0, axial=2e7))
-PIEZO = sb.Piezo(coupling=4e-3, capacitance=60e-9, resistance=2e4, start=0.0, stop=0.25)
+BURST = sb.Burst(
+    frequency_ratio=1.21,
+    velocity_amplitude=0.25,
+    duration_cycles=4.0,
+    ramp_up_cycles=1.0,
+    ramp_down_cycles=0.5,
+    retraction=0.3,
+)
+CHIRP = sb.Chirp(start_ratio=0.8, stop_ratio=2.0, velocity_amplitude=0.25, sweep_cycles=8.0)
+NOISE = sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2, seed=3, ramp_up_cycles=1.0)
+TWO = sb.TwoTone(frequency_ratio=1.2, velocity_amplitude=0.2, second_ratio=2.4, second_amplitude=0.1)
+SPRUNG = paper.BEAM.replace(
+    boundary=sb.BoundaryConditions(
+        left_rotational_stiffness=40.0, right_rotational_stiffness=5.0, axial_support_stiffness=2e7
+    )
+)
+PIEZO = sb.PiezoelectricHarvester(
+    moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_start=0.0, patch_end=0.25
+)
 UNEVEN = sb.Imperfection(
-    rise=4e-6, skew=3e-6, point_load=0.01, point_location=0.4, uniform_load=0.02, gravity=0.01
+    midspan_amplitude=4e-6,
+    antisymmetric_amplitude=3e-6,
+    point_load=0.01,
+    point_location=0.4,
+    uniform_load=0.02,
+    gravity=0.01,
 )
 MEASURED = sb.Imperfection(
     profile=np.array([[0.0, 0.2, 0.5, 0.7, 1.0], [0.0, 3e-6, 6e-6, 4e-6, 0.0]]),
-    rise=2e-6,
-    form="sine",
+    midspan_amplitude=2e-6,
+    shape="sine",
 )
 
 WORLDS: dict[str, World] = {
@@ -167,7 +192,7 @@ WORLDS: dict[str, World] = {
     ),
     "burst": World(
         struck(BURST),
-        {"drive.frequency_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.1, 0.8), "drive.length": (2.0, 12.0)},
+        {"drive.frequency_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.1, 0.8), "drive.duration_cycles": (2.0, 12.0)},
     ),
     "chirp": World(
         struck(CHIRP),
@@ -184,16 +209,16 @@ WORLDS: dict[str, World] = {
     "noise": World(
         struck(NOISE), {"drive.velocity_rms": (0.02, 0.4), "drive.low_ratio": (0.2, 1.0)}
     ),
-    "two_sines": World(
+    "two_tone": World(
         struck(TWO), SINE | {"drive.second_amplitude": (0.0, 0.3), "drive.second_phase": (-3.0, 3.0)}
     ),
     "recorded": World(record, PLACE, cycles=11, own_kernel=False),
-    "still": World(struck(sb.Still(), gap=-1e-4), {"striker.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
+    "still": World(struck(sb.FixedStop(), gap=-1e-4), {"striker.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
     "a body": World(
         struck(sine(), mass=0.02, spring=700.0, damper=0.7), SINE | PLACE, own_kernel=False, decides=False
     ),
     "a sphere": World(
-        struck(sb.Flight(speed=0.4), mass=2e-3, gap=5e-5), {"drive.speed": (0.1, 2.0)} | PLACE, decides=False
+        struck(sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=5e-5), {"drive.speed": (0.1, 2.0)} | PLACE, decides=False
     ),
     "two strikers": World(
         lambda model: {
@@ -214,45 +239,45 @@ WORLDS: dict[str, World] = {
         struck(sine()),
         SINE | PLACE,
         beam=paper.BEAM.replace(axial_load=1.5 * paper.BEAM.critical_load),
-        reference_freq=80.0,
+        reference_frequency=80.0,
         own_kernel=False,
     ),
     "a base": World(
         on_a_base(sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25, phase=0.3)), SHAKEN,
     ),
     "a base under a stop in space": World(
-        on_a_base(sb.Sine(frequency_ratio=0.9, velocity_amplitude=0.25), carries_striker=False),
-        {"base.frequency_ratio": (0.4, 2.0), "base.velocity_amplitude": (0.05, 0.5)},
+        on_a_base(sb.Sine(frequency_ratio=0.9, velocity_amplitude=0.25), striker_on_base=False),
+        {"base_excitation.frequency_ratio": (0.4, 2.0), "base_excitation.velocity_amplitude": (0.05, 0.5)},
     ),
     "a base by its displacement": World(
         on_a_base(sb.DisplacementSine(frequency_ratio=0.9, displacement_amplitude=0.25)),
-        {"base.frequency_ratio": (0.4, 2.0), "base.displacement_amplitude": (0.05, 0.5)},
+        {"base_excitation.frequency_ratio": (0.4, 2.0), "base_excitation.displacement_amplitude": (0.05, 0.5)},
     ),
-    "a base of two sines": World(on_a_base(TWO), {"base.velocity_amplitude": (0.05, 0.5)}),
-    "a burst of the base": World(on_a_base(BURST), {"base.velocity_amplitude": (0.05, 0.5)}),
-    "a swept base": World(on_a_base(CHIRP), {"base.velocity_amplitude": (0.05, 0.5)}),
-    "a noisy base": World(on_a_base(NOISE), {"base.velocity_rms": (0.02, 0.3)}),
+    "a base of two sines": World(on_a_base(TWO), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
+    "a burst of the base": World(on_a_base(BURST), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
+    "a swept base": World(on_a_base(CHIRP), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
+    "a noisy base": World(on_a_base(NOISE), {"base_excitation.velocity_rms": (0.02, 0.3)}),
     "a changing load": World(
-        loaded(sb.LoadSine(frequency_ratio=2.0, amplitude=3.0)), SINE | {"axial.amplitude": (0.0, 20.0)}
+        loaded(sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0)), SINE | {"axial_load.amplitude": (0.0, 20.0)}
     ),
     "a load that falls": World(
-        loaded(sb.LoadRamp(change=-5.0, duration=3.0, hold=4.0)), SINE | {"axial.change": (-20.0, 10.0)}
+        loaded(sb.LoadRamp(change=-5.0, duration=3.0, hold_periods=4.0)), SINE | {"axial_load.change": (-20.0, 10.0)}
     ),
     "a piezo": World(harvested(PIEZO), SINE | {"harvester.resistance": (1e3, 1e6)}),
     "a coil": World(
-        harvested(sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)),
+        harvested(sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)),
         SINE | {"harvester.resistance": (1.0, 100.0)},
     ),
     "a coil with inductance": World(
-        harvested(sb.Coil(constant=1.5, resistance=30.0, coil_resistance=10.0, inductance=0.01)),
+        harvested(sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0, inductance=0.01)),
         SINE | {"harvester.resistance": (1.0, 100.0)},
     ),
     "a bit of all": World(
         lambda model: {
             "contact": paper.CONTACT,
-            "striker": sb.Striker(drive=sine(), mass=0.02, spring=700.0, damper=0.7, gap=1e-5),
-            "base": sb.Base(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1)),
-            "axial": sb.AxialLoad(motion=sb.LoadSine(frequency_ratio=2.0, amplitude=3.0)),
+            "striker": sb.Striker(drive=sine(), mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=1e-5),
+            "base": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1)),
+            "axial": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0)),
             "harvester": PIEZO,
         },
         SINE | PLACE,

@@ -11,24 +11,24 @@ from snapbeam import paper
 from snapbeam.core.validate import InputError
 
 GAP = 0.1 * paper.BEAM.buckling_level
-SPREAD = sb.Spread(of={"velocity_amplitude": sb.Normal(0.02, relative=True)})
+SPREAD = sb.ParameterUncertainty(of={"velocity_amplitude": sb.Normal(0.02, relative=True)})
 HOW = sb.Integration(cycles=3, threads=1)
 
 
 def between_two() -> sb.System:
     """The paper's beam under a stop."""
     one = small_system(3)
-    stop = sb.Striker(drive=sb.Still(), location=0.5, side="above", gap=GAP)
+    stop = sb.Striker(drive=sb.FixedStop(), location=0.5, side="above", gap=GAP)
     return sb.System(one.model, paper.CONTACT, [one.striker, stop])
 
 
 def test_a_statistic_of_one() -> None:
     """The effect of the drive on the stop's peak force is the difference of the runs a score up and down."""
     system = between_two()
-    found = sb.sensitivity(system, "peak_force_striker_2", SPREAD, size=2, integration=HOW)
+    found = sb.sensitivity(system, "peak_force_striker_2", SPREAD, samples=2, integration=HOW)
     speed = system.get("drive.velocity_amplitude")
     ends = [
-        sb.simulate(system.replace(**{"drive.velocity_amplitude": speed * share}), HOW).outcome
+        sb.simulate(system.replace(**{"drive.velocity_amplitude": speed * share}), HOW).summary
         for share in (0.98, 1.02)
     ]
     wanted = [each.peak_force_striker_2 for each in ends]
@@ -40,18 +40,18 @@ def test_a_statistic_of_one() -> None:
 def test_a_goal_and_a_limit_of_one() -> None:
     """The estimate is the mean over the draws of that striker's peak force, not of the greater of both."""
     goal, limit = (
-        sb.Goal(of="peak_force_striker_2"),
-        sb.Limit(of="impacts_striker_1", at_least=1.0, probability=0.5),
+        sb.Objective(quantity="peak_force_striker_2"),
+        sb.Constraint(quantity="impacts_striker_1", lower=1.0, probability=0.5),
     )
     problem = sb.design_problem(
-        between_two(), {"velocity_amplitude": (0.1, 0.3)}, goal, limit, SPREAD, integration=HOW, draws=8
+        between_two(), {"velocity_amplitude": (0.1, 0.3)}, goal, limit, SPREAD, integration=HOW, samples=8
     )
     numbers = np.arange(8)
     estimate = problem.estimate([0.2], numbers)
     runs = problem.runs_of(np.array([[0.2]]), numbers)[0]
     assert estimate.goals[0, 0] == pytest.approx(runs["peak_force_striker_2"].mean(), rel=1e-12)
     assert not np.array_equal(runs["peak_force_striker_2"], runs["peak_force"])
-    assert goal.words == "mean peak contact force, striker 2" and goal.quantity.unit == "N"
+    assert goal.words == "mean peak contact force, striker 2" and goal._quantity.unit == "N"
 
 
 def test_who_is_not_there_is_refused() -> None:
@@ -62,15 +62,15 @@ def test_who_is_not_there_is_refused() -> None:
             between_two(), {"velocity_amplitude": (0.1, 0.3)}, "peak_force_striker_3", [], SPREAD
         )
     with pytest.raises(InputError, match="no quantity"):
-        sb.Goal(of="peak_force_striker_5")
+        sb.Objective(quantity="peak_force_striker_5")
     with pytest.raises(InputError, match="statistic"):
         sb.sensitivity(between_two(), "peak_force_striker_0", SPREAD, integration=HOW)
 
 
 def test_they_are_told_in_words() -> None:
     """Wherever a statistic is shown, the second striker's has its unit and its words."""
-    found = sb.simulate(between_two(), HOW).outcome
-    line = next(each for each in found.table().splitlines() if each.startswith("peak_force_striker_2"))
+    found = sb.simulate(between_two(), HOW).summary
+    line = next(each for each in found.to_text().splitlines() if each.startswith("peak_force_striker_2"))
     assert line.endswith("peak contact force, striker 2") and " N " in line
     assert "peak_force_striker_2" in sb.STATISTICS and "peak_force_striker_2" not in list(sb.STATISTICS)
     assert sb.STATISTICS.get("impulse_striker_4").unit == "N s"

@@ -16,27 +16,33 @@ import snapbeam as sb
 
 KILLS, CHUNK = 20, 2
 HOW = sb.Integration(cycles=20, threads=1)
-SPREAD = sb.Spread(of={"velocity_amplitude": sb.Normal(0.05, relative=True)}, phase=True, displacement=3e-6)
-WIDE = sb.Spread(of={"location": sb.Normal(0.01), "contact.stiffness": sb.LogNormal(0.2)}, phase=True)
+SPREAD = sb.ParameterUncertainty(
+    of={"velocity_amplitude": sb.Normal(0.05, relative=True)}, phase=True, displacement=3e-6
+)
+WIDE = sb.ParameterUncertainty(
+    of={"location": sb.Normal(0.01), "contact.stiffness": sb.LogNormal(0.2)}, phase=True
+)
 
 
 def probability(store):
     axes = {"frequency_ratio": [0.8, 1.4], "velocity_amplitude": np.linspace(0.06, 0.3, 6)}
-    runs = sb.Allocation(half_width=0.08, first=16, most=160)
-    return sb.probability_map(small_system(), axes, SPREAD, runs, integration=HOW, store=store)
+    runs = sb.SamplingPlan(half_width=0.08, initial_runs=16, max_runs=160)
+    return sb.probability_map(small_system(), axes, SPREAD, runs, integration=HOW, checkpoint=store)
 
 
 def optimum(store):
-    effort = sb.Effort(generations=6, population=6, draws=16, fresh=100, candidates=3)
+    effort = sb.OptimizerSettings(
+        generations=6, population=6, samples=16, validation_samples=100, candidates=3
+    )
     variables = {"velocity_amplitude": (0.05, 0.4), "location": (0.3, 0.5)}
-    limit = sb.Limit(of="snap", at_least=0.8)
+    limit = sb.Constraint(quantity="snap", lower=0.8)
     return sb.optimize_design(
-        small_system(), variables, "speed", limit, SPREAD, effort, integration=HOW, store=store
+        small_system(), variables, "speed", limit, SPREAD, effort, integration=HOW, checkpoint=store
     )
 
 
 def tornado(store):
-    return sb.sensitivity(small_system(), "peak_force", WIDE, size=80, integration=HOW, store=store)
+    return sb.sensitivity(small_system(), "peak_force", WIDE, samples=80, integration=HOW, checkpoint=store)
 
 
 def kept(store: Path) -> int:
@@ -53,7 +59,9 @@ def kept(store: Path) -> int:
 def kill_while_it_works(make: Callable[[object], object], store: Path, draw: np.random.Generator) -> bool:
     """Whether a process that asks was killed, once it had kept more several times and a little later."""
     seen = {kept(store)}
-    child = multiprocessing.get_context("fork").Process(target=lambda: make(sb.Keeping(store, chunk=CHUNK)))
+    child = multiprocessing.get_context("fork").Process(
+        target=lambda: make(sb.CheckpointOptions(store, points_per_task=CHUNK))
+    )
     child.start()
     until, wanted = time.monotonic() + 300.0, int(draw.integers(6, 12))
     while child.is_alive() and len(seen) < wanted and time.monotonic() < until:
@@ -75,10 +83,13 @@ def test_nothing_is_lost_when_killed(make, tmp_path) -> None:
     store, draw = tmp_path / "store", np.random.default_rng(3)
     kills = sum(kill_while_it_works(make, store, draw) for _ in range(KILLS))
     assert kills == KILLS, "each time it was at work"
-    tally = sb.Tally()
-    again = make(sb.Keeping(store, chunk=CHUNK, tally=tally))
+    tally = sb.SweepReport()
+    again = make(sb.CheckpointOptions(store, points_per_task=CHUNK, report=tally))
     assert again.equals(whole)
-    assert tally.kept >= KILLS, "what was done before each kill is read again"
+    assert tally.resumed >= KILLS, "what was done before each kill is read again"
     print(make.__name__, kills, "kills;", tally)
-    after = sb.Tally()
-    assert make(sb.Keeping(store, chunk=CHUNK, tally=after)).equals(whole) and after.runs == 0
+    after = sb.SweepReport()
+    assert (
+        make(sb.CheckpointOptions(store, points_per_task=CHUNK, report=after)).equals(whole)
+        and after.runs == 0
+    )

@@ -10,7 +10,7 @@ from small import small_system
 import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.validate import InputError
-from snapbeam.figures import Dots
+from snapbeam.figures import MeasuredPoints
 from snapbeam.lab.calibration.calibrate import calibrate
 from snapbeam.lab.calibration.measurements import ContactTest, Measurements
 
@@ -19,13 +19,13 @@ PRIOR = {"thickness": 0.1, "buckling_level": 0.1}
 
 def measured_of(beam, modes: int = 2, error: float = 0.003, draw=None) -> Measurements:
     """Frequencies of a beam, straight and about its well, with errors of their own if *draw* is given."""
-    straight = sb.ReducedModel.from_beam(beam.replace(axial_load=0.0), modes).natural_freq
-    well = sb.ReducedModel.from_beam(beam, modes).natural_freq
+    straight = sb.ReducedModel.from_beam(beam.replace(axial_load=0.0), modes).natural_frequencies
+    well = sb.ReducedModel.from_beam(beam, modes).natural_frequencies
     noise = [np.zeros(modes), np.zeros(modes)] if draw is None else draw.standard_normal((2, modes))
     values = [f * (1.0 + error * z) for f, z in zip((straight, well), noise, strict=True)]
     return Measurements(
-        straight_freq=values[0].tolist(), straight_freq_se=(error * straight).tolist(),
-        lower_well_freq=values[1].tolist(), lower_well_freq_se=(error * well).tolist(),
+        straight_frequency=values[0].tolist(), straight_freq_se=(error * straight).tolist(),
+        lower_well_frequencies=values[1].tolist(), lower_well_freq_se=(error * well).tolist(),
         damping_ratio=[0.005, 0.0052, 0.0048],
         contact=[ContactTest(closing_speed=0.1, duration=5e-4, peak_force=4.0)],
     )  # fmt: skip
@@ -34,9 +34,9 @@ def measured_of(beam, modes: int = 2, error: float = 0.003, draw=None) -> Measur
 def test_it_is_that_of_the_linear_fit() -> None:
     """Small errors: medians and widths agree with those of least squares."""
     measured = measured_of(paper.BEAM)
-    found = sb.posterior(measured, paper.BEAM, PRIOR, modes=2, draws=400)
+    found = sb.estimate_posterior(measured, paper.BEAM, PRIOR, modes=2, samples=400)
     fit = calibrate(measured, paper.BEAM, modes=2)
-    assert found.effective > 200.0 and not found.is_doubtful
+    assert found.effective_sample_size > 200.0 and not found.is_doubtful
     for name in PRIOR:
         middle, low, high = found.interval()[f"beam.{name}"]
         assert middle == pytest.approx(getattr(paper.BEAM, name), rel=2e-3)
@@ -49,7 +49,9 @@ def test_it_is_that_of_the_linear_fit() -> None:
 def test_what_the_data_do_not_say_stays_as_it_was() -> None:
     """Density and modulus come in as a ratio: their product is as uncertain as before."""
     prior = {"young_modulus": 0.05, "density": 0.05}
-    found = sb.posterior(measured_of(paper.BEAM), paper.BEAM, prior, modes=2, draws=500).resampled(500)
+    found = sb.estimate_posterior(measured_of(paper.BEAM), paper.BEAM, prior, modes=2, samples=500).resampled(
+        500
+    )
     ratio = np.log(found.values[:, 0] / found.values[:, 1])
     product = np.log(found.values[:, 0] * found.values[:, 1])
     assert ratio.std() < 0.01 and product.std() == pytest.approx(0.05 * np.sqrt(2.0), rel=0.2)
@@ -63,7 +65,9 @@ def test_intervals_cover() -> None:
 
 
 def test_what_follows_is_drawn_from_it() -> None:
-    found = sb.posterior(measured_of(paper.BEAM, error=0.02), paper.BEAM, PRIOR, modes=2, draws=400)
+    found = sb.estimate_posterior(
+        measured_of(paper.BEAM, error=0.02), paper.BEAM, PRIOR, modes=2, samples=400
+    )
     spread = found.spread(of={"velocity_amplitude": sb.Normal(0.02, relative=True)})
     scores = spread.normals(np.arange(2000))
     for j, name in enumerate(found.parameters):
@@ -83,8 +87,12 @@ def test_classes_weigh_samples() -> None:
     found = sb.Posterior(("beam.buckling_level",), values, np.array([0.5, 0.5]))
     system = small_system(frequency_ratio=0.02, location=0.4)
     limit = float(sb.quasi_static_threshold(0.4, 0.02))
-    one = Dots(np.array([0.02]), np.array([1.02 * limit]), np.array([0.4]), np.array([2], dtype=np.int8))
-    spread = sb.Spread(of={"velocity_amplitude": sb.Normal(0.01, relative=True)}, held="ratios")
+    one = MeasuredPoints(
+        np.array([0.02]), np.array([1.02 * limit]), np.array([0.4]), np.array([2], dtype=np.int8)
+    )
+    spread = sb.ParameterUncertainty(
+        of={"velocity_amplitude": sb.Normal(0.01, relative=True)}, hold_fixed="ratios"
+    )
     likelihood = sb.class_likelihood(found, system, one, spread, runs=8, integration=sb.Integration(cycles=1))
     assert likelihood.shape == (2,) and (likelihood < 0.0).all()
     np.testing.assert_allclose(found.updated([0.0, np.log(3.0)]).weights, [0.25, 0.75])
@@ -96,8 +104,8 @@ def test_classes_weigh_samples() -> None:
 def test_refusals() -> None:
     measured = measured_of(paper.BEAM)
     with pytest.raises(InputError, match="must be one of"):
-        sb.posterior(measured, paper.BEAM, {"width": 0.1})
+        sb.estimate_posterior(measured, paper.BEAM, {"width": 0.1})
     with pytest.raises(InputError, match="prior"):
-        sb.posterior(measured, paper.BEAM, {})
+        sb.estimate_posterior(measured, paper.BEAM, {})
     with pytest.raises(InputError, match="straight_freq_se"):
-        sb.posterior(Measurements(straight_freq=[30.0]), paper.BEAM, PRIOR)
+        sb.estimate_posterior(Measurements(straight_frequency=[30.0]), paper.BEAM, PRIOR)

@@ -14,9 +14,11 @@ from snapbeam.design.events import OUTCOMES
 from snapbeam.design.probability.allocation import allocate
 from snapbeam.design.probability.dots import class_counts
 from snapbeam.design.proportion import interval_of, wilson
-from snapbeam.figures import Dots
+from snapbeam.figures import MeasuredPoints
 
-SPREAD = sb.Spread(of={"velocity_amplitude": sb.Normal(0.05, relative=True)}, phase=True, displacement=3e-6)
+SPREAD = sb.ParameterUncertainty(
+    of={"velocity_amplitude": sb.Normal(0.05, relative=True)}, phase=True, displacement=3e-6
+)
 AXES = {"frequency_ratio": [0.8, 1.4], "velocity_amplitude": np.linspace(0.06, 0.3, 4)}
 HOW = sb.Integration(cycles=20, threads=1)
 
@@ -45,7 +47,7 @@ def test_wilson_is_scipys() -> None:
 def test_sequential_intervals_cover(method: str) -> None:
     """400 points of probabilities spread over (0, 1): 93 to 97 % of the intervals hold them though runs stop early."""
     truth = (np.arange(400) + 0.5) / 400.0
-    allocation = sb.Allocation(half_width=0.1, interval=method)
+    allocation = sb.SamplingPlan(half_width=0.1, interval=method)
     counts = allocate(coin(truth), 400, allocation)
     _, low, high = counts.limits(allocation, 0)
     assert 0.93 <= ((low <= truth) & (truth <= high)).mean() <= 0.97
@@ -57,7 +59,7 @@ def test_half_the_runs_of_a_uniform_map() -> None:
     """Steep borders, as of a response map: a half width of 0.05 everywhere for at most half the runs; both agree."""
     v, steep = np.linspace(0.0, 1.0, 60), 25.0
     truth = np.concatenate([1.0 / (1.0 + np.exp(-steep * (v - border))) for border in (0.3, 0.55, 0.8)])
-    sequential = sb.Allocation(half_width=0.05)
+    sequential = sb.SamplingPlan(half_width=0.05)
     counts = allocate(coin(truth), truth.size, sequential)
     _, low, high = counts.limits(sequential, 0)
     assert (0.5 * (high - low)).max() <= 0.05
@@ -65,7 +67,7 @@ def test_half_the_runs_of_a_uniform_map() -> None:
     while np.diff(np.ravel(wilson(needed // 2, needed)[1:]))[0] > 0.1:
         needed += 1
     assert counts.runs.sum() <= 0.5 * needed * truth.size
-    uniform = sb.Allocation(half_width=None, first=needed)
+    uniform = sb.SamplingPlan(half_width=None, initial_runs=needed)
     other = allocate(coin(truth, seed=1), truth.size, uniform)
     _, below, above = other.limits(uniform, 0)
     assert ((below <= high) & (low <= above)).mean() >= 0.97
@@ -73,7 +75,7 @@ def test_half_the_runs_of_a_uniform_map() -> None:
 
 def test_a_total_is_kept_and_told() -> None:
     truth = np.linspace(0.01, 0.99, 50)
-    counts = allocate(coin(truth), 50, sb.Allocation(half_width=0.1, first=16, total=2000))
+    counts = allocate(coin(truth), 50, sb.SamplingPlan(half_width=0.1, initial_runs=16, total_runs=2000))
     assert counts.runs.sum() == 2000
     assert counts.open.any() and not counts.open.all()
 
@@ -88,7 +90,7 @@ def test_failed_runs_widen_the_interval() -> None:
 
 def test_map_of_a_beam() -> None:
     """Outcomes add up, threads and resumption change nothing, and a beam driven hard snaps."""
-    runs = sb.Allocation(half_width=0.15, first=16, most=64)
+    runs = sb.SamplingPlan(half_width=0.15, initial_runs=16, max_runs=64)
     ds = sb.probability_map(small_system(), AXES, SPREAD, runs, integration=HOW)
     assert ds["probability"].dims == ("frequency_ratio", "velocity_amplitude", "outcome")
     ends = ds["hits"].sel(outcome=["continuous", "first_well", "other_well"]).sum("outcome")
@@ -102,7 +104,7 @@ def test_map_of_a_beam() -> None:
 
 def test_a_map_is_resumed_after_being_killed(tmp_path) -> None:
     """Killed after every point in turn: nothing is computed twice, and what comes out is what an unbroken map gives."""
-    runs = sb.Allocation(half_width=0.15, first=16, most=64)
+    runs = sb.SamplingPlan(half_width=0.15, initial_runs=16, max_runs=64)
     whole = sb.probability_map(small_system(), AXES, SPREAD, runs, integration=HOW)
     store, seen = tmp_path / "map", 0
 
@@ -110,37 +112,42 @@ def test_a_map_is_resumed_after_being_killed(tmp_path) -> None:
         pass
 
     for _ in range(20):
-        tally = sb.Tally()
+        tally = sb.SweepReport()
         left = [40 + 7 * seen]
 
         def kill(done: int, total: int, left: list[int] = left) -> None:
             if done > left[0]:
                 raise Killed
 
-        keeping = sb.Keeping(store, chunk=16, tally=tally)
+        keeping = sb.CheckpointOptions(store, points_per_task=16, report=tally)
         try:
             found = sb.probability_map(
-                small_system(), AXES, SPREAD, runs, integration=HOW, store=keeping, progress=kill
+                small_system(), AXES, SPREAD, runs, integration=HOW, checkpoint=keeping, progress=kill
             )
             break
         except Killed:
             seen += 1
     assert seen >= 3
     assert found["hits"].equals(whole["hits"]) and found["runs"].equals(whole["runs"])
-    tally = sb.Tally()
+    tally = sb.SweepReport()
     sb.probability_map(
-        small_system(), AXES, SPREAD, runs, integration=HOW, store=sb.Keeping(store, tally=tally)
+        small_system(),
+        AXES,
+        SPREAD,
+        runs,
+        integration=HOW,
+        checkpoint=sb.CheckpointOptions(store, report=tally),
     )
     assert tally.runs == 0
     with pytest.raises(InputError):
-        other = sb.Spread(of=SPREAD.of, phase=True, displacement=3e-6, seed=9)
-        sb.probability_map(small_system(), AXES, other, runs, integration=HOW, store=store)
+        other = sb.ParameterUncertainty(of=SPREAD.of, phase=True, displacement=3e-6, seed=9)
+        sb.probability_map(small_system(), AXES, other, runs, integration=HOW, checkpoint=store)
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"spread": sb.Spread()}, "nothing differs"),
+        ({"spread": sb.ParameterUncertainty()}, "nothing differs"),
         ({"runs": 0}, "first"),
         ({"runs": "many"}, "Allocation"),
         ({"axes": {}}, "at least one parameter"),
@@ -163,12 +170,12 @@ def test_dots_are_judged_by_their_likelihood() -> None:
     share = counts.reshape(-1, 4) / 60.0
     drawn = np.array([generator.choice(4, p=row / row.sum()) for row in share], dtype=np.int8)
     place = np.full(drawn.size, np.nan)
-    good = sb.judge_dots(ds, Dots(omega.ravel(), v.ravel(), place, drawn))
+    good = sb.score_measurements(ds, MeasuredPoints(omega.ravel(), v.ravel(), place, drawn))
     assert good.attrs["p_value"] > 0.01
     low, high = good.attrs["log_likelihood_low"], good.attrs["log_likelihood_high"]
     assert low <= good.attrs["log_likelihood"] <= high
     never = np.full(drawn.size, ResponseClass.TRANSIENT_1, dtype=np.int8)
-    bad = sb.judge_dots(ds, Dots(omega.ravel(), v.ravel(), place, never))
+    bad = sb.score_measurements(ds, MeasuredPoints(omega.ravel(), v.ravel(), place, never))
     assert bad.attrs["p_value"] < 0.01 and bad.attrs["agree"] < good.attrs["agree"]
     with pytest.raises(InputError, match="outside"):
-        sb.judge_dots(ds, Dots(np.array([3.0]), np.array([0.1]), place[:1], never[:1]))
+        sb.score_measurements(ds, MeasuredPoints(np.array([3.0]), np.array([0.1]), place[:1], never[:1]))

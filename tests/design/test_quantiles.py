@@ -27,7 +27,7 @@ def runs_of(truth, seed: int, runs: int, rounds: int = 4):
     def ask(columns, values, numbers):
         return generator.random(values.size) < truth(values), np.zeros(values.size, dtype=bool)
 
-    return search(ask, 1, (0.0, 1.0), sb.Search(runs=runs, rounds=rounds, seed=seed))[0]
+    return search(ask, 1, (0.0, 1.0), sb.QuantileSearchSettings(runs=runs, rounds=rounds, seed=seed))[0]
 
 
 def test_the_limiting_distribution_is_that_of_single_runs() -> None:
@@ -104,7 +104,7 @@ def test_the_quasi_static_threshold() -> None:
     place = np.array([0.25, 0.4, 0.5])
     ds = sb.quantile_threshold(
         small_system(frequency_ratio=0.02), "velocity_amplitude", (1e-4, 0.03), {"location": place},
-        how=sb.Search(runs=120), integration=sb.Integration(cycles=1, threads=1),
+        options=sb.QuantileSearchSettings(runs=120), integration=sb.Integration(cycles=1, threads=1),
     )  # fmt: skip
     expected = sb.quasi_static_threshold(place, 0.02)
     np.testing.assert_allclose(ds["threshold"].sel(quantile=0.5), expected, rtol=0.03)
@@ -113,8 +113,8 @@ def test_the_quasi_static_threshold() -> None:
 
 
 def test_tolerances_spread_the_threshold(tmp_path) -> None:
-    spread = sb.Spread(of={"velocity_amplitude": sb.Normal(0.1, relative=True)})
-    how, run = sb.Search(runs=120), sb.Integration(cycles=10, threads=1)
+    spread = sb.ParameterUncertainty(of={"velocity_amplitude": sb.Normal(0.1, relative=True)})
+    how, run = sb.QuantileSearchSettings(runs=120), sb.Integration(cycles=10, threads=1)
     arguments = (
         small_system(),
         "velocity_amplitude",
@@ -123,11 +123,13 @@ def test_tolerances_spread_the_threshold(tmp_path) -> None:
         spread,
         how,
     )
-    ds = sb.quantile_threshold(*arguments, integration=run, store=tmp_path / "store")
+    ds = sb.quantile_threshold(*arguments, integration=run, checkpoint=tmp_path / "store")
     assert (np.diff(ds["threshold"], axis=-1) > 0.0).all()
-    again = sb.quantile_threshold(*arguments, integration=run.replace(threads=2), store=tmp_path / "store")
+    again = sb.quantile_threshold(
+        *arguments, integration=run.replace(threads=2), checkpoint=tmp_path / "store"
+    )
     assert again.equals(ds)
-    sure = sb.quantile_threshold(*arguments[:4], how=how, integration=run)
+    sure = sb.quantile_threshold(*arguments[:4], options=how, integration=run)
     np.testing.assert_allclose(
         ds["threshold"].sel(quantile=0.5), sure["threshold"].sel(quantile=0.5), rtol=0.1
     )
@@ -135,7 +137,7 @@ def test_tolerances_spread_the_threshold(tmp_path) -> None:
 
 def test_out_of_range_is_told() -> None:
     ds = sb.quantile_threshold(
-        small_system(), "velocity_amplitude", (1e-4, 1e-3), how=sb.Search(runs=120),
+        small_system(), "velocity_amplitude", (1e-4, 1e-3), options=sb.QuantileSearchSettings(runs=120),
         integration=sb.Integration(cycles=3),
     )  # fmt: skip
     assert (ds["outcome_of_search"] == 1).all() and ds["threshold"].isnull().all()
@@ -158,6 +160,6 @@ def test_refusals(change, words: str) -> None:
     with pytest.raises(InputError, match=words):
         sb.quantile_threshold(**given)
     with pytest.raises(InputError):
-        sb.Search(runs=20)
+        sb.QuantileSearchSettings(runs=20)
     with pytest.raises(InputError):
-        sb.Search(probabilities=(0.5, 0.2))
+        sb.QuantileSearchSettings(probabilities=(0.5, 0.2))

@@ -17,8 +17,12 @@ NUMBERS = np.arange(4000)
 
 
 def test_draws_hang_on_their_number_alone() -> None:
-    spread = sb.Spread(of={"contact.stiffness": sb.LogNormal(0.2), "location": sb.Normal(1e-3)}, seed=3)
-    turned = sb.Spread(of={"location": sb.Normal(1e-3), "contact.stiffness": sb.LogNormal(0.2)}, seed=3)
+    spread = sb.ParameterUncertainty(
+        of={"contact.stiffness": sb.LogNormal(0.2), "location": sb.Normal(1e-3)}, seed=3
+    )
+    turned = sb.ParameterUncertainty(
+        of={"location": sb.Normal(1e-3), "contact.stiffness": sb.LogNormal(0.2)}, seed=3
+    )
     whole = spread.normals(NUMBERS[:50])
     np.testing.assert_array_equal(spread.normals(np.array([41, 7, 41])), whole[[41, 7, 41]])
     np.testing.assert_array_equal(turned.normals(NUMBERS[:50])[:, ::-1], whole)
@@ -29,13 +33,13 @@ def test_draws_hang_on_their_number_alone() -> None:
     [
         (sb.Normal(0.02, relative=True), 0.2, 0.004),
         (sb.Normal(0.01), 0.2, 0.01),
-        (sb.Uniform(0.1, relative=True), 0.2, 0.02 / math.sqrt(3.0)),
+        (sb.UniformTolerance(0.1, relative=True), 0.2, 0.02 / math.sqrt(3.0)),
         (sb.LogNormal(0.1), 0.2 * math.exp(0.005), 0.2 * math.exp(0.005) * math.sqrt(math.expm1(0.01))),
-        (sb.Between(0.1, 0.5), 0.3, 0.4 / math.sqrt(12.0)),
+        (sb.UniformRange(0.1, 0.5), 0.3, 0.4 / math.sqrt(12.0)),
     ],
 )
 def test_moments(each, mean: float, sd: float) -> None:
-    spread = sb.Spread(of={"velocity_amplitude": each})
+    spread = sb.ParameterUncertainty(of={"velocity_amplitude": each})
     values = each.at(np.full(NUMBERS.size, 0.2), spread.normals(NUMBERS)[:, 0])
     assert values.mean() == pytest.approx(mean, abs=4.0 * sd / math.sqrt(NUMBERS.size))
     assert values.std() == pytest.approx(sd, rel=0.05)
@@ -48,7 +52,7 @@ def test_correlation() -> None:
         "location": sb.Normal(0.01),
     }
     matrix = np.array([[1.0, -0.8, 0.0], [-0.8, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    scores = sb.Spread(of=of, correlation=matrix, phase=True).normals(NUMBERS)
+    scores = sb.ParameterUncertainty(of=of, correlation=matrix, phase=True).normals(NUMBERS)
     np.testing.assert_allclose(np.corrcoef(scores.T)[:3, :3], matrix, atol=0.06)
     assert scores.shape == (NUMBERS.size, 4)
 
@@ -56,11 +60,11 @@ def test_correlation() -> None:
 def test_hz_and_metres_per_second_are_held() -> None:
     """A beam buckled further has a higher first frequency: the same shaker strikes it at another ratio."""
     system = small_system()
-    spread = sb.Spread(of={"beam.buckling_level": sb.Normal(0.02, relative=True)})
+    spread = sb.ParameterUncertainty(of={"beam.buckling_level": sb.Normal(0.02, relative=True)})
     numbers = np.arange(5)
     points = {"drive.frequency_ratio": np.full(5, 1.3)}
     for held in ("physical", "ratios"):
-        trials = trials_of(system, sb.Spread(of=spread.of, held=held), None)
+        trials = trials_of(system, sb.ParameterUncertainty(of=spread.of, hold_fixed=held), None)
         found = trials.columns(points, numbers)
         hz, speed = [], []
         for i in range(5):
@@ -84,25 +88,32 @@ def test_hz_and_metres_per_second_are_held() -> None:
 def test_a_ringing_start_never_presses_the_tip() -> None:
     """Beside a tip that is drawn back, nothing touches at the start: an overlap would shoot the beam away."""
     system = small_system(velocity_amplitude=0.001)
-    trials = trials_of(system, sb.Spread(displacement=5e-6, phase=True), sb.Integration(cycles=2))
+    trials = trials_of(
+        system, sb.ParameterUncertainty(displacement=5e-6, phase=True), sb.Integration(cycles=2)
+    )
     found = trials.statistics({"drive.velocity_amplitude": np.full(200, 0.001)}, np.arange(200))
-    assert (found["response"] == sb.ResponseClass.INTRAWELL).all()
+    assert (found["response_class"] == sb.ResponseClass.INTRAWELL).all()
     assert found["peak_force"].max() < 1.0
 
 
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: sb.Spread(of={"beam.thicknes": sb.Normal(1.0)}), "thickness"),
-        (lambda: sb.Spread(of={"beam.thickness": 0.01}), "distribution"),
-        (lambda: sb.Spread(of={"model.modes": sb.Normal(1.0)}), "cannot be drawn"),
-        (lambda: sb.Spread(of={"run.step": sb.Normal(1.0)}), "cannot be drawn"),
-        (lambda: sb.Spread(of={"drive.phase": sb.Normal(1.0)}, phase=True), "one of the two"),
-        (lambda: sb.Spread(of={"location": sb.Normal(0.1)}, correlation=[[1.0, 0.2], [0.2, 1.0]]), "shape"),
-        (lambda: sb.Spread(displacement=-1.0), "displacement"),
-        (lambda: sb.Spread(held="hz"), "held"),
+        (lambda: sb.ParameterUncertainty(of={"beam.thicknes": sb.Normal(1.0)}), "thickness"),
+        (lambda: sb.ParameterUncertainty(of={"beam.thickness": 0.01}), "distribution"),
+        (lambda: sb.ParameterUncertainty(of={"model.modes": sb.Normal(1.0)}), "cannot be drawn"),
+        (lambda: sb.ParameterUncertainty(of={"integration.step": sb.Normal(1.0)}), "cannot be drawn"),
+        (lambda: sb.ParameterUncertainty(of={"drive.phase": sb.Normal(1.0)}, phase=True), "one of the two"),
+        (
+            lambda: sb.ParameterUncertainty(
+                of={"location": sb.Normal(0.1)}, correlation=[[1.0, 0.2], [0.2, 1.0]]
+            ),
+            "shape",
+        ),
+        (lambda: sb.ParameterUncertainty(displacement=-1.0), "displacement"),
+        (lambda: sb.ParameterUncertainty(hold_fixed="hz"), "held"),
         (lambda: sb.Normal(0.0), "standard_deviation"),
-        (lambda: sb.Between(2.0, 1.0), "less than high"),
+        (lambda: sb.UniformRange(2.0, 1.0), "less than high"),
     ],
 )
 def test_refusals(make, words: str) -> None:
@@ -111,7 +122,7 @@ def test_refusals(make, words: str) -> None:
 
 
 def test_draws_out_of_range_are_refused() -> None:
-    trials = trials_of(small_system(), sb.Spread(of={"location": sb.Normal(0.5)}), None)
+    trials = trials_of(small_system(), sb.ParameterUncertainty(of={"location": sb.Normal(0.5)}), None)
     with pytest.raises(InputError, match="out of range"):
         trials.columns({}, np.arange(100))
 

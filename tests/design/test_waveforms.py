@@ -39,19 +39,21 @@ def measured(nominal: sb.System, logs: np.ndarray, draw: np.random.Generator) ->
     times = np.linspace(0.0, CYCLES * period * (1.0 - 1e-9), 40 * CYCLES)
     other = other.replace(**drive)
     run = sb.simulate(other, sb.Integration(cycles=CYCLES, accuracy="reference"), sample_times=times)
-    seen = run.dataset.displacement.values * other.scale.length + ERROR * draw.standard_normal(times.size)
+    seen = run.dataset.displacement_at_striker.values * other.scale.length + ERROR * draw.standard_normal(
+        times.size
+    )
     return sb.Waveform(system=nominal, time=times, displacement=seen, standard_error=ERROR)
 
 
 def found(waveform: sb.Waveform, seed: int = 0) -> sb.Posterior:
-    return sb.posterior(None, paper.BEAM, PRIOR, waveforms=waveform, draws=200, seed=seed)
+    return sb.estimate_posterior(None, paper.BEAM, PRIOR, waveforms=waveform, samples=200, seed=seed)
 
 
 def test_the_beam_and_the_contact_are_found() -> None:
     nominal, draw = nominal_system(), np.random.default_rng(3)
     logs = np.array([0.02, -0.015, 0.2])
     said = found(measured(nominal, logs, draw))
-    assert said.effective > 100.0
+    assert said.effective_sample_size > 100.0
     assert said.parameters == ("beam.thickness", "beam.buckling_level", "contact.stiffness")
     truth = np.exp(logs) * [paper.BEAM.thickness, paper.BEAM.buckling_level, paper.CONTACT.stiffness]
     for (middle, low, high), value, known in zip(
@@ -108,12 +110,12 @@ def test_refusals() -> None:
             sb.Waveform(**{**given, **change})
     waveform = sb.Waveform(**given)
     with pytest.raises(InputError, match="measured = None: give measurements, waveforms, or both"):
-        sb.posterior(None, paper.BEAM, PRIOR)
+        sb.estimate_posterior(None, paper.BEAM, PRIOR)
     with pytest.raises(InputTypeError, match="waveforms = 3"):
-        sb.posterior(None, paper.BEAM, PRIOR, waveforms=3)
+        sb.estimate_posterior(None, paper.BEAM, PRIOR, waveforms=3)
     with pytest.raises(InputError, match="contact_stiffness must be one of"):
         from test_posterior import measured_of
 
-        sb.posterior(measured_of(paper.BEAM), paper.BEAM, PRIOR)
+        sb.estimate_posterior(measured_of(paper.BEAM), paper.BEAM, PRIOR)
     with pytest.raises(InputError, match="contact_stiffness is measured by itself"):
-        sb.posterior(measured_of(paper.BEAM), paper.BEAM, PRIOR, waveforms=waveform)
+        sb.estimate_posterior(measured_of(paper.BEAM), paper.BEAM, PRIOR, waveforms=waveform)

@@ -126,9 +126,9 @@ def test_every_page_is_in_the_tree():
 
 
 def test_options_in_the_page_of_commands_are_code():
-    """As words, ``--store`` would be set with a dash."""
+    """As words, ``--checkpoint`` would be set with a dash."""
     text = runpy.run_path(str(ROOT / "docs" / "_ext" / "reference.py"))["command_line"]()
     words = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
     bare = re.findall(r"(?<![\w`-])--[a-z][\w-]*", re.sub(r"`[^`]*`", "", words))
     assert not bare
-    assert "`--store`" in words and "mathrm" not in words
+    assert "`--checkpoint`" in words and "mathrm" not in words

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from snapbeam.dynamics.lifetimes.survival import proportion
-from snapbeam.paper.claims.finding import Check, Finding, Quantity, above, below, found
+from snapbeam.paper.claims.finding import Check, ClaimResult, Quantity, above, below, found
 
 __all__ = ["Row", "claims", "table"]
 
@@ -26,7 +26,7 @@ class Row(NamedTuple):
     measured: str
     rule: str
     fails: str
-    finding: Finding
+    diagnostic: ClaimResult
 
 
 def _all(*checks: Check) -> Check:
@@ -101,7 +101,7 @@ def _more_modes(shares: Mapping[int, tuple[float, float]]) -> Row:
 def _attractor(data: Mapping[str, xr.Dataset]) -> Row:
     """An attractor beside a transient."""
     shares, gaps = [], []
-    for level in ("map", "reference"):
+    for level in ("standard", "reference"):
         ds = data[f"long_{level}"]
         last = np.nan_to_num(ds["last_snap"].values)
         on = last > float(ds.attrs["cycles"]) - float(ds.attrs["quiet"])
@@ -111,7 +111,7 @@ def _attractor(data: Mapping[str, xr.Dataset]) -> Row:
     late = max(gaps)
     return Row(
         "One mode at (1.625, 0.3) has an attractor beside a transient, at both accuracy levels.",
-        f"{_told(shares[0], '.2f')} still snap at 10,000 cycles at level map, {_told(shares[1], '.2f')} at reference; "
+        f"{_told(shares[0], '.2f')} still snap at 10,000 cycles at level standard, {_told(shares[1], '.2f')} at reference; "
         f"the last of the others ended at {late:.0f}",
         f"At both levels some still snap at 10,000 cycles, some ended, and none ended between {_EARLY:.0f} and that; "
         "in part if one ended late.",
@@ -171,6 +171,6 @@ def table(rows: list[Row]) -> list[str]:
         "|---|---|---|---|---|---|",
     ]
     for number, row in enumerate(rows, start=1):
-        verdict = f"**{row.finding.verdict}**" + (" †" if row.finding.close else "")
+        verdict = f"**{row.diagnostic.verdict}**" + (" †" if row.diagnostic.close else "")
         lines.append(f"| T{number} | {row.says} | {row.measured} | {row.rule} | {row.fails} | {verdict} |")
     return lines

@@ -42,7 +42,7 @@ def against(ds: xr.Dataset, figure: xr.Dataset, cycles: int) -> tuple[float, flo
     """Share still snapping, share of a stored map called continuous at the same points, and by how many standard
     errors of counting they differ."""
     at = {name: ds[name].values for name in ("frequency_ratio", "velocity_amplitude")}
-    kind = figure["response"].sel(at, method="nearest").transpose(*at).values
+    kind = figure["response_class"].sel(at, method="nearest").transpose(*at).values
     share = (np.nan_to_num(ds["last_snap"].values) > cycles).mean(axis=-1)
     called = kind == sb.ResponseClass.CONTINUOUS
     spread = math.sqrt((share * (1.0 - share) * (1.0 + 1.0 / ds.sizes["start"])).sum())
@@ -102,7 +102,7 @@ def _many(data: dict[str, xr.Dataset]) -> list[str]:
     ratio, velocity = (
         float(data["long_many_map"].attrs[name]) for name in ("frequency_ratio", "velocity_amplitude")
     )
-    told = [f"at level {level} {lasting(data[f'long_many_{level}'])}" for level in ("map", "reference")]
+    told = [f"at level {level} {lasting(data[f'long_many_{level}'])}" for level in ("standard", "reference")]
     return ["", f"32 modes at ({ratio:g}, {velocity:g}), 10,000 cycles: still snapping {'; '.join(told)}."]
 
 
@@ -164,7 +164,7 @@ def text() -> str:
         lines.append(f"| {modes} | {figure} | {cycles} cycles | {here:.3f} | {there:.3f} | {off:+.1f} |")
     lines += [
         "",
-        "One mode at (1.625, 0.3), 10,000 cycles: still snapping at accuracy level map "
+        "One mode at (1.625, 0.3), 10,000 cycles: still snapping at accuracy level standard "
         f"{lasting(data['long_map'])}; at level reference {lasting(data['long_reference'])}.",
         *_many(data),
         "",

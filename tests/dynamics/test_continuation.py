@@ -15,16 +15,16 @@ import snapbeam as sb
 
 def test_flips_of_the_logistic_map() -> None:
     orbit = sb.periodic_orbit(logistic(2.5), [0.6])
-    branch = sb.continue_orbit(orbit, "r", (2.2, 3.7))
-    assert branch.end == "limit of the parameter"
-    flip = next(event for event in branch.events if event.kind == "flip")
+    branch = sb.continuation(orbit, "r", (2.2, 3.7))
+    assert branch.termination_reason == "limit of the parameter"
+    flip = next(event for event in branch.special_points if event.kind == "flip")
     assert flip.value == pytest.approx(3.0, abs=1e-7)
     doubled = sb.switch_branch(flip, "r", (2.2, 3.7))
-    assert doubled.period == 2 and doubled.least_period == 2 and doubled.is_stable
-    second = sb.continue_orbit(doubled, "r", (2.2, 3.7))
-    flips = [event.value for event in second.events if event.kind == "flip"]
+    assert doubled.period == 2 and doubled.minimal_period == 2 and doubled.is_stable
+    second = sb.continuation(doubled, "r", (2.2, 3.7))
+    flips = [event.value for event in second.special_points if event.kind == "flip"]
     assert flips[0] == pytest.approx(1.0 + math.sqrt(6.0), abs=1e-7)
-    first = next(event for event in second.events if event.kind == "flip")
+    first = next(event for event in second.special_points if event.kind == "flip")
     for event, exact in ((flip, 3.0), (first, 1.0 + math.sqrt(6.0))):
         assert abs(event.value - exact) <= event.error < 1e-7
     assert "±" in repr(flip) and float(branch.to_dataset()["event_error"][0]) == flip.error
@@ -34,8 +34,8 @@ def test_flips_of_the_logistic_map() -> None:
 def test_a_fold_is_passed() -> None:
     """Henon's fixed points meet at a = -(1 - b)^2/4; the branch turns there and goes on along the other."""
     orbit = sb.periodic_orbit(henon(0.1), [0.8, 0.2])
-    branch = sb.continue_orbit(orbit, "a", (-0.2, 0.3), direction="down")
-    fold = next(event for event in branch.events if event.kind == "fold")
+    branch = sb.continuation(orbit, "a", (-0.2, 0.3), direction="down")
+    fold = next(event for event in branch.special_points if event.kind == "fold")
     assert fold.value == pytest.approx(-0.1225, abs=1e-8)
     assert abs(fold.value + 0.1225) <= fold.error < 1e-8
     assert branch.values[-1] > branch.values.min()
@@ -55,12 +55,14 @@ def test_an_isola_is_closed_from_a_seed_on_it() -> None:
         2,
         r=2.1,
     )
-    (seed,) = sb.attractors(ring, np.random.default_rng(0).uniform(-0.3, 0.8, (20, 2)), transient=200).found
-    branch = sb.continue_orbit(seed.orbit, "r", (0.0, 4.0), most=2000)
-    assert branch.end == "closed"
-    assert sorted(event.value for event in branch.events) == pytest.approx([1.5, 2.5], abs=1e-8)
-    assert {event.kind for event in branch.events} == {"fold"}
-    for event in branch.events:
+    (seed,) = sb.find_attractors(
+        ring, np.random.default_rng(0).uniform(-0.3, 0.8, (20, 2)), transient=200
+    ).attractors
+    branch = sb.continuation(seed.orbit, "r", (0.0, 4.0), max_points=2000)
+    assert branch.termination_reason == "closed"
+    assert sorted(event.value for event in branch.special_points) == pytest.approx([1.5, 2.5], abs=1e-8)
+    assert {event.kind for event in branch.special_points} == {"fold"}
+    for event in branch.special_points:
         assert min(abs(event.value - 1.5), abs(event.value - 2.5)) <= event.error < 1e-7
     radius = np.hypot([orbit.coordinates[0] for orbit in branch.orbits], branch.values - 2.0)
     np.testing.assert_allclose(radius, 0.5, atol=1e-8)
@@ -68,7 +70,7 @@ def test_an_isola_is_closed_from_a_seed_on_it() -> None:
     assert other.coordinates[0] == pytest.approx(-seed.orbit.coordinates[0], abs=1e-9) and other.unstable == 1
 
 
-def room(ratio: float, restitution: float, periods: int, looks: int = 40_001) -> float:
+def scratch(ratio: float, restitution: float, periods: int, looks: int = 40_001) -> float:
     """Least gap between the flight of the exact (1, n) orbit and the wall, away from its ends."""
     speed, _ = exact_orbit(ratio, restitution, periods)
     w = 0.5 * (1.0 + restitution) / math.tan(math.pi * periods / ratio) * speed
@@ -84,9 +86,9 @@ def room(ratio: float, restitution: float, periods: int, looks: int = 40_001) ->
 def grazes_at(restitution: float, periods: int, below: float) -> float:
     """The greatest ratio below another at which the flight touches the wall a second time."""
     ratios = np.linspace(below, 1.002 * periods, 80)
-    rooms = np.array([room(float(ratio), restitution, periods, 4001) for ratio in ratios])
+    rooms = np.array([scratch(float(ratio), restitution, periods, 4001) for ratio in ratios])
     first = int(np.flatnonzero(rooms < 0.0)[0])
-    return float(brentq(room, ratios[first], ratios[first - 1], args=(restitution, periods)))
+    return float(brentq(scratch, ratios[first], ratios[first - 1], args=(restitution, periods)))
 
 
 def follow_to_grazing(ratio: float, restitution: float, periods: int, longest: float) -> sb.Branch:
@@ -94,21 +96,24 @@ def follow_to_grazing(ratio: float, restitution: float, periods: int, longest: f
     _, state = exact_orbit(ratio, restitution, periods)
     orbit = sb.periodic_orbit(oscillator(ratio, restitution), state, periods, phase=math.pi)
     between = (1.0005 * periods, ratio + 0.01)
-    branch = sb.continue_orbit(orbit, "frequency_ratio", between, direction="down", longest=longest)
-    assert branch.end == "grazing"
+    branch = sb.continuation(orbit, "frequency_ratio", between, direction="down", max_step=longest)
+    assert branch.termination_reason == "grazing"
     for each, value in zip(branch.orbits, branch.values, strict=True):
         # at the same velocity the wall's amplitude goes with 1/omega
         exact = exact_orbit(float(value), restitution, periods)[1] * ratio / value
         np.testing.assert_allclose(each.coordinates, exact, rtol=0.0, atol=1e-8)
-    grazing = branch.events[-1]
-    assert grazing.kind == "grazing" and grazing.orbit.passage.clearance < 5e-3
+    grazing = branch.special_points[-1]
+    assert grazing.kind == "grazing" and grazing.orbit.contact_summary.clearance < 5e-3
     assert abs(grazing.value - grazes_at(restitution, periods, ratio)) <= grazing.error < 1e-2
     return branch
 
 
 def test_restitution_orbits_are_followed_to_grazing() -> None:
     branch = follow_to_grazing(3.6, 0.8, 2, 0.1)
-    assert branch.events[-1].orbit.passage.clearance < 1e-4 and branch.events[-1].error < 1e-4
+    assert (
+        branch.special_points[-1].orbit.contact_summary.clearance < 1e-4
+        and branch.special_points[-1].error < 1e-4
+    )
     ds = branch.to_dataset()
     assert set(ds["event_kind"].values) <= {"fold", "flip", "Neimark-Sacker", "branch point", "grazing"}
 
@@ -125,23 +130,23 @@ def test_a_branch_of_the_beam() -> None:
     """One mode, from intrawell tapping up: stable first, then a flip; product of multipliers all the way."""
     system = system_of(1, 1.6, 0.03)
     orbit = sb.periodic_orbit(system, transient=1000)
-    branch = sb.continue_orbit(orbit, "velocity_amplitude", (0.005, 0.2), longest=0.1)
+    branch = sb.continuation(orbit, "velocity_amplitude", (0.005, 0.2), max_step=0.1)
     model = system.model
-    exact = -2.0 * float((model.damping_ratio * model.omega).sum()) / (model.reference_freq * 1.6)
+    exact = -2.0 * float((model.damping_ratio * model.omega).sum()) / (model.reference_frequency * 1.6)
     for each in branch.orbits:
         assert each.log_determinant == pytest.approx(exact, abs=1e-8)
-    flip = next(event for event in branch.events if event.kind == "flip")
+    flip = next(event for event in branch.special_points if event.kind == "flip")
     nearest = flip.orbit.multipliers[np.argmin(np.abs(flip.orbit.multipliers + 1.0))]
     assert abs(nearest + 1.0) < 1e-6
     doubled = sb.switch_branch(flip, "velocity_amplitude", (0.005, 0.2))
-    assert doubled.least_period == 2
+    assert doubled.minimal_period == 2
 
 
 def test_refusals() -> None:
     orbit = sb.periodic_orbit(logistic(2.5), [0.6])
     with pytest.raises(sb.InputError, match="must hold the orbit's own"):
-        sb.continue_orbit(orbit, "r", (3.0, 4.0))
+        sb.continuation(orbit, "r", (3.0, 4.0))
     with pytest.raises(sb.InputError, match="must be increasing"):
-        sb.continue_orbit(orbit, "r", (4.0, 3.0))
+        sb.continuation(orbit, "r", (4.0, 3.0))
     with pytest.raises(sb.InputError, match="direction"):
-        sb.continue_orbit(orbit, "r", (2.0, 4.0), direction="sideways")
+        sb.continuation(orbit, "r", (2.0, 4.0), direction="sideways")

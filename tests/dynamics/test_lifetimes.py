@@ -22,14 +22,16 @@ def system_of(modes: int, ratio: float = 1.625, velocity: float = 0.3) -> sb.Sys
 
 AXES = {"frequency_ratio": [1.2, 1.625], "velocity_amplitude": [0.01, 0.2, 0.3]}
 SHORT = sb.Integration(cycles=120)
-TELL = {"survival": sb.Survival(quiet=20.0), "starts": 6}
+TELL = {"survival": sb.LifetimeSettings(settling_cycles=20.0), "starts": 6}
 
 
 def test_nothing_depends_on_threads_order_or_the_other_points(tmp_path) -> None:
     system = system_of(2)
     whole = sb.lifetime_map(system, AXES, SHORT, **TELL)
     one = sb.lifetime_map(system, AXES, SHORT.replace(threads=1), **TELL)
-    kept = sb.lifetime_map(system, AXES, SHORT, store=sb.Keeping(tmp_path / "kept", chunk=2), **TELL)
+    kept = sb.lifetime_map(
+        system, AXES, SHORT, checkpoint=sb.CheckpointOptions(tmp_path / "kept", points_per_task=2), **TELL
+    )
     for other in (one, kept):
         for name in whole.data_vars:
             np.testing.assert_array_equal(whole[name].values, other[name].values, err_msg=str(name))
@@ -46,14 +48,22 @@ def test_nothing_depends_on_threads_order_or_the_other_points(tmp_path) -> None:
 
 
 def test_a_store_is_resumed_and_refuses_other_starts(tmp_path) -> None:
-    system, tally = system_of(1), sb.Tally()
-    first = sb.lifetime_map(system, AXES, SHORT, store=sb.Keeping(tmp_path / "s", chunk=2), **TELL)
-    again = sb.lifetime_map(system, AXES, SHORT, store=sb.Keeping(tmp_path / "s", tally=tally), **TELL)
-    assert tally.computed == 0 and tally.kept == 3
+    system, tally = system_of(1), sb.SweepReport()
+    first = sb.lifetime_map(
+        system, AXES, SHORT, checkpoint=sb.CheckpointOptions(tmp_path / "s", points_per_task=2), **TELL
+    )
+    again = sb.lifetime_map(
+        system, AXES, SHORT, checkpoint=sb.CheckpointOptions(tmp_path / "s", report=tally), **TELL
+    )
+    assert tally.computed == 0 and tally.resumed == 3
     assert first.drop_attrs().equals(again.drop_attrs())
     with pytest.raises(sb.InputError, match="starts"):
         sb.lifetime_map(
-            system, AXES, SHORT, store=tmp_path / "s", **(TELL | {"starts": sb.Starts(count=6, seed=1)})
+            system,
+            AXES,
+            SHORT,
+            checkpoint=tmp_path / "s",
+            **(TELL | {"starts": sb.InitialConditions(count=6, seed=1)}),
         )
 
 
@@ -69,7 +79,7 @@ def test_counts_add_up() -> None:
     falling = ds.snapping_probability.diff("after")
     assert (falling <= 0.0).all()
     assert (ds.lifetime_low <= ds.lifetime_high).all()
-    wider = refit(ds, sb.Survival(quiet=20.0, confidence=0.99))
+    wider = refit(ds, sb.LifetimeSettings(settling_cycles=20.0, confidence=0.99))
     known = ds.lifetime.notnull()
     assert (wider.lifetime_low <= ds.lifetime_low).where(known, True).all()
 
@@ -77,17 +87,21 @@ def test_counts_add_up() -> None:
 def test_the_tip_stands_still_in_space() -> None:
     """A start with the phase drawn differs from one without; none presses the beam before the drive moves."""
     system = system_of(2)
-    starts = sb.Starts(count=8, phase=True, displacement=0.0)
+    starts = sb.InitialConditions(count=8, phase=True, displacement=0.0)
     phases = [float(starts.state(system, s).phase) for s in range(8)]
     assert len(set(phases)) == 8 and all(np.pi <= phase <= 2.0 * np.pi for phase in phases)
-    ds = sb.lifetime_map(system, None, SHORT, starts=starts, survival=sb.Survival(quiet=20.0))
+    ds = sb.lifetime_map(
+        system, None, SHORT, initial_conditions=starts, settings=sb.LifetimeSettings(settling_cycles=20.0)
+    )
     assert ds.last_snap.dims == ("start",)
     assert len(np.unique(ds.last_snap)) > 1
 
 
 def test_runs_that_snap_on_are_followed_to_the_end() -> None:
     """One mode at a point where many runs go on: none is stopped because it is sure to be called continuous."""
-    ds = sb.lifetime_map(system_of(1), None, sb.Integration(cycles=400), starts=24, after=[200, 350])
+    ds = sb.lifetime_map(
+        system_of(1), None, sb.Integration(cycles=400), initial_conditions=24, after=[200, 350]
+    )
     lasting = ds.last_snap.values[ds.last_snap.values > 350.0]
     assert lasting.size == int(ds.runs_snapping) >= 8
     assert (lasting > 390.0).all(), "they still cross in the last cycles"
@@ -99,7 +113,7 @@ def test_runs_that_snap_on_are_followed_to_the_end() -> None:
 @pytest.mark.parametrize("point", MEASURED)
 def test_measured_lifetimes_come_again(point) -> None:
     """Measured twice, once with some 210 runs and here with 400: within both errors, and all of them end in well 2."""
-    ds = sb.lifetime_map(system_of(32, *point), None, sb.Integration(cycles=1000), starts=400)
+    ds = sb.lifetime_map(system_of(32, *point), None, sb.Integration(cycles=1000), initial_conditions=400)
     assert int(ds.runs_snapping) == 0
     assert float(ds.end_probability.sel(well="other")) == 1.0
     relative = float(ds.lifetime) / MEASURED[point] - 1.0
@@ -113,7 +127,7 @@ def test_measured_lifetimes_come_again(point) -> None:
     [
         ({"starts": 0}, "starts = 0"),
         ({"starts": 2.5}, "starts = 2.5"),
-        ({"survival": sb.Survival(quiet=500.0)}, "must be more than the quiet cycles"),
+        ({"survival": sb.LifetimeSettings(settling_cycles=500.0)}, "must be more than the quiet cycles"),
         ({"after": [50, 20]}, "after = [50, 20]"),
         ({"after": [1000]}, "after[0]"),
         ({"axes": {"velocity_amplitde": [0.1, 0.2]}}, "did you mean"),
@@ -133,8 +147,8 @@ def test_a_free_beam_is_refused() -> None:
 def test_no_start_presses_the_tip() -> None:
     """Beside a tip that hardly moves nothing touches at the start: an overlap would shoot the beam away."""
     ds = sb.lifetime_map(
-        system_of(1, 1.2, 0.0005), {"location": [0.3, 0.5]}, SHORT, starts=sb.Starts(count=64, displacement=1e-5),
-        survival=sb.Survival(quiet=20.0),
+        system_of(1, 1.2, 0.0005), {"location": [0.3, 0.5]}, SHORT, initial_conditions=sb.InitialConditions(count=64, displacement=1e-5),
+        settings=sb.LifetimeSettings(settling_cycles=20.0),
     )  # fmt: skip
     assert (ds.runs_never == 64).all() and (ds.end_probability.sel(well="first") == 1.0).all()
     system = system_of(4)
@@ -142,9 +156,9 @@ def test_no_start_presses_the_tip() -> None:
         turned = system.replace(**{"striker.side": side})
         for number in range(6):
             place = np.array([0.1, 0.35, 0.5])
-            many = sb.Starts(count=6).state(turned, number, location=place)
+            many = sb.InitialConditions(count=6).state(turned, number, location=place)
             rest = rest_state(turned.model, turned.striker)
             moved = np.sum(turned.model.shape_at(place) * (many.amplitude - rest.amplitude), axis=-1)
             assert (away * moved > 0.0).all()
-            one = sb.Starts(count=6).state(turned.replace(**{"striker.location": 0.35}), number)
+            one = sb.InitialConditions(count=6).state(turned.replace(**{"striker.location": 0.35}), number)
             np.testing.assert_array_equal(one.amplitude, many.amplitude[1])

@@ -15,10 +15,10 @@ def grebogi_basins(points: int):
     """Basins on the window that the map was first looked at in, points x points starts."""
     flow = grebogi()
     states = np.array([[0.1, -0.3], [math.pi - 0.1, 0.3], [0.3, 0.2], [2.0, -0.1]])
-    found = sb.attractors(flow, states, transient=400)
-    assert [each.kind for each in found.found] == ["periodic", "periodic"]
+    found = sb.find_attractors(flow, states, transient=400)
+    assert [each.kind for each in found.attractors] == ["periodic", "periodic"]
     plane = {"x[1]": np.linspace(0.0, 2.0 * math.pi, points), "x[2]": np.linspace(-0.5, 0.5, points)}
-    ds = sb.basins(found, plane, periods=2000)
+    ds = sb.basins_of_attraction(found, plane, periods=2000)
     assert ds.attrs["undecided"] == 0.0
     return ds["basin"].values
 
@@ -74,13 +74,13 @@ def test_a_cantor_border_has_its_dimension() -> None:
 def test_integrity_of_known_shapes() -> None:
     x, y = np.meshgrid(np.arange(201), np.arange(201), indexing="ij")
     disc = ((x - 100) ** 2 + (y - 100) ** 2 < 60**2).astype(int)
-    found = sb.integrity(disc, 1, attractor=(110, 100))
+    found = sb.dynamical_integrity(disc, 1, attractor=(110, 100))
     assert found.global_measure == pytest.approx(math.pi * 60**2 / 201**2, rel=5e-3)
     assert found.factor == pytest.approx(60.0, abs=1.0) and found.center == (100, 100)
     assert found.local_measure == pytest.approx(50.0, abs=1.0)
-    stretched = sb.integrity(disc, 1, spacing=[0.5, 0.5])
+    stretched = sb.dynamical_integrity(disc, 1, spacing=[0.5, 0.5])
     assert stretched.factor == pytest.approx(0.5 * found.factor)
-    rim = sb.integrity(np.ones((11, 11), dtype=int), 1)
+    rim = sb.dynamical_integrity(np.ones((11, 11), dtype=int), 1)
     assert rim.factor == pytest.approx(6.0), "the rim of the window is a border"
 
 
@@ -97,8 +97,11 @@ def test_classes_of_a_map_are_labels_too() -> None:
         (lambda: sb.basin_entropy(np.zeros((4, 4))), "must be whole numbers"),
         (lambda: sb.basin_entropy(np.zeros((4, 4), dtype=int), 5), "box = 5"),
         (lambda: sb.uncertainty_exponent(np.zeros((40, 40), dtype=int)), "no border is met"),
-        (lambda: sb.integrity(np.zeros((4, 4), dtype=int), 0, attractor=(9, 0)), "attractor = (9, 0)"),
-        (lambda: sb.integrity(np.zeros((4, 4), dtype=int), 0, spacing=[0.0, 1.0]), "spacing"),
+        (
+            lambda: sb.dynamical_integrity(np.zeros((4, 4), dtype=int), 0, attractor=(9, 0)),
+            "attractor = (9, 0)",
+        ),
+        (lambda: sb.dynamical_integrity(np.zeros((4, 4), dtype=int), 0, spacing=[0.0, 1.0]), "spacing"),
     ],
 )
 def test_refusals(call, words: str) -> None:

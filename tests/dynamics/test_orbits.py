@@ -50,8 +50,8 @@ def test_orbits_with_one_impact_in_n_periods(ratio: float, restitution: float, p
     speed, state = exact_orbit(ratio, restitution, periods)
     orbit = sb.periodic_orbit(oscillator(ratio, restitution), state * 1.003, periods, phase=math.pi)
     np.testing.assert_allclose(orbit.coordinates, state, rtol=0.0, atol=1e-8)
-    assert orbit.passage.impacts == 1
-    assert orbit.passage.least_impulse == pytest.approx((1.0 + restitution) * speed, rel=1e-8)
+    assert orbit.contact_summary.impacts == 1
+    assert orbit.contact_summary.least_impulse == pytest.approx((1.0 + restitution) * speed, rel=1e-8)
     assert math.exp(orbit.log_determinant) == pytest.approx(restitution**2, abs=1e-8)
 
 
@@ -63,11 +63,16 @@ def test_products_of_multipliers(modes: int, ratio: float, velocity: float, peri
     system = system_of(modes, ratio, velocity)
     orbit = sb.periodic_orbit(system, period=periods, transient=2000)
     model = system.model
-    exact = -2.0 * periods * float((model.damping_ratio * model.omega).sum()) / (model.reference_freq * ratio)
+    exact = (
+        -2.0
+        * periods
+        * float((model.damping_ratio * model.omega).sum())
+        / (model.reference_frequency * ratio)
+    )
     assert orbit.log_determinant == pytest.approx(exact, abs=1e-8)
     assert np.log(np.abs(orbit.multipliers)).sum() == pytest.approx(exact, abs=1e-8)
-    assert orbit.is_stable and orbit.least_period == periods
-    assert orbit.passage.impacts >= 1
+    assert orbit.is_stable and orbit.minimal_period == periods
+    assert orbit.contact_summary.impacts >= 1
     again = sb.advance(orbit.system, orbit.state, periods, integration=sb.Integration(accuracy="reference"))
     size = abs(orbit.state.amplitude[0])
     np.testing.assert_allclose(again.amplitude, orbit.state.amplitude, rtol=0.0, atol=1e-9 * size)
@@ -78,7 +83,7 @@ def test_multipliers_come_in_reciprocal_pairs_without_damping() -> None:
     for damping in (0.002, 0.0005, 0.0):
         orbit = sb.periodic_orbit(system_of(1, 1.6, 0.03, damping), orbit)
     values = orbit.multipliers
-    assert orbit.passage.impacts == 1
+    assert orbit.contact_summary.impacts == 1
     np.testing.assert_allclose(values[0] * values[1], 1.0, atol=1e-8)
 
 
@@ -91,27 +96,27 @@ def test_known_maps() -> None:
     np.testing.assert_allclose(second.coordinates[0], (-0.7 - root) / 2.8, rtol=1e-9)
     assert not first.is_stable and first.unstable == 1
     twice = sb.periodic_orbit(logistic(3.2), [0.5], 4, transient=400)
-    assert twice.least_period == 2
+    assert twice.minimal_period == 2
 
 
 def test_coarse_derivatives_are_told(monkeypatch) -> None:
-    """At level "map" multipliers are off by more than rounding and less than what is said."""
-    from snapbeam.core import findings
+    """At level standard multipliers are off by more than rounding and less than what is said."""
+    from snapbeam.core import diagnostics
 
-    monkeypatch.setattr(findings, "_told", set())
+    monkeypatch.setattr(diagnostics, "_told", set())
     system = system_of(1, 1.6, 0.03)
-    with pytest.warns(sb.PlausibilityWarning, match="--accuracy reference"):
-        coarse = sb.periodic_orbit(system, transient=1500, integration=sb.Integration(accuracy="map"))
+    with pytest.warns(sb.DiagnosticWarning, match="--accuracy reference"):
+        coarse = sb.periodic_orbit(system, transient=1500, integration=sb.Integration(accuracy="standard"))
     fine = sb.periodic_orbit(system, coarse.coordinates)
-    (told,) = coarse.findings
+    (told,) = coarse.diagnostics
     apart = np.abs(coarse.multipliers - fine.multipliers).max()
     assert 1e-4 < apart < told.numbers["relative_error"]
-    assert findings.findings_of(coarse.to_dataset()) == coarse.findings
-    assert fine.findings == () == findings.findings_of(fine.to_dataset())
+    assert diagnostics.diagnostics_of(coarse.to_dataset()) == coarse.diagnostics
+    assert fine.diagnostics == () == diagnostics.diagnostics_of(fine.to_dataset())
 
 
 def test_what_does_not_converge_says_why() -> None:
-    with pytest.raises(sb.NoOrbit, match="try another period"):
+    with pytest.raises(sb.OrbitNotFoundError, match="try another period"):
         sb.periodic_orbit(logistic(3.9), [0.3], 7, iterations=2)
     free = sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), paper.CONTACT)
     with pytest.raises(sb.InputError, match="striker = None"):

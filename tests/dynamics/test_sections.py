@@ -13,9 +13,11 @@ import snapbeam as sb
 
 def test_a_stroboscopic_section_is_that_of_advance() -> None:
     system = system_of(2, 1.4, 0.02)
-    ds = sb.poincare(system, periods=12, transient=0, integration=sb.Integration(accuracy="reference"))
+    ds = sb.poincare_section(
+        system, periods=12, transient=0, integration=sb.Integration(accuracy="reference")
+    )
     how = sb.Integration(accuracy="reference")
-    every = sb.advance(system, periods=12, every=True, integration=how)
+    every = sb.advance(system, periods=12, save_every_period=True, integration=how)
     size = abs(every.amplitude[0, 0])
     np.testing.assert_allclose(ds["modal_amplitude"].values[1:], every.amplitude, rtol=0.0, atol=1e-6 * size)
     assert (
@@ -25,7 +27,7 @@ def test_a_stroboscopic_section_is_that_of_advance() -> None:
 
 
 def test_an_impact_section_is_on_the_contact() -> None:
-    ds = sb.poincare(system_of(1, 1.6, 0.03), "impact", 40, transient=2000)
+    ds = sb.poincare_section(system_of(1, 1.6, 0.03), "impact", 40, transient=2000)
     assert ds.sizes["point"] == 40
     tip = ds["displacement"].values
     assert tip.std() < 1e-3 * abs(tip.mean()), "the response is of period 1: every impact is alike"
@@ -33,10 +35,10 @@ def test_an_impact_section_is_on_the_contact() -> None:
 
 
 def test_a_section_at_a_level_is_on_it() -> None:
-    ds = sb.poincare(system_of(1, 1.6, 0.3), ("center_displacement", 0.0, "up"), 60, transient=0)
+    ds = sb.poincare_section(system_of(1, 1.6, 0.3), ("midspan_displacement", 0.0, "up"), 60, transient=0)
     assert ds.sizes["point"] >= 2
-    np.testing.assert_allclose(ds["center_displacement"].values, 0.0, atol=1e-7)
-    assert (ds["center_velocity"].values > 0.0).all()
+    np.testing.assert_allclose(ds["midspan_displacement"].values, 0.0, atol=1e-7)
+    assert (ds["midspan_velocity"].values > 0.0).all()
 
 
 def test_sweeps_meet_the_branch() -> None:
@@ -44,12 +46,12 @@ def test_sweeps_meet_the_branch() -> None:
     system = system_of(1, 1.6, 0.03, 0.02)
     values = np.linspace(0.02, 0.06, 5)
     ds = sb.bifurcation_diagram(system, "velocity_amplitude", values, periods=(400, 16))
-    assert ds["center_displacement"].dims == ("sweep", "velocity_amplitude", "period")
+    assert ds["midspan_displacement"].dims == ("sweep", "velocity_amplitude", "period")
     assert (ds["least_period"] == 1).all() and not ds["failed"].any()
     orbit = sb.periodic_orbit(system.replace(**{"drive.velocity_amplitude": 0.04}), transient=300)
     model = orbit.flow.system.model
-    center = float(model.center_shape @ orbit.state.amplitude) / orbit.flow.system.scale.length
-    swept = ds["center_displacement"].sel(velocity_amplitude=0.04, method="nearest")
+    center = float(model.midspan_shape @ orbit.state.amplitude) / orbit.flow.system.scale.length
+    swept = ds["midspan_displacement"].sel(velocity_amplitude=0.04, method="nearest")
     assert np.abs(swept.values - center).max(axis=-1).min() < 1e-3
     np.testing.assert_allclose(ds["impacts_per_period"], 1.0, atol=0.02)
 
@@ -57,12 +59,19 @@ def test_sweeps_meet_the_branch() -> None:
 def test_sweeps_show_hysteresis_and_starts_what_they_miss() -> None:
     """Snapped through on the way up, the beam stays in the far well on the way down."""
     system = system_of(1, 1.6, 0.03, 0.05)
-    ds = sb.bifurcation_diagram(system, "velocity_amplitude", [0.03, 0.4], periods=(150, 16), starts=2)
+    ds = sb.bifurcation_diagram(
+        system, "velocity_amplitude", [0.03, 0.4], periods=(150, 16), initial_conditions=2
+    )
     assert list(ds["sweep"].values) == ["up", "down", "start 0", "start 1"]
-    weak = ds["center_displacement"].sel(velocity_amplitude=0.03).isel(period=-1)
+    weak = ds["midspan_displacement"].sel(velocity_amplitude=0.03).isel(period=-1)
     assert float(weak.sel(sweep="up")) < 0.0 and float(weak.sel(sweep="start 0")) < 0.0
     again = sb.bifurcation_diagram(
-        system, "velocity_amplitude", [0.03, 0.4], sb.Integration(threads=1), periods=(150, 16), starts=2
+        system,
+        "velocity_amplitude",
+        [0.03, 0.4],
+        sb.Integration(threads=1),
+        periods=(150, 16),
+        initial_conditions=2,
     )
     for name in ds.data_vars:
         np.testing.assert_array_equal(ds[name].values, again[name].values, err_msg=str(name))
@@ -86,17 +95,20 @@ def test_a_parameter_of_the_structure_may_be_swept() -> None:
         system, "model.damping_ratio", [0.04, 0.05], sweeps=["down"], periods=(200, 4)
     )
     plain = sb.bifurcation_diagram(system, "velocity_amplitude", [0.03], sweeps=["up"], periods=(200, 4))
-    one = ds["center_displacement"].sel(damping_ratio=0.05).values.ravel()
-    np.testing.assert_allclose(one, plain["center_displacement"].values.ravel(), atol=1e-6)
+    one = ds["midspan_displacement"].sel(damping_ratio=0.05).values.ravel()
+    np.testing.assert_allclose(one, plain["midspan_displacement"].values.ravel(), atol=1e-6)
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda s: sb.poincare(s, "nowhere"), "section"),
-        (lambda s: sb.poincare(s, ("center_displacement", 5.0, "up"), 3, transient=0), "is never met"),
-        (lambda s: sb.poincare(s, ("contact_force", 0.0, "up")), "section[0]"),
-        (lambda s: sb.bifurcation_diagram(s, "contact.law", [1.0, 2.0]), "contact.law"),
+        (lambda s: sb.poincare_section(s, "nowhere"), "section"),
+        (
+            lambda s: sb.poincare_section(s, ("midspan_displacement", 5.0, "up"), 3, transient=0),
+            "is never met",
+        ),
+        (lambda s: sb.poincare_section(s, ("contact_force", 0.0, "up")), "section[0]"),
+        (lambda s: sb.bifurcation_diagram(s, "contact.type", [1.0, 2.0]), "contact.type"),
         (lambda s: sb.bifurcation_diagram(s, "velocity_amplitude", [0.2, 0.1]), "strictly increasing"),
         (lambda s: sb.bifurcation_diagram(s, "velocity_amplitude", [0.1, 0.2], sweeps=[]), "sweeps"),
         (lambda s: sb.bifurcation_diagram(s, "velocity_amplitude", [0.1, 0.2], periods=3), "periods = 3"),

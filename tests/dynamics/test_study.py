@@ -44,18 +44,19 @@ def test_claims_hold_by_rules_that_could_fail() -> None:
     claims = study.rows()
     assert len(claims) >= 6
     for row in claims:
-        assert row.finding.verdict in ("holds", "in part"), row.says
-        assert all(quantity.uncertainty > 0.0 for quantity in row.finding.quantities.values())
+        assert row.diagnostic.verdict in ("holds", "in part"), row.says
+        assert all(quantity.uncertainty > 0.0 for quantity in row.diagnostic.quantities.values())
     data = study.stored("lifetimes")
     shares = {modes: (0.4, 0.01) for modes in study.MODES}
     odd = [(1, "Fig. 6", 200, 0.5, 0.9, 8.0)]
     apart = {"ratio": (0.05, 0.001), "alpha": (0.02, 0.001)}
     points = data["points"].copy(deep=True)
     points["runs_snapping"][:], points["end_probability"][:], points["lifetime"][:] = 200, 0.1, 900.0
-    endless = {f"long_{level}": data[f"long_{level}"].copy(deep=True) for level in ("map", "reference")}
+    endless = {f"long_{level}": data[f"long_{level}"].copy(deep=True) for level in ("standard", "reference")}
     for ds in endless.values():
         ds["last_snap"][:] = 10_000.0
     verdicts = [
-        row.finding.verdict for row in study_claims.claims({"points": points} | endless, shares, odd, apart)
+        row.diagnostic.verdict
+        for row in study_claims.claims({"points": points} | endless, shares, odd, apart)
     ]
     assert verdicts == ["fails"] * 6

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from snapbeam.core.validate import InputError
-from snapbeam.dynamics.lifetimes.survival import Survival, fit_lifetime, proportion
+from snapbeam.dynamics.lifetimes.survival import LifetimeSettings, fit_lifetime, proportion
 
 LIFETIME, DELAY = 50.0, 8.0
 
@@ -73,8 +73,8 @@ def test_proportions() -> None:
         (lambda: fit_lifetime([-1.0], True), "time: must be at least 0"),
         (lambda: fit_lifetime([1.0], True, confidence=1.0), "confidence = 1.0"),
         (lambda: proportion(3, 2), "hits: must be between 0"),
-        (lambda: Survival(quiet=0.0), "quiet = 0.0"),
-        (lambda: Survival(delay=-1.0), "delay = -1.0"),
+        (lambda: LifetimeSettings(settling_cycles=0.0), "quiet = 0.0"),
+        (lambda: LifetimeSettings(delay=-1.0), "delay = -1.0"),
     ],
 )
 def test_refusals(call, words: str) -> None:

@@ -22,7 +22,7 @@ def test_structure_is_the_model_about_its_well(side: str) -> None:
     """The equations of a structure, in q, are Eq. (11) in alpha: the energy of any state is the same."""
     structure = structure_of(MODEL, side)
     sign = 1.0 if side == "below" else -1.0
-    np.testing.assert_array_equal(structure.equilibrium, sign * MODEL.equilibrium)
+    np.testing.assert_array_equal(structure.equilibrium, sign * MODEL.well_amplitude)
     rng = np.random.default_rng(0)
     alpha = 1e-3 * rng.normal(size=(4, 5))
     velocity = rng.normal(size=(4, 5))
@@ -33,12 +33,12 @@ def test_structure_is_the_model_about_its_well(side: str) -> None:
     gq, r = q @ structure.well, q @ structure.coupling
     qr = (q * r).sum(axis=1)
     energy = 0.5 * ((p**2) + (structure.omega * q) ** 2).sum(axis=1)
-    energy = energy + structure.tension_stiffness * qr * (gq + 0.25 * qr)
+    energy = energy + structure.nonlinear_stiffness * qr * (gq + 0.25 * qr)
     expected = MODEL.kinetic_energy(velocity) + MODEL.potential_energy(alpha) - MODEL.well_energy
     np.testing.assert_allclose(energy, expected, rtol=1e-9)
     # the centre, and the other well
     center = structure.center_rest + q @ structure.center
-    np.testing.assert_allclose(center, sign * (alpha @ MODEL.center_shape), rtol=0.0, atol=1e-16)
+    np.testing.assert_allclose(center, sign * (alpha @ MODEL.midspan_shape), rtol=0.0, atol=1e-16)
     np.testing.assert_allclose(
         structure.amplitudes(structure.shift), -structure.equilibrium, rtol=1e-9, atol=1e-16
     )
@@ -59,7 +59,7 @@ def test_ticks_make_whole_periods() -> None:
         SYSTEM, sb.Integration(cycles=7), {"drive.frequency_ratio": np.array([0.3, 1.0, 3.7])}
     )
     runs = ensemble.runs
-    period = 1.0 / (MODEL.reference_freq * np.array([0.3, 1.0, 3.7]))
+    period = 1.0 / (MODEL.reference_frequency * np.array([0.3, 1.0, 3.7]))
     np.testing.assert_allclose(runs["period"] * runs["tick"], period, rtol=1e-15)
     np.testing.assert_array_equal(runs["period"] % runs["step"], 0)
     np.testing.assert_array_equal(runs["end"], 7 * runs["period"])
@@ -82,17 +82,17 @@ def test_the_tip_touches_unless_a_gap_is_given() -> None:
     for side, sign in (("below", 1.0), ("above", -1.0)):
         given = {"striker.side": side}
         struck = SYSTEM.replace(**given)
-        rest = sign * float(MODEL.shape_at(paper.LOCATION) @ MODEL.equilibrium)
-        placed = struck.replace(**{"start.striker_position": rest - sign * 2e-5})
+        rest = sign * float(MODEL.shape_at(paper.LOCATION) @ MODEL.well_amplitude)
+        placed = struck.replace(**{"initial_state.striker_position": rest - sign * 2e-5})
         found = make_ensemble(placed, sb.Integration(cycles=1)).runs["offset"][0]
         assert found == pytest.approx(-2e-5, rel=1e-9), side
 
 
 def test_a_column_that_is_the_systems_own_changes_nothing() -> None:
-    asked = sb.Integration(cycles=2)
-    alone = make_ensemble(SYSTEM, asked)
+    kernel_input = sb.Integration(cycles=2)
+    alone = make_ensemble(SYSTEM, kernel_input)
     for name in ("drive.frequency_ratio", "striker.location", "contact.stiffness", "drive.phase"):
-        same = make_ensemble(SYSTEM, asked, {name: np.full(2, SYSTEM.get(name))})
+        same = make_ensemble(SYSTEM, kernel_input, {name: np.full(2, SYSTEM.get(name))})
         assert same.size == 2
         for column in alone.runs.dtype.names:
             if column not in ("start_row",):

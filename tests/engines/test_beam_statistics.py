@@ -11,7 +11,7 @@ import snapbeam as sb
 from snapbeam import paper
 from snapbeam.engines.outcomes import Statistic, register, withdraw
 from snapbeam.model.start import rest_state
-from snapbeam.sweeps.replicas import Replicas, perturbed_start
+from snapbeam.sweeps.replicas import Replicates, perturbed_start
 
 MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
 MASS = 0.02
@@ -21,15 +21,15 @@ SUSPENDED = sb.Striker(
     spring=MASS * (2.0 * math.pi * 30.0) ** 2,
     damper=0.1,
 )
-SPHERE = sb.Striker(drive=sb.Flight(speed=0.4), mass=2e-3, gap=1e-4)
-STOP = sb.Striker(drive=sb.Still(), location=0.3, side="above", gap=5e-5)
+SPHERE = sb.Striker(drive=sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=1e-4)
+STOP = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
 STRUCK = {"suspended": SUSPENDED, "sphere": SPHERE, "two strikers": [SUSPENDED, STOP]}
 
 
 def recorded(system: sb.System, how: sb.Integration) -> sb.Run:
     """A run with so many instants that its samples give the same statistics."""
     ratio = 1.21 if system.striker.drive.name == "sine" else 1.0
-    end = how.cycles / (MODEL.reference_freq * ratio)
+    end = how.cycles / (MODEL.reference_frequency * ratio)
     return sb.simulate(system, how, sample_times=np.linspace(0.0, end * (1.0 - 1e-12), 20001))
 
 
@@ -68,16 +68,16 @@ def test_a_sphere_that_flies_away_leaves_no_trace_in_the_statistics() -> None:
         withdraw("own_peak")
     assert float(run.end.striker_rate) < -0.1, "it flies away"
     assert_of_beam(run)
-    peak = float(np.abs(run.dataset.displacement).max()) * MODEL.length_scale
+    peak = float(np.abs(run.dataset.displacement_at_striker).max()) * MODEL.length_scale
     assert run.outcome["own_peak"] == pytest.approx(peak, rel=5e-3)
     back = MODEL.linear_modes.T @ MODEL.mass
     q = (run.dataset.modal_amplitude.values - rest_state(MODEL, SPHERE).amplitude) @ back.T
     p = run.dataset.modal_velocity.values @ back.T
     energy = 0.5 * (p * p + (MODEL.omega * q) ** 2)
-    high = MODEL.omega > 2.0 * 2.0 * math.pi * MODEL.reference_freq
+    high = MODEL.omega > 2.0 * 2.0 * math.pi * MODEL.reference_frequency
     assert high.any() and not high.all()
     share = energy[:, high].sum() / energy.sum()
-    assert run.outcome.high_frequency_share == pytest.approx(share, rel=0.05)
+    assert run.outcome.high_frequency_energy_fraction == pytest.approx(share, rel=0.05)
 
 
 def _peak(held: float, step: tuple) -> float:
@@ -86,17 +86,17 @@ def _peak(held: float, step: tuple) -> float:
 
 def test_energy_in_a_circuit_is_not_in_the_modes() -> None:
     """All modes of the beam are high here, so that their share is 1, whatever energy the circuit stores."""
-    coil = sb.Coil(constant=3.0, resistance=50.0, inductance=0.5)
+    coil = sb.ElectromagneticHarvester(constant=3.0, resistance=50.0, inductance=0.5)
     start = sb.State(amplitude=0.8 * MODEL.mirrored.equilibrium)
     system = sb.System(MODEL, start=start, harvester=coil)
     run = sb.simulate(system, sb.Integration(cycles=4, high_frequency_ratio=0.2))
     assert float(run.dataset.energy_circuit.max()) > 1e-3 * float(run.dataset.energy_beam.max())
-    assert run.outcome.high_frequency_share == pytest.approx(1.0, rel=1e-12)
+    assert run.outcome.high_frequency_energy_fraction == pytest.approx(1.0, rel=1e-12)
 
 
 def test_replicates_keep_the_state_of_the_striker() -> None:
     start = sb.State(amplitude=MODEL.equilibrium, striker_shift=-1e-4, striker_rate=0.03)
     system = sb.System(MODEL, paper.CONTACT, SUSPENDED, start)
-    begun = perturbed_start(system, Replicas(2), 1)
+    begun = perturbed_start(system, Replicates(2), 1)
     assert float(begun.striker_shift) == -1e-4 and float(begun.striker_rate) == 0.03
     assert (begun.amplitude != start.amplitude).all()

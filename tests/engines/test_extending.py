@@ -19,7 +19,7 @@ import snapbeam as sb
 from snapbeam import paper
 from snapbeam.config import lookup, parameters
 from snapbeam.core.validate import InputError
-from snapbeam.engines.outcomes import STATISTICS, withdraw
+from snapbeam.engines.outcomes import STATISTICS, unregister
 from snapbeam.model.contact import LAWS
 
 FUNCTION = '''"""The deepest that the tip ever is, at the end of a step, m."""
@@ -93,7 +93,7 @@ def own(tmp_path_factory):
         yield import_module("own_law").LinearContact, statistic, law
     finally:
         sys.path[:] = [path for path in sys.path if path not in (str(statistic), str(law))]
-        withdraw("max_penetration")
+        unregister("max_penetration")
         del LAWS["linear"]
         assert package_hash() == before
 
@@ -101,7 +101,7 @@ def own(tmp_path_factory):
 def thrown(law: type[sb.ContactLaw], spring: float) -> sb.System:
     """A free mass that meets the tip of a shaker at rest."""
     model = sb.ReducedModel.from_matrices(
-        [[MASS]], [0.0], contact_shape=[1.0], length_scale=0.335e-3, reference_freq=80.0
+        [[MASS]], [0.0], contact_shape=[1.0], length_scale=0.335e-3, reference_frequency=80.0
     )
     return sb.System(
         model, law(spring), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0),
@@ -116,8 +116,8 @@ def test_files_touched(own) -> None:
     assert LAWS["linear"] is law
     assert "max_penetration" in STATISTICS
     # the parameter of the law is in the table without a file more, beside another law's of the same name
-    assert lookup("contact.spring").quantity.unit == "N/m"
-    assert "linear" in parameters()["contact.spring"].kinds
+    assert lookup("contact.stiffness").quantity.unit == "N/m"
+    assert "linear" in parameters()["contact.stiffness"].kinds
 
 
 @pytest.mark.slow
@@ -125,13 +125,13 @@ def test_impact_of_a_free_mass_on_a_spring(own) -> None:
     """Half a period: duration pi sqrt(m/k), greatest force v sqrt(k m), depth v sqrt(m/k), and nothing lost."""
     law, *_ = own
     springs = np.geomspace(1e5, 1e7, 5)
-    ds = sb.sweep(thrown(law, 1e6), {"contact.spring": springs}, sb.Integration(cycles=1))
+    ds = sb.sweep(thrown(law, 1e6), {"contact.stiffness": springs}, sb.Integration(cycles=1))
     assert (ds.status == sb.RunStatus.OK).all() and (ds.impacts == 1).all()
     assert ds.spring.attrs == {
-        "units": "N/m", "long_name": "stiffness of the contact", "parameter": "contact.spring",
+        "units": "N/m", "long_name": "stiffness of the contact", "parameter": "contact.stiffness",
     }  # fmt: skip
     root = np.sqrt(MASS / springs)
-    np.testing.assert_allclose(ds.contact_share * (1.0 / 80.0), math.pi * root, rtol=1e-3)
+    np.testing.assert_allclose(ds.contact_time_fraction * (1.0 / 80.0), math.pi * root, rtol=1e-3)
     np.testing.assert_allclose(ds.peak_force, SPEED * np.sqrt(springs * MASS), rtol=1e-3)
     np.testing.assert_allclose(ds.max_penetration, SPEED * root, rtol=2e-2)
     np.testing.assert_allclose(ds.impulse, 2.0 * MASS * SPEED, rtol=2e-3)
@@ -146,14 +146,14 @@ def test_a_beam_struck_by_a_spring(own, tmp_path) -> None:
         sb.ReducedModel.from_beam(paper.BEAM, modes=4, damping_ratio=0.0), law(2e6),
         sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.05),
     )  # fmt: skip
-    axes = {"contact.spring": [5e5, 2e6], "velocity_amplitude": [0.02, 0.3, 0.5]}
+    axes = {"contact.stiffness": [5e5, 2e6], "velocity_amplitude": [0.02, 0.3, 0.5]}
     ds = sb.sweep(system, axes, sb.Integration(cycles=8))
     assert (ds.status == sb.RunStatus.OK).all()
     # without damping nothing is dissipated, and the spring gives back what it takes
-    assert (abs(ds.dissipated_energy) < 2e-3 * ds.gross_work).all()
+    assert (abs(ds.energy_dissipated) < 2e-3 * ds.gross_work).all()
     assert (ds.max_penetration > 0.0).all()
-    early = sb.sweep(system, axes, sb.Integration(cycles=8, early_decision=True))
-    np.testing.assert_array_equal(early.response, ds.response)
+    early = sb.sweep(system, axes, sb.Integration(cycles=8, early_termination=True))
+    np.testing.assert_array_equal(early.response_class, ds.response_class)
     system.save(tmp_path / "own.toml")
     assert sb.System.load(tmp_path / "own.toml") == system
 

@@ -10,7 +10,15 @@ import pytest
 import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.validate import InputError
-from snapbeam.engines.outcomes import BOOK, STATISTICS, Statistic, book_dtype, empty_books, register, withdraw
+from snapbeam.engines.outcomes import (
+    ACCUMULATORS,
+    STATISTICS,
+    Statistic,
+    accumulators_dtype,
+    empty_accumulators,
+    register,
+    unregister,
+)
 
 MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=8)
 
@@ -18,9 +26,11 @@ MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=8)
 def run_of(pair: tuple[float, float], cycles: int, side: str = "below") -> tuple[sb.Run, sb.Run]:
     """A run, and the same one sampled densely and evenly."""
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1], location=0.4, side=side)
-    system, asked = sb.System(MODEL, paper.CONTACT, shaker), sb.Integration(cycles=cycles)
-    end = cycles / (pair[0] * MODEL.reference_freq)
-    return sb.simulate(system, asked), sb.simulate(system, asked, sample_times=np.linspace(0.0, end, 60_001))
+    system, kernel_input = sb.System(MODEL, paper.CONTACT, shaker), sb.Integration(cycles=cycles)
+    end = cycles / (pair[0] * MODEL.reference_frequency)
+    return sb.simulate(system, kernel_input), sb.simulate(
+        system, kernel_input, sample_times=np.linspace(0.0, end, 60_001)
+    )
 
 
 @pytest.fixture(
@@ -40,11 +50,11 @@ def test_peaks(runs) -> None:
     shown, outcome = dense.dataset, run.outcome
     for name, values in (
         ("displacement", shown.displacement),
-        ("center_displacement", shown.center_displacement),
+        ("midspan_displacement", shown.midspan_displacement),
     ):
         assert outcome[f"peak_{name}"] == pytest.approx(float(abs(values).max()), abs=2e-3)
         assert outcome[f"peak_{name}"] == max(abs(outcome[f"min_{name}"]), abs(outcome[f"max_{name}"]))
-    for name, values in (("velocity", shown.velocity), ("center_velocity", shown.center_velocity)):
+    for name, values in (("velocity", shown.velocity), ("midspan_velocity", shown.midspan_velocity)):
         peak = float(abs(values).max())
         # taken at the ends of steps
         assert 0.9 * peak < outcome[f"peak_{name}"] < 1.0001 * peak
@@ -55,9 +65,9 @@ def test_root_mean_squares(runs) -> None:
     shown, outcome = dense.dataset, run.outcome
     for name, values in (
         ("displacement", shown.displacement),
-        ("center_displacement", shown.center_displacement),
+        ("midspan_displacement", shown.midspan_displacement),
         ("velocity", shown.velocity),
-        ("center_velocity", shown.center_velocity),
+        ("midspan_velocity", shown.midspan_velocity),
     ):
         assert outcome[f"rms_{name}"] == pytest.approx(math.sqrt(mean(shown, values.values**2)), rel=2e-2), (
             name
@@ -72,15 +82,15 @@ def test_impulse_work_and_power(runs) -> None:
         assert outcome.impulse == pytest.approx(float(run.impacts.impulse.sum()), rel=1e-12)
     time = shown.time.values
     assert outcome.impulse == pytest.approx(np.trapezoid(shown.contact_force, time), rel=2e-2)
-    assert outcome.shaker_work == pytest.approx(float(shown.work_shaker[-1]), rel=1e-6, abs=1e-12)
+    assert outcome.striker_work == pytest.approx(float(shown.striker_work[-1]), rel=1e-6, abs=1e-12)
     assert outcome.gross_work == float(run.dataset.attrs["gross_work"])
-    assert outcome.gross_work >= abs(outcome.shaker_work) * (1.0 - 1e-14)
-    assert outcome.mean_power == pytest.approx(outcome.shaker_work / time[-1], rel=1e-12)
+    assert outcome.gross_work >= abs(outcome.striker_work) * (1.0 - 1e-14)
+    assert outcome.mean_power == pytest.approx(outcome.striker_work / time[-1], rel=1e-12)
 
 
 def test_dissipated_energy_is_what_the_ledger_says(runs) -> None:
     run, dense = runs
-    assert run.outcome.dissipated_energy == pytest.approx(
+    assert run.outcome.energy_dissipated == pytest.approx(
         float(dense.dataset.energy_dissipated[-1]), abs=2e-4 * run.outcome.gross_work
     )
 
@@ -88,52 +98,55 @@ def test_dissipated_energy_is_what_the_ledger_says(runs) -> None:
 def test_share_of_the_energy_in_high_modes() -> None:
     """Of linear modes about the well at hand; the multiple of omega_1 is asked for."""
     run, dense = run_of((1.4, 0.02), 5)
-    assert run.outcome.crossings == 0
-    limit = run.integration.high_frequency_ratio * MODEL.reference_freq
+    assert run.summary.zero_crossings == 0
+    limit = run.integration.high_frequency_ratio * MODEL.reference_frequency
     back = MODEL.mass @ MODEL.linear_modes
-    q = (dense.dataset.modal_amplitude.values - MODEL.equilibrium) @ back
+    q = (dense.dataset.modal_amplitude.values - MODEL.well_amplitude) @ back
     p = dense.dataset.modal_velocity.values @ back
     energy = 0.5 * (p**2 + (MODEL.omega * q) ** 2)
-    high = MODEL.natural_freq > limit
+    high = MODEL.natural_frequencies > limit
     assert high.any() and not high.all()
     share = mean(dense.dataset, energy[:, high].sum(axis=1)) / mean(dense.dataset, energy.sum(axis=1))
-    assert run.outcome.high_frequency_share == pytest.approx(share, rel=0.1)
+    assert run.summary.high_frequency_energy_fraction == pytest.approx(share, rel=0.1)
     whole = sb.simulate(run.system, run.integration.replace(high_frequency_ratio=0.5), sample_times=[0.0])
     none = sb.simulate(run.system, run.integration.replace(high_frequency_ratio=1e4), sample_times=[0.0])
-    assert (whole.outcome.high_frequency_share, none.outcome.high_frequency_share) == (
+    assert (whole.summary.high_frequency_energy_fraction, none.summary.high_frequency_energy_fraction) == (
         pytest.approx(1.0),
         0.0,
     )
-    assert whole.outcome.peak_force == run.outcome.peak_force
+    assert whole.summary.peak_force == run.summary.peak_force
 
 
 def test_a_map_has_the_statistics_of_its_runs() -> None:
     system = sb.System(MODEL, paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))
-    asked = sb.Integration(cycles=4)
-    ds = sb.sweep(system, {"velocity_amplitude": [0.18, 0.3]}, asked)
+    kernel_input = sb.Integration(cycles=4)
+    ds = sb.sweep(system, {"velocity_amplitude": [0.18, 0.3]}, kernel_input)
     assert set(STATISTICS) == set(ds.data_vars)
     for i, amplitude in enumerate(ds.velocity_amplitude.values):
-        run = sb.simulate(system.replace(**{"drive.velocity_amplitude": float(amplitude)}), asked)
-        assert list(run.outcome) == list(STATISTICS)
+        run = sb.simulate(system.replace(**{"drive.velocity_amplitude": float(amplitude)}), kernel_input)
+        assert list(run.summary) == list(STATISTICS)
         for name in STATISTICS:
-            np.testing.assert_equal(ds[name].values[i], run.outcome[name], err_msg=name)
+            np.testing.assert_equal(ds[name].values[i], run.summary[name], err_msg=name)
 
 
 def test_rows_say_what_they_are() -> None:
     for name, row in STATISTICS.items():
         assert row.name == name and name.isidentifier()
         assert np.dtype(row.dtype)
-        assert len(row.words) > 5 and row.words[0].islower() and not row.words.endswith(".")
+        assert len(row.long_name) > 5 and row.long_name[0].islower() and not row.long_name.endswith(".")
         assert row.update is None, "the package's own are columns of every kernel"
-    assert BOOK == book_dtype()
+    assert ACCUMULATORS == accumulators_dtype()
 
 
 def test_books_begin_empty() -> None:
-    books = empty_books(3)
-    assert books.dtype == BOOK
-    assert (books["status"] == sb.RunStatus.NOT_RUN).all()
-    assert np.isnan(books["last_crossing"]).all() and np.isnan(books["decided_at"]).all()
-    assert (books["peak_force"] == 0.0).all()
+    accumulators_of_runs = empty_accumulators(3)
+    assert accumulators_of_runs.dtype == ACCUMULATORS
+    assert (accumulators_of_runs["status"] == sb.RunStatus.NOT_RUN).all()
+    assert (
+        np.isnan(accumulators_of_runs["last_zero_crossing"]).all()
+        and np.isnan(accumulators_of_runs["early_stop_time"]).all()
+    )
+    assert (accumulators_of_runs["peak_force"] == 0.0).all()
 
 
 # ---------------------------------------------------------------------- rows of somebody
@@ -149,21 +162,21 @@ def test_a_formula_of_what_is_kept_costs_no_compilation() -> None:
     register(row)
     try:
         run = sb.simulate(system, sb.Integration(cycles=4))
-        duration = 4.0 / (1.4 * MODEL.reference_freq)
-        assert run.outcome.mean_force == pytest.approx(run.outcome.impulse / duration, rel=1e-12)
+        duration = 4.0 / (1.4 * MODEL.reference_frequency)
+        assert run.summary.mean_force == pytest.approx(run.summary.impulse / duration, rel=1e-12)
         ds = sb.sweep(system, {"velocity_amplitude": [0.02, 0.03]}, sb.Integration(cycles=4))
-        assert ds.mean_force.values[0] == run.outcome.mean_force
-        assert ds.mean_force.attrs == {"units": "N", "long_name": row.words}
-        assert "mean_force" in run.outcome.table()
-        assert book_dtype() == BOOK
+        assert ds.mean_force.values[0] == run.summary.mean_force
+        assert ds.mean_force.attrs == {"units": "N", "long_name": row.long_name}
+        assert "mean_force" in run.summary.to_text()
+        assert accumulators_dtype() == ACCUMULATORS
     finally:
-        withdraw("mean_force")
-    assert "mean_force" not in sb.simulate(system, sb.Integration(cycles=1)).outcome
+        unregister("mean_force")
+    assert "mean_force" not in sb.simulate(system, sb.Integration(cycles=1)).summary
 
 
 def test_what_cannot_be_registered() -> None:
     def value(reading):
-        return reading.book["impacts"]
+        return reading.accumulators["impacts"]
 
     for name, message in (
         ("impacts", "statistic 'impacts': there is one of that name"),
@@ -173,4 +186,4 @@ def test_what_cannot_be_registered() -> None:
             register(Statistic(name, "float64", "1", "what it is", value))
     for name in ("impacts", "nothing"):
         with pytest.raises(InputError, match=f"statistic '{name}': was not registered"):
-            withdraw(name)
+            unregister(name)

@@ -43,9 +43,10 @@ def test_a_changed_system_says_what_is_old(tab, served, small_map, system):
     })  # fmt: skip
     outcome = sb.simulate(changed, sb.Integration(cycles=30)).outcome
     page.wait(
-        lambda: f"{outcome.crossings} crossings, {outcome.impacts} impacts" in page.head(), "the changed run"
+        lambda: f"{outcome.zero_crossings} crossings, {outcome.impacts} impacts" in page.head(),
+        "the changed run",
     )
-    assert outcome.response.label in page.head()
+    assert outcome.response_class.label in page.head()
     assert "set=beam.thickness" in page.page.url
 
 
@@ -109,7 +110,7 @@ def test_a_list_of_points_is_clicked_point_by_point(tab, serve, system, tmp_path
     page.click(float(ratio[4]), float(velocity[4]))
     page.wait(lambda: "bit for bit" in page.notes(), "the run")
     assert f"beam thickness {float(found['beam_thickness'][4]):.6g}" in page.head()
-    assert sb.ResponseClass(int(found["response"][4])).label in page.head()
+    assert sb.ResponseClass(int(found["response_class"][4])).label in page.head()
     page.page.keyboard.press("ArrowRight")
     page.wait(lambda: "bit for bit" in page.notes() and f"{ratio[4]:.6g}" not in page.head(), "another point")
 
@@ -139,7 +140,7 @@ def test_two_points_side_by_side(tab, served, small_map):
         "B",
     )
     page.click(float(ratio[18]), float(velocity[14]))
-    page.wait(lambda: "crossings" in page.head(1), "the run of B")
+    page.wait(lambda: "zero_crossings" in page.head(1), "the run of B")
     assert f"{ratio[3]:.6g}" in page.head(0) and f"{ratio[18]:.6g}" in page.head(1)
     assert page.data("map-mark", "text") == ["A", "B"]
 
@@ -162,7 +163,7 @@ def test_a_file_that_goes_is_told_and_runs_go_on(tab, serve, small_map, tmp_path
     path.unlink()
     page.click(float(small_map["frequency_ratio"][4]), float(small_map["velocity_amplitude"][4]))
     page.wait(lambda: "no such file any more" in page.notes(), "words")
-    assert "crossings" in page.head()
+    assert "zero_crossings" in page.head()
 
 
 def test_a_store_fills_in_as_it_grows(tab, serve, system, tmp_path):
@@ -178,15 +179,15 @@ def test_a_store_fills_in_as_it_grows(tab, serve, system, tmp_path):
         if done >= 50:
             raise Enough
 
-    keeping = sb.Keeping(path, chunk=16)
+    keeping = sb.CheckpointOptions(path, points_per_task=16)
     with pytest.raises(Enough):
-        sb.sweep(few, axes, sb.Integration(cycles=5), store=keeping, progress=stop)
+        sb.sweep(few, axes, sb.Integration(cycles=5), checkpoint=keeping, progress=stop)
     page = tab(serve("growing.store", where=tmp_path).url)
     clear = "() => { const m = Bokeh.documents[0].get_model_by_name('map-base'); return Array.from(m.data.image[0]); }"
     before = page.js(clear)
     unknown = 0xFF858585
     assert before.count(unknown) > 100
-    sb.sweep(few, axes, sb.Integration(cycles=5), store=sb.Keeping(path, chunk=16))
+    sb.sweep(few, axes, sb.Integration(cycles=5), checkpoint=sb.CheckpointOptions(path, points_per_task=16))
     page.wait(lambda: "200 of 200 points" in page.state(), "all of it")
     assert page.js(clear).count(unknown) == 0
 
@@ -205,7 +206,7 @@ def test_a_map_of_a_million_points(tab, serve, system, tmp_path):
     dims = ("frequency_ratio", "velocity_amplitude")
     force = (dims, rng.random((1000, 1000)), {"units": "N"})
     large = xr.Dataset(
-        {"response": (dims, rng.integers(0, 4, (1000, 1000)).astype(np.int8)), "peak_force": force},
+        {"response_class": (dims, rng.integers(0, 4, (1000, 1000)).astype(np.int8)), "peak_force": force},
         {name: (name, values, labels[name]) for name, values in zip(dims, (x, y), strict=True)},
         seed.attrs,
     )
@@ -213,7 +214,7 @@ def test_a_map_of_a_million_points(tab, serve, system, tmp_path):
     page = tab(serve("large.nc", where=tmp_path).url)
     page.wait(lambda: len(page.data("map-base", "image")) == 1, "the map")
     page.click(float(x[500]), float(y[500]))
-    page.wait(lambda: "crossings" in page.head() and ("map" in page.notes()), "a run of it")
+    page.wait(lambda: "zero_crossings" in page.head() and ("map" in page.notes()), "a run of it")
 
 
 # ---------------------------------------------------------------------- taking away
@@ -243,12 +244,12 @@ def test_what_is_taken_away_is_what_is_shown(tab, served, small_map, folder, tmp
     page.wait(lambda: "snapbeam simulate" in page.text("take-text"), "the command")
     assert _saved(page, "Map", tmp_path).read_bytes().startswith(b"\x89PNG")
     assert _saved(page, "Run", tmp_path).read_bytes().startswith(b"\x89PNG")
-    run = sb.load_run(_saved(page, "Run as NetCDF", tmp_path))
+    run = sb.load(_saved(page, "Run as NetCDF", tmp_path))
     for name in sb.STATISTICS:
-        held, found = small_map[name].values[4, 13].item(), run.outcome[name]
+        held, found = small_map[name].values[4, 13].item(), run.summary[name]
         assert held == found or (held != held and found != found), name
     with xr.open_dataset(_saved(page, "Map as NetCDF", tmp_path)) as whole:
-        np.testing.assert_array_equal(whole["response"], small_map["response"])
+        np.testing.assert_array_equal(whole["response_class"], small_map["response_class"])
     command = page.page.locator("pre.command").inner_text()
     lines = page.page.locator("pre.python").inner_text()
     # the command and the lines, as a person would run them
@@ -257,11 +258,14 @@ def test_what_is_taken_away_is_what_is_shown(tab, served, small_map, folder, tmp
         cwd=folder, capture_output=True, text=True, env=dict(os.environ), check=False,
     )  # fmt: skip
     assert made.returncode == 0, made.stderr
-    again = sb.load_run(folder / "run.nc")
-    np.testing.assert_array_equal(again.dataset["displacement"], run.dataset["displacement"])
+    again = sb.load(folder / "run.nc")
+    np.testing.assert_array_equal(
+        again.dataset["displacement_at_striker"], run.dataset["displacement_at_striker"]
+    )
     subprocess.run([sys.executable, "-c", lines], cwd=tmp_path, check=True, env=dict(os.environ))
     np.testing.assert_array_equal(
-        sb.load_run(tmp_path / "run.nc").dataset["displacement"], run.dataset["displacement"]
+        sb.load(tmp_path / "run.nc").dataset["displacement_at_striker"],
+        run.dataset["displacement_at_striker"],
     )
 
 

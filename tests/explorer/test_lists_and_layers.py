@@ -47,7 +47,7 @@ def test_a_point_of_a_list_is_run_bit_for_bit(points):
         point = scatter.at(number)
         assert scatter.find(point.values) == (number,) and scatter.place(point.values) == (x, y)
         assert point.values["beam.thickness"] == float(points["beam_thickness"][number])
-        outcome = sb.simulate(*point.system(base, how)).outcome
+        outcome = sb.simulate(*point.system(base, how)).summary
         same, words = compared(source.point(scatter.indexers(number)), outcome, "cpu")
         assert same and "bit for bit" in words
     assert scatter.find(point.values | {"beam.thickness": 4.0e-4}) is None
@@ -73,12 +73,12 @@ def test_a_sweep_over_one_axis_is_a_strip(one_mode):
     source = opened(line)
     assert source.dims == ["frequency_ratio", "velocity_amplitude"], "it stands at one amplitude"
     plane = Plane.of(source, "frequency_ratio", "velocity_amplitude", {})
-    np.testing.assert_array_equal(plane.values("response"), line["response"].values[None, :])
+    np.testing.assert_array_equal(plane.values("response_class"), line["response_class"].values[None, :])
     point = plane.at(*plane.index(1.25, 0.4))
     assert point.values["drive.velocity_amplitude"] == float(line["velocity_amplitude"])
     assert point.values["drive.frequency_ratio"] == line["frequency_ratio"].values[4]
     assert plane.find(point.values) == (0, 4)
-    assert source.point(plane.indexers(0, 4))["crossings"] == int(line["crossings"][4])
+    assert source.point(plane.indexers(0, 4))["zero_crossings"] == int(line["zero_crossings"][4])
 
 
 def test_one_point_of_an_axis_may_stand_upward(one_mode):
@@ -93,10 +93,10 @@ def test_one_point_of_an_axis_may_stand_upward(one_mode):
 
 def test_probabilities_and_lifetimes_are_shown_and_told(one_mode, tmp_path):
     axes = {"frequency_ratio": np.linspace(0.8, 1.6, 3), "velocity_amplitude": np.linspace(0.1, 0.3, 2)}
-    spread = sb.Spread(of={"velocity_amplitude": sb.Normal(0.05, relative=True)})
-    allocation = sb.Allocation(half_width=0.4, first=8, most=8)
+    spread = sb.ParameterUncertainty(of={"velocity_amplitude": sb.Normal(0.05, relative=True)})
+    allocation = sb.SamplingPlan(half_width=0.4, initial_runs=8, max_runs=8)
     found = sb.probability_map(one_mode, axes, spread, allocation, integration=SHORT)
-    lived = sb.lifetime_map(one_mode, axes, sb.Integration(cycles=80), starts=6, after=[10, 30])
+    lived = sb.lifetime_map(one_mode, axes, sb.Integration(cycles=80), initial_conditions=6, after=[10, 30])
     both = xr.merge(
         [found, lived.drop_vars([name for name in lived.data_vars if name in found])], compat="override"
     ).assign_attrs(found.attrs)
@@ -121,16 +121,16 @@ def test_probabilities_and_lifetimes_are_shown_and_told(one_mode, tmp_path):
         outcome = sb.simulate(
             *plane.at(1, 2).system(system_of(source.attrs, ""), integration_of(source.attrs))
         )
-        assert compared(held, outcome.outcome, "cpu") == (True, "")
+        assert compared(held, outcome.summary, "cpu") == (True, "")
 
 
 def test_shares_of_replicas_are_told(one_mode):
     axes = {"frequency_ratio": [0.8, 1.2], "velocity_amplitude": [0.1, 0.3]}
-    found = sb.sweep(one_mode, axes, SHORT, replicas=sb.Replicas(3))
+    found = sb.sweep(one_mode, axes, SHORT, replicates=sb.Replicates(3))
     source = opened(found)
     plane = Plane.of(source, "frequency_ratio", "velocity_amplitude", {})
     words = chances(source.layers, source.point(plane.indexers(1, 1)))
-    shares = found["class_share"].isel(frequency_ratio=1, velocity_amplitude=1)
+    shares = found["class_fraction"].isel(frequency_ratio=1, velocity_amplitude=1)
     first = int(shares.values.argmax())
     kind = sb.ResponseClass(int(found["response_class"][first]))
     assert f"{kind.label} {100 * float(shares[first]):.0f} %" in words

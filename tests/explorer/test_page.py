@@ -9,7 +9,7 @@ from snapbeam import ResponseClass
 
 
 def _label(small_map, row, column):
-    return ResponseClass(int(small_map["response"].values[column, row])).label
+    return ResponseClass(int(small_map["response_class"].values[column, row])).label
 
 
 def test_twenty_points_are_the_maps_bit_for_bit(tab, served, small_map):
@@ -22,15 +22,15 @@ def test_twenty_points_are_the_maps_bit_for_bit(tab, served, small_map):
         x, y = float(ratio[column]), float(velocity[row])
         page.click(x, y)
         words = f"frequency ratio {x:.6g}, velocity amplitude {y:.6g}"
-        page.wait(lambda words=words: words in page.head() and "crossings" in page.head(), words)
+        page.wait(lambda words=words: words in page.head() and "zero_crossings" in page.head(), words)
         page.wait(lambda: "bit for bit" in page.notes(), "the comparison")
         assert _label(small_map, row, column) in page.head()
         seen.add(_label(small_map, row, column))
-        crossings = int(small_map["crossings"].values[column, row])
+        crossings = int(small_map["zero_crossings"].values[column, row])
         assert f"{crossings} crossings" in page.head()
         waveform = np.array(page.data("waveform", "y"))
         assert waveform.max() == pytest.approx(
-            float(small_map["max_center_displacement"].values[column, row]), abs=0.01
+            float(small_map["max_midspan_displacement"].values[column, row]), abs=0.01
         )
     assert len(seen) >= 3, "the map of the test should hold several classes"
 
@@ -49,7 +49,7 @@ def test_keys_go_from_point_to_point(tab, served, small_map):
         page.page.keyboard.press(key)
         words = f"frequency ratio {ratio[column]:.6g}, velocity amplitude {velocity[row]:.6g}"
         page.wait(
-            lambda words=words: words in page.head() and "crossings" in page.head(), f"{key} to {words}"
+            lambda words=words: words in page.head() and "zero_crossings" in page.head(), f"{key} to {words}"
         )
         assert _label(small_map, row, column) in page.head()
 
@@ -61,13 +61,13 @@ def test_numbers_are_typed_in_full(tab, served, system):
     page.page.get_by_label("frequency ratio").fill("1.2345678901234567")
     page.page.get_by_label("velocity amplitude").fill("0.31415926535897931")
     page.page.get_by_role("button", name="Run").click()
-    page.wait(lambda: "crossings" in page.head(), "the run")
+    page.wait(lambda: "zero_crossings" in page.head(), "the run")
     exact = system.replace(
         **{"drive.frequency_ratio": 1.2345678901234567, "drive.velocity_amplitude": 0.31415926535897931}
     )
     run = sb.simulate(exact, sb.Integration(cycles=30))
-    assert run.outcome.response.label in page.head()
-    assert f"{run.outcome.crossings} crossings, {run.outcome.impacts} impacts" in page.head()
+    assert run.outcome.response_class.label in page.head()
+    assert f"{run.outcome.zero_crossings} crossings, {run.outcome.impacts} impacts" in page.head()
     page.page.get_by_label("frequency ratio").fill("one")
     page.page.get_by_role("button", name="Run").click()
     page.wait(lambda: "must be a number" in page.head(), "a refusal in words")

@@ -193,7 +193,7 @@ def test_pictures_of_a_list_are_taken_away(tab, serve, system, tmp_path):
     assert b"<svg" in files["svg"].read_bytes()[:2000]
     drawn = np.asarray(Image.open(files["png"]).convert("RGB")).reshape(-1, 3)
     colors = {tuple(each) for each in np.unique(drawn, axis=0)}
-    classes = {sb.ResponseClass(int(kind)) for kind in np.unique(found["response"])}
+    classes = {sb.ResponseClass(int(kind)) for kind in np.unique(found["response_class"])}
     from snapbeam.figures import CLASS_COLORS
 
     for kind in classes:

@@ -46,7 +46,7 @@ def test_a_window_ends_as_the_sweep_of_its_points(one_mode, jobs):
     assert window.own().all()
     axes = {"drive.velocity_amplitude": window.y, "drive.frequency_ratio": window.x}
     whole = sb.sweep(one_mode, axes, sb.Integration(cycles=4))
-    for name in ("response", "crossings", "peak_force", "shaker_work"):
+    for name in ("response_class", "zero_crossings", "peak_force", "striker_work"):
         np.testing.assert_array_equal(window.values[name], whole[name].values, name)
 
 
@@ -98,13 +98,13 @@ def test_zooming_computes_what_is_seen_and_a_click_runs_its_points(tab, served):
 
 @pytest.mark.slow
 def test_the_papers_beam_is_mapped_while_one_looks(tab, serve, folder):
-    (folder / "quick.toml").write_text("[model]\nmodes = 1\n[run]\ncycles = 5\n")
+    (folder / "quick.toml").write_text("[model]\nmodes = 1\n[integration]\ncycles = 5\n")
     page = tab(serve("--config", "quick.toml").url)
     page.wait(lambda: len(page.data("map-windows", "image")) == 1, "a map out of nothing")
     finer = ("blocks of 9", "blocks of 3", "blocks of 1 ", "all ")
     page.wait(lambda: any(words in page.state() for words in finer), "the coarsest level")
     page.click(1.2, 0.3)
-    page.wait(lambda: "crossings" in page.head() and "bit for bit" in page.notes(), "a run")
+    page.wait(lambda: "zero_crossings" in page.head() and "bit for bit" in page.notes(), "a run")
 
 
 def test_what_each_of_two_strikers_does_is_shown_and_kept(one_mode, jobs) -> None:
@@ -113,7 +113,7 @@ def test_what_each_of_two_strikers_does_is_shown_and_kept(one_mode, jobs) -> Non
     from snapbeam.explorer.maps.layers import layers_of
     from snapbeam.explorer.maps.source import SystemSource
 
-    stop = sb.Striker(drive=sb.Still(), location=0.3, side="above", gap=2e-5)
+    stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=2e-5)
     two = sb.System(one_mode.model, one_mode.contact, [one_mode.striker, stop])
     axes = {NAMES[0]: np.linspace(0.9, 1.4, 3), NAMES[1]: np.linspace(0.1, 0.4, 3)}
     offered = SystemSource(two, axes, sb.Integration(cycles=4), "two").variables()
@@ -125,6 +125,6 @@ def test_what_each_of_two_strikers_does_is_shown_and_kept(one_mode, jobs) -> Non
     found = window_dataset(window)
     assert found.peak_force_striker_2.attrs == {"units": "N", "long_name": "peak contact force, striker 2"}
     order = list(layers_of(found))
-    assert order[0] == "response"
+    assert order[0] == "response_class"
     at = order.index("peak_force")
     assert order[at : at + 3] == ["peak_force", "peak_force_striker_1", "peak_force_striker_2"]

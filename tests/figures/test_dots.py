@@ -9,10 +9,10 @@ import pytest
 
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
-from snapbeam.figures import read_dots
+from snapbeam.figures import read_measured_points
 from snapbeam.figures.lab.dot_comparison import plot_dot_comparison
-from snapbeam.lab.compare.dots import Dots
-from snapbeam.lab.compare.maps import compare_dots
+from snapbeam.lab.compare.dots import MeasuredPoints
+from snapbeam.lab.compare.maps import compare_measured_points
 
 
 def table(tmp_path, text):
@@ -22,7 +22,7 @@ def table(tmp_path, text):
 
 
 def test_normalised_columns(tmp_path):
-    dots = read_dots(
+    dots = read_measured_points(
         table(
             tmp_path,
             "# a sweep\nfrequency_ratio, velocity_amplitude, location, response\n\n"
@@ -31,7 +31,7 @@ def test_normalised_columns(tmp_path):
         )
     )
     assert len(dots) == 5
-    assert [ResponseClass(int(kind)).name for kind in dots.response] == [
+    assert [ResponseClass(int(kind)).name for kind in dots.response_class] == [
         "TRANSIENT_2",
         "INTRAWELL",
         "TRANSIENT_1",
@@ -44,13 +44,13 @@ def test_normalised_columns(tmp_path):
 
 def test_units_are_normalised(tmp_path):
     path = table(tmp_path, "response,velocity_m_s,frequency_hz\ncontinuous,0.0310,100\n")
-    dots = read_dots(path, reference_freq=80.0, buckling_level=0.335e-3)
+    dots = read_measured_points(path, reference_frequency=80.0, buckling_level=0.335e-3)
     assert dots.frequency_ratio[0] == 1.25
     assert dots.velocity_amplitude[0] == pytest.approx(0.0310 / (2.0 * math.pi * 80.0 * 0.335e-3))
-    with pytest.raises(InputError, match="column 'frequency_hz' needs reference_freq, in Hz"):
-        read_dots(path)
+    with pytest.raises(InputError, match="column 'frequency_hz' needs reference_frequency, in Hz"):
+        read_measured_points(path)
     with pytest.raises(InputError, match="column 'velocity_m_s' needs buckling_level, in m"):
-        read_dots(path, reference_freq=80.0)
+        read_measured_points(path, reference_frequency=80.0)
 
 
 HEADER = "frequency_ratio,velocity_amplitude,location,response\n"
@@ -83,27 +83,27 @@ HEADER = "frequency_ratio,velocity_amplitude,location,response\n"
 )
 def test_refusals(tmp_path, text, message):
     with pytest.raises(InputError) as refusal:
-        read_dots(table(tmp_path, text))
+        read_measured_points(table(tmp_path, text))
     assert message in str(refusal.value)
 
 
 def test_missing_file(tmp_path):
     with pytest.raises(InputError, match="cannot be read, No such file"):
-        read_dots(tmp_path / "none.csv")
+        read_measured_points(tmp_path / "none.csv")
 
 
 def test_errors_stand_out_in_the_table_of_classes(synthetic_map):
     """An error of one in a hundred is redder than any agreement, and bold; agreements are grey."""
     rng = np.random.default_rng(1)
     i, j = rng.integers(0, 40, 300), rng.integers(0, 25, 300)
-    kinds = synthetic_map["response"].values[i, j].astype(np.int8)
+    kinds = synthetic_map["response_class"].values[i, j].astype(np.int8)
     kinds[np.flatnonzero(kinds == ResponseClass.INTRAWELL)[:2]] = ResponseClass.TRANSIENT_1
     ratio, velocity = (
         synthetic_map["frequency_ratio"].values[i],
         synthetic_map["velocity_amplitude"].values[j],
     )
-    dots = Dots(ratio, velocity, np.full(300, 1 / 2.1), kinds)
-    result = compare_dots(dots, synthetic_map)
+    dots = MeasuredPoints(ratio, velocity, np.full(300, 1 / 2.1), kinds)
+    result = compare_measured_points(dots, synthetic_map)
     ax = plot_dot_comparison(synthetic_map, dots, result).axes[1]
     weights = {(int(t.get_position()[1]), int(t.get_position()[0])): t.get_fontweight() for t in ax.texts}
     images = [image.to_rgba(image.get_array()) for image in ax.images]

@@ -25,21 +25,21 @@ def lives(last: np.ndarray, failed: int = 0) -> xr.Dataset:
     """A point whose runs snap for the last time at these cycles; the first *failed* of them failed."""
     last = np.concatenate([np.full(failed, np.nan), last])[np.newaxis]
     status = np.full(last.shape, int(RunStatus.OK), dtype=np.int8)
-    status[0, :failed] = int(RunStatus.NOT_FINITE)
+    status[0, :failed] = int(RunStatus.DIVERGED)
     labels = {"units": "1"}
     columns = {
         "last_snap": last,
         "snaps": np.isfinite(last).astype(np.int32),
         "late_snaps": (last > CYCLES - QUIET).astype(np.int32),
         "end_well": np.ones(last.shape, dtype=np.int8),
-        "end_is_final": np.zeros(last.shape, dtype=np.int8),  # as files hold it
+        "final_well_proven": np.zeros(last.shape, dtype=np.int8),  # as files hold it
         "status": status,
     }
     ds = xr.Dataset(
         {name: (("point", "start"), values, labels) for name, values in columns.items()},
         attrs={"cycles": CYCLES, "quiet": QUIET, "confidence": 0.95},
     )
-    return refit(ds, sb.Survival(quiet=QUIET), [100])
+    return refit(ds, sb.LifetimeSettings(settling_cycles=QUIET), [100])
 
 
 def curve(ax: plt.Axes) -> tuple[np.ndarray, np.ndarray]:
@@ -79,7 +79,7 @@ def test_survival_without_a_ring_where_all_ended() -> None:
 
 def test_a_section_and_basins_draw_every_state() -> None:
     states = np.linspace(-1.0, 1.0, 7)
-    section = xr.Dataset({"center_displacement": ("hit", states), "center_velocity": ("hit", states**2)})
+    section = xr.Dataset({"midspan_displacement": ("hit", states), "midspan_velocity": ("hit", states**2)})
     ax = plot_section(section)
     np.testing.assert_array_equal(ax.lines[0].get_xdata(), states)
     labels = np.array([[0, 1, -1], [1, 1, 0]])
@@ -100,4 +100,4 @@ def test_a_section_and_basins_draw_every_state() -> None:
 def test_what_holds_nothing_of_the_kind_is_refused() -> None:
     for plot in (plot_survival, plot_basins, plot_section):
         with pytest.raises(sb.InputError):
-            plot(xr.Dataset({"response": ("x", [1.0])}))
+            plot(xr.Dataset({"response_class": ("x", [1.0])}))

@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 
 from snapbeam import InputError
 from snapbeam.core.codes import ResponseClass
-from snapbeam.figures import CLASS_COLORS, Dots, plot_points, plot_response_map, plot_statistic
+from snapbeam.figures import CLASS_COLORS, MeasuredPoints, plot_points, plot_response_map, plot_statistic
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def points() -> xr.Dataset:
     }  # fmt: skip
     full = {"beam_thickness": "beam.thickness", "side": "striker.side"}
     return xr.Dataset(
-        {"response": ("point", rng.integers(0, 4, count).astype("i1")), "peak_force": ("point", force)},
+        {"response_class": ("point", rng.integers(0, 4, count).astype("i1")), "peak_force": ("point", force)},
         coords={
             name: ("point", values, {"parameter": full.get(name, f"drive.{name}")})
             for name, values in coords.items()
@@ -48,7 +48,7 @@ def test_each_point_stands_where_its_values_are(points):
     np.testing.assert_array_equal(
         drawn.get_offsets(), np.c_[points["frequency_ratio"].values, points["velocity_amplitude"].values]
     )
-    wanted = [to_rgb(CLASS_COLORS[ResponseClass(int(kind))]) for kind in points["response"].values]
+    wanted = [to_rgb(CLASS_COLORS[ResponseClass(int(kind))]) for kind in points["response_class"].values]
     np.testing.assert_allclose(drawn.get_facecolors()[:, :3], wanted)
     assert "Excitation frequency" in ax.get_xlabel() and "Velocity amplitude" in ax.get_ylabel()
     assert ax.figure.legends[0].get_texts()[0].get_text().startswith(ResponseClass.INTRAWELL.label)
@@ -73,7 +73,7 @@ def test_a_statistic_of_a_list(points):
 
 def test_what_lies_over_the_points(points):
     kind = np.array([ResponseClass.INTRAWELL], dtype=np.int8)
-    dots = Dots(np.array([1.0]), np.array([0.2]), np.array([0.4762]), kind)
+    dots = MeasuredPoints(np.array([1.0]), np.array([0.2]), np.array([0.4762]), kind)
     ax = plot_response_map(points, threshold_line=True, dots=dots)
     labels = [text.get_text() for text in ax.figure.legends[0].get_texts()]
     assert "measured, 1" in labels and any("QS1" in label for label in labels)

@@ -9,7 +9,7 @@ from matplotlib.colors import to_rgb
 
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
-from snapbeam.figures import CLASS_COLORS, Dots, class_handles, plot_response_map, save_figure
+from snapbeam.figures import CLASS_COLORS, MeasuredPoints, class_handles, plot_response_map, save_figure
 
 
 @pytest.fixture(autouse=True)
@@ -25,7 +25,7 @@ def legend_texts(ax):
 def test_cells(synthetic_map):
     ax = plot_response_map(synthetic_map)
     mesh = ax.collections[0]
-    assert mesh.get_array().size == synthetic_map["response"].size
+    assert mesh.get_array().size == synthetic_map["response_class"].size
     corners = mesh.get_coordinates()
     x, y = synthetic_map["frequency_ratio"].values, synthetic_map["velocity_amplitude"].values
     np.testing.assert_allclose(corners[0, 1:-1, 0], 0.5 * (x[1:] + x[:-1]))
@@ -44,7 +44,10 @@ def test_every_pixel_of_a_cell_has_its_colour(synthetic_map, tmp_path):
     ax.figure.canvas.draw()
     x, y = synthetic_map["frequency_ratio"].values, synthetic_map["velocity_amplitude"].values
     wanted = np.array(
-        [[to_rgb(CLASS_COLORS[ResponseClass(k)]) for k in row] for row in synthetic_map["response"].values]
+        [
+            [to_rgb(CLASS_COLORS[ResponseClass(k)]) for k in row]
+            for row in synthetic_map["response_class"].values
+        ]
     )
     for share in (-0.3, 0.0, 0.3):
         places = np.stack(
@@ -58,7 +61,7 @@ def test_every_pixel_of_a_cell_has_its_colour(synthetic_map, tmp_path):
 
 def test_legend_counts_the_runs(synthetic_map):
     texts = legend_texts(plot_response_map(synthetic_map, threshold_line=True))
-    kinds = synthetic_map["response"].values
+    kinds = synthetic_map["response_class"].values
     share = 100.0 * (kinds == ResponseClass.INTRAWELL).mean()
     assert texts[0] == f"intrawell, {share:.1f} %"
     assert texts[-1].startswith("quasi-static, ")
@@ -69,7 +72,7 @@ def test_legend_counts_the_runs(synthetic_map):
         "continuous interwell",
         "unknown",
     ]
-    known = synthetic_map.where(synthetic_map["response"] >= 0, 0).astype(np.int8).assign_attrs(modes=1)
+    known = synthetic_map.where(synthetic_map["response_class"] >= 0, 0).astype(np.int8).assign_attrs(modes=1)
     assert not any(text.startswith("unknown") for text in legend_texts(plot_response_map(known)))
 
 
@@ -90,7 +93,7 @@ def test_threshold_line(synthetic_map):
 
 
 def test_dots_lie_where_they_were_measured(synthetic_map):
-    dots = Dots(
+    dots = MeasuredPoints(
         np.array([1.0, 2.0, 3.0]),
         np.array([0.2, 0.3, 0.4]),
         np.array([np.nan, 0.476, 0.3]),
@@ -106,14 +109,14 @@ def test_dots_lie_where_they_were_measured(synthetic_map):
 
 
 def test_dots_outside_are_told(synthetic_map):
-    dots = Dots(np.array([9.0]), np.array([0.2]), np.array([np.nan]), np.array([0], dtype=np.int8))
+    dots = MeasuredPoints(np.array([9.0]), np.array([0.2]), np.array([np.nan]), np.array([0], dtype=np.int8))
     with pytest.warns(UserWarning, match="1 of 1 measured points lie outside the map"):
         plot_response_map(synthetic_map, dots=dots)
 
 
 def test_what_is_no_map_of_two_axes(synthetic_map):
     with pytest.raises(InputError, match="no variable 'response'"):
-        plot_response_map(synthetic_map.drop_vars("response"))
+        plot_response_map(synthetic_map.drop_vars("response_class"))
     with pytest.raises(InputError, match="this one has none"):
         plot_response_map(synthetic_map.isel(frequency_ratio=0, velocity_amplitude=0))
     deep = synthetic_map.drop_vars("location").expand_dims(location=[0.3, 0.4])

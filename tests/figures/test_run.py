@@ -54,11 +54,11 @@ def test_window(synthetic_run):
 
 
 def test_measured_run_without_force(synthetic_run):
-    measured = synthetic_run.drop_vars(["contact_force", "penetration", "center_displacement"])
+    measured = synthetic_run.drop_vars(["contact_force", "penetration", "midspan_displacement"])
     figure = plot_run(measured).figure
     assert len(figure.axes) == 1
     assert len(figure.legends[0].get_texts()) == 2
-    free = plot_run(measured.drop_vars(["cycle", "shaker_displacement"])).figure
+    free = plot_run(measured.drop_vars(["cycle", "striker_displacement"])).figure
     assert free.axes[0].get_xlabel() == "Time (s)"
 
 

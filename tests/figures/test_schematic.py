@@ -25,18 +25,22 @@ def words(figure) -> str:
 
 
 def test_says_what_signs_do_not(model) -> None:
-    drive = sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.2, length=4.0)
-    striker = sb.Striker(drive=drive, mass=0.02, spring=700.0, damper=0.7, gap=0.1 * LEVEL)
+    drive = sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.2, duration_cycles=4.0)
+    striker = sb.Striker(
+        drive=drive, mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=0.1 * LEVEL
+    )
     said = words(plot_system(sb.System(model, sb.HuntCrossley(4e8, 2.0), striker)))
     assert "Hunt–Crossley" in said
     assert "gap 0.1 $b$" in said
     assert "= 20 g" in said
-    pressed = sb.Striker(drive=sb.Still(), gap=-0.2 * LEVEL)
+    pressed = sb.Striker(drive=sb.FixedStop(), gap=-0.2 * LEVEL)
     assert "preload 0.2 $b$" in words(plot_system(sb.System(model, paper.CONTACT, pressed)))
 
 
 def test_beam_and_tip_are_where_they_are(model) -> None:
-    striker = sb.Striker(drive=sb.Flight(speed=0.4), mass=2e-3, gap=0.5 * LEVEL, side="above", location=0.5)
+    striker = sb.Striker(
+        drive=sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=0.5 * LEVEL, side="above", location=0.5
+    )
     figure = plot_system(sb.System(model, paper.CONTACT, striker))
     solid = next(line for line in figure.axes[0].lines if line.get_linewidth() == 1.8)
     assert solid.get_ydata().max() == pytest.approx(1.0, abs=1e-3)
@@ -60,7 +64,9 @@ def test_free_beam_and_refusal(model) -> None:
 
 def test_unequal_wells_and_what_makes_them(model) -> None:
     uneven = sb.ReducedModel.from_beam(
-        paper.BEAM, modes=3, imperfection=sb.Imperfection(rise=1.5e-5, point_load=-0.02, point_location=0.3)
+        paper.BEAM,
+        modes=3,
+        imperfection=sb.Imperfection(midspan_amplitude=1.5e-5, point_load=-0.02, point_location=0.3),
     )
     figure = plot_system(
         sb.System(uneven, paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))
@@ -68,7 +74,7 @@ def test_unequal_wells_and_what_makes_them(model) -> None:
     solid, dashed = (
         next(line for line in figure.axes[0].lines if line.get_linewidth() == width) for width in (1.8, 0.8)
     )
-    heights = uneven.wells @ uneven.center_shape / LEVEL
+    heights = uneven.wells @ uneven.midspan_shape / LEVEL
     assert solid.get_ydata()[100] == pytest.approx(heights[0], rel=1e-9)
     assert dashed.get_ydata()[100] == pytest.approx(heights[1], rel=1e-9)
     assert "$F$" in words(figure)

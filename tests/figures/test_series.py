@@ -34,7 +34,7 @@ def test_captions(run):
     text = caption(run.dataset)
     for part in ("161 mm × 400 µm", "335 µm", "$N$ = 3", "= 1.21 (", "$V$ = 0.18 (", "mm/s", "= 0.476"):
         assert part in text
-    assert text.endswith(f": {run.outcome.response.label}")
+    assert text.endswith(f": {run.outcome.response_class.label}")
     assert caption(run.dataset, 2).count("\n") == 1
     assert caption(xr.Dataset()) == ""
 
@@ -55,7 +55,7 @@ def test_what_is_drawn(run):
     alpha = run.plot("modal_amplitudes", modes=2).lines
     assert len(alpha) == 2 and alpha[0].get_ydata()[0] == pytest.approx(-1.0)
     portrait = run.plot("phase_portrait")
-    np.testing.assert_array_equal(portrait.lines[0].get_xdata(), run.dataset.center_displacement)
+    np.testing.assert_array_equal(portrait.lines[0].get_xdata(), run.dataset.midspan_displacement)
     assert portrait.lines[1].get_xdata().size == 13, "whole cycles, both ends"
 
 

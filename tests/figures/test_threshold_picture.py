@@ -39,10 +39,10 @@ def curve():
     flags = {"flag_meanings": " ".join(_KINDS)}
     return xr.Dataset(
         {
-            "first_interwell": (dims, first),
-            "always_interwell": (dims, first + 0.03),
-            "first_interwell_min": (dims, first),
-            "always_interwell_max": (dims, first + 0.03),
+            "lower_threshold": (dims, first),
+            "upper_threshold": (dims, first + 0.03),
+            "lower_threshold_min": (dims, first),
+            "upper_threshold_max": (dims, first + 0.03),
             "outcome": (dims, np.where(np.isnan(first), 1, 0), flags),
         },
         {
@@ -58,7 +58,7 @@ def curve():
 def test_band(curve):
     ax = plot_threshold(curve)
     lines = {line.get_label(): line for line in ax.lines}
-    np.testing.assert_array_equal(lines["$N$ = 32"].get_ydata(), curve["first_interwell"].values[1])
+    np.testing.assert_array_equal(lines["$N$ = 32"].get_ydata(), curve["lower_threshold"].values[1])
     quasi_static = lines[r"quasi-static, $V_\mathrm{QS1}$"]
     np.testing.assert_allclose(
         quasi_static.get_ydata(), curve["frequency_ratio"] * np.sin(np.pi * 0.4) ** 2, rtol=1e-12
@@ -81,7 +81,7 @@ def test_columns_without_an_answer_are_hatched(curve):
     one = curve.isel(modes=1).copy(deep=True)
     hatched = {"undecided": (2, "...."), "not searched": (7, "////")}
     assert not {"undecided: runs failed", "not searched"} & set(texts_of(plot_threshold(one)))
-    for name in ("first_interwell", "always_interwell", "always_interwell_max"):
+    for name in ("lower_threshold", "upper_threshold", "upper_threshold_max"):
         one[name][[2, 7]] = np.nan
     one["outcome"][2], one["outcome"][7] = 4, 5
     ax = plot_threshold(one)
@@ -104,8 +104,8 @@ def test_isolated_points_are_markers(curve, tmp_path):
     ax = plot_threshold(one, quasi_static=False)
     (alone,) = [line for line in ax.lines if line.get_marker() == "o"]
     assert alone.get_xdata().tolist() == one["frequency_ratio"].values[[0, 4, 14]].tolist()
-    np.testing.assert_array_equal(alone.get_ydata(), one["first_interwell"].values[[0, 4, 14]])
-    empty = plot_threshold(one.assign(first_interwell=one["first_interwell"] * np.nan), quasi_static=False)
+    np.testing.assert_array_equal(alone.get_ydata(), one["lower_threshold"].values[[0, 4, 14]])
+    empty = plot_threshold(one.assign(lower_threshold=one["lower_threshold"] * np.nan), quasi_static=False)
     with_points, without = (
         plt.imread(save_figure(each.figure, tmp_path / f"{number}.png"))[..., :3]
         for number, each in enumerate((ax, empty))
@@ -118,9 +118,9 @@ def test_isolated_points_are_markers(curve, tmp_path):
 def test_bands_that_are_open(curve):
     """A band whose highest run is intrawell reaches the end of the range; failed runs widen it by dotted lines."""
     one = curve.isel(modes=1).copy(deep=True)
-    one["always_interwell"][9] = one["always_interwell_max"][9] = np.nan
+    one["upper_threshold"][9] = one["upper_threshold_max"][9] = np.nan
     one["outcome"][9] = 3
-    one["first_interwell_min"][5] = 0.1
+    one["lower_threshold_min"][5] = 0.1
     ax = plot_threshold(one)
     assert ax.get_ylim()[1] == pytest.approx(0.6)
     band = next(each for each in ax.collections if isinstance(each, PolyCollection))
@@ -131,17 +131,17 @@ def test_bands_that_are_open(curve):
 
 def test_what_is_no_threshold(curve):
     with pytest.raises(InputError, match="no threshold curve among"):
-        plot_threshold(curve.drop_vars("first_interwell"))
+        plot_threshold(curve.drop_vars("lower_threshold"))
 
 
 def test_paler_where_repeats_disagree(synthetic_map, tmp_path):
-    kinds = synthetic_map["response"]
+    kinds = synthetic_map["response_class"]
     classes = xr.DataArray([int(k) for k in ResponseClass], dims="response_class")
     share = xr.where(kinds == classes, 1.0, 0.0)
     unsure = (kinds["frequency_ratio"] > 2.0) & (kinds["velocity_amplitude"] < 0.1)
     share = xr.where(unsure, 0.5 * share + 0.5 * (classes == 3), share)
     share = share.transpose(*kinds.dims, "response_class").assign_coords(response_class=classes)
-    ax = plot_response_map(synthetic_map.assign(class_share=share), legend=False)
+    ax = plot_response_map(synthetic_map.assign(class_fraction=share), legend=False)
     path = save_figure(ax.figure, tmp_path / "map.png")
     image = plt.imread(path)[..., :3]
     ax.figure.set_dpi(300)
@@ -157,19 +157,19 @@ def test_paler_where_repeats_disagree(synthetic_map, tmp_path):
 
 
 def test_legend_says_how_many_disagree(synthetic_map):
-    kinds = synthetic_map["response"]
+    kinds = synthetic_map["response_class"]
     classes = xr.DataArray([int(k) for k in ResponseClass], dims="response_class")
     share = xr.where(kinds == classes, 1.0, 0.0).assign_coords(response_class=classes)
-    ax = plot_response_map(synthetic_map.assign(class_share=share))
+    ax = plot_response_map(synthetic_map.assign(class_fraction=share))
     texts = [text.get_text() for text in ax.figure.legends[0].get_texts()]
     assert texts[-1] == "repeats agree, 100 to 25 %;\n0.0 % of cells are split"
 
 
 def test_the_legends_shades_are_those_of_the_map(synthetic_map):
-    kinds = synthetic_map["response"]
+    kinds = synthetic_map["response_class"]
     classes = xr.DataArray([int(k) for k in ResponseClass], dims="response_class")
     share = xr.where(kinds == classes, 1.0, 0.0).assign_coords(response_class=classes)
-    ax = plot_response_map(synthetic_map.assign(class_share=share))
+    ax = plot_response_map(synthetic_map.assign(class_fraction=share))
     ax.figure.canvas.draw()
     legend = ax.figure.legends[0]
     shades = [each for each in legend.findobj(Rectangle) if each is not legend.legendPatch][-4:]

@@ -25,14 +25,16 @@ SPOILED = {"test03": "cut short", "test07": "begins in motion", "test10": "anoth
 
 def write_test(folder, name, ratio, velocity, *, seed=0, spoiled=None):
     """Write ``<name>.cihx`` with its pixels and ``<name>_vib.csv``; what is true of it."""
-    first = MODEL.natural_freq[0]
+    first = MODEL.natural_frequencies[0]
     frequency = ratio * first
     speed = velocity * BEAM.buckling_level * 2.0 * np.pi * first
     lasting = {"duration": 0.1 + (CYCLES + 2) / frequency, "start_up": 0.01}
     true = lab.render_vibrometer(frequency, speed, snr_db=100.0, **lasting)
-    motion = sb.Striker(drive=sb.Recorded.from_dataset(lab.recorded_drive(true, 1e5)), location=LOCATION)
+    motion = sb.Striker(
+        drive=sb.RecordedMotion.from_dataset(lab.recorded_drive(true, 1e5)), location=LOCATION
+    )
     run = sb.simulate(sb.System(MODEL, CONTACT, motion), sb.Integration(cycles=CYCLES))
-    clean = ResponseClass(run.outcome.response).label
+    clean = ResponseClass(run.summary.response_class).label
     if spoiled == "begins in motion":
         run = run.dataset.isel(time=run.dataset.time.values > 3.3 / frequency)
         run = run.assign_coords(time=("time", run.time.values - run.time.values[0], run.time.attrs))
@@ -47,7 +49,7 @@ def write_test(folder, name, ratio, velocity, *, seed=0, spoiled=None):
         frequency *= 1.4
     seen = lab.render_vibrometer(frequency, speed, snr_db=30.0, seed=seed, **lasting)
     lab.write_signal(folder / f"{name}_vib.csv", seen)
-    return {"frequency": frequency, "speed": speed, "response": clean}
+    return {"frequency": frequency, "speed": speed, "response_class": clean}
 
 
 def write_campaign(folder, points=POINTS):

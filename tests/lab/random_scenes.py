@@ -14,7 +14,7 @@ from snapbeam.lab import (
     Defects,
     SyntheticCamera,
     SyntheticStage,
-    findings_of,
+    diagnostics_of,
     open_recording,
     render_recording,
     track,
@@ -254,4 +254,4 @@ def judged(scene, folder, rng):
         ratio = np.abs(miss[known]) / tracked[error].values[known]
         worst, far = max(worst, float(ratio.max())), max(far, float(np.abs(miss[known]).max() / pixel))
         lost = max(lost, 1.0 - float(known.mean()))
-    return Outcome(worst, far, tuple(one.code for one in doubtful(findings_of(tracked))), "", lost)
+    return Outcome(worst, far, tuple(one.code for one in doubtful(diagnostics_of(tracked))), "", lost)

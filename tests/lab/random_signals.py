@@ -9,7 +9,7 @@ import numpy as np
 
 from snapbeam import InputError
 from snapbeam.core.findings import doubtful
-from snapbeam.lab import findings_of, identify_decay, make_signal, measure_drive, render_vibrometer
+from snapbeam.lab import diagnostics_of, identify_decay, make_signal, measure_drive, render_vibrometer
 
 DRIVE_DEFECTS = (
     "dropout", "hold", "spikes", "clipped", "clipped on one side", "clipped before the noise", "gentle start",
@@ -126,7 +126,7 @@ def decay_signal(rng, kind):
             2.0 * np.pi * other * time
         )
     noise = 10.0 ** (-rng.uniform(18.0, 40.0) / 20.0) / np.sqrt(2.0)
-    truth, options = {"natural_freq": freq, "damping_ratio": zeta}, {}
+    truth, options = {"natural_frequencies": freq, "damping_ratio": zeta}, {}
     at = int(rng.uniform(0.25, 0.5) * time.size)
     if kind == "close modes":
         other = freq * (1.0 + rng.uniform(0.02, 0.12))
@@ -183,7 +183,7 @@ def judged_drive(rng, kind):
     if "onset" in truth and drive.startup is not None:
         ratios["onset"] = abs(drive.startup.onset - truth["onset"]) / drive.startup.onset_uncertainty
     worst = max(ratios, key=ratios.get, default="")
-    return Outcome(ratios.get(worst, 0.0), worst, tuple(one.code for one in doubtful(findings_of(drive))))
+    return Outcome(ratios.get(worst, 0.0), worst, tuple(one.code for one in doubtful(diagnostics_of(drive))))
 
 
 def judged_decay(rng, kind):
@@ -198,4 +198,4 @@ def judged_decay(rng, kind):
     mode = fit.modes[0]
     ratios = {name: abs(getattr(mode, name) - truth[name]) / getattr(mode, f"{name}_se") for name in truth}
     worst = max(ratios, key=ratios.get)
-    return Outcome(ratios[worst], worst, tuple(one.code for one in doubtful(fit.findings)))
+    return Outcome(ratios[worst], worst, tuple(one.code for one in doubtful(fit.diagnostics)))

@@ -15,14 +15,14 @@ from snapbeam.figures.lab.calibration import plot_calibration
 from snapbeam.lab.calibration.calibrate import ContactTest, Measurements, calibrate, load_measurements
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import HertzContact
-from snapbeam.model.ends import Ends
+from snapbeam.model.ends import BoundaryConditions
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.paper_values import BEAM
 
 PAPER = Measurements(
-    straight_freq=[80.0, 221.0],
-    lower_well_freq=[81.3],
-    upper_well_freq=[80.5],
+    straight_frequency=[80.0, 221.0],
+    lower_well_frequencies=[81.3],
+    upper_well_frequencies=[80.5],
     damping_ratio=[0.005],
     thickness=0.44e-3,
     buckling_level=0.5e-3,
@@ -30,13 +30,13 @@ PAPER = Measurements(
 
 
 def frequencies(beam: Beam, count: int = 2, modes: int = 12):
-    return ReducedModel.from_beam(beam, modes).natural_freq[:count]
+    return ReducedModel.from_beam(beam, modes).natural_frequencies[:count]
 
 
 def measured(beam: Beam, rng: np.random.Generator | None = None, share: float = 0.003) -> Measurements:
     """Frequencies of a beam, with errors of a *share* of them where there is a generator."""
-    values = {"straight_freq": frequencies(beam.replace(axial_load=0.0), 3)}
-    values |= {"lower_well_freq": frequencies(beam), "upper_well_freq": frequencies(beam)}
+    values = {"straight_frequency": frequencies(beam.replace(axial_load=0.0), 3)}
+    values |= {"lower_well_frequencies": frequencies(beam), "upper_well_frequencies": frequencies(beam)}
     out = {}
     for name, freq in values.items():
         error = share * freq
@@ -50,8 +50,8 @@ def test_the_papers_numbers(tmp_path):
     assert found.values["thickness"] == pytest.approx(0.399e-3, abs=0.0005e-3)
     assert found.values["buckling_level"] == pytest.approx(0.331e-3, abs=0.0005e-3)
     assert 0.0008e-3 < found.standard_errors["buckling_level"] < 0.002e-3
-    assert found.well_freq == pytest.approx(80.9, abs=0.02)  # the mean of 81.3 and 80.5 Hz
-    assert found.start_well_freq == pytest.approx(81.853, abs=0.001)
+    assert found.well_frequencies == pytest.approx(80.9, abs=0.02)  # the mean of 81.3 and 80.5 Hz
+    assert found.start_well_frequencies == pytest.approx(81.853, abs=0.001)
     told = "\n".join(found.remarks)
     assert "0.335 mm" in told and "81.85 Hz" in told and "80.90 Hz" in told
     assert "0.44 mm measured (-9.4%)" in told and "0.5 mm measured (-33.8%)" in told
@@ -72,19 +72,19 @@ def test_the_papers_numbers(tmp_path):
 @pytest.mark.parametrize(("kind", "value"), [("rise", 1.2e-6), ("uniform_load", 11e-3)])
 def test_two_wells_and_soft_ends_go_into_the_file(tmp_path, kind, value):
     """The file's own system has both measured frequencies; what was known of the ends is kept."""
-    ends = Ends(left=40.0, right=60.0)
-    for beam in (BEAM, BEAM.replace(ends=ends)):
+    ends = BoundaryConditions(left_rotational_stiffness=40.0, right_rotational_stiffness=60.0)
+    for beam in (BEAM, BEAM.replace(boundary=ends)):
         found = calibrate(PAPER, beam, modes=6, imperfection=kind)
         path = tmp_path / f"{kind}.toml"
         found.write_config(path)
         config = load_config(path)
         model = config.model
-        assert model.well_freq[:, 0] == pytest.approx([81.3, 80.5], rel=1e-6)
-        assert model.beam.ends == beam.ends
+        assert model.well_frequencies[:, 0] == pytest.approx([81.3, 80.5], rel=1e-6)
+        assert model.beam.boundary == beam.boundary
         assert abs(getattr(model.imperfection, kind)) == pytest.approx(value, rel=0.2)
         assert any(f"{kind} = " in text for text in found.remarks)
-        assert ("[ends]" in path.read_text()) == (beam is not BEAM)
-    one = dataclasses.replace(PAPER, upper_well_freq=())
+        assert ("[boundary]" in path.read_text()) == (beam is not BEAM)
+    one = dataclasses.replace(PAPER, upper_well_frequencies=())
     with pytest.raises(InputError, match="needs the first frequency about both wells; the upper one's"):
         calibrate(one, modes=4, imperfection=kind)
 
@@ -141,15 +141,15 @@ def test_what_data_cannot_tell_apart_is_said(fit, words):
 
 def test_parameters_that_hardly_part_are_warned_of():
     """Length and thickness act alike but for the pull of b."""
-    data = Measurements(straight_freq=[80.0], lower_well_freq=[81.0, 159.0], straight_freq_se=0.4)
+    data = Measurements(straight_frequency=[80.0], lower_well_frequencies=[81.0, 159.0], straight_freq_se=0.4)
     found = calibrate(data, fit=("thickness", "length", "buckling_level"), modes=12)
     assert found.undetermined or any("hardly" in text or "known to" in text for text in found.warnings)
 
 
 def test_only_a_straight_beam_or_only_wells():
-    straight = calibrate(Measurements(straight_freq=[80.0, 221.0]), modes=12)
-    assert list(straight.values) == ["thickness"] and straight.well_freq is None
-    wells = calibrate(Measurements(lower_well_freq=[81.0]), modes=12)
+    straight = calibrate(Measurements(straight_frequency=[80.0, 221.0]), modes=12)
+    assert list(straight.values) == ["thickness"] and straight.well_frequencies is None
+    wells = calibrate(Measurements(lower_well_frequencies=[81.0]), modes=12)
     assert list(wells.values) == ["buckling_level"]
     assert any("nothing is left to check" in text for text in wells.warnings)
     nothing = calibrate(Measurements(damping_ratio=[0.004, 0.007], damping_ratio_se=[0.0002, 0.0002]))
@@ -183,16 +183,16 @@ def test_contact_stiffness_from_collisions():
 def test_a_file_of_measurements(tmp_path):
     path = tmp_path / "m.toml"
     path.write_text(
-        "[measured]\nstraight_freq = [80.0, 221.0]\nstraight_freq_se = 0.4\nlower_well_freq = [81.3]\n"
+        "[measured]\nstraight_freq = [80.0, 221.0]\nstraight_freq_se = 0.4\nlower_well_frequencies = [81.3]\n"
         "[beam]\nlength = 0.161\n[[measured.contact]]\nclosing_speed = 0.1\nduration = 2e-4\n"
         "peak_force = 2.0\n"
     )
     found, others = load_measurements(path)
-    assert found.straight_freq == (80.0, 221.0) and found.straight_freq_se == (0.4, 0.4)
+    assert found.straight_frequency == (80.0, 221.0) and found.straight_freq_se == (0.4, 0.4)
     assert others == {"beam": {"length": 0.161}} and found.contact[0].peak_force == 2.0
     for text, word in (
         ("[measured]\nstraigth_freq = [80.0]\n", "straigth_freq: unknown"),
-        ("[measured]\nstraight_freq = ['80 Hz']\n", r"straight_freq\[0\]"),
+        ("[measured]\nstraight_freq = ['80 Hz']\n", r"straight_frequency\[0\]"),
         ("[measured]\nstraight_freq = [221.0, 80.0]\n", "must increase"),
         ("[measured]\nstraight_freq = [-80.0]\n", "greater than 0"),
         ("[measured]\nstraight_freq = [nan]\n", "finite"),
@@ -218,10 +218,10 @@ def test_a_file_of_measurements(tmp_path):
         (lambda: calibrate(PAPER, fit=("thickness", "thickness")), "different"),
         (lambda: calibrate(PAPER, fit="thickness"), "tuple"),
         (lambda: calibrate(PAPER, BEAM.replace(axial_load=0.0)), "straight"),
-        (lambda: calibrate(Measurements(straight_freq=[80.0]), fit=("buckling_level",)), "about a well"),
+        (lambda: calibrate(Measurements(straight_frequency=[80.0]), fit=("buckling_level",)), "about a well"),
         (lambda: calibrate(Measurements(damping_ratio=[0.01]), fit=("thickness",)), "no frequency"),
         (lambda: calibrate(PAPER, modes=1), "for a model of 1 modes"),
-        (lambda: calibrate({"straight_freq": [80.0]}), "Measurements"),
+        (lambda: calibrate({"straight_frequency": [80.0]}), "Measurements"),
     ],
 )
 def test_refusals(make, word):

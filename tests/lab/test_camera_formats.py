@@ -17,9 +17,9 @@ def pictures(high=4095, shape=(5, 20, 34), seed=0):
 
 
 def read(path, **scales):
-    """The frames of a recording, what it says of itself, and the codes of its findings."""
+    """The frames of a recording, what it says of itself, and the codes of its diagnostics."""
     with open_recording(path, **(SCALES | scales)) as recording:
-        return np.stack(list(recording)), recording, {one.code for one in recording.findings}
+        return np.stack(list(recording)), recording, {one.code for one in recording.diagnostics}
 
 
 @pytest.mark.parametrize("high", [255, 4095])

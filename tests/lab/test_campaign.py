@@ -50,9 +50,9 @@ def is_measured(row, truth):
     for name, true in (("frequency_hz", truth["frequency"]), ("velocity_m_s", truth["speed"])):
         error = float(row[name.replace("_hz", "_se_hz").replace("_m_s", "_se_m_s")])
         assert abs(float(row[name]) - true) < 5.0 * error, (row["test"], name)
-    assert row["response"] == truth["response"]
+    assert row["response_class"] == truth["response_class"]
     assert float(row["location"]) == pytest.approx(1.0 / 2.1)
-    assert (row["findings"], row["comment"]) == ("", "")
+    assert (row["diagnostics"], row["comment"]) == ("", "")
 
 
 def test_a_good_test_and_a_spoiled_one(tmp_path):
@@ -105,7 +105,7 @@ def test_twelve_tests_three_of_them_spoiled_interrupted_and_resumed(tmp_path):
     for name, row in table.items():
         if name in REASONS:
             assert REASONS[name] in row["comment"]
-            assert row["response"] == "unknown"
+            assert row["response_class"] == "unknown"
             assert f"{name}: spoiled: " in done.output
         else:
             is_measured(row, truth[name])

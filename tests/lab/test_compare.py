@@ -18,8 +18,8 @@ from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError
 from snapbeam.figures.lab.dot_comparison import plot_dot_comparison
 from snapbeam.figures.lab.waveform_comparison import plot_waveform_comparison, plot_waveform_overlay
-from snapbeam.lab.compare.dots import Dots
-from snapbeam.lab.compare.maps import compare_dots
+from snapbeam.lab.compare.dots import MeasuredPoints
+from snapbeam.lab.compare.maps import compare_measured_points
 from snapbeam.lab.compare.waveforms import compare_waveforms
 from snapbeam.lab.signals.files import write_signal
 from snapbeam.lab.signals.signal import make_signal
@@ -32,16 +32,16 @@ def dots_of(dataset, count: int = 200, seed: int = 0):
     ratio, velocity = dataset["frequency_ratio"].values, dataset["velocity_amplitude"].values
     i, j = rng.integers(0, ratio.size, count), rng.integers(0, velocity.size, count)
     off = rng.uniform(-0.3, 0.3, (2, count))
-    return Dots(
+    return MeasuredPoints(
         ratio[i] + off[0] * (ratio[1] - ratio[0]),
         velocity[j] + off[1] * (velocity[1] - velocity[0]),
         np.full(count, 1.0 / 2.1),
-        dataset["response"].values[i, j].astype(np.int8),
+        dataset["response_class"].values[i, j].astype(np.int8),
     )
 
 
 def test_dots_from_the_map_agree_with_it(synthetic_map):
-    found = compare_dots(dots_of(synthetic_map), synthetic_map)
+    found = compare_measured_points(dots_of(synthetic_map), synthetic_map)
     assert found.agreement == 1.0 and found.snap_agreement == 1.0
     assert found.used == 200 - int((found.table["measured"] == -1).sum())
     assert np.trace(found.confusion) == found.used
@@ -52,11 +52,11 @@ def test_dots_from_the_map_agree_with_it(synthetic_map):
 
 def test_the_confusion_table_counts_every_swap(synthetic_map):
     dots = dots_of(synthetic_map)
-    swapped = dots.response.copy()
+    swapped = dots.response_class.copy()
     at = np.flatnonzero(swapped == ResponseClass.TRANSIENT_2)[:7]
     swapped[at] = ResponseClass.INTRAWELL
-    found = compare_dots(
-        Dots(dots.frequency_ratio, dots.velocity_amplitude, dots.location, swapped), synthetic_map
+    found = compare_measured_points(
+        MeasuredPoints(dots.frequency_ratio, dots.velocity_amplitude, dots.location, swapped), synthetic_map
     )
     assert found.confusion[ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_2] == 7
     assert found.agreement == pytest.approx(1.0 - 7.0 / found.used)
@@ -65,19 +65,21 @@ def test_the_confusion_table_counts_every_swap(synthetic_map):
 
 
 def test_dots_that_do_not_belong_are_left_out_and_said(synthetic_map):
-    dots = Dots(
+    dots = MeasuredPoints(
         np.array([1.0, 9.0, 1.0, 1.0, 1.0]),
         np.array([0.05, 0.05, 0.9, 0.05, 0.05]),
         np.array([0.476, 0.476, 0.476, 0.3, np.nan]),
         np.array([0, 0, 0, 0, -1], dtype=np.int8),
     )
-    found = compare_dots(dots, synthetic_map)
+    found = compare_measured_points(dots, synthetic_map)
     assert found.table["used"].values.tolist() == [1, 0, 0, 0, 0]
     assert len(found.notes) == 3 and "2 of 5" in found.notes[0]
-    empty = compare_dots(Dots(*(np.empty(0),) * 3, np.empty(0, dtype=np.int8)), synthetic_map)
+    empty = compare_measured_points(
+        MeasuredPoints(*(np.empty(0),) * 3, np.empty(0, dtype=np.int8)), synthetic_map
+    )
     assert empty.used == 0 and np.isnan(empty.agreement)
     with pytest.raises(InputError, match="map"):
-        compare_dots(dots, synthetic_map.drop_vars("response"))
+        compare_measured_points(dots, synthetic_map.drop_vars("response_class"))
 
 
 def measured_of(run, freq: float = 100.0, start: float = 0.0123, noise: float = 0.01, rate: float = 1e4):
@@ -87,7 +89,7 @@ def measured_of(run, freq: float = 100.0, start: float = 0.0123, noise: float = 
     rest = np.clip(time - start, 0.0, None)
     values = {
         name: np.interp(rest, run["time"], run[name]) + noise * rng.standard_normal(time.size)
-        for name in ("displacement", "shaker_displacement")
+        for name in ("displacement", "striker_displacement")
     }
     return trajectory_dataset(time, **values)
 
@@ -131,15 +133,15 @@ def test_dropouts_stay_dropouts(synthetic_run):
 def test_runs_that_cannot_be_compared(synthetic_run, change, word):
     with pytest.raises(InputError, match=word):
         compare_waveforms(measured_of(synthetic_run), synthetic_run, **{"frequency": 100.0, **change})
-    with pytest.raises(InputError, match="measured: run without shaker_displacement"):
-        compare_waveforms(synthetic_run.drop_vars("shaker_displacement"), synthetic_run)
+    with pytest.raises(InputError, match="measured: run without striker_displacement"):
+        compare_waveforms(synthetic_run.drop_vars("striker_displacement"), synthetic_run)
 
 
 def test_pictures(synthetic_map, synthetic_run):
     import matplotlib.pyplot as plt
 
     dots = dots_of(synthetic_map, 40)
-    figure = plot_dot_comparison(synthetic_map, dots, compare_dots(dots, synthetic_map))
+    figure = plot_dot_comparison(synthetic_map, dots, compare_measured_points(dots, synthetic_map))
     assert "agree" in figure.axes[1].get_title(loc="left")
     runs = plot_waveform_comparison(
         compare_waveforms(measured_of(synthetic_run), synthetic_run, 100.0, start=0.0123), (0.0, 5.0)
@@ -216,7 +218,7 @@ def test_commands_of_signals(program, tmp_path):
     assert told.exit_code == 0, told.output
     report = json.loads((tmp_path / "d.json").read_text())
     for method in ("fit", "hilbert", "log_decrement"):
-        assert report[method]["modes"][0]["natural_freq"] == pytest.approx(81.0, rel=5e-4)
+        assert report[method]["modes"][0]["natural_frequencies"] == pytest.approx(81.0, rel=5e-4)
     assert program("identify", tmp_path / "none.csv").exit_code == 2
 
 
@@ -248,7 +250,7 @@ def test_a_drive_takes_amplitude_and_sign_from_the_camera(program, tmp_path, pol
     report = json.loads((tmp_path / "v.json").read_text())["alignment"]
     assert report["polarity"] == polarity
     assert abs(report["gain"] - gain) < 5.0 * report["gain_se"] < 0.02
-    codes = [one["code"] for one in report["findings"]]
+    codes = [one["code"] for one in report["diagnostics"]]
     assert "alignment.amplitude" in codes and ("alignment.polarity" in codes) == (polarity < 0)
     assert "--amplitude-from" in told.output.replace("\n", " ")
     with xr.open_dataset(tmp_path / "drive.nc", engine="h5netcdf") as drive:

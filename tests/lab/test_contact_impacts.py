@@ -34,7 +34,7 @@ def test_the_error_covers_the_truth():
     ratio = np.array([(one.stiffness - STIFFNESS) / one.stiffness_se for one in results])
     assert np.mean(np.abs(ratio) < 2.0) > 0.9
     assert np.mean(np.abs(ratio) < 4.0) > 0.995
-    assert np.mean([bool(one.findings) for one in results]) < 0.02
+    assert np.mean([bool(one.diagnostics) for one in results]) < 0.02
     assert results[0].impacts == 12
 
 
@@ -47,7 +47,9 @@ def test_the_error_covers_the_truth():
     ],
 )
 def test_impacts_that_tell_no_stiffness_say_so(changes, code):
-    assert code in {finding.code for finding in stiffness_from_impacts(collisions(**changes), MASS).findings}
+    assert code in {
+        diagnostic.code for diagnostic in stiffness_from_impacts(collisions(**changes), MASS).diagnostics
+    }
 
 
 def test_too_few_impacts_are_refused():

@@ -60,7 +60,7 @@ def test_the_drift_of_the_camera_is_taken_out(tmp_path):
             found = lab.track(recording, rest_displacement=-BUCKLING_LEVEL, fixed_marks=marks)
         misses[name] = found["displacement_mm"].values - truth
         if marks:
-            codes = {finding.code: finding for finding in lab.findings_of(found)}
+            codes = {diagnostic.code: diagnostic for diagnostic in lab.diagnostics_of(found)}
             assert codes["camera.drift"].numbers["drift_px"] == pytest.approx(3.0, abs=0.1)
             assert np.nanmax(np.abs(misses[name]) / found["displacement_stderr_mm"].values) < 5.0
     assert np.nanmax(np.abs(misses["without"])) > 2.0 * PIXEL * 1e3

@@ -39,22 +39,22 @@ def test_a_mistake_is_right_or_flagged_or_refused(case, tmp_path):
     outcome = looked(case, tmp_path)
     assert case.end in ENDS
     if case.end == "refused":
-        assert outcome.refusal, f"not refused; {outcome.findings}"
+        assert outcome.refusal, f"not refused; {outcome.diagnostics}"
         assert re.search(case.words, outcome.refusal), outcome.refusal
         return
     assert not outcome.refusal, outcome.refusal
-    codes = {finding.code: finding for finding in outcome.findings}
+    codes = {diagnostic.code: diagnostic for diagnostic in outcome.diagnostics}
     if case.code:
         assert case.code in codes, f"{case.code} not told; {list(codes)}"
     if case.end == "flagged":
-        assert codes[case.code].doubtful
+        assert codes[case.code].is_warning
     if case.end == "right":
         # a number within its standard errors, which five of them are sure to cover
         assert not outcome.ratio > 5.0
     # what is told fills its words with the numbers it carries, and its kind is listed
-    for finding in outcome.findings:
-        assert finding.code in KINDS
-        assert all(np.isfinite(value) for value in finding.numbers.values())
+    for diagnostic in outcome.diagnostics:
+        assert diagnostic.code in KINDS
+        assert all(np.isfinite(value) for value in diagnostic.numbers.values())
 
 
 def test_the_table_of_the_documentation_has_every_case():

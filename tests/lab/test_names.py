@@ -3,7 +3,7 @@
 import pytest
 
 import snapbeam
-import snapbeam.core.findings as findings
+import snapbeam.core.findings as diagnostics
 import snapbeam.lab as lab
 
 
@@ -14,7 +14,7 @@ def test_every_public_name_is_there(name):
 
 
 def test_a_finding_of_the_laboratory_is_a_finding_of_the_package():
-    assert lab.Finding is findings.Finding is snapbeam.Finding
+    assert lab.Diagnostic is diagnostics.Diagnostic is snapbeam.Diagnostic
 
 
 def test_a_name_that_is_not_there():

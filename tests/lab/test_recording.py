@@ -92,7 +92,7 @@ def test_a_real_recording_that_contradicts_itself_asks_for_its_frame_rate():
     with open_recording(REAL / "beam.cihx", pixel_size=1e-4, frame_rate=20.0) as recording:
         assert len(recording) == 4 and recording.shape == (80, 1024)
         assert recording.time_step == pytest.approx(2500 / 50_000)
-        assert {finding.code for finding in recording.findings} == {"recording.contradiction"}
+        assert {diagnostic.code for diagnostic in recording.diagnostics} == {"recording.contradiction"}
         assert recording.exposure == pytest.approx(5e-6)
         assert recording.max_value == 4095
         pixels = np.fromfile(REAL / "beam.mraw", dtype="<u2").reshape(4, 80, 1024)

@@ -46,7 +46,7 @@ def through_the_laboratory(folder, seed, *, cycles, camera, snr=None):
     path.unlink()
     path.with_suffix(".mraw").unlink()
     start = recording.truth.attrs["rest_frames"] / camera.frame_rate
-    frequency = drive.frequency_ratio * run.dataset.attrs["reference_freq"]
+    frequency = drive.frequency_ratio * run.dataset.attrs["reference_frequency"]
     classes = [
         class_at_camera(one["time"].values, one["displacement"].values, start, frequency, cycles)
         for one in (recording.truth, tracked)
@@ -94,7 +94,7 @@ def test_onsets_of_isolated_impacts_of_a_simulated_run_within_one_frame(tmp_path
     found = contact_onsets(tracked, minimum_frames=3)["onset"].values
     frame = 1.0 / camera.frame_rate
     begin, length = run.impacts["onset"].values, run.impacts["duration"].values
-    time, penetration = run.dataset["time"].values, 0.335e-3 * run.dataset["penetration"].values
+    time, penetration = run.dataset["time"].values, 0.335e-3 * run.dataset["penetration_normalised"].values
     checked = 0
     for k in range(1, begin.size):
         near = np.interp(begin[k] - np.array([frame, 0.0]), time, penetration)

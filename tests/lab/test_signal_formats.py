@@ -59,7 +59,7 @@ VOLTS = {
 
 def same(signal):
     np.testing.assert_allclose(signal.values, VALUES, atol=2e-9)
-    assert check_signal(signal).sampling_freq == pytest.approx(2000.0, rel=1e-6)
+    assert check_signal(signal).sampling_frequency == pytest.approx(2000.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("kind", TEXTS)
@@ -93,7 +93,7 @@ def test_a_table_without_a_header_is_read_when_its_columns_are_named(tmp_path):
     path.write_text(rows("{v:.9f}", ","))
     with pytest.raises(InputError, match="commas part columns or decimals"):
         read_signal(path)
-    same(read_signal(path, columns="velocity [m/s]", sampling_freq=2000.0))
+    same(read_signal(path, columns="velocity [m/s]", sampling_frequency=2000.0))
 
 
 def test_thousands_are_points_only_before_a_decimal_comma(tmp_path):

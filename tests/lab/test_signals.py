@@ -43,7 +43,7 @@ def test_round_trip(tmp_path, kind):
 
 def test_uff_keeps_a_rate_whose_step_does_not_fit_six_digits(tmp_path):
     back = read(write(tmp_path, "uff", velocity(rate=44_100.0)))
-    assert check_signal(back).sampling_freq == pytest.approx(44_100.0, rel=1e-12)
+    assert check_signal(back).sampling_frequency == pytest.approx(44_100.0, rel=1e-12)
 
 
 def test_units():
@@ -58,7 +58,10 @@ def test_units():
 
 TABLES = {
     "time [ms];velocity [mm/s]\n" + "".join(f"{i};{i % 7},5\n" for i in range(30)): (1e3, 1e-3),
-    "# sampling_freq: 2 kHz\nvelocity (mm/s)\n" + "".join(f"{i % 7}.5\n" for i in range(30)): (2e3, 1e-3),
+    "# sampling_frequency: 2 kHz\nvelocity (mm/s)\n" + "".join(f"{i % 7}.5\n" for i in range(30)): (
+        2e3,
+        1e-3,
+    ),
     "t_ms,velocity_mm_s\n" + "".join(f"{i},{i % 7}.5\n" for i in range(30)): (1e3, 1e-3),
     "time [s]\tvelocity [m/s]\n" + "".join(f"{i / 1e3}\t{i % 7}.5\n" for i in range(30)): (1e3, 1.0),
     "time[s] velocity[mm/s]\n" + "".join(f"{i / 3e3:.4f} {i % 7}.5\n" for i in range(30)): (3e3, 1e-3),
@@ -72,7 +75,7 @@ def test_dialects_of_csv(tmp_path, text):
     rate, scale = TABLES[text]
     signal = read_signal(path)
     np.testing.assert_allclose(signal.values, scale * (np.arange(30) % 7 + 0.5), rtol=1e-12)
-    assert check_signal(signal).sampling_freq == pytest.approx(rate, rel=1e-3)
+    assert check_signal(signal).sampling_frequency == pytest.approx(rate, rel=1e-3)
     assert signal.name == "velocity"
 
 
@@ -124,7 +127,7 @@ def test_channels_and_contradictions(tmp_path):
             read_signal(path, **kwargs)
     npz = write(tmp_path, "wav", velocity())
     with pytest.raises(InputError, match="12000 Hz"):
-        read_signal(npz, sensitivity="1 m/s/FS", sampling_freq=5e3)
+        read_signal(npz, sensitivity="1 m/s/FS", sampling_frequency=5e3)
     with pytest.raises(InputError, match="full scale"):
         read_signal(npz)
 
@@ -155,7 +158,7 @@ def test_any_bytes_are_refused_by_name(tmp_path_factory, kind, raw):
     path = tmp_path_factory.mktemp("junk") / f"junk.{kind}"
     path.write_bytes(raw)
     with pytest.raises(InputError, match="junk"):
-        read_signal(path, units="m", sampling_freq=1e3)
+        read_signal(path, units="m", sampling_frequency=1e3)
 
 
 @pytest.mark.parametrize("kind", KINDS)

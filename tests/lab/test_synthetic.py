@@ -124,7 +124,7 @@ def test_spoiled_frames_are_spoiled_and_marked():
         (lambda: render_recording([0.0, 1.0], [0.0, 9e-3], [0.0, 0.0]), "shape"),
         (lambda: render_recording(*STILL, camera=CAMERA, glare_frames=[999]), "glare_frames"),
         (lambda: render_recording(*STILL, camera=CAMERA).frame(999), "index"),
-        (lambda: render_vibrometer(100.0, 0.1, duration=1.0, sampling_freq=300.0), "sampling_freq"),
+        (lambda: render_vibrometer(100.0, 0.1, duration=1.0, sampling_frequency=300.0), "sampling_frequency"),
         (lambda: render_vibrometer(100.0, 0.1, duration=1.0, onset=2.0), "onset"),
     ],
 )

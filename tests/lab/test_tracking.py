@@ -81,11 +81,11 @@ def test_every_side_and_dark_objects_before_bright_light(tmp_path, side):
 def test_the_result_follows_the_schema_of_a_run(tmp_path):
     calls = []
     tracked = followed(rendered(), tmp_path, progress=lambda done, total: calls.append((done, total)))
-    check_trajectory(tracked, ("displacement", "shaker_displacement", "penetration"))
+    check_trajectory(tracked, ("displacement", "striker_displacement", "penetration"))
     assert calls[-1] == (tracked.sizes["time"],) * 2 and calls == sorted(calls)
     np.testing.assert_allclose(tracked["displacement"] * BUCKLING_LEVEL * 1e3, tracked["displacement_mm"])
     np.testing.assert_allclose(
-        tracked["penetration"], tracked["shaker_displacement"] - tracked["displacement"], atol=1e-12
+        tracked["penetration"], tracked["striker_displacement"] - tracked["displacement"], atol=1e-12
     )
     np.testing.assert_allclose(np.diff(tracked["time"]), 1.0 / FRAME_RATE)
     assert ((tracked["confidence"] >= 0) & (tracked["confidence"] <= 1)).all()

@@ -222,7 +222,7 @@ def test_resampling_noise_free_is_faithful():
             lambda: fit_sine(SignalSamples(np.cos(np.arange(100) * 0.06), np.arange(100) / 1e4, 1e4), 95.0),
             "2",
         ),
-        (lambda: recorded_drive(record()[0], 1500.0), "sampling_freq"),
+        (lambda: recorded_drive(record()[0], 1500.0), "sampling_frequency"),
         (lambda: recorded_drive(record()[0], 1e5, bandwidth=110.0), "bandwidth"),
         (lambda: align(record()[0], record()[0]), "units 'm/s'"),
         (lambda: align(record()[0], record()[0], polarity=0), "polarity"),

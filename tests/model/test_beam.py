@@ -30,7 +30,7 @@ def test_section_properties() -> None:
     assert BEAM.radius_of_gyration == pytest.approx(math.sqrt(BEAM.second_moment / BEAM.area))
     assert BEAM.mass_per_length == pytest.approx(0.0468)
     assert BEAM.bending_stiffness == pytest.approx(0.016)
-    assert BEAM.tension_stiffness == pytest.approx(200e9 * 6e-6 / (2 * 0.161))
+    assert BEAM.nonlinear_stiffness == pytest.approx(200e9 * 6e-6 / (2 * 0.161))
 
 
 def test_second_mode_buckles_at_the_level_of_equal_loads() -> None:

@@ -14,7 +14,7 @@ from snapbeam.model.paper_values import BEAM
 def brute_force(model: ReducedModel, location: float, displacement: float) -> float:
     """Least potential energy of any amplitudes with w(x_s) = r, from many starts, in units of the barrier."""
     shape = model.shape_at(location)
-    scale = np.abs(model.equilibrium[0])
+    scale = np.abs(model.well_amplitude[0])
     unit = -model.well_energy
     # alpha = particular + null(shape) z
     particular = shape * displacement / (shape @ shape)
@@ -22,7 +22,7 @@ def brute_force(model: ReducedModel, location: float, displacement: float) -> fl
 
     def energy(z: np.ndarray) -> tuple[float, np.ndarray]:
         alpha = particular + null @ z * scale
-        slope = (model.stiffness + model.tension_stiffness * (alpha @ alpha)) * alpha
+        slope = (model.stiffness + model.nonlinear_stiffness * (alpha @ alpha)) * alpha
         return float(model.potential_energy(alpha)) / unit, null.T @ slope * scale / unit
 
     rng = np.random.default_rng(0)
@@ -49,12 +49,14 @@ def test_least_energy_matches_brute_force(modes: int, location: float, height: f
 def test_least_energy_is_a_lower_bound_reached_in_the_well(modes: int) -> None:
     model = ReducedModel.from_beam(BEAM, modes)
     rng = np.random.default_rng(modes)
-    shapes = rng.normal(size=(300, modes)) / np.arange(1, modes + 1) ** 2 * 2.0 * np.abs(model.equilibrium[0])
+    shapes = (
+        rng.normal(size=(300, modes)) / np.arange(1, modes + 1) ** 2 * 2.0 * np.abs(model.well_amplitude[0])
+    )
     places = rng.choice([0.2, 0.35, 0.5, 0.7], 300)
     heights = np.array([model.shape_at(x) @ a for x, a in zip(places, shapes, strict=True)])
     bound = least_energy_at(model, places, heights)
     assert (model.potential_energy(shapes) >= bound - 1e-9 * -model.well_energy).all()
-    well = np.array([model.shape_at(x) @ -model.equilibrium for x in (0.2, 0.5)])
+    well = np.array([model.shape_at(x) @ -model.well_amplitude for x in (0.2, 0.5)])
     np.testing.assert_allclose(least_energy_at(model, [0.2, 0.5], well), model.well_energy, rtol=1e-9)
     np.testing.assert_array_equal(least_energy_at(model, 0.3, well), least_energy_at(model, 0.3, -well))
 
@@ -94,7 +96,7 @@ def test_decidable_energy() -> None:
     model = ReducedModel.from_beam(BEAM, 8)
     highest = np.linspace(-1.0, 1.2, 23) * BEAM.buckling_level
     energy = decidable_energy(model, np.full(23, 0.5), highest)
-    barrier = model.barrier_energy - model.well_energy
+    barrier = model.saddle_energy - model.well_energy
     possible = np.isfinite(energy)
     np.testing.assert_array_equal(possible, highest < BEAM.buckling_level * (1.0 - 1e-12))
     assert (energy[possible] < barrier).all()
@@ -106,6 +108,6 @@ def test_decidable_energy() -> None:
 
 def test_decides_nothing_for_structures_given_by_matrices() -> None:
     model = ReducedModel.from_matrices(
-        [[1.0]], [-1.0], contact_shape=[1.0], tension_stiffness=1.0, equilibrium=[-1.0]
+        [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, equilibrium=[-1.0]
     )
     assert decidable_energy(model, np.array([0.5]), np.array([0.0]))[0] == -np.inf

@@ -9,14 +9,14 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core import findings
+from snapbeam.core import diagnostics
 
 SHAKER = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1)
 
 
 @pytest.fixture(autouse=True)
 def nothing_told(monkeypatch):
-    monkeypatch.setattr(findings, "_told", set())
+    monkeypatch.setattr(diagnostics, "_told", set())
 
 
 def system(beam: sb.Beam = paper.BEAM, modes: int = 1, **drive) -> sb.System:
@@ -26,7 +26,7 @@ def system(beam: sb.Beam = paper.BEAM, modes: int = 1, **drive) -> sb.System:
 
 
 def codes(of: sb.System) -> list[str]:
-    return [finding.code for finding in of.findings()]
+    return [diagnostic.code for diagnostic in of.diagnostics()]
 
 
 def deep(level: float) -> sb.Beam:
@@ -53,21 +53,27 @@ def test_the_papers_own_system_is_beyond_doubt() -> None:
 def test_beams(changes, code: str, words: str) -> None:
     import re
 
-    found = {finding.code: finding for finding in system(paper.BEAM.replace(**changes)).findings()}
-    assert re.search(words, found[code].words), found[code].words
+    found = {
+        diagnostic.code: diagnostic for diagnostic in system(paper.BEAM.replace(**changes)).diagnostics()
+    }
+    assert re.search(words, found[code].message), found[code].message
 
 
 def test_a_first_mode_that_a_striker_at_the_centre_cannot_excite() -> None:
     """Above b/r = 6.21 the lowest mode about a well is antisymmetric."""
     assert "first-mode-antisymmetric" not in codes(system(deep(6.20), modes=32))
     assert "first-mode-antisymmetric" in codes(system(deep(6.22), modes=32))
-    (found,) = [f for f in system(deep(6.3), modes=4).findings() if f.code == "first-mode-antisymmetric"]
+    (found,) = [f for f in system(deep(6.3), modes=4).diagnostics() if f.code == "first-mode-antisymmetric"]
     model = sb.ReducedModel.from_beam(deep(6.3), 4)
-    assert found.numbers["symmetric_freq"] == pytest.approx(float(model.natural_freq[model.parity > 0][0]))
-    assert found.numbers["symmetric_freq"] > model.reference_freq
-    assert "set model.reference_freq" in found.words
+    assert found.numbers["symmetric_frequency"] == pytest.approx(
+        float(model.natural_frequencies[model.parity > 0][0])
+    )
+    assert found.numbers["symmetric_frequency"] > model.reference_frequency
+    assert "set model.reference_frequency" in found.message
     # what it advises settles it
-    advised = system(deep(6.3), modes=4).replace(**{"model.reference_freq": found.numbers["symmetric_freq"]})
+    advised = system(deep(6.3), modes=4).replace(
+        **{"model.reference_frequency": found.numbers["symmetric_frequency"]}
+    )
     assert codes(advised) == []
     # one mode is the symmetric one
     assert codes(system(deep(6.3), modes=1)) == []
@@ -75,7 +81,7 @@ def test_a_first_mode_that_a_striker_at_the_centre_cannot_excite() -> None:
 
 def test_drives_that_look_like_another_unit() -> None:
     assert codes(system(frequency_ratio=100.0)) == ["ratio-like-hertz"]
-    assert "is it given in Hz?" in system(frequency_ratio=100.0).findings()[0].words
+    assert "is it given in Hz?" in system(frequency_ratio=100.0).diagnostics()[0].message
     assert codes(system(velocity_amplitude=31.0)) == ["amplitude-like-speed"]
     assert codes(system(frequency_ratio=19.9, velocity_amplitude=19.9)) == []
 
@@ -84,7 +90,7 @@ def told(call) -> list[str]:
     with warnings.catch_warnings(record=True) as seen:
         warnings.simplefilter("always")
         call()
-    return [str(each.message) for each in seen if issubclass(each.category, sb.PlausibilityWarning)]
+    return [str(each.message) for each in seen if issubclass(each.category, sb.DiagnosticWarning)]
 
 
 def test_told_once_and_where_the_caller_stands() -> None:
@@ -94,9 +100,9 @@ def test_told_once_and_where_the_caller_stands() -> None:
     def run() -> None:
         sb.simulate(odd, asked, sample_times=[0.0])
 
-    with pytest.warns(sb.PlausibilityWarning, match=r"beam\.density = 7\.8") as seen:
+    with pytest.warns(sb.DiagnosticWarning, match=r"beam\.density = 7\.8") as seen:
         run()
-    assert [str(each.message) for each in seen] == [odd.findings()[0].words]
+    assert [str(each.message) for each in seen] == [odd.diagnostics()[0].message]
     assert seen[0].filename == __file__
     assert told(run) == []
     assert told(lambda: sb.sweep(odd, {"frequency_ratio": [1.0, 1.1]}, asked)) == []

@@ -14,15 +14,20 @@ from snapbeam.model.drive import HORIZON, Scale
 SCALE = Scale(0.335e-3, 514.0)
 DRIVES = {
     "burst": sb.Burst(
-        frequency_ratio=1.3, velocity_amplitude=0.2, length=6.0, rise=2.0, fall=1.5, retreat=0.4
+        frequency_ratio=1.3,
+        velocity_amplitude=0.2,
+        duration_cycles=6.0,
+        ramp_up_cycles=2.0,
+        ramp_down_cycles=1.5,
+        retraction=0.4,
     ),
-    "linear chirp": sb.Chirp(start_ratio=0.5, stop_ratio=3.0, velocity_amplitude=0.2, sweep_length=7.0),
+    "linear chirp": sb.Chirp(start_ratio=0.5, stop_ratio=3.0, velocity_amplitude=0.2, sweep_cycles=7.0),
     "falling chirp": sb.Chirp(
-        start_ratio=3.0, stop_ratio=0.5, velocity_amplitude=0.2, sweep_length=20.0, spacing="log"
+        start_ratio=3.0, stop_ratio=0.5, velocity_amplitude=0.2, sweep_cycles=20.0, sweep_type="log"
     ),
     "shock": sb.HalfSine(displacement_amplitude=0.4, duration=0.7),
-    "noise": sb.Noise(low_ratio=0.5, high_ratio=3.0, velocity_rms=0.2, seed=7, rise=2.0),
-    "two sines": sb.TwoSines(
+    "noise": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=3.0, velocity_rms=0.2, seed=7, ramp_up_cycles=2.0),
+    "two sines": sb.TwoTone(
         frequency_ratio=1.2, velocity_amplitude=0.2, second_ratio=2.4, second_amplitude=0.1, second_phase=0.7
     ),
 }
@@ -68,24 +73,26 @@ def test_burst_comes_and_goes() -> None:
     np.testing.assert_allclose(moved[after], -0.4 * SCALE.length, rtol=1e-12)
     assert (speed[after] == 0.0).all()
     with pytest.raises(InputError, match=r"rise = 3, fall = 1 with length = 2: together at most the length"):
-        sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.1, length=2.0, rise=3.0)
+        sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.1, duration_cycles=2.0, ramp_up_cycles=3.0)
 
 
 def test_noise_is_its_seed() -> None:
-    long = sb.Noise(low_ratio=1.0, high_ratio=2.0, velocity_rms=0.2, seed=7, rise=0.01)
+    long = sb.BandLimitedNoise(low_ratio=1.0, high_ratio=2.0, velocity_rms=0.2, seed=7, ramp_up_cycles=0.01)
     _, moved, speed, _, _ = sampled(long, 20001, 200.0)
     assert np.sqrt(np.mean(speed**2)) == pytest.approx(0.2 * SCALE.length * SCALE.omega, rel=0.05)
     spectrum = np.abs(np.fft.rfft(speed * np.hanning(speed.size))) ** 2
     freq = np.arange(spectrum.size) / 200.0 * 1.5  # over f_1: 200 periods of the middle of the band
     assert spectrum[(freq > 0.95) & (freq < 2.05)].sum() > 0.999 * spectrum.sum()
     other = sampled(
-        sb.Noise(low_ratio=1.0, high_ratio=2.0, velocity_rms=0.2, seed=8, rise=0.01), 20001, 200.0
+        sb.BandLimitedNoise(low_ratio=1.0, high_ratio=2.0, velocity_rms=0.2, seed=8, ramp_up_cycles=0.01),
+        20001,
+        200.0,
     )[1]
     assert abs(np.corrcoef(moved, other)[0, 1]) < 0.2
     again = sampled(long, 20001, 200.0)[1]
     np.testing.assert_array_equal(again, moved)
     with pytest.raises(InputError, match="low_ratio = 2: must be less than high_ratio = 1"):
-        sb.Noise(low_ratio=2.0, high_ratio=1.0, velocity_rms=0.1)
+        sb.BandLimitedNoise(low_ratio=2.0, high_ratio=1.0, velocity_rms=0.1)
 
 
 def test_sines_by_other_amplitudes() -> None:

@@ -9,7 +9,7 @@ import pytest
 import scipy.linalg
 
 from snapbeam.core.validate import InputError
-from snapbeam.model.galerkin.frequencies import exact_natural_freq
+from snapbeam.model.galerkin.frequencies import exact_natural_frequencies
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.paper_values import BEAM, STRAIGHT_BEAM
 
@@ -44,7 +44,7 @@ def finite_elements(load: float, level: float, elements: int) -> np.ndarray:
 @pytest.mark.parametrize("level", [0.1, 1.0, 4.0, 6.21208, 8.0, 20.0, 200.0])
 def test_buckled_against_finite_elements(level: float) -> None:
     """Twenty frequencies, to the discretisation error of 120 elements, (k h)^4/720 < 2e-4."""
-    exact = exact_natural_freq(BEAM.replace(buckling_level=level * BEAM.radius_of_gyration), 20) / UNIT
+    exact = exact_natural_frequencies(BEAM.replace(buckling_level=level * BEAM.radius_of_gyration), 20) / UNIT
     discrete = finite_elements(4 * math.pi**2, level, 120)[:20]
     np.testing.assert_allclose(discrete, exact, rtol=2e-4)
     np.testing.assert_allclose(discrete[:5], exact[:5], rtol=2e-6, atol=1e-5)
@@ -55,7 +55,7 @@ def test_buckled_against_finite_elements(level: float) -> None:
 def test_straight_against_finite_elements(load: float) -> None:
     beam = BEAM.replace(axial_load=load * BEAM.bending_stiffness / BEAM.length**2)
     np.testing.assert_allclose(
-        finite_elements(load, 0.0, 120)[:20], exact_natural_freq(beam, 20) / UNIT, rtol=2e-4
+        finite_elements(load, 0.0, 120)[:20], exact_natural_frequencies(beam, 20) / UNIT, rtol=2e-4
     )
 
 
@@ -63,19 +63,22 @@ def test_straight_against_finite_elements(load: float) -> None:
 def test_sixty_frequencies_none_missed(level: float) -> None:
     """A Galerkin model of 256 modes bounds each frequency from above, tightly: the counts agree."""
     beam = BEAM.replace(buckling_level=level * BEAM.radius_of_gyration)
-    exact = exact_natural_freq(beam, 60)
-    galerkin = ReducedModel.from_beam(beam, modes=256).natural_freq[:60]
+    exact = exact_natural_frequencies(beam, 60)
+    galerkin = ReducedModel.from_beam(beam, modes=256).natural_frequencies[:60]
     excess = galerkin / exact - 1.0
     assert excess.min() > -1e-12
     assert excess.max() < 1e-4
     assert excess[:20].max() < 1e-5
-    np.testing.assert_array_equal(exact_natural_freq(beam, 7), exact[:7])
+    np.testing.assert_array_equal(exact_natural_frequencies(beam, 7), exact[:7])
 
 
 @pytest.mark.parametrize("load", [-1000.0, -10.0, 0.0, 1.0, 24.0, BEAM.critical_load * (1 - 1e-9)])
 def test_straight_none_missed(load: float) -> None:
     beam = BEAM.replace(axial_load=load)
-    excess = ReducedModel.from_beam(beam, modes=256).natural_freq[:60] / exact_natural_freq(beam, 60) - 1.0
+    excess = (
+        ReducedModel.from_beam(beam, modes=256).natural_frequencies[:60] / exact_natural_frequencies(beam, 60)
+        - 1.0
+    )
     assert excess.min() > -1e-8  # the lowest frequency loses digits in P_cr - P
     assert excess[1:].min() > 0.0
     assert excess.max() < 1e-4
@@ -83,16 +86,16 @@ def test_straight_none_missed(load: float) -> None:
 
 def test_limits() -> None:
     # shallow: omega_1^2 -> 4 pi^4 (b/r)^2/6, and the rest those of the beam at its critical load
-    shallow = exact_natural_freq(BEAM.replace(buckling_level=1e-6 * BEAM.radius_of_gyration), 30)
+    shallow = exact_natural_frequencies(BEAM.replace(buckling_level=1e-6 * BEAM.radius_of_gyration), 30)
     assert shallow[0] / UNIT == pytest.approx(2e-6 * math.pi**2 / math.sqrt(6.0), rel=1e-12)
-    critical = exact_natural_freq(BEAM.replace(axial_load=BEAM.critical_load), 30)
+    critical = exact_natural_frequencies(BEAM.replace(axial_load=BEAM.critical_load), 30)
     assert critical[0] == 0.0
     np.testing.assert_allclose(shallow[1:], critical[1:], rtol=1e-12)
     # the antisymmetric motions do not feel the buckling level
-    deep = exact_natural_freq(BEAM.replace(buckling_level=50.0 * BEAM.radius_of_gyration), 30)
+    deep = exact_natural_frequencies(BEAM.replace(buckling_level=50.0 * BEAM.radius_of_gyration), 30)
     assert all(np.abs(deep / f - 1.0).min() < 1e-14 for f in critical[1:10:2])
     # no load: cos z cosh z = 1
-    z = np.sqrt(2.0 * math.pi * exact_natural_freq(STRAIGHT_BEAM, 12) / (2.0 * math.pi * UNIT))
+    z = np.sqrt(2.0 * math.pi * exact_natural_frequencies(STRAIGHT_BEAM, 12) / (2.0 * math.pi * UNIT))
     assert np.abs(np.cos(z) - 1.0 / np.cosh(z)).max() < 1e-13
 
 
@@ -100,7 +103,9 @@ def test_symmetric_and_antisymmetric_cross() -> None:
     """At b/r = 6.21208 the first two frequencies meet and change places."""
     gaps = []
     for level in (6.212075, 6.212085):
-        first = exact_natural_freq(BEAM.replace(buckling_level=level * BEAM.radius_of_gyration), 2) / UNIT
+        first = (
+            exact_natural_frequencies(BEAM.replace(buckling_level=level * BEAM.radius_of_gyration), 2) / UNIT
+        )
         fixed = int(np.argmin(np.abs(first - 44.36270469277)))
         gaps.append(first[1 - fixed] - first[fixed])
     assert gaps[0] < 0.0 < gaps[1]
@@ -108,6 +113,6 @@ def test_symmetric_and_antisymmetric_cross() -> None:
 
 def test_refusals() -> None:
     with pytest.raises(InputError, match=r"count = 0: must be an integer in \[1, 1000\]"):
-        exact_natural_freq(BEAM, 0)
+        exact_natural_frequencies(BEAM, 0)
     with pytest.raises(InputError, match=r"beam = 1: must be a Beam"):
-        exact_natural_freq(1)  # type: ignore[arg-type]
+        exact_natural_frequencies(1)  # type: ignore[arg-type]

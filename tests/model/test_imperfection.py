@@ -12,7 +12,7 @@ from snapbeam.core.validate import InputError
 from snapbeam.model.decision import crossing_energy
 from snapbeam.model.galerkin.modes import BucklingModes
 from snapbeam.model.imperfection.equilibria import equilibria_of
-from snapbeam.model.imperfection.fitted import fit_wells
+from snapbeam.model.imperfection.fitted import identify_imperfection
 from snapbeam.model.imperfection.passing import least_energy_through
 
 LENGTH = paper.BEAM.length
@@ -27,9 +27,9 @@ def test_shapes_are_what_they_say() -> None:
     modes = BucklingModes(LENGTH, 8)
     x = np.linspace(0.0, LENGTH, 801)
     shapes = modes.shape(x)
-    rise = sb.Imperfection(rise=2e-5).initial_shape(modes) @ shapes
+    rise = sb.Imperfection(midspan_amplitude=2e-5).initial_shape(modes) @ shapes
     np.testing.assert_allclose(rise, 1e-5 * (1.0 - np.cos(2.0 * np.pi * x / LENGTH)), rtol=0.0, atol=1e-18)
-    skew = sb.Imperfection(skew=3e-5).initial_shape(modes) @ shapes
+    skew = sb.Imperfection(antisymmetric_amplitude=3e-5).initial_shape(modes) @ shapes
     assert skew.max() == pytest.approx(3e-5, rel=1e-5)
     assert skew[x < 0.5 * LENGTH].max() == skew.max()
     np.testing.assert_allclose(skew, -skew[::-1], rtol=0.0, atol=1e-18)
@@ -37,10 +37,13 @@ def test_shapes_are_what_they_say() -> None:
     at = np.linspace(0.0, 1.0, 301)
     measured = sb.Imperfection(profile=[at, 1e-5 * (1.0 - np.cos(2.0 * np.pi * at)) + 4e-5 * at + 1e-3])
     np.testing.assert_allclose(
-        measured.initial_shape(modes), sb.Imperfection(rise=2e-5).initial_shape(modes), rtol=0.0, atol=1e-13
+        measured.initial_shape(modes),
+        sb.Imperfection(midspan_amplitude=2e-5).initial_shape(modes),
+        rtol=0.0,
+        atol=1e-13,
     )
     # a half sine by its slope: the integral of (pi a/L) cos(pi x/L) phi_i'
-    sine = sb.Imperfection(rise=1e-5, form="sine").initial_shape(modes)
+    sine = sb.Imperfection(midspan_amplitude=1e-5, shape="sine").initial_shape(modes)
     nodes, weights = np.polynomial.legendre.leggauss(200)
     points = 0.5 * LENGTH * (1.0 + nodes)
     slope = np.pi * 1e-5 / LENGTH * np.cos(np.pi * points / LENGTH)
@@ -54,16 +57,16 @@ def test_loads_are_what_they_say() -> None:
     nodes, weights = np.polynomial.legendre.leggauss(100)
     areas = modes.shape(0.5 * LENGTH * (1.0 + nodes)) @ (0.5 * LENGTH * weights)
     np.testing.assert_allclose(modes.integral, areas, rtol=0.0, atol=1e-14 * areas.max())
-    uniform = sb.Imperfection(uniform_load=0.3).side_load(modes, paper.BEAM)
+    uniform = sb.Imperfection(uniform_load=0.3).transverse_load(modes, paper.BEAM)
     np.testing.assert_allclose(uniform, 0.3 * areas, rtol=0.0, atol=1e-13 * areas.max())
-    weight = sb.Imperfection(gravity=9.81).side_load(modes, paper.BEAM)
+    weight = sb.Imperfection(gravity=9.81).transverse_load(modes, paper.BEAM)
     np.testing.assert_allclose(weight, -9.81 * paper.BEAM.mass_per_length / 0.3 * uniform, rtol=1e-14)
-    point = sb.Imperfection(point_load=0.2, point_location=0.3).side_load(modes, paper.BEAM)
+    point = sb.Imperfection(point_load=0.2, point_location=0.3).transverse_load(modes, paper.BEAM)
     np.testing.assert_allclose(point, 0.2 * modes.shape(0.3 * LENGTH), rtol=1e-14)
     # a load upward lifts both wells, one downward lowers them
     assert (
-        model_of(uniform_load=0.05).wells @ model_of().center_shape
-        > model_of().wells @ model_of().center_shape
+        model_of(uniform_load=0.05).wells @ model_of().midspan_shape
+        > model_of().wells @ model_of().midspan_shape
     ).all()
     assert model_of(gravity=1.0).well_energy < model_of().well_energy
 
@@ -76,16 +79,16 @@ def test_gone_past_a_fold() -> None:
         low, high = (middle, high) if model_of(rise=middle).is_bistable else (low, middle)
     near, past = model_of(rise=low), model_of(rise=high)
     # one mode: kappa + 3 gamma a^2 = 0 at the fold, so that B = 2 (-kappa/3)^1.5/gamma^0.5
-    kappa, gamma = near.stiffness[0], near.tension_stiffness
-    assert near.side_force[0] == pytest.approx(2.0 * (-kappa / 3.0) ** 1.5 / gamma**0.5, rel=1e-6)
-    assert near.well_freq[0, 0] < 0.02 * near.well_freq[1, 0]
+    kappa, gamma = near.stiffness[0], near.nonlinear_stiffness
+    assert near.transverse_force[0] == pytest.approx(2.0 * (-kappa / 3.0) ** 1.5 / gamma**0.5, rel=1e-6)
+    assert near.well_frequencies[0, 0] < 0.02 * near.well_frequencies[1, 0]
     assert not past.is_bistable
     assert len(past.equilibria) == 1
     np.testing.assert_array_equal(past.wells[0], past.wells[1])
     system = sb.System(past, paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))
-    assert "monostable" in [each.code for each in system.findings()]
+    assert "monostable" in [each.code for each in system.diagnostics()]
     with pytest.raises(InputError, match="this imperfection leaves one"):
-        past.barrier_energy  # noqa: B018
+        past.saddle_energy  # noqa: B018
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -121,13 +124,17 @@ def test_bound_behind_early_decision(modes) -> None:
     given = {"rise": 1.2e-5, "point_load": 0.02, "point_location": 0.3}
     model = model_of(modes, **given)
     size = float(np.abs(model.wells).max())
-    depth = model.barrier_energy - model.landscape.deepest.energy
+    depth = model.saddle_energy - model.landscape.deepest.energy
     for location in (0.2, 0.35, 0.5):
         shape = model.shape_at(location)
         for share in (-0.8, -0.3, 0.0, 0.4, 0.9):
             height = share * float(shape @ model.wells[1])
             bound = least_energy_through(
-                model.stiffness, model.tension_stiffness, model.side_force, shape[None], np.array([height])
+                model.stiffness,
+                model.nonlinear_stiffness,
+                model.transverse_force,
+                shape[None],
+                np.array([height]),
             )[0]
             # free coordinates of the plane c . alpha = r
             base, free = shape * height / (shape @ shape), np.linalg.svd(shape[None])[2][1:].T
@@ -141,14 +148,14 @@ def test_bound_behind_early_decision(modes) -> None:
                 best = min(best, found.fun * depth)
             assert bound <= best + 1e-9 * depth
             assert bound == pytest.approx(best, abs=1e-6 * depth)
-    assert crossing_energy(model) == pytest.approx(model.barrier_energy, abs=1e-6 * depth)
+    assert crossing_energy(model) == pytest.approx(model.saddle_energy, abs=1e-6 * depth)
     # without a side force it is that of equal wells
     from snapbeam.model.decision import least_energy_at
 
     plain = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
     none = least_energy_through(
         plain.stiffness,
-        plain.tension_stiffness,
+        plain.nonlinear_stiffness,
         np.zeros(modes),
         plain.shape_at(0.3)[None],
         np.array([0.4 * LEVEL]),
@@ -159,32 +166,41 @@ def test_bound_behind_early_decision(modes) -> None:
 def test_measured_wells_are_explained() -> None:
     """The paper's own beam: 81.3 and 80.5 Hz."""
     for kind in ("rise", "point_load", "uniform_load"):
-        model = fit_wells(paper.BEAM, 81.3, 80.5, kind)
-        np.testing.assert_allclose(model.well_freq[:, 0], [81.3, 80.5], rtol=1e-6)
+        model = identify_imperfection(paper.BEAM, 81.3, 80.5, kind)
+        np.testing.assert_allclose(model.well_frequencies[:, 0], [81.3, 80.5], rtol=1e-6)
         assert model.beam.buckling_level == pytest.approx(0.331e-3, abs=1e-6)
-        mirrored = fit_wells(paper.BEAM, 80.5, 81.3, kind)
+        mirrored = identify_imperfection(paper.BEAM, 80.5, 81.3, kind)
         assert getattr(mirrored.imperfection, kind) == pytest.approx(
             -getattr(model.imperfection, kind), rel=1e-5
         )
-    assert fit_wells(paper.BEAM, 81.3, 80.5).imperfection.rise == pytest.approx(-1.17e-6, abs=0.01e-6)
+    assert identify_imperfection(paper.BEAM, 81.3, 80.5).imperfection.midspan_amplitude == pytest.approx(
+        -1.17e-6, abs=0.01e-6
+    )
     with pytest.raises(InputError, match="no load of this beam"):
-        fit_wells(paper.BEAM, 400.0, 20.0)
+        identify_imperfection(paper.BEAM, 400.0, 20.0)
 
 
 def test_by_dotted_name_and_in_files(tmp_path) -> None:
     system = sb.System(
         model_of(rise=1e-5, skew=2e-6), paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1)
     )
-    assert system.get("imperfection.rise") == 1e-5
+    assert system.get("imperfection.midspan_amplitude") == 1e-5
     other = system.replace(**{"imperfection.point_load": 0.01, "beam.thickness": 4.2e-4, "model.modes": 5})
     assert other.get("imperfection.point_load") == 0.01
-    assert other.get("imperfection.skew") == 2e-6
+    assert other.get("imperfection.antisymmetric_amplitude") == 2e-6
     assert other.model.modes == 5
     system.save(tmp_path / "a.toml")
     assert sb.System.load(tmp_path / "a.toml") == system
-    perfect = system.replace(**{"imperfection.rise": 0.0, "imperfection.skew": 0.0})
+    perfect = system.replace(
+        **{"imperfection.midspan_amplitude": 0.0, "imperfection.antisymmetric_amplitude": 0.0}
+    )
     assert perfect == system.replace(imperfection=None)
-    assert perfect.replace(**{"imperfection.rise": 1e-5, "imperfection.skew": 2e-6}) == system
+    assert (
+        perfect.replace(
+            **{"imperfection.midspan_amplitude": 1e-5, "imperfection.antisymmetric_amplitude": 2e-6}
+        )
+        == system
+    )
     with pytest.raises(InputError, match=r"imperfection.tilt: no parameter"):
         system.replace(**{"imperfection.tilt": 1.0})
     config = config_from_mapping(
@@ -195,7 +211,7 @@ def test_by_dotted_name_and_in_files(tmp_path) -> None:
     with pytest.raises(InputError, match="is it given in mm"):
         config_from_mapping({"imperfection": {"rise": 3.0}})
     matrices = sb.ReducedModel.from_matrices(
-        [[1.0]], [-1.0], contact_shape=[1.0], tension_stiffness=1.0, side_force=[0.1]
+        [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, transverse_force=[0.1]
     )
     again = sb.System.from_mapping(sb.System(matrices).to_mapping())
     np.testing.assert_array_equal(again.model.wells, matrices.wells)
@@ -209,10 +225,10 @@ def test_swept_by_name() -> None:
         sb.ReducedModel.from_beam(paper.BEAM, modes=2), paper.CONTACT,
         sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2),
     )  # fmt: skip
-    axes = {"imperfection.rise": [-1e-5, 0.0, 1e-5], "velocity_amplitude": [0.1, 0.3]}
+    axes = {"imperfection.midspan_amplitude": [-1e-5, 0.0, 1e-5], "velocity_amplitude": [0.1, 0.3]}
     swept = sb.sweep(system, axes, sb.Integration(cycles=6))
     assert swept.response.dims == ("imperfection_rise", "velocity_amplitude")
     plain = sb.sweep(system, {"velocity_amplitude": [0.1, 0.3]}, sb.Integration(cycles=6))
     np.testing.assert_array_equal(swept.max_displacement[1], plain.max_displacement)
-    assert (swept.reference_freq[0] != swept.reference_freq[1]).all()
-    assert swept.reference_freq.values[0] == swept.reference_freq.values[2]
+    assert (swept.reference_frequency[0] != swept.reference_frequency[1]).all()
+    assert swept.reference_frequency.values[0] == swept.reference_frequency.values[2]

@@ -14,8 +14,8 @@ def test_what_is_not_given() -> None:
     asked = sb.Integration()
     assert (asked.cycles, asked.cycles_or_default) == (None, 200)
     assert (asked.step, asked.accuracy, asked.tolerance, asked.engine) == (None, "map", None, "auto")
-    assert not asked.early_decision
-    assert asked == sb.Integration(accuracy="map")
+    assert not asked.early_termination
+    assert asked == sb.Integration(accuracy="standard")
     assert sb.Integration(cycles=7).cycles_or_default == 7
 
 
@@ -42,7 +42,7 @@ def test_replace() -> None:
         ({"tolerance": 1e-12}, InputError, r"tolerance = 1e-12: must be a number in \[1e-10, 0.1\]"),
         ({"tolerance": 1e-3, "step": 1e-5}, InputError, "tolerance = 0.001 with step = 1e-05.*give one"),
         ({"tolerance": 1e-3, "accuracy": "reference"}, InputError, "accuracy = 'reference': give one"),
-        ({"early_decision": "yes"}, InputTypeError, "early_decision = 'yes': must be True or False"),
+        ({"early_termination": "yes"}, InputTypeError, "early_termination = 'yes': must be True or False"),
         ({"threads": 0}, InputError, r"threads = 0: must be an integer in \[1, 4096\]"),
         ({"high_frequency_ratio": 0.0}, InputError, "high_frequency_ratio = 0.0"),
         ({"max_steps": 0}, InputError, "max_steps = 0: must be an integer"),

@@ -22,11 +22,11 @@ DEEP_BEAM = BEAM.replace(buckling_level=8.0 * BEAM.radius_of_gyration)
 def tangent_stiffness(model: ReducedModel, alpha: np.ndarray) -> np.ndarray:
     """Jacobian of K0 alpha + gamma (alpha . alpha) alpha."""
     square = alpha @ alpha * np.eye(alpha.size) + 2.0 * np.outer(alpha, alpha)
-    return np.diag(model.stiffness) + model.tension_stiffness * square
+    return np.diag(model.stiffness) + model.nonlinear_stiffness * square
 
 
 def gradient(model: ReducedModel, alpha: np.ndarray) -> np.ndarray:
-    return model.stiffness * alpha + model.tension_stiffness * (alpha @ alpha) * alpha
+    return model.stiffness * alpha + model.nonlinear_stiffness * (alpha @ alpha) * alpha
 
 
 def test_matrices_against_quadrature() -> None:
@@ -43,7 +43,7 @@ def test_matrices_against_quadrature() -> None:
     assert (model.mass[odd_even] == 0.0).all()
     bending = BEAM.bending_stiffness * np.sum(weight * curvature**2, axis=1)
     np.testing.assert_allclose(model.stiffness, bending - BEAM.axial_load, rtol=1e-13)
-    assert model.tension_stiffness == BEAM.tension_stiffness
+    assert model.nonlinear_stiffness == BEAM.nonlinear_stiffness
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 32, 256])
@@ -64,7 +64,7 @@ def test_linear_modes(beam: Beam, count: int) -> None:
     v, omega = model.linear_modes, model.omega
     assert (np.diff(omega) > 0.0).all()
     assert np.abs(v.T @ model.mass @ v - np.eye(count)).max() < 1e-13
-    stiffness = v.T @ tangent_stiffness(model, model.equilibrium) @ v / np.outer(omega, omega)
+    stiffness = v.T @ tangent_stiffness(model, model.well_amplitude) @ v / np.outer(omega, omega)
     assert np.abs(stiffness - np.eye(count)).max() < 1e-12
     across = np.not_equal.outer(model.parity, model.parity)
     assert (model.tension_matrix[across] == 0.0).all()
@@ -85,20 +85,22 @@ def test_rank_one_with_zero_and_equal_entries() -> None:
 
 def test_beam_at_its_critical_load() -> None:
     model = ReducedModel.from_beam(BEAM.replace(axial_load=BEAM.critical_load), modes=8)
-    assert model.natural_freq[0] == 0.0
-    assert (model.natural_freq[1:] > 0.0).all()
+    assert model.natural_frequencies[0] == 0.0
+    assert (model.natural_frequencies[1:] > 0.0).all()
     np.testing.assert_allclose(model.linear_modes.T @ model.mass @ model.linear_modes, np.eye(8), atol=1e-14)
-    with pytest.raises(InputError, match=r"reference_freq is not given .* give reference_freq in Hz"):
-        _ = model.reference_freq
+    with pytest.raises(
+        InputError, match=r"reference_frequency is not given .* give reference_frequency in Hz"
+    ):
+        _ = model.reference_frequency
 
 
 def test_shape_at() -> None:
     model = ReducedModel.from_beam(BEAM, modes=32)
     modes = BucklingModes(BEAM.length, 32)
     np.testing.assert_array_equal(model.shape_at(LOCATION), modes.shape(LOCATION * BEAM.length))
-    np.testing.assert_array_equal(model.shape_at(0.5), model.center_shape)
-    assert (model.center_shape[1::2] == 0.0).all()
-    assert model.center_shape @ model.equilibrium == pytest.approx(-BEAM.buckling_level, rel=1e-14)
+    np.testing.assert_array_equal(model.shape_at(0.5), model.midspan_shape)
+    assert (model.midspan_shape[1::2] == 0.0).all()
+    assert model.midspan_shape @ model.well_amplitude == pytest.approx(-BEAM.buckling_level, rel=1e-14)
     for bad in (1.1, -0.2, math.nan):
         with pytest.raises(InputError, match=r"location = .*: must be a number in \[0, 1\]"):
             model.shape_at(bad)
@@ -142,10 +144,10 @@ def test_wells_and_barrier_against_optimisation(beam: Beam, count: int) -> None:
     Every path between the wells crosses alpha_1 = 0, and the least energy there is a saddle.
     """
     model = ReducedModel.from_beam(beam, modes=count)
-    a = abs(model.equilibrium[0])
+    a = abs(model.well_amplitude[0])
     scale = abs(model.well_energy)
     excess = beam.axial_load - beam.critical_load
-    assert model.well_energy == pytest.approx(-(excess**2) / (4.0 * beam.tension_stiffness), rel=1e-12)
+    assert model.well_energy == pytest.approx(-(excess**2) / (4.0 * beam.nonlinear_stiffness), rel=1e-12)
     for well in model.wells:
         assert np.abs(gradient(model, well)).max() < 1e-12 * excess * a
         assert (np.linalg.eigvalsh(tangent_stiffness(model, well)) > 0.0).all()
@@ -167,15 +169,17 @@ def test_wells_and_barrier_against_optimisation(beam: Beam, count: int) -> None:
         if count > 1:
             found = minimize(energy_on_ridge, rng.normal(size=count - 1), jac=True, options={"gtol": 1e-9})
             ridge = min(ridge, found.fun)
-    assert model.barrier_energy / scale == pytest.approx(ridge, abs=1e-9)
+    assert model.saddle_energy / scale == pytest.approx(ridge, abs=1e-9)
     if count == 1 or beam is BEAM:
-        assert model.barrier_energy == 0.0
+        assert model.saddle_energy == 0.0
     else:
         second = beam.axial_load - beam.second_critical_load
-        assert model.barrier_energy == pytest.approx(-(second**2) / (4.0 * beam.tension_stiffness), rel=1e-10)
+        assert model.saddle_energy == pytest.approx(
+            -(second**2) / (4.0 * beam.nonlinear_stiffness), rel=1e-10
+        )
         saddle = np.zeros(count)
-        saddle[1] = math.sqrt(second / beam.tension_stiffness)
-        assert float(model.potential_energy(saddle)) == pytest.approx(model.barrier_energy, rel=1e-10)
+        saddle[1] = math.sqrt(second / beam.nonlinear_stiffness)
+        assert float(model.potential_energy(saddle)) == pytest.approx(model.saddle_energy, rel=1e-10)
         assert np.sum(np.linalg.eigvalsh(tangent_stiffness(model, saddle)) < 0.0) == 1
 
 
@@ -192,7 +196,7 @@ def test_energies_of_many_states() -> None:
     modes = BucklingModes(BEAM.length, 5)
     stretch = np.sum(weight * (one @ modes.slope(x)) ** 2)
     bending = 0.5 * BEAM.bending_stiffness * np.sum(weight * (one @ modes.curvature(x)) ** 2)
-    expected = bending - 0.5 * BEAM.axial_load * stretch + 0.25 * BEAM.tension_stiffness * stretch**2
+    expected = bending - 0.5 * BEAM.axial_load * stretch + 0.25 * BEAM.nonlinear_stiffness * stretch**2
     assert potential[2, 1] == pytest.approx(expected, rel=1e-11)
     speed = one @ modes.shape(x)
     assert kinetic[2, 1] == pytest.approx(0.5 * BEAM.mass_per_length * np.sum(weight * speed**2), rel=1e-11)
@@ -208,14 +212,20 @@ def test_straight_beam_has_no_barrier() -> None:
     message = r"the map needs a buckled beam: axial_load = 0 N must exceed the critical load of 24.3685 N"
     with pytest.raises(InputError, match=message):
         model.require_bistable("the map")
-    with pytest.raises(InputError, match="barrier_energy needs a buckled beam"):
-        _ = model.barrier_energy
+    with pytest.raises(InputError, match="saddle_energy needs a buckled beam"):
+        _ = model.saddle_energy
     ReducedModel.from_beam(BEAM, modes=4).require_bistable("the map")
 
 
 def test_arrays_are_read_only() -> None:
     model = ReducedModel.from_beam(BEAM, modes=4)
-    for array in (model.mass, model.stiffness, model.linear_modes, model.natural_freq, model.tension_matrix):
+    for array in (
+        model.mass,
+        model.stiffness,
+        model.linear_modes,
+        model.natural_frequencies,
+        model.tension_matrix,
+    ):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0.0
 

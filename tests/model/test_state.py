@@ -90,21 +90,21 @@ def test_more_modes_are_still_and_none_that_moves_is_lost() -> None:
 
 
 def test_rest_is_in_the_well_that_the_striker_pushes_away_from() -> None:
-    np.testing.assert_array_equal(rest_state(MODEL, BELOW).amplitude, MODEL.equilibrium)
-    np.testing.assert_array_equal(rest_state(MODEL, ABOVE).amplitude, -MODEL.equilibrium)
-    np.testing.assert_array_equal(rest_state(MODEL).amplitude, MODEL.equilibrium)
+    np.testing.assert_array_equal(rest_state(MODEL, BELOW).amplitude, MODEL.well_amplitude)
+    np.testing.assert_array_equal(rest_state(MODEL, ABOVE).amplitude, -MODEL.well_amplitude)
+    np.testing.assert_array_equal(rest_state(MODEL).amplitude, MODEL.well_amplitude)
 
 
 def test_amplitudes_are_counted_in_that_of_the_well() -> None:
     scale = amplitude_scale(MODEL)
-    assert scale == pytest.approx(abs(MODEL.equilibrium[0]), rel=1e-14)
+    assert scale == pytest.approx(abs(MODEL.well_amplitude[0]), rel=1e-14)
     state = started(MODEL, BELOW, None, {"amplitude[1]": 0.5, "velocity[2]": 0.1, "striker_position": 2e-4})
     np.testing.assert_allclose(state.amplitude, [0.5 * scale, 0.0, 0.0], rtol=1e-14)
     np.testing.assert_allclose(state.velocity, [0.0, 0.1 * scale * MODEL.omega[0], 0.0], rtol=1e-12)
     assert float(state.striker_position) == 2e-4
     # the centre of the upper well: amplitude[1] = 1 is b up
     up = started(MODEL, BELOW, None, {"amplitude[1]": 1.0})
-    assert float(MODEL.center_shape @ up.amplitude) == pytest.approx(paper.BEAM.buckling_level, rel=1e-12)
+    assert float(MODEL.midspan_shape @ up.amplitude) == pytest.approx(paper.BEAM.buckling_level, rel=1e-12)
     # of a structure with one well: what moves the centre by the length scale
     spring = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[2.0], length_scale=3.0)
     assert amplitude_scale(spring) == 1.5

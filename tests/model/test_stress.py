@@ -32,8 +32,8 @@ def test_pressure_carries_the_force() -> None:
     assert hertz_stress(found.yield_force, contact.stiffness, 2e-3).pressure == pytest.approx(
         1.6e9, rel=1e-12
     )
-    assert [each.code for each in found.findings()] == ["contact-yields"]
-    assert hertz_stress(0.5 * found.yield_force, contact.stiffness, 2e-3, 1e9).findings() == ()
+    assert [each.code for each in found.diagnostics()] == ["contact-yields"]
+    assert hertz_stress(0.5 * found.yield_force, contact.stiffness, 2e-3, 1e9).diagnostics() == ()
     with pytest.raises(InputError, match="radius = 0"):
         hertz_stress(1.0, 4e8, 0.0)
 
@@ -45,7 +45,7 @@ def test_bending_of_the_well() -> None:
     expected = (
         0.25 * beam.young_modulus * beam.thickness * beam.buckling_level * (2.0 * math.pi / beam.length) ** 2
     )
-    assert float(bending_stress(model, model.equilibrium)) == pytest.approx(expected, rel=1e-12)
-    many = bending_stress(model, np.stack([model.equilibrium, 0.0 * model.equilibrium]))
+    assert float(bending_stress(model, model.well_amplitude)) == pytest.approx(expected, rel=1e-12)
+    many = bending_stress(model, np.stack([model.well_amplitude, 0.0 * model.well_amplitude]))
     assert many.shape == (2,)
     assert many[1] == 0.0

@@ -16,15 +16,17 @@ TWO = {"mass": np.eye(2), "stiffness": [1.0, 4.0], "contact_shape": [1.0, 1.0]}
 
 
 def test_free_mass() -> None:
-    model = ReducedModel.from_matrices([[0.02]], [0.0], contact_shape=[1.0], reference_freq=50.0)
+    model = ReducedModel.from_matrices([[0.02]], [0.0], contact_shape=[1.0], reference_frequency=50.0)
     assert model.omega.tolist() == [0.0]
     assert model.linear_modes[0, 0] == pytest.approx(1.0 / math.sqrt(0.02))
     assert model.contact_mass(0.3) == pytest.approx(0.02)
-    assert model.reference_freq == 50.0
+    assert model.reference_frequency == 50.0
     assert not model.is_bistable
     assert model.length_scale == 1.0
-    with pytest.raises(InputError, match=r"reference_freq is not given and the first natural frequency is 0"):
-        _ = ReducedModel.from_matrices([[0.02]], [0.0], contact_shape=[1.0]).reference_freq
+    with pytest.raises(
+        InputError, match=r"reference_frequency is not given and the first natural frequency is 0"
+    ):
+        _ = ReducedModel.from_matrices([[0.02]], [0.0], contact_shape=[1.0]).reference_frequency
 
 
 def test_free_chain_has_one_rigid_motion() -> None:
@@ -48,17 +50,17 @@ def test_reproduces_the_beam() -> None:
             turn @ beam.mass @ turn.T,
             turn @ np.diag(beam.stiffness) @ turn.T,
             contact_shape=turn @ beam.shape_at(LOCATION),
-            center_shape=turn @ beam.center_shape,
-            tension_stiffness=beam.tension_stiffness,
-            equilibrium=turn @ beam.equilibrium,
+            midspan_shape=turn @ beam.midspan_shape,
+            nonlinear_stiffness=beam.nonlinear_stiffness,
+            equilibrium=turn @ beam.well_amplitude,
             length_scale=BEAM.buckling_level,
             damping_ratio=0.005,
         )
-        np.testing.assert_allclose(model.natural_freq, beam.natural_freq, rtol=1e-12)
-        assert model.reference_freq == pytest.approx(beam.reference_freq)
+        np.testing.assert_allclose(model.natural_frequencies, beam.natural_frequencies, rtol=1e-12)
+        assert model.reference_frequency == pytest.approx(beam.reference_frequency)
         assert model.contact_mass(0.1) == pytest.approx(beam.contact_mass(LOCATION))
         assert model.well_energy == pytest.approx(beam.well_energy)
-        assert model.barrier_energy == pytest.approx(beam.barrier_energy)
+        assert model.saddle_energy == pytest.approx(beam.saddle_energy)
         alpha = 1e-3 * np.random.default_rng(4).normal(size=(3, 6))
         np.testing.assert_allclose(model.potential_energy(alpha @ turn.T), beam.potential_energy(alpha))
         np.testing.assert_allclose(model.kinetic_energy(alpha @ turn.T), beam.kinetic_energy(alpha))
@@ -68,11 +70,11 @@ def test_reproduces_the_beam() -> None:
 
 
 def test_shape_is_the_contact_point_whatever_the_location() -> None:
-    model = ReducedModel.from_matrices(**TWO, center_shape=[1.0, 0.0])
+    model = ReducedModel.from_matrices(**TWO, midspan_shape=[1.0, 0.0])
     np.testing.assert_array_equal(model.shape_at(0.2), [1.0, 1.0])
     np.testing.assert_array_equal(model.shape_at(0.5), [1.0, 1.0])
-    np.testing.assert_array_equal(model.center_shape, [1.0, 0.0])
-    np.testing.assert_array_equal(ReducedModel.from_matrices(**TWO).center_shape, [1.0, 1.0])
+    np.testing.assert_array_equal(model.midspan_shape, [1.0, 0.0])
+    np.testing.assert_array_equal(ReducedModel.from_matrices(**TWO).midspan_shape, [1.0, 1.0])
 
 
 @pytest.mark.parametrize(
@@ -89,13 +91,16 @@ def test_shape_is_the_contact_point_whatever_the_location() -> None:
         ({"stiffness": [1.0, -1.0]}, r"equilibrium = \[0.0, 0.0\]: must be stable, .* eigenvalue -1 1/s"),
         ({"contact_shape": [1.0]}, r"contact_shape of shape \(1,\): must have the shape \(2,\)"),
         ({"contact_shape": [0.0, 0.0]}, r"contact_shape = \[0.0, 0.0\]: must not be all zeros"),
-        ({"center_shape": [math.inf, 0.0]}, r"center_shape\[0\] = .*inf.*: must be finite"),
-        ({"tension_stiffness": -1.0}, r"tension_stiffness = -1.0: must be .* at least 0"),
+        ({"midspan_shape": [math.inf, 0.0]}, r"midspan_shape\[0\] = .*inf.*: must be finite"),
+        ({"nonlinear_stiffness": -1.0}, r"nonlinear_stiffness = -1.0: must be .* at least 0"),
         ({"length_scale": 0.0}, r"length_scale = 0.0: must be .* greater than 0 m"),
         ({"damping_ratio": 1.5}, r"damping_ratio = 1.5: must be a number in \[0, 1\)"),
-        ({"reference_freq": 0.0}, r"reference_freq = 0.0: must be .* greater than 0 Hz"),
+        ({"reference_frequency": 0.0}, r"reference_frequency = 0.0: must be .* greater than 0 Hz"),
         ({"equilibrium": [1.0]}, r"equilibrium of shape \(1,\): must have the shape \(2,\)"),
-        ({"equilibrium": [-1.0, 0.0]}, r"equilibrium = \[-1.0, 0.0\]: must be zero unless tension_stiffness"),
+        (
+            {"equilibrium": [-1.0, 0.0]},
+            r"equilibrium = \[-1.0, 0.0\]: must be zero unless nonlinear_stiffness",
+        ),
     ],
 )
 def test_refusals(changes: dict[str, Any], message: str) -> None:
@@ -112,11 +117,11 @@ def test_refusals(changes: dict[str, Any], message: str) -> None:
     ],
 )
 def test_refuses_what_is_no_lower_well(equilibrium: list[float], message: str) -> None:
-    bistable = {**TWO, "stiffness": [-4.0, 3.0], "tension_stiffness": 4.0}
+    bistable = {**TWO, "stiffness": [-4.0, 3.0], "nonlinear_stiffness": 4.0}
     model = ReducedModel.from_matrices(**bistable, equilibrium=[-1.0, 0.0])
     assert model.is_bistable
     assert model.well_energy == pytest.approx(-1.0)
-    assert model.barrier_energy == 0.0
+    assert model.saddle_energy == 0.0
     np.testing.assert_allclose(model.omega**2, [7.0, 8.0])
     with pytest.raises(InputError, match=message):
         ReducedModel.from_matrices(**bistable, equilibrium=equilibrium)

@@ -23,17 +23,17 @@ def record(samples: int = 400, last: float = 0.0) -> sb.Striker:
     displacement = 1e-4 * np.sin(600.0 * t)
     displacement[-1] += last
     return sb.Striker(
-        drive=sb.Recorded(
+        drive=sb.RecordedMotion(
             displacement=displacement,
             velocity=0.06 * np.cos(600.0 * t),
-            sampling_freq=20_000.0,
+            sampling_frequency=20_000.0,
             frequency=95.0,
         ),
     )
 
 
 def start(**changes) -> sb.State:
-    given = {"amplitude": 0.9 * MODEL.equilibrium, "velocity": np.array([1e-3, 0.0, 0.1])}
+    given = {"amplitude": 0.9 * MODEL.well_amplitude, "velocity": np.array([1e-3, 0.0, 0.1])}
     return sb.State(**(given | changes))
 
 
@@ -41,15 +41,15 @@ BY_MATRICES = sb.ReducedModel.from_matrices(
     [[1.0, 0.1], [0.1, 2.0]],
     [-4.0, 3.0],
     contact_shape=[1.0, 1.0],
-    tension_stiffness=4.0,
+    nonlinear_stiffness=4.0,
     equilibrium=[-1.0, 0.0],
     damping_ratio=[0.01, 0.02],
 )
 SYSTEMS = {
     "plain": PLAIN,
     "recorded": PLAIN.replace(striker=record()),
-    "start": PLAIN.replace(start=start(striker_position=1e-4, phase=0.3, contact_time=-1.0)),
-    "free": sb.System(MODEL, start=start()),
+    "start": PLAIN.replace(initial_state=start(striker_position=1e-4, phase=0.3, contact_time=-1.0)),
+    "free": sb.System(MODEL, initial_state=start()),
     "matrices": sb.System(
         BY_MATRICES,
         sb.HertzContact(1e3),
@@ -58,7 +58,7 @@ SYSTEMS = {
     "gap": PLAIN.replace(**{"striker.gap": -1e-4, "drive.phase": 1.0}),
     "load": PLAIN.replace(**{"beam.axial_load": 36.0}),
     "damping by mode": sb.System(
-        sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=[0.01, 0.02], reference_freq=80.0),
+        sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=[0.01, 0.02], reference_frequency=80.0),
         paper.CONTACT,
         SHAKER,
     ),
@@ -91,8 +91,8 @@ def test_what_is_read_back_runs_alike(tmp_path) -> None:
             sb.simulate(system, sb.Integration(cycles=1, accuracy="reference"), sample_times=[0.0])
             for system in (SYSTEMS[name], sb.System.load(tmp_path / "system.toml"))
         ]
-        np.testing.assert_equal(dict(runs[0].outcome), dict(runs[1].outcome))
-        np.testing.assert_array_equal(runs[0].end.amplitude, runs[1].end.amplitude)
+        np.testing.assert_equal(dict(runs[0].summary), dict(runs[1].summary))
+        np.testing.assert_array_equal(runs[0].final_state.amplitude, runs[1].final_state.amplitude)
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_what_is_read_back_runs_alike(tmp_path) -> None:
         ("[beam]\n", r"\[beam\] length, thickness, width, density, young_modulus: missing"),
         ("[model]\nmodes = 3\n", r"\[model\] modes: unknown key; must be one of mass"),
         ("[model]\nmass = [[1.0]]\n", r"\[model\] stiffness is missing: give it, or a section \[beam\]"),
-        ("[start]\nphase = 1.0\n", r"\[model\] mass is missing"),
+        ("[initial_state]\nphase = 1.0\n", r"\[model\] mass is missing"),
         ("[model\n", "is no TOML"),
     ],
 )
@@ -139,12 +139,12 @@ CHANGES = {
     "beam.axial_load": 36.0,
     "model.modes": 5,
     "model.damping_ratio": 0.01,
-    "model.reference_freq": 80.0,
-    "ends.left": 10.0,
-    "ends.right": 10.0,
-    "ends.axial": 1e8,
-    "imperfection.rise": 1e-5,
-    "imperfection.skew": 1e-6,
+    "model.reference_frequency": 80.0,
+    "boundary.left_rotational_stiffness": 10.0,
+    "boundary.right_rotational_stiffness": 10.0,
+    "boundary.axial_support_stiffness": 1e8,
+    "imperfection.midspan_amplitude": 1e-5,
+    "imperfection.antisymmetric_amplitude": 1e-6,
     "imperfection.point_load": 0.01,
     "imperfection.uniform_load": 0.05,
     "imperfection.gravity": 0.1,
@@ -156,10 +156,10 @@ CHANGES = {
     "drive.frequency_ratio": 1.3,
     "drive.velocity_amplitude": 0.2,
     "drive.phase": 0.5,
-    "start.amplitude[1]": -0.9,
-    "start.velocity[2]": 0.1,
-    "start.striker_position": 1e-4,
-    "start.phase": 0.1,
+    "initial_state.amplitude[1]": -0.9,
+    "initial_state.velocity[2]": 0.1,
+    "initial_state.striker_position": 1e-4,
+    "initial_state.phase": 0.1,
 }
 
 
@@ -184,7 +184,7 @@ def test_every_parameter_of_scope_run_can_be_changed() -> None:
         and (not row.kinds or own[row.section] in row.kinds)
     }
     # of a body alone, or of a rise or a force that is there; a profile is no number
-    others = {"striker.spring", "striker.damper"}
+    others = {"striker.suspension_stiffness", "striker.suspension_damping"}
     others |= {f"imperfection.{name}" for name in ("form", "point_location", "profile")}
     assert names - set(CHANGES) == others
 
@@ -192,36 +192,36 @@ def test_every_parameter_of_scope_run_can_be_changed() -> None:
 OF_OTHERS = {
     "hunt_crossley": (sb.HuntCrossley(4e8, 2.0), {"loss": 1.0, "stiffness": 3e8}),
     "kelvin_voigt": (sb.KelvinVoigt(1e6, 2.0), {"spring": 2e6, "damper": 1.0}),
-    "power": (sb.PowerLaw(1.0, 2.0), {"force_at_micrometre": 2.0, "exponent": 1.7}),
+    "power": (sb.PowerLaw(1.0, 2.0), {"force_at_1um": 2.0, "exponent": 1.7}),
     "layer": (sb.LayeredHertz(4e8, 1e13), {"stiffness": 3e8, "layer_stiffness": 2e13}),
     "restitution": (None, {}),
     "recorded": (None, {}),
     "burst": (
-        sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.1, length=5.0),
+        sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.1, duration_cycles=5.0),
         {
             "frequency_ratio": 1.1, "velocity_amplitude": 0.2, "length": 6.0, "rise": 2.0, "fall": 0.5, "retreat": 0.1,
         },
     ),
     "chirp": (
-        sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_length=20.0),
-        {"start_ratio": 0.6, "stop_ratio": 3.0, "velocity_amplitude": 0.2, "sweep_length": 30.0, "spacing": "log"},
+        sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_cycles=20.0),
+        {"start_ratio": 0.6, "stop_ratio": 3.0, "velocity_amplitude": 0.2, "sweep_cycles": 30.0, "spacing": "log"},
     ),
     "half_sine": (
         sb.HalfSine(displacement_amplitude=0.1, duration=0.5), {"displacement_amplitude": 0.2, "duration": 0.6}
     ),
     "noise": (
-        sb.Noise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
+        sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
         {"low_ratio": 0.6, "high_ratio": 3.0, "velocity_rms": 0.2, "seed": 5, "rise": 2.0},
     ),
-    "two_sines": (
-        sb.TwoSines(frequency_ratio=1.0, velocity_amplitude=0.1, second_ratio=2.0, second_amplitude=0.1),
+    "two_tone": (
+        sb.TwoTone(frequency_ratio=1.0, velocity_amplitude=0.1, second_ratio=2.0, second_amplitude=0.1),
         {
             "frequency_ratio": 1.1, "velocity_amplitude": 0.2, "second_ratio": 2.5, "second_amplitude": 0.2,
             "second_phase": 0.3,
         },
     ),
-    "flight": (sb.Flight(speed=0.4), {"speed": 0.5}),
-    "still": (sb.Still(), {}),
+    "flight": (sb.ConstantVelocity(speed=0.4), {"speed": 0.5}),
+    "still": (sb.FixedStop(), {}),
     "displacement_sine": (
         sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=0.1),
         {"frequency_ratio": 1.1, "displacement_amplitude": 0.2, "phase": 0.1},
@@ -263,7 +263,9 @@ def test_every_sample_and_the_start_are_hashed() -> None:
     """Two runs with different records or starts do not carry the same parameter hash."""
     one, other = (PLAIN.replace(striker=record(last=shift)) for shift in (0.0, 1e-12))
     assert one.hash != other.hash
-    begun, elsewhere = (PLAIN.replace(start=start(velocity=[0.0, 0.0, v])) for v in (0.1, 0.1 + 1e-15))
+    begun, elsewhere = (
+        PLAIN.replace(initial_state=start(velocity=[0.0, 0.0, v])) for v in (0.1, 0.1 + 1e-15)
+    )
     assert begun.hash != elsewhere.hash
     asked = sb.Integration(cycles=1)
     attrs = [
@@ -277,13 +279,17 @@ def test_every_sample_and_the_start_are_hashed() -> None:
 def test_what_a_state_met_on_its_way_is_no_part_of_a_system(tmp_path) -> None:
     """A system that begins in a state from a run is the one that is read back from its file."""
     state = sb.advance(PLAIN, periods=1, tangent=np.zeros((1, 2, 3)))
-    system = PLAIN.replace(start=state)
-    assert system.start.modal is None and system.start.passed is None and system.start.tangent is None
+    system = PLAIN.replace(initial_state=state)
+    assert (
+        system.initial_state.modal is None
+        and system.initial_state.statistics is None
+        and system.initial_state.tangent is None
+    )
     system.save(tmp_path / "system.toml")
     again = sb.System.load(tmp_path / "system.toml")
     asked = sb.Integration(cycles=3)
     runs = [sb.simulate(each, asked, sample_times=[0.0]) for each in (system, again)]
-    np.testing.assert_equal(dict(runs[0].outcome), dict(runs[1].outcome))
+    np.testing.assert_equal(dict(runs[0].summary), dict(runs[1].summary))
 
 
 def test_hash_is_the_same_tomorrow() -> None:
@@ -320,18 +326,18 @@ def test_whole_parts() -> None:
 
 
 def test_damping_and_reference_of_a_structure_given_by_matrices() -> None:
-    system = SYSTEMS["matrices"].replace(**{"model.damping_ratio": 0.05, "model.reference_freq": 1.0})
+    system = SYSTEMS["matrices"].replace(**{"model.damping_ratio": 0.05, "model.reference_frequency": 1.0})
     assert system.model.damping_ratio.tolist() == [0.05, 0.05]
-    assert system.model.reference_freq == 1.0
+    assert system.model.reference_frequency == 1.0
     np.testing.assert_array_equal(system.model.mass, BY_MATRICES.mass)
-    np.testing.assert_allclose(system.model.natural_freq, BY_MATRICES.natural_freq, rtol=1e-15)
+    np.testing.assert_allclose(system.model.natural_frequencies, BY_MATRICES.natural_frequencies, rtol=1e-15)
 
 
 def test_another_number_of_modes_keeps_the_start() -> None:
-    system = PLAIN.replace(start=start())
+    system = PLAIN.replace(initial_state=start())
     more = system.replace(**{"model.modes": 5})
-    np.testing.assert_array_equal(more.start.amplitude, [*system.start.amplitude, 0.0, 0.0])
-    np.testing.assert_array_equal(more.start.velocity, [1e-3, 0.0, 0.1, 0.0, 0.0])
+    np.testing.assert_array_equal(more.initial_state.amplitude, [*system.initial_state.amplitude, 0.0, 0.0])
+    np.testing.assert_array_equal(more.initial_state.velocity, [1e-3, 0.0, 0.1, 0.0, 0.0])
     with pytest.raises(
         InputError, match=r"modes = 2: a state of 3 modes cannot be cut to fewer without loss"
     ):
@@ -354,12 +360,18 @@ def test_another_number_of_modes_keeps_the_start() -> None:
         ),
         (
             {"model.mass": 1.0},
-            r"model\.mass: cannot be changed; must be one of modes, damping_ratio, reference_freq",
+            r"model\.mass: cannot be changed; must be one of modes, damping_ratio, reference_frequency",
         ),
         ({"striker.frequency_ratio": 1.0}, "must be one of location, side, gap"),
         ({"drive.displacement": [1.0]}, "must be one of frequency_ratio, velocity_amplitude, phase"),
-        ({"start.amplitude": 1.0}, r"must be amplitude\[i\], velocity\[i\], phase or striker_position"),
-        ({"start.amplitude[9]": 1.0}, r"start\.amplitude\[9\]: mode = 9: must be an integer in \[1, 3\]"),
+        (
+            {"initial_state.amplitude": 1.0},
+            r"must be amplitude\[i\], velocity\[i\], phase or striker_position",
+        ),
+        (
+            {"initial_state.amplitude[9]": 1.0},
+            r"start\.amplitude\[9\]: mode = 9: must be an integer in \[1, 3\]",
+        ),
         ({"beam": paper.STRAIGHT_BEAM}, "a run needs a buckled beam: axial_load = 0 N must exceed"),
         ({"beam.buckling_level": 1e-3, "beam.axial_load": 30.0}, "give exactly one of the two"),
         ({"model.modes": 0}, r"modes = 0: must be an integer in \[1, 256\]"),
@@ -408,4 +420,4 @@ def test_described() -> None:
 
 def test_scale() -> None:
     assert PLAIN.scale.length == paper.BEAM.buckling_level
-    assert PLAIN.scale.omega == pytest.approx(2.0 * np.pi * MODEL.reference_freq)
+    assert PLAIN.scale.omega == pytest.approx(2.0 * np.pi * MODEL.reference_frequency)

@@ -30,12 +30,15 @@ def response_map(kinds: Any, modes: int = 32, cycles: int = 200, **more: Any) ->
         kinds = np.where(above, ResponseClass.TRANSIENT_2, ResponseClass.INTRAWELL)
     ds = xr.Dataset(
         {
-            "response": (("frequency_ratio", "velocity_amplitude"), kinds.astype(np.int8)),
-            "crossings": (("frequency_ratio", "velocity_amplitude"), np.where(kinds > 0, 1, 0)),
-            "end_is_final": (("frequency_ratio", "velocity_amplitude"), np.ones(kinds.shape, dtype=bool)),
+            "response_class": (("frequency_ratio", "velocity_amplitude"), kinds.astype(np.int8)),
+            "zero_crossings": (("frequency_ratio", "velocity_amplitude"), np.where(kinds > 0, 1, 0)),
+            "final_well_proven": (
+                ("frequency_ratio", "velocity_amplitude"),
+                np.ones(kinds.shape, dtype=bool),
+            ),
         },
         {"frequency_ratio": RATIO, "velocity_amplitude": DRIVE},
-        {"modes": modes, "cycles": cycles, "reference_freq": 83.93 if modes == 1 else 81.85},
+        {"modes": modes, "cycles": cycles, "reference_frequency": 83.93 if modes == 1 else 81.85},
     )
     return ds.assign_attrs(more)
 

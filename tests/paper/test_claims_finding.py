@@ -19,9 +19,9 @@ from snapbeam.paper.recipe import MissingResults
 def test_verdict_of_one_number(value, verdict, close):
     """Holds above 1, in part above 0.5, with an uncertainty of 0.1."""
     number = Quantity(value, 0.1)
-    finding = found(above(number, 1.0), above(number, 0.5), number=number)
-    assert (finding.verdict, finding.close) == (verdict, close)
-    assert finding.verdict in VERDICTS
+    diagnostic = found(above(number, 1.0), above(number, 0.5), number=number)
+    assert (diagnostic.verdict, diagnostic.close) == (verdict, close)
+    assert diagnostic.verdict in VERDICTS
 
 
 def test_conditions_are_joined():
@@ -40,8 +40,8 @@ def test_on_a_limit():
 
 
 def test_an_open_question_matters_beyond_its_uncertainty():
-    finding = measured(above(Quantity(0.2, 0.1), 0.0), moved=Quantity(0.2, 0.1))
-    assert finding.verdict == "open" and finding.numbers["matters"] == 1
+    diagnostic = measured(above(Quantity(0.2, 0.1), 0.0), moved=Quantity(0.2, 0.1))
+    assert diagnostic.verdict == "open" and diagnostic.numbers["matters"] == 1
     assert measured(above(Quantity(0.05, 0.1), 0.0), moved=Quantity(0.05, 0.1)).numbers["matters"] == 0
 
 

@@ -20,7 +20,7 @@ def threshold(modes: int, ratio: float, velocity: np.ndarray, cycles: int = 200)
     """Least velocity amplitude of the row that snaps the beam through."""
     row = sb.response_map(
         model_of(modes), paper.CONTACT, frequency_ratio=ratio, velocity_amplitude=velocity, cycles=cycles,
-        early_decision=True,
+        early_termination=True,
     )  # fmt: skip
     snapped = row.response.values > sb.ResponseClass.INTRAWELL
     assert snapped[-1] and not snapped[0]
@@ -59,8 +59,8 @@ def waveforms() -> sb.Run:
 def test_snap_through_of_figure_5() -> None:
     """Claim 10: it snaps, and where the first mode passes zero higher modes hold the shape."""
     run = waveforms()
-    assert run.outcome.crossings > 0
-    alpha = run.dataset.modal_amplitude.values / abs(model_of(32).equilibrium[0])
+    assert run.summary.zero_crossings > 0
+    alpha = run.dataset.modal_amplitude.values / abs(model_of(32).well_amplitude[0])
     passing = np.abs(alpha[:, 0]) < 0.02
     assert passing.sum() > 10
     higher = np.abs(alpha[passing, 1:]).max(axis=1)
@@ -72,8 +72,8 @@ def test_ripple_in_free_flight() -> None:
     """Claim 10: between impacts the slopes of the beam at the shaker carry the highest modes."""
     model, run = model_of(32), waveforms()
     free = run.dataset.contact_force.values == 0.0
-    q = (run.dataset.modal_amplitude.values - model.equilibrium) @ model.mass @ model.linear_modes
-    high = model.natural_freq > 2000.0
+    q = (run.dataset.modal_amplitude.values - model.well_amplitude) @ model.mass @ model.linear_modes
+    high = model.natural_frequencies > 2000.0
     assert (
         np.abs(q[free][:, high] * model.omega[high]).max()
         > 0.01 * np.abs(q[free][:, 0] * model.omega[0]).max()

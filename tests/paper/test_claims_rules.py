@@ -33,9 +33,9 @@ def notched(at: float, wide: float = 0.4, depth: float = 0.1) -> np.ndarray:
 )
 def test_notch_of_one_mode(at, wide, verdict):
     """2a: at the printed place, near enough for a step of V, elsewhere."""
-    finding = thresholds.notch_of_one_mode(two_maps(notched(at, wide), notched(1.2)))
-    assert finding.verdict == verdict
-    position = finding.quantities["position"]
+    diagnostic = thresholds.notch_of_one_mode(two_maps(notched(at, wide), notched(1.2)))
+    assert diagnostic.verdict == verdict
+    position = diagnostic.quantities["position"]
     assert abs(position.value - at) <= position.uncertainty
 
 
@@ -51,19 +51,21 @@ def test_universally_higher(lower, verdict):
     """3a: nowhere, at few and at many frequencies lower."""
     one, many = np.full(RATIO.size, 0.1), np.full(RATIO.size, 0.2)
     many[30 : 30 + lower] = 0.05
-    finding = thresholds.universally_higher(two_maps(one, many))
-    assert finding.verdict == verdict
-    assert finding.numbers["own_count"] == lower
-    assert finding.quantities["own"].value == pytest.approx(lower / RATIO.size)
+    diagnostic = thresholds.universally_higher(two_maps(one, many))
+    assert diagnostic.verdict == verdict
+    assert diagnostic.numbers["own_count"] == lower
+    assert diagnostic.quantities["own"].value == pytest.approx(lower / RATIO.size)
 
 
 def test_the_axes_matter_for_what_is_lower():
     """3a: a threshold that rises steeply is lower only where the frequency is the same in Hz."""
     one = np.round(0.02 + 0.12 * RATIO, 2)
     many = np.round(one + 0.005, 2)  # never below by half a step on its own axes
-    finding = thresholds.universally_higher(two_maps(one, many))
-    assert finding.numbers["own_count"] == 0
-    assert finding.numbers["hertz_count"] > finding.numbers["own_count"] or finding.verdict == "holds"
+    diagnostic = thresholds.universally_higher(two_maps(one, many))
+    assert diagnostic.numbers["own_count"] == 0
+    assert (
+        diagnostic.numbers["hertz_count"] > diagnostic.numbers["own_count"] or diagnostic.verdict == "holds"
+    )
 
 
 def test_high_frequency():
@@ -106,9 +108,9 @@ def test_entirely_settled_depends_on_the_cut():
     kinds = settled()
     slow = np.broadcast_to(RATIO[:, None] < 0.13, kinds.shape)
     kinds[slow & (kinds > 0)] = ResponseClass.CONTINUOUS
-    finding = classes.settled(long_maps(settled(), kinds, 32))
-    assert finding.quantities["fourth"].value < finding.quantities["share"].value
-    assert finding.verdict == "fails"
+    diagnostic = classes.settled(long_maps(settled(), kinds, 32))
+    assert diagnostic.quantities["fourth"].value < diagnostic.quantities["share"].value
+    assert diagnostic.verdict == "fails"
 
 
 @pytest.mark.parametrize(
@@ -153,7 +155,7 @@ def test_how_transients_end():
 def test_late_changes_lie_near_the_threshold(near, far, verdict):
     """32b."""
     before = response_map(np.full(RATIO.size, 0.3), 32, 1000)
-    kinds = before.response.values.copy()
+    kinds = before.response_class.values.copy()
     close = np.abs(DRIVE / 0.3 - 1.0) <= 0.15
     rng = np.random.default_rng(0)
     chance = np.where(close[None, :], near, far)
@@ -190,7 +192,7 @@ def resonance_data(one: np.ndarray, many: np.ndarray) -> Given:
                 )
             },
             {"frequency_ratio": ratio, "velocity_amplitude": [0.005, 0.02]},
-            {"modes": modes, "reference_freq": 83.93 if modes == 1 else 81.85, "cycles": 1000},
+            {"modes": modes, "reference_frequency": 83.93 if modes == 1 else 81.85, "cycles": 1000},
         )
     return Given(figB10=maps)
 
@@ -213,9 +215,9 @@ def test_one_mode_is_adequate():
     for scale, verdict in ((1.0, "holds"), (0.93, "in part"), (0.8, "fails")):
         # in Hz one mode is 2.5 % higher at the same Omega
         peaks = (1.8 * 83.93 / 81.85 * scale, 1.0), (3.6 * 83.93 / 81.85 * scale, 0.8)
-        finding = resonances.one_mode_is_adequate(resonance_data(PAIR, swept(*peaks)))
-        assert finding.verdict == verdict
-        assert finding.quantities["first"].value == pytest.approx(1.0 / scale - 1.0, abs=0.02)
+        diagnostic = resonances.one_mode_is_adequate(resonance_data(PAIR, swept(*peaks)))
+        assert diagnostic.verdict == verdict
+        assert diagnostic.quantities["first"].value == pytest.approx(1.0 / scale - 1.0, abs=0.02)
 
 
 def test_printed_maxima():
@@ -235,7 +237,7 @@ def test_notch_is_where_the_resonance_ends(end, verdict):
     height = -1.0 + drives[None, :] * np.exp(-(((ratio[:, None] - ridge[None, :]) / 0.05) ** 2))
     study = xr.Dataset(
         {"max_displacement": (("frequency_ratio", "velocity_amplitude"), height),
-         "response": (("frequency_ratio", "velocity_amplitude"), np.zeros(height.shape, dtype=np.int8))},
+         "response_class": (("frequency_ratio", "velocity_amplitude"), np.zeros(height.shape, dtype=np.int8))},
         {"frequency_ratio": ratio, "velocity_amplitude": drives},
     )  # fmt: skip
     results = two_maps(notched(1.2, 0.1), notched(1.2, 0.1), resonance={"modes_1": study, "modes_32": study})
@@ -252,7 +254,7 @@ def window_data(end: tuple[float, float], centre: tuple[float, float]) -> Given:
         row[drives >= low] = ResponseClass.TRANSIENT_2
         row[drives > high] = ResponseClass.CONTINUOUS
     ds = xr.Dataset(
-        {"response": (("location", "velocity_amplitude"), kinds)},
+        {"response_class": (("location", "velocity_amplitude"), kinds)},
         {"location": x, "velocity_amplitude": drives},
     )
     return Given(windows={"omega_0.625": ds, "omega_1.625": ds})
@@ -287,10 +289,10 @@ def dominance_data(until: float) -> Given:
 
 @pytest.mark.parametrize(("until", "verdict"), [(0.4, "holds"), (0.15, "in part"), (0.05, "fails")])
 def test_dominance_needs_more_than_a_narrow_band(until, verdict):
-    """10b: that modes other than the first lead where the first is near zero is no finding."""
-    finding = waveforms.higher_modes_dominate(dominance_data(until))
-    assert finding.verdict == verdict
-    assert finding.quantities["twentieth"].value == 1.0
+    """10b: that modes other than the first lead where the first is near zero is no diagnostic."""
+    diagnostic = waveforms.higher_modes_dominate(dominance_data(until))
+    assert diagnostic.verdict == verdict
+    assert diagnostic.quantities["twentieth"].value == 1.0
 
 
 def disturbed(startup: float, alone: float) -> Given:
@@ -301,7 +303,7 @@ def disturbed(startup: float, alone: float) -> Given:
         rows[name] = np.where(np.arange(400) < share * 400, ResponseClass.CONTINUOUS, base)
     table = xr.Dataset(
         {
-            "response": (("variant", "point"), np.stack(list(rows.values()))),
+            "response_class": (("variant", "point"), np.stack(list(rows.values()))),
             "at_border": ("point", np.arange(400) < 200),
         },
         {"variant": list(rows)},
@@ -327,6 +329,6 @@ def test_a_question_is_held_against_its_own_model():
     data["perturbed"] = response_map(wild, 32)
     assert questions.reference_frequency(Given(sensitivity=data)).numbers["matters"] == 1
     data["one_mode_perturbed"] = response_map(wild, 1)
-    finding = questions.reference_frequency(Given(sensitivity=data))
-    assert finding.numbers["matters"] == 0
-    assert finding.quantities["alone"].value == pytest.approx(float((calm != wild).mean()))
+    diagnostic = questions.reference_frequency(Given(sensitivity=data))
+    assert diagnostic.numbers["matters"] == 0
+    assert diagnostic.quantities["alone"].value == pytest.approx(float((calm != wild).mean()))

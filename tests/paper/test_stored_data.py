@@ -11,7 +11,7 @@ import xarray as xr
 
 from snapbeam import paper
 from snapbeam.core.codes import ResponseClass
-from snapbeam.engines.mark import engine_mark
+from snapbeam.engines.mark import solver_fingerprint
 from snapbeam.paper.store import load_results
 
 DATA = Path(__file__).parents[2] / "docs" / "data"
@@ -25,13 +25,13 @@ def test_data_are_kept():
 @pytest.mark.parametrize("name", KEPT)
 def test_says_what_made_it(name):
     for dataset in load_results(DATA / f"{name}.nc", "full").values():
-        if "response" in dataset:
-            assert not (dataset.response == ResponseClass.UNKNOWN).any() or name == "low_frequency"
+        if "response_class" in dataset:
+            assert not (dataset.response_class == ResponseClass.UNKNOWN).any() or name == "low_frequency"
             # the low-frequency data are joined from several maps, made at different times
             for attribute in (
                 ("modes",)
                 if name == "low_frequency"
-                else ("snapbeam_version", "command", "created", "modes", "cycles", "reference_freq")
+                else ("snapbeam_version", "command", "created", "modes", "cycles", "reference_frequency")
             ):
                 assert attribute in dataset.attrs
             assert "/" not in dataset.attrs["command"].replace("docs/data", "")
@@ -40,7 +40,7 @@ def test_says_what_made_it(name):
 @pytest.mark.parametrize("name", KEPT)
 def test_one_engine_made_them_all_and_it_is_todays(name):
     with xr.open_datatree(DATA / f"{name}.nc", engine="h5netcdf") as tree:
-        assert tree.attrs["engine_fingerprint"] == engine_mark()
+        assert tree.attrs["solver_fingerprint"] == solver_fingerprint()
 
 
 @pytest.mark.parametrize("modes", [1, 32])
@@ -64,7 +64,7 @@ def test_frequency_maps_are_of_full_size(name, cycles):
     maps = load_results(DATA / f"{name}.nc", "full")
     assert [int(ds.attrs["modes"]) for ds in maps.values()] == [1, 32]
     for ds in maps.values():
-        assert ds.response.shape == (160, 66) and ds.attrs["cycles"] == cycles
+        assert ds.response_class.shape == (160, 66) and ds.attrs["cycles"] == cycles
         assert float(ds.frequency_ratio[-1]) == 4.0 and float(ds.velocity_amplitude[-1]) == 0.65
 
 
@@ -73,7 +73,7 @@ def test_location_maps_are_of_full_size(name):
     maps = load_results(DATA / f"{name}.nc", "full")
     assert len(maps) == 6
     for ds in maps.values():
-        assert min(ds.response.shape) >= 60 and ds.attrs["cycles"] == 200
+        assert min(ds.response_class.shape) >= 60 and ds.attrs["cycles"] == 200
 
 
 def test_a_point_of_the_map_is_computed_again():

@@ -116,7 +116,7 @@ def test_fold_of_a_biased_beam():
     for away in (0.04, 0.01):
         load = sb.Imperfection(uniform_load=(1.0 - away) * fold)
         model = sb.ReducedModel.from_beam(paper.BEAM, modes=2, imperfection=load)
-        barriers.append(model.barrier_energy - float(model.potential_energy(model.wells[0])))
+        barriers.append(model.saddle_energy - float(model.potential_energy(model.wells[0])))
     assert np.log(barriers[0] / barriers[1]) / np.log(4.0) == pytest.approx(1.5, abs=0.05)
 
 
@@ -141,7 +141,7 @@ def test_ridge_of_a_known_resonance():
     response[10, 2] = ResponseClass.TRANSIENT_2
     ds = xr.Dataset(
         {"max_displacement": (("frequency_ratio", "velocity_amplitude"), height),
-         "response": (("frequency_ratio", "velocity_amplitude"), response)},
+         "response_class": (("frequency_ratio", "velocity_amplitude"), response)},
         {"frequency_ratio": ratio, "velocity_amplitude": drives},
     )  # fmt: skip
     found = ridge(ds)
@@ -154,7 +154,7 @@ def test_longest_window_forgives_single_points():
     kinds[0, 10:30] = ResponseClass.TRANSIENT_2
     kinds[0, 17] = ResponseClass.CONTINUOUS
     ds = xr.Dataset(
-        {"response": (("location", "velocity_amplitude"), kinds)},
+        {"response_class": (("location", "velocity_amplitude"), kinds)},
         {"location": [0.1, 0.5], "velocity_amplitude": np.arange(1.0, 41.0)},
     )
     low, high = longest_window(ds)
@@ -165,9 +165,9 @@ def test_a_drive_with_a_start_up_transient():
     """Its velocity is that of its displacement, 1 + excess times as great at first and steady at the end."""
     model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
     drive = disturbances._record(model, 1.2, 0.2, 12, excess=0.2)
-    numeric = np.gradient(drive.displacement, 1.0 / drive.sampling_freq)
+    numeric = np.gradient(drive.displacement, 1.0 / drive.sampling_frequency)
     np.testing.assert_allclose(drive.velocity[1:-1], numeric[1:-1], atol=2e-3 * np.abs(drive.velocity).max())
-    steady = 0.2 * paper.BEAM.buckling_level * 2.0 * np.pi * model.reference_freq
+    steady = 0.2 * paper.BEAM.buckling_level * 2.0 * np.pi * model.reference_frequency
     assert drive.velocity[0] == pytest.approx(1.2 * steady) and drive.displacement[0] == 0.0
     assert np.abs(drive.velocity[-128:]).max() == pytest.approx(steady, rel=1e-3)
 
@@ -184,6 +184,6 @@ def test_longer_maps_go_on_from_the_shorter(results):
     """A beam that has snapped through has done so for good."""
     maps = list(results["transients"].values())
     for before, after in zip(maps[::2], maps[1::2], strict=True):
-        snapped = before.response.values > ResponseClass.INTRAWELL
-        assert (after.response.values[snapped] > ResponseClass.INTRAWELL).all()
+        snapped = before.response_class.values > ResponseClass.INTRAWELL
+        assert (after.response_class.values[snapped] > ResponseClass.INTRAWELL).all()
         assert after.attrs["cycles"] == 3 * before.attrs["cycles"]

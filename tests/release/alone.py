@@ -27,7 +27,7 @@ _SYSTEM = (
 )
 _CORE = (
     f"{_SYSTEM}run = sb.simulate(system, sb.Integration(cycles=3)); "
-    "run.save('run.nc'); assert sb.load_run('run.nc').system == run.system; print(run)"
+    "run.save('run.nc'); assert sb.load('run.nc').system == run.system; print(run)"
 )
 _SIGNAL = (
     "import numpy as np; t = np.arange(40000) / 20e3; ramp = np.clip(t / 0.3, 0, 1); "
@@ -62,7 +62,7 @@ USES = {
         "snapbeam simulate --modes 1 --cycles 2 --animate beam.mp4",
     ),
     "cluster": (
-        f"snapbeam map --modes 1 --cycles 4 {_GRID} --store kept --cluster local:1 -o kept.nc",
+        f"snapbeam map --modes 1 --cycles 4 {_GRID} --checkpoint kept --cluster local:1 -o kept.nc",
     ),
     "explorer": (f"snapbeam map --modes 1 --cycles 4 {_GRID}", "page: snapbeam explore map.nc --no-browser"),
     "cuda": (("python", "-c", _CUDA),),

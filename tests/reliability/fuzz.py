@@ -213,7 +213,7 @@ def _judged(longest: float, function: Any, fixed: Sequence[Any], named: Mapping[
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             result = function(*fixed, **named)
-    except (InputError, sb.StoreError, sb.NoOrbit, NoRoomError):
+    except (InputError, sb.CheckpointError, sb.OrbitNotFoundError, NoRoomError):
         return ""
     except _TooLong as error:
         return f"over {longest:g} s, {_trouble(error)}"

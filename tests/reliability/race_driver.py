@@ -45,7 +45,7 @@ def write(store, gate, answer, pause):
     try:
         long_map(**ASKED, store=store, chunk=3, threads=1)
         said = {"ended": "written"}
-    except sb.StoreError as error:
+    except sb.CheckpointError as error:
         said = {"ended": "refused", "text": str(error)}
     except BaseException as error:
         said = {"ended": "died", "text": f"{type(error).__name__}: {error}"}

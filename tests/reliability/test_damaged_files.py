@@ -42,7 +42,7 @@ def test_a_damaged_netcdf_file_is_refused_or_read(written, tmp_path):
         path = tmp_path / f"{number}.nc"
         path.write_bytes(spoiled)
         try:
-            sb.load_run(path)
+            sb.load(path)
         except sb.InputError as error:
             assert str(path) in str(error)
             refused += 1

@@ -103,7 +103,7 @@ def test_a_run_that_cannot_be_saved_is_not_lost(mounted, tmp_path, monkeypatch, 
     with pytest.raises(NoRoomError) as refused:
         run.save(mounted("disk", "size=20k") / "run.nc")
     kept = re.search(r"written to '(.*)' instead", str(refused.value))[1]
-    xr.testing.assert_identical(sb.load_run(kept).impacts, run.impacts)
+    xr.testing.assert_identical(sb.load(kept).impacts, run.impacts)
 
 
 @pytest.mark.slow
@@ -124,7 +124,7 @@ def test_commands_on_a_full_disk(mounted, tmp_path, tried, place):
         "2",
     ]
     command = ["map", *grid, "-o", f"{paths['output']}.nc", "--plot", f"{paths['plot']}.png"]
-    command += ["--store", str(paths["store"])] if place == "store" else []
+    command += ["--checkpoint", str(paths["store"])] if place == "store" else []
     if place == "save":
         command = ["simulate", "--modes", "1", "--cycles", "20", "-o", f"{paths['save']}.nc"]
     env = os.environ | {"PYTHONFAULTHANDLER": "1"}

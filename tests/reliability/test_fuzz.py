@@ -82,7 +82,7 @@ PARTS = (
     "Shaker",
     "Sine",
     "Integration",
-    "Replicas",
+    "Replicates",
     "State",
     "Keeping",
 )

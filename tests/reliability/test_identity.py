@@ -19,8 +19,8 @@ MATRICES = {
     "mass": [[1e-3, 0.0], [0.0, 1e-3]],
     "stiffness": [-60.0, 4000.0],
     "contact_shape": [1.0, 0.3],
-    "center_shape": [1.0, 0.0],
-    "tension_stiffness": 60.0 / (0.335e-3) ** 2,
+    "midspan_shape": [1.0, 0.0],
+    "nonlinear_stiffness": 60.0 / (0.335e-3) ** 2,
     "equilibrium": [-0.335e-3, 0.0],
     "length_scale": 0.335e-3,
     "damping_ratio": 0.005,
@@ -29,7 +29,7 @@ OTHERS = {
     "mass": [[1.1e-3, 0.0], [0.0, 1e-3]],
     "stiffness": [-60.0, 4100.0],
     "contact_shape": [1.0, 0.4],
-    "center_shape": [1.0, 0.1],
+    "midspan_shape": [1.0, 0.1],
     "length_scale": 0.3e-3,
     "damping_ratio": 0.006,
 }
@@ -45,11 +45,11 @@ def system(**changes):
 def test_a_store_gives_back_no_other_structures_numbers(tmp_path):
     """Each number of a structure given by matrices is part of what a store is asked for."""
     store, how = tmp_path / "store", sb.Integration(cycles=2)
-    first = sb.sweep(system(), AXES, how, store=sb.Keeping(store))
+    first = sb.sweep(system(), AXES, how, checkpoint=sb.CheckpointOptions(store))
     for name, value in OTHERS.items():
         with pytest.raises(InputError, match=rf"(?s)holds a map of other parameters.*system\.model\.{name}"):
-            sb.sweep(system(**{name: value}), AXES, how, store=sb.Keeping(store))
-    again = sb.sweep(system(), AXES, how, store=sb.Keeping(store))
+            sb.sweep(system(**{name: value}), AXES, how, checkpoint=sb.CheckpointOptions(store))
+    again = sb.sweep(system(), AXES, how, checkpoint=sb.CheckpointOptions(store))
     np.testing.assert_array_equal(first["peak_force"], again["peak_force"])
 
 
@@ -77,7 +77,9 @@ def test_representations_are_short():
 
 def test_what_computed_stands_in_the_store(tmp_path):
     """The versions, the code, the rounding and the processor of each task, and in the result's words."""
-    found = sb.sweep(system(), AXES, sb.Integration(cycles=2), store=sb.Keeping(tmp_path / "store"))
+    found = sb.sweep(
+        system(), AXES, sb.Integration(cycles=2), checkpoint=sb.CheckpointOptions(tmp_path / "store")
+    )
     (record,) = Ledger(tmp_path / "store" / "ledger.jsonl").records.values()
     assert record.code == code_hash() and record.arithmetic == arithmetic_hash()
     assert f"numpy {np.__version__}" in record.libraries and "numba" in record.libraries
@@ -103,13 +105,13 @@ def test_parts_that_something_else_computed_are_told(tmp_path, name, value, word
     """A store that goes on with another NumPy, another rounding or other code promises no equal bits."""
     store, how = tmp_path / "store", sb.Integration(cycles=2)
     axes = {"drive.velocity_amplitude": np.linspace(0.2, 0.5, 4)}
-    sb.sweep(system(), axes, how, store=sb.Keeping(store, chunk=2))
+    sb.sweep(system(), axes, how, checkpoint=sb.CheckpointOptions(store, points_per_task=2))
     ledger = store / "ledger.jsonl"
     records = list(Ledger(ledger).records.values())
     changed = Record(**vars(records[0]) | {name: value})
     ledger.write_text("".join(f"{record.line()}\n" for record in (changed, records[1])))
     with pytest.warns(UserWarning, match=words):
-        found = sb.sweep(system(), axes, how, store=sb.Keeping(store))
+        found = sb.sweep(system(), axes, how, checkpoint=sb.CheckpointOptions(store))
     assert not found.attrs["reproducible"].startswith("bit for bit")
 
 

@@ -17,7 +17,7 @@ from snapbeam import paper
 system = sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=1), contact=paper.CONTACT,
                    striker=sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))
 run = sb.simulate(system, sb.Integration(cycles=1))
-print(run.outcome.status.name, float(run.dataset.displacement[-1]).hex())
+print(run.outcome.status.name, float(run.dataset.displacement_at_striker[-1]).hex())
 """
 """A run, whose kernel is compiled."""
 SMALL = """

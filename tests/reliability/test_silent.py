@@ -32,15 +32,15 @@ HIDDEN = np.ma.array([0.1, 99.0], mask=[False, True])
         (lambda: finite("length", Metre(3.0)), "without a unit of their own"),
         (lambda: sb.Beam(**{**vars_of(paper.BEAM), "length": Metre(3.0)}), "length.*without a unit"),
         (lambda: sb.classify([1, np.nan], 0, 4, 1), r"crossings\[1\] = .*must be finite"),
-        (lambda: sb.classify([1j], 0, 4, 1), "crossings"),
-        (lambda: sb.classify([True], [False], 4, 1), "crossings"),
+        (lambda: sb.classify([1j], 0, 4, 1), "zero_crossings"),
+        (lambda: sb.classify([True], [False], 4, 1), "zero_crossings"),
         (lambda: sb.classify([1, 2], [0, 0, 0], 4, 1), "do not go together"),
         (lambda: sb.classify([1.5], [0], 4, 1), "whole numbers"),
         (lambda: sb.classify([1], [0], 4, 0), r"final_side: must be \+1 or -1"),
         (lambda: MODEL.potential_energy(1.0), r"alpha of shape \(\)"),
         (lambda: MODEL.potential_energy([1.0, 2.0, 3.0]), r"alpha of shape \(3,\): must have the shape \(..., 2\)"),
         (lambda: MODEL.kinetic_energy([[1.0]]), "alpha_velocity of shape"),
-        (lambda: sb.Replicas(2, halve_step="no"), "halve_step = 'no': must be True or False"),
+        (lambda: sb.Replicates(2, check_half_step="no"), "check_half_step = 'no': must be True or False"),
     ],
 )  # fmt: skip
 def test_refused_by_name(call, words, tried):
@@ -85,7 +85,7 @@ def test_ragged_and_strange_arrays():
 def test_what_is_no_path_closes_no_stream(path, tried):
     """A number names a stream of the process, which would be read, or closed."""
     tried("paths that are none")
-    for load in (sb.load_run, sb.System.load):
+    for load in (sb.load, sb.System.load):
         with pytest.raises(InputTypeError, match="must be a path"):
             load(path)
 

@@ -72,7 +72,7 @@ def test_the_limit_is_the_users():
     for modes in (1, 8, 64, 256):
         assert seconds_of(most_steps(sb.Integration(), modes), modes) == pytest.approx(3600.0, rel=1e-6)
     run = sb.simulate(system(), sb.Integration(cycles=1, max_steps=10**12))
-    assert run.outcome.status == sb.RunStatus.OK
+    assert run.summary.status == sb.RunStatus.OK
 
 
 def test_fast_drives_take_no_memory():

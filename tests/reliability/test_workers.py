@@ -17,9 +17,9 @@ from snapbeam.sweeps.compute import workers
 from snapbeam.sweeps.compute.cluster import open_client, parse_cluster
 from snapbeam.sweeps.compute.tasks import Stage
 from snapbeam.sweeps.compute.workers import ClusterWorkers
-from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.errors import CheckpointError
 from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.stored import Keeping, StoreKeeper, Tally
+from snapbeam.sweeps.stored import CheckpointOptions, StoreKeeper, SweepReport
 
 CHUNK = 3
 DRIVER = Path(__file__).with_name("worker_driver.py")
@@ -34,9 +34,9 @@ def client():
 
 
 def computed(path, work, client, **options):
-    stage, tally, said = Stage("base", work.setup.points, CHUNK), Tally(), []
+    stage, tally, said = Stage("base", work.setup.points, CHUNK), SweepReport(), []
     with MapStore(path, work, CHUNK) as store:
-        keeping = Keeping(path, note=said.append, tally=tally)
+        keeping = CheckpointOptions(path, note=said.append, report=tally)
         results = StoreKeeper(store, ClusterWorkers(client, said.append, **options), keeping).complete(stage)
         return results.read(0, stage.size), tally, said
 
@@ -106,7 +106,7 @@ def test_a_worker_that_never_delivers(tmp_path, work, client, monkeypatch):
 def test_workers_with_other_code_are_refused(tmp_path, work, client, monkeypatch):
     monkeypatch.setattr("snapbeam.core.provenance.code_hash", lambda: "0123456789abcdef")
     monkeypatch.setattr("snapbeam.sweeps.compute.maker.code_hash", lambda: "0123456789abcdef")
-    with pytest.raises(StoreError, match=r"a worker runs snapbeam .* install the same in both places"):
+    with pytest.raises(CheckpointError, match=r"a worker runs snapbeam .* install the same in both places"):
         within(120, computed, tmp_path / "store", work, client)
 
 
@@ -152,7 +152,7 @@ def test_workers_that_are_too_small_are_given_up(tmp_path, work, monkeypatch):
     monkeypatch.setattr(workers, "_POLL", 0.0)
     monkeypatch.setattr(workers, "ATTEMPTS", 1000)
     with pytest.raises(
-        StoreError, match="came and went and no task was finished; they may have too little mem"
+        CheckpointError, match="came and went and no task was finished; they may have too little mem"
     ):
         within(60, computed, tmp_path / "store", work, _Coming())
 
@@ -185,7 +185,7 @@ def test_a_scheduler_that_is_killed(tmp_path, work, monkeypatch, tried):
                 monkeypatch.setattr(ClusterWorkers, "_delivered", then_kill)
                 return computed(tmp_path / "store", work, client)
 
-        with pytest.raises(StoreError, match="the scheduler does not answer any more"):
+        with pytest.raises(CheckpointError, match="the scheduler does not answer any more"):
             within(180, go)
     finally:
         process.kill()
@@ -204,7 +204,7 @@ def test_an_address_where_nobody_is(monkeypatch):
         raise OSError("timed out")
 
     monkeypatch.setattr(Client, "__init__", nobody)
-    with pytest.raises(StoreError, match=r"tcp://127\.0\.0\.1:1': no scheduler answers there"):
+    with pytest.raises(CheckpointError, match=r"tcp://127\.0\.0\.1:1': no scheduler answers there"):
         with open_client(parse_cluster("tcp://127.0.0.1:1")):
             pass
 

@@ -12,7 +12,7 @@ import pytest
 
 from snapbeam.core.validate import InputError
 from snapbeam.sweeps.compute.tasks import Stage
-from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.errors import CheckpointError
 from snapbeam.sweeps.keep.store import MapStore
 
 DRIVER = Path(__file__).with_name("race_driver.py")
@@ -63,7 +63,7 @@ def test_a_refused_writer_touches_nothing(stored, work):
     with MapStore(path, work):
         torn.write_bytes(b"in the middle of it")
         before = {file: file.stat().st_mtime_ns for file in path.rglob("*")}
-        with pytest.raises(StoreError, match=rf"another process .process {os.getpid()}."):
+        with pytest.raises(CheckpointError, match=rf"another process .process {os.getpid()}."):
             MapStore(path, work)
         assert {file: file.stat().st_mtime_ns for file in path.rglob("*")} == before
     with MapStore(path, work):
@@ -97,7 +97,7 @@ def test_a_name_of_a_holder_that_is_gone_is_not_told(stored, work):
     path, _ = stored
     (path / "lock").write_text("process 4194304000\n")
     with MapStore(path, work):
-        with pytest.raises(StoreError, match=rf"process {os.getpid()}"):
+        with pytest.raises(CheckpointError, match=rf"process {os.getpid()}"):
             MapStore(path, work)
     assert (path / "lock").read_text() == ""
 
@@ -119,10 +119,10 @@ def test_a_whole_store_is_read_where_nothing_can_be_written(
     with MapStore(disk / "whole", work) as store:
         assert store.read_only
     result = long_map(**small, store=disk / "whole", output=tmp_path / "map.nc")
-    assert (result["response"].values.ravel() == work.values("response", whole)).all()
+    assert (result["response_class"].values.ravel() == work.values("response_class", whole)).all()
     result.close()
-    with pytest.raises(StoreError, match="is read-only, and 2 of 4 tasks are to be computed"):
+    with pytest.raises(CheckpointError, match="is read-only, and 2 of 4 tasks are to be computed"):
         long_map(**small, store=disk / "half")
-    with pytest.raises(StoreError, match="cannot be written, Read-only file system"):
+    with pytest.raises(CheckpointError, match="cannot be written, Read-only file system"):
         long_map(**small, store=disk / "none")
     tried("stores on read-only media", 3)

@@ -24,7 +24,7 @@ from snapbeam.sweeps.compute.tasks import MemoryKeeper, Stage
 from snapbeam.sweeps.compute.workers import ClusterWorkers
 from snapbeam.sweeps.doors import map_setup
 from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.stored import Keeping, StoreKeeper, Tally
+from snapbeam.sweeps.stored import CheckpointOptions, StoreKeeper, SweepReport
 
 CHUNK = 4
 LONGEST = 180.0
@@ -45,9 +45,9 @@ def compute(store, work, stage, client, said):
     """One map, and again what was given up, as somebody would; leaves the rows or the error in *said*."""
     try:
         for _ in range(4):
-            tally = Tally()
+            tally = SweepReport()
             with MapStore(store, work, CHUNK) as held:
-                keeping = Keeping(store, note=lambda _: None, tally=tally)
+                keeping = CheckpointOptions(store, note=lambda _: None, report=tally)
                 rows = StoreKeeper(held, ClusterWorkers(client, lambda _: None), keeping).complete(stage)
                 found = rows.read(0, stage.size).content_hash()
             said["given up"] = said.get("given up", 0) + len(tally.failed)

@@ -11,7 +11,7 @@ import pytest
 import snapbeam as sb
 from snapbeam import paper
 from snapbeam.core.validate import InputError, InputTypeError
-from snapbeam.engines.plan import plan_steps
+from snapbeam.engines.plan import choose_base_step
 
 REGULAR = {1: (1.6, 0.03), 8: (1.4, 0.03), 32: (3.5, 0.06)}
 """Omega and V of well-conditioned motions with impacts, by the number of modes."""
@@ -54,7 +54,7 @@ def somewhere(system: sb.System) -> sb.State:
     sign = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
     velocity = model.linear_modes[:, 0] * 2e-3 + (model.linear_modes[:, 1] * 1e-3 if model.modes > 1 else 0.0)
     return sb.State(
-        amplitude=sign * 0.6 * model.equilibrium,
+        amplitude=sign * 0.6 * model.well_amplitude,
         velocity=sign * velocity,
         phase=1.1,
         striker_position=-sign * 2e-4,
@@ -71,7 +71,7 @@ SYSTEMS = {
     "many modes": system_of(32, 3.0, 0.5),
     "undriven": sb.System(
         sb.ReducedModel.from_beam(paper.BEAM, 3),
-        start=sb.State(amplitude=[1e-3, 2e-4, 1e-5], velocity=[0.1, 0.0, 0.0]),
+        initial_state=sb.State(amplitude=[1e-3, 2e-4, 1e-5], velocity=[0.1, 0.0, 0.0]),
     ),
     "elastic": sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), sb.Restitution(0.9), system_of(1).striker),
     "plastic": sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), sb.Restitution(0.0), system_of(1).striker),
@@ -82,7 +82,7 @@ SYSTEMS = {
 def test_calls_compose_bit_for_bit(name: str) -> None:
     """Twelve periods in one call, in twelve, in four of three; and all the states on the way."""
     system = SYSTEMS[name]
-    whole, every = sb.advance(system, periods=12), sb.advance(system, periods=12, every=True)
+    whole, every = sb.advance(system, periods=12), sb.advance(system, periods=12, save_every_period=True)
     assert every.batch == (12,)
     state = None
     for number in range(12):
@@ -106,7 +106,7 @@ def test_calls_compose_from_anywhere(name: str) -> None:
     assert_equal(state, whole)
     assert float(whole.phase) == 1.1, "whole periods bring the drive back"
     assert float(whole.striker_position) == pytest.approx(float(start.striker_position), rel=1e-14)
-    assert int(whole.passed["impacts"]) > 0
+    assert int(whole.statistics["impacts"]) > 0
 
 
 def test_parts_of_periods_compose_to_rounding() -> None:
@@ -129,23 +129,23 @@ def test_a_state_in_plain_numbers_goes_on_alike() -> None:
         touching = bool(state.contact_time >= 0.0)
         following, same = sb.advance(system, state, 0.37), sb.advance(system, plain(state), 0.37)
         np.testing.assert_allclose(same.amplitude, following.amplitude, rtol=0.0, atol=1e-13)
-        assert int(following.passed["impacts"]) == int(same.passed["impacts"]), touching
+        assert int(following.statistics["impacts"]) == int(same.statistics["impacts"]), touching
         state = following
 
 
 def test_statistics_of_the_way_add_up() -> None:
     system = system_of(8, *REGULAR[8])
     whole, state = sb.advance(system, periods=20), None
-    total = dict.fromkeys(("crossings", "impacts", "impulse", "shaker_work", "gross_work"), 0.0)
+    total = dict.fromkeys(("zero_crossings", "impacts", "impulse", "striker_work", "gross_work"), 0.0)
     peak = 0.0
     for _ in range(20):
         state = sb.advance(system, state)
         for name in total:
-            total[name] += float(state.passed[name])
-        peak = max(peak, float(state.passed["peak_force"]))
+            total[name] += float(state.statistics[name])
+        peak = max(peak, float(state.statistics["peak_force"]))
     for name, value in total.items():
-        assert float(whole.passed[name]) == pytest.approx(value, rel=1e-12), name
-    assert float(whole.passed["peak_force"]) == peak
+        assert float(whole.statistics[name]) == pytest.approx(value, rel=1e-12), name
+    assert float(whole.statistics["peak_force"]) == peak
 
 
 # ---------------------------------------------------------------------- against an uninterrupted run
@@ -162,16 +162,16 @@ def test_two_hundred_calls_against_a_run_of_two_hundred_cycles(modes: int) -> No
     state, crossings, impacts, work = None, 0, 0, 0.0
     for _ in range(200):
         state = sb.advance(system, state)
-        crossings += int(state.passed["crossings"])
-        impacts += int(state.passed["impacts"])
-        work += float(state.passed["shaker_work"])
+        crossings += int(state.statistics["zero_crossings"])
+        impacts += int(state.statistics["impacts"])
+        work += float(state.statistics["striker_work"])
     impacts += int(state.contact_time >= 0.0)  # one that is still going on
-    assert (crossings, impacts) == (run.outcome.crossings, run.outcome.impacts)
+    assert (crossings, impacts) == (run.summary.zero_crossings, run.summary.impacts)
     assert impacts >= 170
-    assert energy(system, state) == pytest.approx(energy(system, run.end), rel=1e-4)
-    assert work == pytest.approx(run.outcome.shaker_work, rel=1e-4)
+    assert energy(system, state) == pytest.approx(energy(system, run.final_state), rel=1e-4)
+    assert work == pytest.approx(run.summary.striker_work, rel=1e-4)
     np.testing.assert_allclose(
-        state.amplitude, run.end.amplitude, rtol=0.0, atol=1e-4 * abs(state.amplitude[0])
+        state.amplitude, run.final_state.amplitude, rtol=0.0, atol=1e-4 * abs(state.amplitude[0])
     )
 
 
@@ -181,9 +181,9 @@ def test_at_the_reference_level_they_are_one(modes: int) -> None:
     system = system_of(modes, *REGULAR[modes])
     run = sb.simulate(system, REFERENCE.replace(cycles=200), sample_times=[0.0])
     state = sb.advance(system, periods=200, integration=REFERENCE)
-    assert energy(system, state) == pytest.approx(energy(system, run.end), rel=1e-9)
-    assert int(state.passed["impacts"]) == run.outcome.impacts
-    assert float(state.passed["impulse"]) == pytest.approx(run.outcome.impulse, rel=1e-9)
+    assert energy(system, state) == pytest.approx(energy(system, run.final_state), rel=1e-9)
+    assert int(state.statistics["impacts"]) == run.summary.impacts
+    assert float(state.statistics["impulse"]) == pytest.approx(run.summary.impulse, rel=1e-9)
 
 
 def test_a_run_ends_where_a_state_goes_on() -> None:
@@ -191,13 +191,21 @@ def test_a_run_ends_where_a_state_goes_on() -> None:
     system = system_of(8, *REGULAR[8])
     half = sb.simulate(system, sb.Integration(cycles=10), sample_times=[0.0])
     whole = sb.simulate(system, sb.Integration(cycles=20), sample_times=[0.0])
-    gone_on = sb.advance(system, half.end, 10)
+    gone_on = sb.advance(system, half.final_state, 10)
     np.testing.assert_allclose(
-        gone_on.amplitude, whole.end.amplitude, rtol=0.0, atol=1e-6 * abs(whole.end.amplitude[0])
+        gone_on.amplitude,
+        whole.final_state.amplitude,
+        rtol=0.0,
+        atol=1e-6 * abs(whole.final_state.amplitude[0]),
     )
-    again = sb.simulate(system.replace(start=plain(half.end)), sb.Integration(cycles=10), sample_times=[0.0])
+    again = sb.simulate(
+        system.replace(initial_state=plain(half.final_state)), sb.Integration(cycles=10), sample_times=[0.0]
+    )
     np.testing.assert_allclose(
-        again.end.amplitude, whole.end.amplitude, rtol=0.0, atol=1e-6 * abs(whole.end.amplitude[0])
+        again.final_state.amplitude,
+        whole.final_state.amplitude,
+        rtol=0.0,
+        atol=1e-6 * abs(whole.final_state.amplitude[0]),
     )
 
 
@@ -207,9 +215,9 @@ def test_mirror_image() -> None:
     np.testing.assert_array_equal(one.amplitude, -other.amplitude)
     np.testing.assert_array_equal(one.velocity, -other.velocity)
     assert float(one.striker_position) == -float(other.striker_position)
-    for name, value in one.passed.items():
+    for name, value in one.statistics.items():
         if not name.startswith(("min_", "max_")):
-            np.testing.assert_array_equal(value, other.passed[name], err_msg=name)
+            np.testing.assert_array_equal(value, other.statistics[name], err_msg=name)
 
 
 # ---------------------------------------------------------------------- batches
@@ -220,26 +228,26 @@ def test_a_batch_is_its_states() -> None:
     system = system_of(4, 1.3, 0.3)
     rng = np.random.default_rng(3)
     batch = sb.State(
-        amplitude=system.model.equilibrium * rng.uniform(-1.2, 1.2, (3, 5, 1)),
+        amplitude=system.model.well_amplitude * rng.uniform(-1.2, 1.2, (3, 5, 1)),
         velocity=1e-2 * rng.normal(size=(3, 5, 4)),
         phase=rng.uniform(0.0, 6.0, (3, 5)),
         striker_position=rng.uniform(-4e-4, -2e-4, (3, 5)),
     )
     many = sb.advance(system, batch, 4)
-    assert many.batch == (3, 5) and many.passed["impacts"].shape == (3, 5)
+    assert many.batch == (3, 5) and many.statistics["impacts"].shape == (3, 5)
     for at in ((0, 0), (1, 3), (2, 4)):
         alone = sb.advance(system, batch[at], 4)
         assert_equal(many[at], alone)
-        assert {name: values[at] for name, values in many.passed.items()} == pytest.approx(
-            {name: float(value) for name, value in alone.passed.items()}, nan_ok=True, rel=0.0
+        assert {name: values[at] for name, values in many.statistics.items()} == pytest.approx(
+            {name: float(value) for name, value in alone.statistics.items()}, nan_ok=True, rel=0.0
         )
     for threads in (1, 3):
         assert_equal(sb.advance(system, batch, 4, integration=sb.Integration(threads=threads)), many)
-    every = sb.advance(system, batch, 4, every=True)
+    every = sb.advance(system, batch, 4, save_every_period=True)
     assert every.batch == (4, 3, 5)
     assert_equal(every[3], many)
-    assert every.passed["impacts"].tolist() == many.passed["impacts"].tolist(), "of the whole way"
-    assert every[3].passed.keys() == {"status"}
+    assert every.statistics["impacts"].tolist() == many.statistics["impacts"].tolist(), "of the whole way"
+    assert every[3].statistics.keys() == {"status"}
     assert_equal(sb.advance(system, every[1], 2), many)
     assert_equal(sb.advance(system, many, 2), sb.advance(system, batch, 6))
 
@@ -264,7 +272,7 @@ def test_a_striker_that_is_moved_strikes_where_it_is() -> None:
 def test_progress() -> None:
     seen = []
     system = system_of(1)
-    batch = sb.State(amplitude=np.tile(system.model.equilibrium, (40, 1)))
+    batch = sb.State(amplitude=np.tile(system.model.well_amplitude, (40, 1)))
     sb.advance(system, batch, 3, progress=lambda done, total: seen.append((done, total)))
     assert seen[-1] == (40, 40)
 
@@ -277,10 +285,10 @@ def record(model: sb.ReducedModel) -> sb.Striker:
     t = np.arange(int(8.5 * 200)) / 20_000.0
     omega = 2.0 * math.pi * 100.0
     return sb.Striker(
-        drive=sb.Recorded(
+        drive=sb.RecordedMotion(
             displacement=5e-5 * np.sin(omega * t),
             velocity=5e-5 * omega * np.cos(omega * t),
-            sampling_freq=20_000.0,
+            sampling_frequency=20_000.0,
             frequency=100.0,
         ),
     )
@@ -294,7 +302,7 @@ def test_a_record_goes_on_where_it_was_and_ends() -> None:
     assert float(half.phase) == pytest.approx(2.0 * math.pi * 5.0 / held, rel=1e-7)
     rest = sb.advance(system, half, 3)
     np.testing.assert_allclose(rest.amplitude, whole.amplitude, rtol=0.0, atol=1e-12)
-    every = sb.advance(system, periods=8, every=True)
+    every = sb.advance(system, periods=8, save_every_period=True)
     assert every.batch == (8,)
     np.testing.assert_allclose(every[4].amplitude, half.amplitude, rtol=0.0, atol=1e-15)
     with pytest.raises(
@@ -306,10 +314,10 @@ def test_a_record_goes_on_where_it_was_and_ends() -> None:
     end = sb.advance(system, half, held - 5.0)
     with pytest.raises(InputError, match=r"must be at most the 0\.0 cycles that are left"):
         sb.advance(system, end)
-    started = system.replace(start=plain(half))
+    started = system.replace(initial_state=plain(half))
     run = sb.simulate(started, sb.Integration(cycles=3), sample_times=[0.0])
     np.testing.assert_allclose(
-        run.end.amplitude, whole.amplitude, rtol=0.0, atol=1e-4 * abs(whole.amplitude[0])
+        run.final_state.amplitude, whole.amplitude, rtol=0.0, atol=1e-4 * abs(whole.amplitude[0])
     )
 
 
@@ -331,16 +339,17 @@ def test_the_tangent_flow_contracts_as_the_damping_says(modes: int, name: str) -
         state = somewhere(system)
     elif name == "undriven":
         system = sb.System(
-            system.model, start=somewhere(system.replace(striker=None, start=somewhere(system)))
+            system.model,
+            initial_state=somewhere(system.replace(striker=None, initial_state=somewhere(system))),
         )
     impacts = 0
     for _ in range(3):
         state = sb.advance(system, state, tangent=full_basis(modes))
-        impacts += int(state.passed["impacts"])
+        impacts += int(state.statistics["impacts"])
         matrix = state.tangent.reshape(2 * modes, 2 * modes).T
         sign, logarithm = np.linalg.slogdet(matrix)
         model = system.model
-        period = 1.0 / (model.reference_freq * (1.0 if system.striker is None else 1.21))
+        period = 1.0 / (model.reference_frequency * (1.0 if system.striker is None else 1.21))
         expected = -2.0 * float(np.sum(model.damping_ratio * model.omega)) * period
         assert sign == 1.0
         assert logarithm == pytest.approx(expected, rel=1e-9)
@@ -372,12 +381,12 @@ def test_tangents_do_not_disturb() -> None:
 def test_tangents_are_derivatives(modes: int, bound: float) -> None:
     """Against central differences over a period with impacts, at the reference level.
 
-    Measured: 2e-9 to 1e-5, the size of the steps' own error (of level "map": 2e-3 to 6e-2, where steps end at contact).
+    Measured: 2e-9 to 1e-5, the size of the steps' own error (of level "standard": 2e-3 to 6e-2, where steps end at contact).
     """
     system = system_of(modes)
     model, rng = system.model, np.random.default_rng(0)
     state = sb.advance(system, periods=1)
-    size = abs(float(model.equilibrium[0]))
+    size = abs(float(model.well_amplitude[0]))
     falling = rng.normal(size=(2, modes)) / np.arange(1, modes + 1) ** 2
     direction = falling * np.array([[size], [size * model.omega[0]]])
     found = sb.advance(system, state, tangent=direction[None], integration=REFERENCE)
@@ -395,12 +404,12 @@ def test_tangents_are_derivatives(modes: int, bound: float) -> None:
         error = np.linalg.norm(found.tangent[0, row] - difference) / np.linalg.norm(difference)
         assert error < bound, (row, error)
     if modes > 1:
-        assert int(found.passed["impacts"]) > 0
+        assert int(found.statistics["impacts"]) > 0
 
 
 def test_tangents_of_a_batch() -> None:
     system = system_of(2)
-    states = sb.State(amplitude=np.array([[1.0], [0.7]]) * system.model.equilibrium, phase=[0.0, 1.0])
+    states = sb.State(amplitude=np.array([[1.0], [0.7]]) * system.model.well_amplitude, phase=[0.0, 1.0])
     same = np.random.default_rng(1).normal(size=(3, 2, 2))
     found = sb.advance(system, states, 2, tangent=same)
     assert found.tangent.shape == (2, 3, 2, 2)
@@ -430,7 +439,11 @@ SYSTEM = system_of(2)
             InputError,
             "periods = 0: must be a finite number greater than 0",
         ),
-        (lambda: sb.advance(SYSTEM, periods=1.5, every=True), InputError, "periods = 1.5 with every = True"),
+        (
+            lambda: sb.advance(SYSTEM, periods=1.5, save_every_period=True),
+            InputError,
+            "periods = 1.5 with every = True",
+        ),
         (
             lambda: sb.advance(SYSTEM, sb.State(amplitude=[1.0, 2.0, 3.0])),
             InputError,
@@ -471,22 +484,26 @@ def test_refusals(call, error, message: str) -> None:
 def test_what_cannot_be_reached_is_nan_and_says_why() -> None:
     """One of three states overflows: the others are what they are alone, it is no state to go on from."""
     model = SYSTEM.model
-    batch = sb.State(amplitude=np.stack((model.equilibrium, [1e200, 0.0], 0.5 * model.equilibrium)))
+    batch = sb.State(amplitude=np.stack((model.well_amplitude, [1e200, 0.0], 0.5 * model.well_amplitude)))
     found = sb.advance(SYSTEM, batch, 2, tangent=full_basis(2))
-    assert found.passed["status"].tolist() == [sb.RunStatus.OK, sb.RunStatus.NOT_FINITE, sb.RunStatus.OK]
+    assert found.statistics["status"].tolist() == [sb.RunStatus.OK, sb.RunStatus.DIVERGED, sb.RunStatus.OK]
     assert np.isnan(found.amplitude[1]).all() and np.isnan(found.velocity[1]).all()
     assert np.isnan(found.tangent[1]).all()
     assert_equal(found[2], sb.advance(SYSTEM, batch[2], 2))
     with pytest.raises(InputError, match=r"state amplitude\[1, 0\] = .*nan.*: must be finite"):
         sb.advance(SYSTEM, found)
     # as many steps as forty periods of flight would take: what contacts take beyond is too much
-    plan = plan_steps(model, SYSTEM.contact)
+    plan = choose_base_step(model, SYSTEM.contact)
     flight = 40 * math.ceil(2.0 * math.pi / (1.21 * SYSTEM.scale.omega * plan.step))
-    limited = sb.advance(SYSTEM, periods=40, integration=sb.Integration(max_steps=flight), every=True)
+    limited = sb.advance(
+        SYSTEM, periods=40, integration=sb.Integration(max_steps=flight), save_every_period=True
+    )
     reached = np.isfinite(limited.amplitude).all(axis=-1)
-    assert limited.passed["status"].tolist() == [0 if each else sb.RunStatus.STEP_LIMIT for each in reached]
-    assert limited[39].passed["status"] == sb.RunStatus.STEP_LIMIT
+    assert limited.statistics["status"].tolist() == [
+        0 if each else sb.RunStatus.STEP_LIMIT for each in reached
+    ]
+    assert limited[39].statistics["status"] == sb.RunStatus.STEP_LIMIT
     assert 0 < reached.sum() < 40
-    whole = sb.advance(SYSTEM, periods=40, every=True)
+    whole = sb.advance(SYSTEM, periods=40, save_every_period=True)
     np.testing.assert_array_equal(limited.amplitude[reached], whole.amplitude[reached])
     assert reached.tolist() == sorted(reached.tolist(), reverse=True)

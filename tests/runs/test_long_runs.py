@@ -28,7 +28,7 @@ def test_one_march_a_run(monkeypatch) -> None:
 
     def counted(*arguments, **options):
         for piece in record(*arguments, **options):
-            steps.append(int(piece.books["steps"][0]))
+            steps.append(int(piece.accumulators_of_runs["steps"][0]))
             yield piece
 
     def never(*_, **__):
@@ -37,7 +37,7 @@ def test_one_march_a_run(monkeypatch) -> None:
     monkeypatch.setattr(driver, "record", counted)
     monkeypatch.setattr(driver, "run_ensemble", never)
     run = sb.simulate(SYSTEM, sb.Integration(cycles=50))
-    assert run.outcome.impacts > 0 and run.dataset.sizes["time"] > 5000
+    assert run.summary.impacts > 0 and run.dataset.sizes["time"] > 5000
     # pieces follow each other: no step is taken twice
     assert steps == sorted(steps) and len(steps) < 10
 
@@ -48,12 +48,12 @@ def test_a_run_in_pieces_is_the_run(monkeypatch) -> None:
     monkeypatch.setattr(driver, "_SLICE_STEPS", 700)
     monkeypatch.setattr(driver, "_SLICE_BYTES", 2**16)
     cut = sb.simulate(SYSTEM, sb.Integration(cycles=20))
-    np.testing.assert_equal(dict(cut.outcome), dict(whole.outcome))
+    np.testing.assert_equal(dict(cut.summary), dict(whole.summary))
     for name in whole.dataset.variables:
         np.testing.assert_array_equal(cut.dataset[name], whole.dataset[name], err_msg=str(name))
     for name in whole.impacts.variables:
         np.testing.assert_array_equal(cut.impacts[name], whole.impacts[name], err_msg=str(name))
-    np.testing.assert_array_equal(cut.end.amplitude, whole.end.amplitude)
+    np.testing.assert_array_equal(cut.final_state.amplitude, whole.final_state.amplitude)
 
 
 def test_progress(monkeypatch) -> None:

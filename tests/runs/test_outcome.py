@@ -10,7 +10,7 @@ import pytest
 import snapbeam as sb
 from snapbeam.core.codes import ResponseClass, RunStatus, classify
 from snapbeam.engines.outcomes import STATISTICS
-from snapbeam.runs.outcome import Outcome
+from snapbeam.runs.outcome import RunSummary
 
 INTRAWELL, FIRST, SECOND, CONTINUOUS = (
     ResponseClass.INTRAWELL,
@@ -21,7 +21,7 @@ INTRAWELL, FIRST, SECOND, CONTINUOUS = (
 
 
 @pytest.mark.parametrize(
-    ("crossings", "last_quarter", "cycles", "side", "expected"),
+    ("zero_crossings", "last_quarter", "cycles", "side", "expected"),
     [
         (0, 0, 200, -1, INTRAWELL),
         (0, 0, 1, -1, INTRAWELL),
@@ -58,7 +58,7 @@ def test_classify_broadcasts() -> None:
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ((1, 2, 200, 1), "crossings: must be at least crossings_last_quarter"),
+        ((1, 2, 200, 1), "crossings: must be at least zero_crossings_last_quarter"),
         ((-1, -1, 200, 1), "and both at least 0"),
         ((1, 1, 0, 1), "cycles = .*0.*: must be greater than 0"),
     ],
@@ -82,12 +82,12 @@ def test_outcome_from_statistics() -> None:
         name: np.array([0, 1]).astype(row.dtype) if row.dtype != "float64" else np.array([math.nan, 0.5])
         for name, row in STATISTICS.items()
     }
-    outcome = Outcome.from_statistics(values, 1)
-    assert outcome.response is ResponseClass.TRANSIENT_1
-    assert outcome.status is RunStatus.DECIDED
-    assert outcome.decided_at == 0.5
-    assert outcome.end_is_final is True
-    assert type(outcome.crossings) is int
+    outcome = RunSummary.from_statistics(values, 1)
+    assert outcome.response_class is ResponseClass.TRANSIENT_1
+    assert outcome.status is RunStatus.EARLY_STOP
+    assert outcome.early_stop_time == 0.5
+    assert outcome.final_well_proven is True
+    assert type(outcome.zero_crossings) is int
     assert list(outcome) == list(STATISTICS)
     assert len(outcome) == len(STATISTICS)
     assert {name: outcome[name] for name in outcome} == {name: getattr(outcome, name) for name in outcome}
@@ -96,11 +96,11 @@ def test_outcome_from_statistics() -> None:
 
 def test_outcome_says_what_it_is() -> None:
     values = {name: np.zeros(1, dtype=row.dtype) for name, row in STATISTICS.items()}
-    outcome = Outcome.from_statistics(values)
+    outcome = RunSummary.from_statistics(values)
     assert repr(outcome) == "<Outcome intrawell, 0 crossings, 0 impacts>"
-    lines = outcome.table().splitlines()
+    lines = outcome.to_text().splitlines()
     assert len(lines) == len(STATISTICS)
-    assert lines[0].split() == ["response", "intrawell", "response", "class"]
+    assert lines[0].split() == ["response_class", "intrawell", "response_class", "class"]
     (force,) = [line for line in lines if line.startswith("peak_force")]
     assert force.split() == ["peak_force", "0", "N", "peak", "contact", "force"]
     with pytest.raises(AttributeError, match="Outcome has no 'crossing'; it has response, status, crossings"):

@@ -27,12 +27,18 @@ CASES = {
         sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=1), sb.Restitution(0.6), SYSTEM.striker),
         sb.Integration(cycles=4),
     ),
-    "free": (sb.System(MODEL, start=sb.State(amplitude=0.9 * MODEL.equilibrium)), sb.Integration(cycles=3)),
+    "free": (
+        sb.System(MODEL, initial_state=sb.State(amplitude=0.9 * MODEL.well_amplitude)),
+        sb.Integration(cycles=3),
+    ),
     "decided": (
         SYSTEM.replace(**{"drive.velocity_amplitude": 0.36, "model.modes": 1}),
-        sb.Integration(cycles=60, early_decision=True),
+        sb.Integration(cycles=60, early_termination=True),
     ),
-    "failed": (sb.System(MODEL, start=sb.State(amplitude=[1e200, 0.0, 0.0])), sb.Integration(cycles=3)),
+    "failed": (
+        sb.System(MODEL, initial_state=sb.State(amplitude=[1e200, 0.0, 0.0])),
+        sb.Integration(cycles=3),
+    ),
     "no impact ends": (SYSTEM.replace(**{"drive.velocity_amplitude": 0.0}), sb.Integration(cycles=1)),
 }
 
@@ -43,31 +49,33 @@ def test_round_trip(name: str, tmp_path) -> None:
     run = sb.simulate(system, integration)
     run.save(tmp_path / "run.nc")
     assert [file.name for file in tmp_path.iterdir()] == ["run.nc"]
-    again = sb.load_run(tmp_path / "run.nc")
+    again = sb.load(tmp_path / "run.nc")
     xr.testing.assert_identical(again.dataset, run.dataset)
     xr.testing.assert_identical(again.impacts, run.impacts)
-    np.testing.assert_equal(dict(again.outcome), dict(run.outcome))
-    assert [type(value) for value in again.outcome.values()] == [
-        type(value) for value in run.outcome.values()
+    np.testing.assert_equal(dict(again.summary), dict(run.summary))
+    assert [type(value) for value in again.summary.values()] == [
+        type(value) for value in run.summary.values()
     ]
     assert again.system == run.system and again.integration == run.integration
     assert again.accuracy == run.accuracy
-    assert (again.end is None) == (run.end is None) == (name == "failed")
-    if run.end is not None:
+    assert (again.final_state is None) == (run.final_state is None) == (name == "failed")
+    if run.final_state is not None:
         for part in ("amplitude", "velocity", "phase", "striker_position", "contact_time"):
-            np.testing.assert_array_equal(getattr(again.end, part), getattr(run.end, part), err_msg=part)
+            np.testing.assert_array_equal(
+                getattr(again.final_state, part), getattr(run.final_state, part), err_msg=part
+            )
     # saved again, it is the same
     again.save(tmp_path / "again.nc")
-    xr.testing.assert_identical(sb.load_run(tmp_path / "again.nc").dataset, run.dataset)
+    xr.testing.assert_identical(sb.load(tmp_path / "again.nc").dataset, run.dataset)
 
 
 def test_what_was_read_goes_on(tmp_path) -> None:
     run = sb.simulate(SYSTEM, sb.Integration(cycles=3))
     run.save(tmp_path / "run.nc")
-    again = sb.load_run(tmp_path / "run.nc")
+    again = sb.load(tmp_path / "run.nc")
     same = sb.simulate(again.system, again.integration)
     xr.testing.assert_equal(same.dataset, run.dataset)
-    on, of_file = (sb.advance(SYSTEM, state, 2) for state in (run.end, again.end))
+    on, of_file = (sb.advance(SYSTEM, state, 2) for state in (run.final_state, again.final_state))
     np.testing.assert_allclose(of_file.amplitude, on.amplitude, rtol=0.0, atol=1e-12)
 
 
@@ -81,10 +89,10 @@ def test_the_file_says_what_it_is(tmp_path) -> None:
     for name, variable in root.variables.items():
         assert {"units", "long_name"} <= variable.attrs.keys(), name
     outcome = xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="outcome")
-    flags = outcome.response.attrs
-    assert flags["flag_meanings"].split()[list(flags["flag_values"]).index(int(run.outcome.response))] == (
-        run.outcome.response.label.replace(" ", "_")
-    )
+    flags = outcome.response_class.attrs
+    assert flags["flag_meanings"].split()[
+        list(flags["flag_values"]).index(int(run.summary.response_class))
+    ] == (run.summary.response_class.label.replace(" ", "_"))
     assert len(outcome.status.attrs["flag_meanings"].split()) == len(outcome.status.attrs["flag_values"])
     impacts = xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="impacts")
     assert impacts.peak_force.attrs["units"] == "N"
@@ -106,13 +114,13 @@ def test_refusals(tmp_path) -> None:
     with pytest.raises(InputError, match="is not an existing folder"):
         run.save(tmp_path / "none" / "run.nc")
     with pytest.raises(InputError, match=r"none\.nc.*no such file"):
-        sb.load_run(tmp_path / "none.nc")
+        sb.load(tmp_path / "none.nc")
     (tmp_path / "text.nc").write_text("no netcdf")
     with pytest.raises(InputError, match="is no NetCDF file of results"):
-        sb.load_run(tmp_path / "text.nc")
+        sb.load(tmp_path / "text.nc")
     run.dataset.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")
     with pytest.raises(InputError, match=r"is no file of a run that Run\.save wrote"):
-        sb.load_run(tmp_path / "dataset.nc")
+        sb.load(tmp_path / "dataset.nc")
     run.save(tmp_path / "run.nc")
     import h5netcdf
 
@@ -120,8 +128,8 @@ def test_refusals(tmp_path) -> None:
         with h5netcdf.File(tmp_path / "run.nc", "a") as file:
             before, file.attrs[name] = file.attrs[name], text
         with pytest.raises(InputError, match=r"is damaged|is no file of a run"):
-            sb.load_run(tmp_path / "run.nc")
+            sb.load(tmp_path / "run.nc")
         with h5netcdf.File(tmp_path / "run.nc", "a") as file:
             file.attrs[name] = before
-    assert sb.load_run(tmp_path / "run.nc").system == SYSTEM
+    assert sb.load(tmp_path / "run.nc").system == SYSTEM
     assert "<Run intrawell" in repr(run) and "samples" in repr(run)

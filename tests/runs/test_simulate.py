@@ -35,12 +35,12 @@ def simulate(modes: int, ratio: float, velocity: float, cycles: int, **options: 
 def kick(modes: int, share: float) -> np.ndarray:
     """Velocity of the first mode with a *share* of the energy of the barrier."""
     model = model_of(modes)
-    energy = share * (model.barrier_energy - model.well_energy)
+    energy = share * (model.saddle_energy - model.well_energy)
     return model.linear_modes[:, 0] * math.sqrt(2.0 * energy)
 
 
 def assert_same(a: sb.Run, b: sb.Run) -> None:
-    np.testing.assert_equal(dict(a.outcome), dict(b.outcome))
+    np.testing.assert_equal(dict(a.summary), dict(b.summary))
     for name in a.impacts:
         np.testing.assert_array_equal(a.impacts[name], b.impacts[name])
 
@@ -53,7 +53,7 @@ def test_dataset() -> None:
     data = check_trajectory(run.dataset, require=("displacement", "contact_force", "modal_amplitude"))
     assert dict(data.sizes)["mode"] == 3
     assert data.mode.values.tolist() == [1, 2, 3]
-    period = 1.0 / (1.21 * model_of(3).reference_freq)
+    period = 1.0 / (1.21 * model_of(3).reference_frequency)
     assert data.time[0] == 0.0
     assert float(data.time[-1]) == pytest.approx(4.0 * period, rel=1e-14)
     np.testing.assert_allclose(data.cycle, data.time / period, rtol=1e-13)
@@ -61,34 +61,35 @@ def test_dataset() -> None:
     model, scale = model_of(3), paper.BEAM.buckling_level
     alpha = data.modal_amplitude.values
     np.testing.assert_allclose(data.displacement, alpha @ model.shape_at(paper.LOCATION) / scale, atol=1e-14)
-    np.testing.assert_allclose(data.center_displacement, alpha @ model.center_shape / scale, atol=1e-14)
-    np.testing.assert_array_equal(alpha[0], model.equilibrium)
+    np.testing.assert_allclose(data.midspan_displacement, alpha @ model.midspan_shape / scale, atol=1e-14)
+    np.testing.assert_array_equal(alpha[0], model.well_amplitude)
     stroke = 0.18 / 1.21
     tip = float(data.displacement[0]) + stroke * np.sin(2.0 * np.pi * data.cycle.values)
-    np.testing.assert_allclose(data.shaker_displacement, tip, atol=1e-12)
-    np.testing.assert_allclose(data.penetration, data.shaker_displacement - data.displacement, atol=1e-14)
+    np.testing.assert_allclose(data.striker_displacement, tip, atol=1e-12)
+    np.testing.assert_allclose(data.penetration, data.striker_displacement - data.displacement, atol=1e-14)
     depth = np.maximum(data.penetration.values * scale, 0.0)
     np.testing.assert_allclose(data.contact_force, 4e8 * depth**1.5, rtol=1e-13)
     np.testing.assert_allclose(data.energy_contact, 0.4 * 4e8 * depth**2.5, rtol=1e-12, atol=1e-30)
     assert data.attrs["modes"] == 3
     assert data.attrs["contact_stiffness"] == 4e8
     assert data.attrs["frequency_ratio"] == 1.21
-    assert data.attrs["reference_freq"] == model.reference_freq
+    assert data.attrs["reference_frequency"] == model.reference_frequency
 
 
 def test_energy_of_the_dataset_is_that_of_its_amplitudes() -> None:
     """Without damping the velocity follows from the energy: zero at a turning point of one mode."""
     model = model_of(1, 0.0)
-    start = (model.equilibrium, kick(1, 0.5) * 1.0)
+    start = (model.well_amplitude, kick(1, 0.5) * 1.0)
     data = sb.simulate(
-        sb.System(model, start=sb.State(amplitude=start[0], velocity=start[1])), sb.Integration(cycles=3)
+        sb.System(model, initial_state=sb.State(amplitude=start[0], velocity=start[1])),
+        sb.Integration(cycles=3),
     ).dataset
     energy = model.kinetic_energy(start[1]) + model.potential_energy(start[0]) - model.well_energy
     np.testing.assert_allclose(data.energy_beam, energy, rtol=1e-6)
     potential = model.potential_energy(data.modal_amplitude.values) - model.well_energy
     assert (potential <= energy * (1.0 + 1e-6)).all()
     assert potential.max() == pytest.approx(energy, rel=1e-3)
-    assert "shaker_displacement" not in data
+    assert "striker_displacement" not in data
 
 
 @pytest.mark.parametrize(("modes", "bound"), [(1, 1e-6), (8, 1e-6), (32, 2e-4)])
@@ -96,7 +97,8 @@ def test_free_decay_dissipates_what_the_beam_loses(modes: int, bound: float) -> 
     """Measured over eight cycles: below 3e-7; for N = 32 5.4e-5, and 2e-8 at a quarter of the step."""
     data = sb.simulate(
         sb.System(
-            model_of(modes), start=sb.State(amplitude=model_of(modes).equilibrium, velocity=kick(modes, 0.6))
+            model_of(modes),
+            initial_state=sb.State(amplitude=model_of(modes).well_amplitude, velocity=kick(modes, 0.6)),
         ),
         sb.Integration(cycles=8),
     )
@@ -110,7 +112,7 @@ def test_free_decay_dissipates_what_the_beam_loses(modes: int, bound: float) -> 
 def ledger_error(run: sb.Run) -> float:
     """Greatest gap in the ledger over the gross work."""
     data = run.dataset
-    total = (data.energy_beam + data.energy_contact + data.energy_dissipated - data.work_shaker).values
+    total = (data.energy_beam + data.energy_contact + data.energy_dissipated - data.striker_work).values
     return float(np.abs(total - total[0]).max() / data.attrs["gross_work"])
 
 
@@ -148,14 +150,14 @@ def test_order_of_the_energy_ledger(modes: int, pair: tuple[float, float]) -> No
 def test_mirror_image(modes: int) -> None:
     """side="above" negates every displacement and nothing else, to the last bit."""
     below, above = (simulate(modes, 1.21, 0.3, 4, location=0.42, side=side) for side in ("below", "above"))
-    negated = {"displacement", "center_displacement", "shaker_displacement", "modal_amplitude"}
-    negated |= {"velocity", "center_velocity", "modal_velocity"}
+    negated = {"displacement", "midspan_displacement", "striker_displacement", "modal_amplitude"}
+    negated |= {"velocity", "midspan_velocity", "modal_velocity"}
     for name, values in below.dataset.variables.items():
         sign = -1.0 if name in negated else 1.0
         np.testing.assert_array_equal(above.dataset[name], sign * values.values, err_msg=str(name))
     for name in below.impacts:
         np.testing.assert_array_equal(above.impacts[name], below.impacts[name])
-    one, other = below.outcome, above.outcome
+    one, other = below.summary, above.summary
     for name, value in one.items():
         if name.startswith(("min_", "max_")):
             opposite = name.replace("min_", "MAX_").replace("max_", "min_").lower()
@@ -164,12 +166,12 @@ def test_mirror_image(modes: int) -> None:
             assert other[name] == -value
         else:
             np.testing.assert_equal(other[name], value)
-    assert below.outcome.crossings > 0
+    assert below.summary.zero_crossings > 0
 
 
 def test_negated_start() -> None:
     model = model_of(8)
-    alpha, velocity = model.equilibrium * 1.1, kick(8, 1.6)
+    alpha, velocity = model.well_amplitude * 1.1, kick(8, 1.6)
     below = simulate(8, 1.1, 0.2, 3, start=sb.State(amplitude=alpha, velocity=velocity))
     above = simulate(8, 1.1, 0.2, 3, start=sb.State(amplitude=-alpha, velocity=-velocity), side="above")
     np.testing.assert_array_equal(above.dataset.modal_amplitude, -below.dataset.modal_amplitude)
@@ -177,12 +179,14 @@ def test_negated_start() -> None:
     # a free beam has no shaker to say which well the arithmetic begins in: equal but for rounding
     free = [
         sb.simulate(
-            sb.System(model, start=sb.State(amplitude=s * alpha, velocity=s * velocity)),
+            sb.System(model, initial_state=sb.State(amplitude=s * alpha, velocity=s * velocity)),
             sb.Integration(cycles=3),
         )
         for s in (1.0, -1.0)
     ]
-    np.testing.assert_allclose(free[1].dataset.displacement, -free[0].dataset.displacement, atol=1e-11)
+    np.testing.assert_allclose(
+        free[1].dataset.displacement_at_striker, -free[0].dataset.displacement_at_striker, atol=1e-11
+    )
 
 
 def test_shaker_at_the_centre_leaves_the_antisymmetric_modes_at_rest() -> None:
@@ -195,7 +199,7 @@ def test_shaker_at_the_centre_leaves_the_antisymmetric_modes_at_rest() -> None:
 
 
 def test_sample_times_are_returned_exactly() -> None:
-    end = 5.0 / (1.21 * model_of(2).reference_freq)
+    end = 5.0 / (1.21 * model_of(2).reference_frequency)
     times = np.sort(np.random.default_rng(5).uniform(0.0, end, 300))
     times[0], times[-1] = 0.0, end
     run = simulate(2, 1.21, 0.18, 5, sample_times=times)
@@ -203,7 +207,7 @@ def test_sample_times_are_returned_exactly() -> None:
     # the same instants among others give the same numbers
     some = simulate(2, 1.21, 0.18, 5, sample_times=times[::7])
     np.testing.assert_array_equal(some.dataset.modal_amplitude, run.dataset.modal_amplitude[::7])
-    np.testing.assert_array_equal(some.dataset.work_shaker, run.dataset.work_shaker[::7])
+    np.testing.assert_array_equal(some.dataset.striker_work, run.dataset.striker_work[::7])
 
 
 @pytest.mark.parametrize("modes", [1, 32])
@@ -246,42 +250,42 @@ def test_default_sampling_shows_every_contact(modes: int, pair: tuple[float, flo
     ],
 )
 def test_response_agrees_with_the_dataset(modes: int, pair: tuple[float, float], cycles: int) -> None:
-    response = (run := simulate(modes, *pair, cycles)).outcome
-    end = cycles / (pair[0] * model_of(modes).reference_freq)
+    response = (run := simulate(modes, *pair, cycles)).summary
+    end = cycles / (pair[0] * model_of(modes).reference_frequency)
     shown = simulate(modes, *pair, cycles, sample_times=np.linspace(0.0, end, 60_001)).dataset
-    center = shown.center_displacement.values
+    center = shown.midspan_displacement.values
     signs = np.sign(center)
     changes = np.flatnonzero(signs[1:] != signs[:-1])
-    assert response.crossings == changes.size
+    assert response.zero_crossings == changes.size
     late = shown.time.values[changes] > 0.75 * end
-    assert response.crossings_last_quarter == np.count_nonzero(late)
+    assert response.zero_crossings_last_quarter == np.count_nonzero(late)
     spacing = end / 60_000
     if changes.size:
-        assert abs(response.last_crossing - shown.time.values[changes[-1]]) <= 1.001 * spacing
+        assert abs(response.last_zero_crossing - shown.time.values[changes[-1]]) <= 1.001 * spacing
     else:
-        assert math.isnan(response.last_crossing)
+        assert math.isnan(response.last_zero_crossing)
     assert response.final_well == signs[-1]
 
     # a cubic between flight steps sees the extremes to 2e-3 of b, the samples see them to less
     for name, values in (
         ("displacement", shown.displacement),
-        ("center_displacement", shown.center_displacement),
+        ("midspan_displacement", shown.midspan_displacement),
     ):
         assert getattr(response, f"max_{name}") == pytest.approx(float(values.max()), abs=2e-3)
         assert getattr(response, f"min_{name}") == pytest.approx(float(values.min()), abs=2e-3)
     assert response.peak_force == pytest.approx(float(shown.contact_force.max()), rel=5e-3)
     assert response.impacts == run.impacts.sizes["impact"]
     assert response.peak_force == run.impacts.peak_force.max()
-    assert response.contact_share == pytest.approx(float(run.impacts.duration.sum()) / end, rel=1e-12)
+    assert response.contact_time_fraction == pytest.approx(float(run.impacts.duration.sum()) / end, rel=1e-12)
     assert response.status == RunStatus.OK
-    assert math.isnan(response.decided_at)
+    assert math.isnan(response.early_stop_time)
     # final is what the energy proves: in the far well, out of the tip's reach, with too little to come back to it
     model, scale = model_of(modes), paper.BEAM.buckling_level
     energy = float(shown.energy_beam[-1] + shown.energy_contact[-1])
     highest = float(shown.displacement[0]) * scale + pair[1] / pair[0] * scale
     bound = float(decidable_energy(model, np.array([paper.LOCATION]), np.array([highest]))[0])
     out_of_reach = float(shown.displacement[-1]) * scale > max(highest, 0.0)
-    assert response.end_is_final == (signs[-1] > 0 and out_of_reach and energy < bound)
+    assert response.final_well_proven == (signs[-1] > 0 and out_of_reach and energy < bound)
 
 
 @pytest.mark.parametrize(("modes", "pair", "cycles"), [(1, (1.21, 0.05), 6), (8, (1.4, 0.02), 2)])
@@ -289,7 +293,7 @@ def test_impulse_is_the_integral_of_the_force(modes: int, pair: tuple[float, flo
     run = simulate(modes, *pair, cycles)
     onset, duration = run.impacts.onset.values, run.impacts.duration.values
     instants = onset[:, None] + duration[:, None] * np.linspace(0.0, 1.0, 400)
-    end = cycles / (pair[0] * model_of(modes).reference_freq)
+    end = cycles / (pair[0] * model_of(modes).reference_frequency)
     shown = simulate(modes, *pair, cycles, sample_times=np.unique(np.clip(instants, 0.0, end))).dataset
     for impact in range(onset.size):
         inside = (shown.time >= onset[impact]) & (shown.time <= onset[impact] + duration[impact])
@@ -329,11 +333,11 @@ def test_nothing_is_final_of_a_beam_that_is_still_struck() -> None:
             sb.simulate(sb.System(model, paper.CONTACT, shaker), sb.Integration(cycles=n), sample_times=[0.0])
             for n in (10, 200)
         )
-        if short.outcome.final_well < 0:
-            assert not short.outcome.end_is_final
-            changed += long.outcome.crossings != short.outcome.crossings
-        if short.outcome.end_is_final:
-            assert (long.outcome.crossings, long.outcome.final_well) == (short.outcome.crossings, 1)
+        if short.summary.final_well < 0:
+            assert not short.summary.final_well_proven
+            changed += long.summary.zero_crossings != short.summary.zero_crossings
+        if short.summary.final_well_proven:
+            assert (long.summary.zero_crossings, long.summary.final_well) == (short.summary.zero_crossings, 1)
     assert changed > 0
 
 
@@ -341,35 +345,35 @@ def test_nothing_is_final_of_a_beam_that_is_still_struck() -> None:
 def test_class_is_told_by_the_end(start: float) -> None:
     """A beam thrown over the barrier once, from the lower well, is transient; it rests where it is seen."""
     model = model_of(2, 0.05)
-    velocity = -start * model.linear_modes[:, 0] * math.sqrt(3.5 * (model.barrier_energy - model.well_energy))
+    velocity = -start * model.linear_modes[:, 0] * math.sqrt(3.5 * (model.saddle_energy - model.well_energy))
     run = sb.simulate(
-        sb.System(model, start=sb.State(amplitude=-start * model.equilibrium, velocity=velocity)),
+        sb.System(model, initial_state=sb.State(amplitude=-start * model.well_amplitude, velocity=velocity)),
         sb.Integration(cycles=60),
     )
-    assert run.outcome.final_well == np.sign(run.dataset.center_displacement.values[-1])
-    assert run.outcome.end_is_final
+    assert run.summary.final_well == np.sign(run.dataset.midspan_displacement.values[-1])
+    assert run.summary.final_well_proven
     if start < 0.0:
-        assert run.outcome.response == (
-            ResponseClass.TRANSIENT_2 if run.outcome.crossings % 2 else ResponseClass.TRANSIENT_1
+        assert run.summary.response_class == (
+            ResponseClass.TRANSIENT_2 if run.summary.zero_crossings % 2 else ResponseClass.TRANSIENT_1
         )
 
 
 def test_early_decision_ends_the_recording() -> None:
-    full, early = (simulate(1, 1.21, 0.36, 60, early_decision=flag) for flag in (False, True))
-    assert early.outcome.status == RunStatus.DECIDED
-    assert early.outcome.response == full.outcome.response
-    assert early.outcome.decided_at < full.dataset.time[-1]
-    assert early.dataset.time[-1] <= early.outcome.decided_at
+    full, early = (simulate(1, 1.21, 0.36, 60, early_termination=flag) for flag in (False, True))
+    assert early.summary.status == RunStatus.EARLY_STOP
+    assert early.summary.response_class == full.summary.response_class
+    assert early.summary.early_stop_time < full.dataset.time[-1]
+    assert early.dataset.time[-1] <= early.summary.early_stop_time
 
 
 def test_instants_after_an_early_decision() -> None:
-    full = simulate(1, 1.21, 0.36, 60, early_decision=True)
-    late = [full.outcome.decided_at + 0.01]
-    run = simulate(1, 1.21, 0.36, 60, early_decision=True, sample_times=late)
-    assert run.outcome.decided_at == full.outcome.decided_at
+    full = simulate(1, 1.21, 0.36, 60, early_termination=True)
+    late = [full.summary.early_stop_time + 0.01]
+    run = simulate(1, 1.21, 0.36, 60, early_termination=True, sample_times=late)
+    assert run.summary.early_stop_time == full.summary.early_stop_time
     assert run.dataset.time.values.tolist() == late
     assert run.dataset.valid.values.tolist() == [0]
-    assert np.isnan(run.dataset.displacement.values).all()
+    assert np.isnan(run.dataset.displacement_at_striker.values).all()
 
 
 # ---------------------------------------------------------------------- failures
@@ -378,18 +382,18 @@ def test_instants_after_an_early_decision() -> None:
 def test_a_run_that_overflows_says_so() -> None:
     """A failed run does not raise: its class is unknown and its status says why."""
     run = sb.simulate(
-        sb.System(model_of(2), start=sb.State(amplitude=[1e200, 0.0], velocity=[0.0, 0.0])),
+        sb.System(model_of(2), initial_state=sb.State(amplitude=[1e200, 0.0], velocity=[0.0, 0.0])),
         sb.Integration(cycles=2),
     )
-    assert run.outcome.response == ResponseClass.UNKNOWN
-    assert run.outcome.status == RunStatus.NOT_FINITE
-    assert math.isnan(run.outcome.max_displacement)
+    assert run.summary.response_class == ResponseClass.UNKNOWN
+    assert run.summary.status == RunStatus.DIVERGED
+    assert math.isnan(run.summary.max_displacement)
     assert run.dataset.attrs["status"].startswith("NOT_FINITE: ")
     assert run.dataset.time.values.tolist() == [0.0]
     assert run.dataset.valid.values.tolist() == [0]
-    assert run.end is None
+    assert run.final_state is None
     some = sb.simulate(
-        sb.System(model_of(2), start=sb.State(amplitude=[1e200, 0.0], velocity=[0.0, 0.0])),
+        sb.System(model_of(2), initial_state=sb.State(amplitude=[1e200, 0.0], velocity=[0.0, 0.0])),
         sb.Integration(cycles=2),
         sample_times=[0.0, 0.01],
     )
@@ -399,10 +403,10 @@ def test_a_run_that_overflows_says_so() -> None:
 def test_transient_2_from_the_upper_well() -> None:
     """classify() takes +1 for the well opposite to the one the run began in: one crossing is transient 2."""
     model = model_of(2, 0.05)
-    velocity = model.linear_modes[:, 0] * math.sqrt(3.75 * (model.barrier_energy - model.well_energy))
+    velocity = model.linear_modes[:, 0] * math.sqrt(3.75 * (model.saddle_energy - model.well_energy))
     response = sb.simulate(
-        sb.System(model, start=sb.State(amplitude=-model.equilibrium, velocity=velocity)),
+        sb.System(model, initial_state=sb.State(amplitude=-model.well_amplitude, velocity=velocity)),
         sb.Integration(cycles=40),
-    ).outcome
-    assert (response.crossings, response.final_well) == (1, -1)
-    assert response.response == ResponseClass.TRANSIENT_2
+    ).summary
+    assert (response.zero_crossings, response.final_well) == (1, -1)
+    assert response.response_class == ResponseClass.TRANSIENT_2

@@ -110,11 +110,11 @@ def test_refusals_of_systems(call, error: type[Exception], message: str) -> None
 def test_a_step_that_does_not_resolve_a_period_is_refused(ratio: float) -> None:
     """A quarter of a cycle and of the first period is the longest: no class is told of a run that saw nothing."""
     system = SYSTEM.replace(**{"drive.frequency_ratio": ratio})
-    longest = 0.25 / (BUCKLED.reference_freq * max(ratio, 1.0))
+    longest = 0.25 / (BUCKLED.reference_frequency * max(ratio, 1.0))
     words = "a cycle of excitation" if ratio > 1.0 else "a period of the first mode"
     for door in (
         sb.simulate,
-        lambda system, asked: sb.sweep(system, {"velocity_amplitude": [0.1, 0.2]}, asked),
+        lambda system, kernel_input: sb.sweep(system, {"velocity_amplitude": [0.1, 0.2]}, kernel_input),
     ):
         with pytest.raises(
             sb.InputError, match=r"step = 1 s: does not resolve .*must be at most .*a quarter of it"

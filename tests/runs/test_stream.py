@@ -18,7 +18,7 @@ def test_is_what_save_writes(name: str, tmp_path) -> None:
     system, integration = CASES[name]
     outcome = sb.simulate_to_file(system, integration, path=tmp_path / "run.nc")
     assert [file.name for file in tmp_path.iterdir()] == ["run.nc"]
-    same(sb.load_run(tmp_path / "run.nc"), sb.simulate(system, integration), outcome)
+    same(sb.load(tmp_path / "run.nc"), sb.simulate(system, integration), outcome)
 
 
 def test_in_many_pieces(tmp_path, monkeypatch) -> None:
@@ -26,37 +26,41 @@ def test_in_many_pieces(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr("snapbeam.runs.stream._KEPT_BACK", 300)
     system, integration = CASES["plain"][0], sb.Integration(cycles=60)
     outcome = sb.simulate_to_file(system, integration, path=tmp_path / "run.nc")
-    same(sb.load_run(tmp_path / "run.nc"), sb.simulate(system, integration), outcome)
+    same(sb.load(tmp_path / "run.nc"), sb.simulate(system, integration), outcome)
 
 
 def test_instants_asked_for(tmp_path) -> None:
     system, integration = CASES["plain"]
     times = np.linspace(0.0, 0.01, 50)
     sb.simulate_to_file(system, integration, path=tmp_path / "run.nc", sample_times=times)
-    found = sb.load_run(tmp_path / "run.nc").dataset
-    asked = sb.simulate(system, integration, sample_times=times).dataset
+    found = sb.load(tmp_path / "run.nc").dataset
+    kernel_input = sb.simulate(system, integration, sample_times=times).dataset
     np.testing.assert_array_equal(found.time, times)
-    np.testing.assert_allclose(found.displacement, asked.displacement, rtol=1e-13)
+    np.testing.assert_allclose(found.displacement, kernel_input.displacement, rtol=1e-13)
 
 
-def same(found: sb.Run, asked: sb.Run, outcome: sb.Outcome) -> None:
+def same(found: sb.Run, kernel_input: sb.Run, outcome: sb.RunSummary) -> None:
     """But for the last digit of what is summed over modes, which hangs on how many samples are summed at a time."""
-    assert set(found.dataset.variables) == set(asked.dataset.variables)
-    for name, variable in asked.dataset.variables.items():
+    assert set(found.dataset.variables) == set(kernel_input.dataset.variables)
+    for name, variable in kernel_input.dataset.variables.items():
         values, largest = found.dataset[name].values, np.nanmax(np.abs(variable.values), initial=0.0)
         np.testing.assert_allclose(values, variable.values, rtol=1e-13, atol=1e-14 * largest, err_msg=name)
         assert found.dataset[name].attrs == variable.attrs
-    np.testing.assert_array_equal(found.impacts.to_array(), asked.impacts.to_array())
-    np.testing.assert_equal(dict(found.outcome), dict(asked.outcome))
-    np.testing.assert_equal(dict(outcome), dict(asked.outcome))
-    attrs = {key: value for key, value in asked.dataset.attrs.items() if key not in ("created", "command")}
+    np.testing.assert_array_equal(found.impacts.to_array(), kernel_input.impacts.to_array())
+    np.testing.assert_equal(dict(found.summary), dict(kernel_input.summary))
+    np.testing.assert_equal(dict(outcome), dict(kernel_input.summary))
+    attrs = {
+        key: value for key, value in kernel_input.dataset.attrs.items() if key not in ("created", "command")
+    }
     for key, value in attrs.items():
         np.testing.assert_equal(found.dataset.attrs[key], value, err_msg=key)
-    assert found.system == asked.system and found.integration == asked.integration
-    assert found.accuracy == asked.accuracy and (found.end is None) == (asked.end is None)
-    if asked.end is not None and found.end is not None:
-        np.testing.assert_array_equal(found.end.amplitude, asked.end.amplitude)
-        np.testing.assert_array_equal(found.end.velocity, asked.end.velocity)
+    assert found.system == kernel_input.system and found.integration == kernel_input.integration
+    assert found.accuracy == kernel_input.accuracy and (found.final_state is None) == (
+        kernel_input.final_state is None
+    )
+    if kernel_input.final_state is not None and found.final_state is not None:
+        np.testing.assert_array_equal(found.final_state.amplitude, kernel_input.final_state.amplitude)
+        np.testing.assert_array_equal(found.final_state.velocity, kernel_input.final_state.velocity)
 
 
 def test_refusals(tmp_path) -> None:
@@ -97,5 +101,5 @@ print(before, peak())
 """
     said = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
     before, after = map(float, said.split())
-    size = sb.load_run(tmp_path / "long.nc").dataset.nbytes
+    size = sb.load(tmp_path / "long.nc").dataset.nbytes
     assert size > 3e8 and after - before < 2.5e8, (size, before, after)

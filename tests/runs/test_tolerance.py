@@ -29,7 +29,7 @@ def shaker_at(omega: float, speed: float, **given) -> sb.Shaker:
 
 
 def both(run: sb.Run) -> np.ndarray:
-    return np.column_stack((run.dataset.displacement, run.dataset.center_displacement))
+    return np.column_stack((run.dataset.displacement_at_striker, run.dataset.midspan_displacement))
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
@@ -40,7 +40,7 @@ def both(run: sb.Run) -> np.ndarray:
 def test_error_is_within_the_request(modes: int, omega: float, speed: float, tolerance: float) -> None:
     """Against order 6 at a third of the step or less, at the contact point and at the centre."""
     model, shaker = model_of(modes), shaker_at(omega, speed)
-    times = np.linspace(0.0, CYCLES / (omega * model.reference_freq), 30 * CYCLES + 1)
+    times = np.linspace(0.0, CYCLES / (omega * model.reference_frequency), 30 * CYCLES + 1)
     run = sb.simulate(
         sb.System(model, CONTACT, shaker),
         sb.Integration(cycles=CYCLES, tolerance=tolerance),
@@ -48,7 +48,7 @@ def test_error_is_within_the_request(modes: int, omega: float, speed: float, tol
     )
     assert run.accuracy is not None
     assert run.accuracy.reached
-    assert run.accuracy.horizon == pytest.approx(times[-1])
+    assert run.accuracy.predictability_horizon == pytest.approx(times[-1])
     assert run.accuracy.estimated_error <= tolerance
     fine = sb.simulate(
         sb.System(model, CONTACT, shaker),
@@ -74,17 +74,17 @@ def test_chaos_shortens_the_horizon() -> None:
         )
     found = run.accuracy
     assert found is not None
-    assert found.conditioning > 1e-3
-    assert 0.0 < found.horizon < 0.5 * 5 / (0.3 * model.reference_freq)
+    assert found.perturbation_growth > 1e-3
+    assert 0.0 < found.predictability_horizon < 0.5 * 5 / (0.3 * model.reference_frequency)
     assert found.estimated_error <= 1e-6
-    separation = sb.conditioning(sb.System(model, CONTACT, shaker), sb.Integration(cycles=5))
-    late = separation.separation.sel(time=slice(2.0 * found.horizon, None))
+    separation = sb.perturbation_growth(sb.System(model, CONTACT, shaker), sb.Integration(cycles=5))
+    late = separation.separation.sel(time=slice(2.0 * found.predictability_horizon, None))
     assert float(late.max()) > 1e-7
 
 
 def test_a_request_beyond_reach_is_said(monkeypatch) -> None:
     """What the finest steps do not meet is a warning and a shorter horizon, not a claim."""
-    monkeypatch.setattr("snapbeam.runs.tolerance._FINE", (("map", 1.0),))
+    monkeypatch.setattr("snapbeam.runs.tolerance._FINE", (("standard", 1.0),))
     monkeypatch.setattr("snapbeam.runs.tolerance._ROUGH", (("map", 4.0), ("map", 2.0)))
     model, shaker = model_of(8), shaker_at(0.7, 0.4)
     with pytest.warns(RuntimeWarning, match="met only up to"):
@@ -94,28 +94,28 @@ def test_a_request_beyond_reach_is_said(monkeypatch) -> None:
     assert run.accuracy is not None
     assert not run.accuracy.reached
     assert run.accuracy.estimated_error <= 5e-5
-    assert run.accuracy.horizon < 5 / (0.7 * model.reference_freq)
+    assert run.accuracy.predictability_horizon < 5 / (0.7 * model.reference_frequency)
 
 
 def test_named_levels() -> None:
     """(1.21, 0.18), 32 modes, five cycles: map within 1e-3, reference within 1e-8."""
     model, shaker = model_of(32), shaker_at(1.21, 0.18)
-    times = np.linspace(0.0, 5 / (1.21 * model.reference_freq), 101)
+    times = np.linspace(0.0, 5 / (1.21 * model.reference_frequency), 101)
     system = sb.System(model, CONTACT, shaker)
     levels = {
         name: sb.simulate(system, sb.Integration(cycles=5, accuracy=name), sample_times=times)
-        for name in ("map", "reference")
+        for name in ("standard", "reference")
     }
     step = levels["reference"].dataset.attrs["step"]
-    asked = sb.Integration(cycles=5, accuracy="reference")
-    (plan,) = plans_of(system, asked, {})
+    kernel_input = sb.Integration(cycles=5, accuracy="reference")
+    (plan,) = plans_of(system, kernel_input, {})
     assert plan.step == pytest.approx(step)
-    ensemble = make_ensemble(system, asked, plan=plan._replace(step=0.5 * step))
+    ensemble = make_ensemble(system, kernel_input, plan=plan._replace(step=0.5 * step))
     recorded = joined(list(cpu_engine.record(ensemble, times, False)))
     alpha = ensemble.structure.amplitudes(recorded.q)
     truth = alpha @ model.shape_at(1 / 2.1) / model.length_scale
-    assert np.abs(levels["map"].dataset.displacement.values - truth).max() < 1e-3
-    assert np.abs(levels["reference"].dataset.displacement.values - truth).max() < 1e-8
+    assert np.abs(levels["map"].dataset.displacement_at_striker.values - truth).max() < 1e-3
+    assert np.abs(levels["reference"].dataset.displacement_at_striker.values - truth).max() < 1e-8
 
 
 def test_report_travels_with_the_run() -> None:
@@ -154,28 +154,34 @@ def test_mirror_image_is_judged_alike() -> None:
 def test_free_vibration() -> None:
     """Without a shaker the start is what is perturbed."""
     model = model_of(4)
-    start = (0.9 * np.asarray(model.equilibrium), np.zeros(4))
+    start = (0.9 * np.asarray(model.well_amplitude), np.zeros(4))
     run = sb.simulate(
-        sb.System(model, start=sb.State(amplitude=start[0], velocity=start[1])),
+        sb.System(model, initial_state=sb.State(amplitude=start[0], velocity=start[1])),
         sb.Integration(cycles=3, tolerance=1e-8),
         sample_times=[0.01],
     )
     assert run.accuracy is not None
     assert run.accuracy.reached
-    assert 0.0 < run.accuracy.conditioning < 1e-11
+    assert 0.0 < run.accuracy.perturbation_growth < 1e-11
 
 
 def test_conditioning_is_a_growing_response() -> None:
     """It grows in time, is linear in a small perturbation, and zero where nothing is driven."""
     model, shaker = model_of(2), shaker_at(1.21, 0.18)
-    small = sb.conditioning(sb.System(model, CONTACT, shaker), sb.Integration(cycles=3), perturbation=1e-9)
-    large = sb.conditioning(sb.System(model, CONTACT, shaker), sb.Integration(cycles=3), perturbation=1e-8)
+    small = sb.perturbation_growth(
+        sb.System(model, CONTACT, shaker), sb.Integration(cycles=3), perturbation=1e-9
+    )
+    large = sb.perturbation_growth(
+        sb.System(model, CONTACT, shaker), sb.Integration(cycles=3), perturbation=1e-8
+    )
     assert (np.diff(small.separation) >= 0.0).all()
     assert float(large.separation[-1]) == pytest.approx(10.0 * float(small.separation[-1]), rel=0.02)
     assert small.separation.attrs["units"] == "1"
     assert small.attrs["perturbation"] == 1e-9
     assert (
-        sb.conditioning(sb.System(model, CONTACT, shaker), sb.Integration(cycles=1)).attrs["perturbation"]
+        sb.perturbation_growth(sb.System(model, CONTACT, shaker), sb.Integration(cycles=1)).attrs[
+            "perturbation"
+        ]
         == PERTURBATION
     )
 
@@ -198,14 +204,14 @@ def test_refuses_tolerances_out_of_range(tolerance) -> None:
 MOTIONS: dict[str, sb.Drive] = {
     "sine": sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2, phase=0.4),
     "by its displacement": sb.DisplacementSine(frequency_ratio=1.2, displacement_amplitude=0.2),
-    "two sines": sb.TwoSines(
+    "two sines": sb.TwoTone(
         frequency_ratio=1.2, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.1
     ),
-    "burst": sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.2, length=3.0, retreat=0.1),
-    "chirp": sb.Chirp(start_ratio=0.8, stop_ratio=1.5, velocity_amplitude=0.2, sweep_length=5.0),
+    "burst": sb.Burst(frequency_ratio=1.2, velocity_amplitude=0.2, duration_cycles=3.0, retraction=0.1),
+    "chirp": sb.Chirp(start_ratio=0.8, stop_ratio=1.5, velocity_amplitude=0.2, sweep_cycles=5.0),
     "shock": sb.HalfSine(displacement_amplitude=0.3, duration=0.5),
-    "noise": sb.Noise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
-    "flight": sb.Flight(speed=0.1),
+    "noise": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
+    "flight": sb.ConstantVelocity(speed=0.1),
     "sum": sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2, phase=0.4)
     + sb.HalfSine(displacement_amplitude=0.3, duration=0.5),
 }
@@ -224,9 +230,9 @@ def moved(system: sb.System, size: float | None, times: np.ndarray) -> np.ndarra
 @pytest.mark.parametrize("beside", [False, True])
 def test_every_motion_is_changed(name: str, beside: bool) -> None:
     """What a run makes of a change of its drive is asked of every drive, alone and beside others; some stood still."""
-    base = sb.Base(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1))
+    base = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1))
     striker = sb.Striker(drive=MOTIONS[name], gap=0.0)
-    system = sb.System(model_of(1), CONTACT, striker, base=base if beside else None)
+    system = sb.System(model_of(1), CONTACT, striker, base_excitation=base if beside else None)
     times = np.linspace(0.0, 0.012, 25)
     before, after = moved(system, None, times), moved(system, 0.5, times)
     assert np.ptp(before) > 0.0
@@ -235,10 +241,10 @@ def test_every_motion_is_changed(name: str, beside: bool) -> None:
 
 def test_all_that_drives_is_changed() -> None:
     """A base under a stop, a load, a second striker: the numbers of each."""
-    stop = sb.Striker(drive=sb.Still(), gap=1e-4)
+    stop = sb.Striker(drive=sb.FixedStop(), gap=1e-4)
     around = {
-        "base": sb.Base(motion=MOTIONS["chirp"]),
-        "axial": sb.AxialLoad(motion=sb.LoadRamp(change=2.0, duration=3.0)),
+        "base": sb.BaseExcitation(motion=MOTIONS["chirp"]),
+        "axial": sb.AxialLoadModulation(motion=sb.LoadRamp(change=2.0, duration=3.0)),
     }
     second = sb.Striker(drive=MOTIONS["noise"], location=0.3, gap=1e-4)
     ensemble = make_ensemble(
@@ -255,7 +261,7 @@ def test_all_that_drives_is_changed() -> None:
 
 
 def test_what_drives_nothing_changes_the_start() -> None:
-    stop = sb.Striker(drive=sb.Still(), gap=1e-4)
+    stop = sb.Striker(drive=sb.FixedStop(), gap=1e-4)
     start = sb.State(amplitude=[-1e-4])
     ensemble = make_ensemble(sb.System(model_of(1), CONTACT, stop, start), sb.Integration(cycles=1))
     np.testing.assert_array_equal(_perturbed(ensemble, 0.5).starts, 1.5 * ensemble.starts)

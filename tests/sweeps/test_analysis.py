@@ -46,7 +46,7 @@ def test_comparing_maps(synthetic_map):
     same = compare_maps(synthetic_map, synthetic_map)
     assert (same.changed, same.snapped, same.share, same.threshold) == (0.0, 0.0, 0.0, 1.0)
     other = synthetic_map.copy(deep=True)
-    other.response[5, 3] = ResponseClass.CONTINUOUS
+    other.response_class[5, 3] = ResponseClass.CONTINUOUS
     assert compare_maps(synthetic_map, other).changed == pytest.approx(1 / 1000)
     with pytest.raises(InputError, match="must share one grid"):
         compare_maps(synthetic_map, other.isel(frequency_ratio=slice(5)))

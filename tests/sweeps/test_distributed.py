@@ -19,9 +19,9 @@ from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.compute.tasks import Stage
 from snapbeam.sweeps.compute.workers import ATTEMPTS, ClusterWorkers
 from snapbeam.sweeps.doors import long_map, map_setup
-from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.errors import CheckpointError
 from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.stored import Keeping, StoreKeeper, Tally
+from snapbeam.sweeps.stored import CheckpointOptions, StoreKeeper, SweepReport
 
 CHUNK = 3  # twenty points: seven tasks
 
@@ -77,9 +77,9 @@ def trouble(small, folder, once=None, always=None):
 
 
 def computed(path, work, stage, client):
-    tally, said = Tally(), []
+    tally, said = SweepReport(), []
     with MapStore(path, work, CHUNK) as store:
-        keeping = Keeping(path, note=said.append, tally=tally)
+        keeping = CheckpointOptions(path, note=said.append, report=tally)
         results = StoreKeeper(store, ClusterWorkers(client, said.append), keeping).complete(stage)
         return results.read(0, stage.size), tally, said, store.made_with()
 
@@ -115,19 +115,19 @@ def test_a_poisonous_task_is_set_apart(tmp_path, small, whole, client):
     assert (status[poisoned] == RunStatus.NOT_RUN).all() and (
         np.delete(status, np.r_[poisoned]) == RunStatus.OK
     ).all()
-    assert (work.values("response", columns)[poisoned] == ResponseClass.UNKNOWN).all()
+    assert (work.values("response_class", columns)[poisoned] == ResponseClass.UNKNOWN).all()
     assert sorted(len(file.read_text()) for file in tmp_path.glob("*-*")) == [1, 1, 1, 1, 1, 2, 3]
-    tally = Tally()
+    tally = SweepReport()
     result = long_map(**small, store=tmp_path / "store", tally=tally)  # here, and without the poison
-    assert tally.kept == 6 and tally.computed == 1
+    assert tally.resumed == 6 and tally.computed == 1
     np.testing.assert_array_equal(
-        result["response"].values.ravel(), PointWork.values(work, "response", whole)
+        result["response_class"].values.ravel(), PointWork.values(work, "response_class", whole)
     )
 
 
 def test_workers_that_cannot_compute_at_all(tmp_path, small, client):
     work, stage = trouble(small, tmp_path, always=dict.fromkeys(range(7), "raise"))
-    with pytest.raises(StoreError, match="cannot compute this map: a task raised RuntimeError: no luck"):
+    with pytest.raises(CheckpointError, match="cannot compute this map: a task raised RuntimeError: no luck"):
         computed(tmp_path / "store", work, stage, client)
 
 

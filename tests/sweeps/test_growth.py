@@ -14,7 +14,7 @@ from snapbeam.cli import app
 from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.doors import long_map, map_setup
 from snapbeam.sweeps.keep.growth import layers_of
-from snapbeam.sweeps.stored import Tally
+from snapbeam.sweeps.stored import SweepReport
 
 LONGER = {
     "frequency_ratio": np.sort(np.append(np.linspace(0.4, 2.0, 5), [0.2, 1.0])),  # one before, one between
@@ -36,26 +36,26 @@ def test_a_longer_map_takes_what_the_store_holds(tmp_path, small):
     long_map(**small, store=path, chunk=6)
     ledger = (path / "ledger.jsonl").read_bytes()
     data = {file: file.read_bytes() for file in (path / "runs.zarr" / "base").rglob("c.*")}
-    tally = Tally()
+    tally = SweepReport()
     grown = long_map(**(small | LONGER), store=path, tally=tally)
     assert tally.runs == 42 - 20, "only what the store had not was run"
     assert not tally.damaged and not tally.failed
     same(grown, long_map(**(small | LONGER)))
     assert (path / "ledger.jsonl").read_bytes().startswith(ledger), "nothing of before was written again"
     assert {file: file.read_bytes() for file in data} == data
-    same(sb.read_store(path), grown)
+    same(sb.read_checkpoint(path), grown)
     assert json.loads((path / "map.json").read_bytes())["format_version"] == 4, "not for versions before"
 
-    again = Tally()
+    again = SweepReport()
     same(long_map(**(small | LONGER), store=path, tally=again), grown)
     assert again.runs == 0
 
     wider = small | LONGER | {"velocity_amplitude": np.append(LONGER["velocity_amplitude"], 0.9)}
-    once_more = Tally()
+    once_more = SweepReport()
     third = long_map(**wider, store=path, tally=once_more)
     assert once_more.runs == 7
     same(third, long_map(**wider))
-    same(sb.read_store(path), third)
+    same(sb.read_checkpoint(path), third)
 
 
 def test_layers_hold_each_point_once(small):
@@ -86,9 +86,9 @@ def test_a_map_that_is_stopped_while_it_grows_goes_on(tmp_path, small):
 
     with pytest.raises(KeyboardInterrupt):
         long_map(**(small | LONGER), store=path, progress=stop)
-    half = sb.read_store(path)
+    half = sb.read_checkpoint(path)
     assert 20 < half.attrs["points_done"] < 42 and half.attrs["points_total"] == 42
-    tally = Tally()
+    tally = SweepReport()
     same(long_map(**(small | LONGER), store=path, tally=tally), long_map(**(small | LONGER)))
     assert 0 < tally.runs < 22
 
@@ -102,13 +102,13 @@ def test_damage_in_any_layer_is_found_and_repaired(tmp_path, small, layer):
     held = bytearray(file.read_bytes())
     held[len(held) // 2] ^= 0x10
     file.write_bytes(bytes(held))
-    tally = Tally()
+    tally = SweepReport()
     same(long_map(**(small | LONGER), store=path, verify=True, tally=tally), grown)
     assert [stage for stage, _ in tally.damaged] == [layer]
 
 
 def test_values_that_rounding_alone_tells_apart_are_those_of_the_store(tmp_path, small):
-    path, told, tally = tmp_path / "store", [], Tally()
+    path, told, tally = tmp_path / "store", [], SweepReport()
     first = small | {"velocity_amplitude": np.linspace(0.1, 0.3, 3)}
     long_map(**first, store=path)
     asked = np.linspace(0.1, 0.5, 5)
@@ -126,15 +126,15 @@ def test_axes_in_another_order_and_of_other_structures_grow_too(tmp_path, model,
     short = {"velocity_amplitude": [0.1, 0.4], "modes": [1, 3]}
     longer = {"modes": [1, 2, 3], "velocity_amplitude": [0.1, 0.25, 0.4]}
     how = sb.Integration(cycles=3)
-    sb.sweep(system, short, how, store=tmp_path / "store")
-    grown = sb.sweep(system, longer, how, store=tmp_path / "store")
-    assert grown["response"].dims == ("modes", "velocity_amplitude")
+    sb.sweep(system, short, how, checkpoint=tmp_path / "store")
+    grown = sb.sweep(system, longer, how, checkpoint=tmp_path / "store")
+    assert grown["response_class"].dims == ("modes", "velocity_amplitude")
     same(grown, sb.sweep(system, longer, how))
-    same(sb.read_store(tmp_path / "store"), grown)
+    same(sb.read_checkpoint(tmp_path / "store"), grown)
 
 
 def test_repeats_of_a_point_do_not_depend_on_where_it_stands(tmp_path, small):
-    few = small | {"replicas": 2, "replica_size": 1e-4}
+    few = small | {"replicas": 2, "perturbation_rms": 1e-4}
     long_map(**few, store=tmp_path / "store")
     grown = long_map(**(few | LONGER), store=tmp_path / "store")
     same(grown, long_map(**(few | LONGER)))
@@ -182,8 +182,8 @@ def test_the_command_grows_a_store_by_its_name_and_an_axis(tmp_path, monkeypatch
         assert done.exit_code == 0, done.output
         return done.output
 
-    run(*common, "--velocity-amplitude", "0.1:0.3:3", "--store", "s.map", "-o", "a.nc")
-    said = run("--velocity-amplitude", "0.1:0.5:5", "--store", "s.map", "-o", "b.nc")
+    run(*common, "--velocity-amplitude", "0.1:0.3:3", "--checkpoint", "s.map", "-o", "a.nc")
+    said = run("--velocity-amplitude", "0.1:0.5:5", "--checkpoint", "s.map", "-o", "b.nc")
     assert "10 runs" in said or "10 of" in said or "10 to go" in said, said
     run(
         *common, "--velocity-amplitude", "0.1,0.2,0.3,0.4,0.5", "-o", "fresh.nc"
@@ -191,10 +191,10 @@ def test_the_command_grows_a_store_by_its_name_and_an_axis(tmp_path, monkeypatch
     with xr.open_dataset("b.nc") as grown, xr.open_dataset("fresh.nc") as fresh:
         for name in fresh.data_vars:
             np.testing.assert_array_equal(grown[name].values, fresh[name].values, err_msg=name)
-    resumed = run("--store", "s.map", "-o", "c.nc")  # by its name alone: as it is now
+    resumed = run("--checkpoint", "s.map", "-o", "c.nc")  # by its name alone: as it is now
     with xr.open_dataset("c.nc") as again:
         assert again.sizes["velocity_amplitude"] == 5, resumed
     refused = runner.invoke(
-        app, ["map", "--store", "s.map", "--cycles", "6", "-o", "d.nc"], env={"COLUMNS": "300"}
+        app, ["map", "--checkpoint", "s.map", "--cycles", "6", "-o", "d.nc"], env={"COLUMNS": "300"}
     )
     assert refused.exit_code == 2 and "not marched on" in refused.output

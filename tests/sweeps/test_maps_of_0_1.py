@@ -33,28 +33,37 @@ def assert_equal(one, other) -> None:
 
 def test_dataset() -> None:
     ds = make(location=LOCATION)
-    assert ds.response.dims == ("frequency_ratio", "velocity_amplitude", "location")
-    assert ds.response.shape == (3, 4, 2)
-    assert ds.response.dtype == np.int8
+    assert ds.response_class.dims == ("frequency_ratio", "velocity_amplitude", "location")
+    assert ds.response_class.shape == (3, 4, 2)
+    assert ds.response_class.dtype == np.int8
     assert set(ds.data_vars) == set(STATISTICS)
     for name, row in STATISTICS.items():
         assert ds[name].dtype == np.dtype(row.dtype)
-        assert (ds[name].attrs["units"], ds[name].attrs["long_name"]) == (row.unit, row.words)
+        assert (ds[name].attrs["units"], ds[name].attrs["long_name"]) == (row.unit, row.long_name)
     np.testing.assert_array_equal(ds.velocity_amplitude, VELOCITY)
     system = {"modes", "damping_ratio", "contact_stiffness", "beam_length", "beam_thickness", "side"}
-    made = {"cycles", "reference_freq", "step", "engine", "snapbeam_version", "title", "created", "command"}
+    made = {
+        "cycles",
+        "reference_frequency",
+        "step",
+        "engine",
+        "snapbeam_version",
+        "title",
+        "created",
+        "command",
+    }
     assert system | made <= set(ds.attrs)
     assert all(np.ndim(value) == 0 for value in ds.attrs.values())
-    assert ds.response.attrs["flag_values"].tolist() == [-1, 0, 1, 2, 3]
+    assert ds.response_class.attrs["flag_values"].tolist() == [-1, 0, 1, 2, 3]
 
 
 def test_numbers_are_no_dimensions() -> None:
     ds = make(frequency_ratio=1.21, location=0.4)
-    assert ds.response.dims == ("velocity_amplitude",)
+    assert ds.response_class.dims == ("velocity_amplitude",)
     assert float(ds.frequency_ratio) == 1.21
     assert ds.attrs["location"] == 0.4
     point = make(frequency_ratio=1.21, velocity_amplitude=0.3)
-    assert point.response.dims == ()
+    assert point.response_class.dims == ()
     np.testing.assert_array_equal(make(frequency_ratio=[1.21]).response.dims, make().response.dims)
 
 
@@ -67,7 +76,7 @@ def test_every_point_is_its_run(modes: int) -> None:
             shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=VELOCITY[j])
             response = sb.simulate(
                 sb.System(model_of(modes), paper.CONTACT, shaker), sb.Integration(cycles=4)
-            ).outcome
+            ).summary
             point = {name: ds[name].values[i, j].item() for name in STATISTICS}
             np.testing.assert_equal(point, dict(response))
 
@@ -93,27 +102,27 @@ def test_mirror_image() -> None:
 
 def test_reference_frequency() -> None:
     """Omega and V mean another frequency and velocity: half of omega_1, twice the ratios."""
-    freq = model_of(1).reference_freq
+    freq = model_of(1).reference_frequency
     half = make(
-        reference_freq=0.5 * freq,
+        reference_frequency=0.5 * freq,
         frequency_ratio=2.0 * np.array(RATIO),
         velocity_amplitude=2.0 * np.array(VELOCITY),
     )
     whole = make()
-    assert half.attrs["reference_freq"] == 0.5 * freq
-    np.testing.assert_array_equal(half.response, whole.response)
+    assert half.attrs["reference_frequency"] == 0.5 * freq
+    np.testing.assert_array_equal(half.response_class, whole.response)
     np.testing.assert_allclose(half.peak_force, whole.peak_force, rtol=1e-6)
 
 
 def test_early_decision_keeps_the_classes() -> None:
     ratio, velocity = np.linspace(0.4, 3.5, 16), np.linspace(0.05, 0.6, 12)
     full, early = (
-        make(frequency_ratio=ratio, velocity_amplitude=velocity, cycles=24, early_decision=flag)
+        make(frequency_ratio=ratio, velocity_amplitude=velocity, cycles=24, early_termination=flag)
         for flag in (False, True)
     )
-    np.testing.assert_array_equal(full.response, early.response)
-    assert np.isfinite(early.decided_at).any()
-    assert not np.isfinite(full.decided_at).any()
+    np.testing.assert_array_equal(full.response, early.response_class)
+    assert np.isfinite(early.early_stop_time).any()
+    assert not np.isfinite(full.early_stop_time).any()
 
 
 def test_progress_and_interruption() -> None:
@@ -177,9 +186,9 @@ def test_progress_and_interruption() -> None:
         ({"side": "left"}, sb.InputError, "side = 'left': must be one of 'below', 'above'"),
         ({"threads": 0}, sb.InputError, r"threads = 0: must be an integer in \[1, "),
         (
-            {"reference_freq": 0.0},
+            {"reference_frequency": 0.0},
             sb.InputError,
-            "reference_freq = 0.0: must be a finite number greater than 0",
+            "reference_frequency = 0.0: must be a finite number greater than 0",
         ),
     ],
 )

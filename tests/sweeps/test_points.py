@@ -18,7 +18,7 @@ MIXED = {
     "drive.velocity_amplitude": np.linspace(0.1, 0.4, 4),
     "modes": [1, 3],
     "striker.side": ["below", "above"],
-    "early_decision": [False, True],
+    "early_termination": [False, True],
 }
 
 
@@ -27,10 +27,10 @@ def test_a_mapping_makes_a_grid() -> None:
     assert isinstance(grid, Grid)
     assert list(grid.axes) == [
         "drive.frequency_ratio", "beam.thickness", "drive.velocity_amplitude", "model.modes", "striker.side",
-        "run.early_decision",
+        "integration.early_termination",
     ]  # fmt: skip
     assert grid.dims == (
-        "frequency_ratio", "beam_thickness", "velocity_amplitude", "modes", "side", "early_decision",
+        "frequency_ratio", "beam_thickness", "velocity_amplitude", "modes", "side", "early_termination",
     )  # fmt: skip
     assert grid.size == 3 * 2 * 4 * 2 * 2 * 2
     assert [values.dtype.kind for values in grid.axes.values()] == ["f", "f", "f", "i", "U", "b"]
@@ -40,7 +40,7 @@ def test_counting_keeps_the_runs_of_a_structure_together() -> None:
     """Axes of the structure outermost, each group in the order it was given; every combination once."""
     grid = points_of(MIXED)
     assert grid.order == (
-        "beam.thickness", "model.modes", "striker.side", "run.early_decision", "drive.frequency_ratio",
+        "beam.thickness", "model.modes", "striker.side", "integration.early_termination", "drive.frequency_ratio",
         "drive.velocity_amplitude",
     )  # fmt: skip
     assert grid.shape == (2, 2, 2, 2, 3, 4)
@@ -140,9 +140,9 @@ def frame(**columns) -> pd.DataFrame:
         ({"modes": [1, 2], "model.modes": [1, 2]}, r"model\.modes: stands twice among the axes"),
         ({"beam.thicknes": [1e-4, 2e-4]}, r"beam\.thicknes: no parameter; did you mean 'beam\.thickness'"),
         ({3: [1, 2]}, "3: no parameter"),
-        ({"run.engine": ["cpu", "cuda"]}, r"run\.engine: cannot be swept"),
+        ({"integration.engine": ["cpu", "cuda"]}, r"run\.engine: cannot be swept"),
         ({"threads": [1, 2]}, "threads: cannot be swept"),
-        ({"run.tolerance": [1e-3, 1e-2]}, r"run\.tolerance: cannot be swept"),
+        ({"integration.tolerance": [1e-3, 1e-2]}, r"run\.tolerance: cannot be swept"),
         ({"drive.displacement": [1.0, 2.0]}, r"drive\.displacement: cannot be swept"),
         ({"location": [0.5, 0.4]}, r"location\[0\] = 0.5, location\[1\] = 0.4: must be strictly increasing"),
         ({"location": [0.5, 1.0]}, r"location = 1.0: must be a number in \(0, 1\)"),

@@ -24,13 +24,15 @@ AXES = {"velocity_amplitude": np.linspace(0.05, 0.4, 10), "frequency_ratio": np.
 @pytest.fixture(scope="module")
 def whole(system, tmp_path_factory):
     path = tmp_path_factory.mktemp("store") / "map.store"
-    dataset = sb.sweep(system, AXES, sb.Integration(cycles=5), store=sb.Keeping(path, chunk=16))
+    dataset = sb.sweep(
+        system, AXES, sb.Integration(cycles=5), checkpoint=sb.CheckpointOptions(path, points_per_task=16)
+    )
     return path, dataset
 
 
 def test_a_finished_store_is_the_map_that_was_returned(whole):
     path, dataset = whole
-    read = sb.read_store(path)
+    read = sb.read_checkpoint(path)
     assert read.attrs["points_done"] == read.attrs["points_total"] == 120
     for name in sb.STATISTICS:
         np.testing.assert_array_equal(
@@ -48,13 +50,14 @@ def test_what_is_not_done_is_unknown_and_says_so(whole, tmp_path):
     shutil.copytree(path, half)
     lines = (half / "ledger.jsonl").read_text().splitlines()
     (half / "ledger.jsonl").write_text("\n".join([*lines[:3], lines[3][:40]]))  # the last line is torn
-    read = sb.read_store(half)
+    read = sb.read_checkpoint(half)
     assert read.attrs["points_done"] == 48
-    known = read["response"].transpose(*dataset["response"].dims).values >= 0
+    known = read["response_class"].transpose(*dataset["response_class"].dims).values >= 0
     assert known.sum() == 48
-    assert (read["status"].values[read["response"].values < 0] == sb.RunStatus.NOT_RUN).all()
+    assert (read["status"].values[read["response_class"].values < 0] == sb.RunStatus.NOT_RUN).all()
     np.testing.assert_array_equal(
-        read["response"].transpose(*dataset["response"].dims).values[known], dataset["response"].values[known]
+        read["response_class"].transpose(*dataset["response_class"].dims).values[known],
+        dataset["response_class"].values[known],
     )
 
 
@@ -66,14 +69,14 @@ def test_damaged_rows_are_not_read(whole, tmp_path):
     shutil.copytree(path, spoilt)
     chunk = next(item for item in (spoilt / "runs.zarr" / "base" / "numbers").rglob("c*") if item.is_file())
     chunk.write_bytes(chunk.read_bytes()[:-5] + b"12345")
-    assert sb.read_store(spoilt).attrs["points_done"] == 104
+    assert sb.read_checkpoint(spoilt).attrs["points_done"] == 104
 
 
 def test_what_is_no_store_is_refused(tmp_path):
     with pytest.raises(sb.InputError, match="holds no map"):
-        sb.read_store(tmp_path)
+        sb.read_checkpoint(tmp_path)
     with pytest.raises(sb.InputTypeError, match="must be a folder"):
-        sb.read_store(3)
+        sb.read_checkpoint(3)
 
 
 def test_the_order_of_the_axes_is_kept_before_anything_is_computed(system, tmp_path):
@@ -90,8 +93,14 @@ def test_the_order_of_the_axes_is_kept_before_anything_is_computed(system, tmp_p
         path = tmp_path / f"{name}.store"
         with pytest.raises(Enough):
             given = {each: axes[each] for each in order}
-            sb.sweep(system, given, sb.Integration(cycles=2), store=sb.Keeping(path, chunk=2), progress=stop)
+            sb.sweep(
+                system,
+                given,
+                sb.Integration(cycles=2),
+                checkpoint=sb.CheckpointOptions(path, points_per_task=2),
+                progress=stop,
+            )
         (path / "ledger.jsonl").write_text("")
-        read = sb.read_store(path)
-        assert read["response"].dims == tuple(lookup(each).short for each in order)
+        read = sb.read_checkpoint(path)
+        assert read["response_class"].dims == tuple(lookup(each).short for each in order)
         assert read.attrs["points_done"] == 0

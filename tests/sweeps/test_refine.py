@@ -14,13 +14,13 @@ from snapbeam.sweeps.compute.task import ResultTable
 from snapbeam.sweeps.doors import long_map
 from snapbeam.sweeps.points import Grid
 from snapbeam.sweeps.refine import refine, refined_grid
-from snapbeam.sweeps.stored import Tally
+from snapbeam.sweeps.stored import SweepReport
 
 
 class DrawnWork:
     """Classes read off a picture of them, in place of runs."""
 
-    integers, numbers = ("response", "status"), ("peak_force",)
+    integers, numbers = ("response_class", "status"), ("peak_force",)
 
     def __init__(self, grid, classify):
         self.setup = type("Setup", (), {"points": grid})
@@ -79,7 +79,7 @@ def test_a_smooth_boundary_costs_its_length():
     np.testing.assert_array_equal(results.columns.integers[:, 0].reshape(grid.shape), truth(grid, disc))
     assert results.computed.mean() < 0.2
     status = results.columns.integers[:, 1].reshape(grid.shape)
-    np.testing.assert_array_equal(status == RunStatus.INFERRED, ~results.computed)
+    np.testing.assert_array_equal(status == RunStatus.FILLED, ~results.computed)
     np.testing.assert_array_equal(np.isnan(results.columns.numbers[:, 0]), ~results.computed.ravel())
     seen = np.concatenate(
         [np.stack([p["drive.frequency_ratio"], p["drive.velocity_amplitude"]], 1) for _, p in book.asked]
@@ -177,21 +177,21 @@ def test_computed_points_are_those_of_a_full_map(tmp_path, small):
         xr.testing.assert_equal(refined[name].where(computed), full[name].where(computed))
     assert refined.attrs["points_computed"] == int(computed.sum())
     inferred = ~computed.values
-    assert (refined["status"].values[inferred] == RunStatus.INFERRED).all()
-    assert (refined["response"].values[inferred] >= 0).all()
-    wrong = int((refined["response"] != full["response"]).sum())
+    assert (refined["status"].values[inferred] == RunStatus.FILLED).all()
+    assert (refined["response_class"].values[inferred] >= 0).all()
+    wrong = int((refined["response_class"] != full["response_class"]).sum())
     print(f"{wrong} of {int(inferred.sum())} inferred points differ from the full map")
     long_map(**small, store=tmp_path / "store", chunk=7)
-    tally = Tally()
+    tally = SweepReport()
     stored = long_map(
         **small, store=tmp_path / "store", refine_levels=2, output=tmp_path / "m.nc", tally=tally
     )
     xr.testing.assert_equal(stored.load(), refined)
-    assert tally.kept == 3 and tally.computed > 1
-    again = Tally()
+    assert tally.resumed == 3 and tally.computed > 1
+    again = SweepReport()
     long_map(**small, store=tmp_path / "store", refine_levels=2, tally=again)
-    assert again.computed == 0 and again.kept == tally.tasks
-    checked = Tally()
+    assert again.computed == 0 and again.resumed == tally.tasks
+    checked = SweepReport()
     long_map(**small, store=tmp_path / "store", refine_levels=2, verify=True, tally=checked)
     assert checked.computed == 0 and not checked.damaged and checked.missing == 0
 

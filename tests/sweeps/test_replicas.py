@@ -10,7 +10,7 @@ import snapbeam as sb
 from snapbeam.core.validate import InputError
 from snapbeam.model.paper_values import BEAM, CONTACT
 from snapbeam.sweeps.doors import long_map
-from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicas, perturbed_start
+from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicates, perturbed_start
 
 
 def test_measuring_error_is_that_of_a_pixel():
@@ -29,12 +29,12 @@ def starts_of(model, replicas, side="below"):
 @pytest.mark.parametrize("modes", [1, 4, 32])
 def test_starts_have_the_size_asked_for(modes):
     model = sb.ReducedModel.from_beam(BEAM, modes=modes)
-    starts = starts_of(model, Replicas(2000, size=5e-6))
-    moved = np.array([model.center_shape @ (start.amplitude - model.equilibrium) for start in starts])
+    starts = starts_of(model, Replicates(2000, perturbation_rms=5e-6))
+    moved = np.array([model.midspan_shape @ (start.amplitude - model.well_amplitude) for start in starts])
     assert np.sqrt(np.mean(moved**2)) == pytest.approx(5e-6, rel=0.08)
     assert abs(moved.mean()) < 4.0 * 5e-6 / np.sqrt(2000)
     q = np.array(
-        [np.linalg.solve(model.linear_modes, start.amplitude - model.equilibrium) for start in starts]
+        [np.linalg.solve(model.linear_modes, start.amplitude - model.well_amplitude) for start in starts]
     )
     p = np.array([np.linalg.solve(model.linear_modes, start.velocity) for start in starts])
     energy = 0.5 * np.array([np.mean((q * model.omega) ** 2, axis=0), np.mean(p**2, axis=0)])
@@ -43,10 +43,10 @@ def test_starts_have_the_size_asked_for(modes):
 
 def test_starts_are_reproducible_and_mirror():
     model = sb.ReducedModel.from_beam(BEAM, modes=3)
-    first = starts_of(model, Replicas(3), "below")
-    more = starts_of(model, Replicas(5), "below")
-    other = starts_of(model, Replicas(3, seed=1), "below")
-    mirror = starts_of(model, Replicas(3), "above")
+    first = starts_of(model, Replicates(3), "below")
+    more = starts_of(model, Replicates(5), "below")
+    other = starts_of(model, Replicates(3, seed=1), "below")
+    mirror = starts_of(model, Replicates(3), "above")
     for at, start in enumerate(first):
         np.testing.assert_array_equal(start.amplitude, more[at].amplitude)
         np.testing.assert_array_equal(start.amplitude, -mirror[at].amplitude)
@@ -56,22 +56,22 @@ def test_starts_are_reproducible_and_mirror():
 
 def test_shares(small):
     plain = sb.response_map(**small)
-    sure = long_map(**small, replicas=6, halve_step=True)
-    share = sure["class_share"]
+    sure = long_map(**small, replicas=6, check_half_step=True)
+    share = sure["class_fraction"]
     assert share.dims == ("frequency_ratio", "velocity_amplitude", "response_class")
     np.testing.assert_allclose(share.sum("response_class"), 1.0)
     np.testing.assert_allclose(share.values * 8.0, np.rint(share.values * 8.0))
     for name in plain.data_vars:
         xr.testing.assert_equal(sure[name], plain[name])
-    own = share.sel(response_class=sure["response"])
+    own = share.sel(response_class=sure["response_class"])
     assert (own >= 1.0 / 8.0).all()
     halved = sb.response_map(**small, step=0.5 * plain.attrs["step"])
-    np.testing.assert_array_equal(sure["response_half_step"], halved["response"])
-    assert sure.attrs["replicas"] == 6 and sure.attrs["replica_size"] == MEASURING_ERROR
-    tiny = long_map(**small, replicas=2, replica_size=1e-15)
-    wild = long_map(**small, replicas=6, replica_size=1e-4)
-    assert float(tiny["class_share"].max("response_class").mean()) > float(
-        wild["class_share"].max("response_class").mean()
+    np.testing.assert_array_equal(sure["response_half_step"], halved["response_class"])
+    assert sure.attrs["replicas"] == 6 and sure.attrs["perturbation_rms"] == MEASURING_ERROR
+    tiny = long_map(**small, replicas=2, perturbation_rms=1e-15)
+    wild = long_map(**small, replicas=6, perturbation_rms=1e-4)
+    assert float(tiny["class_fraction"].max("response_class").mean()) > float(
+        wild["class_fraction"].max("response_class").mean()
     )
 
 
@@ -79,15 +79,15 @@ def test_repeats_of_starts_that_are_swept():
     """A change is added to where each point begins, not to the rest state."""
     model = sb.ReducedModel.from_beam(BEAM, modes=2)
     system = sb.System(model, CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02))
-    axes = {"start.velocity[1]": [0.0, 1.0, 2.0], "velocity_amplitude": [0.02, 0.03]}
+    axes = {"initial_state.velocity[1]": [0.0, 1.0, 2.0], "velocity_amplitude": [0.02, 0.03]}
     asked = sb.Integration(cycles=3)
-    ds = sb.sweep(system, axes, asked, replicas=Replicas(2, size=1e-15))
-    assert (ds.class_share.max("response_class") == 1.0).all(), "hardly changed, every repeat is the run"
-    assert len(np.unique(ds.response)) > 1, "and the runs differ"
-    replicas = Replicas(1, size=1e-6)
+    ds = sb.sweep(system, axes, asked, replicates=Replicates(2, perturbation_rms=1e-15))
+    assert (ds.class_fraction.max("response_class") == 1.0).all(), "hardly changed, every repeat is the run"
+    assert len(np.unique(ds.response_class)) > 1, "and the runs differ"
+    replicas = Replicates(1, perturbation_rms=1e-6)
     batch = sb.State(amplitude=np.array([[1e-3, 0.0], [2e-3, 1e-4]]), phase=[0.0, 0.5])
     moved = perturbed_start(system, replicas, 0, batch)
-    change = perturbed_start(system, replicas, 0).amplitude - model.equilibrium
+    change = perturbed_start(system, replicas, 0).amplitude - model.well_amplitude
     np.testing.assert_allclose(moved.amplitude - batch.amplitude, [change, change], rtol=1e-9)
     np.testing.assert_array_equal(moved.phase, batch.phase)
 
@@ -95,5 +95,5 @@ def test_repeats_of_starts_that_are_swept():
 def test_what_is_refused(small):
     with pytest.raises(InputError, match="replicas = -1"):
         long_map(**small, replicas=-1)
-    with pytest.raises(InputError, match="replica_size = 0"):
-        long_map(**small, replicas=1, replica_size=0.0)
+    with pytest.raises(InputError, match="perturbation_rms = 0"):
+        long_map(**small, replicas=1, perturbation_rms=0.0)

@@ -22,8 +22,8 @@ from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.compute.tasks import Stage, chunk_size
 from snapbeam.sweeps.doors import long_map, map_setup
 from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.replicas import Replicas
-from snapbeam.sweeps.stored import Tally
+from snapbeam.sweeps.replicas import Replicates
+from snapbeam.sweeps.stored import SweepReport
 
 HERE = Path(__file__).parent
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="kills and forks are POSIX here")
@@ -57,11 +57,22 @@ def test_killed_at_two_hundred_random_instants(tmp_path):
 
 
 def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
-    """``snapbeam map --store DIR`` of a killed command: the rest is computed, the file is the same."""
+    """``snapbeam map --checkpoint DIR`` of a killed command: the rest is computed, the file is the same."""
     monkeypatch.chdir(tmp_path)
     command = [sys.executable, "-c", "from snapbeam.cli import main; main()", "map", "--modes", "1"]
     command += ["--cycles", "60", "--frequency-ratio", "0.5:2:8", "--velocity-amplitude", "0.05:0.6:8"]
-    command += ["--store", "store", "--chunk", "4", "--threads", "1", "--log", "map.log", "-o", "map.nc"]
+    command += [
+        "--checkpoint",
+        "store",
+        "--points-per-task",
+        "4",
+        "--threads",
+        "1",
+        "--log",
+        "map.log",
+        "-o",
+        "map.nc",
+    ]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     ledger = tmp_path / "store" / "ledger.jsonl"
     deadline = time.monotonic() + 300.0
@@ -72,7 +83,7 @@ def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
     process.communicate()
     done = ledger.read_text().count("\n")
     assert done < 16 and not (tmp_path / "map.nc").exists()
-    again = CliRunner().invoke(app, ["map", "--store", "store", "-o", "map.nc", "--log", "map.log"])
+    again = CliRunner().invoke(app, ["map", "--checkpoint", "store", "-o", "map.nc", "--log", "map.log"])
     assert again.exit_code == 0, again.output
     assert f"16 tasks, {done} done before, {16 - done} computed now, 0 damaged, 0 given up" in again.stdout
     log = (tmp_path / "map.log").read_text().splitlines()
@@ -87,16 +98,16 @@ def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
     )  # fmt: skip
     xr.testing.assert_equal(resumed, whole)
     assert "bit for bit" in resumed.attrs["reproducible"]
-    verified = CliRunner().invoke(app, ["map", "--store", "store", "--verify"])
+    verified = CliRunner().invoke(app, ["map", "--checkpoint", "store", "--check-checkpoint"])
     assert verified.exit_code == 0 and "16 done before, 0 computed now, 0 damaged" in verified.stdout
-    refused = CliRunner().invoke(app, ["map", "--store", "store", "--cycles", "61"])
+    refused = CliRunner().invoke(app, ["map", "--checkpoint", "store", "--cycles", "61"])
     assert refused.exit_code == 2 and "cycles: 60 in the store, 61 asked for" in refused.stderr
 
 
 def test_interrupt_keeps_what_is_finished(tmp_path):
     command = [sys.executable, "-c", "from snapbeam.cli import main; main()", "map", "--modes", "1"]
     command += ["--cycles", "2000", "--frequency-ratio", "0.5:2:8", "--velocity-amplitude", "0.05:0.6:8"]
-    command += ["--store", "store", "--chunk", "1", "--threads", "1"]
+    command += ["--checkpoint", "store", "--points-per-task", "1", "--threads", "1"]
     process = subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
@@ -115,9 +126,9 @@ def test_interrupt_keeps_what_is_finished(tmp_path):
 @pytest.mark.parametrize("early", [False, True])
 def test_bits_do_not_depend_on_tasks_order_or_threads(tmp_path, small, early):
     """Over location too, where the rows of a task's structure are computed together, and with repeats."""
-    asked = dict(small, location=[0.21, 0.3, 0.4762], early_decision=early)
+    asked = dict(small, location=[0.21, 0.3, 0.4762], early_termination=early)
     asked["model"] = sb.ReducedModel.from_beam(asked["model"].beam, modes=4)
-    work = PointWork(map_setup(**asked), Replicas(1, halve_step=True))
+    work = PointWork(map_setup(**asked), Replicates(1, check_half_step=True))
     grid = work.setup.points
     wanted = work.compute(grid.take(np.arange(grid.size)), 2).content_hash()
     for chunk, threads, reverse in ((7, 1, True), (1, 2, False), (60, 3, False)):
@@ -132,9 +143,9 @@ def test_bits_do_not_depend_on_tasks_order_or_threads(tmp_path, small, early):
 def test_the_file_is_the_map(tmp_path, small):
     """Written a block at a time, the file is what xarray would write of the map in memory."""
     whole = sb.response_map(**small)
-    tally = Tally()
+    tally = SweepReport()
     stored = long_map(**small, store=tmp_path / "store", chunk=6, output=tmp_path / "a.nc", tally=tally)
-    assert (tally.tasks, tally.kept, tally.computed, tally.runs) == (4, 0, 4, 20)
+    assert (tally.tasks, tally.resumed, tally.computed, tally.runs) == (4, 0, 4, 20)
     whole.to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
     expected = xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf")
     stored = stored.load()

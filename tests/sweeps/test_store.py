@@ -22,12 +22,12 @@ from snapbeam.core.validate import InputError
 from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.compute.tasks import Stage
 from snapbeam.sweeps.doors import long_map, map_setup
-from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.errors import CheckpointError
 from snapbeam.sweeps.keep import durable, ledger, tables
 from snapbeam.sweeps.keep.durable import StoreLock, append_line
 from snapbeam.sweeps.keep.ledger import Ledger, Record
 from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.stored import Tally
+from snapbeam.sweeps.stored import SweepReport
 
 CHUNK = 6  # twenty points: four tasks, the last one short
 
@@ -116,7 +116,7 @@ def test_damage_after_the_check_is_not_read(stored, work):
     with MapStore(path, work) as store:
         store.open_stage(stage)
         flip(chunks(path)[-1])
-        with pytest.raises(StoreError, match="task 3 of stage base was damaged after"):
+        with pytest.raises(CheckpointError, match="task 3 of stage base was damaged after"):
             store.reader(stage).read(0, stage.size)
 
 
@@ -185,7 +185,7 @@ def test_a_damaged_description_is_told(stored, work):
     held = json.loads((path / "map.json").read_text())
     for text in ("", "{", json.dumps(held | {"parameters": held["parameters"] | {"cycles": 4}})):
         (path / "map.json").write_text(text)
-        with pytest.raises(StoreError, match=r"map\.json is damaged"):
+        with pytest.raises(CheckpointError, match=r"map\.json is damaged"):
             MapStore(path, work)
     (path / "map.json").write_text(json.dumps(held | {"format_version": 99}))
     with pytest.raises(InputError, match=r"another format \(99\)"):
@@ -231,11 +231,11 @@ def test_a_second_writer_is_refused_until_the_first_is_gone(stored, work):
     process = subprocess.Popen([sys.executable, "-c", HOLDER, str(path)], stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout.readline() == "held\n"
-        with pytest.raises(StoreError, match=f"written by another process .process {process.pid}."):
+        with pytest.raises(CheckpointError, match=f"written by another process .process {process.pid}."):
             MapStore(path, work)
         process.send_signal(signal.SIGKILL)
         process.wait()
-        with MapStore(path, work), pytest.raises(StoreError, match=f"process {os.getpid()}"):
+        with MapStore(path, work), pytest.raises(CheckpointError, match=f"process {os.getpid()}"):
             MapStore(path, work)
     finally:
         process.kill()
@@ -267,7 +267,7 @@ def test_a_full_disk_loses_nothing(tmp_path, work, whole, monkeypatch, where, wr
     place, name = (tables, "durable_write") if where == "data" else (ledger, "append_line")
     with monkeypatch.context() as patch, store:
         patch.setattr(place, name, Full(getattr(durable, name), writes))
-        with pytest.raises(StoreError, match="No space left on device; no finished task is lost"):
+        with pytest.raises(CheckpointError, match="No space left on device; no finished task is lost"):
             for task in range(stage.tasks):
                 store.commit(stage, task, work.compute(stage.columns(task), 1))
     finished = writes // 2 if where == "data" else writes
@@ -309,15 +309,15 @@ def test_a_full_file_system(small_disk, tmp_path, monkeypatch):
     filler = small_disk / "filler"
     filler.write_bytes(b"0" * 400_000)
     command = ["map", "--modes", "1", "--cycles", "2", "--frequency-ratio", "0.5:2:10"]
-    command += ["--velocity-amplitude", "0.05:0.6:8", "--chunk", "2", "--threads", "1"]
-    full = CliRunner().invoke(app, [*command, "--store", str(small_disk / "store"), "-o", "a.nc"])
+    command += ["--velocity-amplitude", "0.05:0.6:8", "--points-per-task", "2", "--threads", "1"]
+    full = CliRunner().invoke(app, [*command, "--checkpoint", str(small_disk / "store"), "-o", "a.nc"])
     assert full.exit_code == 1
     assert "No space left on device; no finished task is lost: make room" in full.stderr
     assert "Traceback" not in full.output and not Path("a.nc").exists()
     filler.unlink()
     done = Ledger(small_disk / "store" / "ledger.jsonl").records
     assert 0 < len(done) < 40
-    again = CliRunner().invoke(app, [*command, "--store", str(small_disk / "store"), "-o", "a.nc"])
+    again = CliRunner().invoke(app, [*command, "--checkpoint", str(small_disk / "store"), "-o", "a.nc"])
     assert again.exit_code == 0, again.output
     assert f"{len(done)} done before, {40 - len(done)} computed now, 0 damaged" in again.stdout
     CliRunner().invoke(app, [*command, "-o", "b.nc"])
@@ -333,10 +333,10 @@ def test_verify_repairs_and_computes_nothing_else(tmp_path, small, work):
         for task in (0, 2):
             store.commit(stage, task, work.compute(stage.columns(task), 1))
     flip(path / "runs.zarr/base/integers/c.2.0")
-    tally = Tally()
+    tally = SweepReport()
     checked = long_map(**small, store=path, verify=True, tally=tally, threads=1)
     assert tally.damaged == [("base", 2)] and tally.computed == 1 and tally.missing == 2
-    assert int((checked["response"] == -1).sum()) == 8
+    assert int((checked["response_class"] == -1).sum()) == 8
     assert (checked["status"].values.ravel()[6:12] == snapbeam.RunStatus.NOT_RUN).all()
     with pytest.raises(InputError, match="there is no map to verify"):
         long_map(**small, store=tmp_path / "none", verify=True)

@@ -41,7 +41,7 @@ def whole(system) -> xr.Dataset:
 
 def assert_point_is_run(dataset: xr.Dataset, system: sb.System, integration: sb.Integration = ASKED) -> None:
     """A point of a map against simulate(), every statistic to the last bit."""
-    outcome = sb.simulate(system, integration, sample_times=[0.0]).outcome
+    outcome = sb.simulate(system, integration, sample_times=[0.0]).summary
     for name in STATISTICS:
         np.testing.assert_equal(dataset[name].item(), outcome[name], err_msg=name)
 
@@ -56,7 +56,7 @@ def test_labels(whole, system) -> None:
         assert whole[name].attrs["parameter"] == full
     assert whole.beam_buckling_level.attrs["units"] == "m"
     # what goes with the structure stands beside it, and nowhere else
-    for name in ("reference_freq", "step", "length_scale"):
+    for name in ("reference_frequency", "step", "length_scale"):
         assert whole[name].dims == ("beam_buckling_level", "damping_ratio", "modes")
         assert name not in whole.attrs
     assert not {"modes", "damping_ratio", "beam_buckling_level", "beam_axial_load"} & whole.attrs.keys()
@@ -67,7 +67,7 @@ def test_labels(whole, system) -> None:
         other = system.replace(
             **{"beam.buckling_level": level, "model.damping_ratio": 0.01, "model.modes": 4}
         )
-        assert whole.reference_freq.values[i, 1, 1] == other.model.reference_freq
+        assert whole.reference_frequency.values[i, 1, 1] == other.model.reference_frequency
         assert whole.length_scale.values[i, 1, 1] == level
 
 
@@ -89,7 +89,7 @@ def test_every_point_is_its_run(whole, system) -> None:
 def test_axes_in_another_order_are_the_same_points(whole, system) -> None:
     names = ("frequency_ratio", "modes", "beam.buckling_level", "damping_ratio")
     other = sb.sweep(system, {name: AXES[name] for name in names}, ASKED)
-    assert other.response.dims == ("frequency_ratio", "modes", "beam_buckling_level", "damping_ratio")
+    assert other.response_class.dims == ("frequency_ratio", "modes", "beam_buckling_level", "damping_ratio")
     for name in STATISTICS:
         np.testing.assert_array_equal(other[name].transpose(*whole.response.dims), whole[name], err_msg=name)
 
@@ -101,19 +101,19 @@ def test_parts_stores_and_threads(whole, system, tmp_path) -> None:
         np.testing.assert_array_equal(
             part[name], whole[name].isel(modes=[1], frequency_ratio=slice(1, None)), err_msg=name
         )
-    keeping = sb.Keeping(tmp_path / "store", chunk=5)
-    stored = sb.sweep(system, AXES, ASKED.replace(threads=1), store=keeping, output=tmp_path / "map.nc")
+    keeping = sb.CheckpointOptions(tmp_path / "store", points_per_task=5)
+    stored = sb.sweep(system, AXES, ASKED.replace(threads=1), checkpoint=keeping, output=tmp_path / "map.nc")
     xr.testing.assert_equal(stored.load(), whole)
-    tally = sb.Tally()
-    again = sb.sweep(system, AXES, ASKED, store=sb.Keeping(tmp_path / "store", tally=tally))
+    tally = sb.SweepReport()
+    again = sb.sweep(system, AXES, ASKED, checkpoint=sb.CheckpointOptions(tmp_path / "store", report=tally))
     xr.testing.assert_equal(again, whole)
-    assert (tally.tasks, tally.kept, tally.computed) == (7, 7, 0)
+    assert (tally.tasks, tally.resumed, tally.computed) == (7, 7, 0)
     with pytest.raises(InputError, match=r"points\.model\.modes: \[1, 4\] in the store, \[1, 3\] asked for"):
-        sb.sweep(system, AXES | {"modes": [1, 3]}, ASKED, store=tmp_path / "store")
+        sb.sweep(system, AXES | {"modes": [1, 3]}, ASKED, checkpoint=tmp_path / "store")
     with pytest.raises(
         InputError, match=r"system\.beam\.thickness: 0\.0004 in the store, 0\.00041 asked for"
     ):
-        sb.sweep(system.replace(**{"beam.thickness": 4.1e-4}), AXES, ASKED, store=tmp_path / "store")
+        sb.sweep(system.replace(**{"beam.thickness": 4.1e-4}), AXES, ASKED, checkpoint=tmp_path / "store")
 
 
 def test_the_file_is_the_map(whole, system, tmp_path) -> None:
@@ -134,7 +134,13 @@ def test_the_file_is_the_map(whole, system, tmp_path) -> None:
 
 def test_on_a_cluster(whole, system, tmp_path) -> None:
     pytest.importorskip("distributed")
-    there = sb.sweep(system, AXES, ASKED, store=sb.Keeping(tmp_path / "store", chunk=9), cluster="local:2")
+    there = sb.sweep(
+        system,
+        AXES,
+        ASKED,
+        checkpoint=sb.CheckpointOptions(tmp_path / "store", points_per_task=9),
+        cluster="local:2",
+    )
     xr.testing.assert_equal(there, whole)
 
 
@@ -174,27 +180,27 @@ def test_drawn_with_right_labels(system, tmp_path) -> None:
 SINGLE = {
     "beam.thickness": [3.5e-4, 4.5e-4],
     "beam.axial_load": [35.0, 40.0],
-    "model.reference_freq": [80.0, 90.0],
+    "model.reference_frequency": [80.0, 90.0],
     "contact.stiffness": [1e7, 4e8],
     "striker.location": [0.25, 0.45],
     "striker.gap": [-1e-5, 0.0, 2e-5],
     "striker.side": ["below", "above"],
     "drive.phase": [0.0, 1.5],
     "drive.velocity_amplitude": [0.0, 0.3],
-    "start.amplitude[1]": [-1.0, 0.5],
-    "start.velocity[2]": [0.0, 0.3],
-    "start.striker_position": [-4e-4, -3.35e-4],
-    "run.cycles": [2, 5],
-    "run.accuracy": ["map", "reference"],
-    "run.early_decision": [False, True],
-    "run.high_frequency_ratio": [1.5, 5.0],
+    "initial_state.amplitude[1]": [-1.0, 0.5],
+    "initial_state.velocity[2]": [0.0, 0.3],
+    "initial_state.striker_position": [-4e-4, -3.35e-4],
+    "integration.cycles": [2, 5],
+    "integration.accuracy": ["map", "reference"],
+    "integration.early_termination": [False, True],
+    "integration.high_frequency_ratio": [1.5, 5.0],
 }
 
 
 @pytest.mark.parametrize("name", SINGLE)
 def test_an_axis_over(name: str, system) -> None:
     ds = sb.sweep(system, {name: SINGLE[name]}, ASKED)
-    (dim,) = ds.response.dims
+    (dim,) = ds.response_class.dims
     for i, value in enumerate(SINGLE[name]):
         if name.startswith("run."):
             assert_point_is_run(ds.isel({dim: i}), system, ASKED.replace(**{name[4:]: value}))
@@ -219,10 +225,10 @@ def test_restitution(system) -> None:
 def test_recorded_drives(system) -> None:
     t = np.arange(900) / 20_000.0
     record = sb.Striker(
-        drive=sb.Recorded(
+        drive=sb.RecordedMotion(
             displacement=3e-5 * np.sin(600.0 * t),
             velocity=0.018 * np.cos(600.0 * t),
-            sampling_freq=20_000.0,
+            sampling_frequency=20_000.0,
             frequency=95.0,
         ),
     )
@@ -239,7 +245,7 @@ def test_recorded_drives(system) -> None:
 def test_starts_of_a_free_beam(system) -> None:
     """From both wells and over the barrier: a point does not depend on those beside it."""
     free = sb.System(system.model)
-    axes = {"start.amplitude[1]": [-1.0, 0.2, 1.0], "start.velocity[1]": [0.0, 0.7, 1.9]}
+    axes = {"initial_state.amplitude[1]": [-1.0, 0.2, 1.0], "initial_state.velocity[1]": [0.0, 0.7, 1.9]}
     ds = sb.sweep(free, axes, ASKED)
     for i, j in itertools.product(range(3), range(3)):
         begun = free.replace(
@@ -255,8 +261,8 @@ def test_a_basin_of_attraction(system, tmp_path) -> None:
     """Starts of a struck beam as both axes of a picture: the well it ends in."""
     calm = system.replace(**{"drive.velocity_amplitude": 0.02, "model.damping_ratio": 0.05})
     axes = {
-        "start.amplitude[1]": np.linspace(-1.5, 1.5, 13), "start.velocity[1]": np.linspace(-1.0, 1.0, 9),
-        "start.striker_position": [-5e-4],
+        "initial_state.amplitude[1]": np.linspace(-1.5, 1.5, 13), "initial_state.velocity[1]": np.linspace(-1.0, 1.0, 9),
+        "initial_state.striker_position": [-5e-4],
     }  # fmt: skip
     ds = sb.sweep(calm, axes, sb.Integration(cycles=40))
     wells = ds.final_well.squeeze().values
@@ -294,7 +300,7 @@ def table() -> pd.DataFrame:
 def test_a_list_point_for_point(table, system, tmp_path) -> None:
     """In any order, structures mixed: each point is its run; kept, resumed and exported like a grid."""
     ds = sb.sweep(system, table, ASKED)
-    assert ds.response.dims == ("point",)
+    assert ds.response_class.dims == ("point",)
     assert ds.who.values.tolist() == table.who.tolist()
     for i in range(12):
         row = table.iloc[i]
@@ -305,8 +311,11 @@ def test_a_list_point_for_point(table, system, tmp_path) -> None:
             }
         )  # fmt: skip
         assert_point_is_run(ds.isel(point=i), changed)
-        assert float(ds.reference_freq[i]) == changed.model.reference_freq
-    assert not {"modes", "reference_freq", "beam_thickness", "location", "frequency_ratio"} & ds.attrs.keys()
+        assert float(ds.reference_frequency[i]) == changed.model.reference_frequency
+    assert (
+        not {"modes", "reference_frequency", "beam_thickness", "location", "frequency_ratio"}
+        & ds.attrs.keys()
+    )
     turned = sb.sweep(system, table.iloc[::-1], ASKED)
     for name in STATISTICS:
         np.testing.assert_array_equal(turned[name][::-1], ds[name], err_msg=name)
@@ -314,7 +323,11 @@ def test_a_list_point_for_point(table, system, tmp_path) -> None:
     for name in STATISTICS:
         np.testing.assert_array_equal(as_dataset[name], ds[name], err_msg=name)
     stored = sb.sweep(
-        system, table, ASKED, store=sb.Keeping(tmp_path / "store", chunk=5), output=tmp_path / "list.nc"
+        system,
+        table,
+        ASKED,
+        checkpoint=sb.CheckpointOptions(tmp_path / "store", points_per_task=5),
+        output=tmp_path / "list.nc",
     ).load()
     xr.testing.assert_equal(stored.drop_vars("who"), ds.drop_vars("who"))
     assert stored.who.values.tolist() == table.who.tolist()
@@ -325,7 +338,7 @@ def test_points_that_differ_in_structure_alone(system) -> None:
     ds = sb.sweep(system, pd.DataFrame({"modes": [2, 1, 2]}), ASKED)
     for i, modes in enumerate((2, 1, 2)):
         assert_point_is_run(ds.isel(point=i), system.replace(**{"model.modes": modes}))
-    free = sb.System(system.model, start=sb.State(amplitude=0.5 * system.model.equilibrium))
+    free = sb.System(system.model, initial_state=sb.State(amplitude=0.5 * system.model.well_amplitude))
     ds = sb.sweep(free, {"damping_ratio": [0.001, 0.1]}, ASKED)
     for i, ratio in enumerate((0.001, 0.1)):
         assert_point_is_run(ds.isel(damping_ratio=i), free.replace(**{"model.damping_ratio": ratio}))
@@ -344,7 +357,7 @@ def test_a_structure_that_is_none_is_refused_before_any_run(system, monkeypatch)
     ):
         sb.sweep(loaded, {"beam.thickness": [4e-4, 5e-4], "frequency_ratio": [1.0, 1.2]}, ASKED)
     with pytest.raises(InputError, match=r"start\.amplitude\[2\]: mode = 2: must be an integer in \[1, 1\]"):
-        sb.sweep(system, pd.DataFrame({"modes": [2, 1], "start.amplitude[2]": [0.1, 0.1]}), ASKED)
+        sb.sweep(system, pd.DataFrame({"modes": [2, 1], "initial_state.amplitude[2]": [0.1, 0.1]}), ASKED)
 
 
 def test_parameters_that_are_only_in_order_together(system) -> None:
@@ -357,7 +370,7 @@ def test_parameters_that_are_only_in_order_together(system) -> None:
         ds = sb.sweep(loaded, points, ASKED)
         assert (ds.status == sb.RunStatus.OK).all()
         assert (ds.length_scale > 0.0).all()
-        last = ds.isel({str(name): -1 for name in ds.response.dims})
+        last = ds.isel({str(name): -1 for name in ds.response_class.dims})
         both = {"beam.thickness": 5e-4, "beam.axial_load": 70.0}
         assert_point_is_run(last, loaded.replace(**both))
         assert float(last.length_scale) == loaded.replace(**both).scale.length
@@ -383,7 +396,9 @@ def test_parameters_that_are_only_in_order_together(system) -> None:
             r"contact\.coefficient: no parameter of this system; it has beam\.length",
         ),
         (
-            lambda s: sb.sweep(sb.System(s.model, start=sb.State(amplitude=[0.0, 0.0])), {"location": [0.3]}),
+            lambda s: sb.sweep(
+                sb.System(s.model, initial_state=sb.State(amplitude=[0.0, 0.0])), {"location": [0.3]}
+            ),
             InputError,
             r"striker\.location: no parameter of this system",
         ),
@@ -398,12 +413,16 @@ def test_parameters_that_are_only_in_order_together(system) -> None:
             "give exactly one of the two",
         ),
         (
-            lambda s: sb.sweep(s, {"start.amplitude[9]": [0.0]}),
+            lambda s: sb.sweep(s, {"initial_state.amplitude[9]": [0.0]}),
             InputError,
             r"mode = 9: must be an integer in \[1, 2\]",
         ),
-        (lambda s: sb.sweep(s, {"location": [0.3]}, replicas="many"), InputTypeError, "replicas = 'many'"),
-        (lambda s: sb.sweep(s, {"location": [0.3]}, store=3), InputTypeError, "store = 3: must be a folder"),
+        (lambda s: sb.sweep(s, {"location": [0.3]}, replicates="many"), InputTypeError, "replicas = 'many'"),
+        (
+            lambda s: sb.sweep(s, {"location": [0.3]}, checkpoint=3),
+            InputTypeError,
+            "store = 3: must be a folder",
+        ),
         (lambda s: sb.sweep(s, {"location": [0.3]}, cluster="local:2"), InputError, "cluster: needs a store"),
         (lambda s: sb.sweep(s, {"location": [0.3]}, refine_levels=-1), InputError, "refine_levels = -1"),
         (lambda s: sb.sweep(s, {"location": [0.3]}, output="map.csv"), InputError, r"must end in \.nc"),

@@ -21,7 +21,7 @@ RUNNER = CliRunner()
 def brute_force(full: xr.Dataset, along: str) -> tuple[np.ndarray, np.ndarray]:
     """Both curves of a full map, column by column in plain Python."""
     values = full[along].values
-    table = full["response"].transpose(..., along).values
+    table = full["response_class"].transpose(..., along).values
     curves = np.full((2, *table.shape[:-1]), np.nan)
     for at in np.ndindex(table.shape[:-1]):
         column = [kind > 0 for kind in table[at]]
@@ -55,17 +55,19 @@ def brute_force(full: xr.Dataset, along: str) -> tuple[np.ndarray, np.ndarray]:
 )  # fmt: skip
 def test_thresholds_are_those_of_the_full_map(along, values, over, modes, cycles):
     system = SYSTEM.replace(**{"model.modes": modes})
-    asked = sb.Integration(cycles=cycles, early_decision=True)
+    asked = sb.Integration(cycles=cycles, early_termination=True)
     full = sb.sweep(system, {**over, along: values}, asked)
     found = sb.threshold(system, along, values, over, sb.Integration(cycles=cycles))
     short = found.attrs["along"]
     first, always = brute_force(full, short)
-    np.testing.assert_array_equal(found["first_interwell"], first)
-    np.testing.assert_array_equal(found["always_interwell"], always)
-    np.testing.assert_array_equal(found["first_interwell_min"], first)
-    np.testing.assert_array_equal(found["always_interwell_max"], always)
-    np.testing.assert_array_equal(found["response"], full["response"].transpose(*found["response"].dims))
-    assert found.attrs["runs"] == full["response"].size and not found["failed_runs"].any()
+    np.testing.assert_array_equal(found["lower_threshold"], first)
+    np.testing.assert_array_equal(found["upper_threshold"], always)
+    np.testing.assert_array_equal(found["lower_threshold_min"], first)
+    np.testing.assert_array_equal(found["upper_threshold_max"], always)
+    np.testing.assert_array_equal(
+        found["response_class"], full["response_class"].transpose(*found["response_class"].dims)
+    )
+    assert found.attrs["runs"] == full["response_class"].size and not found["failed_runs"].any()
     assert set(np.unique(found["outcome"])) <= {0, 1, 2, 3}
     np.testing.assert_array_equal(found["outcome"] == 1, np.isnan(first))
     assert np.isfinite(first).any()
@@ -89,31 +91,31 @@ KINDS = [
 
 def test_what_failed_runs_leave_open(monkeypatch):
     found = thresholds_of(monkeypatch, " ".join(row[0] for row in KINDS))
-    names = "first_interwell always_interwell first_interwell_min always_interwell_max last_intrawell".split()
+    names = "lower_threshold upper_threshold lower_threshold_min upper_threshold_max last_intrawell".split()
     for name, expected in zip(names, np.array([row[2:] for row in KINDS]).T, strict=True):
         np.testing.assert_array_equal(found[name], expected, err_msg=name)
     flags = found["outcome"].attrs["flag_meanings"].split()
     assert [flags[code] for code in found["outcome"].values] == [row[1] for row in KINDS]
     assert found["failed_runs"].values.tolist() == [row[0].count("?") for row in KINDS]
-    np.testing.assert_array_equal(found["status"] == sb.RunStatus.NOT_FINITE, found["response"] < 0)
+    np.testing.assert_array_equal(found["status"] == sb.RunStatus.DIVERGED, found["response_class"] < 0)
 
 
 def test_runs_of_an_engine_that_fail():
     """A start far outside the finite range fails; it is neither intrawell nor interwell."""
     asked = sb.Integration(cycles=12)
-    far = {"start.amplitude[1]": [-1.0, 1e103]}
+    far = {"initial_state.amplitude[1]": [-1.0, 1e103]}
     found = sb.threshold(SYSTEM, "velocity_amplitude", AMPLITUDE, far, asked)
     assert found["outcome"].values.tolist() == [0, 5]
     assert found["failed_runs"].values.tolist() == [0, 5]
-    assert (found["status"][1] == sb.RunStatus.NOT_FINITE).all() and (found["response"][1] == -1).all()
+    assert (found["status"][1] == sb.RunStatus.DIVERGED).all() and (found["response_class"][1] == -1).all()
     found = sb.threshold(
-        SYSTEM, "start.amplitude[1]", [-1.1, -0.9, 1e103], {"velocity_amplitude": [0.1, 0.3]}, asked
+        SYSTEM, "initial_state.amplitude[1]", [-1.1, -0.9, 1e103], {"velocity_amplitude": [0.1, 0.3]}, asked
     )
     assert found["outcome"].values.tolist() == [4, 2]
-    np.testing.assert_array_equal(found["first_interwell"], [np.nan, -1.1])
-    np.testing.assert_array_equal(found["first_interwell_min"], [1e103, -1.1])
-    np.testing.assert_array_equal(found["always_interwell"], [np.nan, -1.1])
-    np.testing.assert_array_equal(found["always_interwell_max"], [np.nan, np.nan])
+    np.testing.assert_array_equal(found["lower_threshold"], [np.nan, -1.1])
+    np.testing.assert_array_equal(found["lower_threshold_min"], [1e103, -1.1])
+    np.testing.assert_array_equal(found["upper_threshold"], [np.nan, -1.1])
+    np.testing.assert_array_equal(found["upper_threshold_max"], [np.nan, np.nan])
 
 
 def test_several_numbers_of_modes(contact):
@@ -123,13 +125,13 @@ def test_several_numbers_of_modes(contact):
     both = sb.threshold_curve(
         models, contact, cycles=4, **axes, progress=lambda done, total: seen.append((done, total))
     )
-    assert both["first_interwell"].dims == ("modes", "frequency_ratio")
+    assert both["lower_threshold"].dims == ("modes", "frequency_ratio")
     assert both["modes"].values.tolist() == [1, 2]
-    assert both["reference_freq"].values == pytest.approx([83.93, 83.93], abs=0.01)
+    assert both["reference_frequency"].values == pytest.approx([83.93, 83.93], abs=0.01)
     assert both.attrs["runs"] == 64
     assert seen[-1] == (64, 64) and all(a[0] <= b[0] for a, b in itertools.pairwise(seen))
     alone = sb.threshold_curve(models[1], contact, cycles=4, **axes)
-    np.testing.assert_array_equal(both["first_interwell"].sel(modes=2), alone["first_interwell"])
+    np.testing.assert_array_equal(both["lower_threshold"].sel(modes=2), alone["lower_threshold"])
 
 
 def test_what_is_refused(model, contact):
@@ -154,7 +156,7 @@ def test_command(tmp_path, monkeypatch):
     assert done.exit_code == 0, done.output
     assert "300 runs in" in done.stdout and "N = 2: lowest threshold V = " in done.stdout
     curve = xr.load_dataset("threshold.nc", engine="h5netcdf")
-    assert curve["first_interwell"].shape == (2, 5) and curve.attrs["runs"] == 300
+    assert curve["lower_threshold"].shape == (2, 5) and curve.attrs["runs"] == 300
     assert (tmp_path / "t.png").stat().st_size > 10_000
     refused = RUNNER.invoke(app, ["threshold", "--modes", "1,x"])
     assert refused.exit_code == 2 and "whole numbers separated by commas, such as 1,32" in refused.stderr
@@ -173,7 +175,7 @@ def test_command_on_a_coarse_grid(tmp_path, monkeypatch):
         sb.Integration(cycles=30),
     )  # fmt: skip
     first, _ = brute_force(full, "velocity_amplitude")
-    np.testing.assert_array_equal(curve["first_interwell"], first)
+    np.testing.assert_array_equal(curve["lower_threshold"], first)
     assert np.isfinite(first).all(), "every column has interwell runs"
     assert "no interwell response" not in done.stdout
     assert f"lowest threshold V = {first.min():.4g} at Omega = " in done.stdout

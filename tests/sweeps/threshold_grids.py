@@ -32,9 +32,9 @@ def stand_in(monkeypatch, columns: str) -> np.ndarray:
         found = true(self, points, threads, progress, **more)
         at = np.rint((points["drive.frequency_ratio"] - 1.0) * (len(table) - 1)).astype(int)
         row = np.rint(points["drive.velocity_amplitude"] * 10.0).astype(int) - 1
-        found["response"] = table[at, row]
-        failed = found["response"] == ResponseClass.UNKNOWN
-        found["status"] = np.where(failed, RunStatus.NOT_FINITE, RunStatus.OK).astype(found["status"].dtype)
+        found["response_class"] = table[at, row]
+        failed = found["response_class"] == ResponseClass.UNKNOWN
+        found["status"] = np.where(failed, RunStatus.DIVERGED, RunStatus.OK).astype(found["status"].dtype)
         return found
 
     monkeypatch.setattr(SweepSetup, "march", march)

@@ -101,18 +101,20 @@ def lifetimes(
     --starts 100 -o lifetimes.nc --plot lifetimes.png
     """
     from snapbeam.dynamics.lifetimes.lifetime_map import lifetime_map
-    from snapbeam.dynamics.lifetimes.survival import Survival
-    from snapbeam.dynamics.starts import Starts
+    from snapbeam.dynamics.lifetimes.survival import LifetimeSettings
+    from snapbeam.dynamics.starts import InitialConditions
 
     settings = configured(given)
     _checked(output, plot)
-    chosen = Starts(count=32 if starts is None else starts, phase=phase, seed=0 if seed is None else seed)
+    chosen = InitialConditions(
+        count=32 if starts is None else starts, phase=phase, seed=0 if seed is None else seed
+    )
     begun = time.monotonic()
-    cycles = settings.integration.cycles if given.get("run.cycles") is not None else 1000
+    cycles = settings.integration.cycles if given.get("integration.cycles") is not None else 1000
     with progress(None, "lifetimes", "points") as report:
         dataset = lifetime_map(
             settings.system, settings.axes() or None, settings.integration.replace(cycles=cycles, threads=threads),
-            starts=chosen, survival=Survival(quiet=50.0 if quiet_cycles is None else quiet_cycles), store=store,
+            initial_conditions=chosen, settings=LifetimeSettings(settling_cycles=50.0 if quiet_cycles is None else quiet_cycles), checkpoint=store,
             progress=report,
         )  # fmt: skip
     runs = int(dataset["last_snap"].size)
@@ -162,7 +164,7 @@ def diagram(
     begun = time.monotonic()
     with progress(None, "diagram", "values") as report:
         dataset = bifurcation_diagram(
-            settings.system, along, points, settings.integration.replace(threads=threads), starts=starts or 0,
+            settings.system, along, points, settings.integration.replace(threads=threads), initial_conditions=starts or 0,
             periods=(100 if leave is None else leave, 32 if keep is None else keep), progress=report,
         )  # fmt: skip
     lines = [f"{points.size} values in {duration(time.monotonic() - begun)}"]
@@ -191,13 +193,13 @@ def exponents(
 
     Example: snapbeam dynamics exponents --modes 8 --frequency-ratio 1.4 --velocity-amplitude 0.01 --k 4
     """
-    from snapbeam.dynamics.lyapunov import lyapunov
+    from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 
     settings = configured(given)
     _checked(output, plot)
     begun = time.monotonic()
     with progress(None, "exponents", "periods") as report:
-        dataset = lyapunov(
+        dataset = lyapunov_spectrum(
             settings.system, 1 if k is None else k, 500 if periods is None else periods,
             transient=100 if transient is None else transient, axes=settings.axes() or None,
             integration=settings.integration.replace(threads=threads), progress=report,
@@ -227,11 +229,11 @@ def section(
 
     Example: snapbeam dynamics section --modes 1 --frequency-ratio 1.625 --velocity-amplitude 0.3 --plot section.png
     """
-    from snapbeam.dynamics.sections import poincare
+    from snapbeam.dynamics.sections import poincare_section
 
     settings = configured(given)
     _checked(output, plot)
-    dataset = poincare(
+    dataset = poincare_section(
         settings.system, at, 1000 if periods is None else periods,
         transient=100 if transient is None else transient, integration=settings.integration,
     )  # fmt: skip
@@ -263,26 +265,29 @@ def branch(
     Example: snapbeam dynamics branch --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --between 0.005:0.3
     """
     from snapbeam.cli.common.options import parse_window
-    from snapbeam.dynamics.orbits.continuation import continue_orbit
-    from snapbeam.dynamics.orbits.orbit import NoOrbit, periodic_orbit
+    from snapbeam.dynamics.orbits.continuation import continuation
+    from snapbeam.dynamics.orbits.orbit import OrbitNotFoundError, periodic_orbit
 
     settings = configured(given)
     _checked(output, plot)
     limits = parse_window(between)
     assert limits is not None
     begun = time.monotonic()
-    how = None if given.get("run.accuracy") is None else settings.integration
+    how = None if given.get("integration.accuracy") is None else settings.integration
     try:
         orbit = periodic_orbit(
             settings.system, period=1 if period is None else period, transient=500 if transient is None else transient,
             integration=how,
         )  # fmt: skip
-    except NoOrbit as error:
+    except OrbitNotFoundError as error:
         from snapbeam.core.validate import InputError
 
         raise InputError(f"no orbit of period {1 if period is None else period}: {error}") from None
-    found = continue_orbit(orbit, along, limits, direction=direction, most=500 if most is None else most)
-    lines = [f"{found!r} in {duration(time.monotonic() - begun)}", *(f"{event!r}" for event in found.events)]
+    found = continuation(orbit, along, limits, direction=direction, max_points=500 if most is None else most)
+    lines = [
+        f"{found!r} in {duration(time.monotonic() - begun)}",
+        *(f"{event!r}" for event in found.special_points),
+    ]
     _finish(found.to_dataset(), output, plot, "branch", [line.strip("<>") for line in lines])
 
 
@@ -312,8 +317,8 @@ def basins(
     Example: snapbeam dynamics basins --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --plot basins.png
     """
     from snapbeam.config import parse_axis
-    from snapbeam.dynamics.attractors import attractors
-    from snapbeam.dynamics.basins import basins as basins_of
+    from snapbeam.dynamics.attractors import find_attractors
+    from snapbeam.dynamics.basins import basins_of_attraction as basins_of
     from snapbeam.dynamics.measures import basin_entropy
 
     settings = configured(given)
@@ -323,15 +328,15 @@ def basins(
         "amplitude[1]": parse_axis("amplitudes", amplitudes),
         "velocity[1]": parse_axis("velocities", velocities),
     }
-    found = attractors(
+    found = find_attractors(
         settings.system,
         200 if states is None else states,
         integration=settings.integration.replace(threads=threads),
     )
     with progress(None, "basins", "periods") as report:
         dataset = basins_of(found, plane, periods=200 if periods is None else periods, progress=report)
-    lines = [f"{len(found.found)} attractors in {duration(time.monotonic() - begun)}"]
-    for number, each in enumerate(found.found):
+    lines = [f"{len(found.attractors)} attractors in {duration(time.monotonic() - begun)}"]
+    for number, each in enumerate(found.attractors):
         share = 100.0 * float((dataset["basin"] == number).mean())
         lines.append(f"{number}: {repr(each).strip('<>')}, {share:.3g} % of the plane")
     lines.append(f"undecided: {100 * dataset.attrs['undecided']:.3g} %")
@@ -368,7 +373,7 @@ def edge(
     Example: snapbeam dynamics edge --modes 1 --damping-ratio 0.05 --frequency-ratio 1.6 --velocity-amplitude 0.03
     --plot edge.png
     """
-    from snapbeam.dynamics.edge import edge_state, kicked
+    from snapbeam.dynamics.edge import edge_tracking, kicked
     from snapbeam.dynamics.flow import Stroboscope
 
     settings = configured(given)
@@ -376,10 +381,11 @@ def edge(
     ahead = 40 if horizon is None else horizon
     how = settings.integration
     flow = Stroboscope(
-        settings.system, how if given.get("run.accuracy") is not None else how.replace(accuracy="reference")
+        settings.system,
+        how if given.get("integration.accuracy") is not None else how.replace(accuracy="reference"),
     )
     begun = time.monotonic()
-    found = edge_state(
+    found = edge_tracking(
         flow, *kicked(flow, kick, ahead), periods=60 if periods is None else periods, horizon=ahead
     )
     lines = [f"{found!r}".strip("<>") + f", in {duration(time.monotonic() - begun)}"]

@@ -26,15 +26,15 @@ def frequencies(
 
     from snapbeam.core.prefixes import prefixed
     from snapbeam.core.validate import integer
-    from snapbeam.model.galerkin.frequencies import exact_natural_freq
+    from snapbeam.model.galerkin.frequencies import exact_natural_frequencies
 
     count = integer("count", count, 1, 200)
     model = configured(given).model
     beam = model.beam
     assert beam is not None
-    reduced = model.natural_freq
-    exact = exact_natural_freq(beam, count=count)
-    straight = exact_natural_freq(beam.replace(axial_load=0.0), count=count)
+    reduced = model.natural_frequencies
+    exact = exact_natural_frequencies(beam, count=count)
+    straight = exact_natural_frequencies(beam.replace(axial_load=0.0), count=count)
     state = f"buckled by b = {prefixed(beam.buckling_level, 'm', 4)}" if beam.is_buckled else "not buckled"
     answer(
         axial_load=beam.axial_load, critical_load=beam.critical_load, buckling_level=beam.buckling_level,

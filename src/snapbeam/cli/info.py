@@ -36,6 +36,6 @@ def info(
         console.print(
             f"  {name:<{max(map(len, names)) + 2}}{about}{f' ({units})' if units not in (None, '1') else ''}"
         )
-    if "response" in dataset:
+    if "response_class" in dataset:
         console.print(class_table(dataset), *status_lines(dataset), sep="\n")
     console.print(parameter_table(dataset.attrs))

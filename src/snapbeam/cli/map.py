@@ -68,23 +68,25 @@ def compute_map(
     system = settings.system
     system.model.require_bistable("a map")
     beam = system.model.beam
-    overlay = read_overlay(dots, system.model.reference_freq, None if beam is None else beam.buckling_level)
+    overlay = read_overlay(
+        dots, system.model.reference_frequency, None if beam is None else beam.buckling_level
+    )
 
     from snapbeam.sweeps.setup import sweep_setup
-    from snapbeam.sweeps.stored import Keeping, Tally, compute_sweep
+    from snapbeam.sweeps.stored import CheckpointOptions, SweepReport, compute_sweep
 
     setup = sweep_setup(system, axes, settings.integration.replace(threads=threads))
     asked = long.sweep_options(keeping)
     total = setup.points.size
     start = time.monotonic()
-    tally = Tally()
+    tally = SweepReport()
     with long.report(total, keeping["log"], keeping["store"]) as say:
-        kept = Keeping(
+        kept = CheckpointOptions(
             keeping["store"], keeping["verify"], keeping["chunk"], long.kept_config(settings, keeping),
             say.note, tally,
         )  # fmt: skip
         dataset = compute_sweep(
-            setup, kept, output=output if long.is_long(keeping) and not kept.verify else None,
+            setup, kept, output=output if long.is_long(keeping) and not kept.check_checkpoint else None,
             progress=say.progress, **asked,
         )  # fmt: skip
         lines = long.tally_lines(tally, keeping["store"], time.monotonic() - start)

@@ -116,7 +116,7 @@ def _check_measured(figure: str, names: list[str], dots: Path | None, measured: 
     if dots is not None:
         if not {"fig6", "fig7", "fig8"} & set(names):
             raise InputError(f"dots: {figure} shows no measured responses; fig6, fig7 and fig8 do")
-        read_overlay(dots, paper_model(1).reference_freq, BEAM.buckling_level)
+        read_overlay(dots, paper_model(1).reference_frequency, BEAM.buckling_level)
     if measured:
         if "fig4" not in names:
             raise InputError(f"measured: {figure} shows no measured run; fig4 does")

@@ -53,7 +53,7 @@ def plot(
     dataset = open_result(file)
     if "time" in dataset.dims:
         draw_run(dataset, output, opt.parse_window(window))
-    elif "first_interwell" in dataset:
+    elif "lower_threshold" in dataset:
         draw_threshold(dataset, output)
     else:
         wanted = {
@@ -63,7 +63,7 @@ def plot(
         }
         dataset = _sliced(dataset, wanted, at or [])
         attrs = dataset.attrs
-        overlay = read_overlay(dots, attrs.get("reference_freq"), attrs.get("beam_buckling_level"))
+        overlay = read_overlay(dots, attrs.get("reference_frequency"), attrs.get("beam_buckling_level"))
         draw_map(dataset, output, overlay, threshold_line)
     answer(files=[output])
     out().print(f"Written: {file_line(output)}")

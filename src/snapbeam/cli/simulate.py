@@ -28,7 +28,7 @@ __all__ = ["simulate"]
 
 
 @door
-@with_parameters(*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN, "run.tolerance")
+@with_parameters(*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN, "integration.tolerance")
 def simulate(
     given: Any,
     drive: Annotated[
@@ -105,7 +105,7 @@ def simulate(
             raise sb.InputError(f"{', '.join(named)}: must be left out with a recorded drive")
         assert system.striker is not None
         recorded = sb.Striker(
-            drive=sb.Recorded.from_dataset(_recorded(drive)),
+            drive=sb.RecordedMotion.from_dataset(_recorded(drive)),
             location=system.striker.location,
             side=system.striker.side,
         )
@@ -120,7 +120,7 @@ def simulate(
             )
         else:
             run = sb.simulate(system, integration, sample_times=times, progress=progress)
-            outcome = run.outcome
+            outcome = run.summary
     console = out()
     console.print(_told(outcome, time.monotonic() - start))
     if output is not None:
@@ -133,7 +133,7 @@ def simulate(
         console.print(f"Written: {file_line(_animated(run.dataset, animate, part))}")
     files = [path for path in (output, plot, animate) if path is not None]
     answer(outcome=outcome, seconds=time.monotonic() - start, system=system.hash, files=files)
-    if outcome.status not in (sb.RunStatus.OK, sb.RunStatus.DECIDED):
+    if outcome.status not in (sb.RunStatus.OK, sb.RunStatus.EARLY_STOP):
         raise typer.Exit(FAILED)
 
 
@@ -201,18 +201,18 @@ def _told(answer: Any, elapsed: float) -> str:
     from snapbeam.core.codes import RunStatus
     from snapbeam.core.prefixes import prefixed
 
-    kind, status = answer.response, answer.status
-    if status not in (RunStatus.OK, RunStatus.DECIDED):
+    kind, status = answer.response_class, answer.status
+    if status not in (RunStatus.OK, RunStatus.EARLY_STOP):
         return f"[bold red]failed[/] ({status.name}): {status.advice}"
     well = "upper" if answer.final_well > 0 else "lower"
-    final = ", and stays there for certain" if answer.end_is_final else ""
-    crossings = f"{answer.crossings}, {answer.crossings_last_quarter} of them in the last quarter"
-    contact = f"{answer.impacts}, in contact {100.0 * answer.contact_share:.3g} % of the time"
-    center = f"{answer.min_center_displacement:.4g} to {answer.max_center_displacement:.4g} b"
+    final = ", and stays there for certain" if answer.final_well_proven else ""
+    crossings = f"{answer.zero_crossings}, {answer.zero_crossings_last_quarter} of them in the last quarter"
+    contact = f"{answer.impacts}, in contact {100.0 * answer.contact_time_fraction:.3g} % of the time"
+    center = f"{answer.min_midspan_displacement:.4g} to {answer.max_midspan_displacement:.4g} b"
     force = (
         "no finite force" if answer.peak_force != answer.peak_force else prefixed(answer.peak_force, "N", 4)
     )
-    work, lost = (prefixed(each, "J", 4) for each in (answer.shaker_work, answer.dissipated_energy))
+    work, lost = (prefixed(each, "J", 4) for each in (answer.striker_work, answer.energy_dissipated))
     lines = [
         f"[bold]{kind.label}[/] (in {duration(elapsed)}; {status.advice})",
         f"  zero crossings        {crossings}",
@@ -223,6 +223,6 @@ def _told(answer: Any, elapsed: float) -> str:
         f"  peak contact force    {force}",
         f"  striker's work        {work}, {lost} dissipated",
     ]
-    if answer.crossings:
-        lines.insert(2, f"  last crossing         at {prefixed(answer.last_crossing, 's', 5)}")
+    if answer.zero_crossings:
+        lines.insert(2, f"  last crossing         at {prefixed(answer.last_zero_crossing, 's', 5)}")
     return "\n".join(lines)

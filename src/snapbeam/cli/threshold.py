@@ -86,11 +86,11 @@ def threshold(
     if plot is not None:
         files.append(draw_threshold(dataset, plot))
     names = (
-        "first_interwell", "always_interwell", "first_interwell_min", "always_interwell_max", "failed_runs",
+        "lower_threshold", "upper_threshold", "lower_threshold_min", "upper_threshold_max", "failed_runs",
     )  # fmt: skip
     answer(
         along=dataset.attrs["along"],
-        axes={str(each): dataset[each].values for each in dataset["first_interwell"].dims},
+        axes={str(each): dataset[each].values for each in dataset["lower_threshold"].dims},
         **{each: dataset[each].values for each in names},
         outcome=np.array(_kinds(dataset))[dataset["outcome"].values],
         runs=dataset.attrs["runs"], seconds=elapsed, files=files,
@@ -108,7 +108,7 @@ def _axes_of(settings: Config, along: str) -> dict[str, Any]:
     values = axes.pop(name, None)
     if values is None:
         if name != "drive.velocity_amplitude":
-            raise InputError(f"{along}: give the values to choose from, as --axis {along}=start:stop:count")
+            raise InputError(f"{along}: give the values to choose from, as --sweep {along}=start:stop:count")
         values = np.atleast_1d(parse_axis("velocity_amplitude", _VALUES))
     if not [each for each in axes if each != "model.modes"]:
         axes["drive.frequency_ratio"] = np.atleast_1d(parse_axis("frequency_ratio", "0.1:4:64"))
@@ -118,7 +118,7 @@ def _axes_of(settings: Config, along: str) -> dict[str, Any]:
 def _summary(dataset: xr.Dataset, elapsed: float) -> list[str]:
     lines = [f"{dataset.attrs['runs']} runs in {duration(elapsed)}"]
     along = dataset.attrs["along"]
-    first = dataset["first_interwell"]
+    first = dataset["lower_threshold"]
     across = str(first.dims[-1])
     for at in np.ndindex(first.shape[:-1]):
         chosen = dict(zip(map(str, first.dims[:-1]), at, strict=True))
@@ -133,7 +133,7 @@ def _kinds(dataset: xr.Dataset) -> list[str]:
 
 def _curve(curve: xr.Dataset, along: str, across: str, chosen: dict[str, int]) -> list[str]:
     """Return the lines that describe one curve."""
-    first, always = curve["first_interwell"], curve["always_interwell"]
+    first, always = curve["lower_threshold"], curve["upper_threshold"]
     named = [coordinate_text(name, curve[name].item()) for name in chosen]
     if "modes" in curve.attrs and "modes" not in chosen:
         named.append(coordinate_text("modes", int(curve.attrs["modes"])))
@@ -163,14 +163,14 @@ def _curve(curve: xr.Dataset, along: str, across: str, chosen: dict[str, int]) -
     open_above = int((first.notnull() & always.isnull()).sum())
     if open_above:
         lines.append(f"  highest run is intrawell, at {open_above} of {first.size} points")
-    lower = first.notnull() & (curve["first_interwell_min"] < first)
+    lower = first.notnull() & (curve["lower_threshold_min"] < first)
     if bool(lower.any()):
-        lowest = float(curve["first_interwell_min"].where(lower).min())
+        lowest = float(curve["lower_threshold_min"].where(lower).min())
         lines.append(
             f"  failed runs leave the threshold open, down to {coordinate_text(along, lowest)}, "
             f"at {int(lower.sum())} of {first.size} points"
         )
-    higher = always.notnull() & ~(curve["always_interwell_max"] == always)
+    higher = always.notnull() & ~(curve["upper_threshold_max"] == always)
     if bool(higher.any()):
         lines.append(
             f"  failed runs leave the top of the band open, at {int(higher.sum())} of {first.size} points"

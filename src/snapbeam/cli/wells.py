@@ -17,10 +17,10 @@ __all__ = ["wells"]
 @with_parameters(*BEAM, *ENDS, *IMPERFECTION, *MODEL)
 def wells(
     given: Any,
-    lower_freq: Annotated[
+    lower_frequencies: Annotated[
         float | None, opt.number_option("First frequency measured about the lower well, Hz.", "Fit")
     ] = None,
-    upper_freq: Annotated[
+    upper_frequencies: Annotated[
         float | None, opt.number_option("First frequency measured about the upper well, Hz.", "Fit")
     ] = None,
     fit: Annotated[
@@ -37,15 +37,17 @@ def wells(
     from rich.table import Table
 
     from snapbeam.core.validate import InputError
-    from snapbeam.model.imperfection.fitted import fit_wells
+    from snapbeam.model.imperfection.fitted import identify_imperfection
 
     model = configured(given).model
     assert model.beam is not None
-    if (lower_freq is None) != (upper_freq is None):
-        raise InputError("lower_freq, upper_freq: give both, or neither")
+    if (lower_frequencies is None) != (upper_frequencies is None):
+        raise InputError("lower_frequencies, upper_frequencies: give both, or neither")
     console = out()
-    if lower_freq is not None and upper_freq is not None:
-        model = fit_wells(model.beam, lower_freq, upper_freq, fit, model.modes, model.imperfection)
+    if lower_frequencies is not None and upper_frequencies is not None:
+        model = identify_imperfection(
+            model.beam, lower_frequencies, upper_frequencies, fit, model.modes, model.imperfection
+        )
         assert model.beam is not None
         assert model.imperfection is not None
         unit = {"rise": "m", "point_load": "N", "uniform_load": "N/m"}[fit]
@@ -55,7 +57,7 @@ def wells(
         )
     beam = model.beam
     assert beam is not None
-    heights = [1e3 * float(model.center_shape @ each.amplitude) for each in model.equilibria]
+    heights = [1e3 * float(model.midspan_shape @ each.amplitude) for each in model.equilibria]
     table = Table(box=None, pad_edge=False)
     for title in ("", "centre (mm)", "energy (µJ)", "unstable directions"):
         table.add_column(title, justify="right")
@@ -64,9 +66,9 @@ def wells(
         row = kinds.get(each.unstable_directions, "hilltop"), f"{height:.4f}", f"{1e6 * each.energy:.4f}"
         table.add_row(*row, str(each.unstable_directions))
     console.print(table)
-    freq = model.well_freq[:, :3]
+    freq = model.well_frequencies[:, :3]
     if model.is_bistable:
-        barriers = [model.barrier_energy - float(model.potential_energy(well)) for well in model.wells]
+        barriers = [model.saddle_energy - float(model.potential_energy(well)) for well in model.wells]
         for name, row, barrier in zip(("lower", "upper"), freq, barriers, strict=True):
             own = ", ".join(f"{each:.3f}" for each in row)
             console.print(f"{name} well: {own} Hz; barrier {1e6 * barrier:.4f} µJ")

@@ -1,7 +1,7 @@
 """Parameters by name: the one table of them, parameter files, axes and units, checked at the door.
 
-A file has the sections ``[beam]``, ``[ends]``, ``[imperfection]``, ``[model]``, ``[contact]``, ``[striker]``,
-``[drive]``, ``[base]``, ``[axial]``, ``[harvester]``, ``[start]``, ``[axes]`` and ``[run]``, and of a second striker
+A file has the sections ``[beam]``, ``[boundary]``, ``[imperfection]``, ``[model]``, ``[contact]``, ``[striker]``,
+``[drive]``, ``[base_excitation]``, ``[axial_load]``, ``[harvester]``, ``[initial_state]``, ``[sweep]`` and ``[integration]``, and of a second striker
 ``[contact_2]``, ``[striker_2]`` and ``[drive_2]``; what it leaves out takes the paper's value.  A key that does not
 exist is refused with the nearest one that does, text where a number belongs is refused, and so is a number so far from
 any beam that it must be in another unit.

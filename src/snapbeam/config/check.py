@@ -28,16 +28,16 @@ SECTIONS = (
 )  # fmt: skip
 _KINDS: dict[str, Mapping[str, type]] = {
     "drive": DRIVES,
-    "base": {name: kind for name, kind in DRIVES.items() if kind.shakes()},
+    "base": {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()},
     "axial": LOADS,
     "harvester": HARVESTERS,
 }
-"""What a section may be of, where its ``kind`` says so."""
+"""What a section may be of, where its ``type`` says so."""
 _OF_MAP = {"frequency_ratio": "drive", "velocity_amplitude": "drive", "location": "striker"}
 """Names that a section [map] of version 0.1 may hold, and the sections they belong to."""
 _SYMBOLS = {
     "E": "young_modulus", "L": "length", "N": "modes", "Omega": "frequency_ratio", "P": "axial_load",
-    "V": "velocity_amplitude", "b": "buckling_level", "e": "coefficient", "f1": "reference_freq", "h": "thickness",
+    "V": "velocity_amplitude", "b": "buckling_level", "e": "coefficient", "f1": "reference_frequency", "h": "thickness",
     "k_c": "stiffness", "kc": "stiffness", "omega": "frequency_ratio", "rho": "density", "x_s": "location",
     "xs": "location", "zeta": "damping_ratio",
 }  # fmt: skip
@@ -83,14 +83,14 @@ def _entries(sections: Mapping[str, Any], lines: list[str]) -> list[tuple[str, s
 def _place(section: str, name: str, value: Any) -> tuple[str, str]:
     """Where something belongs.
 
-    Version 0.1 had the striker and its drive in one section, axes by short names, and the reference frequency in [run].
+    Version 0.1 had the striker and its drive in one section, axes by short names, and the reference frequency in [integration].
     """
     if section == "shaker":
         return ("drive" if name in ("frequency_ratio", "velocity_amplitude") else "striker"), name
     if section == "map":
         single = isinstance(value, (int, float)) and not isinstance(value, bool)
         return (_OF_MAP[name], name) if single else ("axes", f"{_OF_MAP[name]}.{name}")
-    if section == "run" and name == "reference_freq":
+    if section == "run" and name == "reference_frequency":
         return "model", name
     return section, name
 
@@ -101,10 +101,10 @@ def _known(section: str, found: Mapping[str, Mapping[str, Any]]) -> list[str]:
     names = [row.name.partition(".")[2] for row in parameters().values() if row.section == kind]
     if number > 1:
         names = [name for name in names if row_of(f"{section}.{name}") is not None]
-        return names + {"drive": ["kind"], "contact": ["law"]}.get(kind, [])
+        return names + {"drive": ["type"], "contact": ["type"]}.get(kind, [])
     names += [name.partition(".")[2] for name in PHYSICAL if name.startswith(f"{section}.")]
-    names += ["kind"] if section in _KINDS else []
-    return names + (["law", *MATERIALS, *WANTED] if section == "contact" else [])
+    names += ["type"] if section in _KINDS else []
+    return names + (["type", *MATERIALS, *WANTED] if section == "contact" else [])
 
 
 def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any]]) -> str:
@@ -177,13 +177,13 @@ def _is_sum(section: str, value: Any) -> bool:
     """Whether a kind is a sum of drives, such as ``"sine+burst"``, that the section may hold."""
     if not isinstance(value, str) or "+" not in value or value not in DRIVES:
         return False
-    return numbered(section)[0] == "drive" or (section == "base" and DRIVES[value].shakes())
+    return numbered(section)[0] == "drive" or (section == "base" and DRIVES[value].can_excite_base())
 
 
 def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
     """What is in no row: the law, the drive's kind, materials, and physical units."""
-    if name in ("law", "kind"):
-        known = LAWS if name == "law" else _KINDS[numbered(section)[0]]
+    if name in ("type", "type"):
+        known = LAWS if name == "type" else _KINDS[numbered(section)[0]]
         if value not in known and not _is_sum(section, value):
             return f"{name} = {value!r}: must be one of {', '.join(map(repr, known))}", None
         return "", value
@@ -249,7 +249,7 @@ def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
         return ["[contact] give stiffness, or radius, young_modulus and poisson_ratio, not both"]
     if 0 < len(given) < len(MATERIALS):
         return ["[contact] radius, young_modulus and poisson_ratio belong together; one is missing"]
-    if "coefficient" in contact and "law" not in contact and (given or "stiffness" in contact):
+    if "coefficient" in contact and "type" not in contact and (given or "stiffness" in contact):
         return ["[contact] give stiffness, of Hertz's law, or coefficient, of Newton's, not both"]
     for full, row in PHYSICAL.items():
         section, name, ratio = *full.split("."), row.parameter.partition(".")[2]

@@ -23,9 +23,9 @@ WANTED = {
 }
 """What a loss may follow from: unit and words."""
 _TELLING = {
-    "coefficient": "restitution", "loss": "hunt_crossley", "restitution": "hunt_crossley", "speed": "hunt_crossley",
+    "coefficient": "restitution", "damping_factor": "hunt_crossley", "restitution": "hunt_crossley", "speed": "hunt_crossley",
     "layer_stiffness": "layer",
-    "spring": "kelvin_voigt", "damper": "kelvin_voigt", "force_at_micrometre": "power", "exponent": "power",
+    "linear_stiffness": "kelvin_voigt", "linear_damping": "kelvin_voigt", "force_at_1um": "power", "exponent": "power",
 }  # fmt: skip
 """Names that one law alone has."""
 _SPHERES = ("hertz", "hunt_crossley", "layer")
@@ -33,8 +33,8 @@ _SPHERES = ("hertz", "hunt_crossley", "layer")
 
 def law_of(values: Mapping[str, Any]) -> str:
     """The law that is named, or that has the names that were given."""
-    if "law" in values:
-        return str(values["law"])
+    if "type" in values:
+        return str(values["type"])
     told = [law for name, law in _TELLING.items() if name in values]
     return told[0] if told else "hertz"
 
@@ -47,7 +47,7 @@ def contact_of(given: Mapping[str, Any]) -> dict[str, Any]:
     InputError
     """
     values = dict(given)
-    law = values["law"] = law_of(values)
+    law = values["type"] = law_of(values)
     materials = {name: values.pop(name) for name in MATERIALS if name in values}
     if materials:
         moduli, ratios = tuple(materials["young_modulus"]), tuple(materials["poisson_ratio"])
@@ -58,21 +58,21 @@ def contact_of(given: Mapping[str, Any]) -> dict[str, Any]:
     if wanted:
         if len(wanted) < len(WANTED):
             raise InputError("[contact] restitution and speed belong together; one is missing")
-        if "loss" in values or law != "hunt_crossley":
+        if "damping_factor" in values or law != "hunt_crossley":
             raise InputError(
-                "[contact] restitution and speed make the loss of law = 'hunt_crossley'; give no other"
+                "[contact] restitution and speed make the loss of type = 'hunt_crossley'; give no other"
             )
-        values["loss"] = HuntCrossley.from_restitution(
+        values["damping_factor"] = HuntCrossley.from_restitution(
             values["stiffness"], wanted["restitution"], wanted["speed"]
-        ).loss
+        ).damping_factor
     return values
 
 
 def contact_rivals() -> list[tuple[set[str], set[str]]]:
     """What stands for the same thing: giving one set takes the other away."""
-    sphere, lossy = {"stiffness", *MATERIALS}, {"loss", *WANTED}
-    spring, power = {"spring", "damper"}, {"force_at_micrometre", "exponent"}
-    pairs = [({"stiffness"}, set(MATERIALS)), ({"loss"}, set(WANTED))]
+    sphere, lossy = {"stiffness", *MATERIALS}, {"damping_factor", *WANTED}
+    spring, power = {"linear_stiffness", "linear_damping"}, {"force_at_1um", "exponent"}
+    pairs = [({"stiffness"}, set(MATERIALS)), ({"damping_factor"}, set(WANTED))]
     pairs.append(({"layer_stiffness"}, lossy))
     groups = [{"coefficient"}, sphere | lossy | {"layer_stiffness"}, spring, power]
     pairs += [(one, other) for i, one in enumerate(groups) for other in groups[i + 1 :]]

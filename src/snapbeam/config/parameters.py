@@ -19,15 +19,15 @@ from snapbeam.core.validate import InputError, shown
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import LAWS
 from snapbeam.model.drive import DRIVES
-from snapbeam.model.ends import Ends
+from snapbeam.model.ends import BoundaryConditions
 from snapbeam.model.galerkin.reduction import MODEL_QUANTITIES
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.integration import Integration
-from snapbeam.model.quantity import RUN, Quantity, quantities
+from snapbeam.model.quantity import RUN, ParameterField, quantities
 from snapbeam.model.start import START_NAME
 from snapbeam.model.striker import Striker
 from snapbeam.model.striker.another import numbered
-from snapbeam.model.world import HARVESTERS, LOADS, Base
+from snapbeam.model.world import HARVESTERS, LOADS, BaseExcitation
 
 __all__ = ["Parameter", "lookup", "parameters", "row_of", "short_names"]
 
@@ -55,7 +55,7 @@ class Parameter:
 
     name: str
     short: str
-    quantity: Quantity
+    quantity: ParameterField
     default: Any = None
     kinds: tuple[str, ...] = ()
 
@@ -72,7 +72,7 @@ class Parameter:
     @property
     def label(self) -> str:
         """Words, symbol and unit, for an axis of a picture."""
-        words = self.quantity.words[:1].upper() + self.quantity.words[1:]
+        words = self.quantity.long_name[:1].upper() + self.quantity.long_name[1:]
         symbol = f" ${self.quantity.symbol}$" if self.quantity.symbol else ""
         raised = _POWER.sub(r"$^{\1}$", self.quantity.unit)
         unit = "" if raised == "1" else f" ({raised})"
@@ -100,18 +100,18 @@ class Parameter:
 def _rows() -> Iterable[Parameter]:
     own: tuple[tuple[str, type], ...] = (
         ("beam", Beam),
-        ("ends", Ends),
+        ("ends", BoundaryConditions),
         ("imperfection", Imperfection),
         ("striker", Striker),
         ("run", Integration),
     )
     for section, part in own:
         yield from _of_class(section, part)
-    for row in _of_class("base", Base):
+    for row in _of_class("base", BaseExcitation):
         yield dataclasses.replace(row, short=f"base_{row.short}")
     for name, (item, default) in MODEL_QUANTITIES.items():
         yield Parameter(f"model.{name}", item.short or name, item, default)
-    shaking = {name: kind for name, kind in DRIVES.items() if kind.shakes()}
+    shaking = {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()}
     several: tuple[tuple[str, Mapping[str, type]], ...] = (
         ("contact", LAWS),
         ("drive", DRIVES),
@@ -134,11 +134,11 @@ def _around(row: Parameter) -> Parameter:
     """A parameter of what surrounds the beam, told from the striker's of the same name."""
     section, _, name = row.name.partition(".")
     of = _AROUND[section]
-    words = f"{row.quantity.words}, of {of}" if of else row.quantity.words
+    words = f"{row.quantity.long_name}, of {of}" if of else row.quantity.long_name
     plain = name if row.short == name or section == "base" else row.short
     plain = plain.removeprefix("load_")
     return dataclasses.replace(
-        row, short=f"{section}_{plain}", quantity=dataclasses.replace(row.quantity, words=words)
+        row, short=f"{section}_{plain}", quantity=dataclasses.replace(row.quantity, long_name=words)
     )
 
 
@@ -171,7 +171,7 @@ def _table(registered: tuple[tuple[tuple[str, type], ...], ...]) -> dict[str, Pa
 
 _OF_STRIKER = re.compile(r"(.+)_striker_([2-9])")
 _OF_TERM = re.compile(r"(.+)_([1-4])")
-_FIRST_ALONE = ("striker.mass", "striker.spring", "striker.damper")
+_FIRST_ALONE = ("striker.mass", "striker.suspension_stiffness", "striker.suspension_damping")
 
 
 def row_of(name: str) -> Parameter | None:
@@ -183,15 +183,15 @@ def row_of(name: str) -> Parameter | None:
     if row is None and found is not None and kind in ("drive", "base"):
         row = table.get(f"{kind}.{found[1]}")
         if row is not None:
-            words = f"{row.quantity.words}, of term {found[2]}"
-            own = dataclasses.replace(row.quantity, words=words)
+            words = f"{row.quantity.long_name}, of term {found[2]}"
+            own = dataclasses.replace(row.quantity, long_name=words)
             row = dataclasses.replace(row, name=name, short=f"{row.short}_{found[2]}", quantity=own)
     if number == 1 or row is None:
         return row
     if row.name in _FIRST_ALONE:
         return None
-    words = f"{row.quantity.words}, of striker {number}"
-    quantity = dataclasses.replace(row.quantity, words=words)
+    words = f"{row.quantity.long_name}, of striker {number}"
+    quantity = dataclasses.replace(row.quantity, long_name=words)
     return dataclasses.replace(row, name=name, short=f"{row.short}_striker_{number}", quantity=quantity)
 
 
@@ -219,7 +219,7 @@ def short_names() -> dict[str, str]:
 def lookup(name: str) -> Parameter:
     """The row of a parameter, by its dotted name or by the name that datasets use.
 
-    ``start.amplitude[i]`` and ``start.velocity[i]`` stand for every mode i.
+    ``initial_state.amplitude[i]`` and ``initial_state.velocity[i]`` stand for every mode i.
 
     Raises
     ------
@@ -237,10 +237,12 @@ def lookup(name: str) -> Parameter:
         of, mode = found[1], found[2]
         over = "that of the well" if of == "amplitude" else "omega_1 times the amplitude of the well"
         words = f"{of} of buckling mode {mode} at the start, over {over}"
-        return Parameter(f"start.{of}[{mode}]", f"start_{of}_{mode}", Quantity("1", words, scope=RUN))
-    if name in ("start.striker_position", "start_striker_position"):
+        return Parameter(f"start.{of}[{mode}]", f"start_{of}_{mode}", ParameterField("1", words, scope=RUN))
+    if name in ("initial_state.striker_position", "start_striker_position"):
         words = "mid-position of the striker's tip in space"
-        return Parameter("start.striker_position", "start_striker_position", Quantity("m", words, scope=RUN))
+        return Parameter(
+            "initial_state.striker_position", "start_striker_position", ParameterField("m", words, scope=RUN)
+        )
     shorts = short_names()
     if name in shorts:
         return table[shorts[name]]

@@ -120,7 +120,7 @@ class Config:
             contact = {"stiffness": CONTACT.stiffness}
         drive = dict(DEFAULT_DRIVE)
         given = self.section("drive")
-        if given.get("kind", "sine") != "sine":
+        if given.get("type", "sine") != "sine":
             drive = {}
         for physical, name in (("frequency_hz", "frequency_ratio"), ("velocity_m_s", "velocity_amplitude")):
             if physical in given:
@@ -148,8 +148,8 @@ class Config:
             return self._started(System.from_mapping(sections))
         sections["contact"] = contact_of(sections["contact"])
         if self._stands_still:
-            sections["drive"] = {"kind": "still"}
-        sections["drive"].setdefault("kind", "sine")
+            sections["drive"] = {"type": "fixed"}
+        sections["drive"].setdefault("type", "sine")
         later = {
             f"{section}.{name}": sections[section].pop(name)
             for section in ("drive", "striker")
@@ -175,7 +175,7 @@ class Config:
             if number > 1:
                 found[name] = contact_of(self.section(name)) if kind == "contact" else self.section(name)
                 if kind == "drive":
-                    found[name].setdefault("kind", "sine")
+                    found[name].setdefault("type", "sine")
         return found
 
     @property

@@ -67,7 +67,7 @@ def config_text(config: Config, comment: str = "") -> str:
             physical = PHYSICAL.get(f"{section}.{name}")
             if row is not None:
                 unit = "" if row.quantity.unit == "1" else f", {row.quantity.unit}"
-                lines.append(f"# {row.quantity.words}{unit}")
+                lines.append(f"# {row.quantity.long_name}{unit}")
             elif physical is not None:
                 lines.append(f"# {physical.words}, {physical.unit}")
             lines.append(tomli_w.dumps({name: _plain(value)}).rstrip("\n"))

@@ -48,16 +48,16 @@ _LABELS = {
 
 
 class RunStatus(IntEnum):
-    """How a run ended.  All but ``OK``, ``DECIDED`` and ``INFERRED`` leave the response class unknown."""
+    """How a run ended.  All but ``OK``, ``EARLY_STOP`` and ``FILLED`` leave the response class unknown."""
 
     OK = 0
-    DECIDED = 1
-    RUNNING = 2
-    NOT_FINITE = 3
+    EARLY_STOP = 1
+    INTERRUPTED = 2
+    DIVERGED = 3
     STEP_LIMIT = 4
     NOT_RUN = 5
-    INFERRED = 6
-    UNBALANCED = 7
+    FILLED = 6
+    ENERGY_ERROR = 7
 
     @property
     def advice(self) -> str:
@@ -67,21 +67,24 @@ class RunStatus(IntEnum):
 
 _ADVICE = {
     RunStatus.OK: "ran to its last cycle",
-    RunStatus.DECIDED: "ended early because its response class was certain; statistics stop at decided_at",
-    RunStatus.RUNNING: "not finished: the run was interrupted before its last cycle",
-    RunStatus.NOT_FINITE: "the state left the finite numbers; use a smaller step, and check that the "
+    RunStatus.EARLY_STOP: "ended early because its response class was certain; statistics stop at early_stop_time",
+    RunStatus.INTERRUPTED: "not finished: the run was interrupted before its last cycle",
+    RunStatus.DIVERGED: "the state left the finite numbers; use a smaller step, and check that the "
     "contact stiffness, the damping and the drive are meant in SI units",
     RunStatus.STEP_LIMIT: "used more steps than allowed, as happens when the contact is far stiffer than the "
     "default step expects; use a larger step or a softer contact",
     RunStatus.NOT_RUN: "never started: the task that held this point failed or was skipped",
-    RunStatus.UNBALANCED: "ended with more energy than the striker put in, so that its steps were too long for what "
+    RunStatus.ENERGY_ERROR: "ended with more energy than the striker put in, so that its steps were too long for what "
     "the beam did; use accuracy = 'reference' or a smaller step",
-    RunStatus.INFERRED: "not run: the points around it in a refined map are all of this class",
+    RunStatus.FILLED: "not run: the points around it in a refined map are all of this class",
 }
 
 
 def classify(
-    crossings: ArrayLike, crossings_last_quarter: ArrayLike, cycles: ArrayLike, final_side: ArrayLike
+    zero_crossings: ArrayLike,
+    zero_crossings_last_quarter: ArrayLike,
+    cycles: ArrayLike,
+    final_well: ArrayLike,
 ) -> NDArray[np.int8]:
     """Class of a response by the rules of section 4.2 of the paper.
 
@@ -90,10 +93,10 @@ def classify(
 
     Parameters
     ----------
-    crossings, crossings_last_quarter : array_like of int
+    zero_crossings, zero_crossings_last_quarter : array_like of int
     cycles : array_like
         Cycles of excitation of the run, 4 n.
-    final_side : array_like
+    final_well : array_like
         +1 if the run ended in the well opposite to the one it started in, -1 if in the same.
 
     Returns
@@ -101,10 +104,10 @@ def classify(
     int8 array of the broadcast shape, values of :class:`ResponseClass`
     """
     given = {
-        "crossings": crossings,
-        "crossings_last_quarter": crossings_last_quarter,
+        "zero_crossings": zero_crossings,
+        "zero_crossings_last_quarter": zero_crossings_last_quarter,
         "cycles": cycles,
-        "final_side": final_side,
+        "final_well": final_well,
     }
     arrays = [finite_array(name, value) for name, value in given.items()]
     try:
@@ -117,7 +120,7 @@ def classify(
     if (np.abs(side) != 1.0).any():
         raise InputError("final_side: must be +1 or -1")
     if (total < 0).any() or (last < 0).any() or (last > total).any():
-        raise InputError("crossings: must be at least crossings_last_quarter, and both at least 0")
+        raise InputError("crossings: must be at least zero_crossings_last_quarter, and both at least 0")
     if (duration <= 0).any():
         raise InputError(f"cycles = {duration.min()!r}: must be greater than 0")
     return class_of(total, last, duration, side)

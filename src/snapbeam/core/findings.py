@@ -1,4 +1,4 @@
-"""Findings: what is doubtful about an input or a result, as data; and the ways they are told, kept and refused."""
+"""Diagnostics: what is doubtful about an input or a result, as data; and the ways they are told, kept and refused."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from typing import Any
 from snapbeam.core.validate import InputError, choice
 
 __all__ = [
-    "Finding",
-    "ImplausibleError",
-    "PlausibilityWarning",
+    "Diagnostic",
+    "DiagnosticError",
+    "DiagnosticWarning",
     "Severity",
-    "doubtful",
-    "findings_of",
+    "is_warning",
+    "diagnostics_of",
     "from_json",
     "refuse",
     "tell",
@@ -27,33 +27,33 @@ __all__ = [
 ]
 
 
-class PlausibilityWarning(UserWarning):
+class DiagnosticWarning(UserWarning):
     """Something that can be computed but is probably not what was meant."""
 
 
 class Severity(StrEnum):
-    """How much a finding takes from a result.
+    """How much a diagnostic takes from a result.
 
-    NOTE: worth knowing, the numbers stand.  DOUBT: the numbers may not be what was meant, or be off by more than
-    their standard errors, which were widened where that could be told.  WRONG: the numbers contradict something
+    INFO: worth knowing, the numbers stand.  WARNING: the numbers may not be what was meant, or be off by more than
+    their standard errors, which were widened where that could be told.  ERROR: the numbers contradict something
     known and cannot be right as they are.
     """
 
-    NOTE = "note"
-    DOUBT = "doubt"
-    WRONG = "wrong"
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
 
 
 @dataclass(frozen=True)
-class Finding:
+class Diagnostic:
     """One thing that is doubtful: what the numbers of an input or a result do not say by themselves.
 
     Attributes
     ----------
     code : str
         Short name, stable over versions, such as ``"first-mode-antisymmetric"`` or ``"camera.gamma"``, by which
-        programs tell findings apart.
-    words : str
+        programs tell diagnostics apart.
+    message : str
         What was found and what to do about it.
     numbers : mapping of str to float
         The figures behind the words, by name.
@@ -62,9 +62,9 @@ class Finding:
     """
 
     code: str
-    words: str
+    message: str
     numbers: Mapping[str, float] = field(default_factory=dict)
-    severity: Severity = Severity.DOUBT
+    severity: Severity = Severity.WARNING
 
     def __post_init__(self) -> None:
         words = tuple(str(each.value) for each in Severity)
@@ -72,59 +72,64 @@ class Finding:
         object.__setattr__(self, "severity", Severity(self.severity))
 
     @property
-    def doubtful(self) -> bool:
+    def is_warning(self) -> bool:
         """Whether the result should not be used without a look: all but notes."""
-        return self.severity is not Severity.NOTE
+        return self.severity is not Severity.INFO
 
     def plain(self) -> dict[str, Any]:
-        """The finding as plain words and numbers; what is not finite becomes None."""
+        """The diagnostic as plain words and numbers; what is not finite becomes None."""
         numbers = {
             name: float(value) if math.isfinite(value) else None for name, value in self.numbers.items()
         }
-        return {"code": self.code, "severity": self.severity.value, "words": self.words, "numbers": numbers}
+        return {
+            "code": self.code,
+            "severity": self.severity.value,
+            "message": self.message,
+            "numbers": numbers,
+        }
 
     def __str__(self) -> str:
-        return f"{self.severity.value} [{self.code}]: {self.words}"
+        return f"{self.severity.value} [{self.code}]: {self.message}"
 
 
-class ImplausibleError(InputError):
-    """A measurement refused because of its findings, which are in ``findings``."""
+class DiagnosticError(InputError):
+    """A measurement refused because of its diagnostics, which are in ``diagnostics``."""
 
-    def __init__(self, message: str, findings: tuple[Finding, ...]) -> None:
+    def __init__(self, message: str, diagnostics: tuple[Diagnostic, ...]) -> None:
         super().__init__(message)
-        self.findings = findings
+        self.diagnostics = diagnostics
 
 
-def doubtful(findings: Iterable[Finding]) -> tuple[Finding, ...]:
-    """The findings that take something from the result: all but notes."""
-    return tuple(one for one in findings if one.doubtful)
+def doubtful(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """The diagnostics that take something from the result: all but notes."""
+    return tuple(one for one in diagnostics if one.is_warning)
 
 
-def refuse(findings: Iterable[Finding], what: str) -> None:
-    """Raise if any finding is more than a note.
+def refuse(diagnostics: Iterable[Diagnostic], what: str) -> None:
+    """Raise if any diagnostic is more than a note.
 
     Raises
     ------
-    ImplausibleError
-        With the words of every such finding; *what* names the measurement.
+    DiagnosticError
+        With the words of every such diagnostic; *what* names the measurement.
     """
-    found = doubtful(findings)
+    found = doubtful(diagnostics)
     if found:
-        told = "; ".join(f"[{one.code}] {one.words}" for one in found)
-        raise ImplausibleError(f"{what}: refused as implausible: {told}", found)
+        told = "; ".join(f"[{one.code}] {one.message}" for one in found)
+        raise DiagnosticError(f"{what}: refused as implausible: {told}", found)
 
 
-def to_json(findings: Iterable[Finding]) -> str:
-    """Findings as text for an attribute of a file."""
-    return json.dumps([one.plain() for one in findings], ensure_ascii=False)
+def to_json(diagnostics: Iterable[Diagnostic]) -> str:
+    """Diagnostics as text for an attribute of a file."""
+    return json.dumps([one.plain() for one in diagnostics], ensure_ascii=False)
 
 
-def from_json(text: str) -> tuple[Finding, ...]:
-    """Findings from what :func:`to_json` wrote."""
+def from_json(text: str) -> tuple[Diagnostic, ...]:
+    """Diagnostics from what :func:`to_json` wrote."""
     return tuple(
-        Finding(
+        Diagnostic(
             str(one["code"]),
-            str(one["words"]),
+            str(one["message"]),
             {name: math.nan if value is None else float(value) for name, value in one["numbers"].items()},
             Severity(one["severity"]),
         )
@@ -132,13 +137,13 @@ def from_json(text: str) -> tuple[Finding, ...]:
     )
 
 
-def findings_of(result: Any) -> tuple[Finding, ...]:
-    """The findings of a result: of a measurement, or of a dataset or its file's attributes; none if it has none."""
-    own = getattr(result, "findings", None)
+def diagnostics_of(result: Any) -> tuple[Diagnostic, ...]:
+    """The diagnostics of a result: of a measurement, or of a dataset or its file's attributes; none if it has none."""
+    own = getattr(result, "diagnostics", None)
     if isinstance(own, tuple):
         return own
     attrs = getattr(result, "attrs", result if isinstance(result, Mapping) else {})
-    text = attrs.get("findings")
+    text = attrs.get("diagnostics")
     return from_json(text) if isinstance(text, str) else ()
 
 
@@ -146,12 +151,12 @@ _told: set[tuple[str, str]] = set()
 _PACKAGE = __name__.partition(".")[0]
 
 
-def tell(findings: Iterable[Finding]) -> None:
-    """Warn of each finding, once a process for the same words, where the package was called from."""
-    for finding in findings:
-        if (finding.code, finding.words) not in _told:
-            _told.add((finding.code, finding.words))
-            warnings.warn(finding.words, PlausibilityWarning, stacklevel=_outside())
+def tell(diagnostics: Iterable[Diagnostic]) -> None:
+    """Warn of each diagnostic, once a process for the same words, where the package was called from."""
+    for diagnostic in diagnostics:
+        if (diagnostic.code, diagnostic.message) not in _told:
+            _told.add((diagnostic.code, diagnostic.message))
+            warnings.warn(diagnostic.message, DiagnosticWarning, stacklevel=_outside())
 
 
 def _outside() -> int:

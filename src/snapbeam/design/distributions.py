@@ -11,7 +11,7 @@ from scipy.special import ndtr
 
 from snapbeam.core.validate import InputError, finite, finite_array, flag, positive
 
-__all__ = ["KINDS", "Between", "Distribution", "Empirical", "LogNormal", "Normal", "Uniform"]
+__all__ = ["KINDS", "UniformRange", "Distribution", "Empirical", "LogNormal", "Normal", "UniformTolerance"]
 
 _Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class Distribution:
 
     def describe(self) -> dict[str, Any]:
         """Its kind and its numbers, plain."""
-        return {"kind": self.kind, **self.__dict__}
+        return {"type": self.kind, **self.__dict__}
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Normal(Distribution):
 
 
 @dataclass(frozen=True)
-class Uniform(Distribution):
+class UniformTolerance(Distribution):
     """Uniformly distributed within a half width of the nominal value, as a drawing's tolerance +- is.
 
     Parameters
@@ -107,7 +107,7 @@ class LogNormal(Distribution):
 
 
 @dataclass(frozen=True)
-class Between(Distribution):
+class UniformRange(Distribution):
     """Uniformly distributed between two values, whatever the nominal value: a phase that nobody sets.
 
     Parameters
@@ -156,5 +156,7 @@ class Empirical(Distribution):
         return np.asarray(np.interp(ndtr(normal), ranks, self.quantiles) + 0.0 * nominal)
 
 
-KINDS: dict[str, type[Distribution]] = {each.kind: each for each in (Normal, Uniform, LogNormal, Between)}
+KINDS: dict[str, type[Distribution]] = {
+    each.kind: each for each in (Normal, UniformTolerance, LogNormal, UniformRange)
+}
 """Distributions by the names that files use."""

@@ -17,7 +17,7 @@ from snapbeam.model.system import System
 __all__ = ["OUTCOMES", "Event", "reached", "require_held"]
 
 Statistics = dict[str, NDArray[Any]]
-_REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
+_REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 _FIRST = (ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_1)
 
 
@@ -29,15 +29,16 @@ class Event(NamedTuple):
 
 
 OUTCOMES: dict[str, Event] = {
-    "snap": Event("the beam snaps through at least once", lambda found: found["response"] > 0),
+    "snap": Event("the beam snaps through at least once", lambda found: found["response_class"] > 0),
     "continuous": Event(
-        "the beam snaps on at the end", lambda found: found["response"] == ResponseClass.CONTINUOUS
+        "the beam snaps on at the end", lambda found: found["response_class"] == ResponseClass.CONTINUOUS
     ),
     "first_well": Event(
-        "the beam ends about the well it began in", lambda found: np.isin(found["response"], _FIRST)
+        "the beam ends about the well it began in", lambda found: np.isin(found["response_class"], _FIRST)
     ),
     "other_well": Event(
-        "the beam ends about the other well", lambda found: found["response"] == ResponseClass.TRANSIENT_2
+        "the beam ends about the other well",
+        lambda found: found["response_class"] == ResponseClass.TRANSIENT_2,
     ),
 }
 """Outcomes that every probability map has.  The last three exclude each other and one of them happens."""
@@ -55,7 +56,7 @@ def require_held(names: Iterable[str], system: System) -> None:
     ------
     InputError
     """
-    strikers = 0 if system.striker is None else 1 + len(system.others)
+    strikers = 0 if system.striker is None else 1 + len(system.further_contacts)
     held = rows_for(strikers)
     for name in names:
         if name in STATISTICS and name not in held:

@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, positive
 from snapbeam.design.events import OUTCOMES
-from snapbeam.design.optimum.design import Effort, optimize_design
-from snapbeam.design.probability.allocation import Allocation
+from snapbeam.design.optimum.design import OptimizerSettings, optimize_design
+from snapbeam.design.probability.allocation import SamplingPlan
 from snapbeam.design.probability.probability_map import allocation_of, probability_map
 from snapbeam.design.proportion import wilson
 from snapbeam.design.quantiles.quantile_threshold import quantile_threshold
-from snapbeam.design.quantiles.search import Search
+from snapbeam.design.quantiles.search import QuantileSearchSettings
 from snapbeam.design.trials import Trials, trials_of
 from snapbeam.model.integration import Integration
 from snapbeam.sweeps.points import Columns, PointList, points_of
 from snapbeam.sweeps.sweep import sweep
 
-__all__ = ["LONG", "Cost", "plan"]
+__all__ = ["LONG", "CostEstimate", "estimate_cost"]
 
 LONG = 600.0
 """Seconds from which a computation counts as long."""
@@ -38,12 +38,12 @@ Point = Callable[[NDArray[np.float64]], Columns]
 
 
 @dataclass(frozen=True)
-class Cost:
+class CostEstimate:
     """What a question will take.
 
     Attributes
     ----------
-    runs, runs_most : int
+    runs, max_runs : int
         Runs, as far as a trial can tell, and at most.
     seconds : float
         Of this machine, with the threads asked for; kernels that must be compiled are not counted.
@@ -54,7 +54,7 @@ class Cost:
     """
 
     runs: int
-    runs_most: int
+    max_runs: int
     seconds: float
     memory: float
     disk: float
@@ -68,7 +68,7 @@ class Cost:
     def __str__(self) -> str:
         hours, rest = divmod(round(self.seconds), 3600)
         text = f"{hours} h {rest // 60} min" if hours else f"{rest // 60} min {rest % 60} s"
-        most = "" if self.runs_most == self.runs else f" (at most {self.runs_most})"
+        most = "" if self.max_runs == self.runs else f" (at most {self.max_runs})"
         return (
             f"about {self.runs} runs{most}, {text} on this machine, {self.memory / 2**20:.0f} MiB of memory, "
             f"{self.disk / 2**20:.1f} MiB in a store; told from {self.trial_runs} runs"
@@ -76,7 +76,9 @@ class Cost:
 
 
 @checked
-def plan(question: Callable[..., Any], *arguments: Any, trial: float = 10.0, **options: Any) -> Cost:
+def estimate_cost(
+    question: Callable[..., Any], *arguments: Any, trial: float = 10.0, **options: Any
+) -> CostEstimate:
     """What a question costs, from a trial of some seconds with runs scattered over it.
 
     Parameters
@@ -112,11 +114,11 @@ def plan(question: Callable[..., Any], *arguments: Any, trial: float = 10.0, **o
 
 def _of_sweep(
     trial: float, system: Any, axes: Any, integration: Integration | None = None, **options: Any
-) -> Cost:
+) -> CostEstimate:
     points = points_of(axes)
     repeats = options.get("replicas") or 0
     each = 1 + int(getattr(repeats, "count", repeats))
-    early = bool(integration is not None and integration.early_decision)
+    early = bool(integration is not None and integration.early_termination)
     trials = trials_of(system, None, integration, early=early)
     made, seconds, _ = _trial(trials, lambda u: points.take((u * points.size).astype(np.int64)), trial)
     return _cost(points.size * each, points.size * each, seconds / made, made)
@@ -124,7 +126,7 @@ def _of_sweep(
 
 def _of_probability(
     trial: float, system: Any, axes: Any, spread: Any = None, runs: Any = None, **options: Any
-) -> Cost:
+) -> CostEstimate:
     allocation = allocation_of(runs)
     trials = trials_of(system, spread, options.get("integration"))
     points = points_of(axes)
@@ -137,32 +139,32 @@ def _of_probability(
     made, seconds, found = _trial(trials, point, trial)
     happened = np.asarray(OUTCOMES[allocation.outcome].happened(found))
     expected = _expected(allocation, np.concatenate(where), happened, points.size)
-    most = points.size * (allocation.first if allocation.half_width is None else allocation.most)
+    most = points.size * (allocation.initial_runs if allocation.half_width is None else allocation.max_runs)
     if allocation.half_width is not None:
         most = min(most, points.size * _needed(0.5, allocation))
-    if allocation.total is not None:
-        expected, most = min(expected, allocation.total), min(most, allocation.total)
+    if allocation.total_runs is not None:
+        expected, most = min(expected, allocation.total_runs), min(most, allocation.total_runs)
     return _cost(expected, most, seconds / made, made)
 
 
-def _needed(share: float, allocation: Allocation) -> int:
+def _needed(share: float, allocation: SamplingPlan) -> int:
     """Runs after which a probability is known as narrowly as asked."""
     assert allocation.half_width is not None
-    n = allocation.first
-    while n < allocation.most:
+    n = allocation.initial_runs
+    while n < allocation.max_runs:
         _, low, high = wilson(share * n, n, allocation.confidence)
         if 0.5 * float(high - low) <= allocation.half_width:
             break
         n = int(n * 1.05) + 1
-    return min(n, allocation.most)
+    return min(n, allocation.max_runs)
 
 
 def _expected(
-    allocation: Allocation, where: NDArray[np.int64], happened: NDArray[np.bool_], points: int
+    allocation: SamplingPlan, where: NDArray[np.int64], happened: NDArray[np.bool_], points: int
 ) -> int:
     """Runs of a map, from few runs at few points: those with both outcomes need more."""
     if allocation.half_width is None:
-        return points * allocation.first
+        return points * allocation.initial_runs
     sure, unsure = _needed(0.01, allocation), _needed(0.3, allocation)
     mixed = []
     for one in np.unique(where):
@@ -176,8 +178,8 @@ def _expected(
 def _of_threshold(
     trial: float, system: Any, along: str, between: Any, over: Any = None, spread: Any = None, how: Any = None,
     **options: Any,
-) -> Cost:  # fmt: skip
-    how = Search() if how is None else how
+) -> CostEstimate:  # fmt: skip
+    how = QuantileSearchSettings() if how is None else how
     trials = trials_of(system, spread, options.get("integration"))
     points = points_of(over) if over else None
     low, high = between
@@ -203,12 +205,12 @@ def points_of_along(along: str, values: NDArray[np.float64]) -> Columns:
 def _of_design(
     trial: float, system: Any, variables: Any, goals: Any, limits: Any, spread: Any, effort: Any = None,
     **options: Any,
-) -> Cost:  # fmt: skip
+) -> CostEstimate:  # fmt: skip
     from snapbeam.design.optimum.design import design_problem
 
-    effort = Effort() if effort is None else effort
+    effort = OptimizerSettings() if effort is None else effort
     problem = design_problem(
-        system, variables, goals, limits, spread, draws=effort.draws, integration=options.get("integration")
+        system, variables, goals, limits, spread, samples=effort.draws, integration=options.get("integration")
     )
     bounds = np.array(list(problem.bounds.values()))
 
@@ -243,5 +245,5 @@ def _trial(trials: Trials, point: Point, limit: float) -> tuple[int, float, dict
     return made, spent, {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _cost(runs: int, most: int, each: float, made: int) -> Cost:
-    return Cost(runs, most, runs * each, runs * float(_RUN_BYTES), runs * float(_KEPT_BYTES), made)
+def _cost(runs: int, most: int, each: float, made: int) -> CostEstimate:
+    return CostEstimate(runs, most, runs * each, runs * float(_RUN_BYTES), runs * float(_KEPT_BYTES), made)

@@ -22,21 +22,21 @@ from snapbeam.core.validate import (
     nonnegative,
     shown,
 )
-from snapbeam.design.distributions import KINDS, Between, Distribution, Normal
+from snapbeam.design.distributions import KINDS, UniformRange, Distribution, Normal
 
 if TYPE_CHECKING:
     from snapbeam.lab.calibration.calibrate import Calibration
 
-__all__ = ["Spread", "spread_from_mapping"]
+__all__ = ["ParameterUncertainty", "spread_from_mapping"]
 
 _Array = NDArray[np.float64]
 HELD = ("physical", "ratios")
-_OWN = ("displacement", "phase", "held", "seed", "correlation")
-_PHASE = Between(math.pi, 2.0 * math.pi)
+_OWN = ("displacement", "phase", "hold_fixed", "seed", "correlation")
+_PHASE = UniformRange(math.pi, 2.0 * math.pi)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Spread:
+class ParameterUncertainty:
     """How systems that are built, driven and started alike differ from each other.
 
     Draw number s comes from the seed and s alone (Philox with the key (seed, s)): it is the same at every point, in
@@ -54,7 +54,7 @@ class Spread:
         that would be pressed by the tip at rest begins on the other side of its rest instead.
     phase : bool
         Whether the drive begins at any phase of the half of its cycle in which the tip is drawn back.
-    held : {"physical", "ratios"}
+    hold_fixed : {"physical", "ratios"}
         What a beam that differs from the nominal one is struck with.  ``"physical"``: the same frequency in Hz,
         velocity in m/s and location in m, so that Omega, V and x_s change with the beam's own frequency, buckling level
         and length.  ``"ratios"``: the same Omega, V and x_s.
@@ -74,7 +74,7 @@ class Spread:
     correlation: ArrayLike | None = None
     displacement: float = 0.0
     phase: bool = False
-    held: str = "physical"
+    hold_fixed: str = "physical"
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -94,7 +94,7 @@ class Spread:
             of[row.name] = each
         nonnegative("displacement", self.displacement, "m")
         integer("seed", self.seed, 0, 2**63 - 1)
-        choice("held", self.held, HELD)
+        choice("hold_fixed", self.hold_fixed, HELD)
         if flag("phase", self.phase):
             if "drive.phase" in of:
                 raise InputError("phase = True with drive.phase: give one of the two")
@@ -116,7 +116,7 @@ class Spread:
 
     @classmethod
     @checked
-    def from_calibration(cls, calibration: Calibration, **more: Any) -> Spread:
+    def from_calibration(cls, calibration: Calibration, **more: Any) -> ParameterUncertainty:
         """The spread that a calibration leaves: its standard errors and their correlation, damping and contact too.
 
         Raises
@@ -181,18 +181,18 @@ class Spread:
     def describe(self) -> dict[str, Any]:
         """What tells this spread from another one, plain."""
         found: dict[str, Any] = {name: each.describe() for name, each in self.of.items()}
-        own = {"displacement": self.displacement, "held": self.held, "seed": self.seed}
+        own = {"displacement": self.displacement, "hold_fixed": self.hold_fixed, "seed": self.seed}
         if self.correlation is not None:
             own["correlation"] = np.asarray(self.correlation).tolist()
         return found | own
 
 
-def spread_from_mapping(given: Mapping[str, Any], name: str = "spread") -> Spread:
+def spread_from_mapping(given: Mapping[str, Any], name: str = "spread") -> ParameterUncertainty:
     """The spread that a section of a parameter file describes.
 
     Each parameter stands with a table that names one distribution: ``{normal = 0.02, relative = true}``,
     ``{uniform = 1e-5}``, ``{lognormal = 0.3}`` or ``{between = [3.14, 6.28]}``; beside them stand ``displacement``,
-    ``phase``, ``held`` and ``seed``.
+    ``phase``, ``hold_fixed`` and ``seed``.
 
     Raises
     ------
@@ -205,7 +205,7 @@ def spread_from_mapping(given: Mapping[str, Any], name: str = "spread") -> Sprea
         if not isinstance(table, Mapping):
             raise InputError(f"{name}.{key} = {shown(table)}: must be a table, such as {{normal = 0.01}}")
         of[key] = _distribution(f"{name}.{key}", table)
-    return Spread(of=of, **{key: given[key] for key in _OWN if key in given})
+    return ParameterUncertainty(of=of, **{key: given[key] for key in _OWN if key in given})
 
 
 def _flat(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -233,7 +233,7 @@ def _distribution(name: str, table: Mapping[str, Any]) -> Distribution:
     if kinds[0] == "between":
         if more or not isinstance(value, (list, tuple)) or len(value) != 2:
             raise InputError(f"{name}.between = {shown(value)}: must be two numbers [low, high] alone")
-        return Between(*value)
+        return UniformRange(*value)
     if kinds[0] == "lognormal" and more:
         raise InputError(f"{name}: a lognormal is relative by itself; leave relative out")
     kind: Any = KINDS[kinds[0]]

@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 
 from snapbeam.config.parameters import lookup
 from snapbeam.config.physical import PHYSICAL, unit_of
-from snapbeam.core.findings import PlausibilityWarning
+from snapbeam.core.findings import DiagnosticWarning
 from snapbeam.core.validate import InputError, InputTypeError, shown
-from snapbeam.design.spread import Spread
-from snapbeam.dynamics.starts import Starts, held_in_space
+from snapbeam.design.spread import ParameterUncertainty
+from snapbeam.dynamics.starts import InitialConditions, held_in_space
 from snapbeam.model.integration import Integration
 from snapbeam.model.start import amplitude_scale
 from snapbeam.model.system import System
 from snapbeam.sweeps.compute.task import PointWork
 from snapbeam.sweeps.points import Columns, PointList
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
-from snapbeam.sweeps.stored import Keeping, compute_table
+from snapbeam.sweeps.stored import CheckpointOptions, compute_table
 
 __all__ = ["Trials", "trials_of"]
 
@@ -70,8 +70,8 @@ class Trials:
     system: System
     """With its tip held in space if starts differ."""
     integration: Integration
-    spread: Spread
-    keeping: Keeping = field(default_factory=Keeping)
+    spread: ParameterUncertainty
+    keeping: CheckpointOptions = field(default_factory=CheckpointOptions)
     cluster: str | None = None
     runs: int = 0
     """Runs asked for so far."""
@@ -100,7 +100,7 @@ class Trials:
             nominal = points[name] if name in points else np.full(numbers.size, self._nominal(name))
             found[name] = each.at(nominal, scores[:, j])
             _require_allowed(name, found[name])
-        if spread.held == "physical" and spread.structural:
+        if spread.hold_fixed == "physical" and spread.structural:
             self._hold(points, found, numbers.size)
         if spread.displacement > 0.0:
             found |= self._ringing(found, numbers)
@@ -140,7 +140,7 @@ class Trials:
         first = {name: values[:1] for name, values in columns.items()} if structural else columns
         with warnings.catch_warnings():
             if self.rounds:  # what is doubtful of the system was told in the first round
-                warnings.simplefilter("ignore", PlausibilityWarning)
+                warnings.simplefilter("ignore", DiagnosticWarning)
             setup = sweep_setup(self.system, PointList(first), self.integration)
         if not structural:
             return setup
@@ -218,10 +218,10 @@ class Trials:
         modes = self.system.model.modes
         location = columns.get("striker.location", np.full(size, striker.location))
         table = np.empty((size, 2, modes))
-        starts = Starts(count=1, displacement=self.spread.displacement, seed=self.spread.seed)
+        starts = InitialConditions(count=1, displacement=self.spread.displacement, seed=self.spread.seed)
         for system, which in self._structures(columns, size):
             scale = amplitude_scale(system.model)
-            speed = scale * 2.0 * np.pi * system.model.reference_freq
+            speed = scale * 2.0 * np.pi * system.model.reference_frequency
             runs: dict[int, list[int]] = {}
             for i in which:
                 runs.setdefault(int(numbers[i]), []).append(i)
@@ -266,10 +266,10 @@ def _require_allowed(name: str, values: NDArray[np.float64]) -> None:
 
 def trials_of(
     system: System,
-    spread: Spread | None,
+    spread: ParameterUncertainty | None,
     integration: Integration | None,
     *,
-    store: str | os.PathLike[str] | Keeping | None = None,
+    store: str | os.PathLike[str] | CheckpointOptions | None = None,
     cluster: str | None = None,
     early: bool = True,
 ) -> Trials:
@@ -283,22 +283,26 @@ def trials_of(
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if system.striker is None:
         raise InputError("striker = None: what nothing strikes has no outcome to ask for")
-    spread = Spread() if spread is None else spread
-    if not isinstance(spread, Spread):
+    spread = ParameterUncertainty() if spread is None else spread
+    if not isinstance(spread, ParameterUncertainty):
         raise InputTypeError(f"spread = {shown(spread)}: must be a Spread")
     integration = Integration() if integration is None else integration
     if not isinstance(integration, Integration):
         raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
-    if spread.held == "physical" and spread.structural and system.striker.drive.name not in ("sine", "still"):
+    if (
+        spread.hold_fixed == "physical"
+        and spread.structural
+        and system.striker.drive.name not in ("sine", "fixed")
+    ):
         raise InputError(
             f"held = 'physical' with a drive of kind {system.striker.drive.name!r}: only a sine's frequency and "
             "velocity are held in Hz and m/s; give held = 'ratios'"
         )
-    keeping = store if isinstance(store, Keeping) else Keeping(store)
+    keeping = store if isinstance(store, CheckpointOptions) else CheckpointOptions(store)
     if spread.moves_start and "striker.gap" not in spread.of:
         if system.parameters.get("striker.gap") is None:
             system = held_in_space(system)
-    return Trials(system, integration.replace(early_decision=early), spread, keeping, cluster)
+    return Trials(system, integration.replace(early_termination=early), spread, keeping, cluster)
 
 
 Ask = Callable[[_Numbers, _Numbers], dict[str, NDArray[Any]]]

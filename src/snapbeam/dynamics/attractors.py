@@ -16,15 +16,15 @@ from snapbeam.core.validate import InputError, finite_array, integer, positive
 from snapbeam.dynamics.bifurcation import least_period
 from snapbeam.dynamics.capture import Ball, Cloud, balls_of, cloud_of
 from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of
-from snapbeam.dynamics.lyapunov import lyapunov
-from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit, shoot
+from snapbeam.dynamics.lyapunov import lyapunov_spectrum
+from snapbeam.dynamics.orbits.orbit import OrbitNotFoundError, PeriodicOrbit, shoot
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["KINDS", "UNDECIDED", "Attractor", "Attractors", "attractors", "spread_states"]
+__all__ = ["KINDS", "UNDECIDED", "Attractor", "Attractors", "find_attractors", "spread_states"]
 
 _Array = NDArray[np.float64]
 UNDECIDED = -1
@@ -46,11 +46,11 @@ class Attractor:
     """One of :data:`KINDS`."""
     points: _Array
     """Once a period: all of a periodic orbit, some of a chaotic attractor, shape (points, d)."""
-    orbit: Orbit | None
+    orbit: PeriodicOrbit | None
     exponent: float
     """Largest Lyapunov exponent, 1/s (per period of a map)."""
     exponent_error: float
-    certificate: Orbit | None = None
+    verification: PeriodicOrbit | None = None
     """The orbit at accuracy level "reference", whose multipliers say that it is stable."""
 
     @property
@@ -59,7 +59,7 @@ class Attractor:
         return self.orbit.period if self.orbit is not None else 0
 
     @cached_property
-    def captures(self) -> list[Ball] | Cloud:
+    def trapping_region(self) -> list[Ball] | Cloud:
         """How a state is told to be on its way there."""
         return balls_of(self.orbit) if self.orbit is not None else cloud_of(self.points)
 
@@ -73,17 +73,17 @@ class Attractors:
     """The attractors that were found, certified, and where every state went."""
 
     flow: Flow
-    found: list[Attractor]
+    attractors: list[Attractor]
     """Periodic ones first, by period, then by the coordinates of their points."""
     labels: NDArray[np.int64]
     """Of every state: number of its attractor, or :data:`UNDECIDED`."""
-    lasted: int
+    check_periods: int
     """Periods over which a chaotic attractor was seen not to end."""
 
     @property
     def shares(self) -> _Array:
         """Of the states that go to each."""
-        return np.array([float((self.labels == i).mean()) for i in range(len(self.found))])
+        return np.array([float((self.labels == i).mean()) for i in range(len(self.attractors))])
 
     @property
     def undecided(self) -> float:
@@ -91,15 +91,15 @@ class Attractors:
         return float((self.labels == UNDECIDED).mean())
 
     def __repr__(self) -> str:
-        return f"<{len(self.found)} attractors, {100 * self.undecided:.3g} % of {self.labels.size} states undecided>"
+        return f"<{len(self.attractors)} attractors, {100 * self.undecided:.3g} % of {self.labels.size} states undecided>"
 
     def to_dataset(self) -> xr.Dataset:
         """Kinds, periods, exponents, shares and points, labelled."""
         import xarray as xr
 
-        size = max((len(each.points) for each in self.found), default=1)
-        points = np.full((len(self.found), size, self.flow.dimension), np.nan)
-        for i, each in enumerate(self.found):
+        size = max((len(each.points) for each in self.attractors), default=1)
+        points = np.full((len(self.attractors), size, self.flow.dimension), np.nan)
+        for i, each in enumerate(self.attractors):
             points[i, : len(each.points)] = each.points
         names = getattr(self.flow, "names", tuple(f"x[{i + 1}]" for i in range(self.flow.dimension)))
 
@@ -109,18 +109,18 @@ class Attractors:
         unit = "1/s" if isinstance(self.flow, Stroboscope) else "1"
         return xr.Dataset(
             {
-                "kind": ("attractor", [each.kind for each in self.found], {"long_name": "kind of attractor"}),
-                "period": ("attractor", [each.period for each in self.found], labels("periods; 0: chaotic")),
-                "exponent": ("attractor", [each.exponent for each in self.found], labels("largest exponent", unit)),
+                "kind": ("attractor", [each.kind for each in self.attractors], {"long_name": "kind of attractor"}),
+                "period": ("attractor", [each.period for each in self.attractors], labels("periods; 0: chaotic")),
+                "exponent": ("attractor", [each.exponent for each in self.attractors], labels("largest exponent", unit)),
                 "exponent_error": (
-                    "attractor", [each.exponent_error for each in self.found], labels("standard error", unit)
+                    "attractor", [each.exponent_error for each in self.attractors], labels("standard error", unit)
                 ),
                 "share": ("attractor", self.shares, labels("share of the states that go there")),
                 "points": (("attractor", "point", "coordinate"), points, labels("the attractor once a period")),
                 "label": ("state", self.labels, labels("attractor that a state goes to; -1: undecided")),
             },
             {"coordinate": list(names)},
-            {"title": "attractors", "undecided": self.undecided, "lasted": self.lasted},
+            {"title": "find_attractors", "undecided": self.undecided, "check_periods": self.check_periods},
         )  # fmt: skip
 
 
@@ -147,13 +147,13 @@ def spread_states(flow: Stroboscope, count: int, seed: int = 0) -> _Array:
 
 
 @checked
-def attractors(
+def find_attractors(
     system: System | Flow,
     states: ArrayLike | int = 200,
     *,
     transient: int = 1000,
-    most_periods: int = 8,
-    lasting: int = 1000,
+    max_periods: int = 8,
+    check_periods: int = 1000,
     seed: int = 0,
     tolerance: float = 1e-10,
     integration: Integration | None = None,
@@ -163,7 +163,7 @@ def attractors(
 
     A periodic attractor is certified when shooting converges from where a state came to and every multiplier is inside
     the unit circle, at accuracy level "reference" too.  A chaotic one, when its largest exponent is above 0 by three
-    standard errors and none of its states left it in *lasting* more periods: slow transients are so told from
+    standard errors and none of its states left it in *check_periods* more periods: slow transients are so told from
     attractors as far as that time goes.
 
     Parameters
@@ -173,9 +173,9 @@ def attractors(
         Where to begin, or how many states to spread over both wells.
     transient : int
         Periods to leave out.
-    most_periods : int
+    max_periods : int
         Longest period, in periods of the drive, that is looked for.
-    lasting : int
+    check_periods : int
         Periods over which a chaotic attractor must not end.
     seed : int
         Of states that are spread.
@@ -191,7 +191,10 @@ def attractors(
     """
     flow = flow_of(system, integration)
     leave = integer("transient", transient, 1, 10**7)
-    most, lasts = integer("most_periods", most_periods, 1, 512), integer("lasting", lasting, 20, 10**7)
+    most, lasts = (
+        integer("max_periods", max_periods, 1, 512),
+        integer("check_periods", check_periods, 20, 10**7),
+    )
     rows = _states_of(flow, states, seed)
     allowed = positive("tolerance", tolerance)
 
@@ -237,10 +240,10 @@ def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
 
 def _orbits(
     flow: Flow, seen: Marched, repeats: NDArray[np.int64], tolerance: float
-) -> list[tuple[Orbit, Orbit]]:
+) -> list[tuple[PeriodicOrbit, PeriodicOrbit]]:
     """The stable orbits that states which repeat are on, each once and with its certificate."""
-    found: list[Orbit] = []
-    certificates: list[Orbit] = []
+    found: list[PeriodicOrbit] = []
+    certificates: list[PeriodicOrbit] = []
     missed: list[_Array] = []
     for s in np.flatnonzero(repeats > 0):
         x = seen.states[s]
@@ -248,11 +251,11 @@ def _orbits(
             continue
         try:
             orbit = shoot(flow, x, int(repeats[s]), tolerance, 40)
-        except NoOrbit:
+        except OrbitNotFoundError:
             missed.append(x)
             continue
-        if orbit.least_period != orbit.period:
-            orbit = shoot(flow, orbit.coordinates, orbit.least_period, tolerance, 40)
+        if orbit.minimal_period != orbit.period:
+            orbit = shoot(flow, orbit.coordinates, orbit.minimal_period, tolerance, 40)
         near = np.abs(orbit.points - x).max(axis=1).min() < 10.0 * _REPEATS
         certificate = _certificate(orbit, tolerance) if near and orbit.is_stable else None
         if certificate is None:
@@ -263,25 +266,25 @@ def _orbits(
     return list(zip(found, certificates, strict=True))
 
 
-def _certificate(orbit: Orbit, tolerance: float) -> Orbit | None:
+def _certificate(orbit: PeriodicOrbit, tolerance: float) -> PeriodicOrbit | None:
     """The same orbit by fine steps, if it is there and stable: tangents of coarse ones are a per cent off."""
     if not isinstance(orbit.flow, Stroboscope) or orbit.flow.integration.accuracy == "reference":
         return orbit
     try:
         fine = shoot(orbit.flow.refined, orbit.coordinates, orbit.period, tolerance, 40)
-    except NoOrbit:
+    except OrbitNotFoundError:
         return None
     near = float(np.abs(fine.coordinates - orbit.coordinates).max()) < 10.0 * _REPEATS
     return fine if near and fine.is_stable else None
 
 
-def _is_same(one: Orbit, other: Orbit) -> bool:
+def _is_same(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
     return (
         one.period == other.period and float(np.abs(other.points - one.coordinates).max(axis=1).min()) < _SAME
     )
 
 
-def _nearest(orbits: list[Orbit], x: _Array) -> int:
+def _nearest(orbits: list[PeriodicOrbit], x: _Array) -> int:
     """The orbit that a state is on, as nearly as states that repeat are told."""
     for number, orbit in enumerate(orbits):
         if float(np.abs(orbit.points - x).max(axis=1).min()) < 10.0 * _REPEATS:
@@ -289,7 +292,7 @@ def _nearest(orbits: list[Orbit], x: _Array) -> int:
     return UNDECIDED
 
 
-def _periodic(orbit: Orbit, certificate: Orbit) -> Attractor:
+def _periodic(orbit: PeriodicOrbit, certificate: PeriodicOrbit) -> Attractor:
     size = max(float(np.abs(certificate.multipliers[0])), 1e-300)
     exponent = float(np.log(size)) / (orbit.period * orbit.flow.period)
     return Attractor("periodic", orbit.points, orbit, exponent, 0.0, certificate)
@@ -302,7 +305,7 @@ def _chaotic(
     which: NDArray[np.int64],
     most: int,
     lasts: int,
-    orbits: list[Orbit],
+    orbits: list[PeriodicOrbit],
 ) -> tuple[list[Attractor], list[NDArray[np.int64]]]:
     """Groups of runs that never repeat, those of them that last and diverge."""
     if not which.size or not flow.smooth:
@@ -315,7 +318,9 @@ def _chaotic(
     for group in _groups(later.every):
         if left[group].any():
             continue
-        exponents = lyapunov(flow, 1, max(lasts // 2, 100), transient=0, states=later.states[group[:_FEW]])
+        exponents = lyapunov_spectrum(
+            flow, 1, max(lasts // 2, 100), transient=0, states=later.states[group[:_FEW]]
+        )
         value = float(exponents["exponent"].mean())
         error = float(exponents["exponent_error"].max())
         if not value > _SIGMAS * error:
@@ -360,6 +365,6 @@ def _ordered(found: list[Attractor]) -> tuple[list[Attractor], NDArray[np.int64]
         return (KINDS.index(each.kind), each.period, *np.round(lowest, 6).tolist())
 
     order = sorted(range(len(found)), key=key)
-    place = np.empty(len(found), dtype=np.int64)
-    place[order] = np.arange(len(found))
-    return [found[i] for i in order], place
+    workspace = np.empty(len(found), dtype=np.int64)
+    workspace[order] = np.arange(len(found))
+    return [found[i] for i in order], workspace

@@ -18,7 +18,7 @@ from snapbeam.model.state import State
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["basins"]
+__all__ = ["basins_of_attraction"]
 
 _Array = NDArray[np.float64]
 _AMONG = 8
@@ -26,11 +26,11 @@ _AMONG = 8
 
 
 @checked
-def basins(
-    found: Attractors,
-    plane: Mapping[str, ArrayLike],
+def basins_of_attraction(
+    attractors: Attractors,
+    grid: Mapping[str, ArrayLike],
     *,
-    rest: State | ArrayLike | None = None,
+    fixed_coordinates: State | ArrayLike | None = None,
     periods: int = 200,
     every: int = 10,
     progress: Callable[[int, int], object] | None = None,
@@ -43,11 +43,11 @@ def basins(
 
     Parameters
     ----------
-    found : Attractors
+    attractors : Attractors
         Of :func:`attractors`.
-    plane : mapping of str to array_like
+    grid : mapping of str to array_like
         Two coordinates with their values, such as ``{"amplitude[1]": ..., "velocity[1]": ...}``, strictly increasing.
-    rest : State or array_like of shape (d,), optional
+    fixed_coordinates : State or array_like of shape (d,), optional
         The other coordinates; a beam at rest in the well that a run starts in by default.
     periods : int
         Of the drive, at most.
@@ -66,13 +66,13 @@ def basins(
     InputError
         For bad input.
     """
-    if not isinstance(found, Attractors):
-        raise InputTypeError(f"found = {shown(found)}: must be Attractors, as sb.attractors gives")
-    flow = found.flow
+    if not isinstance(attractors, Attractors):
+        raise InputTypeError(f"found = {shown(attractors)}: must be Attractors, as sb.attractors gives")
+    flow = attractors.flow
     total, step = integer("periods", periods, 1, 10**6), integer("every", every, 1, 10**4)
-    names, columns, rows = _plane(flow, plane, rest)
-    label, after = _labelled(found, flow, rows, total, step, progress)
-    return _dataset(found, names, columns, label, after, total)
+    names, columns, rows = _plane(flow, grid, fixed_coordinates)
+    label, after = _labelled(attractors, flow, rows, total, step, progress)
+    return _dataset(attractors, names, columns, label, after, total)
 
 
 def _plane(
@@ -90,7 +90,7 @@ def _plane(
         assert isinstance(flow, Stroboscope)
         base = flow.coordinates(rest)[0]
     else:
-        base = np.zeros(flow.dimension) if rest is None else finite_array("rest", rest)
+        base = np.zeros(flow.dimension) if rest is None else finite_array("fixed_coordinates", rest)
     if base.shape != (flow.dimension,):
         raise InputError(f"rest of shape {base.shape}: must have the shape ({flow.dimension},)")
     first, second = np.meshgrid(*columns, indexing="ij")
@@ -109,15 +109,15 @@ def _labelled(
     progress: Callable[[int, int], object] | None,
 ) -> tuple[NDArray[np.int64], _Array]:
     label, after = np.full(len(rows), UNDECIDED), np.full(len(rows), np.nan)
-    among = np.zeros((len(found.found), len(rows)), dtype=np.int64)
+    among = np.zeros((len(found.attractors), len(rows)), dtype=np.int64)
     open_, x, done = np.arange(len(rows)), rows, 0
     while done < total and open_.size:
         ahead = min(step, total - done)
         x = flow.march(x, ahead).states
         done += ahead
         taken = np.zeros(open_.size, dtype=bool)
-        for number, each in enumerate(found.found):
-            captures = each.captures
+        for number, each in enumerate(found.attractors):
+            captures = each.trapping_region
             if isinstance(captures, Cloud):
                 inside = captures.holds(x)
                 among[number, open_] = np.where(inside, among[number, open_] + 1, 0)
@@ -151,8 +151,11 @@ def _dataset(
 
     shape = tuple(column.size for column in columns)
     words = {"units": "1", "long_name": "number of the attractor that a state goes to; -1: undecided"}
-    meanings = ["undecided", *(f"period_{each.period}" if each.orbit else "chaotic" for each in found.found)]
-    words |= {"flag_values": np.arange(-1, len(found.found)), "flag_meanings": " ".join(meanings)}  # type: ignore[dict-item]
+    meanings = [
+        "undecided",
+        *(f"period_{each.period}" if each.orbit else "chaotic" for each in found.attractors),
+    ]
+    words |= {"flag_values": np.arange(-1, len(found.attractors)), "flag_meanings": " ".join(meanings)}  # type: ignore[dict-item]
     of: dict[str, Any] = {
         name: (name, column, {"units": "1", "long_name": _long_name(name)})
         for name, column in zip(names, columns, strict=True)
@@ -162,7 +165,7 @@ def _dataset(
             "basin": (names, label.reshape(shape), words),
             "captured_after": (names, after.reshape(shape), {"units": "1", "long_name": "periods until certain"}),
             "attractor_points": (
-                ("attractor", "point", "plane"), _shown(found, names), {"units": "1", "long_name": "attractors there"}
+                ("attractor", "point", "grid"), _shown(found, names), {"units": "1", "long_name": "attractors there"}
             ),
         },
         of,
@@ -174,9 +177,9 @@ def _shown(found: Attractors, names: list[str]) -> _Array:
     """The two coordinates of the points of every attractor."""
     known = list(getattr(found.flow, "names", tuple(f"x[{i + 1}]" for i in range(found.flow.dimension))))
     at = [known.index(name) for name in names]
-    size = max((len(each.points) for each in found.found), default=1)
-    table = np.full((len(found.found), size, 2), np.nan)
-    for i, each in enumerate(found.found):
+    size = max((len(each.points) for each in found.attractors), default=1)
+    table = np.full((len(found.attractors), size, 2), np.nan)
+    for i, each in enumerate(found.attractors):
         table[i, : len(each.points)] = each.points[:, at]
     return table
 

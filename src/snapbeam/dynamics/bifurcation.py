@@ -13,7 +13,7 @@ from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, InputTypeError, axis, choice, flag, integer, shown
 from snapbeam.dynamics.flow import Stroboscope
 from snapbeam.dynamics.orbits.passage import passage_of
-from snapbeam.dynamics.starts import Starts, starts_of
+from snapbeam.dynamics.starts import InitialConditions, starts_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.start import rest_state
 from snapbeam.model.system import System
@@ -25,7 +25,7 @@ __all__ = ["bifurcation_diagram", "least_period"]
 
 _Array = NDArray[np.float64]
 SWEEPS = ("up", "down")
-_SEEN = ("center_displacement", "displacement", "center_velocity", "velocity")
+_SEEN = ("midspan_displacement", "displacement_at_striker", "midspan_velocity", "velocity_at_striker")
 _PASSAGE = 4
 """Periods that approaches are looked at in."""
 
@@ -38,7 +38,7 @@ def bifurcation_diagram(
     integration: Integration | None = None,
     *,
     sweeps: Sequence[str] = SWEEPS,
-    starts: Starts | int = 0,
+    initial_conditions: InitialConditions | int = 0,
     periods: tuple[int, int] = (100, 32),
     grazing: bool = False,
     progress: Callable[[int, int], object] | None = None,
@@ -56,7 +56,7 @@ def bifurcation_diagram(
         Strictly increasing.
     integration : Integration, optional
     sweeps : sequence of {"up", "down"}
-    starts : Starts or int
+    initial_conditions : Starts or int
         Starts of every value beside the sweeps; none by default.
     periods : pair of int
         Periods to leave out at each value, and to keep.
@@ -87,7 +87,11 @@ def bifurcation_diagram(
     kinds = [choice("sweeps", kind, SWEEPS) for kind in sweeps]
     leave, keep = _periods(periods)
     flag("grazing", grazing)
-    many = starts_of(starts) if isinstance(starts, Starts) or starts else None
+    many = (
+        starts_of(initial_conditions)
+        if isinstance(initial_conditions, InitialConditions) or initial_conditions
+        else None
+    )
     if not kinds and many is None:
         raise InputError("sweeps = (): must be at least one, or starts at least 1")
     flow = Stroboscope(system, Integration() if integration is None else integration)
@@ -150,7 +154,10 @@ class _Diagram:
             ]
         every = np.concatenate([each.every[:, self.leave :] for each in marched if each.every is not None])
         counts = np.array(
-            [np.concatenate([each.statistics[name] for each in marched]) for name in ("impacts", "crossings")]
+            [
+                np.concatenate([each.statistics[name] for each in marched])
+                for name in ("impacts", "zero_crossings")
+            ]
         )
         return every, counts.T / periods
 
@@ -163,19 +170,23 @@ class _Diagram:
         for step in range(count):
             at = np.array([step if kind == "up" else count - 1 - step for kind in kinds])
             kept, passed = self._go(x, at)
-            for i, place in enumerate(at):
-                rows[i, place], counts[i, place] = kept[i], passed[i]
+            for i, workspace in enumerate(at):
+                rows[i, workspace], counts[i, workspace] = kept[i], passed[i]
             x = kept[:, -1]
             report(1)
         self.sweeps += kinds
         self.rows += list(rows)
         self.counts += list(counts)
 
-    def begin(self, label: str, starts: Starts, number: int, report: Callable[[int], None]) -> None:
+    def begin(
+        self, label: str, starts: InitialConditions, number: int, report: Callable[[int], None]
+    ) -> None:
         """Every value from one start."""
         system = self.flow.system
-        place = self.values if self.name == "striker.location" else None
-        state = starts.state(system, number, system.start or rest_state(system.model, system.striker), place)
+        workspace = self.values if self.name == "striker.location" else None
+        state = starts.state(
+            system, number, system.initial_state or rest_state(system.model, system.striker), workspace
+        )
         rows = np.broadcast_to(self.flow.coordinates(state), (self.values.size, self.flow.dimension))
         kept, counts = self._go(rows, np.arange(self.values.size))
         self.sweeps.append(label)
@@ -192,8 +203,8 @@ class _Diagram:
         model, scale = system.model, system.scale
         full = rows * self.flow.scales
         location = 0.5 if system.striker is None else system.striker.location
-        shapes = {"center": model.center_shape, "": model.shape_at(location)}
-        labels = {"units": row.quantity.unit, "long_name": row.quantity.words, "parameter": row.name}
+        shapes = {"center": model.midspan_shape, "": model.shape_at(location)}
+        labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
         dataset = xr.Dataset(
             coords={"sweep": self.sweeps, row.short: (row.short, self.values, labels)},
             attrs={"title": "bifurcation diagram", "along": row.short, "periods_left_out": self.leave}

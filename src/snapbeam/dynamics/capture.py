@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_lyapunov
 from scipy.spatial import cKDTree
 
-from snapbeam.dynamics.orbits.orbit import Orbit
+from snapbeam.dynamics.orbits.orbit import PeriodicOrbit
 
 __all__ = ["Ball", "Cloud", "balls_of", "cloud_of"]
 
@@ -49,7 +49,7 @@ class Ball:
         return found
 
 
-def balls_of(orbit: Orbit) -> list[Ball]:
+def balls_of(orbit: PeriodicOrbit) -> list[Ball]:
     """A ball about every point of a stable orbit, in the order of its points; radius 0 where none was found."""
     points, found = orbit.points, []
     size = orbit.coordinates.size
@@ -67,7 +67,7 @@ def balls_of(orbit: Orbit) -> list[Ball]:
     return found
 
 
-def _ball(orbit: Orbit, point: _Array, slope: _Array, directions: _Array) -> Ball:
+def _ball(orbit: PeriodicOrbit, point: _Array, slope: _Array, directions: _Array) -> Ball:
     metric = solve_discrete_lyapunov(slope.T, np.eye(point.size))
     metric = 0.5 * (metric + metric.T)
     factor = np.linalg.cholesky(metric)

@@ -13,7 +13,7 @@ from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive
 from snapbeam.dynamics.bifurcation import least_period
 from snapbeam.dynamics.flow import Flow, Stroboscope, flow_of
-from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit, shoot
+from snapbeam.dynamics.orbits.orbit import OrbitNotFoundError, PeriodicOrbit, shoot
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
@@ -21,7 +21,7 @@ from snapbeam.model.system import System
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["EdgeState", "edge_state", "kicked"]
+__all__ = ["EdgeState", "edge_tracking", "kicked"]
 
 _Array = NDArray[np.float64]
 _PIECES = 16
@@ -37,7 +37,7 @@ class EdgeState:
     """Once a period, shape (periods, d)."""
     distance: _Array
     """Between the two states that hold it, at each."""
-    orbit: Orbit | None
+    orbit: PeriodicOrbit | None
     """The unstable orbit that it comes to, if it comes to one."""
 
     def to_dataset(self) -> xr.Dataset:
@@ -51,7 +51,7 @@ class EdgeState:
         return xr.Dataset(
             {
                 "state": (("period", "coordinate"), self.states, labels),
-                "distance": (
+                "bisect_threshold": (
                     "period",
                     self.distance,
                     {"units": "1", "long_name": "distance of the two that hold it"},
@@ -78,33 +78,33 @@ class EdgeState:
 
 
 @checked
-def edge_state(
+def edge_tracking(
     system: System | Flow,
-    quiet: State | ArrayLike,
-    snapping: State | ArrayLike,
+    u1: State | ArrayLike,
+    u2: State | ArrayLike,
     *,
     periods: int = 60,
     horizon: int = 40,
-    distance: float = 1e-9,
-    apart: float = 1e-5,
+    bisect_threshold: float = 1e-9,
+    diverge_threshold: float = 1e-5,
     outcome: Callable[[Flow, _Array, int], NDArray[np.bool_]] | None = None,
     integration: Integration | None = None,
 ) -> EdgeState:
     """Follow the border between snapping and not (Skufca, Yorke and Eckhardt, Phys. Rev. Lett. 96 (2006) 174101).
 
-    Of the states between a quiet one and one that snaps, two are found that are *distance* apart and differ in their
-    outcome; both are marched on until they are *apart*, and the search is taken up again between them.
+    Of the states between a quiet one and one that snaps, two are found that are *bisect_threshold* apart and differ in their
+    outcome; both are marched on until they are *diverge_threshold*, and the search is taken up again between them.
 
     Parameters
     ----------
     system : System, or a Flow
-    quiet, snapping : State or array_like of shape (d,)
+    u1, u2 : State or array_like of shape (d,)
         A state from which the beam does not leave its well within *horizon* periods, and one from which it does.
     periods : int
         To follow the border for.
     horizon : int
         Periods after which the outcome is told.
-    distance, apart : float
+    bisect_threshold, diverge_threshold : float
         In units of the well's amplitude.
     outcome : callable, optional
         ``outcome(flow, states, horizon) -> bool array``, in place of snapping.
@@ -122,11 +122,14 @@ def edge_state(
     """
     flow = flow_of(system, integration, "reference")
     total, ahead = integer("periods", periods, 2, 10**6), integer("horizon", horizon, 1, 10**6)
-    near, far = positive("distance", distance), positive("apart", apart)
+    near, far = (
+        positive("bisect_threshold", bisect_threshold),
+        positive("diverge_threshold", diverge_threshold),
+    )
     if not near < far:
-        raise InputError(f"distance = {near:g}: must be less than apart = {far:g}")
+        raise InputError(f"distance = {near:g}: must be less than diverge_threshold = {far:g}")
     decide = _snaps if outcome is None else outcome
-    low, high = _row(flow, quiet, "quiet"), _row(flow, snapping, "snapping")
+    low, high = _row(flow, u1, "u1"), _row(flow, u2, "u2")
     told = decide(flow, np.stack([low, high]), ahead)
     if bool(told[0]) or not bool(told[1]):
         raise InputError(
@@ -164,7 +167,7 @@ def kicked(flow: Stroboscope, size: float | None, horizon: int) -> tuple[_Array,
         raise InputError(f"the start: it snaps within {horizon} periods by itself; take a weaker drive")
     if not told.any():
         raise InputError(
-            f"kick (--kick) = {sizes[-1]:g}: does not snap within {horizon} periods; take a harder one"
+            f"kick (--initial-velocity) = {sizes[-1]:g}: does not snap within {horizon} periods; take a harder one"
         )
     return quiet, rows[int(np.argmax(told))]
 
@@ -182,12 +185,12 @@ def _row(flow: Flow, state: State | ArrayLike, name: str) -> _Array:
 
 def _snaps(flow: Flow, states: _Array, horizon: int) -> NDArray[np.bool_]:
     marched = flow.march(states, horizon)
-    if "crossings" not in marched.statistics:
+    if "zero_crossings" not in marched.statistics:
         raise InputError("outcome: is needed for a flow that is no System")
-    crossed = np.asarray(marched.statistics["crossings"] > 0)
+    crossed = np.asarray(marched.statistics["zero_crossings"] > 0)
     if isinstance(flow, Stroboscope):
         # on the border's way some have crossed before they are looked at again
-        shape, first = flow.system.model.center_shape, flow.coordinates()[0]
+        shape, first = flow.system.model.midspan_shape, flow.coordinates()[0]
         side = states[:, : flow.modes] @ shape * float(first[: flow.modes] @ shape)
         crossed |= side < 0.0
     return crossed
@@ -212,7 +215,7 @@ def _bisect(
     return low, high
 
 
-def _settled(flow: Flow, path: _Array) -> Orbit | None:
+def _settled(flow: Flow, path: _Array) -> PeriodicOrbit | None:
     """The unstable orbit that the last periods repeat."""
     tail = path[-max(4, len(path) // 3) :]
     period = int(least_period(tail[None], 1e-3)[0])
@@ -220,5 +223,5 @@ def _settled(flow: Flow, path: _Array) -> Orbit | None:
         return None
     try:
         return shoot(flow, tail[-1], period, 1e-10, 40)
-    except NoOrbit:
+    except OrbitNotFoundError:
         return None

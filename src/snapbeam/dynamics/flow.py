@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.parameters import lookup
 from snapbeam.core.codes import RunStatus
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.dynamics.starts import held_in_space
 from snapbeam.engines.answer import statistics_of
@@ -35,7 +35,7 @@ from snapbeam.runs.states import states_of
 __all__ = ["Flow", "Marched", "Stroboscope", "flow_of"]
 
 _Array = NDArray[np.float64]
-_REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
+_REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 _SAME_PHASE = 1e-6
 """Difference of two phases, rad, that rounding can make."""
 _BYTES = 2**27
@@ -130,7 +130,7 @@ class Stroboscope:
             raise InputError(
                 f"tolerance = {self.integration.tolerance:g}: is for one run; give steps, or accuracy = 'reference'"
             )
-        if self.phase is not None and self.system.has_surroundings:
+        if self.phase is not None and self.system.has_environment:
             raise InputError(
                 f"phase = {self.phase:g}: a base or an axial load is at its own phase when a period begins; give none"
             )
@@ -155,7 +155,7 @@ class Stroboscope:
     def smooth(self) -> bool:
         """Whether the law of contact has a force without a jump."""
         contact = self.system.contact
-        return contact is None or self.system.striker is None or contact.keeps.smooth
+        return contact is None or self.system.striker is None or contact.properties.smooth
 
     @property
     def refined(self) -> Stroboscope:
@@ -163,12 +163,12 @@ class Stroboscope:
         return Stroboscope(self.system, self.integration.replace(accuracy="reference", step=None), self.phase)
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
         """What is doubtful about derivatives of this flow."""
         if not self.smooth or self.integration.accuracy == "reference":
             return ()
         return (
-            Finding(
+            Diagnostic(
                 "dynamics.coarse_tangent",
                 "accuracy = 'map': derivatives, and so multipliers and where a branch has its events, are off by up to "
                 "2 %, since the steps in contact are long; take accuracy = 'reference' (--accuracy reference)",
@@ -186,7 +186,7 @@ class Stroboscope:
     def scales(self) -> _Array:
         """What the coordinates are counted in, m^0.5 and m^0.5/s, shape (d,)."""
         size = amplitude_scale(self.system.model)
-        speed = size * 2.0 * math.pi * self.system.model.reference_freq
+        speed = size * 2.0 * math.pi * self.system.model.reference_frequency
         return np.repeat([size, speed], self.modes)
 
     @property
@@ -194,14 +194,14 @@ class Stroboscope:
         """The ``phase`` of a state that begins a period, rad; NaN: every motion begins at its own phase."""
         if self.phase is not None:
             return self.phase
-        return math.nan if self.system.start is None else float(self.system.start.phase)
+        return math.nan if self.system.initial_state is None else float(self.system.initial_state.phase)
 
     @property
     def striker_phase(self) -> float:
         """Phase at the beginning of a period, rad, of the motion whose cycle is the period; 0 if nothing moves."""
-        if self.system.leads is None:
+        if self.system.primary_excitation is None:
             return 0.0
-        own, given = float(getattr(self.system.leads[1], "phase", 0.0)), self.given_phase
+        own, given = float(getattr(self.system.primary_excitation[1], "phase", 0.0)), self.given_phase
         if math.isnan(given):
             return own
         # several motions share one clock, which counts from the time at which all have their own phases
@@ -224,7 +224,7 @@ class Stroboscope:
         section, _, field = lookup(name).name.partition(".")
         alone = len(self.system.moving) == 1 and section == self.system.moving[0][0]
         if field == "phase" and alone and not math.isnan(self.given_phase):
-            source = "phase" if self.phase is not None else "start.phase"
+            source = "phase" if self.phase is not None else "initial_state.phase"
             raise InputError(
                 f"{source} = {self.given_phase:g}: must not be given if {section}.phase changes; leave {source} out"
             )
@@ -236,7 +236,7 @@ class Stroboscope:
     def coordinates(self, state: State | None = None) -> _Array:
         """A state, or a batch of them, in the coordinates of the flow, shape (runs, d); the start by default."""
         if state is None:
-            state = self.system.start or rest_state(self.system.model, self.system.striker)
+            state = self.system.initial_state or rest_state(self.system.model, self.system.striker)
         else:
             self._require_phase(state)
         if state.modes != self.modes:
@@ -249,7 +249,7 @@ class Stroboscope:
         turns = 1 if len(self.system.moving) < 2 else HORIZON
         apart = (state.phase - self._clock_phase) * turns
         apart = np.abs(apart - 2.0 * math.pi * np.rint(apart / (2.0 * math.pi)))
-        if self.system.leads is not None and (apart > _SAME_PHASE).any():
+        if self.system.primary_excitation is not None and (apart > _SAME_PHASE).any():
             raise InputError(
                 f"state phase = {shown(state.phase)}: must be the phase at which the system is observed, "
                 f"{self._clock_phase:g} rad, or NaN; advance the state to that phase with sb.advance"
@@ -314,13 +314,13 @@ class Stroboscope:
         lost = ~np.asarray(np.isfinite(rows).all(axis=1))
         full = np.where(lost[:, None], 0.0, rows) * self.scales
         passed: dict[str, Any] = {
-            "status": np.where(lost, int(RunStatus.NOT_FINITE), int(RunStatus.OK)).astype(np.int8)
+            "status": np.where(lost, int(RunStatus.DIVERGED), int(RunStatus.OK)).astype(np.int8)
         }
         return State(
             amplitude=full[:, : self.modes],
             velocity=full[:, self.modes :],
             phase=np.array(self.given_phase),
-            passed=passed,
+            statistics=passed,
         )
 
     def _march_part(
@@ -331,13 +331,13 @@ class Stroboscope:
         every: bool,
         points: Mapping[str, _Array] | None,
     ) -> Marched:
-        lost = None if begun.passed is None else ~np.isin(begun.passed["status"], _REACHED)
+        lost = None if begun.statistics is None else ~np.isin(begun.statistics["status"], _REACHED)
         own = {lookup(name).name: np.asarray(values) for name, values in (points or {}).items()}
         for name in own:
             self._require_free(name)
         ensemble = make_ensemble(
             self.system,
-            self.integration.replace(early_decision=False),
+            self.integration.replace(early_termination=False),
             own,
             start=begun.flat(),
             periods=periods,
@@ -346,32 +346,38 @@ class Stroboscope:
         model = self.system.model
         moved = None
         if tangents is None:
-            landings = engine.march_landing(ensemble, self.integration.threads)
+            landings = engine.integrate_to_landing(ensemble, self.integration.threads)
         else:
             back = model.linear_modes.T @ model.mass
             given = (tangents * self.scales).reshape(*tangents.shape[:2], 2, self.modes)
-            landings, changed = engine.march_tangents(ensemble, given @ back.T, self.integration.threads)
+            landings, changed = engine.integrate_tangents(ensemble, given @ back.T, self.integration.threads)
             moved = (changed @ model.linear_modes.T).reshape(tangents.shape) / self.scales
-        failed = ~np.isin(landings.books["status"], _REACHED)
+        failed = ~np.isin(landings.accumulators_of_runs["status"], _REACHED)
         if lost is not None:
             failed |= lost
-        last = self._rows(ensemble, landings.q[:, -1:], landings.p[:, -1:], landings.home[:, -1:])[:, 0]
-        whole = self._rows(ensemble, landings.q, landings.p, landings.home) if every else None
+        last = self._rows(ensemble, landings.q[:, -1:], landings.p[:, -1:], landings.well_sign[:, -1:])[:, 0]
+        whole = self._rows(ensemble, landings.q, landings.p, landings.well_sign) if every else None
         for array in (last, whole, moved):
             if array is not None:
                 array[failed] = np.nan
         q, p = (np.where(failed[:, None], 0.0, each[:, -1]) for each in (landings.q, landings.p))
         ticks = ensemble.runs["end"]
-        hidden = states_of(ensemble, q, p, landings.home[:, -1], landings.contact_ticks[:, -1], ticks)
-        status = np.where(failed, np.where(landings.books["status"] == 0, 3, landings.books["status"]), 0)
+        hidden = states_of(ensemble, q, p, landings.well_sign[:, -1], landings.contact_ticks[:, -1], ticks)
+        status = np.where(
+            failed,
+            np.where(
+                landings.accumulators_of_runs["status"] == 0, 3, landings.accumulators_of_runs["status"]
+            ),
+            0,
+        )
         # after a period every motion is where it began
-        hidden = replace(hidden, phase=ensemble.runs["phase"].copy(), passed={"status": status})
-        return Marched(last, whole, moved, statistics_of(ensemble, landings.books), hidden)
+        hidden = replace(hidden, phase=ensemble.runs["phase"].copy(), statistics={"status": status})
+        return Marched(last, whole, moved, statistics_of(ensemble, landings.accumulators_of_runs), hidden)
 
-    def _rows(self, ensemble: Any, q: _Array, p: _Array, home: NDArray[np.int64]) -> _Array:
+    def _rows(self, ensemble: Any, q: _Array, p: _Array, well_sign: NDArray[np.int64]) -> _Array:
         """States in coordinates, one by one, so that none depends on the others; shape (runs, periods, d)."""
         structure = ensemble.structure
-        first = np.where((home < 0)[..., None], q + structure.shift, q)
+        first = np.where((well_sign < 0)[..., None], q + structure.shift, q)
         modes = self.system.model.linear_modes.T
         amplitude = structure.equilibrium + (first[..., None, :] @ modes)[..., 0, :]
         velocity = (p[..., None, :] @ modes)[..., 0, :]
@@ -398,7 +404,7 @@ def _joined(parts: list[Marched]) -> Marched:
 def _joined_states(states: list[State]) -> State:
     from snapbeam.model.state import ModalState
 
-    names = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
+    names = ("amplitude", "velocity_at_striker", "phase", "striker_position", "contact_time")
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(each, name) for each in states]) for name in names
     }
@@ -409,11 +415,15 @@ def _joined_states(states: list[State]) -> State:
         name: np.concatenate([getattr(each, name) for each in modals])
         for name in ("q", "p", "home", "offset")
     }
-    status = np.concatenate([np.asarray((each.passed or {})["status"]) for each in states])
-    return State(**arrays, passed={"status": status}, modal=ModalState(**parts, structure=first.structure))
+    status = np.concatenate([np.asarray((each.statistics or {})["status"]) for each in states])
+    return State(
+        **arrays, statistics={"status": status}, modal=ModalState(**parts, structure=first.structure)
+    )
 
 
-def flow_of(system: System | Flow, integration: Integration | None = None, accuracy: str = "map") -> Flow:
+def flow_of(
+    system: System | Flow, integration: Integration | None = None, accuracy: str = "standard"
+) -> Flow:
     """The flow that a system makes, or one that is one; *accuracy* is meant where no integration is given."""
     if isinstance(system, System):
         return Stroboscope(system, Integration(accuracy=accuracy) if integration is None else integration)

@@ -21,7 +21,7 @@ from snapbeam.sweeps.points import Points, points_of
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["lyapunov", "separation_exponent"]
+__all__ = ["lyapunov_spectrum", "largest_lyapunov"]
 
 _Array = NDArray[np.float64]
 _BLOCKS = 20
@@ -29,7 +29,7 @@ _BLOCKS = 20
 
 
 @checked
-def lyapunov(
+def lyapunov_spectrum(
     system: System | Flow,
     k: int = 1,
     periods: int = 500,
@@ -76,14 +76,14 @@ def lyapunov(
     Raises
     ------
     InputError
-        For bad input, and for a law of contact whose force jumps: see :func:`separation_exponent`.
+        For bad input, and for a law of contact whose force jumps: see :func:`largest_lyapunov`.
     """
     flow = flow_of(system, integration)
     count = integer("k", k, 1, flow.dimension)
     total, before = integer("periods", periods, _BLOCKS, 10**7), integer("transient", transient, 0, 10**7)
     if not flow.smooth:
         raise InputError(
-            "contact: its force jumps, so that the tangent flow does; use separation_exponent for the largest one"
+            "contact: its force jumps, so that the tangent flow does; use largest_lyapunov for the largest one"
         )
     begun, points, columns = _runs(flow, states, axes)
     marched = flow.march(begun, before, points=columns) if before else flow.march(begun, 1, points=columns)
@@ -93,8 +93,8 @@ def lyapunov(
     for period in range(total):
         marched = flow.march(marched, 1, tangents=frame, points=columns)
         frame, growth[period] = _orthogonal(marched)
-        if "crossings" in marched.statistics:
-            crossed[period] = marched.statistics["crossings"] > 0
+        if "zero_crossings" in marched.statistics:
+            crossed[period] = marched.statistics["zero_crossings"] > 0
         if progress is not None:
             progress(period + 1, total)
     return _dataset(flow, growth, crossed, points, before)
@@ -203,7 +203,7 @@ def _periods(flow: Flow, points: Points) -> _Array:
 
 
 @checked
-def separation_exponent(
+def largest_lyapunov(
     system: System | Flow,
     periods: int = 500,
     *,

@@ -16,7 +16,7 @@ __all__ = [
     "Integrity",
     "UncertaintyExponent",
     "basin_entropy",
-    "integrity",
+    "dynamical_integrity",
     "uncertainty_exponent",
 ]
 
@@ -166,7 +166,7 @@ class Integrity(NamedTuple):
 
 
 @checked
-def integrity(
+def dynamical_integrity(
     labels: ArrayLike, label: int, attractor: tuple[int, ...] | None = None, spacing: ArrayLike | None = None
 ) -> Integrity:
     """Global and local integrity measure and integrity factor of one basin in a window.

@@ -17,19 +17,25 @@ from snapbeam.runs.simulate import simulate
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["poincare"]
+__all__ = ["poincare_section"]
 
 _Array = NDArray[np.float64]
 SECTIONS = ("stroboscopic", "impact")
-_LEVELS = ("displacement", "center_displacement", "velocity", "center_velocity", "penetration")
+_LEVELS = (
+    "displacement_at_striker",
+    "midspan_displacement",
+    "velocity_at_striker",
+    "midspan_velocity",
+    "penetration_normalised",
+)
 _DIRECTIONS = ("up", "down", "both")
 _SAMPLES = 128
 """A period of the drive or, where that is shorter, of the first mode, to find passages in."""
-_RATES = {"displacement": "velocity", "center_displacement": "center_velocity"}
+_RATES = {"displacement_at_striker": "velocity_at_striker", "midspan_displacement": "midspan_velocity"}
 
 
 @checked
-def poincare(
+def poincare_section(
     system: System,
     section: str | tuple[str, float, str] = "stroboscopic",
     periods: int = 500,
@@ -45,7 +51,7 @@ def poincare(
     system : System
     section : {"stroboscopic", "impact"} or tuple
         Once a period of the drive; at the onset of every impact; or ``(variable, level, direction)`` with a variable of
-        a run (``"center_displacement"``, ``"displacement"``, their velocities or ``"penetration"``), a level in its
+        a run (``"midspan_displacement"``, ``"displacement_at_striker"``, their velocities or ``"penetration_normalised"``), a level in its
         unit and ``"up"``, ``"down"`` or ``"both"``.
     periods : int
         Periods of the drive to look at.
@@ -69,7 +75,7 @@ def poincare(
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
-    if system.leads is None:
+    if system.primary_excitation is None:
         raise InputError("striker = None: a section of a beam that nothing moves is of no drive")
     total, before = integer("periods", periods, 1, 10**6), integer("transient", transient, 0, 10**7)
     flow = Stroboscope(system, Integration() if integration is None else integration, phase)
@@ -80,7 +86,7 @@ def poincare(
     if not np.isfinite(begun).all():
         raise InputError("transient: the run failed before the section; use a smaller step")
     held = flow.starting(flow.state(begun[0]))
-    how = flow.integration.replace(cycles=total, early_decision=False)
+    how = flow.integration.replace(cycles=total, early_termination=False)
     end = total * flow.period
     if section == "stroboscopic":
         times = np.arange(total + 1) * flow.period
@@ -111,7 +117,7 @@ def _passages(
 ) -> _Array:
     """Instants at which a variable passes its level: between samples, then by the secant rule on the run itself."""
     name, value, direction = level
-    spacing = min(period, 1.0 / system.model.reference_freq) / _SAMPLES
+    spacing = min(period, 1.0 / system.model.reference_frequency) / _SAMPLES
     grid = np.linspace(0.0, end, int(np.ceil(end / spacing)) + 1)
     seen = simulate(system, how, sample_times=grid).dataset[name].values - value
     rising = (seen[:-1] < 0.0) & (seen[1:] >= 0.0)
@@ -143,7 +149,7 @@ def _dataset(system: System, how: Integration, times: _Array, flow: Stroboscope,
     if not times.size:
         raise InputError(f"section = {shown(section)}: is never met within the periods asked for")
     data = simulate(system, how, sample_times=times).dataset
-    kept = data[["displacement", "velocity", "center_displacement", "center_velocity", "modal_amplitude",
+    kept = data[["displacement_at_striker", "velocity_at_striker", "midspan_displacement", "midspan_velocity", "modal_amplitude",
                  "modal_velocity"]]  # fmt: skip
     kept = kept.rename(time="point").reset_coords(drop=True)
     phase = (flow.striker_phase + 2.0 * np.pi * times / flow.period) % (2.0 * np.pi)

@@ -14,13 +14,13 @@ from snapbeam.core.validate import InputError, InputTypeError, flag, integer, no
 from snapbeam.model.start import rest_state
 from snapbeam.model.state import State
 from snapbeam.model.system import System
-from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicas, perturbed_start
+from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicates, perturbed_start
 
-__all__ = ["Starts", "held_in_space", "leaving", "starts_of"]
+__all__ = ["InitialConditions", "held_in_space", "leaving", "starts_of"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Starts:
+class InitialConditions:
     """Starts that differ a little, or in the phase of the drive; number s is the same whatever it is run with.
 
     Parameters
@@ -70,18 +70,23 @@ class Starts:
 
         *location* is where the tip strikes, x_s/L, or that of each of several runs; the system's by default.
         """
-        found = state if state is not None else system.start
+        found = state if state is not None else system.initial_state
         if found is None:
             found = rest_state(system.model, system.striker)
         if self.displacement > 0.0:
-            rung = perturbed_start(system, Replicas(1, self.displacement, seed=self.seed), number, found)
+            rung = perturbed_start(system, Replicates(1, self.displacement, seed=self.seed), number, found)
             found = leaving(system, found, rung, location)
         if not self.phase:
             return found
         generator = np.random.Generator(np.random.Philox(key=[self.seed, number]).jumped())
         phase = math.pi * (1.0 + generator.random())
         return dataclasses.replace(
-            found, phase=np.array(phase), contact_time=np.array(np.nan), tangent=None, passed=None, modal=None
+            found,
+            phase=np.array(phase),
+            contact_time=np.array(np.nan),
+            tangent=None,
+            statistics=None,
+            modal=None,
         )
 
 
@@ -93,10 +98,10 @@ def leaving(system: System, rest: State, begun: State, location: ArrayLike | Non
     striker = system.striker
     if striker is None:
         return begun
-    place = np.asarray(striker.location if location is None else location, dtype=np.float64)
+    workspace = np.asarray(striker.location if location is None else location, dtype=np.float64)
     change: list[NDArray[np.float64]] = [begun.amplitude - rest.amplitude, begun.velocity - rest.velocity]
     away = 1.0 if striker.side == "below" else -1.0
-    reach = np.sum(system.model.shape_at(place) * change[0], axis=-1)
+    reach = np.sum(system.model.shape_at(workspace) * change[0], axis=-1)
     turn = np.where(away * reach < 0.0, -1.0, 1.0)[..., None]
     return dataclasses.replace(
         begun,
@@ -104,23 +109,23 @@ def leaving(system: System, rest: State, begun: State, location: ArrayLike | Non
         velocity=rest.velocity + turn * change[1],
         contact_time=np.array(np.nan),
         tangent=None,
-        passed=None,
+        statistics=None,
         modal=None,
     )
 
 
-def starts_of(given: Starts | int) -> Starts:
+def starts_of(given: InitialConditions | int) -> InitialConditions:
     """Starts, or that many of them.
 
     Raises
     ------
     InputTypeError
     """
-    if isinstance(given, Starts):
+    if isinstance(given, InitialConditions):
         return given
     if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, np.integer)):
         raise InputTypeError(f"starts = {shown(given)}: must be a number of starts, or Starts")
-    return Starts(count=int(given))
+    return InitialConditions(count=int(given))
 
 
 def held_in_space(system: System) -> System:
@@ -134,7 +139,7 @@ def held_in_space(system: System) -> System:
         For a recorded drive, whose periods differ.
     """
     striker = system.striker
-    if system.others:
+    if system.further_contacts:
         raise InputError(
             "striker: the tools of dynamics know where one striker stands and since when it touches; of several "
             "strikers ask for whole runs, by simulate or a sweep"
@@ -159,11 +164,11 @@ def held_in_space(system: System) -> System:
 
     offset = float(make_ensemble(system, Integration()).runs["offset"][0])
     held = system.replace(**{"striker.gap": -offset + 0.0})
-    start = system.start
+    start = system.initial_state
     if start is None or np.isnan(start.striker_position).all():
         return held
     free = State(amplitude=start.amplitude, velocity=start.velocity, phase=start.phase)
-    return held.replace(start=free)
+    return held.replace(initial_state=free)
 
 
 def _require_common_period(system: System) -> None:
@@ -171,7 +176,7 @@ def _require_common_period(system: System) -> None:
     if len(system.moving) == 0:
         return
     (section, first), *others = system.moving
-    for name, drive in system.moving if system.has_surroundings else ():
+    for name, drive in system.moving if system.has_environment else ():
         if not drive.harmonic:
             raise InputError(f"{name}: is no sine; dynamics need what repeats")
     for name, drive in others:

@@ -33,7 +33,7 @@ class Reading:
     """The books of an ensemble, and what it takes to read them."""
 
     ensemble: Ensemble
-    book: NDArray[Any]
+    accumulators: NDArray[Any]
     cycles: float
 
     @property
@@ -62,36 +62,36 @@ class Reading:
 
         Damping, and a contact with losses, only take energy.
         """
-        book, status = self.book, self.book["status"]
-        done = (status == RunStatus.OK) | (status == RunStatus.DECIDED)
+        accumulators, status = self.accumulators, self.accumulators["status"]
+        done = (status == RunStatus.OK) | (status == RunStatus.EARLY_STOP)
         with np.errstate(invalid="ignore"):  # runs that failed have no numbers
-            given = book["work"] + book["base_work"] + book["load_work"]
-            made = book["energy"] - book["first_energy"] - given
-        allowed = _MADE * book["gross_work"]
-        allowed = allowed + _ROUNDED * (np.abs(book["energy"]) + np.abs(book["first_energy"]))
-        return np.where(done & (made > allowed), RunStatus.UNBALANCED, status)
+            given = accumulators["work"] + accumulators["base_work"] + accumulators["load_work"]
+            made = accumulators["energy"] - accumulators["first_energy"] - given
+        allowed = _MADE * accumulators["gross_work"]
+        allowed = allowed + _ROUNDED * (np.abs(accumulators["energy"]) + np.abs(accumulators["first_energy"]))
+        return np.where(done & (made > allowed), RunStatus.ENERGY_ERROR, status)
 
     @cached_property
     def good(self) -> NDArray[np.bool_]:
         """Runs whose class is known."""
         status = self.status
-        return np.asarray((status == RunStatus.OK) | (status == RunStatus.DECIDED))
+        return np.asarray((status == RunStatus.OK) | (status == RunStatus.EARLY_STOP))
 
     @cached_property
     def duration(self) -> NDArray[np.float64]:
         """Time marched, s."""
-        return np.asarray(self.book["time"] * self.ensemble.runs["tick"])
+        return np.asarray(self.accumulators["time"] * self.ensemble.runs["tick"])
 
     def seen(self, column: str) -> NDArray[np.float64]:
         """A column, NaN where the run failed."""
-        return np.where(self.good, self.book[column], np.nan)
+        return np.where(self.good, self.accumulators[column], np.nan)
 
     @property
     def others(self) -> NDArray[np.float64]:
         """What is kept of each striker beside the first, shape (runs, strikers, kinds)."""
         if self.ensemble.others is None:
-            return np.zeros((self.book.size, 0, 4))
-        return np.asarray(self.book["others"])
+            return np.zeros((self.accumulators.size, 0, 4))
+        return np.asarray(self.accumulators["others"])
 
     def one(self, column: int, number: int) -> NDArray[np.float64]:
         """A column of one of several strikers, the first being 1: its own is what the others leave of the whole."""
@@ -99,10 +99,10 @@ class Reading:
         if number > 1:
             found = others[:, number - 2]
         elif column == OTHER_PEAK:
-            found = self.book["peak_force"]
+            found = self.accumulators["peak_force"]
         else:
             whole = {OTHER_IMPACTS: "impacts", OTHER_IMPULSE: "total_impulse", OTHER_WORK: "work"}[column]
-            found = self.book[whole] - others.sum(axis=1)
+            found = self.accumulators[whole] - others.sum(axis=1)
         return np.asarray(found if column == OTHER_IMPACTS else np.where(self.good, found, np.nan))
 
     @property
@@ -112,7 +112,7 @@ class Reading:
         if self.ensemble.others is not None:
             return np.maximum(force, self.others[:, :, OTHER_PEAK].max(axis=1))
         if self.ensemble.law.impulsive:
-            return np.where((force == 0.0) & (self.book["impacts"] > 0), np.nan, force)
+            return np.where((force == 0.0) & (self.accumulators["impacts"] > 0), np.nan, force)
         return force
 
     @cached_property
@@ -122,38 +122,42 @@ class Reading:
         Untouched, the beam only loses energy: with less than it takes to come back to the highest position the tip
         will ever have, or to pass the saddle, it never does.  Nothing is said of a well that the tip is in.
         """
-        book, ensemble = self.book, self.ensemble
+        accumulators, ensemble = self.accumulators, self.ensemble
         model = ensemble.structure.model
-        found = np.zeros(book.size, dtype=bool)
+        found = np.zeros(accumulators.size, dtype=bool)
         if not model.is_bistable:
             return found
-        settled = self.good & (book["energy"] < crossing_energy(model) - model.well_energy)
+        settled = self.good & (accumulators["energy"] < crossing_energy(model) - model.well_energy)
         if not (ensemble.highest > -np.inf).any():
             return np.asarray(settled)
         reach, level = np.maximum(ensemble.highest, 0.0), 0.0
         if ensemble.structure.uneven is not None:
             level = ensemble.structure.uneven.level
             reach = passed_heights(model, ensemble.location, ensemble.highest)
-        away = settled & (book["side"] > 0) & (book["displacement"] > reach)
-        away &= book["center"] > level
+        away = settled & (accumulators["side"] > 0) & (accumulators["displacement"] > reach)
+        away &= accumulators["center"] > level
         which = np.flatnonzero(away)
         if which.size:
             bound = decidable_energy(model, ensemble.location[which], ensemble.highest[which])
-            found[which] = book["energy"][which] < bound
+            found[which] = accumulators["energy"][which] < bound
         return found
 
 
 def statistics_of(
-    ensemble: Ensemble, books: NDArray[Any], cycles: float | None = None
+    ensemble: Ensemble, accumulators_of_runs: NDArray[Any], cycles: float | None = None
 ) -> dict[str, NDArray[Any]]:
     """What an engine found, in the units and signs of a map; arrays of shape (runs,) by name.
 
     *cycles* is how long the runs lasted, if not as the ensemble says.
     """
-    reading = Reading(ensemble, books, ensemble.cycles if cycles is None else cycles)
+    reading = Reading(ensemble, accumulators_of_runs, ensemble.cycles if cycles is None else cycles)
     found = {}
     strikers = 1 if ensemble.others is None else 1 + len(ensemble.others.laws)
     for name, row in rows_for(strikers).items():
-        values = row.value(reading) if row.update is None else row.value(reading, books[f"own_{name}"])
+        values = (
+            row.value(reading)
+            if row.update is None
+            else row.value(reading, accumulators_of_runs[f"own_{name}"])
+        )
         found[name] = np.asarray(values).astype(row.dtype)
     return found

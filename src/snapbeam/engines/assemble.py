@@ -14,9 +14,9 @@ from snapbeam.core.validate import InputError
 from snapbeam.engines.clock import Clocked, clocked, most_steps
 from snapbeam.engines.columns import RUN
 from snapbeam.engines.driven import Driven, begun_at, cycles_of, driven_of, fastest_of, phases_of
-from snapbeam.engines.ensemble import Ensemble, Tapped
+from snapbeam.engines.ensemble import Ensemble, CircuitCoupling
 from snapbeam.engines.others import others_of
-from snapbeam.engines.plan import Plan, plan_steps
+from snapbeam.engines.plan import Plan, choose_base_step
 from snapbeam.engines.structure import Structure, structure_of
 from snapbeam.model.contact import ContactLaw, HertzContact
 from snapbeam.model.decision import decidable_energy, passed_heights
@@ -34,11 +34,11 @@ __all__ = ["FAR_AWAY", "cycles_of", "make_ensemble", "plans_of", "run_columns"]
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
 
-_LOWEST = {"map": 1e-9, "reference": 1e-13}
+_LOWEST = {"standard": 1e-9, "reference": 1e-13}
 """Height of a flight after an impact that lasts no time, over b, below which chatter ends in sticking."""
 _RESOLVED = 24.0
 """Flight steps, at least, in a period of a base's or an axial load's fastest part."""
-_TAPPED = {"map": 0.35, "reference": 0.1}
+_TAPPED = {"standard": 0.35, "reference": 0.1}
 """Longest step with a harvester, over the reciprocal of the greatest angular frequency with an open circuit. It
 is in the kicks, and at 0.5 a run of one or three modes still loses up to 5e-3 of its gross work."""
 FAR_AWAY = -1e30
@@ -78,13 +78,13 @@ def make_ensemble(
         For parameters that cannot differ between the runs of an ensemble, and for more steps than can be counted.
     """
     columns = run_columns(system, points or {})
-    state = (system.start or rest_state(system.model, system.striker)) if start is None else start
+    state = (system.initial_state or rest_state(system.model, system.striker)) if start is None else start
     runs = next(iter(columns.values())).size if columns else 1
     if state.batch and runs in (1, state.batch[0]):
         runs = state.batch[0]
     columns = {name: np.array(np.broadcast_to(values, (runs,))) for name, values in columns.items()}
     side = _side(system, state, goes_on=periods is not None)
-    structure = structure_of(system.model, side, system.striker, system.base, system.harvester)
+    structure = structure_of(system.model, side, system.striker, system.base_excitation, system.harvester)
     plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
     if step_factor != 1.0:
         plans = [each._replace(step=step_factor * each.step) for each in plans]
@@ -99,7 +99,7 @@ def make_ensemble(
     if tapped is not None:
         table["circuit_rate"] = tapped.rate
     highest = table["rest_contact"] + table["offset"] + driven.highest
-    if structure.body_mass is not None or driven.kind.parts or system.others:
+    if structure.body_mass is not None or driven.kind.parts or system.further_contacts:
         highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown, and a shaken beam too
     time = clocked(table, system, integration, driven.period, plans, periods)
     _decisions(table, system, structure, integration, time, places.location, highest)
@@ -136,7 +136,7 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
     size = next(iter(points.values())).size if points else 1
     own: dict[str, float] = {}
     parts: list[tuple[str, Any]] = [("contact", system.contact), ("striker", system.striker)]
-    for number, each in enumerate(system.others, 2):
+    for number, each in enumerate(system.further_contacts, 2):
         parts += [(f"contact_{number}", each.contact), (f"striker_{number}", each.striker)]
         own |= {f"drive_{number}.{name}": value for name, value in each.striker.drive.values().items()}
     for section, part in parts:
@@ -150,13 +150,13 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
         own |= {f"drive.{name}": value for name, value in system.striker.drive.values().items()}
     if system.harvester is not None:
         own["harvester.resistance"] = float(system.harvester.resistance)
-    for section, around in (("base", system.base), ("axial", system.axial)):
+    for section, around in (("base", system.base_excitation), ("axial", system.axial_load)):
         if around is not None:
             own |= {f"{section}.{name}": value for name, value in around.motion.values().items()}
     columns = {name: np.full(size, value) for name, value in own.items()}
     for name, values in points.items():
         section, _, field = name.partition(".")
-        strikers = 0 if system.striker is None else 1 + len(system.others)
+        strikers = 0 if system.striker is None else 1 + len(system.further_contacts)
         may_gap = field == "gap" and numbered(section)[0] == "striker" and numbered(section)[1] <= strikers
         if name not in columns and not may_gap:
             raise InputError(f"{name}: no parameter that may differ between the runs of one ensemble")
@@ -172,11 +172,11 @@ def plans_of(system: System, integration: Integration, columns: Mapping[str, _Ar
     plans, striker = _plans_of(system, integration, columns), system.striker
     further = [
         _plans_of(system, integration, columns, f"contact_{number}", each.contact)
-        for number, each in enumerate(system.others, 2)
+        for number, each in enumerate(system.further_contacts, 2)
     ]
     if further:
         plans = [_serving(each) for each in zip(plans, *further, strict=True)]
-    if integration.step is None and (system.base is not None or system.axial is not None):
+    if integration.step is None and (system.base_excitation is not None or system.axial_load is not None):
         fastest = fastest_of(system, columns, len(plans))
         plans = [
             each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate)))
@@ -240,11 +240,11 @@ def _plans_of(
     runs = next(iter(columns.values())).size if columns else 1
     contact = contact or (system.contact if system.striker is not None else None)
     if contact is None or not of_contact:
-        return [plan_steps(_struck(system), contact, step=step, accuracy=accuracy)] * runs
+        return [choose_base_step(_struck(system), contact, step=step, accuracy=accuracy)] * runs
     table = np.stack(list(of_contact.values()), axis=1)
     different, which = np.unique(table, axis=0, return_inverse=True)
     plans = [
-        plan_steps(
+        choose_base_step(
             _struck(system),
             dataclasses.replace(contact, **dict(zip(of_contact, map(float, row), strict=True))),  # type: ignore[type-var]
             step=step,
@@ -263,7 +263,7 @@ def _side(system: System, state: State, goes_on: bool) -> str:
         return "below"
     # seen from the well the beam starts in, so that mirror images are mirrored to the bit
     first = state.flat()[0]
-    return "above" if float(first.amplitude @ system.model.center_shape) > 0.0 else "below"
+    return "above" if float(first.amplitude @ system.model.midspan_shape) > 0.0 else "below"
 
 
 class _Places(NamedTuple):
@@ -287,7 +287,7 @@ def _starts(structure: Structure, table: NDArray[Any], state: State, unit: float
     table["start_row"] = np.arange(table.size) if count > 1 else 0
     table["home"], table["contact_time"] = 1.0, flat.contact_time
     if modal is not None and modal.structure == structure.hash:
-        table["home"] = modal.home
+        table["home"] = modal.well_sign
         return np.stack((modal.q, modal.p), axis=1)
     parts = (flat.amplitude, flat.velocity, flat.striker_shift, flat.striker_rate, flat.circuit / unit)
     pairs = [structure.to_modal(*each) for each in zip(*parts, strict=True)]
@@ -314,7 +314,7 @@ def _offsets(
         same = structure.sign * (table["rest_contact"] + modal.offset) == flat.striker_position
         return np.where(same, modal.offset, position)
     pairs = {(int(run["contact_row"]), int(run["start_row"])) for run in table}
-    reach = {(place, at): float(rows[place] @ starts[at, 0]) for place, at in pairs}
+    reach = {(workspace, at): float(rows[workspace] @ starts[at, 0]) for workspace, at in pairs}
     touching = np.array([reach[int(run["contact_row"]), int(run["start_row"])] for run in table])
     begun = begun_at(driven, table["phase"])
     offset = touching - begun
@@ -323,7 +323,7 @@ def _offsets(
     return np.asarray(np.where(np.isnan(flat.striker_position), offset, position))
 
 
-def _tapped(system: System, columns: Mapping[str, _Array], runs: int) -> Tapped | None:
+def _tapped(system: System, columns: Mapping[str, _Array], runs: int) -> CircuitCoupling | None:
     """The circuit of a harvester, for every run."""
     harvester = system.harvester
     if harvester is None:
@@ -332,7 +332,7 @@ def _tapped(system: System, columns: Mapping[str, _Array], runs: int) -> Tapped 
     loss, inertia = harvester.loss(resistance), harvester.inertia
     rate = loss / inertia if inertia > 0.0 else 1.0 / loss
     unit = 1.0 / math.sqrt(inertia) if inertia > 0.0 else 1.0
-    return Tapped(rate, harvester.share(resistance), harvester.volts(resistance) * unit)
+    return CircuitCoupling(rate, harvester.share(resistance), harvester.volts(resistance) * unit)
 
 
 def _law_numbers(law: type[ContactLaw], system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
@@ -353,8 +353,8 @@ def _decisions(
 ) -> None:
     """When a run may end early."""
     table["decide_crossings"], table["decide_energy"] = -1, -math.inf
-    keeps = system.contact is None or system.contact.keeps.energy_bound
-    if not integration.early_decision or not keeps or system.others:
+    properties = system.contact is None or system.contact.properties.energy_bound
+    if not integration.early_termination or not properties or system.further_contacts:
         return
     table["decide_crossings"] = int(time.cycles / 20.0)
     table["decide_reach"] = np.maximum(highest, 0.0)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputError
 from snapbeam.engines.plan import Plan
-from snapbeam.model.drive import HORIZON, Recorded
+from snapbeam.model.drive import HORIZON, RecordedMotion
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 
@@ -53,22 +53,24 @@ def clocked(
     """
     require_resolved(system, integration, cycle)
     lengths = np.array([plan.step for plan in plans])
-    drive = system.leads[1] if system.leads is not None else None
-    repeats = drive is None or (drive.repeats and len(system.moving) < 2)
+    drive = system.primary_excitation[1] if system.primary_excitation is not None else None
+    repeats = drive is None or (drive.is_periodic and len(system.moving) < 2)
     table["step"] = SUBDIVISION
     table["coarsest"] = [plan.coarsest for plan in plans]
     table["finest"] = [plan.finest for plan in plans]
-    if isinstance(drive, Recorded):
+    if isinstance(drive, RecordedMotion):
         turn = np.full(table.size, drive.duration)
         left = 1.0 - table["phase"] / (2.0 * math.pi)
-        asked = _asked_cycles(drive, integration, periods, float(left.min()))
+        kernel_input = _asked_cycles(drive, integration, periods, float(left.min()))
         steps = _whole_steps(turn, lengths, 1.0)
         table["period"] = steps * SUBDIVISION
         table["tick"] = turn / table["period"]
         held = drive.duration * drive.frequency
         table["landing"] = np.rint(table["period"] / held)
-        share = asked / drive.frequency / drive.duration
-        table["end"] = np.rint(share * table["period"] if periods is None else asked * table["landing"])
+        share = kernel_input / drive.frequency / drive.duration
+        table["end"] = np.rint(
+            share * table["period"] if periods is None else kernel_input * table["landing"]
+        )
         table["end"] = np.minimum(table["end"], np.rint(left * table["period"]))
         cycles = float(table["end"][0] * table["tick"][0] * drive.frequency)
     else:
@@ -90,18 +92,20 @@ def clocked(
     return Clocked(cycles)
 
 
-def _asked_cycles(drive: Recorded, integration: Integration, periods: float | None, left: float) -> float:
+def _asked_cycles(
+    drive: RecordedMotion, integration: Integration, periods: float | None, left: float
+) -> float:
     """Cycles to march, of a record of which a share *left* is still to come."""
     held = drive.duration * drive.frequency * left
-    asked = integration.cycles if periods is None else periods
-    if asked is None and held > 0.0:
+    kernel_input = integration.cycles if periods is None else periods
+    if kernel_input is None and held > 0.0:
         return held
-    if asked is None or asked > held + 1e-6:  # states stand on ticks
+    if kernel_input is None or kernel_input > held + 1e-6:  # states stand on ticks
         of = "of" if left == 1.0 else "that are left of"
         raise InputError(
-            f"cycles = {asked}: must be at most the {max(held, 0.0):.1f} cycles {of} the recorded drive"
+            f"cycles = {kernel_input}: must be at most the {max(held, 0.0):.1f} cycles {of} the recorded drive"
         )
-    return min(float(asked), held)
+    return min(float(kernel_input), held)
 
 
 def require_resolved(system: System, integration: Integration, cycle: _Array) -> None:
@@ -113,7 +117,7 @@ def require_resolved(system: System, integration: Integration, cycle: _Array) ->
     """
     if integration.step is None:
         return
-    shortest, first = float(cycle.min()), 1.0 / system.model.reference_freq
+    shortest, first = float(cycle.min()), 1.0 / system.model.reference_frequency
     for length, words in ((shortest, "a cycle of excitation"), (first, "a period of the first mode")):
         if integration.step * _FEWEST > length * (1.0 + 1e-12):
             raise InputError(

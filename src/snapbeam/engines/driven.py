@@ -36,7 +36,7 @@ class Driven(NamedTuple):
 def cycles_of(system: System, columns: Mapping[str, _Array]) -> _Array:
     """Seconds of one cycle of excitation of each run, or of the first mode where nothing moves, shape (runs,)."""
     runs = next(iter(columns.values())).size if columns else 1
-    leads = system.leads
+    leads = system.primary_excitation
     if leads is None:
         return 2.0 * math.pi / (np.ones(runs) * system.scale.omega)
     section, drive = leads
@@ -76,7 +76,9 @@ def driven_of(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
     if striker.side == "above":
         highest = drive.mirrored_bounds(own, scale)
     table = np.stack([found[name] for name in drive.number_names], axis=1)
-    return Driven(drive.marched_as or type(drive), table, cycles_of(system, columns), highest, speed, samples)
+    return Driven(
+        drive.integrated_as or type(drive), table, cycles_of(system, columns), highest, speed, samples
+    )
 
 
 def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Driven:
@@ -85,25 +87,25 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
     Nothing is said of how high the tip comes to be used: no such run is decided by it.
     """
     scale, names = system.scale, {"drive": "tip", "base": "base", "axial": "load"}
-    names |= {f"drive_{number}": f"tip{number - 1}" for number in range(2, 2 + len(system.others))}
+    names |= {f"drive_{number}": f"tip{number - 1}" for number in range(2, 2 + len(system.further_contacts))}
     kinds: dict[str, type[Drive]] = {}
     found: dict[str, _Array] = {}
     speed, fastest = np.zeros(runs), np.zeros(runs)
     for section, drive in system.moving:
         part, own = names[section], _own(columns, section, runs)
         numbers = drive.numbers(own, scale)
-        kinds[part] = drive.marched_as or type(drive)
+        kinds[part] = drive.integrated_as or type(drive)
         found |= {f"{part}_{name}": numbers[name] for name in drive.number_names}
         found[f"{part}_phase"] = columns.get(f"{section}.phase", np.zeros(runs))
         fastest = np.maximum(fastest, numbers["fastest" if "fastest" in numbers else "omega"])
         if section == "drive":
             speed = speed + drive.bounds(own, scale)[1]
-    if system.base is not None:
-        own, base = _own(columns, "base", runs), system.base
+    if system.base_excitation is not None:
+        own, base = _own(columns, "base", runs), system.base_excitation
         sign = 1.0 if base.direction == "up" else -1.0
         side = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
-        follow = 0.0 if base.carries_striker or system.striker is None else -side * sign
-        found["base_hardest"] = base.motion.hardest(own, scale)
+        follow = 0.0 if base.striker_on_base or system.striker is None else -side * sign
+        found["base_hardest"] = base.motion.peak_acceleration(own, scale)
         found["base_sign"], found["base_follow"] = np.full(runs, sign), np.full(runs, follow)
         speed = speed + abs(follow) * base.motion.bounds(own, scale)[1]
     kind, cycle = joined(kinds), cycles_of(system, columns)
@@ -137,12 +139,16 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
         if section not in ("base", "axial"):
             continue
         own = {name: np.array([value]) for name, value in drive.values().items()}
-        numbers, kind = drive.numbers(own, system.scale), drive.marched_as or type(drive)
+        numbers, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
         table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
         arguments = numbers["omega"][0] * times + (begun if alone else float(getattr(drive, "phase", 0.0)))
         pairs = np.array([tip_motion(table, np.empty(0), at) for at in arguments.tolist()]).reshape(-1, 2)
         sign = (
-            -1.0 if section == "base" and system.base is not None and system.base.direction == "down" else 1.0
+            -1.0
+            if section == "base"
+            and system.base_excitation is not None
+            and system.base_excitation.direction == "down"
+            else 1.0
         )
         found[section] = sign * pairs[:, 0], sign * pairs[:, 1]
     return found
@@ -154,11 +160,11 @@ def tip_of(system: System, number: int, times: _Array) -> tuple[_Array, _Array]:
     Seen from its own side, in the frame of the ends but without what a base does to it.  Of systems whose run begins
     with their drives.
     """
-    striker = system.others[number - 2].striker if number > 1 else system.striker
+    striker = system.further_contacts[number - 2].striker if number > 1 else system.striker
     assert striker is not None
     drive = striker.drive
     own = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
-    numbers, kind = drive.numbers(own, system.scale), drive.marched_as or type(drive)
+    numbers, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
     table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
     arguments = numbers["omega"][0] * times + float(getattr(drive, "phase", 0.0))
     pairs = np.array([tip_motion(table, np.empty(0), at) for at in arguments.tolist()]).reshape(-1, 2)

@@ -18,7 +18,7 @@ _EACH = {
     "impacts": (OTHER_IMPACTS, "impacts"),
     "peak_force": (OTHER_PEAK, "peak contact force"),
     "impulse": (OTHER_IMPULSE, "impulse on the beam, all impacts"),
-    "shaker_work": (OTHER_WORK, "work done"),
+    "striker_work": (OTHER_WORK, "work done"),
 }
 """What each of several has: where the others' is kept, and words."""
 _NUMBERS = {str(number) for number in range(1, MOST_STRIKERS + 1)}

@@ -13,13 +13,13 @@ from snapbeam.model.contact import ContactLaw
 from snapbeam.model.drive import Drive, Scale
 from snapbeam.model.world import Harvester
 
-__all__ = ["Ensemble", "OtherStrikers", "Tapped"]
+__all__ = ["Ensemble", "FurtherContactTable", "CircuitCoupling"]
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
 
 
-class Tapped(NamedTuple):
+class CircuitCoupling(NamedTuple):
     """A harvester's circuit, for every run, arrays of shape (runs,)."""
 
     rate: _Array
@@ -31,7 +31,7 @@ class Tapped(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class OtherStrikers:
+class FurtherContactTable:
     """The strikers beside the first one of every run."""
 
     laws: tuple[type[ContactLaw], ...]
@@ -74,9 +74,9 @@ class Ensemble:
     """Angular frequency above which a mode counts as high, rad/s."""
     cycles: float
     """Cycles of excitation of each run."""
-    tapped: Tapped | None = None
+    tapped: CircuitCoupling | None = None
     harvester: Harvester | None = None
-    others: OtherStrikers | None = None
+    others: FurtherContactTable | None = None
 
     @property
     def forced(self) -> bool:

@@ -21,7 +21,7 @@ from snapbeam.model.paper_values import BEAM, CONTACT
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
 
-__all__ = ["engine_mark"]
+__all__ = ["solver_fingerprint"]
 
 _CASES = ((1, 1.4, 0.02), (4, 1.21, 0.05), (12, 1.4, 0.02))
 """Modes, frequency ratio, velocity amplitude: three cycles of each are conditioned to 1e-11 or better."""
@@ -29,7 +29,7 @@ _KEPT = ("max_displacement", "min_displacement", "total_impulse", "contact_time"
 
 
 @cache
-def engine_mark() -> str:
+def solver_fingerprint() -> str:
     """Sixteen hexadecimal digits that are equal where engine and default steps are."""
     digest = hashlib.sha256()
     for modes, ratio, velocity in _CASES:
@@ -39,8 +39,12 @@ def engine_mark() -> str:
             Striker(drive=Sine(frequency_ratio=ratio, velocity_amplitude=velocity)),
         )
         for accuracy in ACCURACIES:
-            book = driver.run_ensemble(make_ensemble(system, Integration(cycles=3, accuracy=accuracy)), 1)[0]
-            digest.update(f"{modes} {accuracy} {int(book['steps'])} {int(book['impacts'])}".encode())
+            accumulators = driver.run_ensemble(
+                make_ensemble(system, Integration(cycles=3, accuracy=accuracy)), 1
+            )[0]
+            digest.update(
+                f"{modes} {accuracy} {int(accumulators['steps'])} {int(accumulators['impacts'])}".encode()
+            )
             for name in _KEPT:
-                digest.update(np.format_float_scientific(float(book[name]), precision=8).encode())
+                digest.update(np.format_float_scientific(float(accumulators[name]), precision=8).encode())
     return digest.hexdigest()[:16]

@@ -62,8 +62,8 @@ def flight_step(model: ReducedModel, order: int, limit: float) -> float:
         Greatest error of a displacement, over the buckling level, after two periods of the first mode; where the
         start is sensitive, that many times the displacement's relative slope along the velocity at the start.
     """
-    period = 1.0 / model.reference_freq
-    if model.tension_stiffness == 0.0 or not model.tension_matrix.any():
+    period = 1.0 / model.reference_frequency
+    if model.nonlinear_stiffness == 0.0 or not model.tension_matrix.any():
         return period / _FEWEST  # nothing but linear modes, whose flow is exact
     structure = structure_of(model, "below")
     key = (structure.hash, order, limit)
@@ -83,36 +83,42 @@ class _Bench:
         model = structure.model
         self.structure = structure
         self.order = order
-        self.period = 1.0 / model.reference_freq
+        self.period = 1.0 / model.reference_frequency
         length = model.length_scale or 1.0
-        shapes = [model.shape_at(x) for x in _PLACES] if model.beam is not None else [model.center_shape]
+        shapes = [model.shape_at(x) for x in _PLACES] if model.beam is not None else [model.midspan_shape]
         if model.contact_shape is not None:
             shapes.append(model.contact_shape)
-        kept = slice(0, _MOST_MODES)
-        self.omega, self.damping = structure.omega[kept], (structure.damping_ratio * structure.omega)[kept]
-        self.columns = np.array(structure.coupling[kept, kept].T, order="C")
-        self.well = structure.well[kept]
+        kernel_output = slice(0, _MOST_MODES)
+        self.omega, self.damping = (
+            structure.omega[kernel_output],
+            (structure.damping_ratio * structure.omega)[kernel_output],
+        )
+        self.columns = np.array(structure.coupling[kernel_output, kernel_output].T, order="C")
+        self.well = structure.well[kernel_output]
         self.rest = self.force = np.zeros(self.omega.size)
         if (
             far and structure.uneven is not None
         ):  # about the mirror image of the first well, at rest in the second
             self.well = -self.well
-            self.rest, self.force = structure.uneven.second[kept], structure.uneven.force[kept]
-        self.rows = (np.array(shapes) @ model.linear_modes)[:, kept] / length
+            self.rest, self.force = (
+                structure.uneven.second[kernel_output],
+                structure.uneven.force[kernel_output],
+            )
+        self.rows = (np.array(shapes) @ model.linear_modes)[:, kernel_output] / length
         if model.beam is not None:
             struck = model.shape_at(_STRUCK)
         else:
-            struck = model.center_shape if model.contact_shape is None else model.contact_shape
-        blow = (struck @ model.linear_modes)[kept]
+            struck = model.midspan_shape if model.contact_shape is None else model.contact_shape
+        blow = (struck @ model.linear_modes)[kernel_output]
         if not blow.any():
             blow = np.ones(self.omega.size)
         if structure.uneven is not None and model.landscape is not None:
-            barrier = model.barrier_energy - model.landscape.deepest.energy
+            barrier = model.saddle_energy - model.landscape.deepest.energy
         elif model.is_bistable:
             straight, well = np.zeros(model.modes), structure.equilibrium
             barrier = float(model.potential_energy(straight) - model.potential_energy(well))
         else:
-            barrier = 0.5 * (2.0 * math.pi * model.reference_freq / np.abs(self.rows[:, 0]).max()) ** 2
+            barrier = 0.5 * (2.0 * math.pi * model.reference_frequency / np.abs(self.rows[:, 0]).max()) ** 2
         self.starts = []
         for energy, duration, *_ in _STARTS:
             # the spectrum of a pulse falls off beyond the inverse of what it lasts
@@ -142,7 +148,7 @@ class _Bench:
         )
         kicks = np.multiply.outer(steps, composition.kick)
         out, work = np.empty((counts.size, self.omega.size)), np.empty((3, self.omega.size))
-        whole, gamma = counts.astype(np.int64), self.structure.tension_stiffness
+        whole, gamma = counts.astype(np.int64), self.structure.nonlinear_stiffness
         kernel(_march, ())(
             whole,
             flows,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.engines.ensemble import OtherStrikers
+from snapbeam.engines.ensemble import FurtherContactTable
 from snapbeam.engines.scalar.several import LAW, NUMBERS, OFFSET, REST, SIGN, SPEED
 from snapbeam.engines.scalar.tip import tip_motion
 from snapbeam.engines.structure import Structure
@@ -22,17 +22,17 @@ _Array = NDArray[np.float64]
 
 def others_of(
     system: System, structure: Structure, columns: Mapping[str, _Array], runs: int
-) -> OtherStrikers | None:
+) -> FurtherContactTable | None:
     """Where they are and what they touch by; their motions are in the ensemble's drive.
 
     A striker stands where its tip touches the beam at rest in the first well, or its gap away from that.
     """
-    if not system.others:
+    if not system.further_contacts:
         return None
-    count = len(system.others)
+    count = len(system.further_contacts)
     numbers, places = np.zeros((runs, count, NUMBERS)), np.zeros((runs, count), dtype=np.int64)
     rows: list[_Array] = []
-    for j, each in enumerate(system.others):
+    for j, each in enumerate(system.further_contacts):
         number, striker = j + 2, each.striker
         assert system.striker is not None
         sign = 1.0 if striker.side == system.striker.side else -1.0
@@ -50,7 +50,9 @@ def others_of(
         names = type(each.contact).numbers_type()._fields
         for k, name in enumerate(names):
             numbers[:, j, LAW + k] = columns[f"contact_{number}.{name}"]
-    return OtherStrikers(tuple(type(each.contact) for each in system.others), numbers, places, np.array(rows))
+    return FurtherContactTable(
+        tuple(type(each.contact) for each in system.further_contacts), numbers, places, np.array(rows)
+    )
 
 
 def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
@@ -65,7 +67,7 @@ def _begun(drive: Drive, columns: Mapping[str, _Array], section: str, system: Sy
     phase = columns.get(f"{section}.phase", np.zeros(runs))
     if not phase.any():
         return np.zeros(runs)
-    found, kind = drive.numbers(own, system.scale), drive.marched_as or type(drive)
+    found, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
     made: Any = kind.numbers_type()
     table = np.stack([found[name] for name in kind.number_names], axis=1)
     return np.array(
@@ -76,7 +78,7 @@ def _begun(drive: Drive, columns: Mapping[str, _Array], section: str, system: Sy
 def _speed(drive: Drive, columns: Mapping[str, _Array], section: str, system: System, runs: int) -> _Array:
     """Greatest speed of the tip in the frame of the ends, m/s."""
     speed = drive.bounds(_own(columns, section, runs), system.scale)[1]
-    base = system.base
-    if base is not None and not base.carries_striker:
+    base = system.base_excitation
+    if base is not None and not base.striker_on_base:
         speed = speed + base.motion.bounds(_own(columns, "base", runs), system.scale)[1]
     return speed

@@ -1,6 +1,6 @@
 """The table of outcomes: what kernels keep of a run, and what follows from it.
 
-Kernels write :data:`BOOK`, one record a run; maps, runs and :class:`~snapbeam.Outcome` hold :data:`STATISTICS`.
+Kernels write :data:`ACCUMULATORS`, one record a run; maps, runs and :class:`~snapbeam.Outcome` hold :data:`STATISTICS`.
 A new statistic is a row: either a formula of what is kept already, or, with ``update``, a scalar function
 that kernels call after every step.
 """
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from snapbeam.engines.answer import Reading
 
 __all__ = [
-    "BOOK",
+    "ACCUMULATORS",
     "OTHER_IMPACTS",
     "OTHER_IMPULSE",
     "OTHER_PEAK",
@@ -31,11 +31,11 @@ __all__ = [
     "STATISTICS",
     "Passed",
     "Statistic",
-    "book_dtype",
-    "empty_books",
+    "accumulators_dtype",
+    "empty_accumulators",
     "register",
     "updated",
-    "withdraw",
+    "unregister",
 ]
 
 Values = NDArray[Any]
@@ -50,8 +50,8 @@ class Passed(NamedTuple):
     displacement: tuple[float, float]
     """Of the beam at the striker's location, at the two ends of the step."""
     velocity: tuple[float, float]
-    center_displacement: tuple[float, float]
-    center_velocity: tuple[float, float]
+    midspan_displacement: tuple[float, float]
+    midspan_velocity: tuple[float, float]
     penetration: tuple[float, float]
     touching: bool
 
@@ -63,22 +63,22 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("touching", np.int64, 0),
     ("onset", np.int64, 0),  # tick at which the present contact began
     ("side", np.int64, 0),  # sign of the centre displacement, -1 in the well the run began in
-    ("crossings", np.int64, 0),
-    ("crossings_last_quarter", np.int64, 0),
+    ("zero_crossings", np.int64, 0),
+    ("zero_crossings_last_quarter", np.int64, 0),
     ("impacts", np.int64, 0),
     ("steps", np.int64, 0),
     ("samples", np.int64, 0),
-    ("last_crossing", np.float64, math.nan),
+    ("last_zero_crossing", np.float64, math.nan),
     ("min_displacement", np.float64, 0.0),
     ("max_displacement", np.float64, 0.0),
     ("min_center", np.float64, 0.0),
     ("max_center", np.float64, 0.0),
     ("peak_velocity", np.float64, 0.0),
-    ("peak_center_velocity", np.float64, 0.0),
+    ("peak_midspan_velocity", np.float64, 0.0),
     ("square_displacement", np.float64, 0.0),  # integrals over time
     ("square_center", np.float64, 0.0),
     ("square_velocity", np.float64, 0.0),
-    ("square_center_velocity", np.float64, 0.0),
+    ("square_midspan_velocity", np.float64, 0.0),
     ("energy_time", np.float64, 0.0),  # integral of the modal energy, sampled
     ("high_energy_time", np.float64, 0.0),  # of the modes above a frequency
     ("peak_force", np.float64, 0.0),
@@ -98,7 +98,7 @@ _KEPT: tuple[tuple[str, type, float], ...] = (
     ("center", np.float64, 0.0),
     ("deepest", np.float64, 0.0),  # greatest penetration of the present contact
     ("impulse", np.float64, 0.0),  # of the present contact
-    ("decided_at", np.float64, math.nan),
+    ("early_stop_time", np.float64, math.nan),
 )
 
 
@@ -117,7 +117,7 @@ class Statistic:
     dtype : str
     unit : str
         As UDUNITS knows it; ``"1"`` for displacements over b and velocities over b omega_1.
-    words : str
+    long_name : str
     value : callable
         From a :class:`~snapbeam.engines.answer.Reading` of many runs to an array of shape (runs,).  With *update*:
         from the reading and the array of what *update* left.
@@ -131,14 +131,14 @@ class Statistic:
     name: str
     dtype: str
     unit: str
-    words: str
+    long_name: str
     value: Callable[..., Values]
     update: Callable[[float, Any], float] | None = None
     start: float = 0.0
 
 
 def _plain(column: str) -> Callable[[Reading], Values]:
-    return lambda reading: reading.book[column]
+    return lambda reading: reading.accumulators[column]
 
 
 def _seen(column: str, factor: Callable[[Reading], float] = lambda _: 1.0) -> Callable[[Reading], Values]:
@@ -170,16 +170,21 @@ def _rms(column: str, per_speed: bool) -> Callable[[Reading], Values]:
 
 
 def _response(reading: Reading) -> Values:
-    book = reading.book
+    accumulators = reading.accumulators
     kinds = class_of(
-        book["crossings"], book["crossings_last_quarter"], reading.cycles, -reading.first_side * book["side"]
+        accumulators["zero_crossings"],
+        accumulators["zero_crossings_last_quarter"],
+        reading.cycles,
+        -reading.first_side * accumulators["side"],
     )
     return np.where(reading.good, kinds, ResponseClass.UNKNOWN)
 
 
 def _contact_share(reading: Reading) -> Values:
     with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.where(reading.duration > 0.0, reading.book["contact_time"] / reading.duration, np.nan)
+        share = np.where(
+            reading.duration > 0.0, reading.accumulators["contact_time"] / reading.duration, np.nan
+        )
     return np.where(reading.good, share, np.nan)
 
 
@@ -222,18 +227,18 @@ def _mean_power(reading: Reading) -> Values:
 
 
 _ROWS = (
-    Statistic("response", "int8", "1", "response class", _response),
+    Statistic("response_class", "int8", "1", "response class", _response),
     Statistic("status", "int8", "1", "status of the run", lambda reading: reading.status),
-    Statistic("crossings", "int32", "1", "zero crossings of the centre displacement", _plain("crossings")),
+    Statistic("zero_crossings", "int32", "1", "zero crossings of the centre displacement", _plain("zero_crossings")),
     Statistic(
-        "crossings_last_quarter", "int32", "1", "zero crossings in the last quarter", _plain("crossings_last_quarter")
+        "zero_crossings_last_quarter", "int32", "1", "zero crossings in the last quarter", _plain("zero_crossings_last_quarter")
     ),
-    Statistic("last_crossing", "float64", "s", "time of the last zero crossing", _plain("last_crossing")),
+    Statistic("last_zero_crossing", "float64", "s", "time of the last zero crossing", _plain("last_zero_crossing")),
     Statistic(
         "final_well", "int8", "1", "sign of the centre displacement at the end",
-        lambda reading: reading.sign * reading.book["side"],
+        lambda reading: reading.sign * reading.accumulators["side"],
     ),
-    Statistic("end_is_final", "bool", "1", "whether the run provably ends in its last well", lambda r: r.final),
+    Statistic("final_well_proven", "bool", "1", "whether the run provably ends in its last well", lambda r: r.final),
     Statistic(
         "min_displacement", "float64", "1", "least beam displacement at the striker, over b",
         _low_high("min_displacement", "max_displacement", greatest=False),
@@ -243,23 +248,23 @@ _ROWS = (
         _low_high("min_displacement", "max_displacement", greatest=True),
     ),
     Statistic(
-        "min_center_displacement", "float64", "1", "least centre displacement, over b",
+        "min_midspan_displacement", "float64", "1", "least centre displacement, over b",
         _low_high("min_center", "max_center", greatest=False),
     ),
     Statistic(
-        "max_center_displacement", "float64", "1", "greatest centre displacement, over b",
+        "max_midspan_displacement", "float64", "1", "greatest centre displacement, over b",
         _low_high("min_center", "max_center", greatest=True),
     ),
     Statistic("peak_force", "float64", "N", "peak contact force", lambda reading: reading.peak_force),
     Statistic("impacts", "int32", "1", "impacts", _plain("impacts")),
-    Statistic("contact_share", "float64", "1", "share of time in contact", _contact_share),
-    Statistic("decided_at", "float64", "s", "time at which the class became certain", _plain("decided_at")),
+    Statistic("contact_time_fraction", "float64", "1", "share of time in contact", _contact_share),
+    Statistic("early_stop_time", "float64", "s", "time at which the class became certain", _plain("early_stop_time")),
     Statistic(
         "peak_displacement", "float64", "1", "greatest distance of the contact point from the straight beam, over b",
         _peak("min_displacement", "max_displacement"),
     ),
     Statistic(
-        "peak_center_displacement", "float64", "1", "greatest distance of the centre from the straight beam, over b",
+        "peak_midspan_displacement", "float64", "1", "greatest distance of the centre from the straight beam, over b",
         _peak("min_center", "max_center"),
     ),
     Statistic(
@@ -267,15 +272,15 @@ _ROWS = (
         _seen("peak_velocity", lambda reading: 1.0 / reading.speed),
     ),
     Statistic(
-        "peak_center_velocity", "float64", "1", "greatest speed of the centre at the end of a step, over b omega_1",
-        _seen("peak_center_velocity", lambda reading: 1.0 / reading.speed),
+        "peak_midspan_velocity", "float64", "1", "greatest speed of the centre at the end of a step, over b omega_1",
+        _seen("peak_midspan_velocity", lambda reading: 1.0 / reading.speed),
     ),
     Statistic(
         "rms_displacement", "float64", "1", "root mean square displacement of the contact point, over b",
         _rms("square_displacement", per_speed=False),
     ),
     Statistic(
-        "rms_center_displacement", "float64", "1", "root mean square displacement of the centre, over b",
+        "rms_midspan_displacement", "float64", "1", "root mean square displacement of the centre, over b",
         _rms("square_center", per_speed=False),
     ),
     Statistic(
@@ -283,28 +288,28 @@ _ROWS = (
         _rms("square_velocity", per_speed=True),
     ),
     Statistic(
-        "rms_center_velocity", "float64", "1", "root mean square velocity of the centre, over b omega_1",
-        _rms("square_center_velocity", per_speed=True),
+        "rms_midspan_velocity", "float64", "1", "root mean square velocity of the centre, over b omega_1",
+        _rms("square_midspan_velocity", per_speed=True),
     ),
     Statistic("impulse", "float64", "N s", "impulse on the beam, all impacts", _seen("total_impulse")),
-    Statistic("shaker_work", "float64", "J", "work done by the striker", _seen("work")),
+    Statistic("striker_work", "float64", "J", "work done by the striker", _seen("work")),
     Statistic(
         "gross_work", "float64", "J", "work done by the striker, the base and the axial load, taken as positive",
         _seen("gross_work"),
     ),
     Statistic("mean_power", "float64", "W", "work done by the striker over the time of the run", _mean_power),
     Statistic(
-        "dissipated_energy", "float64", "J", "energy dissipated: all work less what the beam gained",
+        "energy_dissipated", "float64", "J", "energy dissipated: all work less what the beam gained",
         _dissipated,
     ),
-    Statistic("contact_loss", "float64", "J", "energy lost in contact", _seen("lost")),
+    Statistic("energy_lost_contact", "float64", "J", "energy lost in contact", _seen("lost")),
     Statistic(
-        "high_frequency_share", "float64", "1", "share of the modal energy above a multiple of omega_1, over time",
+        "high_frequency_energy_fraction", "float64", "1", "share of the modal energy above a multiple of omega_1, over time",
         _high_share,
     ),
     Statistic("base_work", "float64", "J", "work done by the base, in its frame", _seen("base_work")),
     Statistic("load_work", "float64", "J", "work done by the change of the axial load", _seen("load_work")),
-    Statistic("harvested_energy", "float64", "J", "energy that ended in the harvester's load", _harvested),
+    Statistic("energy_harvested", "float64", "J", "energy that ended in the harvester's load", _harvested),
     Statistic(
         "harvested_power", "float64", "W", "energy in the harvester's load over the time of the run", _harvested_power
     ),
@@ -346,7 +351,7 @@ def register(statistic: Statistic) -> None:
     STATISTICS[statistic.name] = statistic
 
 
-def withdraw(name: str) -> None:
+def unregister(name: str) -> None:
     """Take a registered statistic out of the table again.
 
     Raises
@@ -359,7 +364,7 @@ def withdraw(name: str) -> None:
     del STATISTICS[name]
 
 
-def book_dtype(others: int = 0) -> np.dtype[Any]:
+def accumulators_dtype(others: int = 0) -> np.dtype[Any]:
     """One record of what kernels keep of a run, with *others* strikers beside the first."""
     # first, so that Numba does not take the record for one of the kind without
     fields: list[Any] = [("others", np.float64, (others, OTHER_WORK + 1))] if others else []
@@ -368,15 +373,15 @@ def book_dtype(others: int = 0) -> np.dtype[Any]:
     return np.dtype(fields, align=True)
 
 
-BOOK = book_dtype()
+ACCUMULATORS = accumulators_dtype()
 """Of the package's own statistics."""
 
 
-def empty_books(runs: int, others: int = 0) -> Any:
+def empty_accumulators(runs: int, others: int = 0) -> Any:
     """Books of runs that have not begun, with *others* strikers beside the first."""
-    books = np.zeros(runs, dtype=book_dtype(others))
+    accumulators_of_runs = np.zeros(runs, dtype=accumulators_dtype(others))
     for name, _, start in _KEPT:
-        books[name] = start
+        accumulators_of_runs[name] = start
     for row in updated():
-        books[f"own_{row.name}"] = row.start
-    return books
+        accumulators_of_runs[f"own_{row.name}"] = row.start
+    return accumulators_of_runs

@@ -15,11 +15,11 @@ _Array = NDArray[np.float64]
 class Landings(NamedTuple):
     """States of many runs at every landing."""
 
-    books: NDArray[Any]
+    accumulators_of_runs: NDArray[Any]
     q: _Array
     """Linear modes about the well at hand, shape (runs, landings, N)."""
     p: _Array
-    home: NDArray[np.int64]
+    well_sign: NDArray[np.int64]
     """That well: +1 the first, -1 the other, shape (runs, landings)."""
     contact_ticks: NDArray[np.int64]
     """Ticks since the present contact began, -1 where tip and beam are apart."""
@@ -31,7 +31,7 @@ class Last(NamedTuple):
     q: _Array
     """Linear modes about the well at hand, shape (N,)."""
     p: _Array
-    home: int
+    well_sign: int
     contact_ticks: int
 
 
@@ -47,6 +47,6 @@ class Recorded(NamedTuple):
     """Penetration, contact force, beam energy, contact energy, work, dissipation, loss in contact; (samples, 7)."""
     impacts: _Array
     """Onset, duration, peak force and impulse of each impact that ended, shape (impacts, 4)."""
-    books: NDArray[Any]
+    accumulators_of_runs: NDArray[Any]
     """The run's book as it is at the end of the piece, shape (1,)."""
     last: Last

@@ -11,23 +11,23 @@ from snapbeam.model.contact import ContactLaw
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.integration import ACCURACIES
 
-__all__ = ["Plan", "plan_steps"]
+__all__ = ["Plan", "choose_base_step"]
 
 # Free flight: the error allowed a step, as it is measured on the structure, by level of accuracy.
-_LIMIT = {"map": 2.5e-7, "reference": 2e-11}
-_LIMIT_OF_HITS = {"map": 1e-9, "reference": 1e-13}
+_LIMIT = {"standard": 2.5e-7, "reference": 2e-11}
+_LIMIT_OF_HITS = {"standard": 1e-9, "reference": 1e-13}
 """Where impacts last no time: no contact steps share the error, and there is one mode only."""
-_ORDER = {"map": 4, "reference": 6}
+_ORDER = {"standard": 4, "reference": 6}
 _FREE_TURN = 4.0
 """Of the fastest mode in a flight step of level "reference", rad."""
 _MOST_DECAY = 1.8
 """Of the mode that decays fastest, in a flight step."""
 # Contact: longest step over the time of an impact at the speed 0.2 b omega_1, by level, and how many
 # halvings below it the shortest step is, by order.
-_CONTACT_SHARE = {"map": 1.0 / 8.0, "reference": 1.0 / 32.0}
+_CONTACT_SHARE = {"standard": 1.0 / 8.0, "reference": 1.0 / 32.0}
 _CONTACT_SPEED = 0.2
 _HALVINGS = {4: 4, 6: 10}
-_MOST_HALVINGS = {"map": 5, "reference": 7}
+_MOST_HALVINGS = {"standard": 5, "reference": 7}
 _CONTACT_TURN = math.pi
 """Of the fastest mode in the longest contact step, rad: the contact moves every mode, and beyond half a turn
 its kicks come in step with the fastest ones."""
@@ -45,12 +45,12 @@ class Plan(NamedTuple):
     """Halvings of the flight step that make the shortest contact step."""
 
 
-def plan_steps(
+def choose_base_step(
     model: ReducedModel,
     contact: ContactLaw | None,
     *,
     step: float | None = None,
-    accuracy: str = "map",
+    accuracy: str = "standard",
 ) -> Plan:
     """The steps of a run: short enough in flight, as measured on the model itself, and for an impact.
 
@@ -61,8 +61,8 @@ def plan_steps(
         that every run of a map is stepped alike.
     step : float, optional
         Flight step in seconds, instead of the default; contact steps scale with it.
-    accuracy : {"map", "reference"}
-        ``"map"``: order 4, and errors of about a thousandth of the buckling level where a run is well conditioned.
+    accuracy : {"standard", "reference"}
+        ``"standard"``: order 4, and errors of about a thousandth of the buckling level where a run is well conditioned.
         ``"reference"``: order 6, and errors a hundred thousand times smaller.
     """
     choice("accuracy", accuracy, ACCURACIES)
@@ -79,8 +79,8 @@ def plan_steps(
     duration = 0.0
     if contact is not None and not contact.impulsive:
         mass = model.lightest_contact_mass
-        speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_freq
-        duration = contact.resolved_time(mass, speed)
+        speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_frequency
+        duration = contact.time_scale(mass, speed)
     if duration > 0.0:
         impact = _CONTACT_SHARE[accuracy] * duration
         flight = min(flight, impact * 2 ** _MOST_HALVINGS[accuracy])

@@ -36,20 +36,20 @@ class Engine(Protocol):
         """March every run of an ensemble; a book a run."""
         ...
 
-    def march_landing(
+    def integrate_to_landing(
         self, ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
     ) -> Landings:
         """As :meth:`run_ensemble`, and the states at every landing."""
         ...
 
-    def march_tangents(
+    def integrate_tangents(
         self,
         ensemble: Ensemble,
         tangents: NDArray[np.float64],
         threads: int | None = None,
         progress: Progress | None = None,
     ) -> tuple[Landings, NDArray[np.float64]]:
-        """As :meth:`march_landing`, with small changes of the states carried along."""
+        """As :meth:`integrate_to_landing`, with small changes of the states carried along."""
         ...
 
     def record(

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.striker import Striker
-from snapbeam.model.world.base import Base, rigid_mass
+from snapbeam.model.world.base import BaseExcitation, rigid_mass
 from snapbeam.model.world.harvester import Harvester
 
 __all__ = ["Structure", "Uneven", "structure_of"]
@@ -56,7 +56,7 @@ class Structure:
     damping_ratio: _Array
     coupling: _Array
     """G = V^T V, shape (N, N), exactly 0 between modes that the tension does not couple."""
-    tension_stiffness: float
+    nonlinear_stiffness: float
     """gamma, Eq. (15)."""
     well: _Array
     """g = V^T alpha_eq."""
@@ -75,7 +75,7 @@ class Structure:
     model: ReducedModel
     uneven: Uneven | None = None
     """Of unequal wells."""
-    shaken: _Array | None = None
+    add_base_acceleration: _Array | None = None
     """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi)."""
     tapped: _Array | None = None
     """Of a harvester: its coupling, scaled so that half the square of the circuit's coordinate is its energy."""
@@ -157,13 +157,13 @@ class Structure:
         digest = hashlib.sha256()
         for part in (self.omega, self.damping_ratio, self.coupling, self.well, self.center, self.equilibrium):
             digest.update(np.ascontiguousarray(part).tobytes())
-        digest.update(np.array([self.tension_stiffness, self.sign]).tobytes())
+        digest.update(np.array([self.nonlinear_stiffness, self.sign]).tobytes())
         if self.uneven is not None:
             digest.update(np.ascontiguousarray(self.uneven.force).tobytes())
         if self.tapped is not None:
             digest.update(np.ascontiguousarray(self.tapped).tobytes())
-        if self.shaken is not None:
-            digest.update(np.ascontiguousarray(self.shaken).tobytes())
+        if self.add_base_acceleration is not None:
+            digest.update(np.ascontiguousarray(self.add_base_acceleration).tobytes())
         if self.body_mass is not None:
             digest.update(np.array([self.body_mass]).tobytes())
         return digest.hexdigest()
@@ -173,7 +173,7 @@ def structure_of(
     model: ReducedModel,
     side: str,
     striker: Striker | None = None,
-    base: Base | None = None,
+    base: BaseExcitation | None = None,
     harvester: Harvester | None = None,
 ) -> Structure:
     """The structure of a reduced model, about the well that a striker from *side* pushes away from.
@@ -183,61 +183,63 @@ def structure_of(
     """
     sign = 1.0 if side == "below" else -1.0
     model = model if sign > 0.0 else model.mirrored
-    equilibrium = sign * model.equilibrium
+    equilibrium = sign * model.well_amplitude
     modes = model.linear_modes
     struck = Structure(
         omega=model.omega,
         damping_ratio=model.damping_ratio,
         coupling=model.tension_matrix,
-        tension_stiffness=float(model.tension_stiffness),
+        nonlinear_stiffness=float(model.nonlinear_stiffness),
         well=modes.T @ equilibrium,
-        center=sign * (modes.T @ model.center_shape),
+        center=sign * (modes.T @ model.midspan_shape),
         shift=-2.0 * (modes.T @ model.mass @ equilibrium),
         stretch=float(equilibrium @ equilibrium),
-        center_rest=sign * float(model.center_shape @ equilibrium),
+        center_rest=sign * float(model.midspan_shape @ equilibrium),
         sign=sign,
         equilibrium=equilibrium,
         model=model,
         uneven=_uneven(model, sign),
-        shaken=None if base is None else -(modes.T @ rigid_mass(model)),
+        add_base_acceleration=None if base is None else -(modes.T @ rigid_mass(model)),
     )
     if striker is not None and striker.mass is not None:
-        struck = _with_body(struck, striker, carried=base is not None and base.carries_striker)
+        struck = _with_body(struck, striker, integrate_sticking_run=base is not None and base.striker_on_base)
     return struck if harvester is None else _with_circuit(struck, harvester)
 
 
 def _uneven(model: ReducedModel, sign: float) -> Uneven | None:
     """What unequal wells add, of a model that is seen from the striker's side."""
-    if model.landscape is None or model.side_force is None or not model.is_bistable:
+    if model.landscape is None or model.transverse_force is None or not model.is_bistable:
         return None
     lower, upper = model.landscape.lower, model.landscape.upper
     away = upper.amplitude + lower.amplitude
     return Uneven(
-        force=sign * 2.0 * (model.linear_modes.T @ model.side_force),
-        lift=2.0 * float(model.side_force @ lower.amplitude),
+        force=sign * 2.0 * (model.linear_modes.T @ model.transverse_force),
+        lift=2.0 * float(model.transverse_force @ lower.amplitude),
         second=sign * (model.linear_modes.T @ (model.mass @ away)),
         depth=upper.energy - lower.energy,
         level=model.dividing_height,
     )
 
 
-def _with_body(structure: Structure, striker: Striker, carried: bool = False) -> Structure:
+def _with_body(structure: Structure, striker: Striker, integrate_sticking_run: bool = False) -> Structure:
     """The structure with the mode of a striker that is a body, which a base shakes too if it carries it."""
     assert striker.mass is not None
-    own = -structure.sign * math.sqrt(striker.mass) if carried else 0.0
+    own = -structure.sign * math.sqrt(striker.mass) if integrate_sticking_run else 0.0
     count = structure.omega.size + 1
     coupling = np.zeros((count, count))
     coupling[:-1, :-1] = structure.coupling
     return dataclasses.replace(
         structure,
-        omega=np.append(structure.omega, math.sqrt(striker.spring / striker.mass)),
+        omega=np.append(structure.omega, math.sqrt(striker.suspension_stiffness / striker.mass)),
         damping_ratio=np.append(structure.damping_ratio, striker.damping_ratio),
         coupling=coupling,
         well=np.append(structure.well, 0.0),
         center=np.append(structure.center, 0.0),
         shift=np.append(structure.shift, 0.0),
         uneven=None if structure.uneven is None else _with_rest(structure.uneven),
-        shaken=None if structure.shaken is None else np.append(structure.shaken, own),
+        add_base_acceleration=None
+        if structure.add_base_acceleration is None
+        else np.append(structure.add_base_acceleration, own),
         body_mass=striker.mass,
     )
 
@@ -262,7 +264,9 @@ def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
         **longer,
         coupling=tension,
         uneven=None if structure.uneven is None else _with_rest(structure.uneven),
-        shaken=None if structure.shaken is None else np.append(structure.shaken, 0.0),
+        add_base_acceleration=None
+        if structure.add_base_acceleration is None
+        else np.append(structure.add_base_acceleration, 0.0),
         tapped=np.append(coupling, 0.0),
         circuit=True,
     )

@@ -51,7 +51,7 @@ def answer(
     try:
         held = card.expected(point)
         chances = chances_of(source.layers, held)
-        same, words = compared(held, run.outcome, str(source.attrs.get("engine", "cpu")))
+        same, words = compared(held, run.summary, str(source.attrs.get("engine", "cpu")))
     except InputError as error:  # the run stands, although its map cannot be read any more
         same, words = False, str(error)
     if times is not None:
@@ -61,7 +61,7 @@ def answer(
 
 def _quick(system: Any, integration: Any, token: Token) -> Run | None:
     """The run at a few instants, all that its pictures need made; None where those instants cannot be known."""
-    if system.striker is None or not system.striker.drive.harmonic or integration.early_decision:
+    if system.striker is None or not system.striker.drive.harmonic or integration.early_termination:
         return None
     times = _even_times(system, integration, _QUICK)
     run = sb.simulate(system, integration, sample_times=times, progress=token.check)
@@ -73,5 +73,5 @@ def _quick(system: Any, integration: Any, token: Token) -> Run | None:
 
 def _even_times(system: Any, integration: Any, count: int) -> NDArray[np.float64]:
     """Instants evenly over a run with a sinusoidal drive."""
-    frequency = system.striker.drive.frequency_ratio * system.model.reference_freq
+    frequency = system.striker.drive.frequency_ratio * system.model.reference_frequency
     return np.linspace(0.0, integration.cycles_or_default / frequency, count)

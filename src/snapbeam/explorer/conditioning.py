@@ -26,21 +26,21 @@ def conditioned(run: Run, token: Token) -> str:
     if (
         striker is None
         or not striker.drive.harmonic
-        or run.outcome.status not in (RunStatus.OK, RunStatus.DECIDED)
+        or run.summary.status not in (RunStatus.OK, RunStatus.EARLY_STOP)
     ):
         return ""
     cycles = integration.cycles_or_default
     if cycles > _MOST_CYCLES:
         return ""
     token.check()
-    found = sb.conditioning(system, integration, accuracy="map", perturbation=NEIGHBOUR)
+    found = sb.perturbation_growth(system, integration, accuracy="standard", perturbation=NEIGHBOUR)
     token.check()
     apart = np.flatnonzero(found["separation"].values > _APART)
     amplitude = system.parameters["drive.velocity_amplitude"]
     neighbour = system.replace(**{"drive.velocity_amplitude": amplitude * (1.0 + NEIGHBOUR)})
-    other: Any = sb.simulate(neighbour, integration, sample_times=[0.0], progress=token.check).outcome
-    same = other.response is run.outcome.response and other.final_well == run.outcome.final_well
-    ends = "ends in the same class and well" if same else f"ends elsewhere: {other.response.label}"
+    other: Any = sb.simulate(neighbour, integration, sample_times=[0.0], progress=token.check).summary
+    same = other.response_class is run.summary.response_class and other.final_well == run.summary.final_well
+    ends = "ends in the same class and well" if same else f"ends elsewhere: {other.response_class.label}"
     if not apart.size:
         near = f"a neighbour {NEIGHBOUR:.0e} away in V stays within {_APART:g} b"
         return f"well conditioned: {near} for all {cycles} cycles"

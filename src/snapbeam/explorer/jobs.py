@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-from snapbeam import InputError, StoreError
+from snapbeam import InputError, CheckpointError
 
 __all__ = ["Cancelled", "Jobs", "Token"]
 
@@ -150,7 +150,7 @@ def _guarded(work: Callable[[Token], Any], done: Callable[[Any, str], None], tok
         result = work(token)
     except Cancelled:
         return
-    except (InputError, StoreError, OSError) as error:
+    except (InputError, CheckpointError, OSError) as error:
         words = str(error) or type(error).__name__
     except MemoryError:
         words = "there is not enough memory for this"

@@ -59,7 +59,9 @@ def check_run(system: System, integration: Integration) -> None:
     if system.model.modes > MODES:
         raise InputError(f"model.modes = {system.model.modes}: a page may ask for at most {MODES}")
     if integration.cycles_or_default > CYCLES:
-        raise InputError(f"run.cycles = {integration.cycles_or_default}: a page may ask for at most {CYCLES}")
+        raise InputError(
+            f"integration.cycles = {integration.cycles_or_default}: a page may ask for at most {CYCLES}"
+        )
 
 
 def samples_of(system: System, integration: Integration) -> int | None:

@@ -68,7 +68,7 @@ def map_command(axes: Mapping[str, tuple[float, float, int]], fixed: Mapping[str
     for name, value in fixed.items():
         parts += ["--set", f"{name}={_value(value)}"]
     for name, (first, last, count) in axes.items():
-        parts += ["--axis", f"{name}={first!r}:{last!r}:{count}"]
+        parts += ["--sweep", f"{name}={first!r}:{last!r}:{count}"]
     return shlex.join([*parts, "-o", "window.nc", "--plot", "window.png"])
 
 

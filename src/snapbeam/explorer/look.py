@@ -203,7 +203,7 @@ def _class_table() -> NDArray[np.uint8]:
 
 def colors_of(name: str, values: NDArray[Any], limits: tuple[float, float]) -> NDArray[np.uint32]:
     """Numbers as colours, packed; what is not finite is left clear."""
-    if name == "response":
+    if name == "response_class":
         table = _class_table()
         bytes_ = table[np.clip(values.astype(np.int64) + 1, 0, len(table) - 1)]
     else:

@@ -16,11 +16,11 @@ from snapbeam.figures.series import plot_energies, plot_modal_amplitudes, plot_p
 from snapbeam.figures.statistic import plot_statistic
 from snapbeam.figures.style import CLASS_COLORS, house_style, new_figure, save_figure
 from snapbeam.figures.threshold import plot_threshold
-from snapbeam.lab.compare.dots import Dots, read_dots
+from snapbeam.lab.compare.dots import MeasuredPoints, read_measured_points
 
 __all__ = [
     "CLASS_COLORS",
-    "Dots",
+    "MeasuredPoints",
     "class_handles",
     "house_style",
     "new_figure",
@@ -40,6 +40,6 @@ __all__ = [
     "plot_survival",
     "plot_system",
     "plot_threshold",
-    "read_dots",
+    "read_measured_points",
     "save_figure",
 ]

@@ -33,8 +33,8 @@ def draw_agreement(
 
     Returns what a legend needs to say so: a scale of the shades.
     """
-    share = dataset["class_share"].squeeze().transpose(dims[1], dims[0], "response_class")
-    kinds = dataset["response"].squeeze().transpose(dims[1], dims[0]).values
+    share = dataset["class_fraction"].squeeze().transpose(dims[1], dims[0], "response_class")
+    kinds = dataset["response_class"].squeeze().transpose(dims[1], dims[0]).values
     own = kinds[..., None] == share["response_class"].values
     agreement = np.where(own, share.values, 0.0).sum(axis=-1)
     unknown = np.isnan(share.values).any(axis=-1)

@@ -17,7 +17,7 @@ from snapbeam.core.foreign import MADE_BY
 from snapbeam.core.validate import InputError, integer, nonnegative, positive
 from snapbeam.figures.captions import caption
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.ends import Ends
+from snapbeam.model.ends import BoundaryConditions
 from snapbeam.model.ends.of_beam import modes_between
 from snapbeam.model.galerkin.bent import displacement_along
 from snapbeam.runs.schema import check_trajectory
@@ -248,8 +248,8 @@ class _Scene:
         inside = (self.time >= times[0]) & (self.time <= times[-1])
         self.across = dataset["cycle"].values if "cycle" in dataset.variables else self.time
         self.shape = _BeamShape(dataset) if "modal_amplitude" in dataset else None
-        self.beam = dataset["displacement"].values
-        self.shaker = dataset["shaker_displacement"].values if "shaker_displacement" in dataset else None
+        self.beam = dataset["displacement_at_striker"].values
+        self.shaker = dataset["striker_displacement"].values if "striker_displacement" in dataset else None
         self.location = float(dataset.attrs.get("location", 0.5))
         self.rate = np.median(np.diff(times))
         self.times = times
@@ -332,7 +332,7 @@ class _BeamShape:
                 float(dataset.attrs[f"beam_{name}"]) for name in ("young_modulus", "width", "thickness")
             )
             stiff = young * width * thickness**3 / 12.0
-            self.modes = modes_between(Ends(**held), self.length, stiff, self.alpha.shape[-1])
+            self.modes = modes_between(BoundaryConditions(**held), self.length, stiff, self.alpha.shape[-1])
 
     def at(self, time: float) -> _Array:
         after = int(np.clip(np.searchsorted(self.time, time), 1, self.time.size - 1))

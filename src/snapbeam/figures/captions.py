@@ -32,14 +32,18 @@ def caption(dataset: xr.Dataset, lines: int = 1) -> str:
         what.append(f"$N$ = {int(attrs['modes'])}")
     if "frequency_ratio" in attrs and "frequency_ratio" not in dataset.dims:
         text = rf"$\Omega$ = {attrs['frequency_ratio']:.4g}"
-        if "reference_freq" in attrs:
-            text += f" ({prefixed(attrs['frequency_ratio'] * attrs['reference_freq'], 'Hz')})"
+        if "reference_frequency" in attrs:
+            text += f" ({prefixed(attrs['frequency_ratio'] * attrs['reference_frequency'], 'Hz')})"
         how.append(text)
     if "velocity_amplitude" in attrs and "velocity_amplitude" not in dataset.dims:
         text = f"$V$ = {attrs['velocity_amplitude']:.4g}"
-        if {"reference_freq", "length_scale"} <= set(attrs):
+        if {"reference_frequency", "length_scale"} <= set(attrs):
             speed = (
-                attrs["velocity_amplitude"] * 2.0 * np.pi * attrs["reference_freq"] * attrs["length_scale"]
+                attrs["velocity_amplitude"]
+                * 2.0
+                * np.pi
+                * attrs["reference_frequency"]
+                * attrs["length_scale"]
             )
             text += f" ({prefixed(speed, 'm/s')})"
         how.append(text)
@@ -47,5 +51,5 @@ def caption(dataset: xr.Dataset, lines: int = 1) -> str:
         how.append(rf"$x_\mathrm{{s}}$ = {attrs['location']:.3g}")
     parts = [", ".join(part for part in each if part) for each in (what, how)]
     text = ("\n" if lines > 1 else ", ").join(part for part in parts if part)
-    kind = attrs.get("response")
+    kind = attrs.get("response_class")
     return f"{text}: {kind}" if isinstance(kind, str) and text else text

@@ -18,7 +18,7 @@ from snapbeam.figures.axes import axis_label
 from snapbeam.figures.response_map import UPWARD, class_handles, draw_dots, draw_threshold_line, subtitle
 from snapbeam.figures.statistic import scaled_values, wants_powers
 from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_figure
-from snapbeam.lab.compare.dots import Dots
+from snapbeam.lab.compare.dots import MeasuredPoints
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,12 +40,12 @@ _SHARE = 0.04
 @checked
 def plot_points(
     dataset: xr.Dataset,
-    name: str = "response",
+    name: str = "response_class",
     ax: Axes | None = None,
     *,
     across: str | None = None,
     upward: str | None = None,
-    dots: Dots | None = None,
+    dots: MeasuredPoints | None = None,
     threshold_line: bool = False,
     legend: bool = True,
 ) -> Axes:
@@ -56,7 +56,7 @@ def plot_points(
     dataset : xarray.Dataset
         What :func:`snapbeam.sweep` made of a list of points: variables over ``point``, parameters as coordinates.
     name : str
-        ``"response"``, one of :data:`snapbeam.STATISTICS`, or any other variable over the points.
+        ``"response_class"``, one of :data:`snapbeam.STATISTICS`, or any other variable over the points.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
     across, upward : str, optional
@@ -83,7 +83,7 @@ def plot_points(
         named = [str(key) for key, item in dataset.data_vars.items() if item.dims == ("point",)]
         raise InputError(f"variable = {shown(name)}: the points have {', '.join(named) or 'no variables'}")
     along = _along(dataset, across, upward)
-    of_class = name == "response"
+    of_class = name == "response_class"
     with house_style():
         own = new_figure("single", 92.0 if of_class and legend else 74.0) if ax is None else None
         if own is not None:
@@ -111,7 +111,7 @@ def plot_points(
 
 
 def _over(
-    ax: Axes, dataset: xr.Dataset, along: tuple[str, str], dots: Dots | None, threshold_line: bool
+    ax: Axes, dataset: xr.Dataset, along: tuple[str, str], dots: MeasuredPoints | None, threshold_line: bool
 ) -> list[Any]:
     """Draw what lies over the points; what a legend needs for it."""
     if dots is None and not threshold_line:

@@ -19,7 +19,7 @@ from snapbeam.figures.axes import dress, edges_of, positions, symbol_of
 from snapbeam.figures.captions import beam_text
 from snapbeam.figures.panels import class_cells
 from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_figure
-from snapbeam.lab.compare.dots import Dots
+from snapbeam.lab.compare.dots import MeasuredPoints
 from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ _Array = NDArray[np.float64]
 UPWARD = ("velocity_amplitude", "location")
 """Axes that are drawn upward rather than across, the first of them first."""
 
-_CURVES = ("min_center_displacement", "max_center_displacement")
+_CURVES = ("min_midspan_displacement", "max_midspan_displacement")
 """Drawn over the classes of a map over one axis."""
 _NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 
@@ -42,7 +42,7 @@ def plot_response_map(
     dataset: xr.Dataset,
     ax: Axes | None = None,
     *,
-    dots: Dots | None = None,
+    dots: MeasuredPoints | None = None,
     threshold_line: bool = False,
     legend: bool = True,
 ) -> Axes:
@@ -50,7 +50,7 @@ def plot_response_map(
 
     Cell borders lie midway between the points of an axis, the outermost as far out as the next one in (but
     not below zero, nor beyond the end of the beam).  Cells of a map with repeats are the paler the fewer
-    of them agree (``class_share``).
+    of them agree (``class_fraction``).
 
     Parameters
     ----------
@@ -79,11 +79,13 @@ def plot_response_map(
     import xarray as xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
-    if "response" in dataset and dataset["response"].dims == ("point",):
+    if "response_class" in dataset and dataset["response_class"].dims == ("point",):
         from snapbeam.figures.point_list import plot_points
 
-        return plot_points(dataset, "response", ax, dots=dots, threshold_line=threshold_line, legend=legend)
-    if "response" in dataset and _is_line(dataset):
+        return plot_points(
+            dataset, "response_class", ax, dots=dots, threshold_line=threshold_line, legend=legend
+        )
+    if "response_class" in dataset and _is_line(dataset):
         return _line(dataset, ax, dots is not None or threshold_line, legend)
     across, upward, kinds = _two_axes(dataset)
     edges = tuple(edges_of(dataset, name) for name in (across, upward))
@@ -103,7 +105,7 @@ def plot_response_map(
         dress(ax.yaxis, dataset, upward)
         ax.set_title(subtitle(dataset, (across, upward)), loc="left")
         handles = class_handles(kinds)
-        if "class_share" in dataset:
+        if "class_fraction" in dataset:
             handles.append(draw_agreement(ax, dataset, (across, upward), edges))
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
         if threshold_line:
@@ -118,7 +120,7 @@ def plot_response_map(
 
 
 def _is_line(dataset: xr.Dataset) -> bool:
-    response = dataset["response"].squeeze()
+    response = dataset["response_class"].squeeze()
     return response.ndim == 1 and "point" not in response.dims
 
 
@@ -126,7 +128,7 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
     """A map over one axis."""
     if overlaid:
         raise InputError("dots, threshold_line: are drawn over two axes; this map has one")
-    name = str(dataset["response"].squeeze().dims[0])
+    name = str(dataset["response_class"].squeeze().dims[0])
     with house_style():
         own = new_figure("single", 84.0 if legend else 62.0) if ax is None else None
         ax = own.add_subplot() if own is not None else ax
@@ -134,7 +136,7 @@ def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) ->
         fix_ticks(ax)
         _draw_line(ax, dataset, name)
         ax.set_title(subtitle(dataset, (name,)), loc="left")
-        handles = class_handles(dataset["response"].values)
+        handles = class_handles(dataset["response_class"].values)
         if legend and own is not None:
             own.legend(handles=handles, loc="outside lower center", ncols=2)
         elif legend:
@@ -146,7 +148,7 @@ def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
     """Draw classes along the axis *name*, with the least and the greatest displacement of the centre above them."""
     points, _ = positions(dataset, name)
     edges = edges_of(dataset, name)
-    kinds = dataset["response"].squeeze().values[None, :]
+    kinds = dataset["response_class"].squeeze().values[None, :]
     low, high = -1.6, 1.6
     curves = [dataset[key].squeeze().values for key in _CURVES if key in dataset]
     if curves and np.isfinite(np.concatenate(curves)).any():
@@ -165,9 +167,9 @@ def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
     import xarray as xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
-    if "response" not in dataset:
+    if "response_class" not in dataset:
         raise InputError(f"no map: it has no variable 'response' among {list(map(str, dataset.variables))}")
-    response = dataset["response"].squeeze()
+    response = dataset["response_class"].squeeze()
     named = [str(name) for name in response.dims]
     if len(named) != 2 or "point" in named:
         sizes = ", ".join(f"{name} {size}" for name, size in response.sizes.items()) or "none"
@@ -254,7 +256,9 @@ def _given(fixed: dict[str, float | None], name: str) -> float:
     return value
 
 
-def draw_dots(ax: Axes, dots: Dots, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+def draw_dots(
+    ax: Axes, dots: MeasuredPoints, across: str, upward: str, fixed: dict[str, float | None]
+) -> Line2D:
     """Draw measured responses over a map, those at other values of its fixed coordinates left out with a warning."""
     keep = np.ones(len(dots), dtype=bool)
     for name, value in fixed.items():
@@ -269,7 +273,7 @@ def draw_dots(ax: Axes, dots: Dots, across: str, upward: str, fixed: dict[str, f
             f"{int((~keep).sum())} of {len(dots)} measured points do not belong to {named} and are left out",
             stacklevel=3,
         )
-    colors = [CLASS_COLORS[ResponseClass(int(kind))] for kind in dots.response[keep]]
+    colors = [CLASS_COLORS[ResponseClass(int(kind))] for kind in dots.response_class[keep]]
     where = getattr(dots, across)[keep], getattr(dots, upward)[keep]
     outside = (
         (where[0] < ax.get_xlim()[0])

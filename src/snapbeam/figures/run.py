@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 __all__ = ["plot_run"]
 
 _CURVES = (
-    ("center_displacement", "beam, centre", CENTER_COLOR),
-    ("displacement", "beam, at the striker", BEAM_COLOR),
-    ("shaker_displacement", "striker", SHAKER_COLOR),
+    ("midspan_displacement", "beam, centre", CENTER_COLOR),
+    ("displacement_at_striker", "beam, at the striker", BEAM_COLOR),
+    ("striker_displacement", "striker", SHAKER_COLOR),
 )
 _MANY = 20_000  # samples above which a curve is stored as pixels in a vector file
 
@@ -60,11 +60,11 @@ def plot_run(
     InputError
         If the dataset is no run or the window holds less than two samples.
     """
-    dataset = dataset_of(run, "displacement")
+    dataset = dataset_of(run, "displacement_at_striker")
     across, label = across_of(dataset)
     part = _cut(dataset, across, window)
     has_force = "contact_force" in part and bool((part["contact_force"] > 0.0).any())
-    rows = 1 + ("penetration" in part) + ("contact_force" in part)
+    rows = 1 + ("penetration_normalised" in part) + ("contact_force" in part)
     if ax is not None:
         return _alone(ax, part, part[across].values, label)
     with house_style():
@@ -147,8 +147,8 @@ def _column(
     if at == 0:
         axes[0].axhline(0.0, color="0.6", linewidth=0.5, zorder=0)
     row = 1
-    if "penetration" in part:
-        depth = 1e3 * np.maximum(part["penetration"].values, 0.0)
+    if "penetration_normalised" in part:
+        depth = 1e3 * np.maximum(part["penetration_normalised"].values, 0.0)
         axes[row].plot(x, depth, color=BEAM_COLOR, rasterized=pixels)
         axes[row].set_ylim(bottom=0.0)
         if at == 0:

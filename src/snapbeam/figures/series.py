@@ -32,7 +32,7 @@ _ENERGIES = (
     ("energy_beam", "in the beam", BEAM_COLOR),
     ("energy_contact", "in the contact", SHAKER_COLOR),
     ("energy_dissipated", "dissipated", "#858585"),
-    ("work_shaker", "striker's work", CENTER_COLOR),
+    ("striker_work", "striker's work", CENTER_COLOR),
 )
 
 
@@ -144,7 +144,7 @@ def plot_spectrum(
     run: Run | xr.Dataset,
     ax: Axes | None = None,
     *,
-    variable: str = "center_displacement",
+    variable: str = "midspan_displacement",
     window: Any = None,
 ) -> Axes:
     """Draw the amplitude spectrum of a run, from evenly spaced samples under a Hann window.
@@ -213,7 +213,7 @@ def plot_phase_portrait(
     """
     before = "center_" if choice("of", of, ("center", "striker")) == "center" else ""
     dataset = dataset_of(run, f"{before}displacement", f"{before}velocity")
-    w, v = (dataset[f"{before}{name}"].values for name in ("displacement", "velocity"))
+    w, v = (dataset[f"{before}{name}"].values for name in ("displacement_at_striker", "velocity_at_striker"))
     with house_style():
         ax = _axes(ax, dataset)
         ax.plot(w, v, color="0.6", linewidth=0.4, rasterized=w.size > 20_000)

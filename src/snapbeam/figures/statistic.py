@@ -125,7 +125,7 @@ def _label(dataset: xr.Dataset, name: str, values: np.ndarray) -> tuple[float, s
     """What values are divided by, and what stands beside them."""
     attrs = dataset[name].attrs
     row = STATISTICS.get(name)
-    words = str(attrs.get("long_name", row.words if row else name))
+    words = str(attrs.get("long_name", row.long_name if row else name))
     unit = str(attrs.get("units", row.unit if row else "1"))
     words = words[:1].upper() + words[1:]
     if unit == "1":

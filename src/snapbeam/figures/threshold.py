@@ -22,7 +22,7 @@ __all__ = ["plot_threshold"]
 
 _Array = NDArray[np.float64]
 _OPEN = "left open by failed runs"
-_NEEDED = ("first_interwell", "always_interwell", "first_interwell_min", "always_interwell_max", "outcome")
+_NEEDED = ("lower_threshold", "upper_threshold", "lower_threshold_min", "upper_threshold_max", "outcome")
 
 _STYLES = (("#B03A27", "-"), ("#16245E", "-"), ("#4C97C8", "--"), ("#6E8B2F", "-."), ("#000000", ":"))
 
@@ -60,7 +60,7 @@ def plot_threshold(
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if not set(_NEEDED) <= set(dataset.variables):
         raise InputError(f"no threshold curve among {list(map(str, dataset.variables))}")
-    dims = [str(name) for name in dataset["first_interwell"].squeeze().dims]
+    dims = [str(name) for name in dataset["lower_threshold"].squeeze().dims]
     if not 1 <= len(dims) <= 2:
         raise InputError(
             f"threshold over {dims}: is drawn along one axis, a curve for each point of another one"
@@ -88,7 +88,7 @@ def plot_threshold(
             ax.plot(x, _quasi_static(dataset, along, x), color="black", linewidth=0.8, dashes=(4, 2),
                     label=r"quasi-static, $V_\mathrm{QS1}$")  # fmt: skip
         amplitude = dataset[raised].values
-        upper = dataset["always_interwell_max"].where(dataset["first_interwell"].notnull(), -np.inf)
+        upper = dataset["upper_threshold_max"].where(dataset["lower_threshold"].notnull(), -np.inf)
         closed = bool(upper.notnull().all()) and bool(np.isfinite(upper).any())
         top = min(amplitude[-1], 1.4 * float(upper.max())) if closed else amplitude[-1]
         fix_ticks(ax)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from snapbeam.core.findings import Finding, ImplausibleError, Severity, findings_of
+from snapbeam.core.findings import Diagnostic, DiagnosticError, Severity, diagnostics_of
 
 _HOMES = {
     "Alignment": "drive.align",
@@ -56,7 +56,7 @@ _HOMES = {
     "measure_drive": "drive.vibrometer",
 }
 
-__all__ = ["Finding", "ImplausibleError", "Severity", "findings_of", *sorted(_HOMES)]
+__all__ = ["Diagnostic", "DiagnosticError", "Severity", "diagnostics_of", *sorted(_HOMES)]
 
 
 def __getattr__(name: str) -> Any:

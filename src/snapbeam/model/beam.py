@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 from snapbeam.core.validate import InputError, InputTypeError, finite, shown
-from snapbeam.model.ends.ends import CLAMPED, Ends
+from snapbeam.model.ends.ends import CLAMPED, BoundaryConditions
 from snapbeam.model.ends.of_beam import Modes, modes_between
 from snapbeam.model.galerkin.modes import wavenumbers
 from snapbeam.model.quantity import quantities, quantity
@@ -52,7 +52,7 @@ class Beam:
     axial_load : float
         Axial load P, N, compression positive.  Below the critical load the beam is straight; a
         negative load is tension.
-    ends : Ends
+    boundary : Ends
         How the ends are held; clamped and rigid by default.  Others change the critical loads, the first of them in the
         relation above, and 4 L^2/(pi^2 E S) in it to phi_1(L/2)^2/gamma.
 
@@ -101,12 +101,12 @@ class Beam:
         optional=True,
         short="beam_axial_load",
     )
-    ends: Ends = CLAMPED
+    boundary: BoundaryConditions = CLAMPED
     _given: str = dataclasses.field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.ends, Ends):
-            raise InputTypeError(f"ends = {shown(self.ends)}: must be Ends")
+        if not isinstance(self.boundary, BoundaryConditions):
+            raise InputTypeError(f"ends = {shown(self.boundary)}: must be Ends")
         level: float | None = self.buckling_level
         load: float | None = self.axial_load
         # what followed from the other in the beam that dataclasses.replace starts from is not given
@@ -142,9 +142,9 @@ class Beam:
         return _Derived(math.sqrt(max(load - self.critical_load, 0.0) / stretch)), load
 
     def _stretch(self) -> float:
-        if self.ends.is_ideal:
+        if self.boundary.is_clamped:
             return math.pi**2 * self.young_modulus * self.area / (4.0 * self.length**2)
-        return self.tension_stiffness / float(self.buckling_modes(1).shape(0.5 * self.length)[0]) ** 2
+        return self.nonlinear_stiffness / float(self.buckling_modes(1).shape(0.5 * self.length)[0]) ** 2
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
@@ -176,7 +176,7 @@ class Beam:
 
     def buckling_modes(self, count: int) -> Modes:
         """The first *count* buckling modes between the beam's ends."""
-        return modes_between(self.ends, self.length, self.bending_stiffness, count)
+        return modes_between(self.boundary, self.length, self.bending_stiffness, count)
 
     @property
     def area(self) -> float:
@@ -204,22 +204,26 @@ class Beam:
         return self.young_modulus * self.second_moment
 
     @property
-    def tension_stiffness(self) -> float:
+    def nonlinear_stiffness(self) -> float:
         """Stiffness gamma = E S / (2 L) of the midplane stretching, N/m (Eq. 15), less for supports that give way."""
         rigid = self.young_modulus * self.area / (2.0 * self.length)
-        return rigid if self.ends.axial is None else rigid / (1.0 + 2.0 * rigid / self.ends.axial)
+        return (
+            rigid
+            if self.boundary.axial_support_stiffness is None
+            else rigid / (1.0 + 2.0 * rigid / self.boundary.axial_support_stiffness)
+        )
 
     @property
     def critical_load(self) -> float:
         """First critical load P_cr = E I k_1^2, N: 4 pi^2 E I / L^2 between clamps (Eq. 3)."""
-        if self.ends.turn:
+        if self.boundary.rotational_stiffness:
             return self.bending_stiffness * float(self.buckling_modes(1).wavenumber[0]) ** 2
         return self.bending_stiffness * (2.0 * math.pi / self.length) ** 2
 
     @property
     def second_critical_load(self) -> float:
         """Second critical load E I k_2^2, N, of the antisymmetric mode: 2.0457 P_cr between clamps."""
-        if self.ends.turn:
+        if self.boundary.rotational_stiffness:
             return self.bending_stiffness * float(self.buckling_modes(2).wavenumber[1]) ** 2
         return self.bending_stiffness * float(wavenumbers(2, self.length)[1]) ** 2
 

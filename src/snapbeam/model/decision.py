@@ -45,7 +45,7 @@ def least_energy_at(model: ReducedModel, location: ArrayLike, displacement: Arra
     x, r = np.broadcast_arrays(np.asarray(location, float), np.asarray(displacement, float))
     places, which = np.unique(x.ravel(), return_inverse=True)
     squares = np.array([model.shape_at(float(place)) ** 2 for place in places])
-    k0, gamma = np.asarray(model.stiffness), model.tension_stiffness
+    k0, gamma = np.asarray(model.stiffness), model.nonlinear_stiffness
     pinned = np.array([pinned_load(square, k0) for square in squares])[which]
     squares, heights = squares[which], r.ravel() ** 2
 
@@ -97,16 +97,16 @@ def passed_heights(
 
 def crossing_energy(model: ReducedModel) -> float:
     """Energy, J, that a beam needs at least for its centre to pass from one well to the other."""
-    if model.landscape is None or model.side_force is None or model.stiffness.ndim > 1:
-        return model.barrier_energy
+    if model.landscape is None or model.transverse_force is None or model.stiffness.ndim > 1:
+        return model.saddle_energy
     bound = least_energy_through(
         model.stiffness,
-        model.tension_stiffness,
-        model.side_force,
-        model.center_shape[None],
+        model.nonlinear_stiffness,
+        model.transverse_force,
+        model.midspan_shape[None],
         np.array([model.dividing_height]),
     )
-    return min(float(bound[0]), model.barrier_energy)
+    return min(float(bound[0]), model.saddle_energy)
 
 
 def decidable_energy(
@@ -124,10 +124,10 @@ def decidable_energy(
         return _uneven_energy(model, location, highest)
     bounded = highest < np.inf
     reach = np.where(bounded, np.maximum(highest, 0.0), 0.0)
-    barrier = model.barrier_energy
+    barrier = model.saddle_energy
     limit = np.minimum(least_energy_at(model, location, reach), barrier)
     places, which = np.unique(location, return_inverse=True)
-    well = np.abs(np.array([float(model.shape_at(float(x)) @ model.equilibrium) for x in places]))[which]
+    well = np.abs(np.array([float(model.shape_at(float(x)) @ model.well_amplitude) for x in places]))[which]
     energy = limit - model.well_energy - RESERVE * (barrier - model.well_energy)
     return np.where(bounded & (reach < well), energy, -np.inf)
 
@@ -136,13 +136,15 @@ def _uneven_energy(
     model: ReducedModel, location: NDArray[np.float64], highest: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """The same of unequal wells, above the first of them."""
-    assert model.landscape is not None and model.side_force is not None
+    assert model.landscape is not None and model.transverse_force is not None
     bounded = highest < np.inf
     reach = passed_heights(model, location, np.where(bounded, highest, 0.0))
     places, which = np.unique(location, return_inverse=True)
     shapes = np.array([model.shape_at(float(x)) for x in places])[which.ravel()]
-    through = least_energy_through(model.stiffness, model.tension_stiffness, model.side_force, shapes, reach)
+    through = least_energy_through(
+        model.stiffness, model.nonlinear_stiffness, model.transverse_force, shapes, reach
+    )
     limit = np.minimum(through, crossing_energy(model))
-    kept = RESERVE * (model.barrier_energy - model.landscape.deepest.energy)
+    kept = RESERVE * (model.saddle_energy - model.landscape.deepest.energy)
     well = shapes @ model.landscape.upper.amplitude
     return np.where(bounded & (reach < well), limit - model.well_energy - kept, -np.inf)

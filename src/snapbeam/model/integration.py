@@ -11,7 +11,7 @@ from snapbeam.model.quantity import check_fields, quantities, quantity
 
 __all__ = ["ACCURACIES", "CYCLES", "ENGINES", "Integration"]
 
-ACCURACIES = ("map", "reference")
+ACCURACIES = ("standard", "reference")
 ENGINES = ("auto", "cpu", "cuda")
 CYCLES = 200
 """Cycles of a run unless others are asked for."""
@@ -28,20 +28,20 @@ class Integration:
     step : float, optional
         Step in free flight, s; steps in contact scale with it.  The default follows from the model and
         the contact; its error is on the docs' page on accuracy.
-    accuracy : {"map", "reference"}
-        ``"map"``: order 4.  ``"reference"``: order 6 and much shorter steps, to check others with.
+    accuracy : {"standard", "reference"}
+        ``"standard"``: order 4.  ``"reference"``: order 6 and much shorter steps, to check others with.
     tolerance : float, optional
         Greatest error allowed in the displacement of the contact point and of the centre of one run, in b, from
         1e-10 to 0.1, as far as the problem's conditioning lets any integrator promise it; in place of *step*
         and *accuracy*.
     engine : {"auto", "cpu", "cuda"}
         What integrates; ``"auto"`` takes the fastest that serves.
-    early_decision : bool
+    early_termination : bool
         End a run once its response class is certain: the class is the same, statistics other than it stop there.
     threads : int, optional
         Threads of the CPU engine; all usable cores by default.  No number depends on it.
     high_frequency_ratio : float
-        Multiple of omega_1 above which the energy of a mode counts as high, for ``high_frequency_share``.
+        Multiple of omega_1 above which the energy of a mode counts as high, for ``high_frequency_energy_fraction``.
     max_steps : int, optional
         Steps that one run may take.  A run whose free flight alone takes more is refused before it begins; one that
         takes more since it is much in contact ends with the status STEP_LIMIT.  By default what one core does in
@@ -57,13 +57,13 @@ class Integration:
         "1", "cycles of excitation", default=None, kind=int, low=1, high=10**7, optional=True
     )
     step: float | None = quantity("s", "step in free flight", default=None, low=0.0, optional=True)
-    accuracy: str = quantity("1", "accuracy level", default="map", kind=str, choices=ACCURACIES)
+    accuracy: str = quantity("1", "accuracy level", default="standard", kind=str, choices=ACCURACIES)
     tolerance: float | None = quantity(
         "1", "greatest error of the displacement, over b", default=None, low=1e-10, high=0.1, closed="both",
         optional=True,
     )  # fmt: skip
     engine: str = quantity("1", "what integrates", default="auto", kind=str, choices=ENGINES)
-    early_decision: bool = quantity(
+    early_termination: bool = quantity(
         "1", "whether a run ends once its response class is certain", default=False, kind=bool
     )
     threads: int | None = quantity(
@@ -78,7 +78,7 @@ class Integration:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.tolerance is not None and (self.step is not None or self.accuracy != "map"):
+        if self.tolerance is not None and (self.step is not None or self.accuracy != "standard"):
             raise InputError(
                 f"tolerance = {self.tolerance!r} with step = {self.step!r}, accuracy = {self.accuracy!r}: give one"
             )

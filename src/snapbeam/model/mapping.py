@@ -12,14 +12,14 @@ from snapbeam.core.validate import InputError, mapping, shown
 from snapbeam.model.beam import Beam
 from snapbeam.model.contact import LAWS, ContactLaw
 from snapbeam.model.drive import DRIVES, Drive
-from snapbeam.model.ends import Ends
+from snapbeam.model.ends import BoundaryConditions
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.quantity import quantities
 from snapbeam.model.state import State
 from snapbeam.model.striker import Striker
-from snapbeam.model.striker.another import Another, numbered
-from snapbeam.model.world import HARVESTERS, LOADS, AxialLoad, Base
+from snapbeam.model.striker.another import ContactPair, numbered
+from snapbeam.model.world import HARVESTERS, LOADS, AxialLoadModulation, BaseExcitation
 
 __all__ = ["SECTIONS", "parts_from_mapping", "parts_to_mapping"]
 
@@ -39,7 +39,7 @@ SECTIONS = (
 """Sections of a system, in their order."""
 
 _MATRICES = (
-    "mass", "stiffness", "contact_shape", "center_shape", "tension_stiffness", "equilibrium", "length_scale",
+    "mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "equilibrium", "length_scale",
 )  # fmt: skip
 _START = (
     "amplitude",
@@ -58,7 +58,7 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
     model: ReducedModel = system.model
     contact: ContactLaw | None = system.contact
     striker: Striker | None = system.striker
-    start: State | None = system.start
+    start: State | None = system.initial_state
     sections: dict[str, dict[str, Any]] = {}
     section: dict[str, Any] = {}
     damping = model.damping_ratio
@@ -68,40 +68,42 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         names = ("length", "thickness", "width", "density", "young_modulus", beam.given)
         sections["beam"] = {name: float(getattr(beam, name)) for name in names}
         section["modes"] = model.modes
-        if not beam.ends.is_ideal:
-            sections["ends"] = _fields(beam.ends)
+        if not beam.boundary.is_clamped:
+            sections["ends"] = _fields(beam.boundary)
         if model.imperfection is not None:
             own = {name: getattr(model.imperfection, name) for name in quantities(Imperfection)}
             sections["imperfection"] = {name: value for name, value in own.items() if value is not None}
     else:
         section |= {name: getattr(model, name) for name in _MATRICES}
-        if model.side_force is not None:
+        if model.transverse_force is not None:
             section.pop("equilibrium")  # follows from the force
-            section["side_force"] = model.side_force
+            section["transverse_force"] = model.transverse_force
     section["damping_ratio"] = float(damping[0]) if uniform else np.array(damping)
-    if model.given_reference_freq is not None:
-        section["reference_freq"] = model.given_reference_freq
+    if model.given_reference_frequency is not None:
+        section["reference_frequency"] = model.given_reference_frequency
     sections["model"] = section
     if contact is not None:
-        sections["contact"] = {"law": contact.name} | _fields(contact)
+        sections["contact"] = {"type": contact.name} | _fields(contact)
     if striker is not None:
         # without a mass there is no suspension
         left_out = ("spring", "damper") if striker.mass is None else ()
         own = {name: getattr(striker, name) for name in quantities(Striker) if name not in left_out}
         sections["striker"] = {name: value for name, value in own.items() if value is not None}
-        sections["drive"] = {"kind": striker.drive.name} | _fields(striker.drive)
-    for number, each in enumerate(system.others, 2):
-        sections[f"contact_{number}"] = {"law": each.contact.name} | _fields(each.contact)
+        sections["drive"] = {"type": striker.drive.name} | _fields(striker.drive)
+    for number, each in enumerate(system.further_contacts, 2):
+        sections[f"contact_{number}"] = {"type": each.contact.name} | _fields(each.contact)
         own = {name: getattr(each.striker, name) for name in ("location", "side", "gap")}
         sections[f"striker_{number}"] = {name: value for name, value in own.items() if value is not None}
-        sections[f"drive_{number}"] = {"kind": each.striker.drive.name} | _fields(each.striker.drive)
-    if system.base is not None:
-        own = {name: getattr(system.base, name) for name in quantities(Base)}
-        sections["base"] = {"kind": system.base.motion.name} | own | _fields(system.base.motion)
-    if system.axial is not None:
-        sections["axial"] = {"kind": system.axial.motion.name} | _fields(system.axial.motion)
+        sections[f"drive_{number}"] = {"type": each.striker.drive.name} | _fields(each.striker.drive)
+    if system.base_excitation is not None:
+        own = {name: getattr(system.base_excitation, name) for name in quantities(BaseExcitation)}
+        sections["base"] = (
+            {"type": system.base_excitation.motion.name} | own | _fields(system.base_excitation.motion)
+        )
+    if system.axial_load is not None:
+        sections["axial"] = {"type": system.axial_load.motion.name} | _fields(system.axial_load.motion)
     if system.harvester is not None:
-        sections["harvester"] = {"kind": system.harvester.name} | _fields(system.harvester)
+        sections["harvester"] = {"type": system.harvester.name} | _fields(system.harvester)
     if start is not None:
         values = {name: getattr(start, name) for name in _START}
         sections["start"] = {
@@ -127,21 +129,21 @@ def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, A
             raise InputError(f"{name} = {shown(values)}: must be a section [{name}]")
     parts: dict[str, Any] = {"model": _model(sections)}
     if "contact" in sections:
-        parts["contact"] = _chosen(sections["contact"], "contact", "law", LAWS)
+        parts["contact"] = _chosen(sections["contact"], "contact", "type", LAWS)
     if "striker" in sections or "drive" in sections:
-        drive: Drive = _chosen(sections.get("drive", {}), "drive", "kind", DRIVES)
+        drive: Drive = _chosen(sections.get("drive", {}), "drive", "type", DRIVES)
         own = dict(sections.get("striker", {}))
         _only(own, "striker", list(quantities(Striker)))
         parts["striker"] = Striker(drive=drive, **own)
     parts["others"] = _others(sections, parts.get("contact"))
     if "base" in sections:
         own = dict(sections["base"])
-        around = {name: own.pop(name) for name in quantities(Base) if name in own}
-        parts["base"] = Base(motion=_chosen(own, "base", "kind", DRIVES), **around)
+        around = {name: own.pop(name) for name in quantities(BaseExcitation) if name in own}
+        parts["base"] = BaseExcitation(motion=_chosen(own, "base", "type", DRIVES), **around)
     if "axial" in sections:
-        parts["axial"] = AxialLoad(motion=_chosen(sections["axial"], "axial", "kind", LOADS))
+        parts["axial"] = AxialLoadModulation(motion=_chosen(sections["axial"], "axial", "type", LOADS))
     if "harvester" in sections:
-        parts["harvester"] = _chosen(sections["harvester"], "harvester", "kind", HARVESTERS)
+        parts["harvester"] = _chosen(sections["harvester"], "harvester", "type", HARVESTERS)
     if "start" in sections:
         values = dict(sections["start"])
         _only(values, "start", list(_START))
@@ -150,7 +152,7 @@ def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, A
     return parts
 
 
-def _others(sections: Mapping[str, Mapping[str, Any]], contact: Any) -> tuple[Another, ...]:
+def _others(sections: Mapping[str, Mapping[str, Any]], contact: Any) -> tuple[ContactPair, ...]:
     """The strikers beside the first: sections striker_2, drive_2 and contact_2 (without it the first one's law)."""
     numbers = sorted({numbered(name)[1] for name in sections} - {1})
     if numbers != list(range(2, 2 + len(numbers))):
@@ -160,11 +162,11 @@ def _others(sections: Mapping[str, Mapping[str, Any]], contact: Any) -> tuple[An
         names = {kind: f"{kind}_{number}" for kind in ("striker", "drive", "contact")}
         own = dict(sections.get(names["striker"], {}))
         _only(own, names["striker"], list(quantities(Striker)))
-        drive = _chosen(sections.get(names["drive"], {"kind": "still"}), names["drive"], "kind", DRIVES)
+        drive = _chosen(sections.get(names["drive"], {"type": "fixed"}), names["drive"], "type", DRIVES)
         law = contact
         if names["contact"] in sections:
-            law = _chosen(sections[names["contact"]], names["contact"], "law", LAWS)
-        found.append(Another(Striker(drive=drive, **own), law))
+            law = _chosen(sections[names["contact"]], names["contact"], "type", LAWS)
+        found.append(ContactPair(Striker(drive=drive, **own), law))
     return tuple(found)
 
 
@@ -173,22 +175,24 @@ def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
     if "beam" in sections:
         values = dict(sections["beam"])
         _only(values, "beam", list(quantities(Beam)))
-        _only(own, "model", ["modes", "damping_ratio", "reference_freq"])
+        _only(own, "model", ["modes", "damping_ratio", "reference_frequency"])
         _needed(values, "beam", Beam)
         uneven = dict(sections.get("imperfection", {}))
         _only(uneven, "imperfection", list(quantities(Imperfection)))
         held = dict(sections.get("ends", {}))
-        _only(held, "ends", list(quantities(Ends)))
+        _only(held, "ends", list(quantities(BoundaryConditions)))
         return ReducedModel.from_beam(
-            Beam(**values, ends=Ends(**held)), **own, imperfection=Imperfection(**uneven)
+            Beam(**values, boundary=BoundaryConditions(**held)), **own, imperfection=Imperfection(**uneven)
         )
     if "ends" in sections:
-        raise InputError("[ends]: belong to a beam; a structure given by matrices has them in its matrices")
+        raise InputError(
+            "[boundary]: belong to a beam; a structure given by matrices has them in its matrices"
+        )
     if "imperfection" in sections:
         raise InputError(
-            "[imperfection]: belongs to a beam; give the side_force of a structure given by matrices"
+            "[imperfection]: belongs to a beam; give the transverse_force of a structure given by matrices"
         )
-    _only(own, "model", [*_MATRICES, "side_force", "damping_ratio", "reference_freq"])
+    _only(own, "model", [*_MATRICES, "transverse_force", "damping_ratio", "reference_frequency"])
     for name in ("mass", "stiffness", "contact_shape"):
         if name not in own:
             raise InputError(f"[model] {name} is missing: give it, or a section [beam]")

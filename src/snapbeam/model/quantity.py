@@ -13,7 +13,7 @@ from typing import Any
 
 from snapbeam.core.validate import choice, finite, flag, integer, nonnegative, positive, within
 
-__all__ = ["RUN", "STRUCTURE", "Quantity", "check_fields", "quantities", "quantity"]
+__all__ = ["RUN", "STRUCTURE", "ParameterField", "check_fields", "quantities", "quantity"]
 
 RUN = "run"
 """Scope of what may differ between the runs of one ensemble."""
@@ -22,14 +22,14 @@ STRUCTURE = "structure"
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ParameterField:
     """What one field means.
 
     Attributes
     ----------
     unit : str
         SI unit, ``"1"`` if it has none.
-    words : str
+    long_name : str
         What it is.
     kind : type
         float, int, bool, str, or object for anything that checks itself.
@@ -49,7 +49,7 @@ class Quantity:
     """
 
     unit: str
-    words: str
+    long_name: str
     kind: type = float
     low: float = -math.inf
     high: float = math.inf
@@ -83,10 +83,10 @@ class Quantity:
 
 def quantity(unit: str, words: str, *, default: Any = dataclasses.MISSING, **more: Any) -> Any:
     """A dataclass field that is a :class:`Quantity`."""
-    return dataclasses.field(default=default, metadata={"quantity": Quantity(unit, words, **more)})
+    return dataclasses.field(default=default, metadata={"quantity": ParameterField(unit, words, **more)})
 
 
-def quantities(kind: type) -> dict[str, Quantity]:
+def quantities(kind: type) -> dict[str, ParameterField]:
     """The quantities of a dataclass, by the names of their fields."""
     return {
         item.name: item.metadata["quantity"]

@@ -16,11 +16,11 @@ from snapbeam.model.mapping import SECTIONS
 from snapbeam.model.quantity import quantities
 from snapbeam.model.start import started
 from snapbeam.model.state import State
-from snapbeam.model.striker.another import Another, numbered
+from snapbeam.model.striker.another import ContactPair, numbered
 
 __all__ = ["replaced"]
 
-_OF_MODEL = ("modes", "damping_ratio", "reference_freq")
+_OF_MODEL = ("modes", "damping_ratio", "reference_frequency")
 
 
 def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -71,8 +71,8 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
 
 
 def _others(
-    others: tuple[Another, ...], whole: Mapping[str, Any], inside: Mapping[str, Mapping[str, Any]]
-) -> tuple[Another, ...]:
+    others: tuple[ContactPair, ...], whole: Mapping[str, Any], inside: Mapping[str, Mapping[str, Any]]
+) -> tuple[ContactPair, ...]:
     """The strikers beside the first one, changed by dotted name or whole part."""
     for name in (*whole, *inside):
         if numbered(name)[1] > 1 + len(others):
@@ -93,7 +93,7 @@ def _others(
             striker = _changed(striker, f"striker_{number}", inside[f"striker_{number}"])
         if f"contact_{number}" in inside:
             contact = _changed(contact, f"contact_{number}", inside[f"contact_{number}"])
-        made.append(Another(striker, contact))
+        made.append(ContactPair(striker, contact))
     return tuple(made)
 
 
@@ -137,14 +137,14 @@ def _with_imperfection(
     """The model of the same beam with another imperfection; of a perfect one *values* are all that it then has."""
     if model.beam is None:
         raise InputError(
-            "imperfection: this model was given by matrices, it has no beam; give its side_force"
+            "imperfection: this model was given by matrices, it has no beam; give its transverse_force"
         )
     if values:
         changed = _changed(Imperfection() if imperfection is None else imperfection, "imperfection", values)
         imperfection = changed
     damping: Any = model.damping_ratio
     return ReducedModel.from_beam(
-        model.beam, model.modes, damping, model.given_reference_freq, imperfection=imperfection
+        model.beam, model.modes, damping, model.given_reference_frequency, imperfection=imperfection
     )
 
 
@@ -161,13 +161,13 @@ def _model(
             raise InputError("beam: this model was given by matrices, it has no beam")
         given = {
             "damping_ratio": of_model.get("damping_ratio", model.damping_ratio),
-            "reference_freq": of_model.get("reference_freq", model.given_reference_freq),
+            "reference_frequency": of_model.get("reference_frequency", model.given_reference_frequency),
         }
-        names = ("mass", "stiffness", "contact_shape", "center_shape", "tension_stiffness", "equilibrium")
+        names = ("mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "equilibrium")
         rest = {name: getattr(model, name) for name in names}
-        if model.side_force is not None:
+        if model.transverse_force is not None:
             rest = {name: value for name, value in rest.items() if name != "equilibrium"}
-            rest["side_force"] = model.side_force
+            rest["transverse_force"] = model.transverse_force
         return ReducedModel.from_matrices(**rest, length_scale=model.length_scale or 1.0, **given)
     known = [item.name for item in dataclasses.fields(model.beam) if item.init]
     for name in of_beam:
@@ -179,7 +179,7 @@ def _model(
     changed = {
         "modes": model.modes,
         "damping_ratio": damping,
-        "reference_freq": model.given_reference_freq,
+        "reference_frequency": model.given_reference_frequency,
         "imperfection": model.imperfection,
     } | dict(of_model)
     return ReducedModel.from_beam((model.beam if beam is None else beam).replace(**of_beam), **changed)

@@ -22,17 +22,17 @@ START_NAME = re.compile(r"(amplitude|velocity)\[([1-9][0-9]{0,3})\]")
 def amplitude_scale(model: ReducedModel) -> float:
     """What amplitudes of a start are counted in, m^0.5: the first amplitude in a well, or, of a structure
     with one well, what moves the centre by the length scale."""
-    well = float(np.sqrt(model.equilibrium @ model.equilibrium))
+    well = float(np.sqrt(model.well_amplitude @ model.well_amplitude))
     if well > 0.0:
         return well
-    return float(model.length_scale or 1.0) / float(np.abs(model.center_shape).max())
+    return float(model.length_scale or 1.0) / float(np.abs(model.midspan_shape).max())
 
 
 def rest_state(model: ReducedModel, striker: Striker | None = None) -> State:
     """At rest in the well that the striker pushes away from, and touched by it."""
     if striker is not None and striker.side == "above":
         return State(amplitude=-model.mirrored.equilibrium)
-    return State(amplitude=model.equilibrium)
+    return State(amplitude=model.well_amplitude)
 
 
 def started(
@@ -64,5 +64,5 @@ def started(
         if found[1] == "amplitude":
             amplitude[..., mode] = column * scale
         else:
-            velocity[..., mode] = column * scale * 2.0 * np.pi * model.reference_freq
+            velocity[..., mode] = column * scale * 2.0 * np.pi * model.reference_frequency
     return State(amplitude=amplitude, velocity=velocity, **parts)

@@ -15,7 +15,7 @@ from snapbeam.core.validate import InputError, finite_array, mapping, shown
 __all__ = ["ModalState", "State"]
 
 _Array = NDArray[np.float64]
-_REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
+_REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 
 
 class ModalState(NamedTuple):
@@ -24,7 +24,7 @@ class ModalState(NamedTuple):
     q: _Array
     """Linear modes about the well, shape (..., N)."""
     p: _Array
-    home: _Array
+    well_sign: _Array
     """+1 about the well that the striker pushes away from, -1 about the other, shape (...)."""
     offset: _Array
     """Penetration of the tip at mid-stroke into the beam at rest in the first well, m."""
@@ -57,7 +57,7 @@ class State:
         where there is none, or where it is at rest.
     tangent : array_like of shape (..., k, 2, N), optional
         Small changes of amplitude and velocity that were carried along, k of them.
-    passed : mapping, optional
+    statistics : mapping, optional
         What happened on the way here: crossings, impacts, peak_force, ... by name.  A state that was not reached,
         as its ``passed["status"]`` says, is NaN.
     modal : ModalState, optional
@@ -78,11 +78,11 @@ class State:
     striker_rate: _Array = np.nan  # type: ignore[assignment]
     circuit: _Array = np.nan  # type: ignore[assignment]
     tangent: _Array | None = None
-    passed: Mapping[str, _Array] | None = field(default=None, repr=False)
+    statistics: Mapping[str, _Array] | None = field(default=None, repr=False)
     modal: ModalState | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
-        amplitude = _finite_where_known("state amplitude", self.amplitude, self.passed)
+        amplitude = _finite_where_known("state amplitude", self.amplitude, self.statistics)
         if amplitude.ndim == 0:
             raise InputError(
                 f"state amplitude = {float(amplitude):g}: must be an array of shape (..., modes)"
@@ -90,7 +90,7 @@ class State:
         batch = amplitude.shape[:-1]
         velocity = np.zeros_like(amplitude)
         if self.velocity is not None:
-            velocity = _finite_where_known("state velocity", self.velocity, self.passed)
+            velocity = _finite_where_known("state velocity", self.velocity, self.statistics)
             if velocity.shape != amplitude.shape:
                 raise InputError(
                     f"state velocity of shape {velocity.shape}: must have shape {amplitude.shape}"
@@ -124,16 +124,16 @@ class State:
         """States of a batch, with what is known of each of them and not of their way as a whole."""
         if not self.batch:
             raise InputError(f"state[{index!r}]: this is one state, not a batch")
-        passed, tangent = self.passed, self.tangent
+        passed, tangent = self.statistics, self.tangent
         if passed is not None:
-            passed = {
+            statistics = {
                 name: values[index] for name, values in passed.items() if np.shape(values) == self.batch
             }
         if tangent is not None:
             tangent = tangent[index] if tangent.shape[:-3] == self.batch else None
         modal = self.modal
         if modal is not None:
-            parts = (modal.q[index], modal.p[index], modal.home[index], modal.offset[index])
+            parts = (modal.q[index], modal.p[index], modal.well_sign[index], modal.offset[index])
             modal = ModalState(*parts, modal.structure)
         return State(
             amplitude=self.amplitude[index],
@@ -145,7 +145,7 @@ class State:
             striker_rate=self.striker_rate[index],
             circuit=self.circuit[index],
             tangent=tangent,
-            passed=passed,
+            statistics=passed,
             modal=modal,
         )
 
@@ -195,7 +195,7 @@ class State:
 
 def _finite_where_known(name: str, value: ArrayLike, passed: Mapping[str, _Array] | None) -> _Array:
     """Numbers that are finite, but for states that were not reached, as their status says."""
-    status = None if passed is None else mapping("passed", passed).get("status")
+    status = None if passed is None else mapping("statistics", passed).get("status")
     if status is None:
         return finite_array(name, value)
     array = np.array(value, dtype=np.float64)

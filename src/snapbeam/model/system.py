@@ -14,19 +14,19 @@ from typing import Any
 import numpy as np
 
 from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.provenance import canonical_json
 from snapbeam.core.validate import InputError, InputTypeError, file_path, instance, shown
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.doubts import doubts_of
-from snapbeam.model.drive import Drive, Scale, Still
+from snapbeam.model.drive import Drive, Scale, FixedStop
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.mapping import parts_from_mapping, parts_to_mapping
 from snapbeam.model.replacing import replaced
 from snapbeam.model.state import State
 from snapbeam.model.striker import Shaker, Striker
-from snapbeam.model.striker.another import Another, check_others, parted
-from snapbeam.model.world import AxialLoad, Base, Harvester
+from snapbeam.model.striker.another import ContactPair, check_others, parted
+from snapbeam.model.world import AxialLoadModulation, BaseExcitation, Harvester
 from snapbeam.model.world.check import check_world
 
 __all__ = ["System"]
@@ -42,20 +42,20 @@ class System:
     contact : ContactLaw, or a sequence of them, optional
         Needed with a striker.  Of several strikers, one law each or one for all.
     striker : Striker or Shaker, or a sequence of them, optional
-        Without one the structure vibrates freely from *start*.  Several strike at once, each with its own place, side,
+        Without one the structure vibrates freely from *initial_state*.  Several strike at once, each with its own place, side,
         law and drive; runs begin in the well that the first one pushes away from.
-    base : Base, optional
+    base_excitation : Base, optional
         The motion of what both ends of the beam are mounted on.
-    axial : AxialLoad, optional
+    axial_load : AxialLoadModulation, optional
         How the axial load changes in time.
     harvester : Piezo or Coil, optional
         A circuit that turns motion into power in a resistor.
-    start : State, optional
+    initial_state : State, optional
         Where runs begin, one state; by default at rest in the well that the striker pushes away from, touched by it.
 
     Attributes
     ----------
-    others : tuple of Another
+    further_contacts : tuple of Another
         The strikers beside the first one, with their laws.
 
     Raises
@@ -78,17 +78,17 @@ class System:
     model: ReducedModel
     contact: ContactLaw | None = None
     striker: Striker | None = None
-    start: State | None = None
-    base: Base | None = None
-    axial: AxialLoad | None = None
+    initial_state: State | None = None
+    base_excitation: BaseExcitation | None = None
+    axial_load: AxialLoadModulation | None = None
     harvester: Harvester | None = None
-    others: tuple[Another, ...] = ()
+    further_contacts: tuple[ContactPair, ...] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.striker, (list, tuple)) or isinstance(self.contact, (list, tuple)):
-            for name, value in parted(self.striker, self.contact, self.others).items():
+            for name, value in parted(self.striker, self.contact, self.further_contacts).items():
                 object.__setattr__(self, name, value)
-        model, contact, striker, start = self.model, self.contact, self.striker, self.start
+        model, contact, striker, start = self.model, self.contact, self.striker, self.initial_state
         if not isinstance(model, ReducedModel):
             raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")
         if isinstance(striker, Shaker):
@@ -100,7 +100,7 @@ class System:
             raise InputTypeError(
                 f"contact = {shown(contact)}: must be a law of contact, such as HertzContact(stiffness)"
             )
-        if contact is not None and contact.most_modes is not None and model.modes > contact.most_modes:
+        if contact is not None and contact.max_modes is not None and model.modes > contact.max_modes:
             raise InputError(
                 f"contact = {shown(contact)} with modes = {model.modes}: Newton's law needs one mode, since the "
                 "mass met by an impulse at a point falls to zero as modes are added; use a HertzContact"
@@ -129,7 +129,7 @@ class System:
                 )
             # what a system is made of is what it is hashed and saved by: a state's way here is no part of it
             object.__setattr__(
-                self, "start", dataclasses.replace(start, tangent=None, passed=None, modal=None)
+                self, "initial_state", dataclasses.replace(start, tangent=None, statistics=None, modal=None)
             )
 
     # ------------------------------------------------------------------ by dotted name
@@ -140,8 +140,8 @@ class System:
         Names are those of the table of parameters (:data:`snapbeam.config.PARAMETERS`), such as
         ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``striker.location`` and
         ``drive.frequency_ratio`` (of the second striker ``striker_2.location``, ``drive_2.frequency_ratio``,
-        ``contact_2.stiffness``), or whole parts: ``beam``, ``model``, ``contact``, ``striker``, ``drive``, ``start``,
-        ``base``, ``axial``, ``harvester``.
+        ``contact_2.stiffness``), or whole parts: ``beam``, ``model``, ``contact``, ``striker``, ``drive``, ``initial_state``,
+        ``base_excitation``, ``axial_load``, ``harvester``.
 
         Raises
         ------
@@ -177,7 +177,7 @@ class System:
     def scale(self) -> Scale:
         """Length and angular frequency that displacements and drives are normalised by."""
         assert self.model.length_scale is not None
-        return Scale(self.model.length_scale, 2.0 * np.pi * self.model.reference_freq)
+        return Scale(self.model.length_scale, 2.0 * np.pi * self.model.reference_frequency)
 
     @property
     def moving(self) -> tuple[tuple[str, Drive], ...]:
@@ -188,30 +188,30 @@ class System:
         found: list[tuple[str, Drive]] = []
         more = [
             (f"drive_{number}", each.striker.drive)
-            for number, each in enumerate(self.others, 2)
-            if not isinstance(each.striker.drive, Still)
+            for number, each in enumerate(self.further_contacts, 2)
+            if not isinstance(each.striker.drive, FixedStop)
         ]
-        alone = self.base is None and self.axial is None and not more
-        if self.striker is not None and (alone or not isinstance(self.striker.drive, Still)):
+        alone = self.base_excitation is None and self.axial_load is None and not more
+        if self.striker is not None and (alone or not isinstance(self.striker.drive, FixedStop)):
             found.append(("drive", self.striker.drive))
         found += more
-        if self.base is not None:
-            found.append(("base", self.base.motion))
-        if self.axial is not None:
-            found.append(("axial", self.axial.motion))
+        if self.base_excitation is not None:
+            found.append(("base_excitation", self.base_excitation.motion))
+        if self.axial_load is not None:
+            found.append(("axial_load", self.axial_load.motion))
         return tuple(found)
 
     @property
-    def has_surroundings(self) -> bool:
+    def has_environment(self) -> bool:
         """Whether a base moves, the axial load changes or a harvester taps the beam."""
-        return self.base is not None or self.axial is not None or self.harvester is not None
+        return self.base_excitation is not None or self.axial_load is not None or self.harvester is not None
 
     @property
-    def leads(self) -> tuple[str, Drive] | None:
+    def primary_excitation(self) -> tuple[str, Drive] | None:
         """That of which one cycle is a cycle of excitation, with its section; None where nothing moves."""
         return self.moving[0] if self.moving else None
 
-    def findings(self) -> tuple[Finding, ...]:
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
         """What is doubtful about it: sizes that look like another unit, assumptions of the model left behind."""
         return doubts_of(self.model, self.striker)
 
@@ -295,8 +295,8 @@ class System:
         parts = [f"modes={self.model.modes}", f"contact={self.contact!r}"]
         if self.striker is not None:
             parts.append(f"striker={self.striker!r}" if self.striker.drive.harmonic else "striker=recorded")
-        if self.others:
-            parts.append(f"strikers={1 + len(self.others)}")
+        if self.further_contacts:
+            parts.append(f"strikers={1 + len(self.further_contacts)}")
         return f"<System {', '.join(parts)}, hash {self.hash[:12]}>"
 
 

@@ -153,7 +153,7 @@ class Recipe:
             Results to share with other recipes; *size* and *data* are theirs then.
         **options
             What the recipe takes beside: ``dots`` (fig6, fig7, fig8: a CSV table of measured responses, see
-            :func:`snapbeam.figures.read_dots`), ``measured`` (fig4: three files of measured runs).
+            :func:`snapbeam.figures.read_measured_points`), ``measured`` (fig4: three files of measured runs).
         """
         return self._draw(Results(size, read=data) if results is None else results, options)
 

@@ -11,7 +11,7 @@ import numpy as np
 from snapbeam.core.files import check_writable
 from snapbeam.core.netcdf import write_netcdf
 from snapbeam.core.validate import InputError
-from snapbeam.engines.mark import engine_mark
+from snapbeam.engines.mark import solver_fingerprint
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,7 +29,7 @@ def save_results(results: Mapping[str, xr.Dataset], path: Path, size: str) -> Pa
 
     target = check_writable(path, "output", (".nc",))
     groups: dict[str | None, xr.Dataset] = {
-        None: xr.Dataset(attrs={"paper_size": size, "engine_fingerprint": engine_mark()})
+        None: xr.Dataset(attrs={"paper_size": size, "solver_fingerprint": solver_fingerprint()})
     }
     encoding: dict[str | None, dict[str, dict[str, object]]] = {}
     for name, dataset in results.items():

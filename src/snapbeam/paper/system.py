@@ -32,7 +32,7 @@ _Array = NDArray[np.float64]
 
 TOLERANCE = 1e-5
 """What a run that is shown may be wrong by, in b: far below the width of a line."""
-KEPT = ("response", "status", "crossings", "end_is_final", "decided_at")
+KEPT = ("response_class", "status", "zero_crossings", "final_well_proven", "early_stop_time")
 """What is kept of a map that is run for its classes."""
 
 
@@ -50,7 +50,7 @@ def paper_run(
     :class:`~snapbeam.Integration`.
     """
     location, sample_times = more.pop("location", LOCATION), more.pop("sample_times", None)
-    model = replace(paper_model(modes), given_reference_freq=more.pop("reference_freq", None))
+    model = replace(paper_model(modes), given_reference_frequency=more.pop("reference_frequency", None))
     shaker = sb.Shaker(
         frequency_ratio=frequency_ratio, velocity_amplitude=velocity_amplitude, location=location
     )
@@ -61,7 +61,7 @@ def paper_run(
 def class_map(results: Results, what: str, model: sb.ReducedModel, **axes: Any) -> xr.Dataset:
     """A map of classes of the paper's shaker on *model*, each run ended once its class is certain."""
     contact = axes.pop("contact", CONTACT)
-    axes = {"location": LOCATION, "early_decision": True, **axes}
+    axes = {"location": LOCATION, "early_termination": True, **axes}
     ds = sb.response_map(model, contact, progress=results.progress(what), **axes)
     return ds[list(KEPT)]
 
@@ -93,7 +93,7 @@ def relative_map(
             velocity_amplitude=relative * static,
             location=float(x),
             cycles=cycles,
-            early_decision=True,
+            early_termination=True,
         )
         amplitude = ds["velocity_amplitude"].values
         made.append(ds.attrs["created"])

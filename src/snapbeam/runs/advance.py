@@ -36,10 +36,10 @@ __all__ = ["advance"]
 
 _Array = NDArray[np.float64]
 
-_REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
+_REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 PASSED = (
-    "status", "crossings", "impacts", "peak_force", "impulse", "shaker_work", "gross_work", "dissipated_energy",
-    "min_displacement", "max_displacement", "min_center_displacement", "max_center_displacement", "contact_share",
+    "status", "zero_crossings", "impacts", "peak_force", "impulse", "striker_work", "gross_work", "energy_dissipated",
+    "min_displacement", "max_displacement", "min_midspan_displacement", "max_midspan_displacement", "contact_time_fraction",
 )  # fmt: skip
 """Statistics of the way that a state has behind it."""
 
@@ -51,7 +51,7 @@ def advance(
     tangent: ArrayLike | None = None,
     *,
     integration: Integration | None = None,
-    every: bool = False,
+    save_every_period: bool = False,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> State:
     """Where a system stands some periods of the excitation after it stood in a state.
@@ -72,7 +72,7 @@ def advance(
         steps: k of them for each state, or the same k for all.
     integration : Integration, optional
         Steps, accuracy, threads.  States go on on the CPU, for *periods*, and no run is decided early.
-    every : bool
+    save_every_period : bool
         Whether to give the states after each period, along a new first dimension, instead of the last one; their
         ``passed`` is of the whole way, but for the status, which is of each state.
     progress : callable, optional
@@ -94,7 +94,7 @@ def advance(
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if state is not None and not isinstance(state, State):
         raise InputTypeError(f"state = {shown(state)}: must be a State")
-    if system.others:
+    if system.further_contacts:
         raise InputError(
             "striker: a state says where one striker stands and since when it touches; of several strikers ask for "
             "whole runs, by simulate or a sweep"
@@ -103,40 +103,44 @@ def advance(
         "integration", Integration() if integration is None else integration, Integration, "an Integration"
     )
     span = positive("periods", periods)
-    every = flag("every", every)
+    save_every_period = flag("save_every_period", save_every_period)
     report = counting(progress, "advance", "states")
     if state is None:
         require_motion(system)
-        state = system.start if system.start is not None else rest_state(system.model, system.striker)
+        state = (
+            system.initial_state
+            if system.initial_state is not None
+            else rest_state(system.model, system.striker)
+        )
     if state.modes != system.model.modes:
         raise InputError(
             f"state of {state.modes} modes: must have the {system.model.modes} modes of the model"
         )
-    if every and not float(span).is_integer():
+    if save_every_period and not float(span).is_integer():
         raise InputError(f"periods = {span:g} with every = True: must be a whole number")
     flat = state.flat()
     if integration.tolerance is not None:
         raise InputError(
             f"tolerance = {integration.tolerance:g}: is for one run; give steps, or accuracy = 'reference'"
         )
-    ensemble = make_ensemble(system, integration.replace(early_decision=False), start=flat, periods=span)
+    ensemble = make_ensemble(system, integration.replace(early_termination=False), start=flat, periods=span)
     _, engine = resolve("cpu")
     vectors = None
     if tangent is None:
-        landings = engine.march_landing(ensemble, integration.threads, report)
+        landings = engine.integrate_to_landing(ensemble, integration.threads, report)
     else:
         given = _checked_tangent(system, tangent, flat)
         back = system.model.linear_modes.T @ system.model.mass
-        landings, moved = engine.march_tangents(ensemble, given @ back.T, integration.threads, report)
-        moved[~np.isin(landings.books["status"], _REACHED)] = np.nan
+        landings, moved = engine.integrate_tangents(ensemble, given @ back.T, integration.threads, report)
+        moved[~np.isin(landings.accumulators_of_runs["status"], _REACHED)] = np.nan
         vectors = (moved @ system.model.linear_modes.T).reshape((*state.batch, *moved.shape[1:]))
-    found = _states(ensemble, landings, every)
-    passed = statistics_of(ensemble, landings.books)
-    return _shaped(found, state.batch, every, {name: passed[name] for name in PASSED}, vectors)
+    found = _states(ensemble, landings, save_every_period)
+    passed = statistics_of(ensemble, landings.accumulators_of_runs)
+    return _shaped(found, state.batch, save_every_period, {name: passed[name] for name in PASSED}, vectors)
 
 
 def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
-    if system.contact is not None and not system.contact.keeps.smooth:
+    if system.contact is not None and not system.contact.properties.smooth:
         raise InputError(
             f"tangent with contact = {shown(system.contact)}: its force jumps, so that the tangent flow does; give none"
         )
@@ -149,7 +153,7 @@ def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
         raise InputError(
             "tangent with a harvester: the tangent flow is that of the beam alone; give none, or leave it out"
         )
-    if system.contact is not None and not system.contact.keeps.tangent:
+    if system.contact is not None and not system.contact.properties.tangent:
         raise InputError(
             f"tangent with contact = {system.contact!r}: the tangent flow is known for laws whose force depends on the "
             "penetration alone, such as HertzContact(stiffness); give none"
@@ -170,19 +174,19 @@ def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
 
 def _states(ensemble: Ensemble, landings: Landings, every: bool) -> list[State]:
     """States after each period, or after the last one alone, with their status; NaN where a run did not come so far."""
-    count, book = landings.q.shape[1], landings.books
-    failed = ~np.isin(book["status"], _REACHED)
+    count, accumulators = landings.q.shape[1], landings.accumulators_of_runs
+    failed = ~np.isin(accumulators["status"], _REACHED)
     found = []
     for at in range(count) if every else (count - 1,):
         ticks = np.minimum((at + 1) * ensemble.runs["landing"], ensemble.runs["end"])
         q, p = landings.q[:, at].copy(), landings.p[:, at].copy()
-        lost = failed & ((book["time"] < ticks) | (at == count - 1))
+        lost = failed & ((accumulators["time"] < ticks) | (at == count - 1))
         q[lost], p[lost] = 0.0, 0.0
-        state = states_of(ensemble, q, p, landings.home[:, at], landings.contact_ticks[:, at], ticks)
+        state = states_of(ensemble, q, p, landings.well_sign[:, at], landings.contact_ticks[:, at], ticks)
         amplitude, velocity = state.amplitude.copy(), state.velocity.copy()
         amplitude[lost], velocity[lost] = np.nan, np.nan
-        status: Any = np.where(lost, book["status"], int(RunStatus.OK)).astype(np.int8)
-        found.append(replace(state, amplitude=amplitude, velocity=velocity, passed={"status": status}))
+        status: Any = np.where(lost, accumulators["status"], int(RunStatus.OK)).astype(np.int8)
+        found.append(replace(state, amplitude=amplitude, velocity=velocity, statistics={"status": status}))
     return found
 
 
@@ -219,6 +223,6 @@ def _shaped(
         modal = ModalState(**parts, structure=found[0].modal.structure)
     statistics = {name: values.reshape(batch) for name, values in passed.items()}
     if every:
-        status = [np.asarray(state.passed["status"]) for state in found if state.passed is not None]
+        status = [np.asarray(state.statistics["status"]) for state in found if state.statistics is not None]
         statistics["status"] = np.stack(status).reshape(shape)
-    return State(**arrays, tangent=tangent, passed=statistics, modal=modal)
+    return State(**arrays, tangent=tangent, statistics=statistics, modal=modal)

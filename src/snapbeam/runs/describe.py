@@ -30,7 +30,7 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
         "modes": model.modes,
         "damping_ratio": float(damping[0]) if np.all(damping == damping[0]) else damping.tolist(),
         "length_scale": model.length_scale,
-        "reference_freq": model.reference_freq,
+        "reference_frequency": model.reference_frequency,
         "step": plan.step,
         "order": plan.order,
         "longest_contact_step": plan.step / 2**plan.coarsest,
@@ -41,26 +41,26 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
         attrs |= _short(system.contact)
     if model.beam is not None:
         attrs |= {name: float(value) for name, value in _short(model.beam).items()}
-        attrs |= _short(model.beam.ends)
+        attrs |= _short(model.beam.boundary)
     if model.imperfection is not None:
         attrs |= _short(model.imperfection)
-    sections = system.to_mapping() if system.has_surroundings else {}
+    sections = system.to_mapping() if system.has_environment else {}
     for section in ("base", "axial", "harvester"):
         for name, value in sections.get(section, {}).items():
-            short = f"{section}_kind" if name == "kind" else lookup(f"{section}.{name}").short
+            short = f"{section}_kind" if name == "type" else lookup(f"{section}.{name}").short
             attrs[short] = int(value) if isinstance(value, bool) else value
     return attrs | _of_others(system)
 
 
 def _of_others(system: System) -> dict[str, Any]:
     """What is said of the strikers beside the first."""
-    attrs: dict[str, Any] = {"strikers": 1 + len(system.others)} if system.others else {}
-    for section, values in system.to_mapping().items() if system.others else ():
+    attrs: dict[str, Any] = {"strikers": 1 + len(system.further_contacts)} if system.further_contacts else {}
+    for section, values in system.to_mapping().items() if system.further_contacts else ():
         number = numbered(section)[1]
         if number > 1:
             attrs |= {
                 f"{name}_striker_{number}"
-                if name in ("law", "kind")
+                if name in ("type", "type")
                 else lookup(f"{section}.{name}").short: value
                 for name, value in values.items()
             }

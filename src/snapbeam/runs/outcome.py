@@ -13,47 +13,50 @@ from snapbeam.core.showing import html_table
 from snapbeam.core.validate import InputError, integer, mapping
 from snapbeam.engines.outcomes import STATISTICS
 
-__all__ = ["Outcome"]
+__all__ = ["RunSummary"]
 
 
-class Outcome(Mapping[str, Any]):
+class RunSummary(Mapping[str, Any]):
     """What one run did, in a few numbers: a mapping, and the same as attributes.
 
     The names, units and meanings are those of :data:`snapbeam.STATISTICS`; displacements are over b, velocities
     over b omega_1.  A run that failed has ``response`` UNKNOWN and a ``status`` whose ``advice`` says why.  A run
-    decided early (``decided_at`` in seconds, NaN otherwise) has the certain class, but extremes and counts that
-    stop there.  ``end_is_final`` says whether the run provably stays in the well it ended in; ``final_well`` is the
+    decided early (``early_stop_time`` in seconds, NaN otherwise) has the certain class, but extremes and counts that
+    stop there.  ``final_well_proven`` says whether the run provably stays in the well it ended in; ``final_well`` is the
     sign of w(1/2) at the end.
     """
 
     response: ResponseClass
     status: RunStatus
     crossings: int
-    crossings_last_quarter: int
-    last_crossing: float
+    zero_crossings_last_quarter: int
+    last_zero_crossing: float
     final_well: int
-    end_is_final: bool
+    final_well_proven: bool
     min_displacement: float
     max_displacement: float
-    min_center_displacement: float
-    max_center_displacement: float
+    min_midspan_displacement: float
+    max_midspan_displacement: float
     peak_force: float
     impacts: int
-    contact_share: float
-    decided_at: float
+    contact_time_fraction: float
+    early_stop_time: float
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         mapping("values", values)
-        if missing := {"response", "status"} - set(values):
+        if missing := {"response_class", "status"} - set(values):
             raise InputError(f"values: without {', '.join(sorted(missing))}")
         found = {
             name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()
         }
-        found["response"], found["status"] = ResponseClass(found["response"]), RunStatus(found["status"])
+        found["response_class"], found["status"] = (
+            ResponseClass(found["response_class"]),
+            RunStatus(found["status"]),
+        )
         self._values = found
 
     @classmethod
-    def from_statistics(cls, statistics: Mapping[str, NDArray[np.generic]], index: int = 0) -> Outcome:
+    def from_statistics(cls, statistics: Mapping[str, NDArray[np.generic]], index: int = 0) -> RunSummary:
         """One run of what :func:`snapbeam.engines.answer.statistics_of` returns."""
         mapping("statistics", statistics)
         index = integer(
@@ -81,18 +84,20 @@ class Outcome(Mapping[str, Any]):
 
     def __repr__(self) -> str:
         ended = "" if self.status is RunStatus.OK else f", {self.status.name}"
-        return f"<Outcome {self.response.label}{ended}, {self.crossings} crossings, {self.impacts} impacts>"
+        return (
+            f"<Outcome {self.response.label}{ended}, {self.zero_crossings} crossings, {self.impacts} impacts>"
+        )
 
     def _repr_html_(self) -> str:
-        rows = [line.split(maxsplit=1) for line in self.table().splitlines()]
+        rows = [line.split(maxsplit=1) for line in self.to_text().splitlines()]
         return html_table(f"Outcome: {self.response.label}", rows)
 
-    def table(self) -> str:
+    def to_text(self) -> str:
         """Every statistic with its unit and its meaning, a line each."""
         lines = []
         for name, value in self._values.items():
             row = STATISTICS.get(name)
-            unit, words = ("", "") if row is None else (row.unit, row.words)
+            unit, words = ("", "") if row is None else (row.unit, row.long_name)
             shown = value.label if isinstance(value, ResponseClass) else getattr(value, "name", value)
             text = f"{shown:.6g}" if isinstance(shown, float) else str(shown)
             lines.append(f"{name:26s} {text:>16s} {'' if unit == '1' else unit:4s} {words}")

@@ -9,21 +9,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.core.findings import Finding, tell
+from snapbeam.core.findings import Diagnostic, tell
 from snapbeam.core.validate import InputError, finite_array
 from snapbeam.engines.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.outputs import Recorded
 from snapbeam.engines.plan import Plan
-from snapbeam.model.drive import Recorded as RecordedMotion
+from snapbeam.model.drive import RecordedMotion as RecordedMotion
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.runs.describe import attributes_of
-from snapbeam.runs.outcome import Outcome
+from snapbeam.runs.outcome import RunSummary
 from snapbeam.runs.request import cycle_of
 from snapbeam.runs.states import states_of
-from snapbeam.runs.tolerance import Accuracy, steps_for
+from snapbeam.runs.tolerance import ErrorEstimate, steps_for
 
 __all__ = ["MEMORY_LIMIT", "Prepared", "check_memory", "end_state", "prepared", "reached_by", "said_of"]
 
@@ -35,7 +35,7 @@ MEMORY_LIMIT = 4 * 2**30
 """Bytes that the samples of a run may take."""
 _ENERGY_ERROR = 1e-3
 """Of the gross work, from which a run says that it misses its energy ledger."""
-_ENDED = (RunStatus.OK, RunStatus.DECIDED)
+_ENDED = (RunStatus.OK, RunStatus.EARLY_STOP)
 
 
 class Prepared(NamedTuple):
@@ -44,7 +44,7 @@ class Prepared(NamedTuple):
     system: System
     integration: Integration
     plan: Plan
-    accuracy: Accuracy | None
+    accuracy: ErrorEstimate | None
     """What an asked tolerance gave."""
     ensemble: Ensemble
     times: _Array | None
@@ -70,7 +70,7 @@ def prepared(system: System, integration: Integration, sample_times: ArrayLike |
     InputError
         For bad input.
     """
-    tell(system.findings())
+    tell(system.diagnostics())
     plan, accuracy = plans_of(system, integration, run_columns(system, {}))[0], None
     if integration.tolerance is not None:
         plan, accuracy = steps_for(system, integration)
@@ -82,15 +82,15 @@ def prepared(system: System, integration: Integration, sample_times: ArrayLike |
     return Prepared(system, integration, plan, accuracy, ensemble, times, count, end, period)
 
 
-def said_of(run: Prepared, outcome: Outcome, books: Any) -> dict[str, Any]:
+def said_of(run: Prepared, outcome: RunSummary, accumulators_of_runs: Any) -> dict[str, Any]:
     """The attributes of a run that ended; says where it misses its energy ledger."""
     lasted = run.end / run.period
     more: dict[str, Any] = _own_attributes(run.system, run.integration, lasted)
-    more["response"] = outcome.response.label
+    more["response_class"] = outcome.response_class.label
     more["status"] = f"{outcome.status.name}: {outcome.status.advice}"
     attrs = attributes_of("run of a struck bistable beam", run.system, run.integration, run.plan, more)
-    attrs["gross_work"] = float(books["gross_work"][0])
-    attrs["energy_error"] = _energy_error(books)
+    attrs["gross_work"] = float(accumulators_of_runs["gross_work"][0])
+    attrs["energy_error"] = _energy_error(accumulators_of_runs)
     tell(_unbalanced(attrs["energy_error"]))
     if run.accuracy is not None:
         attrs |= run.accuracy.attributes()
@@ -109,33 +109,42 @@ def _own_attributes(system: System, integration: Integration, lasted: float) -> 
         }
     elif striker is not None and isinstance(striker.drive, RecordedMotion):
         attrs |= {
-            "drive": "recorded",
-            "frequency_ratio": striker.drive.frequency / system.model.reference_freq,
+            "drive": "recorded_motion",
+            "frequency_ratio": striker.drive.frequency / system.model.reference_frequency,
         }
     if striker is not None:
         attrs |= {"location": striker.location, "side": striker.side}
-    attrs["early_decision"] = int(integration.early_decision)
+    attrs["early_termination"] = int(integration.early_termination)
     return attrs
 
 
-def _energy_error(books: Any) -> float:
+def _energy_error(accumulators_of_runs: Any) -> float:
     """What the ledger of a recorded run misses at its end, over the gross work: 0 for exact steps.
 
     The striker's work less what the beam and the contact gained and what was dissipated, as it was integrated.
     """
-    book = books[0]
+    accumulators = accumulators_of_runs[0]
     with np.errstate(invalid="ignore"):  # a run that failed has no numbers
-        given = book["work"] + book["base_work"] + book["load_work"]
-        missed = given - (book["energy"] - book["first_energy"]) - book["dissipated"] - book["circuit_energy"]
-    scale = float(book["gross_work"]) or float(abs(book["first_energy"]) + abs(book["energy"])) or 1.0
+        given = accumulators["work"] + accumulators["base_work"] + accumulators["load_work"]
+        missed = (
+            given
+            - (accumulators["energy"] - accumulators["first_energy"])
+            - accumulators["dissipated"]
+            - accumulators["circuit_energy"]
+        )
+    scale = (
+        float(accumulators["gross_work"])
+        or float(abs(accumulators["first_energy"]) + abs(accumulators["energy"]))
+        or 1.0
+    )
     return float(missed) / scale
 
 
-def _unbalanced(error: float) -> list[Finding]:
+def _unbalanced(error: float) -> list[Diagnostic]:
     if not abs(error) > _ENERGY_ERROR:
         return []
     return [
-        Finding(
+        Diagnostic(
             "ledger-missed",
             f"the run misses its energy ledger by {abs(error):.2g} of the gross work: its steps are too "
             "long for what the beam does; use accuracy = 'reference', a tolerance, or a smaller step",
@@ -145,7 +154,7 @@ def _unbalanced(error: float) -> list[Finding]:
 
 
 def _regular_count(system: System, end: float, period: float) -> int:
-    fastest = min(period, 1.0 / system.model.reference_freq)
+    fastest = min(period, 1.0 / system.model.reference_frequency)
     count = end / fastest * _SAMPLES_PER_CYCLE
     if count > 1e9:
         raise InputError(
@@ -187,16 +196,16 @@ def reached_by(recorded: Recorded, until: float) -> Recorded:
     )
 
 
-def end_state(ensemble: Ensemble, recorded: Recorded, outcome: Outcome) -> State | None:
+def end_state(ensemble: Ensemble, recorded: Recorded, outcome: RunSummary) -> State | None:
     """Where a run stands at its end; None if it failed."""
     if outcome.status not in _ENDED:
         return None
-    last, time = recorded.last, int(recorded.books["time"][0])
+    last, time = recorded.last, int(recorded.accumulators_of_runs["time"][0])
     states = states_of(
         ensemble,
         last.q[None],
         last.p[None],
-        np.array([last.home]),
+        np.array([last.well_sign]),
         np.array([last.contact_ticks]),
         np.array([time]),
     )

@@ -11,10 +11,10 @@ from snapbeam.model.drive import Sine
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 
-__all__ = ["asked", "cycle_of", "require_motion"]
+__all__ = ["kernel_input", "cycle_of", "require_motion"]
 
 
-def asked(system: Any, integration: Any) -> tuple[System, Integration]:
+def kernel_input(system: Any, integration: Any) -> tuple[System, Integration]:
     """Check a system and an integration.
 
     Parameters
@@ -39,7 +39,7 @@ def asked(system: Any, integration: Any) -> tuple[System, Integration]:
 
 def require_motion(system: System) -> None:
     """Refuse a system in which nothing could move."""
-    if system.striker is None and system.start is None and not system.moving:
+    if system.striker is None and system.initial_state is None and not system.moving:
         raise InputError(
             "striker = None: a beam that nothing strikes needs a start to move from (initial_state)"
         )
@@ -47,10 +47,10 @@ def require_motion(system: System) -> None:
 
 def cycle_of(system: System) -> float:
     """Seconds of one cycle of excitation, or of the first mode where nothing strikes."""
-    freq = system.model.reference_freq
-    if system.leads is None:
+    freq = system.model.reference_frequency
+    if system.primary_excitation is None:
         return 1.0 / freq
-    drive = system.leads[1]
+    drive = system.primary_excitation[1]
     if isinstance(drive, Sine):
         return 1.0 / (freq * drive.frequency_ratio)
     columns = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}

@@ -13,8 +13,8 @@ from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
-from snapbeam.runs.outcome import Outcome
-from snapbeam.runs.tolerance import Accuracy
+from snapbeam.runs.outcome import RunSummary
+from snapbeam.runs.tolerance import ErrorEstimate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,7 +38,7 @@ class Run:
     ----------
     dataset : xarray.Dataset
         Time series: the variables of :data:`snapbeam.runs.schema.SCHEMA`.
-    outcome : Outcome
+    summary : Outcome
         The class and the statistics.
     impacts : xarray.Dataset
         Onset, duration, peak force and impulse of each impact.
@@ -48,17 +48,17 @@ class Run:
         how.
     accuracy : Accuracy or None
         What an asked tolerance gave.
-    end : State or None
+    final_state : State or None
         Where the run stands at its end; None if it failed.
     """
 
     dataset: xr.Dataset
-    outcome: Outcome
+    summary: RunSummary
     impacts: xr.Dataset
     system: System
     integration: Integration
-    accuracy: Accuracy | None = None
-    end: State | None = None
+    accuracy: ErrorEstimate | None = None
+    final_state: State | None = None
 
     @classmethod
     def of(cls, tables: Callable[[], tuple[xr.Dataset, xr.Dataset]], **parts: Any) -> Run:
@@ -68,7 +68,7 @@ class Run:
         other attributes.
         """
         run = cls.__new__(cls)
-        vars(run).update({"accuracy": None, "end": None} | parts | {"_tables": tables})
+        vars(run).update({"accuracy": None, "final_state": None} | parts | {"_tables": tables})
         return run
 
     def __getattr__(self, name: str) -> Any:
@@ -85,7 +85,7 @@ class Run:
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the run to a NetCDF file, whole or not at all; :func:`snapbeam.load_run` reads it back.
+        """Write the run to a NetCDF file, whole or not at all; :func:`snapbeam.load` reads it back.
 
         Raises
         ------
@@ -101,19 +101,17 @@ class Run:
 
         Options are those of the function ``plot_...`` of :mod:`snapbeam.figures`; returns the axes.
         """
-        choice("kind", kind, _KINDS)
+        choice("type", kind, _KINDS)
         return plotter(f"plot_{kind}")(self, ax=ax, **options)
 
     def _repr_html_(self) -> str:
-        shown = ("crossings", "impacts", "peak_force", "shaker_work", "contact_share")
+        shown = ("zero_crossings", "impacts", "peak_force", "striker_work", "contact_time_fraction")
         rows = [
-            (STATISTICS[name].words, f"{self.outcome[name]:.5g}", STATISTICS[name].unit) for name in shown
+            (STATISTICS[name].long_name, f"{self.summary[name]:.5g}", STATISTICS[name].unit) for name in shown
         ]
         rows += [(section, line.strip(), "") for section, _, line in _described(self.system)]
-        return html_table(f"Run: {self.outcome.response.label}, {self.outcome.status.advice}", rows)
+        return html_table(f"Run: {self.summary.response_class.label}, {self.summary.status.advice}", rows)
 
     def __repr__(self) -> str:
         samples = self.dataset.sizes["time"]
-        return (
-            f"<Run {self.outcome.response.label}, {samples} samples, {self.impacts.sizes['impact']} impacts>"
-        )
+        return f"<Run {self.summary.response_class.label}, {samples} samples, {self.impacts.sizes['impact']} impacts>"

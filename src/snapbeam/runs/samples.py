@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.engines.driven import motions_of
-from snapbeam.engines.ensemble import Ensemble, Tapped
+from snapbeam.engines.ensemble import Ensemble, CircuitCoupling
 from snapbeam.engines.outputs import Recorded
 from snapbeam.model.system import System
 from snapbeam.runs.schema import trajectory_dataset
@@ -38,7 +38,13 @@ def joined(pieces: list[Recorded]) -> Recorded:
     order = np.argsort(times, kind="stable")
     order = order[np.append(True, np.diff(times[order]) > 0.0)] if order.size else order
     return Recorded(
-        times[order], q[order], p[order], values[order], impacts, pieces[-1].books, pieces[-1].last
+        times[order],
+        q[order],
+        p[order],
+        values[order],
+        impacts,
+        pieces[-1].accumulators_of_runs,
+        pieces[-1].last,
     )
 
 
@@ -71,33 +77,33 @@ def run_dataset(
     shape = model.shape_at(location)
     displacement = alpha @ shape / scale
     variables: dict[str, _Array] = {
-        "displacement": displacement,
-        "center_displacement": alpha @ model.center_shape / scale,
-        "velocity": rate @ shape / speed,
-        "center_velocity": rate @ model.center_shape / speed,
+        "displacement_at_striker": displacement,
+        "midspan_displacement": alpha @ model.midspan_shape / scale,
+        "velocity_at_striker": rate @ shape / speed,
+        "midspan_velocity": rate @ model.midspan_shape / speed,
     }
     struck = system.striker is not None
     if struck:
         penetration = values[:, 0] / scale
         variables |= {
-            "shaker_displacement": displacement + structure.sign * penetration,
-            "penetration": penetration,
+            "striker_displacement": displacement + structure.sign * penetration,
+            "penetration_normalised": penetration,
             "contact_force": values[:, 1],
         }
     variables |= {"modal_amplitude": alpha, "modal_velocity": rate, "energy_beam": values[:, 2]}
     if struck:
-        variables |= {"energy_contact": values[:, 3], "work_shaker": values[:, 4]}
+        variables |= {"energy_contact": values[:, 3], "striker_work": values[:, 4]}
     if structure.body_mass is not None:
         variables["energy_striker"] = own
     variables["energy_dissipated"] = values[:, 5]
     variables |= _around(ensemble, system, recorded, values)
     if ensemble.others is not None:
-        of_each = strikers_of(ensemble, system, recorded, values, variables["shaker_displacement"])
+        of_each = strikers_of(ensemble, system, recorded, values, variables["striker_displacement"])
         variables["energy_contact"] = of_each.pop("energy_contact")
         variables |= of_each
     if ensemble.tapped is not None:
         variables |= _harvested(ensemble, ensemble.tapped, recorded, values)
-    if struck and system.contact is not None and system.contact.loses:
+    if struck and system.contact is not None and system.contact.is_dissipative:
         variables["energy_lost_contact"] = values[:, 6]
     at = recorded.times
     valid = np.asarray(np.isfinite(values[:, 2:]).all(axis=1) & np.isfinite(alpha).all(axis=1))
@@ -117,7 +123,9 @@ def run_dataset(
     return trajectory_dataset(at, at / period, attrs=attrs, **variables)
 
 
-def _harvested(ensemble: Ensemble, tapped: Tapped, recorded: Recorded, values: _Array) -> dict[str, _Array]:
+def _harvested(
+    ensemble: Ensemble, tapped: CircuitCoupling, recorded: Recorded, values: _Array
+) -> dict[str, _Array]:
     """What a run says of a harvester."""
     structure = ensemble.structure
     assert structure.tapped is not None
@@ -139,16 +147,16 @@ def _harvested(ensemble: Ensemble, tapped: Tapped, recorded: Recorded, values: _
 def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Array) -> dict[str, _Array]:
     """What a run says of a moving base and of a changing axial load."""
     found: dict[str, _Array] = {}
-    if system.base is None and system.axial is None:
+    if system.base_excitation is None and system.axial_load is None:
         return found
     motions = motions_of(ensemble, system, recorded.times)
-    if system.base is not None:
+    if system.base_excitation is not None:
         found["base_displacement"] = motions["base"][0] / system.scale.length
         found["base_velocity"] = motions["base"][1] / (system.scale.length * system.scale.omega)
-        found["work_base"] = values[:, 7]
-    if system.axial is not None:
+        found["base_work"] = values[:, 7]
+    if system.axial_load is not None:
         found["load_change"] = motions["axial"][0]
-        found["work_load"] = values[:, 8]
+        found["load_work"] = values[:, 8]
     return found
 
 

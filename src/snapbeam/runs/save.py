@@ -17,15 +17,15 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import quantities
 from snapbeam.model.state import State
 from snapbeam.model.system import System
-from snapbeam.runs.outcome import Outcome
+from snapbeam.runs.outcome import RunSummary
 from snapbeam.runs.run import Run
 from snapbeam.runs.schema import check_trajectory
-from snapbeam.runs.tolerance import Accuracy
+from snapbeam.runs.tolerance import ErrorEstimate
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["compressed", "description", "load_run", "outcome_dataset", "save_run"]
+__all__ = ["compressed", "description", "load", "outcome_dataset", "save_run"]
 
 _FORMAT = "snapbeam run 2"
 _GROUPS = ("impacts", "outcome")
@@ -40,13 +40,13 @@ def save_run(run: Run, path: str | os.PathLike[str]) -> None:
     integration, the accuracy and the end are JSON in attributes of the root.
     """
     target = check_writable(path, "path", (".nc",))
-    root = run.dataset.assign_attrs(description(run.system, run.integration, run.accuracy, run.end))
-    groups = {None: root, "impacts": run.impacts.assign_attrs({}), "outcome": outcome_dataset(run.outcome)}
+    root = run.dataset.assign_attrs(description(run.system, run.integration, run.accuracy, run.final_state))
+    groups = {None: root, "impacts": run.impacts.assign_attrs({}), "outcome": outcome_dataset(run.summary)}
     write_netcdf(groups, target, {name: compressed(dataset) for name, dataset in groups.items()})
 
 
 def description(
-    system: System, integration: Integration, accuracy: Accuracy | None, end: State | None
+    system: System, integration: Integration, accuracy: ErrorEstimate | None, end: State | None
 ) -> dict[str, str]:
     """The attributes of a file from which a run is read again."""
     described = {
@@ -61,7 +61,7 @@ def description(
     return described
 
 
-def load_run(path: str | os.PathLike[str]) -> Run:
+def load(path: str | os.PathLike[str]) -> Run:
     """Read a run that :meth:`snapbeam.Run.save` wrote.
 
     Raises
@@ -79,27 +79,29 @@ def load_run(path: str | os.PathLike[str]) -> Run:
         system = System.from_mapping(_arrays(json.loads(attrs.pop("snapbeam_system"))))
         integration = Integration(**json.loads(attrs.pop("snapbeam_integration")))
         accuracy = (
-            Accuracy(**json.loads(attrs.pop("snapbeam_accuracy"))) if "snapbeam_accuracy" in attrs else None
+            ErrorEstimate(**json.loads(attrs.pop("snapbeam_accuracy")))
+            if "snapbeam_accuracy" in attrs
+            else None
         )
         end = _state(json.loads(attrs.pop("snapbeam_end"))) if "snapbeam_end" in attrs else None
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"path = {str(path)!r}: its description is damaged ({error})") from None
     dataset = check_trajectory(dataset.drop_attrs(deep=False).assign_attrs(attrs))
     values = {str(name): array.values.item() for name, array in parts["outcome"].variables.items()}
-    return Run(dataset, Outcome(values), parts["impacts"], system, integration, accuracy, end)
+    return Run(dataset, RunSummary(values), parts["impacts"], system, integration, accuracy, end)
 
 
-def outcome_dataset(outcome: Outcome) -> xr.Dataset:
+def outcome_dataset(outcome: RunSummary) -> xr.Dataset:
     """The statistics of a run as scalar variables, with what their codes mean."""
     import xarray as xr
 
     variables: dict[str, Any] = {}
     for name, value in outcome.items():
         row = STATISTICS[name]
-        labels: dict[str, Any] = {"units": row.unit, "long_name": row.words}
+        labels: dict[str, Any] = {"units": row.unit, "long_name": row.long_name}
         kinds: type[ResponseClass] | type[RunStatus] | None = None
-        if name in ("response", "status"):
-            kinds = ResponseClass if name == "response" else RunStatus
+        if name in ("response_class", "status"):
+            kinds = ResponseClass if name == "response_class" else RunStatus
             labels |= code_flags(kinds)
         variables[name] = ((), np.asarray(int(value) if kinds else value).astype(row.dtype), labels)
     return xr.Dataset(variables)

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import ArrayLike
 
-__all__ = ["SCHEMA", "Quantity", "check_trajectory", "trajectory_dataset"]
+__all__ = ["SCHEMA", "Variable", "check_trajectory", "trajectory_dataset"]
 
 
-class Quantity(NamedTuple):
+class Variable(NamedTuple):
     """What one variable of a run is: its dimensions, its unit and its name in words."""
 
     dims: tuple[str, ...]
@@ -29,46 +29,46 @@ class Quantity(NamedTuple):
     long_name: str
 
 
-SCHEMA: dict[str, Quantity] = {
-    "time": Quantity(("time",), "s", "time"),
-    "cycle": Quantity(("time",), "1", "cycles of excitation"),
-    "mode": Quantity(("mode",), "1", "buckling mode"),
-    "striker": Quantity(("striker",), "1", "number of the striker"),
-    "displacement": Quantity(("time",), "1", "beam displacement at the striker, over b"),
-    "center_displacement": Quantity(("time",), "1", "beam displacement at the centre, over b"),
-    "velocity": Quantity(("time",), "1", "beam velocity at the striker, over b omega_1"),
-    "center_velocity": Quantity(("time",), "1", "beam velocity at the centre, over b omega_1"),
-    "shaker_displacement": Quantity(("time",), "1", "striker displacement, over b"),
-    "penetration": Quantity(("time",), "1", "penetration, over b"),
-    "contact_force": Quantity(("time",), "N", "contact force"),
-    "striker_displacement": Quantity(("time", "striker"), "1", "displacement of each striker's tip, over b"),
-    "striker_penetration": Quantity(("time", "striker"), "1", "penetration of each striker, over b"),
-    "striker_force": Quantity(("time", "striker"), "N", "contact force of each striker"),
-    "modal_amplitude": Quantity(("time", "mode"), "m^0.5", "modal amplitude"),
-    "modal_velocity": Quantity(("time", "mode"), "m^0.5/s", "modal velocity"),
-    "energy_beam": Quantity(("time",), "J", "kinetic and potential energy of the beam, above its well"),
-    "energy_contact": Quantity(("time",), "J", "energy stored in the contact"),
-    "energy_striker": Quantity(
+SCHEMA: dict[str, Variable] = {
+    "time": Variable(("time",), "s", "time"),
+    "cycle": Variable(("time",), "1", "cycles of excitation"),
+    "mode": Variable(("mode",), "1", "buckling mode"),
+    "striker": Variable(("striker",), "1", "number of the striker"),
+    "displacement_at_striker": Variable(("time",), "1", "beam displacement at the striker, over b"),
+    "midspan_displacement": Variable(("time",), "1", "beam displacement at the centre, over b"),
+    "velocity_at_striker": Variable(("time",), "1", "beam velocity at the striker, over b omega_1"),
+    "midspan_velocity": Variable(("time",), "1", "beam velocity at the centre, over b omega_1"),
+    "striker_displacement": Variable(("time",), "1", "striker displacement, over b"),
+    "penetration_normalised": Variable(("time",), "1", "penetration, over b"),
+    "contact_force": Variable(("time",), "N", "contact force"),
+    "striker_displacements": Variable(("time", "striker"), "1", "displacement of each striker's tip, over b"),
+    "striker_penetrations": Variable(("time", "striker"), "1", "penetration of each striker, over b"),
+    "striker_forces": Variable(("time", "striker"), "N", "contact force of each striker"),
+    "modal_amplitude": Variable(("time", "mode"), "m^0.5", "modal amplitude"),
+    "modal_velocity": Variable(("time", "mode"), "m^0.5/s", "modal velocity"),
+    "energy_beam": Variable(("time",), "J", "kinetic and potential energy of the beam, above its well"),
+    "energy_contact": Variable(("time",), "J", "energy stored in the contact"),
+    "energy_striker": Variable(
         ("time",), "J", "energy of the striker's motion beyond that of its drive, in its suspension included"
     ),
-    "work_shaker": Quantity(("time",), "J", "work done by the striker"),
-    "energy_dissipated": Quantity(("time",), "J", "energy dissipated"),
-    "base_displacement": Quantity(("time",), "1", "displacement of the base in space, over b"),
-    "base_velocity": Quantity(("time",), "1", "velocity of the base in space, over b omega_1"),
-    "work_base": Quantity(("time",), "J", "work done by the base, in its frame"),
-    "load_change": Quantity(("time",), "N", "axial load beyond that of the reduction"),
-    "work_load": Quantity(("time",), "J", "work done by the change of the axial load"),
-    "voltage": Quantity(("time",), "V", "voltage across the harvester's load"),
-    "power_load": Quantity(("time",), "W", "power in the harvester's load"),
-    "energy_harvested": Quantity(("time",), "J", "energy that ended in the harvester's load"),
-    "energy_circuit": Quantity(("time",), "J", "energy stored in the harvester's circuit"),
-    "energy_lost_contact": Quantity(("time",), "J", "part of it that was lost in contact"),
-    "valid": Quantity(("time",), "1", "whether the sample was measured"),
+    "striker_work": Variable(("time",), "J", "work done by the striker"),
+    "energy_dissipated": Variable(("time",), "J", "energy dissipated"),
+    "base_displacement": Variable(("time",), "1", "displacement of the base in space, over b"),
+    "base_velocity": Variable(("time",), "1", "velocity of the base in space, over b omega_1"),
+    "base_work": Variable(("time",), "J", "work done by the base, in its frame"),
+    "load_change": Variable(("time",), "N", "axial load beyond that of the reduction"),
+    "load_work": Variable(("time",), "J", "work done by the change of the axial load"),
+    "voltage": Variable(("time",), "V", "voltage across the harvester's load"),
+    "power_load": Variable(("time",), "W", "power in the harvester's load"),
+    "energy_harvested": Variable(("time",), "J", "energy that ended in the harvester's load"),
+    "energy_circuit": Variable(("time",), "J", "energy stored in the harvester's circuit"),
+    "energy_lost_contact": Variable(("time",), "J", "part of it that was lost in contact"),
+    "valid": Variable(("time",), "1", "whether the sample was measured"),
 }
 """Every variable a run may have, by name; ``time``, ``cycle`` and ``mode`` are coordinates."""
 
 _MODAL = ("modal_amplitude", "modal_velocity")
-_OF_STRIKERS = ("striker_displacement", "striker_penetration", "striker_force")
+_OF_STRIKERS = ("striker_displacements", "striker_penetrations", "striker_forces")
 _FORMER_UNITS = {"b": "1"}
 """Units that files of version 0.1 give to numbers over b."""
 _COORDINATES = ("time", "cycle", "mode", "striker")
@@ -140,7 +140,9 @@ def _labelled(name: str, values: np.ndarray) -> tuple[tuple[str, ...], np.ndarra
     return quantity.dims, values, {"units": quantity.units, "long_name": quantity.long_name}
 
 
-def check_trajectory(dataset: xr.Dataset, require: Iterable[str] = ("displacement",)) -> xr.Dataset:
+def check_trajectory(
+    dataset: xr.Dataset, require: Iterable[str] = ("displacement_at_striker",)
+) -> xr.Dataset:
     """Return *dataset* if it follows the schema of a run; say what is wrong with it if not.
 
     Variables beyond the schema are left alone, so that an experiment may add its own.

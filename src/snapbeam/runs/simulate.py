@@ -17,9 +17,9 @@ from snapbeam.engines.cpu.driver import usable_cores
 from snapbeam.engines.registry import resolve
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.runs.outcome import Outcome
+from snapbeam.runs.outcome import RunSummary
 from snapbeam.runs.recording import check_memory, end_state, prepared, reached_by, said_of
-from snapbeam.runs.request import asked
+from snapbeam.runs.request import kernel_input
 from snapbeam.runs.run import Run
 from snapbeam.runs.samples import impact_table, joined, run_dataset
 
@@ -85,7 +85,7 @@ def simulate(
     """
     if isinstance(system, (list, tuple)):
         return _several(system, integration, sample_times, progress)
-    system, integration = asked(system, integration)
+    system, integration = kernel_input(system, integration)
     report = sharing(progress, "run")
     run = prepared(system, integration, sample_times)
     times, ensemble = run.times, run.ensemble
@@ -94,12 +94,16 @@ def simulate(
     recorded = joined(list(engine.record(ensemble, run.instants, times is None, report)))
     if report is not None:
         report(1.0)
-    outcome = Outcome.from_statistics(statistics_of(ensemble, recorded.books, run.end / run.period))
+    outcome = RunSummary.from_statistics(
+        statistics_of(ensemble, recorded.accumulators_of_runs, run.end / run.period)
+    )
     if times is None and outcome.status != RunStatus.OK:
-        recorded = reached_by(recorded, float(recorded.books["time"][0] * ensemble.runs["tick"][0]))
+        recorded = reached_by(
+            recorded, float(recorded.accumulators_of_runs["time"][0] * ensemble.runs["tick"][0])
+        )
         if recorded.times.size == 0:
             times = np.zeros(1)  # it failed before anything could be written down
-    attrs = said_of(run, outcome, recorded.books)
+    attrs = said_of(run, outcome, recorded.accumulators_of_runs)
     return Run.of(
         lambda: (
             run_dataset(ensemble, system, recorded, times, run.period, attrs),
@@ -121,7 +125,7 @@ def _several(
     for at, system in enumerate(systems):
         if not isinstance(system, System):
             raise InputTypeError(f"system[{at}] = {shown(system)}: must be a System")
-    checked = [asked(system, integration) for system in systems]
+    checked = [kernel_input(system, integration) for system in systems]
     threads = next((each.threads for _, each in checked), None) or usable_cores()
     with ThreadPoolExecutor(max_workers=max(1, min(threads, len(systems) or 1))) as pool:
         waiting = [pool.submit(simulate, system, each, sample_times=sample_times) for system, each in checked]

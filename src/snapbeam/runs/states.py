@@ -26,17 +26,17 @@ def circuit_unit(ensemble: Ensemble) -> float:
 
 
 def states_of(
-    ensemble: Ensemble, q: _Array, p: _Array, home: _Integers, contact_ticks: _Integers, ticks: _Integers
+    ensemble: Ensemble, q: _Array, p: _Array, well_sign: _Integers, contact_ticks: _Integers, ticks: _Integers
 ) -> State:
     """States of the runs of an ensemble, a batch of shape (runs,).
 
     *q* and *p* of shape (runs, N) are linear modes about the well *home*; *ticks* is when.
     """
     structure, runs = ensemble.structure, ensemble.runs
-    far = (home < 0)[:, None]
+    far = (well_sign < 0)[:, None]
     first = np.where(far, q + structure.shift, q)
     # a sine comes round after each turn; a record has an end
-    comes_round = ensemble.drive.harmonic or (ensemble.drive.parts and ensemble.drive.repeats)
+    comes_round = ensemble.drive.harmonic or (ensemble.drive.parts and ensemble.drive.is_periodic)
     turned = (ticks % runs["period"] if comes_round else ticks) / runs["period"]
     tick = runs["tick"]
     return State(
@@ -50,5 +50,5 @@ def states_of(
         striker_shift=structure.body_of(q),
         striker_rate=structure.body_of(p),
         circuit=structure.circuit_of(p) * circuit_unit(ensemble),
-        modal=ModalState(q, p, home.astype(np.float64), np.array(runs["offset"]), structure.hash),
+        modal=ModalState(q, p, well_sign.astype(np.float64), np.array(runs["offset"]), structure.hash),
     )

@@ -19,7 +19,7 @@ from snapbeam.engines.outputs import Recorded
 from snapbeam.engines.registry import resolve
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.runs.outcome import Outcome
+from snapbeam.runs.outcome import RunSummary
 from snapbeam.runs.recording import Prepared, end_state, prepared, reached_by, said_of
 from snapbeam.runs.samples import impact_table, joined, run_dataset
 from snapbeam.runs.save import compressed, description, outcome_dataset
@@ -43,11 +43,11 @@ def simulate_to_file(
     path: str | os.PathLike[str],
     sample_times: ArrayLike | None = None,
     progress: Callable[[float], object] | bool | None = None,
-) -> Outcome:
+) -> RunSummary:
     """Simulate one run and write it to a file while it goes on: the file that ``simulate(...).save(path)`` writes.
 
     Memory does not grow with what a sample holds, modes and energies; it takes 8 bytes for each instant that is to be
-    recorded, and some 200 MB beside.  :func:`snapbeam.load_run` reads the file whole; ``xarray.open_dataset(path)``
+    recorded, and some 200 MB beside.  :func:`snapbeam.load` reads the file whole; ``xarray.open_dataset(path)``
     reads what is asked of it.
 
     Parameters
@@ -107,16 +107,20 @@ class _Writer:
         for begin in range(0, ready, _CHUNK):
             self.append(_part(together, slice(begin, min(ready, begin + _CHUNK))))
 
-    def finish(self) -> Outcome:
+    def finish(self) -> RunSummary:
         """Write what waits, the impacts, the outcome and what there is to say of the run."""
         from xarray.backends import H5NetCDFStore
 
         run, last = self.run, self.waiting
         assert last is not None  # an engine hands over one piece at least
-        outcome = Outcome.from_statistics(statistics_of(run.ensemble, last.books, run.end / run.period))
+        outcome = RunSummary.from_statistics(
+            statistics_of(run.ensemble, last.accumulators_of_runs, run.end / run.period)
+        )
         if outcome.status != RunStatus.OK:
-            last = reached_by(last, float(last.books["time"][0] * run.ensemble.runs["tick"][0]))
-        attrs = said_of(run, outcome, last.books)
+            last = reached_by(
+                last, float(last.accumulators_of_runs["time"][0] * run.ensemble.runs["tick"][0])
+            )
+        attrs = said_of(run, outcome, last.accumulators_of_runs)
         self.append(last, np.zeros(1) if self.written + last.times.size == 0 else None)
         end = end_state(run.ensemble, last, outcome)
         self.file.attrs.update(attrs | description(run.system, run.integration, run.accuracy, end))

@@ -28,12 +28,12 @@ def strikers_of(
     """
     others, length = ensemble.others, system.scale.length
     assert others is not None and system.striker is not None
-    count, samples = 1 + len(system.others), recorded.times.size
+    count, samples = 1 + len(system.further_contacts), recorded.times.size
     force, depth, tip = (np.zeros((samples, count)) for _ in range(3))
     energy = values[:, 3].copy()
     sign = ensemble.structure.sign
     force[:, 0], depth[:, 0], tip[:, 0] = values[:, 1], values[:, 0] / length, first
-    for j, each in enumerate(system.others):
+    for j, each in enumerate(system.further_contacts):
         numbers, row = others.numbers[0, j], others.rows[others.places[0, j]]
         reached = recorded.q @ row
         motion, _ = tip_of(system, j + 2, recorded.times)
@@ -48,16 +48,16 @@ def strikers_of(
         depth[:, j + 1] = pressed / length
         tip[:, j + 1] = sign * numbers[SIGN] * (numbers[REST] + numbers[OFFSET] + motion) / length
     return {
-        "striker_force": force,
-        "striker_penetration": depth,
-        "striker_displacement": tip,
+        "striker_forces": force,
+        "striker_penetrations": depth,
+        "striker_displacements": tip,
         "energy_contact": energy,
     }
 
 
 def _follows(ensemble: Ensemble, system: System, recorded: Recorded) -> _Array:
     """What a base does to tips that stand in space, in its frame, as seen from the first striker's side."""
-    if system.base is None or system.base.carries_striker:
+    if system.base_excitation is None or system.base_excitation.striker_on_base:
         return np.zeros(recorded.times.size)
     moved = motions_of(ensemble, system, recorded.times)["base"][0]
     return np.asarray(-ensemble.structure.sign * moved)

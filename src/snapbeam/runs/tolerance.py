@@ -24,13 +24,13 @@ from snapbeam.engines.plan import Plan
 from snapbeam.engines.registry import resolve
 from snapbeam.model.integration import ACCURACIES, Integration
 from snapbeam.model.system import System
-from snapbeam.runs.request import asked, cycle_of
+from snapbeam.runs.request import kernel_input, cycle_of
 from snapbeam.runs.samples import joined
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["PERTURBATION", "Accuracy", "conditioning", "steps_for"]
+__all__ = ["PERTURBATION", "ErrorEstimate", "perturbation_growth", "steps_for"]
 
 _Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ _SAMPLES_PER_CYCLE = 40
 _MOST_SAMPLES = 400_000
 _CHEAP = 3e-5
 """Tolerance from which order 4 is the cheaper one."""
-_ROUGH = (("map", 1.0), ("map", 0.5))
+_ROUGH = (("standard", 1.0), ("standard", 0.5))
 _FINE = tuple(("reference", 2.0**power) for power in range(1, -5, -1))
 """Level of accuracy and length of its steps over those that the level takes, from coarse to fine."""
 _BETWEEN = 2.0
@@ -50,7 +50,7 @@ _BETWEEN = 2.0
 
 
 @dataclass(frozen=True)
-class Accuracy:
+class ErrorEstimate:
     """What a tolerance asked of :func:`~snapbeam.simulate` gave."""
 
     tolerance: float
@@ -58,9 +58,9 @@ class Accuracy:
     estimated_error: float
     """Bound of the error up to the horizon, b: twice the greatest difference from the next coarser run, which is larger
     than the error wherever refinement converges, and the conditioning there."""
-    horizon: float
+    predictability_horizon: float
     """Up to here, s, the estimate holds: the end of the run, or where the conditioning forbids more."""
-    conditioning: float
+    perturbation_growth: float
     """Greatest change of the displacement, up to the end of the run, by a relative change of V by 1e-13, b."""
     reached: bool
     """Whether the estimate is within the tolerance up to the conditioning's horizon."""
@@ -79,7 +79,7 @@ class Accuracy:
         }
 
 
-def conditioning(
+def perturbation_growth(
     system: System,
     integration: Integration | None = None,
     *,
@@ -93,7 +93,7 @@ def conditioning(
     system : System
     integration : Integration, optional
         The number of cycles and the solver settings.  ``accuracy`` takes the place of its accuracy and tolerance.
-    accuracy : {"map", "reference"}
+    accuracy : {"standard", "reference"}
         Steps of the two runs compared.
     perturbation : float
         Relative change of every motion that drives the system, or of the start if nothing does.
@@ -113,8 +113,8 @@ def conditioning(
 
     size = positive("perturbation", perturbation)
     level = choice("accuracy", accuracy, ACCURACIES)
-    system, integration = asked(system, integration)
-    integration = integration.replace(accuracy=level, tolerance=None, early_decision=False)
+    system, integration = kernel_input(system, integration)
+    integration = integration.replace(accuracy=level, tolerance=None, early_termination=False)
     plan = plans_of(system, integration, run_columns(system, {}))[0]
     ensemble = make_ensemble(system, integration, plan=plan)
     times = _instants(system, ensemble)
@@ -136,7 +136,7 @@ def conditioning(
     )
 
 
-def steps_for(system: System, integration: Integration) -> tuple[Plan, Accuracy]:
+def steps_for(system: System, integration: Integration) -> tuple[Plan, ErrorEstimate]:
     """Steps with which a run meets the tolerance of *integration*, and what they gave.
 
     Runs of ever finer steps are compared with the one before, at the contact point and at the centre, 40 times
@@ -146,14 +146,14 @@ def steps_for(system: System, integration: Integration) -> tuple[Plan, Accuracy]
     """
     limit = integration.tolerance
     assert limit is not None
-    whole = integration.replace(tolerance=None, early_decision=False)
+    whole = integration.replace(tolerance=None, early_termination=False)
     steps = {
         level: plans_of(system, whole.replace(accuracy=level), run_columns(system, {}))[0]
         for level in ACCURACIES
     }
     rungs = _FINE if limit < _CHEAP else (*_ROUGH, *_FINE[1:])
     levels = [steps[level]._replace(step=length * steps[level].step) for level, length in rungs]
-    times = _instants(system, make_ensemble(system, whole, plan=steps["map"]))
+    times = _instants(system, make_ensemble(system, whole, plan=steps["standard"]))
     coarse = _watch(system, make_ensemble(system, whole, plan=levels[0]), times)
     for plan in levels[1:]:
         ensemble = make_ensemble(system, whole, plan=plan)
@@ -169,15 +169,15 @@ def steps_for(system: System, integration: Integration) -> tuple[Plan, Accuracy]
         last = min(last, _last_within(bound, limit))
         warnings.warn(
             f"tolerance = {limit:g} b is met only up to {times[last]:g} s of {times[-1]:g} s although the conditioning "
-            "would allow more; run.accuracy says so too",
+            "would allow more; integration.accuracy says so too",
             RuntimeWarning,
             stacklevel=3,
         )
-    return plan, Accuracy(
+    return plan, ErrorEstimate(
         tolerance=limit,
         estimated_error=float(bound[last]),
-        horizon=float(times[last]),
-        conditioning=float(response[-1]),
+        predictability_horizon=float(times[last]),
+        perturbation_growth=float(response[-1]),
         reached=reached,
         step=plan.step,
         order=plan.order,
@@ -186,7 +186,7 @@ def steps_for(system: System, integration: Integration) -> tuple[Plan, Accuracy]
 
 def _instants(system: System, ensemble: Ensemble) -> _Array:
     end = float(ensemble.runs["tick"][0] * ensemble.runs["end"][0])
-    fastest = min(cycle_of(system), 1.0 / system.model.reference_freq)
+    fastest = min(cycle_of(system), 1.0 / system.model.reference_frequency)
     count = math.ceil(end / fastest * _SAMPLES_PER_CYCLE)
     return np.linspace(0.0, end, min(count, _MOST_SAMPLES) + 1)
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Difference",
     "Notch",
-    "class_share",
+    "class_fraction",
     "compare_maps",
     "interwell_threshold",
     "is_interwell",
@@ -38,7 +38,7 @@ def interwell_threshold(ds: xr.Dataset, amplitude: str = "velocity_amplitude") -
     The threshold is NaN where no run is interwell, and where a failed run at a smaller amplitude leaves it open.
     Points that were never started (status ``NOT_RUN``) are left out.
     """
-    response = ds["response"].transpose(..., amplitude)
+    response = ds["response_class"].transpose(..., amplitude)
     if response.ndim != 2:
         raise InputError(f"map over {response.dims}: must have {amplitude!r} and one more axis")
     snapped = is_interwell(response.values)
@@ -80,7 +80,7 @@ def threshold_notch(x: _Array, threshold: _Array, step: float, window: tuple[flo
     return Notch(float(0.5 * (x[first] + x[last])), float(threshold[at]), float(x[first]), float(x[last]))
 
 
-def class_share(
+def class_fraction(
     response: NDArray[np.int8], kind: ResponseClass, where: NDArray[np.bool_] | None = None
 ) -> float:
     """Share of the points, those *where* holds, that have a class; NaN if there are none."""
@@ -106,7 +106,7 @@ class Difference:
 
 def compare_maps(first: xr.Dataset, second: xr.Dataset) -> Difference:
     """Compare the classes of two maps over the same grid."""
-    a, b = first["response"].values, second["response"].values
+    a, b = first["response_class"].values, second["response_class"].values
     if a.shape != b.shape or a.ndim != 2:
         raise InputError(f"maps of shapes {a.shape} and {b.shape}: must share one grid of two axes")
     changed = a != b
@@ -118,7 +118,7 @@ def compare_maps(first: xr.Dataset, second: xr.Dataset) -> Difference:
         lower[axis], upper[axis] = slice(None, -1), slice(1, None)
         border[tuple(lower)] |= step
         border[tuple(upper)] |= step
-    shares = [abs(class_share(a, kind) - class_share(b, kind)) for kind in ResponseClass]
+    shares = [abs(class_fraction(a, kind) - class_fraction(b, kind)) for kind in ResponseClass]
     curves = [interwell_threshold(ds) for ds in (first, second)]
     both = np.isfinite(curves[0]) & np.isfinite(curves[1])
     return Difference(

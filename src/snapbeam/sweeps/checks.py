@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from snapbeam.config.parameters import lookup
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.validate import InputError
 from snapbeam.engines.assemble import cycles_of, run_columns
 from snapbeam.engines.clock import require_resolved
@@ -18,7 +18,7 @@ from snapbeam.sweeps.points import Grid, Points
 if TYPE_CHECKING:
     from snapbeam.sweeps.setup import SweepSetup
 
-__all__ = ["findings_of", "require_every_structure", "require_parameters"]
+__all__ = ["diagnostics_of", "require_every_structure", "require_parameters"]
 
 
 def require_parameters(system: System, points: Points) -> None:
@@ -32,7 +32,7 @@ def require_parameters(system: System, points: Points) -> None:
             raise InputError(f"{name}: no parameter of this system; it has {', '.join(system.parameters)}")
     if (
         system.striker is None
-        and system.start is None
+        and system.initial_state is None
         and not system.moving
         and not any(name.startswith("start.") for name in first)
     ):
@@ -46,12 +46,12 @@ def _at(system: System, point: dict[str, Any]) -> System:
     return system.replace(**{name: value for name, value in plain.items() if not name.startswith("run.")})
 
 
-def findings_of(system: System, points: Points) -> Iterator[Finding]:
+def diagnostics_of(system: System, points: Points) -> Iterator[Diagnostic]:
     """What is doubtful about the system, or at the ends of what is swept."""
-    yield from system.findings()
+    yield from system.diagnostics()
     for number in _ends(points):
         point = {name: values[0] for name, values in points.take(np.array([number])).items()}
-        yield from _at(system, point).findings()
+        yield from _at(system, point).diagnostics()
 
 
 def _ends(points: Points) -> list[int]:
@@ -73,7 +73,7 @@ def require_every_structure(setup: SweepSetup) -> None:
     Before any run: a sweep does not end in the middle of the night because its last beam is not buckled.
     """
     names = setup.points.names
-    stepped = setup.integration.step is not None or "run.step" in names
+    stepped = setup.integration.step is not None or "integration.step" in names
     if not stepped and all(lookup(name).is_run and not name.startswith("start.") for name in names):
         return
     columns = setup.points.take(np.arange(setup.points.size))

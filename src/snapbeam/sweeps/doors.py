@@ -27,9 +27,9 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.striker import Shaker
 from snapbeam.model.system import System
 from snapbeam.sweeps.points import Grid, PointList, points_of
-from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicas
+from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicates
 from snapbeam.sweeps.setup import SweepSetup, sweep_setup
-from snapbeam.sweeps.stored import Keeping, Note, Tally, compute_sweep
+from snapbeam.sweeps.stored import CheckpointOptions, Note, SweepReport, compute_sweep
 from snapbeam.sweeps.threshold import threshold
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def map_setup(
     location: ArrayLike = 1.0 / 2.1,
     cycles: int = 200,
     side: str = "below",
-    reference_freq: float | None = None,
+    reference_frequency: float | None = None,
     **options: Any,
 ) -> SweepSetup:
     """A map of version 0.1 as a sweep; *options* are those of an :class:`~snapbeam.Integration`."""
@@ -69,8 +69,10 @@ def map_setup(
             scalars[name] = within(name, value, low, high, closed=closed)
         else:
             axes[full] = value
-    if reference_freq is not None and isinstance(model, ReducedModel):
-        model = replace(model, given_reference_freq=positive("reference_freq", reference_freq, "Hz"))
+    if reference_frequency is not None and isinstance(model, ReducedModel):
+        model = replace(
+            model, given_reference_frequency=positive("reference_frequency", reference_frequency, "Hz")
+        )
     if contact is None:
         raise InputError("contact = None: must be a law of contact, such as HertzContact(stiffness)")
     shaker = Shaker(
@@ -101,11 +103,11 @@ def response_map(
     location: ArrayLike = 1.0 / 2.1,
     cycles: int = 200,
     side: str = "below",
-    reference_freq: float | None = None,
+    reference_frequency: float | None = None,
     step: float | None = None,
-    accuracy: str = "map",
+    accuracy: str = "standard",
     engine: str = "auto",
-    early_decision: bool = False,
+    early_termination: bool = False,
     threads: int | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
@@ -124,9 +126,9 @@ def response_map(
         Cycles of excitation of each run.
     side : {"below", "above"}
         Side of the beam the shaker pushes from.
-    reference_freq : float, optional
+    reference_frequency : float, optional
         Frequency in Hz that stands for omega_1; the model's first natural frequency if not given.
-    step, accuracy, engine, early_decision, threads
+    step, accuracy, engine, early_termination, threads
         As in an :class:`~snapbeam.Integration`.
     progress : callable, optional
         Called as ``progress(done, total)`` while the map grows.
@@ -144,10 +146,10 @@ def response_map(
     """
     setup = map_setup(
         model, contact, frequency_ratio=frequency_ratio, velocity_amplitude=velocity_amplitude, location=location,
-        cycles=cycles, side=side, reference_freq=reference_freq, step=step, accuracy=accuracy, engine=engine,
-        early_decision=early_decision, threads=threads,
+        cycles=cycles, side=side, reference_frequency=reference_frequency, step=step, accuracy=accuracy, engine=engine,
+        early_termination=early_termination, threads=threads,
     )  # fmt: skip
-    return _plain(setup, compute_sweep(setup, Keeping(), progress=counting(progress, "map")))
+    return _plain(setup, compute_sweep(setup, CheckpointOptions(), progress=counting(progress, "map")))
 
 
 def _plain(setup: SweepSetup, dataset: xr.Dataset) -> xr.Dataset:
@@ -164,14 +166,14 @@ def long_map(
     cluster: str | None = None,
     refine_levels: int = 0,
     replicas: int = 0,
-    replica_size: float = MEASURING_ERROR,
-    replica_seed: int = 0,
-    halve_step: bool = False,
+    perturbation_rms: float = MEASURING_ERROR,
+    replicate_seed: int = 0,
+    check_half_step: bool = False,
     chunk: int | None = None,
     output: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
     note: Note | None = None,
-    tally: Tally | None = None,
+    tally: SweepReport | None = None,
     config: dict[str, Any] | None = None,
     **options: Any,
 ) -> xr.Dataset:
@@ -186,8 +188,8 @@ def long_map(
         As in :func:`snapbeam.sweep`.
     verify, chunk, note, tally, config
         As in :class:`snapbeam.Keeping`.
-    replicas, replica_size, replica_seed, halve_step
-        As in :class:`snapbeam.Replicas`.
+    replicas, perturbation_rms, replicate_seed, check_half_step
+        As in :class:`snapbeam.Replicates`.
 
     Returns
     -------
@@ -197,16 +199,16 @@ def long_map(
     ------
     InputError
         For bad input, and for a store that holds another map.
-    StoreError
+    CheckpointError
         If the store is in use, cannot be written or is damaged beyond repair.
     """
     setup = map_setup(model, contact, **options)
     repeats = None
-    if flag("halve_step", halve_step) or integer("replicas", replicas, 0, 10_000):
-        repeats = Replicas(replicas, replica_size, bool(halve_step), replica_seed)
+    if flag("check_half_step", check_half_step) or integer("replicas", replicas, 0, 10_000):
+        repeats = Replicates(replicas, perturbation_rms, bool(check_half_step), replicate_seed)
     dataset = compute_sweep(
         setup,
-        Keeping(store, verify, chunk, config, note, tally),
+        CheckpointOptions(store, verify, chunk, config, note, tally),
         cluster=cluster,
         refine_levels=refine_levels,
         replicas=repeats,
@@ -242,7 +244,7 @@ def threshold_curve(
     progress
         As in :func:`snapbeam.threshold`.
     **options
-        ``cycles``, ``side``, ``reference_freq``, ``step``, ``accuracy``, ``engine``, ``threads`` as in
+        ``cycles``, ``side``, ``reference_frequency``, ``step``, ``accuracy``, ``engine``, ``threads`` as in
         :func:`snapbeam.response_map`.
 
     Returns
@@ -296,7 +298,7 @@ def threshold_curve(
         return curves[0]
     words = {"units": "Hz", "long_name": "frequency that Omega and V are normalised by"}
     for curve in curves:
-        curve["reference_freq"] = ((), curve.attrs["reference_freq"], words)
+        curve["reference_frequency"] = ((), curve.attrs["reference_frequency"], words)
         curve["step"] = ((), curve.attrs["step"], {"units": "s", "long_name": "step in free flight"})
     labels = {"units": "1", "long_name": "number of modes N"}
     coordinate = xr.DataArray([each.modes for each in models], dims="modes", attrs=labels)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-__all__ = ["StoreError"]
+__all__ = ["CheckpointError"]
 
 
-class StoreError(OSError):
+class CheckpointError(OSError):
     """A store that cannot be written, read or trusted, or workers that cannot compute; the message says what to do."""

@@ -25,7 +25,13 @@ Columns = dict[str, NDArray[Any]]
 """Values of some points by dotted name, arrays of shape (points,)."""
 POINT = "point"
 """Dimension of a list of points."""
-_NOT_SWEPT = ("run.engine", "run.threads", "run.tolerance", "drive.displacement", "drive.velocity")
+_NOT_SWEPT = (
+    "integration.engine",
+    "integration.threads",
+    "integration.tolerance",
+    "drive.displacement",
+    "drive.velocity",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,7 +276,7 @@ def _length(columns: Mapping[str, NDArray[Any]]) -> int:
 
 
 def _labels(row: Parameter) -> dict[str, Any]:
-    return {"units": row.quantity.unit, "long_name": row.quantity.words, "parameter": row.name}
+    return {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
 
 
 def _coordinate(row: Parameter, values: NDArray[Any]) -> tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]:

@@ -21,18 +21,18 @@ from snapbeam.sweeps.keep.description import read_description
 from snapbeam.sweeps.keep.growth import BASE, layers_of
 from snapbeam.sweeps.keep.ledger import Ledger, Record
 from snapbeam.sweeps.points import Grid
-from snapbeam.sweeps.replicas import Replicas
+from snapbeam.sweeps.replicas import Replicates
 from snapbeam.sweeps.setup import SweepSetup
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["read_store"]
+__all__ = ["read_checkpoint"]
 
 _TABLES = ("integers", "numbers")
 
 
-def read_store(store: str | os.PathLike[str]) -> xr.Dataset:
+def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
     """The map of a store as far as it is computed; it may be growing meanwhile.
 
     Points that are not done, or whose task is just being written, are unknown, with the status NOT_RUN.  Of a sweep
@@ -40,7 +40,7 @@ def read_store(store: str | os.PathLike[str]) -> xr.Dataset:
 
     Parameters
     ----------
-    store : path
+    checkpoint : path
         The folder of a sweep over a grid.
 
     Returns
@@ -53,22 +53,22 @@ def read_store(store: str | os.PathLike[str]) -> xr.Dataset:
     InputError
         If the folder is no store, or holds what cannot be told from its description: a list of points, a recorded
         drive, other statistics.
-    StoreError
+    CheckpointError
         If its description is damaged.
     """
-    if not isinstance(store, (str, os.PathLike)):
-        raise InputTypeError(f"store = {shown(store)}: must be a folder")
-    folder = file_path("store", store)
+    if not isinstance(checkpoint, (str, os.PathLike)):
+        raise InputTypeError(f"store = {shown(checkpoint)}: must be a folder")
+    folder = file_path("checkpoint", checkpoint)
     file = folder / "map.json"
     if file.is_symlink() or not file.is_file():
-        raise InputError(f"store = {str(store)!r}: holds no map")
+        raise InputError(f"store = {str(checkpoint)!r}: holds no map")
     held = read_description(file)
     ledger = Ledger(folder / "ledger.jsonl")
     done: dict[str, dict[int, Record]] = {}
     for (name, task), record in ledger.records.items():
         if record.state == "done":
             done.setdefault(name, {})[task] = record
-    work = _work(held, str(store), {} if "grown" in held else done.get(BASE, {}))
+    work = _work(held, str(checkpoint), {} if "grown" in held else done.get(BASE, {}))
     table, points = work.unfinished(work.setup.points.size), 0
     for layer in layers_of(work, held.get("grown", []), int(held["chunk"])):
         part, count = _rows(folder, layer.work, layer.stage, done.get(layer.stage.name, {}))
@@ -111,7 +111,7 @@ def _work(described: dict[str, Any], name: str, done: dict[int, Record]) -> Poin
         for section, values in sections.items()
     })  # fmt: skip
     integration = Integration(**held["integration"])
-    repeats = Replicas(**held["replicas"]) if "replicas" in held else None
+    repeats = Replicates(**held["replicas"]) if "replicas" in held else None
     number, record = next(iter(done.items()), (0, None))
     given = described.get("axes")
     known = isinstance(given, list) and sorted(map(str, given)) == sorted(axes)

@@ -108,7 +108,7 @@ def refine(keeper: Keeper, levels: int, progress: Progress | None = None) -> tup
 
 def _classes(keeper: Keeper, results: Rows, size: int) -> _Classes:
     blocks = [
-        keeper.work.values("response", results.read(start, min(start + _BLOCK, size)))
+        keeper.work.values("response_class", results.read(start, min(start + _BLOCK, size)))
         for start in range(0, size, _BLOCK)
     ]
     return np.concatenate(blocks).astype(np.int8)
@@ -191,8 +191,8 @@ def _assemble(
     keeper: Keeper, grid: Grid, parts: list[tuple[_Index, Rows]], classes: _Classes, computed: _Mask
 ) -> RefinedRows:
     work = keeper.work
-    columns = work.unfinished(grid.size, RunStatus.INFERRED)
-    columns.integers[:, work.integers.index("response")] = classes.ravel()
+    columns = work.unfinished(grid.size, RunStatus.FILLED)
+    columns.integers[:, work.integers.index("response_class")] = classes.ravel()
     for index, results in parts:
         for start in range(0, index.size, _BLOCK):
             rows = index[start : start + _BLOCK]

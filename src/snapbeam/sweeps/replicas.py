@@ -16,48 +16,48 @@ from snapbeam.model.start import rest_state
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 
-__all__ = ["MEASURING_ERROR", "Replicas", "perturbed_start"]
+__all__ = ["MEASURING_ERROR", "Replicates", "perturbed_start"]
 
 MEASURING_ERROR = 12e-6 / 12.0**0.5
 """Error of a position read to one pixel of the paper's camera, 12 um: the rms of rounding to a pixel, m."""
 
 
 @dataclass(frozen=True)
-class Replicas:
+class Replicates:
     """Repeats of every point of a map.
 
     Attributes
     ----------
     count : int
         Repeats with a changed start, beside the run from rest.
-    size : float
+    perturbation_rms : float
         Root mean square of the change of the centre displacement, m.
-    halve_step : bool
+    check_half_step : bool
         One repeat more, from rest with every step halved.
     seed : int
         Chooses the changes.
     """
 
     count: int
-    size: float = MEASURING_ERROR
-    halve_step: bool = False
+    perturbation_rms: float = MEASURING_ERROR
+    check_half_step: bool = False
     seed: int = 0
 
     def __post_init__(self) -> None:
         integer("replicas", self.count, 0, 10_000)
-        flag("halve_step", self.halve_step)
-        positive("replica_size", self.size, "m")
-        integer("replica_seed", self.seed, 0, 2**63 - 1)
-        if self.count == 0 and not self.halve_step:
+        flag("check_half_step", self.check_half_step)
+        positive("perturbation_rms", self.perturbation_rms, "m")
+        integer("replicate_seed", self.seed, 0, 2**63 - 1)
+        if self.count == 0 and not self.check_half_step:
             raise InputError("replicas = 0: must be at least 1, or with the step halved")
 
     @property
     def runs(self) -> int:
         """Runs of each point, the one from rest included."""
-        return 1 + self.count + int(self.halve_step)
+        return 1 + self.count + int(self.check_half_step)
 
 
-def perturbed_start(system: System, replicas: Replicas, repeat: int, state: State | None = None) -> State:
+def perturbed_start(system: System, replicas: Replicates, repeat: int, state: State | None = None) -> State:
     """The start of one repeat: a beam that still rings faintly in all its modes, the same for every point of a map.
 
     It is added to *state*, or a batch of states, or else to the system's own start.
@@ -67,16 +67,16 @@ def perturbed_start(system: System, replicas: Replicas, repeat: int, state: Stat
     root mean square asked for.
     """
     model = system.model
-    rest = state if state is not None else system.start
+    rest = state if state is not None else system.initial_state
     if rest is None:
         rest = rest_state(model, system.striker)
     sign = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
     moving = model.omega > 0.0
     per_unit = np.where(moving, 1.0 / np.where(moving, model.omega, 1.0), 0.0)
-    reach = float(np.sqrt(np.sum(((model.center_shape @ model.linear_modes) * per_unit) ** 2)))
+    reach = float(np.sqrt(np.sum(((model.midspan_shape @ model.linear_modes) * per_unit) ** 2)))
     if reach == 0.0:
         raise InputError("replicas: no mode moves the centre, so its start cannot be changed")
-    speed = replicas.size / reach
+    speed = replicas.perturbation_rms / reach
     generator = np.random.Generator(np.random.Philox(key=[replicas.seed, repeat]))
     q, velocity = generator.standard_normal((2, model.modes)) * speed
     return dataclasses.replace(
@@ -85,6 +85,6 @@ def perturbed_start(system: System, replicas: Replicas, repeat: int, state: Stat
         velocity=rest.velocity + sign * (model.linear_modes @ velocity),
         contact_time=np.array(np.nan),
         tangent=None,
-        passed=None,
+        statistics=None,
         modal=None,
     )

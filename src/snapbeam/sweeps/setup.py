@@ -19,7 +19,7 @@ from snapbeam.engines.assemble import make_ensemble, plans_of, run_columns
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.engines.plan import Plan
 from snapbeam.engines.registry import resolve
-from snapbeam.model.drive import Recorded
+from snapbeam.model.drive import RecordedMotion
 from snapbeam.model.integration import Integration
 from snapbeam.model.quantity import quantities
 from snapbeam.model.start import started
@@ -27,7 +27,7 @@ from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.runs.describe import attributes_of
 from snapbeam.runs.save import code_flags
-from snapbeam.sweeps.checks import findings_of, require_every_structure, require_parameters
+from snapbeam.sweeps.checks import diagnostics_of, require_every_structure, require_parameters
 from snapbeam.sweeps.points import Columns, Grid, Points, points_of
 
 if TYPE_CHECKING:
@@ -105,9 +105,9 @@ class SweepSetup:
                     law=ensemble.law,
                     drive=ensemble.drive,
                     body=ensemble.structure.body_mass is not None,
-                    uneven=ensemble.structure.model.side_force is not None,
-                    around=system.has_surroundings,
-                    several=bool(system.others),
+                    uneven=ensemble.structure.model.transverse_force is not None,
+                    around=system.has_environment,
+                    several=bool(system.further_contacts),
                 )[1]
                 books = engine.run_ensemble(ensemble, threads, report)
                 for name, values in statistics_of(ensemble, books).items():
@@ -151,7 +151,7 @@ class SweepSetup:
     def start_of(system: System, points: dict[str, NDArray[np.float64]]) -> State | None:
         """Where runs of a system begin, if the points say something of it."""
         own = {name[6:]: values for name, values in points.items() if name.startswith("start.")}
-        return started(system.model, system.striker, system.start, own) if own else None
+        return started(system.model, system.striker, system.initial_state, own) if own else None
 
     @cached_property
     def plan(self) -> Plan:
@@ -172,7 +172,9 @@ class SweepSetup:
         return [
             name
             for name in self.points.names
-            if name.startswith(("beam.", "model.", "ends.", "imperfection.", "run.step", "run.accuracy"))
+            if name.startswith(
+                ("beam.", "model.", "ends.", "imperfection.", "integration.step", "integration.accuracy")
+            )
         ]
 
     def identity(self) -> dict[str, Any]:
@@ -192,7 +194,7 @@ class SweepSetup:
         own: dict[str, Any] = {
             "cycles": self._cycles(),
             "engine": self.integration.engine,
-            "early_decision": int(self.integration.early_decision),
+            "early_termination": int(self.integration.early_termination),
         }
         if self.system.striker is not None:
             own["side"] = self.system.striker.side
@@ -202,7 +204,7 @@ class SweepSetup:
         varied = {lookup(name).short for name in self.points.names}
         if self.structural:
             varied |= {
-                "reference_freq",
+                "reference_frequency",
                 "step",
                 "longest_contact_step",
                 "shortest_contact_step",
@@ -221,7 +223,7 @@ class SweepSetup:
     def _cycles(self) -> float:
         """Cycles of each run; those of the record, if it is marched to its end."""
         drive = None if self.system.striker is None else self.system.striker.drive
-        if isinstance(drive, Recorded) and self.integration.cycles is None:
+        if isinstance(drive, RecordedMotion) and self.integration.cycles is None:
             return round(drive.duration * drive.frequency, 9)
         return self.integration.cycles_or_default
 
@@ -230,7 +232,7 @@ class SweepSetup:
         coords = self.points.coordinates()
         for name, value in self.fixed.items():
             row = lookup(name)
-            coords[row.short] = ((), value, {"units": row.quantity.unit, "long_name": row.quantity.words})
+            coords[row.short] = ((), value, {"units": row.quantity.unit, "long_name": row.quantity.long_name})
         if self.structural:
             coords |= self._of_structure()
         return coords
@@ -252,10 +254,10 @@ class SweepSetup:
             if key not in made:
                 system, integration = self.neighbour(dict(zip(names, key, strict=True)))
                 plan = plans_of(system, integration, run_columns(system, {}))[0]
-                made[key] = system.model.reference_freq, plan.step, system.scale.length
+                made[key] = system.model.reference_frequency, plan.step, system.scale.length
             table[(slice(None), *at)] = made[key]
         labels = {
-            "reference_freq": ("Hz", "frequency that Omega and V are normalised by"),
+            "reference_frequency": ("Hz", "frequency that Omega and V are normalised by"),
             "step": ("s", "step in free flight"),
             "length_scale": ("m", "length that displacements are normalised by"),
         }
@@ -296,14 +298,14 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         modes=system.model.modes,
         law=law,
         body=system.striker is not None and system.striker.mass is not None,
-        uneven=system.model.side_force is not None,
-        around=system.has_surroundings,
-        several=bool(system.others),
+        uneven=system.model.transverse_force is not None,
+        around=system.has_environment,
+        several=bool(system.further_contacts),
         **({} if system.striker is None else {"drive": type(system.striker.drive)}),
     )[0]
     setup = SweepSetup(system, integration.replace(engine=resolved), points)
     require_every_structure(setup)
-    tell(findings_of(system, points))
+    tell(diagnostics_of(system, points))
     return setup
 
 
@@ -315,15 +317,15 @@ def _alike(system: System, state: State | None, runs: int) -> list[NDArray[np.in
     every = np.arange(runs)
     if system.striker is not None or state is None or not state.batch:
         return [every]
-    upper = state.amplitude @ system.model.center_shape > 0.0
+    upper = state.amplitude @ system.model.midspan_shape > 0.0
     return [part for part in (every[~upper], every[upper]) if part.size]
 
 
 def variable_attributes(name: str) -> dict[str, Any]:
     """Unit and name in words of one variable of a map; for codes, what they mean."""
     row = STATISTICS[name]
-    labels: dict[str, Any] = {"units": row.unit, "long_name": row.words}
-    if name == "response":
+    labels: dict[str, Any] = {"units": row.unit, "long_name": row.long_name}
+    if name == "response_class":
         labels |= code_flags(ResponseClass)
     elif name == "status":
         labels |= code_flags(RunStatus)

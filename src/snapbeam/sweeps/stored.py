@@ -18,19 +18,19 @@ from snapbeam.sweeps.compute.cluster import Cluster, open_client, parse_cluster
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Keeper, MemoryKeeper, Rows, Stage
 from snapbeam.sweeps.compute.workers import ClusterWorkers, Failure, HereWorkers, Workers
-from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.errors import CheckpointError
 from snapbeam.sweeps.export import to_dataset, to_netcdf
 from snapbeam.sweeps.keep.growth import BASE, snapped
 from snapbeam.sweeps.keep.store import MapStore
 from snapbeam.sweeps.points import Points
 from snapbeam.sweeps.refine import MAX_LEVELS, RefinedRows, refine
-from snapbeam.sweeps.replicas import Replicas
+from snapbeam.sweeps.replicas import Replicates
 from snapbeam.sweeps.setup import Progress, SweepSetup
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Keeping", "Tally", "compute_sweep", "compute_table"]
+__all__ = ["CheckpointOptions", "SweepReport", "compute_sweep", "compute_table"]
 
 Note = Callable[[str], object]
 
@@ -46,12 +46,12 @@ class _Incomplete(Exception):
 
 
 @dataclass
-class Tally:
+class SweepReport:
     """What happened while a sweep was computed."""
 
     tasks: int = 0
     """Tasks of the stages so far."""
-    kept: int = 0
+    resumed: int = 0
     """Tasks that were done before."""
     computed: int = 0
     damaged: list[tuple[str, int]] = field(default_factory=list)
@@ -65,40 +65,40 @@ class Tally:
 
 
 @dataclass(frozen=True, eq=False)
-class Keeping:
+class CheckpointOptions:
     """Where a sweep is kept while it is computed, and how.
 
     Parameters
     ----------
     path : path, optional
         Folder of the store; in memory if none is given.
-    verify : bool
+    check_checkpoint : bool
         Check every finished task of the store and compute again only those that are damaged; points that
         were never computed stay unknown.
-    chunk : int, optional
+    points_per_task : int, optional
         Points of a task of a new store.
     config : dict, optional
         Parameters to keep in the store as a parameter file would hold them.
     note : callable, optional
         Called as ``note(text)`` with what there is to say.
-    tally : Tally, optional
+    report : Tally, optional
         Filled with what was computed, kept, damaged and given up.
     """
 
     path: str | os.PathLike[str] | None = None
-    verify: bool = False
-    chunk: int | None = None
+    check_checkpoint: bool = False
+    points_per_task: int | None = None
     config: dict[str, Any] | None = None
     note: Note | None = None
-    tally: Tally | None = None
+    report: SweepReport | None = None
 
     def __post_init__(self) -> None:
         if self.path is not None and not isinstance(self.path, (str, os.PathLike)):
             raise InputTypeError(f"store = {shown(self.path)}: must be a folder")
-        flag("verify", self.verify)
-        if self.path is None and self.verify:
+        flag("check_checkpoint", self.check_checkpoint)
+        if self.path is None and self.check_checkpoint:
             raise InputError("verify: needs a store")
-        if self.path is not None and self.verify and not (Path(self.path) / "map.json").is_file():
+        if self.path is not None and self.check_checkpoint and not (Path(self.path) / "map.json").is_file():
             raise InputError(f"store = {str(self.path)!r}: there is no map to verify")
 
 
@@ -110,14 +110,14 @@ def _scattered(task: int) -> float:
 class StoreKeeper:
     """A sweep kept in a store: finished tasks are read, damaged and missing ones are computed."""
 
-    def __init__(self, store: MapStore, workers: Workers, keeping: Keeping) -> None:
+    def __init__(self, store: MapStore, workers: Workers, keeping: CheckpointOptions) -> None:
         self.store = store
         self.work = store.work
         self.chunk = store.chunk
         self.workers = workers
-        self.tally = Tally() if keeping.tally is None else keeping.tally
+        self.tally = SweepReport() if keeping.report is None else keeping.report
         self.note: Note = keeping.note if keeping.note is not None else (lambda _: None)
-        self.only_damaged = keeping.verify
+        self.only_damaged = keeping.check_checkpoint
 
     def complete(self, stage: Stage, progress: Progress | None = None) -> Rows:
         """Compute the tasks of a stage that are not done, committing each; of a store that has grown, of each layer."""
@@ -137,7 +137,7 @@ class StoreKeeper:
         store.open_stage(stage)
         damaged, pending = store.damaged_in(stage), store.pending(stage)
         tally.tasks += stage.tasks
-        tally.kept += stage.tasks - len(pending)
+        tally.resumed += stage.tasks - len(pending)
         tally.damaged += [(stage.name, task) for task in damaged]
         if damaged:
             self.note(
@@ -145,7 +145,7 @@ class StoreKeeper:
             )
         todo = sorted(damaged if self.only_damaged else pending, key=_scattered)
         if todo and store.read_only:
-            raise StoreError(
+            raise CheckpointError(
                 f"store = {str(store.path)!r}: is read-only, and {len(todo)} of {stage.tasks} tasks are to be computed"
             )
         sizes = {task: int(np.diff(stage.bounds(task))[0]) for task in todo}
@@ -173,18 +173,18 @@ class StoreKeeper:
 
 def compute_sweep(
     setup: SweepSetup,
-    keeping: Keeping,
+    keeping: CheckpointOptions,
     *,
     cluster: str | None = None,
     refine_levels: int = 0,
-    replicas: Replicas | None = None,
+    replicas: Replicates | None = None,
     output: str | os.PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> xr.Dataset:
     """Compute a sweep that was checked; see :func:`snapbeam.sweep`."""
     levels = integer("refine_levels", refine_levels, 0, MAX_LEVELS)
-    if replicas is not None and not isinstance(replicas, Replicas):
-        raise InputTypeError(f"replicas = {shown(replicas)}: must be a number of repeats, or Replicas")
+    if replicas is not None and not isinstance(replicas, Replicates):
+        raise InputTypeError(f"replicas = {shown(replicas)}: must be a number of repeats, or Replicates")
     if progress is not None and not callable(progress):
         raise InputTypeError(f"progress = {shown(progress)}: must be callable, as progress(done, total)")
     target = None if output is None else check_writable(output, "output", (".nc",))
@@ -202,7 +202,7 @@ def compute_sweep(
         return _result(work, points, rows, more, target)
 
 
-def _require_room(points: int, keeping: Keeping) -> None:
+def _require_room(points: int, keeping: CheckpointOptions) -> None:
     """Refuse a sweep whose results would not fit, before anything is computed."""
     size = points * _POINT_BYTES
     if keeping.path is None and size > _MEMORY:
@@ -225,13 +225,13 @@ def _computed(keeper: Keeper, levels: int, progress: Progress | None) -> tuple[P
 
 
 @contextmanager
-def _keeper(work: PointWork, keeping: Keeping, cluster: Cluster | None) -> Iterator[Keeper]:
+def _keeper(work: PointWork, keeping: CheckpointOptions, cluster: Cluster | None) -> Iterator[Keeper]:
     threads = work.setup.integration.threads
     if keeping.path is None:
         yield MemoryKeeper(work, threads)
         return
-    path, grow = Path(keeping.path), not keeping.verify
-    with MapStore(path, work, keeping.chunk, keeping.config, grow=grow) as kept:
+    path, grow = Path(keeping.path), not keeping.check_checkpoint
+    with MapStore(path, work, keeping.points_per_task, keeping.config, grow=grow) as kept:
         if cluster is None:
             yield StoreKeeper(kept, HereWorkers(threads), keeping)
             return
@@ -249,9 +249,9 @@ def _result(
         repeats = work.replicas
         more |= {
             "replicas": repeats.count,
-            "replica_size": repeats.size,
-            "replica_seed": repeats.seed,
-            "halve_step": int(repeats.halve_step),
+            "perturbation_rms": repeats.perturbation_rms,
+            "replicate_seed": repeats.seed,
+            "check_half_step": int(repeats.check_half_step),
         }
     attrs = work.setup.attributes(more=more)
     if isinstance(rows, RefinedRows):
@@ -271,7 +271,11 @@ def _result(
 
 
 def compute_table(
-    work: PointWork, keeping: Keeping, *, cluster: str | None = None, progress: Progress | None = None
+    work: PointWork,
+    keeping: CheckpointOptions,
+    *,
+    cluster: str | None = None,
+    progress: Progress | None = None,
 ) -> tuple[ResultTable, dict[str, Any]]:
     """Compute any work over the points of its sweep, kept and resumed as a sweep is.
 

@@ -10,9 +10,9 @@ from snapbeam.core.reporting import counting
 from snapbeam.core.validate import integer
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.sweeps.replicas import Replicas
+from snapbeam.sweeps.replicas import Replicates
 from snapbeam.sweeps.setup import sweep_setup
-from snapbeam.sweeps.stored import Keeping, compute_sweep
+from snapbeam.sweeps.stored import CheckpointOptions, compute_sweep
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,10 +25,10 @@ def sweep(
     axes: Mapping[str, Any] | xr.Dataset | Any,
     integration: Integration | None = None,
     *,
-    store: str | os.PathLike[str] | Keeping | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
     cluster: str | None = None,
     refine_levels: int = 0,
-    replicas: Replicas | int | None = None,
+    replicates: Replicates | int | None = None,
     output: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
@@ -47,7 +47,7 @@ def sweep(
         (``"frequency_ratio"``), with strictly increasing values.  A dataset with one-dimensional variables, or a
         data frame, makes a list of points along the dimension ``point``.
     integration : Integration, optional
-    store : path or Keeping, optional
+    checkpoint : path or Keeping, optional
         Folder that keeps the sweep while it is computed.  One that exists is resumed: what is finished and
         undamaged is not computed again.
     cluster : str, optional
@@ -55,8 +55,8 @@ def sweep(
         process by default.  Needs a store.
     refine_levels : int
         Times the spacing of the axes of numbers is halved where neighbours differ in class.
-    replicas : Replicas or int, optional
-        Repeats of each run with a changed start; adds ``class_share``.
+    replicates : Replicates or int, optional
+        Repeats of each run with a changed start; adds ``class_fraction``.
     output : path, optional
         NetCDF file to write, a block at a time, so that memory does not grow with the sweep.
     progress : callable, optional
@@ -73,7 +73,7 @@ def sweep(
     InputError
         For bad input, and for a store that holds another sweep.  Runs that fail numerically are UNKNOWN points with
         a ``status``.
-    StoreError
+    CheckpointError
         If the store is in use, cannot be written or is damaged beyond repair.
 
     Examples
@@ -81,10 +81,10 @@ def sweep(
     >>> ds = sb.sweep(system, {"model.damping_ratio": [0.002, 0.005], "frequency_ratio": omega})  # doctest: +SKIP
     """
     setup = sweep_setup(system, axes, integration)
-    keeping = store if isinstance(store, Keeping) else Keeping(store)
-    if replicas is not None and not isinstance(replicas, Replicas):
-        replicas = integer("replicas", replicas, 0, 10_000)
-    repeats = Replicas(replicas) if isinstance(replicas, int) and replicas else replicas or None
+    keeping = checkpoint if isinstance(checkpoint, CheckpointOptions) else CheckpointOptions(checkpoint)
+    if replicates is not None and not isinstance(replicates, Replicates):
+        replicates = integer("replicates", replicates, 0, 10_000)
+    repeats = Replicates(replicates) if isinstance(replicates, int) and replicates else replicates or None
     return compute_sweep(
         setup,
         keeping,

@@ -16,7 +16,7 @@ from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.sweeps.points import Grid, points_of
 from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup, variable_attributes
-from snapbeam.sweeps.stored import Keeping, compute_sweep
+from snapbeam.sweeps.stored import CheckpointOptions, compute_sweep
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,9 +36,9 @@ _OUTCOMES = (
 
 def threshold(
     system: System,
-    along: str,
+    parameter: str,
     values: ArrayLike,
-    over: Mapping[str, ArrayLike],
+    axes: Mapping[str, ArrayLike],
     integration: Integration | None = None,
     *,
     progress: Progress | bool | None = None,
@@ -53,14 +53,14 @@ def threshold(
     ----------
     system : System
         The model; parameters that are not in `over` keep their values.
-    along : str
+    parameter : str
         Parameter to raise, such as ``"velocity_amplitude"``: one that may differ between the runs of an ensemble.
     values : array_like
         Values of that parameter, strictly increasing, in its unit: the range and the resolution of the threshold.
-    over : mapping of str to array_like
+    axes : mapping of str to array_like
         Axes of the threshold, as in :func:`snapbeam.sweep`.
     integration : Integration, optional
-        Solver settings.  Every run ends as soon as its response class is certain, whatever `early_decision` is.
+        Solver settings.  Every run ends as soon as its response class is certain, whatever `early_termination` is.
     progress : callable, optional
         Function that receives ``(done, total)``, numbers of runs; True writes a line to standard error.
 
@@ -69,13 +69,13 @@ def threshold(
     xarray.Dataset
         Over the axes:
 
-        - ``first_interwell``: lowest value with an interwell run; NaN if no run is interwell.
-        - ``always_interwell``: lowest value from which every run with a response class is interwell; NaN if the
+        - ``lower_threshold``: lowest value with an interwell run; NaN if no run is interwell.
+        - ``upper_threshold``: lowest value from which every run with a response class is interwell; NaN if the
           highest such run is intrawell.
-        - ``last_intrawell``: highest value with an intrawell run below ``first_interwell``.
+        - ``last_intrawell``: highest value with an intrawell run below ``lower_threshold``.
         - ``failed_runs``: number of runs without a response class.  Such a run is neither interwell nor
           intrawell.
-        - ``first_interwell_min``, ``always_interwell_max``: lower limit of the first curve if every failed run were
+        - ``lower_threshold_min``, ``upper_threshold_max``: lower limit of the first curve if every failed run were
           interwell, and upper limit of the second if every failed run were intrawell.  They differ from the
           curves only where a failed run leaves the threshold open; NaN where no value of the range is the limit.
         - ``outcome``: one of the flags ``band_found``, ``no_interwell_in_range``, ``lowest_value_is_interwell``,
@@ -90,22 +90,22 @@ def threshold(
         For bad input, such as a parameter that belongs to the model and cannot differ between the runs of an
         ensemble.
     """
-    row = lookup(along)
+    row = lookup(parameter)
     if not row.is_run or row.quantity.kind is not float:
         raise InputError(
-            f"along = {shown(along)}: must be a number that may differ between runs, such as velocity_amplitude"
+            f"along = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
         )
-    if not isinstance(over, Mapping) or not over:
-        raise InputError(f"over = {shown(over)}: must map at least one parameter to an array of values")
+    if not isinstance(axes, Mapping) or not axes:
+        raise InputError(f"over = {shown(axes)}: must map at least one parameter to an array of values")
     if np.size(values) < 2:
-        raise InputError(f"{along}: must be an array of at least two values to choose from")
+        raise InputError(f"{parameter}: must be an array of at least two values to choose from")
     asked = Integration() if integration is None else integration
     if not isinstance(asked, Integration):
         raise InputError(f"integration = {shown(integration)}: must be an Integration")
-    points = points_of({**over, row.name: values})
+    points = points_of({**axes, row.name: values})
     assert isinstance(points, Grid)
-    setup = sweep_setup(system, points, asked.replace(early_decision=True))
-    computed = compute_sweep(setup, Keeping(), progress=counting(progress, "threshold", "runs"))
+    setup = sweep_setup(system, points, asked.replace(early_termination=True))
+    computed = compute_sweep(setup, CheckpointOptions(), progress=counting(progress, "threshold", "runs"))
     return _dataset(setup, row.name, computed)
 
 
@@ -118,21 +118,21 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
     values = setup.points.axes[along]
     dims = tuple(lookup(name).short for name in setup.points.axes if name != along)
     whole = (*dims, row.short)
-    response = computed["response"].transpose(*whole).values
+    response = computed["response_class"].transpose(*whole).values
     rows = _thresholds(response)
     attrs = setup.attributes("threshold of the interwell response of a struck bistable beam")
-    attrs.pop("early_decision")
-    attrs |= {"along": row.short, "runs": int(response.size)}
+    attrs.pop("early_termination")
+    attrs |= {"parameter": row.short, "runs": int(response.size)}
     dataset = xr.Dataset(coords=setup.coordinates(), attrs=attrs)
-    words = row.quantity.words
+    words = row.quantity.long_name
     symbol = f" {row.quantity.symbol}" if row.quantity.symbol else ""
     padded = np.append(values, np.nan)
     for name, text in (
-        ("first_interwell", f"lowest {words}{symbol} that makes an interwell response"),
-        ("always_interwell", f"{words}{symbol} above which all runs are interwell"),
+        ("lower_threshold", f"lowest {words}{symbol} that makes an interwell response"),
+        ("upper_threshold", f"{words}{symbol} above which all runs are interwell"),
         ("last_intrawell", f"highest {words}{symbol} run below that without snap-through"),
-        ("first_interwell_min", f"lowest {words}{symbol} that may be interwell, failed runs included"),
-        ("always_interwell_max", f"{words}{symbol} above which no run failed or is intrawell"),
+        ("lower_threshold_min", f"lowest {words}{symbol} that may be interwell, failed runs included"),
+        ("upper_threshold_max", f"{words}{symbol} above which no run failed or is intrawell"),
     ):
         dataset[name] = (dims, padded[rows[name]], {"units": row.quantity.unit, "long_name": text})
     failed = {"units": "1", "long_name": "runs without a response class"}
@@ -144,7 +144,7 @@ def _dataset(setup: SweepSetup, along: str, computed: xr.Dataset) -> xr.Dataset:
         "flag_meanings": " ".join(_OUTCOMES),
     }
     dataset["outcome"] = (dims, rows["outcome"].astype(np.int8), flags)
-    for name in ("response", "status"):
+    for name in ("response_class", "status"):
         dataset[name] = (whole, computed[name].transpose(*whole).values, variable_attributes(name))
     return dataset
 
@@ -173,11 +173,11 @@ def _thresholds(response: NDArray[np.int8]) -> dict[str, NDArray[Any]]:
         0,
     )
     return {
-        "first_interwell": first,
-        "always_interwell": always,
+        "lower_threshold": first,
+        "upper_threshold": always,
         "last_intrawell": np.where(below.any(axis=-1), count - 1 - _lowest(below[..., ::-1]), count),
-        "first_interwell_min": first_min,
-        "always_interwell_max": always_max,
+        "lower_threshold_min": first_min,
+        "upper_threshold_max": always_max,
         "failed_runs": failed.sum(axis=-1),
         "outcome": outcome,
     }

@@ -27,7 +27,7 @@ from snapbeam.engines.cuda.layout import device_structure, launch_bounds
 CONTACT = sb.HertzContact(stiffness=4e8)
 
 
-def ensemble_of(modes, ratio, velocity, cycles, accuracy="map", location=1 / 2.1, **options) -> Ensemble:
+def ensemble_of(modes, ratio, velocity, cycles, accuracy="standard", location=1 / 2.1, **options) -> Ensemble:
     """Runs of the paper's beam, for a whole number of cycles or a part of one."""
     model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes, damping_ratio=0.005)
     ratio, velocity = np.atleast_1d(ratio).astype(float), np.atleast_1d(velocity).astype(float)
@@ -58,7 +58,7 @@ JOBS = {
     "two modes": Job(ensemble_of(2, 3.0, 0.5, 0.3)),
     "a block of sixteen": Job(ensemble_of(2, 1.6, 0.4, 0.04), Options(1, fewest_threads=16)),
     "sixth order": Job(ensemble_of(1, 3.5, 0.5, 0.1, accuracy="reference")),
-    "decided": Job(ensemble_of(1, 1.4 + 26 / 110 * 5, 0.1 + 5 / 22, 20, early_decision=True)),
+    "decided": Job(ensemble_of(1, 1.4 + 26 / 110 * 5, 0.1 + 5 / 22, 20, early_termination=True)),
     "step limit": Job(dataclasses.replace(ensemble_of(1, 1.6, 0.4, 1), max_steps=5)),
     "not finite": Job(_absurd(ensemble_of(1, 1.6, 0.4, 1))),
 }
@@ -72,24 +72,28 @@ def simulated():
 @pytest.mark.parametrize("name", ["one mode", "two modes", "a block of sixteen", "sixth order", "decided"])
 def test_same_run_as_the_cpu_engine_to_round_off(simulated, name):
     """Over the first impacts every event falls on the same tick, and every number agrees to 1e-9 of it."""
-    books, _ = simulated[name]
+    accumulators_of_runs, _ = simulated[name]
     expected = cpu_engine.run_ensemble(JOBS[name].ensemble)
-    assert (books["steps"] >= 5).all()
+    assert (accumulators_of_runs["steps"] >= 5).all()
     for column in expected.dtype.names:
         if expected.dtype[column].kind == "i":
-            np.testing.assert_array_equal(books[column], expected[column], err_msg=column)
+            np.testing.assert_array_equal(accumulators_of_runs[column], expected[column], err_msg=column)
         else:
-            np.testing.assert_allclose(books[column], expected[column], rtol=1e-9, atol=1e-18, err_msg=column)
+            np.testing.assert_allclose(
+                accumulators_of_runs[column], expected[column], rtol=1e-9, atol=1e-18, err_msg=column
+            )
 
 
 def test_the_cases_hold_what_they_are_for(simulated):
-    books, _ = simulated["one mode"]
-    assert books["impacts"].tolist() == [2, 1]
-    assert books["crossings"].tolist() == [0, 1], "one run snaps through, and changes its well"
-    assert (books["peak_force"] > 1.0).all()
-    books, _ = simulated["decided"]
-    assert books["status"][0] == RunStatus.DECIDED
-    assert np.isfinite(books["decided_at"][0])
+    accumulators_of_runs, _ = simulated["one mode"]
+    assert accumulators_of_runs["impacts"].tolist() == [2, 1]
+    assert accumulators_of_runs["zero_crossings"].tolist() == [0, 1], (
+        "one run snaps through, and changes its well"
+    )
+    assert (accumulators_of_runs["peak_force"] > 1.0).all()
+    accumulators_of_runs, _ = simulated["decided"]
+    assert accumulators_of_runs["status"][0] == RunStatus.EARLY_STOP
+    assert np.isfinite(accumulators_of_runs["early_stop_time"][0])
 
 
 def test_runs_do_not_depend_on_slices_or_blocks(simulated):
@@ -100,10 +104,10 @@ def test_runs_do_not_depend_on_slices_or_blocks(simulated):
 
 
 def test_bad_ends_have_a_status(simulated):
-    books = simulated["step limit"][0]
-    assert books["status"][0] == RunStatus.STEP_LIMIT
-    assert books["steps"][0] == 5
-    assert simulated["not finite"][0]["status"][0] == RunStatus.NOT_FINITE
+    accumulators_of_runs = simulated["step limit"][0]
+    assert accumulators_of_runs["status"][0] == RunStatus.STEP_LIMIT
+    assert accumulators_of_runs["steps"][0] == 5
+    assert simulated["not finite"][0]["status"][0] == RunStatus.DIVERGED
 
 
 @pytest.mark.parametrize("modes", [1, 2, 9, 32, 50, 128])
@@ -144,7 +148,7 @@ def test_auto_takes_a_device_only_where_it_pays(monkeypatch):
         {"cycles": 38},
         {"modes": 129},
         {"law": sb.Restitution},
-        {"drive": sb.Recorded},
+        {"drive": sb.RecordedMotion},
     ):
         assert engines.resolve("auto", **(big | less))[0] == "cpu", less
     with pytest.raises(InputError, match="more than its 128"):
@@ -161,7 +165,7 @@ def test_the_kernel_compiles_for_a_device(monkeypatch, order, threads, columns):
     """To PTX, without a device: no array of a thread may end up in memory, and no sine in a library."""
     from numba import cuda, float64
 
-    from snapbeam.engines.cuda.march import march_kernel, signature
+    from snapbeam.engines.cuda.march import integrate_kernel, signature
 
     def nothing(x):
         x[0] = 0.0
@@ -174,7 +178,7 @@ def test_the_kernel_compiles_for_a_device(monkeypatch, order, threads, columns):
     class Device:
         compute_capability = (9, 0)
 
-    kernel = march_kernel(order, threads, columns, 6)
+    kernel = integrate_kernel(order, threads, columns, 6)
     monkeypatch.setattr(sys.modules[type(kernel).__module__], "get_current_device", lambda: Device)
     ptx, _ = cuda.compile(
         kernel.py_func,

@@ -29,13 +29,13 @@ def test_coefficients(order: int) -> None:
 
 def state_after(model: sb.ReducedModel, accuracy: str, steps: int) -> np.ndarray:
     """Displacement along two cycles of free flight below the barrier, damped."""
-    energy = model.barrier_energy - model.well_energy
+    energy = model.saddle_energy - model.well_energy
     velocity = model.linear_modes[:, 0] * math.sqrt(1.4 * energy)
     if model.modes > 1:
         velocity = velocity + model.linear_modes[:, 1] * math.sqrt(0.1 * energy)
-    period = 1.0 / model.reference_freq
+    period = 1.0 / model.reference_frequency
     return sb.simulate(
-        sb.System(model, start=sb.State(amplitude=model.equilibrium, velocity=velocity)),
+        sb.System(model, initial_state=sb.State(amplitude=model.well_amplitude, velocity=velocity)),
         sb.Integration(cycles=2, accuracy=accuracy, step=period / steps),
         sample_times=np.linspace(0.0, 2.0 * period * (1.0 - 1e-12), 5)[1:],
     ).dataset.modal_amplitude.values
@@ -62,7 +62,7 @@ def test_measured_order_with_contact(modes: int, pair: tuple[float, float]) -> N
     """
     model = sb.ReducedModel.from_beam(paper.BEAM, modes)
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1])
-    end = 2.0 / (pair[0] * model.reference_freq)
+    end = 2.0 / (pair[0] * model.reference_frequency)
     times = np.linspace(0.0, end, 401)[1:] * (1.0 - 1e-12)
     system = sb.System(model, paper.CONTACT, shaker)
 

@@ -14,7 +14,7 @@ import snapbeam
 from snapbeam.engines.scalar import fingerprint as marking
 from snapbeam.engines.scalar.fingerprint import fingerprint
 from snapbeam.model.contact import HertzContact, Restitution
-from snapbeam.model.drive import Recorded, Sine
+from snapbeam.model.drive import RecordedMotion, Sine
 
 PACKAGE = Path(snapbeam.__file__).parent
 
@@ -77,7 +77,13 @@ def test_a_file_more_is_another_fingerprint(copy) -> None:
 def test_what_no_kernel_bakes_in_is_not_in_it(copy) -> None:
     """A change of a label costs nobody a compilation."""
     first = mark()
-    for name in ("core/findings.py", "model/system.py", "runs/simulate.py", "cli/app.py", "figures/style.py"):
+    for name in (
+        "core/diagnostics.py",
+        "model/system.py",
+        "runs/simulate.py",
+        "cli/app.py",
+        "figures/style.py",
+    ):
         assert changed(copy / name) == first
 
 
@@ -87,8 +93,8 @@ def test_laws_and_drives_have_their_own(copy) -> None:
         for kinds in (
             (HertzContact, Sine),
             (Restitution, Sine),
-            (HertzContact, Recorded),
-            (Restitution, Recorded),
+            (HertzContact, RecordedMotion),
+            (Restitution, RecordedMotion),
         )
     ]
     assert None not in marks
@@ -159,7 +165,7 @@ def test_the_names_that_a_law_gives_are_part_of_it(tmp_path, monkeypatch) -> Non
 
 def test_a_statistic_of_somebody_is_never_kept() -> None:
     """It stands for functions from anywhere; two of them must not share a kernel."""
-    from snapbeam.engines.outcomes import Statistic, register, withdraw
+    from snapbeam.engines.outcomes import Statistic, register, unregister
     from snapbeam.engines.scalar.extras import extras_of_table
 
     assert fingerprint((HertzContact, Sine, type(extras_of_table()).owner)) is not None
@@ -167,7 +173,7 @@ def test_a_statistic_of_somebody_is_never_kept() -> None:
     try:
         assert fingerprint((HertzContact, Sine, type(extras_of_table()).owner)) is None
     finally:
-        withdraw("own")
+        unregister("own")
 
 
 def test_a_law_typed_at_a_prompt_is_never_kept() -> None:

@@ -6,7 +6,7 @@ import json
 import subprocess
 import sys
 
-from snapbeam.engines.outcomes import Statistic, register, withdraw
+from snapbeam.engines.outcomes import Statistic, register, unregister
 from snapbeam.engines.scalar.extras import extras_of_table
 from snapbeam.model.contact import LAWS, ContactLaw
 from snapbeam.model.drive import DRIVES
@@ -52,7 +52,7 @@ def test_types_of_numbers_are_named_apart() -> None:
     try:
         kinds += [before, type(extras_of_table())]
     finally:
-        withdraw("own")
+        unregister("own")
 
     def law() -> type[ContactLaw]:
         class Somebodys(ContactLaw):

@@ -13,7 +13,7 @@ from numba import njit
 
 from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, select_less, store, vabs, vfloor
 from snapbeam.engines.scalar.physics import (
-    circle,
+    sincos_cosm1,
     decay_less_one,
     mode_energy,
     rotation,
@@ -29,7 +29,7 @@ from snapbeam.engines.scalar.physics import (
 @njit
 def over_scalars(x, y, z, out):
     for i in range(x.size):
-        out[0, i], out[1, i], out[13, i] = circle(x[i])
+        out[0, i], out[1, i], out[13, i] = sincos_cosm1(x[i])
         out[2, i] = decay_less_one(y[i])
         out[3, i], out[4, i], out[5, i], out[6, i] = rotation(
             z[i], x[i] * x[i], out[0, i], out[13, i], out[2, i]
@@ -48,7 +48,7 @@ def over_lanes(x, y, z, out):
     flat = out.reshape(out.size)
     for i in range(0, size, 8):
         a, b, c = load(x, i), load(y, i), load(z, i)
-        sine, cosine, less_one = circle(a)
+        sine, cosine, less_one = sincos_cosm1(a)
         e = decay_less_one(b)
         store(flat, i, sine)
         store(flat, size + i, cosine)
@@ -115,16 +115,18 @@ def test_decay(evaluated) -> None:
 @settings(max_examples=50, deadline=None, derandomize=True)
 def test_flows_near_the_identity_keep_their_digits(x: float) -> None:
     """cos x - 1 and exp(-x) - 1 are accurate relative to themselves, however small x is."""
-    assert circle(x)[2] == pytest.approx(-2.0 * math.sin(0.5 * x) ** 2, rel=3e-16 * 4)
+    assert sincos_cosm1(x)[2] == pytest.approx(-2.0 * math.sin(0.5 * x) ** 2, rel=3e-16 * 4)
     assert decay_less_one(x) == pytest.approx(math.expm1(-x), rel=2e-15)
 
 
 @pytest.mark.parametrize(("omega", "zeta"), [(500.0, 0.005), (2.4e5, 0.005), (100.0, 0.9), (3.0, 0.0)])
 def test_rotation_is_the_exact_flow(omega: float, zeta: float) -> None:
     """The rows are the exponential of q' = p, p' = -omega^2 q - 2 zeta omega p."""
-    time, damped = 0.7 / omega, omega * math.sqrt(1.0 - zeta**2)
-    sine, _, less_one = circle(damped * time)
-    rows = rotation(zeta * omega, omega**2, sine / damped, less_one, decay_less_one(zeta * omega * time))
+    time, apply_contact_loss = 0.7 / omega, omega * math.sqrt(1.0 - zeta**2)
+    sine, _, less_one = sincos_cosm1(apply_contact_loss * time)
+    rows = rotation(
+        zeta * omega, omega**2, sine / apply_contact_loss, less_one, decay_less_one(zeta * omega * time)
+    )
     scale = np.diag([1.0, 1.0 / omega])
     exact = scipy.linalg.expm(time * np.array([[0.0, 1.0], [-(omega**2), -2.0 * zeta * omega]]))
     got = scale @ (np.reshape(rows, (2, 2)) + np.eye(2)) @ np.linalg.inv(scale)

@@ -10,13 +10,13 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from snapbeam.engines.scalar.signals import (
-    count_crossings,
+    count_zero_crossings,
     cubic,
-    first_fall,
-    first_rise,
+    first_downcrossing,
+    first_upcrossing,
     sign_of,
     turning_point,
-    widened,
+    update_extrema,
 )
 
 VALUES = st.floats(-2.0, 2.0).map(lambda x: round(x, 6))
@@ -57,7 +57,7 @@ def test_turning_point_and_extremes(u0: float, v0: float, u1: float, v1: float, 
     """A cubic whose slopes at the ends differ in sign turns once; where they do not, its ends are taken."""
     u = sampled(u0, v0, u1, v1, 1.0)
     turn = turning_point(u0, v0 / h, u1, v1 / h, h)
-    low, high = widened(math.inf, -math.inf, u0, v0 / h, u1, v1 / h, h)
+    low, high = update_extrema(math.inf, -math.inf, u0, v0 / h, u1, v1 / h, h)
     if v0 * v1 >= 0.0:
         assert turn == -1.0
         assert (low, high) == (min(u0, u1), max(u0, u1))
@@ -79,7 +79,7 @@ def test_crossings(u0: float, v0: float, u1: float, v1: float, h: float) -> None
     # a turn so close to zero that samples cannot tell
     turn = turning_point(u0, v0 / h, u1, v1 / h, h)
     assume(turn < 0.0 or abs(np.interp(turn, S, u)) > 1e-4)
-    count, last, side = count_crossings(sign_of(u0, 0), u0, v0 / h, u1, v1 / h, h)
+    count, last, side = count_zero_crossings(sign_of(u0, 0), u0, v0 / h, u1, v1 / h, h)
     assert count == changes.size
     assert side == np.sign(u1)
     if count:
@@ -93,20 +93,20 @@ def test_crossings(u0: float, v0: float, u1: float, v1: float, h: float) -> None
 def test_parity_of_crossings(u0: float, v0: float, u1: float, v1: float, h: float) -> None:
     """Whatever happens between, an odd number of crossings has changed the side."""
     for side in (-1, 1):
-        count, last, after = count_crossings(side, u0, v0 / h, u1, v1 / h, h)
+        count, last, after = count_zero_crossings(side, u0, v0 / h, u1, v1 / h, h)
         assert (count % 2 == 1) == (after != side)
         assert last == -1.0 or 0.0 <= last <= 1.0
 
 
 def test_crossings_through_exact_zeros() -> None:
     """A value of exactly zero belongs to the side before it; the other side must be seen to count."""
-    assert count_crossings(-1, -1.0, 1.0, 0.0, 1.0, 1.0) == (0, -1.0, -1)
-    count, last, side = count_crossings(-1, 0.0, 1.0, 1.0, 1.0, 1.0)
+    assert count_zero_crossings(-1, -1.0, 1.0, 0.0, 1.0, 1.0) == (0, -1.0, -1)
+    count, last, side = count_zero_crossings(-1, 0.0, 1.0, 1.0, 1.0, 1.0)
     assert (count, side) == (1, 1)
     assert last == 0.0
-    assert count_crossings(0, 0.0, 1.0, 1.0, 1.0, 1.0)[::2] == (0, 1)
+    assert count_zero_crossings(0, 0.0, 1.0, 1.0, 1.0, 1.0)[::2] == (0, 1)
     # touches zero from below and turns
-    assert count_crossings(-1, -0.25, 1.0, -0.25, -1.0, 1.0)[0] in (0, 2)
+    assert count_zero_crossings(-1, -0.25, 1.0, -0.25, -1.0, 1.0)[0] in (0, 2)
 
 
 @given(VALUES, SLOPES, VALUES, SLOPES, STEPS)
@@ -122,7 +122,7 @@ def test_first_rise(u0: float, v0: float, u1: float, v1: float, h: float) -> Non
         and not 0.0 <= u.max() < 1e-4
         and not -1e-4 < u.max() < 0.0
     )
-    rise = first_rise(u0, v0 / h, u1, v1 / h, h)
+    rise = first_upcrossing(u0, v0 / h, u1, v1 / h, h)
     above = np.flatnonzero(u > 0.0)
     if above.size == 0:
         assert rise == -1.0
@@ -131,10 +131,10 @@ def test_first_rise(u0: float, v0: float, u1: float, v1: float, h: float) -> Non
 
 
 def test_first_rise_at_the_start() -> None:
-    assert first_rise(0.0, 1.0, 1.0, 1.0, 1.0) == 0.0
-    assert first_rise(0.0, -1.0, -1.0, -1.0, 1.0) == -1.0
+    assert first_upcrossing(0.0, 1.0, 1.0, 1.0, 1.0) == 0.0
+    assert first_upcrossing(0.0, -1.0, -1.0, -1.0, 1.0) == -1.0
     # leaves downward, turns, and comes back through zero
-    assert first_rise(0.0, -1.0, 1.0, 4.0, 1.0) == pytest.approx(
+    assert first_upcrossing(0.0, -1.0, 1.0, 4.0, 1.0) == pytest.approx(
         S[np.flatnonzero(sampled(0.0, -1.0, 1.0, 4.0, 1.0) > 1e-9)[0]], abs=3e-4
     )
 
@@ -144,7 +144,7 @@ def test_first_rise_at_the_start() -> None:
 def test_first_fall(u0: float, v0: float, u1: float, v1: float, h: float) -> None:
     """A fall that is the only one is found; of three, one is."""
     u = sampled(u0, v0, u1, v1, 1.0)
-    fall = first_fall(u0, v0 / h, u1, v1 / h, h)
+    fall = first_downcrossing(u0, v0 / h, u1, v1 / h, h)
     falls = S[np.flatnonzero((u[:-1] > 0.0) & (u[1:] <= 0.0))]
     crossings = np.count_nonzero((u[1:] > 0.0) != (u[:-1] > 0.0))
     if crossings == 1:

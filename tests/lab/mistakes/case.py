@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from snapbeam import InputError
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.lab.plausibility import (
     alignment,
     calibration,
@@ -36,7 +36,7 @@ class Outcome:
     ``ratio`` is the largest error of any number, in its standard errors; NaN where no number was asked.
     """
 
-    findings: tuple[Finding, ...] = ()
+    diagnostics: tuple[Diagnostic, ...] = ()
     refusal: str = ""
     ratio: float = math.nan
 
@@ -46,8 +46,8 @@ class Case:
     """One mistake.
 
     ``look`` makes it in a folder and measures it.  ``end`` is what must come of it: "right", "flagged" with the
-    finding ``code``, or "refused" with words that match ``words``.  ``sees`` says what gives it away, where
-    that is no finding's.
+    diagnostic ``code``, or "refused" with words that match ``words``.  ``sees`` says what gives it away, where
+    that is no diagnostic's.
     """
 
     group: str

@@ -40,10 +40,10 @@ def outcome(signal, freq, zeta, **options):
     fit = identify_decay(signal, **options)
     mode = fit.modes[0]
     ratio = max(
-        off(mode.natural_freq, freq, mode.natural_freq_se),
+        off(mode.natural_frequencies, freq, mode.natural_freq_se),
         off(mode.damping_ratio, zeta, mode.damping_ratio_se),
     )
-    return Outcome(fit.findings, "", ratio)
+    return Outcome(fit.diagnostics, "", ratio)
 
 
 def impact(folder):
@@ -54,10 +54,10 @@ def impact(folder):
     assert len(fit.modes) == 4
     ratio = 0.0
     for mode in fit.modes:
-        freq, zeta, *_ = min(modes, key=lambda one: abs(one[0] - mode.natural_freq))
-        ratio = max(ratio, off(mode.natural_freq, freq, mode.natural_freq_se))
+        freq, zeta, *_ = min(modes, key=lambda one: abs(one[0] - mode.natural_frequencies))
+        ratio = max(ratio, off(mode.natural_frequencies, freq, mode.natural_freq_se))
         ratio = max(ratio, off(mode.damping_ratio, zeta, mode.damping_ratio_se))
-    return Outcome(fit.findings, "", ratio)
+    return Outcome(fit.diagnostics, "", ratio)
 
 
 def clipped(level):
@@ -122,11 +122,11 @@ def softened(freq, share, zeta):
 def folded(folder):
     """3000 Hz sampled at 5000: all that is in the record is 2000 Hz."""
     outcome = judged(softened(3000.0, 0.005, 81.0 * ZETA / 3000.0), freq=3000.0)
-    return Outcome(outcome.findings)
+    return Outcome(outcome.diagnostics)
 
 
 def just_folded(folder):
-    return Outcome(judged(ringing(2600.0, 81.0 * ZETA / 2600.0), freq=2600.0).findings)
+    return Outcome(judged(ringing(2600.0, 81.0 * ZETA / 2600.0), freq=2600.0).diagnostics)
 
 
 def warming(share):

@@ -40,7 +40,7 @@ def judged(signal, onset=0.1, one=True):
     assert not one or abs(highest / SIZE - 1.0) < 0.03, (
         f"drive of {1e6 * highest:.4g} um for {1e6 * SIZE:.4g}"
     )
-    return Outcome(drive.findings, "", ratio)
+    return Outcome(drive.diagnostics, "", ratio)
 
 
 def dropout(length, at=0.5):
@@ -81,13 +81,13 @@ def upside_down(folder):
     turned = -right["velocity"].values[:both]
     assert np.abs(made["velocity"].values[:both] - turned).max() < 0.15 * SPEED
     assert alignment.polarity == -1
-    return Outcome(alignment.findings, "", off(alignment.delay, -0.03, alignment.delay_se))
+    return Outcome(alignment.diagnostics, "", off(alignment.delay, -0.03, alignment.delay_se))
 
 
 def half_the_amplitude(folder):
     signal = record()
     alignment = lab.align(seen_by_camera(gain=1.1), signal, FREQ)
-    return Outcome(alignment.findings, "", off(alignment.gain, 1.1, alignment.gain_se))
+    return Outcome(alignment.diagnostics, "", off(alignment.gain, 1.1, alignment.gain_se))
 
 
 def run(rest=0.0):
@@ -97,14 +97,14 @@ def run(rest=0.0):
     shaker = -1.2 + 0.2 * np.sin(2.0 * np.pi * FREQ * since) * (1.0 - 0.4 * np.exp(-since / 0.01))
     beam = -1.0 + 0.3 * np.sin(2.0 * np.pi * FREQ * since) ** 3
     cycle = {} if rest else {"cycle": FREQ * time}
-    return trajectory_dataset(time, attrs={}, displacement=beam, shaker_displacement=shaker, **cycle)
+    return trajectory_dataset(time, attrs={}, displacement=beam, striker_displacement=shaker, **cycle)
 
 
 def compared_upside_down(folder):
     measured, simulated = run(0.03), run()
-    turned = simulated["shaker_displacement"]
-    simulated["shaker_displacement"] = (turned.dims, 2.0 * float(turned[0]) - turned.values, turned.attrs)
-    return Outcome(lab.compare_waveforms(measured, simulated, FREQ).findings)
+    turned = simulated["striker_displacement"]
+    simulated["striker_displacement"] = (turned.dims, 2.0 * float(turned[0]) - turned.values, turned.attrs)
+    return Outcome(lab.compare_waveforms(measured, simulated, FREQ).diagnostics)
 
 
 def gentle(start_up):

@@ -24,7 +24,7 @@ def rate_of(header, right=None, **opened):
         with lab.open_recording(with_pixels(folder, header), pixel_size=PIXEL, **opened) as recording:
             if right is not None:
                 assert recording.frame_rate == right, recording.frame_rate
-            return Outcome(recording.findings)
+            return Outcome(recording.diagnostics)
 
     return look
 
@@ -33,7 +33,7 @@ def reciprocal(folder):
     path = with_pixels(folder, "beam_2k.cih")
     with lab.open_recording(path, pixel_size=PIXEL) as recording:
         assert abs(recording.exposure * 119_149.0 - 1.0) < 1e-9
-        return Outcome(recording.findings)
+        return Outcome(recording.diagnostics)
 
 
 def high_arch(**shapes):
@@ -44,15 +44,15 @@ def high_arch(**shapes):
             length=0.161, thickness=0.4e-3, width=15e-3, density=7800.0, young_modulus=200e9,
             buckling_level=7.0 * 0.4e-3 / np.sqrt(12.0),
         )  # fmt: skip
-        well = ReducedModel.from_beam(beam, 12).natural_freq[:2]
-        straight = ReducedModel.from_beam(beam.replace(axial_load=0.0), 12).natural_freq[:2]
+        well = ReducedModel.from_beam(beam, 12).natural_frequencies[:2]
+        straight = ReducedModel.from_beam(beam.replace(axial_load=0.0), 12).natural_frequencies[:2]
         measured = lab.Measurements(
-            straight_freq=straight, straight_freq_se=1e-3 * straight, lower_well_freq=well[: shapes.pop("count", 2)],
+            straight_frequency=straight, straight_freq_se=1e-3 * straight, lower_well_frequencies=well[: shapes.pop("count", 2)],
             **shapes,
         )  # fmt: skip
         found = lab.calibrate(measured)
         error = found.standard_errors.get("buckling_level", np.inf)
-        return Outcome(found.findings, "", off(found.values["buckling_level"], beam.buckling_level, error))
+        return Outcome(found.diagnostics, "", off(found.values["buckling_level"], beam.buckling_level, error))
 
     return look
 
@@ -78,7 +78,7 @@ def jumping(folder):
     assert ((flags & FrameFlag.JUMP) != 0).all()
     miss = tracked["shaker_displacement_mm"].values
     ratio = off(miss, good.truth["shaker_displacement_mm"].values, tracked["shaker_stderr_mm"].values)
-    return Outcome(tuple(lab.findings_of(tracked)), "", ratio)
+    return Outcome(tuple(lab.diagnostics_of(tracked)), "", ratio)
 
 
 def half_the_exposure(folder):
@@ -99,7 +99,7 @@ def half_the_exposure(folder):
         tracked = lab.track(recording, rest_displacement=-BUCKLING_LEVEL, rest_frames=5)
     found = lab.align(_seen(tracked), record, frequency)
     rest = drawn.truth.attrs["rest_frames"] / FRAME_RATE
-    return Outcome(found.findings, "", off(found.delay, rest, found.delay_se))
+    return Outcome(found.diagnostics, "", off(found.delay, rest, found.delay_se))
 
 
 def _seen(tracked):

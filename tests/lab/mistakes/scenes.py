@@ -12,7 +12,7 @@ from snapbeam.lab import (
     Defects,
     SyntheticCamera,
     SyntheticStage,
-    findings_of,
+    diagnostics_of,
     open_recording,
     render_recording,
     track,
@@ -67,7 +67,7 @@ def scene(
     ):
         if value in tracked:
             ratio = max(ratio, off(tracked[value], truth[value].values, tracked[error].values))
-    return Outcome(tuple(findings_of(tracked)), "", ratio)
+    return Outcome(tuple(diagnostics_of(tracked)), "", ratio)
 
 
 def changed(change):
@@ -89,7 +89,7 @@ def changed(change):
                              ("shaker_displacement_mm", "shaker_stderr_mm")):  # fmt: skip
             ratio = max(ratio, off(tracked[value], drawn.truth[value].values, tracked[error].values))
         assert ratio < 5.0, ratio
-        return Outcome(tuple(findings_of(tracked)), "", ratio)
+        return Outcome(tuple(diagnostics_of(tracked)), "", ratio)
 
     return look
 
@@ -171,7 +171,7 @@ def fields(folder, make):
             true = np.stack([true, later.truth[value].values], 1).ravel()
         ratio = max(ratio, off(tracked[value], true, tracked[error].values))
     assert ratio < 5.0, ratio
-    return Outcome(tuple(findings_of(tracked)), "", ratio)
+    return Outcome(tuple(diagnostics_of(tracked)), "", ratio)
 
 
 def woven(first, second):
@@ -284,7 +284,7 @@ CASES = (
     light("grey levels that are light to the power of 2.2", "flagged", "camera.gamma", defects={"gamma": 2.2}),
     light("the same, undone", "right", sees="gamma (--gamma) 2.2 turns grey levels into light",
           defects={"gamma": 2.2}, gamma=2.2),
-    light("video with lossy compression", "flagged", "recording.lossy", name="scene.mp4"),
+    light("video with lossy compression", "flagged", "recording.rate_dependent", name="scene.mp4"),
     Case(AFTERWARDS, "each frame the mean of itself and the one before", changed(blended), "flagged",
          "camera.averaged"),
     Case(AFTERWARDS, "noise reduction in time", changed(denoised), "flagged", "camera.averaged"),

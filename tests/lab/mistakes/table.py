@@ -25,8 +25,8 @@ def row(case: Case, outcome: Outcome) -> str:
     if case.end == "refused":
         says = outcome.refusal
     else:
-        said = [finding for finding in outcome.findings if finding.code == case.code]
-        says = f"`{case.code}` {said[0].words}" if said else "—"
+        said = [diagnostic for diagnostic in outcome.diagnostics if diagnostic.code == case.code]
+        says = f"`{case.code}` {said[0].message}" if said else "—"
     cells = (case.mistake, case.end, sees, says)
     return "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in cells) + " |\n"
 

@@ -16,7 +16,7 @@ from snapbeam.cli.common.console import duration, notes, pace, progress
 
 if TYPE_CHECKING:
     from snapbeam.config import Config
-    from snapbeam.sweeps.stored import Tally
+    from snapbeam.sweeps.stored import SweepReport
 
 __all__ = [
     "LongReport",
@@ -34,7 +34,7 @@ _LONG = "Long maps"
 StoreOption = Annotated[
     Path | None,
     typer.Option(
-        "--store",
+        "--checkpoint",
         help="Folder to keep the map in while it is computed; one that exists is resumed, and grows with longer axes.",
         rich_help_panel=_LONG,
         metavar="DIR",
@@ -43,14 +43,16 @@ StoreOption = Annotated[
 Verify = Annotated[
     bool,
     typer.Option(
-        "--verify", help="Check the store and compute again only what is damaged.", rich_help_panel=_LONG
+        "--check-checkpoint",
+        help="Check the store and compute again only what is damaged.",
+        rich_help_panel=_LONG,
     ),
 ]
 ClusterOption = Annotated[
     str | None,
     typer.Option(
         "--cluster",
-        help="Who computes: local:N, tcp://host:port, or slurm.toml; needs --store.",
+        help="Who computes: local:N, tcp://host:port, or slurm.toml; needs --checkpoint.",
         rich_help_panel=_LONG,
         metavar="WHERE",
     ),
@@ -59,7 +61,7 @@ Refine = Annotated[
     int | None,
     opt.count_option("Times to halve the spacing of the axes where neighbours differ in class.", _LONG),
 ]
-Replicas = Annotated[
+Replicates = Annotated[
     int | None, opt.count_option("Repeats of each run with a slightly different start.", _LONG)
 ]
 ReplicaSize = Annotated[
@@ -68,7 +70,9 @@ ReplicaSize = Annotated[
 ]
 HalveStep = Annotated[
     bool,
-    typer.Option("--halve-step", help="One repeat more with the time step halved.", rich_help_panel=_LONG),
+    typer.Option(
+        "--check-half-step", help="One repeat more with the time step halved.", rich_help_panel=_LONG
+    ),
 ]
 Chunk = Annotated[int | None, opt.count_option("Points of a task; follows from the map by default.", _LONG)]
 Log = Annotated[
@@ -76,15 +80,15 @@ Log = Annotated[
     typer.Option("--log", help="Text file to append the progress to.", rich_help_panel=_LONG, metavar="FILE"),
 ]
 
-_KEPT = {"refine": int, "replicas": int, "replica_size": float, "halve_step": bool}
+_KEPT = {"refine": int, "replicas": int, "perturbation_rms": float, "check_half_step": bool}
 _OPTIONS: dict[str, tuple[Any, Any]] = {
     "store": (None, StoreOption),
     "verify": (False, Verify),
     "cluster": (None, ClusterOption),
     "refine": (None, Refine),
-    "replicas": (None, Replicas),
-    "replica_size": (None, ReplicaSize),
-    "halve_step": (False, HalveStep),
+    "replicas": (None, Replicates),
+    "perturbation_rms": (None, ReplicaSize),
+    "check_half_step": (False, HalveStep),
     "chunk": (None, Chunk),
     "log": (None, Log),
 }
@@ -124,13 +128,13 @@ def is_long(keeping: Mapping[str, Any]) -> bool:
 def sweep_options(keeping: Mapping[str, Any]) -> dict[str, Any]:
     """What a sweep is asked for beside its store."""
     from snapbeam.core.validate import integer
-    from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicas
+    from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicates
 
     repeats = None
     count = 0 if keeping["replicas"] is None else integer("replicas", keeping["replicas"], 0, 10_000)
-    if count or keeping["halve_step"]:
-        size = MEASURING_ERROR if keeping["replica_size"] is None else keeping["replica_size"]
-        repeats = Replicas(count, size, bool(keeping["halve_step"]))
+    if count or keeping["check_half_step"]:
+        size = MEASURING_ERROR if keeping["perturbation_rms"] is None else keeping["perturbation_rms"]
+        repeats = Replicates(count, size, bool(keeping["check_half_step"]))
     return {"cluster": keeping["cluster"], "refine_levels": keeping["refine"] or 0, "replicas": repeats}
 
 
@@ -235,23 +239,23 @@ def report(total: int, log: Path | None, store: Path | None) -> Iterator[LongRep
             yield said
         except KeyboardInterrupt:
             said.note(
-                "stopped; nothing is kept: with --store FOLDER it could go on from here another time"
+                "stopped; nothing is kept: with --checkpoint FOLDER it could go on from here another time"
                 if store is None
                 else "stopped; what the store holds is kept, and the same command goes on from there"
             )
             raise
 
 
-def tally_lines(tally: Tally, store: Path | None, elapsed: float) -> list[str]:
+def tally_lines(tally: SweepReport, store: Path | None, elapsed: float) -> list[str]:
     """Return what happened, in words."""
     lines = []
     if store is not None:
         lines.append(f"{tally.runs} runs computed in {duration(elapsed)}")
         lines.append(
-            f"Store {store}: {tally.tasks} tasks, {tally.kept} done before, {tally.computed} computed now, "
+            f"Store {store}: {tally.tasks} tasks, {tally.resumed} done before, {tally.computed} computed now, "
             f"{len(tally.damaged)} damaged, {len(tally.failed)} given up"
         )
     if tally.missing:
-        lines.append(f"{tally.missing} tasks were never computed; without --verify they will be")
+        lines.append(f"{tally.missing} tasks were never computed; without --check-checkpoint they will be")
     lines += [f"given up: {stage} task {task} {reason}" for stage, task, reason in tally.failed]
     return lines

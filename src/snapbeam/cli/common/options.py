@@ -43,7 +43,7 @@ Dots = Annotated[
 ThresholdLine = Annotated[
     bool,
     typer.Option(
-        "--threshold-line", help="Draw the quasi-static threshold V_QS1 (Eq. 21).", rich_help_panel=_OUTPUT
+        "--quasi-static-line", help="Draw the quasi-static threshold V_QS1 (Eq. 21).", rich_help_panel=_OUTPUT
     ),
 ]
 Window = Annotated[

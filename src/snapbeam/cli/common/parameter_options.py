@@ -31,14 +31,18 @@ __all__ = [
 
 BEAM = ("beam.length", "beam.thickness", "beam.width", "beam.density", "beam.young_modulus", "beam.buckling_level",
         "beam.axial_load")  # fmt: skip
-ENDS = ("ends.left", "ends.right", "ends.axial")
-IMPERFECTION = ("imperfection.rise", "imperfection.skew", "imperfection.point_load", "imperfection.point_location",
+ENDS = (
+    "boundary.left_rotational_stiffness",
+    "boundary.right_rotational_stiffness",
+    "boundary.axial_support_stiffness",
+)
+IMPERFECTION = ("imperfection.midspan_amplitude", "imperfection.antisymmetric_amplitude", "imperfection.point_load", "imperfection.point_location",
                 "imperfection.uniform_load", "imperfection.gravity")  # fmt: skip
-MODEL = ("model.modes", "model.damping_ratio", "model.reference_freq")
+MODEL = ("model.modes", "model.damping_ratio", "model.reference_frequency")
 CONTACT = ("contact.stiffness", "contact.radius", "contact.young_modulus", "contact.poisson_ratio",
-           "contact.coefficient", "contact.loss", "contact.restitution", "contact.speed")  # fmt: skip
-STRIKER = ("striker.location", "striker.location_m", "striker.side", "striker.gap", "striker.mass", "striker.spring",
-           "striker.damper")  # fmt: skip
+           "contact.coefficient", "contact.damping_factor", "contact.restitution", "contact.speed")  # fmt: skip
+STRIKER = ("striker.location", "striker.location_m", "striker.side", "striker.gap", "striker.mass", "striker.suspension_stiffness",
+           "striker.suspension_damping")  # fmt: skip
 DRIVE = (
     "drive.frequency_ratio",
     "drive.frequency_hz",
@@ -46,7 +50,14 @@ DRIVE = (
     "drive.velocity_m_s",
     "drive.phase",
 )
-RUN = ("run.cycles", "run.step", "run.accuracy", "run.engine", "run.early_decision", "run.max_steps")
+RUN = (
+    "integration.cycles",
+    "integration.step",
+    "integration.accuracy",
+    "integration.engine",
+    "integration.early_termination",
+    "integration.max_steps",
+)
 
 _PANELS = {
     "beam": "Beam (default: the paper's)",
@@ -64,35 +75,35 @@ _OPTIONS = {
     "contact.radius": "--contact-radius",
     "contact.young_modulus": "--contact-young-modulus",
     "contact.poisson_ratio": "--contact-poisson-ratio",
-    "contact.coefficient": "--restitution-coefficient",
-    "contact.loss": "--contact-loss",
-    "contact.restitution": "--contact-restitution",
-    "contact.speed": "--restitution-speed",
+    "contact.coefficient": "--newton-restitution",
+    "contact.damping_factor": "--contact-damping-factor",
+    "contact.restitution": "--hunt-crossley-restitution",
+    "contact.speed": "--hunt-crossley-speed",
     "drive.phase": "--drive-phase",
-    "ends.left": "--ends-left",
-    "ends.right": "--ends-right",
-    "ends.axial": "--ends-axial",
-    "drive.velocity_m_s": "--velocity",
+    "boundary.left_rotational_stiffness": "--left-rotational-stiffness",
+    "boundary.right_rotational_stiffness": "--right-rotational-stiffness",
+    "boundary.axial_support_stiffness": "--axial-support-stiffness",
+    "drive.velocity_m_s": "--velocity-m-s",
     "striker.location_m": "--location-m",
     "striker.mass": "--striker-mass",
-    "striker.spring": "--striker-spring",
-    "striker.damper": "--striker-damper",
+    "striker.suspension_stiffness": "--striker-suspension-stiffness",
+    "striker.suspension_damping": "--striker-suspension-damping",
 }
 _WORDS = {
     "contact.radius": "radius of the sphere, with the two next ones in place of a stiffness, m",
     "contact.young_modulus": "Young's moduli of sphere and beam, Pa: E1,E2",
     "contact.poisson_ratio": "Poisson ratios of sphere and beam: nu1,nu2",
     "contact.coefficient": "coefficient of restitution, for one mode, in place of Hertz's law",
-    "contact.loss": "loss chi of the contact, s/m: Hunt and Crossley's law",
+    "contact.damping_factor": "loss chi of the contact, s/m: Hunt and Crossley's law",
     "contact.restitution": "share of its speed that a free mass keeps, with the next one in place of a loss",
     "contact.speed": "speed at which it keeps that share, m/s",
     "beam.axial_load": "axial load, N, compression positive; instead of --buckling-level",
-    "model.reference_freq": "frequency that Omega and V are normalised by, Hz; the model's first by default",
+    "model.reference_frequency": "frequency that Omega and V are normalised by, Hz; the model's first by default",
     "model.damping_ratio": "damping ratio of every linear mode, or one for each: zeta1,zeta2,...",
-    "run.step": "step in free flight, s; follows from the model by default",
-    "run.accuracy": "accuracy level: map, or reference, far finer, to check with",
-    "run.engine": "what integrates; auto takes the fastest there is",
-    "run.early_decision": "end a run once its response class is certain; its other statistics then stop there",
+    "integration.step": "step in free flight, s; follows from the model by default",
+    "integration.accuracy": "accuracy level: standard, or reference, far finer, to check with",
+    "integration.engine": "what integrates; auto takes the fastest there is",
+    "integration.early_termination": "end a run once its response class is certain; its other statistics then stop there",
 }
 _PAIRS = ("contact.young_modulus", "contact.poisson_ratio")
 _LISTS = ("model.damping_ratio",)
@@ -181,7 +192,7 @@ def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
     }
     if with_axes:
         axis = typer.Option(
-            "--axis",
+            "--sweep",
             help="Sweep any parameter: beam.thickness=3e-4:5e-4:20, model.modes=1,8; again for another axis. Without "
             "one, the map is over frequency ratio and velocity amplitude.",
             metavar="NAME=VALUES",
@@ -201,7 +212,7 @@ def _option(name: str, is_axis: bool) -> Any:
     unit, words, symbol = "", _WORDS.get(name, ""), ""
     if row is not None:
         unit = "" if row.quantity.unit == "1" else row.quantity.unit
-        words = words or row.quantity.words + (f", {unit}" if unit else "")
+        words = words or row.quantity.long_name + (f", {unit}" if unit else "")
         symbol = row.quantity.symbol
     elif physical is not None:
         words = f"{physical.words}, {physical.unit}, in place of a ratio"
@@ -277,7 +288,7 @@ def configured(
             sections.setdefault(section, {})[field] = _value(name, value)
     for text in given.get("set_") or ():
         name, value = _assignment(text, "set")
-        full = name if "." in name and name.partition(".")[2] in ("law", "kind") else lookup(name).name
+        full = name if "." in name and name.partition(".")[2] in ("type", "type") else lookup(name).name
         section, _, field = full.partition(".")
         sections.setdefault(section, {})[field] = _value(full, value)
     for text in given.get("axis") or ():

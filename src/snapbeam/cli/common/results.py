@@ -38,13 +38,13 @@ def check_pictures(*pictures: tuple[str, Path | None]) -> None:
             check_writable(path, name, FIGURE_SUFFIXES)
 
 
-def read_overlay(dots: Path | None, reference_freq: float | None, buckling_level: float | None) -> Any:
+def read_overlay(dots: Path | None, reference_frequency: float | None, buckling_level: float | None) -> Any:
     """Return the measured points of a CSV file, normalised, or None."""
     if dots is None:
         return None
-    from snapbeam.lab.compare.dots import read_dots
+    from snapbeam.lab.compare.dots import read_measured_points
 
-    return read_dots(dots, reference_freq=reference_freq, buckling_level=buckling_level)
+    return read_measured_points(dots, reference_frequency=reference_frequency, buckling_level=buckling_level)
 
 
 def write_map(dataset: xr.Dataset, path: Path) -> Path:

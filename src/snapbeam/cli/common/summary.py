@@ -38,8 +38,8 @@ _PAPER = ("frequency_ratio", "velocity_amplitude", "location")
 def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | None = None) -> RenderableType:
     """Return the classes, the lowest interwell amplitude, what failed, the files and what to try next."""
     attrs = dataset.attrs
-    runs = dataset["response"].size
-    noun = "point" if "computed" in dataset or "class_share" in dataset else "run"
+    runs = dataset["response_class"].size
+    noun = "point" if "computed" in dataset or "class_fraction" in dataset else "run"
     head = f"{_count(runs, noun)} of {_modes(dataset)} over {_count(attrs.get('cycles', 0), 'cycle')}"
     if elapsed is not None:
         head += f" in {duration(elapsed)} ({runs / max(elapsed, 1e-9):.3g} runs/s)"
@@ -62,10 +62,10 @@ def map_summary(dataset: xr.Dataset, files: Sequence[Path], elapsed: float | Non
 
 def map_facts(dataset: xr.Dataset) -> dict[str, Any]:
     """What a map shows, as plain values: points of each class and status, the lowest interwell point, the notch."""
-    kinds, codes = np.asarray(dataset["response"].values), np.asarray(dataset["status"].values)
+    kinds, codes = np.asarray(dataset["response_class"].values), np.asarray(dataset["status"].values)
     low = lowest_interwell(dataset)
     return {
-        "sizes": {str(name): int(size) for name, size in dataset["response"].sizes.items()},
+        "sizes": {str(name): int(size) for name, size in dataset["response_class"].sizes.items()},
         "classes": {kind.label: int((kinds == kind).sum()) for kind in ResponseClass},
         "statuses": {
             kind.name.lower(): int((codes == kind).sum()) for kind in RunStatus if (codes == kind).any()
@@ -83,11 +83,11 @@ def _modes(dataset: xr.Dataset) -> str:
 
 def _raised(dataset: xr.Dataset) -> str:
     """The axis whose least interwell value is of interest: the velocity amplitude, or the last one of numbers."""
-    if "velocity_amplitude" in dataset.dims or not dataset["response"].dims:
+    if "velocity_amplitude" in dataset.dims or not dataset["response_class"].dims:
         return "velocity_amplitude"
     numbers = [
         str(name)
-        for name in dataset["response"].dims
+        for name in dataset["response_class"].dims
         if name in dataset.coords and dataset[name].dtype.kind == "f"
     ]
     return numbers[-1] if numbers else "velocity_amplitude"
@@ -99,9 +99,9 @@ def _count(number: int, noun: str) -> str:
 
 def class_table(dataset: xr.Dataset) -> Table:
     """Return the number and the share of runs of each class."""
-    kinds = np.asarray(dataset["response"].values)
+    kinds = np.asarray(dataset["response_class"].values)
     table = Table(box=None, pad_edge=False)
-    table.add_column("response")
+    table.add_column("response_class")
     table.add_column("runs", justify="right")
     table.add_column("share", justify="right")
     for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
@@ -116,7 +116,7 @@ def lowest_interwell(dataset: xr.Dataset) -> dict[str, Any] | None:
 
     Of a map without that axis it is the least value of its last axis of numbers.
     """
-    response, raised = dataset["response"], _raised(dataset)
+    response, raised = dataset["response_class"], _raised(dataset)
     interwell = response.values >= ResponseClass.TRANSIENT_1
     if not interwell.any():
         return None
@@ -137,7 +137,7 @@ def deepest_notch(dataset: xr.Dataset) -> dict[str, float] | None:
     """
     from scipy.signal import find_peaks
 
-    response = dataset["response"].squeeze()
+    response = dataset["response_class"].squeeze()
     if set(response.dims) != {"frequency_ratio", "velocity_amplitude"}:
         return None
     velocity = dataset["velocity_amplitude"]
@@ -168,7 +168,7 @@ def _where(point: dict[str, Any], raised: str, attrs: dict[str, Any]) -> str:
         if raised in point
         else ", ".join(others)
     )
-    freq, level = attrs.get("reference_freq"), attrs.get("beam_buckling_level")
+    freq, level = attrs.get("reference_frequency"), attrs.get("beam_buckling_level")
     if freq and level and {"frequency_ratio", "velocity_amplitude"} <= point.keys():
         velocity, omega = point["velocity_amplitude"], point["frequency_ratio"]
         speed = prefixed(2.0 * np.pi * freq * level * velocity, "m/s")
@@ -184,12 +184,12 @@ def status_lines(dataset: xr.Dataset) -> list[str]:
     lines = []
     for status in RunStatus:
         count = int((codes == status).sum())
-        if count and status not in (RunStatus.OK, RunStatus.DECIDED, RunStatus.INFERRED):
+        if count and status not in (RunStatus.OK, RunStatus.EARLY_STOP, RunStatus.FILLED):
             lines.append(f"[bold red]{count} failed[/] ({status.name}): {status.advice}")
-    decided = int((codes == RunStatus.DECIDED).sum())
+    decided = int((codes == RunStatus.EARLY_STOP).sum())
     if decided:
         lines.append(f"{decided} of {codes.size} runs ended early, their class being certain.")
-    inferred = int((codes == RunStatus.INFERRED).sum())
+    inferred = int((codes == RunStatus.FILLED).sum())
     if inferred:
         lines.append(
             f"{codes.size - inferred} of {codes.size} points were run, "
@@ -202,7 +202,7 @@ def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, Any]
     """Commands that go on from a map, each of the very system that it is of."""
     lines = []
     file = shlex.quote(str(files[0])) if files else None
-    axes = [str(name) for name in dataset["response"].dims if name in dataset.coords]
+    axes = [str(name) for name in dataset["response_class"].dims if name in dataset.coords]
     if low is not None and file is not None and "point" not in dataset.dims:
         point = point_text({name: low[name] for name in axes})
         at = f" --point {shlex.quote(point)}" if point else ""
@@ -218,7 +218,7 @@ def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, Any]
                 "-o closer.nc --plot closer.png"
             )
     if file is not None:
-        line = " --threshold-line" if set(axes) <= set(_PAPER) else ""
+        line = " --quasi-static-line" if set(axes) <= set(_PAPER) else ""
         if sum(dataset.sizes[name] > 1 for name in axes) == 2:
             lines.append(f"draw it again     snapbeam plot {file}{line} -o map.pdf")
         lines.append(

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from snapbeam.config import Config
-    from snapbeam.design.plan import Cost
-    from snapbeam.design.spread import Spread
+    from snapbeam.design.plan import CostEstimate
+    from snapbeam.design.spread import ParameterUncertainty
 
 __all__ = ["File", "Output", "PlanOnly", "Store", "Yes", "agreed", "finish", "read", "taken"]
 
@@ -39,7 +39,9 @@ Yes = Annotated[
 PlanOnly = Annotated[
     bool,
     typer.Option(
-        "--plan", help="Say what it costs, from a trial of ten seconds, and stop.", rich_help_panel="Cost"
+        "--estimate-cost",
+        help="Say what it costs, from a trial of ten seconds, and stop.",
+        rich_help_panel="Cost",
     ),
 ]
 Output = typer.Option(
@@ -47,7 +49,7 @@ Output = typer.Option(
 )
 
 
-def read(file: Path, section: str) -> tuple[Config, Spread, dict[str, Any]]:
+def read(file: Path, section: str) -> tuple[Config, ParameterUncertainty, dict[str, Any]]:
     """The system, its spread and the section of the question.
 
     Raises
@@ -92,7 +94,7 @@ def taken(kind: Any, table: dict[str, Any], where: str) -> Any:
         raise InputError(f"{where}: {error}") from None
 
 
-def agreed(cost: Cost, yes: bool, stop: bool) -> bool:
+def agreed(cost: CostEstimate, yes: bool, stop: bool) -> bool:
     """Tell what a computation costs, and ask where it is long and somebody is there to answer."""
     import sys
 
@@ -100,7 +102,7 @@ def agreed(cost: Cost, yes: bool, stop: bool) -> bool:
     answer(
         plan={
             "runs": cost.runs,
-            "runs_most": cost.runs_most,
+            "runs_most": cost.max_runs,
             "seconds": cost.seconds,
             "disk_bytes": cost.disk,
         }

@@ -31,12 +31,12 @@ def design(
     The file has [spread] beside the sections of any parameter file, and in [design] the goals, with
     [design.variables] (name = [low, high]), [[design.limits]] and [design.effort].
 
-    Example: snapbeam design switch.toml -o design.nc --plot design.png --store design.store
+    Example: snapbeam design switch.toml -o design.nc --plot design.png --checkpoint design.store
     """
     from snapbeam.cli.common.results import check_pictures
     from snapbeam.core.files import check_writable
     from snapbeam.design.optimum.design import optimize_design
-    from snapbeam.design.plan import plan as plan_of
+    from snapbeam.design.plan import estimate_cost as plan_of
     from snapbeam.figures.design import plot_designs
 
     settings, spread, asked = read(file, "design")
@@ -50,7 +50,7 @@ def design(
         return
     begun = time.monotonic()
     with progress(None, "design", "generations") as report:
-        dataset = optimize_design(*arguments, integration=how, store=store, progress=report)
+        dataset = optimize_design(*arguments, integration=how, checkpoint=store, progress=report)
     answer(
         designs={
             str(name): each.values for name, each in dataset.data_vars.items() if "tried" not in each.dims
@@ -62,8 +62,8 @@ def design(
 def _question(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any]:
     """Variables, goals, limits and effort of the section."""
     from snapbeam.core.validate import InputError
-    from snapbeam.design.optimum.design import Effort
-    from snapbeam.design.optimum.measures import Goal, Limit
+    from snapbeam.design.optimum.design import OptimizerSettings
+    from snapbeam.design.optimum.measures import Objective, Constraint
 
     known = ("goals", "variables", "limits", "effort")
     for name in asked:
@@ -73,9 +73,17 @@ def _question(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any]:
         if not asked.get(name):
             raise InputError(f"design.{name}: is needed")
     listed = asked["goals"] if isinstance(asked["goals"], list) else [asked["goals"]]
-    goals = [Goal(of=each) if isinstance(each, str) else taken(Goal, each, "design.goals") for each in listed]
-    limits = [taken(Limit, each, "design.limits") for each in asked.get("limits", [])]
-    return asked["variables"], goals, limits, taken(Effort, asked.get("effort", {}), "design.effort")
+    goals = [
+        Objective(quantity=each) if isinstance(each, str) else taken(Objective, each, "design.goals")
+        for each in listed
+    ]
+    limits = [taken(Constraint, each, "design.limits") for each in asked.get("limits", [])]
+    return (
+        asked["variables"],
+        goals,
+        limits,
+        taken(OptimizerSettings, asked.get("effort", {}), "design.effort"),
+    )
 
 
 def _lines(dataset: xr.Dataset, elapsed: float) -> list[str]:

@@ -28,7 +28,7 @@ def probability(
 ) -> None:
     """Map how likely a struck beam snaps and where it ends, when systems, drives and starts differ by their tolerances.
 
-    The file has [spread] beside the sections of any parameter file, the axes in [axes], and in [probability] how
+    The file has [spread] beside the sections of any parameter file, the axes in [sweep], and in [probability] how
     narrow the intervals are to be.
 
     Example: snapbeam probability switch.toml -o probability.nc --plot probability.png
@@ -36,15 +36,15 @@ def probability(
     from snapbeam.cli.common.results import check_pictures
     from snapbeam.config import DEFAULT_AXES
     from snapbeam.core.files import check_writable
-    from snapbeam.design.plan import plan as plan_of
-    from snapbeam.design.probability.allocation import Allocation
+    from snapbeam.design.plan import estimate_cost as plan_of
+    from snapbeam.design.probability.allocation import SamplingPlan
     from snapbeam.design.probability.probability_map import probability_map
     from snapbeam.figures.design import plot_probability
 
     settings, spread, asked = read(file, "probability")
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
-    runs: Any = asked["runs"] if set(asked) == {"runs"} else taken(Allocation, asked, "probability")
+    runs: Any = asked["runs"] if set(asked) == {"runs"} else taken(SamplingPlan, asked, "probability")
     axes = settings.axes(DEFAULT_AXES)
     how = settings.integration.replace(threads=threads)
     cost = plan_of(
@@ -55,7 +55,7 @@ def probability(
     begun = time.monotonic()
     with progress(None, "probability map", "runs") as report:
         dataset = probability_map(
-            settings.system, axes, spread, runs, integration=how, store=store, progress=report
+            settings.system, axes, spread, runs, integration=how, checkpoint=store, progress=report
         )
     small = {name: dataset[name].values for name in ("probability", "probability_low", "probability_high", "runs")
              if dataset[name].size <= 4000}  # fmt: skip

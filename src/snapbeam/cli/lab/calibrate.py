@@ -12,7 +12,7 @@ from snapbeam.cli.lab import calibrate_options as asked
 from snapbeam.cli.lab import options as lab
 
 if TYPE_CHECKING:
-    from snapbeam.core.findings import Finding
+    from snapbeam.core.findings import Diagnostic
     from snapbeam.lab.calibration.measurements import ContactTest
 
 __all__ = ["calibrate"]
@@ -73,12 +73,12 @@ def calibrate(
         config_from_mapping(sections, str(measurements))
         settings = override(settings, sections)
     for name, text in (
-        ("straight_freq", straight), ("lower_well_freq", lower_well), ("upper_well_freq", upper_well),
+        ("straight_frequency", straight), ("lower_well_frequencies", lower_well), ("upper_well_frequencies", upper_well),
         ("damping_ratio", damping),
     ):  # fmt: skip
         if text is not None:
             text, shapes = _shapes(text)
-            if shapes and not name.endswith("well_freq"):
+            if shapes and not name.endswith("well_frequencies"):
                 raise InputError(f"{name} = {text!r}: only frequencies about a well carry a shape, s or a")
             if shapes:
                 given[name.replace("_freq", "_shape")] = shapes
@@ -87,7 +87,7 @@ def calibrate(
     for name, value in (("thickness", measured_thickness), ("buckling_level", measured_buckling_level)):
         if value is not None:
             given[name] = value
-    told: tuple[Finding, ...] = ()
+    told: tuple[Diagnostic, ...] = ()
     if impacts is not None:
         if effective_mass is None:
             raise InputError(
@@ -120,10 +120,10 @@ def calibrate(
     console.print(table)
     for text in result.remarks:
         console.print(f"- {text}")
-    findings = (*told, *result.findings)
-    lab.tell_findings(console, findings)
+    diagnostics = (*told, *result.diagnostics)
+    lab.tell_findings(console, diagnostics)
     if strict:
-        refuse(findings, "calibration")
+        refuse(diagnostics, "calibration")
     if output is not None:
         result.write_config(output)
         console.print(f"Written: {file_line(output)}")
@@ -148,7 +148,9 @@ def _shapes(text: str) -> tuple[str, tuple[str, ...]]:
     )
 
 
-def _contact_tests(path: Path, effective_mass: float) -> tuple[tuple[ContactTest, ...], tuple[Finding, ...]]:
+def _contact_tests(
+    path: Path, effective_mass: float
+) -> tuple[tuple[ContactTest, ...], tuple[Diagnostic, ...]]:
     """The contact stiffness of tracked impacts as one test, and what is to be said of it."""
     from snapbeam.cli.common.results import open_result
     from snapbeam.core.validate import InputError
@@ -161,8 +163,8 @@ def _contact_tests(path: Path, effective_mass: float) -> tuple[tuple[ContactTest
         f"  impacts             {found.impacts}, duration with speed to the power {found.exponent:+.2f} +- "
         f"{found.exponent_se:.2f}: {found.stiffness:.3g} +- {found.stiffness_se:.1g} N/m^1.5"
     )
-    if any(one.code == "contact.exponent" for one in found.findings):
-        raise InputError(f"{path}: {found.findings[0].words}")
+    if any(one.code == "contact.exponent" for one in found.diagnostics):
+        raise InputError(f"{path}: {found.diagnostics[0].message}")
     # one collision at 1 m/s that stands for all
     duration = HERTZ_TIME * (1.25 * effective_mass / found.stiffness) ** 0.4
     share = (
@@ -171,4 +173,4 @@ def _contact_tests(path: Path, effective_mass: float) -> tuple[tuple[ContactTest
     test = ContactTest(
         closing_speed=1.0, duration=duration, effective_mass=effective_mass, relative_error=max(share, 1e-6)
     )
-    return (test,), found.findings
+    return (test,), found.diagnostics

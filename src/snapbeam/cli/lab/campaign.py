@@ -54,7 +54,7 @@ def campaign(
     ] = None,
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
-    sampling_freq: lab.SamplingFreq = None,
+    sampling_frequency: lab.SamplingFreq = None,
     simulated: Annotated[
         Path | None,
         typer.Option("--map", help="Map to lay the responses on.", metavar="FILE", rich_help_panel=_OUTPUT),
@@ -72,7 +72,7 @@ def campaign(
 
     Each test is kept as soon as it is measured; begun again, the campaign goes on where it was, and measures
     only what has changed.  A test that cannot be measured is a row that says why.  With --strict a test with
-    any doubtful finding counts as spoiled.
+    any doubtful diagnostic counts as spoiled.
 
     Example: snapbeam campaign tests/ --buckling-level 0.331e-3 --location 0.47619 --pixel-size 12e-6 --map
     map.nc
@@ -89,7 +89,7 @@ def campaign(
                 "buckling_level": buckling_level, "location": location, "beam_thickness": beam_thickness,
                 "side": side,
             },
-            "signal": {"units": units, "sensitivity": sensitivity, "sampling_freq": sampling_freq},
+            "signal": {"units": units, "sensitivity": sensitivity, "sampling_frequency": sampling_frequency},
             "campaign": {"cycles": cycles},
         },
     )  # fmt: skip
@@ -129,12 +129,12 @@ def _tell(done: int, total: int, result: Any) -> None:
     head = f"[{done}/{total}] {result.test}: "
     if result.status == "measured":
         console.print(
-            f"{head}{result.frequency_hz:.5g} Hz, {1e3 * result.velocity_m_s:.4g} mm/s, {result.response}",
+            f"{head}{result.frequency_hz:.5g} Hz, {1e3 * result.velocity_m_s:.4g} mm/s, {result.response_class}",
             markup=False,
         )
     else:
         console.print(f"{head}spoiled: {result.reason}", markup=False)
-    for code, severity, words in result.findings:
+    for code, severity, words in result.diagnostics:
         if severity != "note" and words != result.reason:
             console.print(f"    {severity} [{code}] {words}", markup=False)
 
@@ -144,16 +144,16 @@ def _on_map(target: Path, simulated: Path) -> Path:
     from snapbeam.cli.common.results import open_result
     from snapbeam.figures.lab.dot_comparison import plot_dot_comparison
     from snapbeam.figures.style import save_figure
-    from snapbeam.lab.compare.dots import read_dots
-    from snapbeam.lab.compare.maps import compare_dots
+    from snapbeam.lab.compare.dots import read_measured_points
+    from snapbeam.lab.compare.maps import compare_measured_points
 
     dataset = open_result(simulated)
-    dots = read_dots(
+    dots = read_measured_points(
         target / "tests.csv",
-        reference_freq=dataset.attrs.get("reference_freq"),
+        reference_frequency=dataset.attrs.get("reference_frequency"),
         buckling_level=dataset.attrs.get("beam_buckling_level"),
     )
-    result = compare_dots(dots, dataset)
+    result = compare_measured_points(dots, dataset)
     console = out()
     if result.used:
         low, high = result.agreement_interval

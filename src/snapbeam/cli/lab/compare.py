@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from snapbeam.core.findings import Finding
+    from snapbeam.core.findings import Diagnostic
 
 __all__ = ["compare"]
 
@@ -71,9 +71,9 @@ def compare(
     dataset = open_result(simulated)
     if measured.suffix.lower() == ".csv":
         summary, figure = _dots(measured, dataset, plot is not None)
-        findings: tuple[Finding, ...] = ()
+        diagnostics: tuple[Diagnostic, ...] = ()
     else:
-        summary, figure, findings = _run(
+        summary, figure, diagnostics = _run(
             open_result(measured),
             dataset,
             frequency,
@@ -87,7 +87,7 @@ def compare(
         save_figure(figure, plot)
         console.print(f"Written: {file_line(plot)}")
     if strict:
-        refuse(findings, str(measured))
+        refuse(diagnostics, str(measured))
     if report is not None:
         lab.write_json(report, summary)
         console.print(f"Written: {file_line(report)}")
@@ -96,16 +96,16 @@ def compare(
 def _dots(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None]:
     from rich.table import Table
 
-    from snapbeam.lab.compare.dots import read_dots
-    from snapbeam.lab.compare.maps import compare_dots
+    from snapbeam.lab.compare.dots import read_measured_points
+    from snapbeam.lab.compare.maps import compare_measured_points
 
     attrs = dataset.attrs
-    dots = read_dots(
+    dots = read_measured_points(
         path,
-        reference_freq=attrs.get("reference_freq"),
+        reference_frequency=attrs.get("reference_frequency"),
         buckling_level=attrs.get("beam_buckling_level"),
     )
-    result = compare_dots(dots, dataset)
+    result = compare_measured_points(dots, dataset)
     console = out()
     low, high = result.agreement_interval
     if result.used:
@@ -143,10 +143,10 @@ def _run(
     cycles: int,
     window: tuple[float, float] | None,
     draw: str,
-) -> tuple[dict, Figure | None, tuple[Finding, ...]]:
+) -> tuple[dict, Figure | None, tuple[Diagnostic, ...]]:
     import numpy as np
 
-    from snapbeam.core.findings import findings_of
+    from snapbeam.core.findings import diagnostics_of
     from snapbeam.lab.compare.response import measure_response
     from snapbeam.lab.compare.waveforms import compare_waveforms
 
@@ -169,11 +169,11 @@ def _run(
     )
     parted = "never" if np.isnan(result.parted) else f"at cycle {result.parted:.2f}"
     console.print(f"  the two part        {parted} (by more than {result.apart:.2g} b)")
-    findings = (*findings_of(run), *result.findings)
-    lab.tell_findings(console, findings)
+    diagnostics = (*diagnostics_of(run), *result.diagnostics)
+    lab.tell_findings(console, diagnostics)
     summary = {
-        "measured_response": seen.response.label,
-        "measured_crossings": seen.crossings,
+        "measured_response": seen.response_class.label,
+        "measured_crossings": seen.zero_crossings,
         "reasons": list(seen.reasons),
         "rms_difference_b": result.rms_difference,
         "correlation": result.correlation,
@@ -181,11 +181,11 @@ def _run(
         "amplitude_ratio": result.amplitude_ratio,
         "shift_cycles": result.shift,
         "parted_cycle": result.parted,
-        "findings": [one.plain() for one in findings],
+        "diagnostics": [one.plain() for one in diagnostics],
     }
     figure = None
     if draw:
         from snapbeam.figures.lab.waveform_comparison import plot_waveform_comparison, plot_waveform_overlay
 
         figure = (plot_waveform_overlay if draw == "overlay" else plot_waveform_comparison)(result, window)
-    return summary, figure, findings
+    return summary, figure, diagnostics

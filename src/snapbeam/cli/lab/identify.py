@@ -25,7 +25,7 @@ def identify(
     channel: lab.Channel = None,
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
-    sampling_freq: lab.SamplingFreq = None,
+    sampling_frequency: lab.SamplingFreq = None,
     columns: lab.Columns = None,
     plot: opt.Plot = None,
     stabilisation: asked.Stabilisation = None,
@@ -53,7 +53,7 @@ def identify(
     if report is not None:
         check_writable(report, "json", (".json",))
     choice("method", method, (*METHODS, "all"))
-    data = lab.open_signal(signal, channel, units, sensitivity, sampling_freq, columns)
+    data = lab.open_signal(signal, channel, units, sensitivity, sampling_frequency, columns)
     rough = lab.numbers("frequencies", frequencies) or None
     fits = {
         name: identify_decay(
@@ -75,7 +75,7 @@ def identify(
             table.add_row(
                 name if i == 0 else "",
                 str(i + 1),
-                f"{mode.natural_freq:.4f} +- {mode.natural_freq_se:.4f}",
+                f"{mode.natural_frequencies:.4f} +- {mode.natural_freq_se:.4f}",
                 f"{100 * mode.damping_ratio:.4f} +- {100 * mode.damping_ratio_se:.4f}",
                 f"{mode.amplitude:.4g} {fit.units}",
                 f"{mode.softening * mode.amplitude**2:.4f}" if i == 0 else "",
@@ -87,14 +87,15 @@ def identify(
             strength = f"{mode.law_strength:.3f} +- {mode.law_strength_se:.3f}"
             console.print(f"damping: viscous and {mode.law}, {strength} times as strong at the start")
     if mirror_channel is not None:
-        second = lab.open_signal(signal, mirror_channel, units, sensitivity, sampling_freq, columns)
+        second = lab.open_signal(signal, mirror_channel, units, sensitivity, sampling_frequency, columns)
         shapes = mode_shapes(data, second, first)
         told = ", ".join(
-            f"{mode.natural_freq:.4g} Hz {kind}" for mode, kind in zip(first.modes, shapes, strict=True)
+            f"{mode.natural_frequencies:.4g} Hz {kind}"
+            for mode, kind in zip(first.modes, shapes, strict=True)
         )
         console.print(f"shapes: {told}")
-    findings = tuple({one.code: one for fit in fits.values() for one in fit.findings}.values())
-    lab.tell_findings(console, findings)
+    diagnostics = tuple({one.code: one for fit in fits.values() for one in fit.diagnostics}.values())
+    lab.tell_findings(console, diagnostics)
     if plot is not None:
         from snapbeam.figures.lab.identification import plot_decay
 
@@ -106,7 +107,7 @@ def identify(
         save_figure(plot_stabilisation(data, first), stabilisation)
         console.print(f"Written: {file_line(stabilisation)}")
     if strict:
-        refuse(findings, str(signal))
+        refuse(diagnostics, str(signal))
     if report is not None:
         lab.write_json(report, {name: fit.summary() for name, fit in fits.items()})
         console.print(f"Written: {file_line(report)}")

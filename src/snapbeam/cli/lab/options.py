@@ -1,4 +1,4 @@
-"""What the laboratory commands share: the options of a signal file, findings, and figures as JSON."""
+"""What the laboratory commands share: the options of a signal file, diagnostics, and figures as JSON."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from snapbeam.cli.common.console import write_json
 if TYPE_CHECKING:
     import xarray as xr
 
-    from snapbeam.core.findings import Finding
+    from snapbeam.core.findings import Diagnostic
 
 __all__ = [
     "Channel", "Columns", "JsonFile", "SamplingFreq", "Sensitivity", "SignalFile", "Strict", "Units", "numbers",
@@ -66,7 +66,7 @@ Strict = Annotated[
     bool,
     typer.Option(
         "--strict",
-        help="Refuse a result with any finding that makes it doubtful; write none.",
+        help="Refuse a result with any diagnostic that makes it doubtful; write none.",
         rich_help_panel=_OUTPUT,
     ),
 ]
@@ -86,7 +86,7 @@ def open_signal(
     channel: str | None,
     units: str | None,
     sensitivity: str | None,
-    sampling_freq: float | None,
+    sampling_frequency: float | None,
     columns: str | None = None,
 ) -> xr.DataArray:
     """Read a signal; a channel given as a whole number is counted, unless one has that name."""
@@ -94,20 +94,25 @@ def open_signal(
 
     chosen: str | int | None = channel
     if channel is not None and channel.isdigit():
-        names = [entry["name"] for entry in read_channels(path, sampling_freq, columns)]
+        names = [entry["name"] for entry in read_channels(path, sampling_frequency, columns)]
         chosen = channel if channel in names else int(channel)
     return read_signal(
-        path, chosen, units=units, sensitivity=sensitivity, sampling_freq=sampling_freq, columns=columns
+        path,
+        chosen,
+        units=units,
+        sensitivity=sensitivity,
+        sampling_frequency=sampling_frequency,
+        columns=columns,
     )
 
 
-def tell_findings(console: Console, findings: Iterable[Finding]) -> None:
-    """Print findings, the gravest first, each with its code."""
+def tell_findings(console: Console, diagnostics: Iterable[Diagnostic]) -> None:
+    """Print diagnostics, the gravest first, each with its code."""
     order = {"wrong": 0, "doubt": 1, "note": 2}
     style = {"wrong": "bold red", "doubt": "yellow", "note": "dim"}
-    for one in sorted(findings, key=lambda finding: order[finding.severity.value]):
+    for one in sorted(diagnostics, key=lambda diagnostic: order[diagnostic.severity.value]):
         kind = one.severity.value
-        console.print(f"[{style[kind]}]{kind}[/] {escape(f'[{one.code}]')} {escape(one.words)}")
+        console.print(f"[{style[kind]}]{kind}[/] {escape(f'[{one.code}]')} {escape(one.message)}")
 
 
 def whole_numbers(name: str, text: str, count: int) -> tuple[int, ...]:

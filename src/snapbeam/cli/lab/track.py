@@ -73,7 +73,7 @@ def track(
         check_writable(video, "video", (".mp4", ".mov", ".avi"))
     integer("frame", frame, 0)
     integer("video_every", video_every, 1)
-    from snapbeam.core.findings import findings_of, refuse
+    from snapbeam.core.findings import diagnostics_of, refuse
     from snapbeam.lab.tracking.quality import tracking_quality, tracking_report
     from snapbeam.lab.tracking.settings import TrackingSettings
     from snapbeam.lab.tracking.track import track as track_recording
@@ -108,7 +108,7 @@ def track(
             if report is not None:
                 files.append(save_figure(plot_tracking_quality(dataset), report))
         if strict:  # the pictures show what is wrong; the result is not written
-            refuse(findings_of(dataset), str(recording))
+            refuse(diagnostics_of(dataset), str(recording))
         write_netcdf(dataset, output)
         files.insert(0, output)
         if video is not None:
@@ -116,13 +116,13 @@ def track(
 
             with progress(len(opened), "video", "frames") as tell:
                 files.append(annotated_video(opened, dataset, video, every=video_every, progress=tell))
-    found = findings_of(dataset)
+    found = diagnostics_of(dataset)
     answer(
-        quality=tracking_quality(dataset), findings=[asdict(finding) for finding in found],
+        quality=tracking_quality(dataset), diagnostics=[asdict(diagnostic) for diagnostic in found],
         seconds=elapsed, files=files,
     )  # fmt: skip
     console = out()
-    console.print(tracking_report(dataset, findings=False), markup=False)
+    console.print(tracking_report(dataset, diagnostics=False), markup=False)
     lab.tell_findings(console, found)
     console.print(f"{len(opened) / elapsed:.0f} frames/s, {duration(elapsed)}")
     for path in files:

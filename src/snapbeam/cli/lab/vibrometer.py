@@ -18,7 +18,7 @@ def vibrometer(
     channel: lab.Channel = None,
     units: lab.Units = None,
     sensitivity: lab.Sensitivity = None,
-    sampling_freq: lab.SamplingFreq = None,
+    sampling_frequency: lab.SamplingFreq = None,
     columns: lab.Columns = None,
     camera: asked.Camera = None,
     polarity: asked.Polarity = None,
@@ -26,7 +26,7 @@ def vibrometer(
     amplitude: asked.Amplitude = None,
     amplitude_from: asked.AmplitudeFrom = "vibrometer",
     drive_output: asked.DriveOutput = None,
-    drive_sampling_freq: asked.DriveSamplingFreq = None,
+    drive_sampling_frequency: asked.DriveSamplingFreq = None,
     plot: opt.Plot = None,
     report: lab.JsonFile = None,
     strict: lab.Strict = False,
@@ -52,13 +52,13 @@ def vibrometer(
     ):
         if path is not None:
             check_writable(path, name, suffixes)
-    data = lab.open_signal(signal, channel, units, sensitivity, sampling_freq, columns)
+    data = lab.open_signal(signal, channel, units, sensitivity, sampling_frequency, columns)
     limit = SNR_LIMIT if snr_limit is None else snr_limit
     drive = measure_drive(data, frequency, amplitude=amplitude, snr_limit=limit)
     fit, summary = drive.steady, drive.summary()
     console = out()
     verdict = "[green]accepted[/]" if drive.accepted else "[bold red]not accepted[/]"
-    if drive.accepted and doubtful(drive.findings):
+    if drive.accepted and doubtful(drive.diagnostics):
         verdict = "[yellow]accepted, but doubtful[/]"
     console.print(f"{signal.name}: {verdict} (sine to noise and distortion above {limit:g} dB)")
     console.print(f"  frequency    {fit.frequency:.6g} +- {fit.frequency_se:.1g} Hz")
@@ -69,7 +69,7 @@ def vibrometer(
         f"  distortion   {100.0 * fit.distortion:.3f} % (noise alone: {100.0 * fit.distortion_floor:.3f} %)"
     )
     console.print(f"  start-up     {summary['startup']}")
-    findings = drive.findings
+    diagnostics = drive.diagnostics
     alignment = None
     if camera is not None:
         from snapbeam.cli.common.results import open_result
@@ -77,27 +77,27 @@ def vibrometer(
         from snapbeam.lab.drive.seen import shaker_signal
 
         alignment = align(shaker_signal(open_result(camera)), data, frequency, polarity=polarity, near=near)
-        findings += alignment.findings
+        diagnostics += alignment.diagnostics
         summary["alignment"] = {
             "delay_s": alignment.delay, "delay_se_s": alignment.delay_se, "certain": alignment.certain,
             "polarity": alignment.polarity, "gain": alignment.gain, "gain_se": alignment.gain_se,
             "clock_difference": alignment.clock_difference,
-            "findings": [one.plain() for one in alignment.findings],
+            "diagnostics": [one.plain() for one in alignment.diagnostics],
         }  # fmt: skip
         console.print(f"  alignment    {alignment.description}")
-    lab.tell_findings(console, findings)
+    lab.tell_findings(console, diagnostics)
     if plot is not None:
         from snapbeam.figures.lab.vibrometer import plot_drive
 
         save_figure(plot_drive(data, drive), plot)
         console.print(f"Written: {file_line(plot)}")
     if strict:
-        refuse(findings, str(signal))
+        refuse(diagnostics, str(signal))
     if drive_output is not None:
         from snapbeam.lab.drive.record import recorded_drive
 
         resampled = recorded_drive(
-            data, drive_sampling_freq or 1e5, measurement=drive, alignment=alignment, polarity=polarity,
+            data, drive_sampling_frequency or 1e5, measurement=drive, alignment=alignment, polarity=polarity,
             amplitude_from=amplitude_from,
         )  # fmt: skip
         write_netcdf(resampled, drive_output)

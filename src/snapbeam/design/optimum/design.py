@@ -15,19 +15,19 @@ from snapbeam.core.kinds import checked
 from snapbeam.core.provenance import canonical_json
 from snapbeam.core.reporting import counting
 from snapbeam.core.validate import InputError, InputTypeError, integer, shown, within
-from snapbeam.design.optimum.evolution import Evolution, front_of
-from snapbeam.design.optimum.measures import Goal, Limit
+from snapbeam.design.optimum.evolution import DifferentialEvolution, front_of
+from snapbeam.design.optimum.measures import Objective, Constraint
 from snapbeam.design.optimum.problem import DesignProblem, Estimate, problem_of
-from snapbeam.design.spread import Spread
+from snapbeam.design.spread import ParameterUncertainty
 from snapbeam.design.trials import trials_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.sweeps.stored import Keeping
+from snapbeam.sweeps.stored import CheckpointOptions
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Effort", "design_problem", "optimize_design"]
+__all__ = ["OptimizerSettings", "design_problem", "optimize_design"]
 
 _Array = NDArray[np.float64]
 CHECK, REPORT = 10**9, 2 * 10**9
@@ -36,7 +36,7 @@ HOLDS = ("fails", "undecided", "holds")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Effort:
+class OptimizerSettings:
     """How long a design is sought.
 
     Parameters
@@ -45,9 +45,9 @@ class Effort:
         Including the first.
     population : int
         Designs of a generation, at least 6.
-    draws : int
+    samples : int
         Runs of a design while it is sought, at least 8.
-    fresh : int
+    validation_samples : int
         Runs on fresh draws of a design that is checked, and again of one that is reported.
     candidates : int
         Designs that are checked at most, the best first, until one holds.
@@ -57,8 +57,8 @@ class Effort:
 
     generations: int = 30
     population: int = 24
-    draws: int = 64
-    fresh: int = 400
+    samples: int = 64
+    validation_samples: int = 400
     candidates: int = 8
     confidence: float = 0.95
     seed: int = 0
@@ -66,29 +66,32 @@ class Effort:
     def __post_init__(self) -> None:
         integer("generations", self.generations, 1, 10**6)
         integer("population", self.population, 6, 10**5)
-        integer("draws", self.draws, 8, 10**6)
-        integer("fresh", self.fresh, 20, 10**7)
+        integer("samples", self.samples, 8, 10**6)
+        integer("validation_samples", self.validation_samples, 20, 10**7)
         integer("candidates", self.candidates, 1, 10**4)
         within("confidence", self.confidence, 0.0, 1.0)
         integer("seed", self.seed, 0, 2**63 - 1)
 
     @property
-    def most_runs(self) -> int:
+    def max_runs(self) -> int:
         """Runs that a design takes at most, of one goal."""
-        return self.generations * self.population * self.draws + (self.candidates + 1) * self.fresh
+        return (
+            self.generations * self.population * self.samples
+            + (self.candidates + 1) * self.validation_samples
+        )
 
 
 @checked
 def design_problem(
     system: System,
     variables: Mapping[str, tuple[float, float]],
-    goals: Any,
-    limits: Any,
-    spread: Spread,
+    objectives: Any,
+    constraints: Any,
+    uncertainty: ParameterUncertainty,
     *,
-    draws: int = 64,
+    samples: int = 64,
     integration: Integration | None = None,
-    store: str | os.PathLike[str] | Keeping | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
 ) -> DesignProblem:
     """A design problem for an optimiser of one's own, such as pymoo's, Optuna's or Ax's; as of :func:`design`.
 
@@ -103,21 +106,23 @@ def design_problem(
     InputError
         For variables, goals and limits that cannot be, and a spread in which nothing differs.
     """
-    trials = trials_of(system, spread, integration, store=store, early=_early(goals, limits))
-    return problem_of(trials, variables, goals, limits, draws)
+    trials = trials_of(
+        system, uncertainty, integration, store=checkpoint, early=_early(objectives, constraints)
+    )
+    return problem_of(trials, variables, objectives, constraints, samples)
 
 
 @checked
 def optimize_design(
     system: System,
     variables: Mapping[str, tuple[float, float]],
-    goals: Any,
-    limits: Any,
-    spread: Spread,
-    effort: Effort | None = None,
+    objectives: Any,
+    constraints: Any,
+    uncertainty: ParameterUncertainty,
+    settings: OptimizerSettings | None = None,
     *,
     integration: Integration | None = None,
-    store: str | os.PathLike[str] | Keeping | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
     """Where and how to strike so that limits hold with a stated probability and goals are least.
@@ -132,14 +137,14 @@ def optimize_design(
         The nominal one.
     variables : mapping of str to (low, high)
         Real parameters that may be chosen.
-    goals : Goal or str, or a list of up to three
+    objectives : Goal or str, or a list of up to three
         What to make small; of several the Pareto front is sought.
-    limits : Limit, or a list of them
-    spread : Spread
+    constraints : Limit, or a list of them
+    uncertainty : Spread
         What differs between systems that are built and driven alike.
-    effort : Effort, optional
+    settings : Effort, optional
     integration : Integration, optional
-    store : path or Keeping, optional
+    checkpoint : path or Keeping, optional
         Folder that keeps the runs; one that exists is resumed.
     progress : callable, optional
         Called as ``progress(done, total)`` with generations; True writes a line to standard error.
@@ -168,41 +173,50 @@ def optimize_design(
     ...     spread,
     ... )
     """
-    effort = Effort() if effort is None else effort
-    if not isinstance(effort, Effort):
-        raise InputTypeError(f"effort = {shown(effort)}: must be an Effort")
+    settings = OptimizerSettings() if settings is None else settings
+    if not isinstance(settings, OptimizerSettings):
+        raise InputTypeError(f"effort = {shown(settings)}: must be an Effort")
     problem = design_problem(
-        system, variables, goals, limits, spread, draws=effort.draws, integration=integration, store=store
+        system,
+        variables,
+        objectives,
+        constraints,
+        uncertainty,
+        samples=settings.samples,
+        integration=integration,
+        checkpoint=checkpoint,
     )
     report = counting(progress, "design", "generations")
-    search = Evolution(list(problem.bounds.values()), effort.population, effort.seed)
+    search = DifferentialEvolution(list(problem.bounds.values()), settings.population, settings.seed)
     tried: list[tuple[_Array, _Array, _Array]] = []
-    for generation in range(effort.generations):
+    for generation in range(settings.generations):
         asked = search.ask()
         worth = problem.evaluate(asked)
         tried.append((asked, worth.goals, worth.violation))
         search.tell(worth.goals, worth.violation)
         if report is not None:
-            report(generation + 1, effort.generations)
+            report(generation + 1, settings.generations)
     x, goal_values, violation = (np.concatenate(parts) for parts in zip(*tried, strict=True))
-    chosen = _chosen(problem, effort, x, goal_values, violation)
-    found = [_fresh(problem, effort, x[i], REPORT) for i in chosen]
-    return _dataset(problem, effort, (x, goal_values, violation), chosen, found)
+    chosen = _chosen(problem, settings, x, goal_values, violation)
+    found = [_fresh(problem, settings, x[i], REPORT) for i in chosen]
+    return _dataset(problem, settings, (x, goal_values, violation), chosen, found)
 
 
 def _early(goals: Any, limits: Any) -> bool:
     """Whether runs may end once their class is certain: not where a statistic of theirs is asked for."""
-    listed = [*([goals] if isinstance(goals, (str, Goal)) else goals)]
-    listed += [limits] if isinstance(limits, Limit) else list(limits)
-    made = [Goal(of=each) if isinstance(each, str) else each for each in listed]
-    return all(getattr(each, "quantity", None) is not None and each.quantity.kind != "run" for each in made)
+    listed = [*([goals] if isinstance(goals, (str, Objective)) else goals)]
+    listed += [limits] if isinstance(limits, Constraint) else list(limits)
+    made = [Objective(quantity=each) if isinstance(each, str) else each for each in listed]
+    return all(getattr(each, "quantity", None) is not None and each._quantity.kind != "run" for each in made)
 
 
-def _fresh(problem: DesignProblem, effort: Effort, x: _Array, begin: int) -> Estimate:
-    return problem.estimate(x, np.arange(begin, begin + effort.fresh), effort.confidence)
+def _fresh(problem: DesignProblem, effort: OptimizerSettings, x: _Array, begin: int) -> Estimate:
+    return problem.estimate(x, np.arange(begin, begin + effort.validation_samples), effort.confidence)
 
 
-def _chosen(problem: DesignProblem, effort: Effort, x: _Array, goals: _Array, violation: _Array) -> list[int]:
+def _chosen(
+    problem: DesignProblem, effort: OptimizerSettings, x: _Array, goals: _Array, violation: _Array
+) -> list[int]:
     """Designs to be reported: the best that holds on fresh draws, or the front."""
     good = np.flatnonzero(violation == 0.0)
     if not good.size:
@@ -236,7 +250,7 @@ def _chosen(problem: DesignProblem, effort: Effort, x: _Array, goals: _Array, vi
 def _holds(problem: DesignProblem, found: Estimate) -> tuple[int, float]:
     """Whether limits hold for certain (2), fail for certain (0) or neither (1), and by how much they may lack."""
     required = np.array([limit.required for limit in problem.limits])
-    own = np.array([limit.quantity.kind == "design" for limit in problem.limits], dtype=bool)
+    own = np.array([limit._quantity.kind == "design" for limit in problem.limits], dtype=bool)
     wanted = np.where(own, 1.0, required)
     short = float(np.maximum(wanted - found.limits[:, 1], 0.0).sum()) if required.size else 0.0
     if short == 0.0:
@@ -246,7 +260,7 @@ def _holds(problem: DesignProblem, found: Estimate) -> tuple[int, float]:
 
 def _dataset(
     problem: DesignProblem,
-    effort: Effort,
+    effort: OptimizerSettings,
     tried: tuple[_Array, _Array, _Array],
     chosen: list[int],
     found: list[Estimate],
@@ -256,7 +270,7 @@ def _dataset(
     trials = problem.trials
     attrs: dict[str, Any] = {
         "title": "designs of a struck bistable beam", "system": trials.system.hash,
-        "spread": canonical_json(trials.spread.describe()), "draws": effort.draws, "fresh": effort.fresh,
+        "uncertainty": canonical_json(trials.spread.describe()), "samples": effort.samples, "validation_samples": effort.validation_samples,
         "generations": effort.generations, "population": effort.population, "confidence": effort.confidence,
         "seed": effort.seed, "spread_seed": trials.spread.seed, "runs_made": trials.runs,
         "cycles": trials.integration.cycles_or_default, "modes": trials.system.model.modes,
@@ -267,12 +281,12 @@ def _dataset(
     x, goals, violation = tried
     for j, name in enumerate(problem.names):
         row = lookup(name)
-        labels = {"units": row.quantity.unit, "long_name": row.quantity.words, "parameter": name}
+        labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": name}
         dataset[row.short] = (("design",), x[chosen, j], labels)
         dataset[f"tried_{row.short}"] = (("tried",), x[:, j], labels)
     for k, goal in enumerate(problem.goals):
-        sign = -1.0 if goal.largest else 1.0
-        own = {"units": goal.quantity.unit, "long_name": goal.words}
+        sign = -1.0 if goal.maximize else 1.0
+        own = {"units": goal._quantity.unit, "long_name": goal.words}
         for end, values in zip(
             ("", "_low", "_high"), np.array([each.goals[k] for each in found]).T, strict=True
         ):
@@ -281,7 +295,7 @@ def _dataset(
         seen = np.where(np.isfinite(goals[:, k]), sign * goals[:, k], np.nan)
         dataset[f"tried_goal_{goal.label}"] = (("tried",), seen, own)
     for k, limit in enumerate(problem.limits):
-        own = {"units": "1", "long_name": f"share of systems that keep the limit of {limit.of}"}
+        own = {"units": "1", "long_name": f"share of systems that keep the limit of {limit.quantity}"}
         own |= {
             name: value for name in ("at_least", "at_most") if (value := getattr(limit, name)) is not None
         }
@@ -289,7 +303,7 @@ def _dataset(
             ("", "_low", "_high"), np.array([each.limits[k] for each in found]).T, strict=True
         ):
             dataset[f"kept_{limit.label}{end}"] = (("design",), values, own)
-        required = 1.0 if limit.quantity.kind == "design" else limit.required
+        required = 1.0 if limit._quantity.kind == "design" else limit.required
         dataset[f"required_{limit.label}"] = (
             (),
             required,

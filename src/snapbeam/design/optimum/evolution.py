@@ -14,12 +14,12 @@ from scipy import stats
 
 from snapbeam.core.validate import InputError, finite_array, integer, within
 
-__all__ = ["Evolution", "dominates", "front_of"]
+__all__ = ["DifferentialEvolution", "dominates", "front_of"]
 
 _Array = NDArray[np.float64]
 
 
-class Evolution:
+class DifferentialEvolution:
     """A population that is asked for designs and told their goals and violations.
 
     Parameters

@@ -17,13 +17,13 @@ from snapbeam.design.proportion import interval_of
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.model.system import System
 
-__all__ = ["OWN", "Goal", "Limit", "Quantity", "quantity_of"]
+__all__ = ["OWN", "Objective", "Constraint", "QuantityOfInterest", "quantity_of"]
 
 _Array = NDArray[np.float64]
 Values = dict[str, NDArray[Any]]
 
 
-class Quantity(NamedTuple):
+class QuantityOfInterest(NamedTuple):
     """Something with a number for every run, or for every design."""
 
     name: str
@@ -59,7 +59,7 @@ def _acceleration(system: System, values: Values) -> _Array:
 
 def _settled(_: System, values: Values) -> _Array:
     """Cycles to the last crossing; those of runs that do not end in a well are infinite."""
-    found = np.nan_to_num(values["last_crossing"], nan=0.0) / values[CYCLE]
+    found = np.nan_to_num(values["last_zero_crossing"], nan=0.0) / values[CYCLE]
     return np.where(OUTCOMES["continuous"].happened(values), np.inf, found)
 
 
@@ -67,19 +67,21 @@ CYCLE = "cycle"
 """Seconds of a cycle, beside the statistics of a run."""
 
 
-OWN: dict[str, Quantity] = {
+OWN: dict[str, QuantityOfInterest] = {
     row.name: row
     for row in (
-        Quantity("speed", "m/s", "velocity amplitude of the tip", "design", _speed),
-        Quantity("stroke", "m", "displacement amplitude of the tip", "design", _stroke),
-        Quantity("acceleration", "m/s^2", "acceleration amplitude of the tip", "design", _acceleration),
-        Quantity("cycles_to_settle", "1", "cycles to the last snap", "run", _settled),
+        QuantityOfInterest("speed", "m/s", "velocity amplitude of the tip", "design", _speed),
+        QuantityOfInterest("stroke", "m", "displacement amplitude of the tip", "design", _stroke),
+        QuantityOfInterest(
+            "acceleration", "m/s^2", "acceleration amplitude of the tip", "design", _acceleration
+        ),
+        QuantityOfInterest("cycles_to_settle", "1", "cycles to the last snap", "run", _settled),
     )
 }
 """Quantities beside statistics, outcomes and parameters; the first three are of a sine."""
 
 
-def quantity_of(name: str) -> Quantity:
+def quantity_of(name: str) -> QuantityOfInterest:
     """A quantity by name: an outcome, a statistic, one of :data:`OWN`, or a parameter of the design.
 
     Raises
@@ -87,71 +89,73 @@ def quantity_of(name: str) -> Quantity:
     InputError
         If there is none.
     """
-    if instance("of", name, str, "a name") in OWN:
+    if instance("quantity", name, str, "a name") in OWN:
         return OWN[name]
     if name in OUTCOMES:
         event = OUTCOMES[name]
-        return Quantity(name, "1", event.words, "outcome", lambda _, found: event.happened(found))
+        return QuantityOfInterest(name, "1", event.words, "outcome", lambda _, found: event.happened(found))
     if name in STATISTICS:
         row = STATISTICS[name]
         if row.dtype not in ("float64", "int32"):
             raise InputError(f"{name}: is no number that could be small or large")
-        return Quantity(name, row.unit, row.words, "run", lambda _, found: found[name].astype(np.float64))
+        return QuantityOfInterest(
+            name, row.unit, row.long_name, "run", lambda _, found: found[name].astype(np.float64)
+        )
     try:
         parameter = lookup(name)
     except InputError:
         known = ", ".join((*OWN, *OUTCOMES))
         raise InputError(f"{name}: no quantity; must be one of {known}, a statistic or a parameter") from None
     full = parameter.name
-    return Quantity(
-        full, parameter.quantity.unit, parameter.quantity.words, "design", lambda s, v: _own(full, v, s)
+    return QuantityOfInterest(
+        full, parameter.quantity.unit, parameter.quantity.long_name, "design", lambda s, v: _own(full, v, s)
     )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Goal:
+class Objective:
     """Something to make small, or large.
 
     Parameters
     ----------
-    of : str
+    quantity : str
         An outcome (its probability), a statistic of the runs, of one of several strikers too, as
         ``"peak_force_striker_2"``, a parameter, ``"speed"``, ``"stroke"``, ``"acceleration"`` or
         ``"cycles_to_settle"``.
     quantile : float, optional
         Of a statistic, in (0, 1): what is exceeded by no more than the rest of the runs; its mean by default.
-    largest : bool
+    maximize : bool
         Whether it is to be large.
     """
 
-    of: str
+    quantity: str
     quantile: float | None = None
-    largest: bool = False
+    maximize: bool = False
 
     def __post_init__(self) -> None:
-        kind = quantity_of(self.of).kind
+        kind = quantity_of(self.quantity).kind
         if self.quantile is not None:
             within("quantile", self.quantile, 0.0, 1.0)
             if kind != "run":
                 raise InputError(
-                    f"quantile = {self.quantile:g} of {self.of}: only statistics of runs have quantiles"
+                    f"quantile = {self.quantile:g} of {self.quantity}: only statistics of runs have quantiles"
                 )
 
     @property
-    def quantity(self) -> Quantity:
+    def _quantity(self) -> QuantityOfInterest:
         """What it is of."""
-        return quantity_of(self.of)
+        return quantity_of(self.quantity)
 
     @property
     def label(self) -> str:
         """Its name in datasets."""
-        name = self.of.replace(".", "_")
+        name = self.quantity.replace(".", "_")
         return name if self.quantile is None else f"{name}_q{100.0 * self.quantile:g}".replace(".", "_")
 
     @property
     def words(self) -> str:
         """What is made small or large."""
-        quantity = self.quantity
+        quantity = self._quantity
         if quantity.kind == "outcome":
             return f"probability that {quantity.words}"
         if self.quantile is not None:
@@ -165,7 +169,7 @@ class Goal:
         Of an outcome Wilson's interval, of a mean Student's, of a quantile that of order statistics.
         """
         n = values.size
-        if self.quantity.kind == "outcome":
+        if self._quantity.kind == "outcome":
             found = interval_of(int(values.sum()), n, failed, confidence=confidence)
             return float(found[0]), float(found[1]), float(found[2])
         if n < 2 or failed:  # a run that failed might have been anything
@@ -191,85 +195,85 @@ def _quantile(ordered: _Array, share: float, confidence: float) -> tuple[float, 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limit:
+class Constraint:
     """Something to keep.
 
     Parameters
     ----------
-    of : str
+    quantity : str
         As of a :class:`Goal`.
-    at_least, at_most : float, optional
-        One of them at least.  Of an outcome *at_least* is its probability, such as 0.95 of ``"other_well"``.
+    lower, upper : float, optional
+        One of them at least.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
     probability : float
         Of a statistic of runs: share of all systems that must keep it, in (0, 1).
     """
 
-    of: str
-    at_least: float | None = None
-    at_most: float | None = None
+    quantity: str
+    lower: float | None = None
+    upper: float | None = None
     probability: float = 0.95
 
     def __post_init__(self) -> None:
-        kind = quantity_of(self.of).kind
-        if self.at_least is None and self.at_most is None:
-            raise InputError(f"limit of {self.of}: must have at_least or at_most")
-        for name in ("at_least", "at_most"):
+        kind = quantity_of(self.quantity).kind
+        if self.lower is None and self.upper is None:
+            raise InputError(f"limit of {self.quantity}: must have at_least or at_most")
+        for name in ("lower", "upper"):
             if getattr(self, name) is not None:
                 finite(name, getattr(self, name))
         within("probability", self.probability, 0.0, 1.0)
         if kind == "outcome":
-            if self.at_most is not None or self.at_least is None:
-                raise InputError(f"limit of {self.of}: give the probability it must have at_least")
-            within("at_least", self.at_least, 0.0, 1.0)
-        elif self.at_least is not None and self.at_most is not None and self.at_least > self.at_most:
-            raise InputError(f"limit of {self.of}: at_least = {self.at_least:g} is more than at_most")
+            if self.upper is not None or self.lower is None:
+                raise InputError(f"limit of {self.quantity}: give the probability it must have at_least")
+            within("lower", self.lower, 0.0, 1.0)
+        elif self.lower is not None and self.upper is not None and self.lower > self.upper:
+            raise InputError(f"limit of {self.quantity}: lower = {self.lower:g} is more than at_most")
 
     @property
-    def quantity(self) -> Quantity:
+    def _quantity(self) -> QuantityOfInterest:
         """What it is of."""
-        return quantity_of(self.of)
+        return quantity_of(self.quantity)
 
     @property
     def label(self) -> str:
         """Its name in datasets."""
-        return self.of.replace(".", "_")
+        return self.quantity.replace(".", "_")
 
     @property
     def required(self) -> float:
         """Share of the runs that must keep it."""
-        return float(self.at_least) if self.quantity.kind == "outcome" else self.probability  # type: ignore[arg-type]
+        return float(self.lower) if self._quantity.kind == "outcome" else self.probability  # type: ignore[arg-type]
 
     def kept(self, values: NDArray[Any]) -> NDArray[np.bool_]:
         """Which runs keep it."""
-        if self.quantity.kind == "outcome":
+        if self._quantity.kind == "outcome":
             return np.asarray(values, dtype=bool)
-        low = -np.inf if self.at_least is None else self.at_least
-        high = np.inf if self.at_most is None else self.at_most
+        low = -np.inf if self.lower is None else self.lower
+        high = np.inf if self.upper is None else self.upper
         return np.asarray((values >= low) & (values <= high))
 
     def excess(self, values: _Array) -> _Array:
         """By how much designs break it, over its size; 0 where they keep it."""
-        size = positive("size", max(abs(self.at_least or 0.0), abs(self.at_most or 0.0), 1e-300))
-        low = -np.inf if self.at_least is None else self.at_least
-        high = np.inf if self.at_most is None else self.at_most
+        size = positive("size", max(abs(self.lower or 0.0), abs(self.upper or 0.0), 1e-300))
+        low = -np.inf if self.lower is None else self.lower
+        high = np.inf if self.upper is None else self.upper
         return np.asarray(np.maximum(np.maximum(low - values, values - high), 0.0) / size)
 
 
-def require_kinds(goals: Any, limits: Any) -> tuple[tuple[Goal, ...], tuple[Limit, ...]]:
+def require_kinds(goals: Any, limits: Any) -> tuple[tuple[Objective, ...], tuple[Constraint, ...]]:
     """Goals and limits as tuples.
 
     Raises
     ------
     InputError
     """
-    listed = (goals,) if isinstance(goals, (str, Goal)) else tuple(goals)
-    made = tuple(Goal(of=each) if isinstance(each, str) else each for each in listed)
-    kept = (limits,) if isinstance(limits, Limit) else tuple(limits)
+    listed = (goals,) if isinstance(goals, (str, Objective)) else tuple(goals)
+    made = tuple(Objective(quantity=each) if isinstance(each, str) else each for each in listed)
+    kept = (limits,) if isinstance(limits, Constraint) else tuple(limits)
     for each in made:
-        if not isinstance(each, Goal):
+        if not isinstance(each, Objective):
             raise InputError(f"goals: {shown(each)} must be a Goal, or the name of a quantity")
     for each in kept:
-        if not isinstance(each, Limit):
+        if not isinstance(each, Constraint):
             raise InputError(f"limits: {shown(each)} must be a Limit")
     if not 1 <= len(made) <= 3:
         raise InputError(f"goals: {len(made)} of them; must be one to three")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.config.parameters import lookup
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, shown
 from snapbeam.design.events import reached, require_held
-from snapbeam.design.optimum.measures import CYCLE, Goal, Limit, require_kinds
+from snapbeam.design.optimum.measures import CYCLE, Objective, Constraint, require_kinds
 from snapbeam.design.proportion import wilson
 from snapbeam.design.trials import Trials
 from snapbeam.sweeps.points import Columns
@@ -55,8 +55,8 @@ class DesignProblem:
     trials: Trials
     bounds: dict[str, tuple[float, float]]
     """By dotted name."""
-    goals: tuple[Goal, ...]
-    limits: tuple[Limit, ...]
+    goals: tuple[Objective, ...]
+    limits: tuple[Constraint, ...]
     draws: int = 64
     """Runs of a design while it is sought, the same draws for every one."""
     margin: float = 0.5
@@ -118,17 +118,17 @@ class DesignProblem:
         failed = int((~good).sum())
         goals = np.empty((len(self.goals), 3))
         for row, goal in zip(goals, self.goals, strict=True):
-            if goal.quantity.kind == "design":
+            if goal._quantity.kind == "design":
                 row[:] = self._own(goal, x)[0]
             else:
-                values = goal.quantity.of(self.trials.system, found)[good]
+                values = goal._quantity.of(self.trials.system, found)[good]
                 row[:] = goal.estimate(values, failed, confidence)
         limits = np.ones((len(self.limits), 3))
         for row, limit in zip(limits, self.limits, strict=True):
-            if limit.quantity.kind == "design":
+            if limit._quantity.kind == "design":
                 row[:] = float(limit.excess(self._own(limit, x))[0] == 0.0)
                 continue
-            kept = limit.kept(limit.quantity.of(self.trials.system, found)) & good
+            kept = limit.kept(limit._quantity.of(self.trials.system, found)) & good
             row[0] = kept.sum() / max(int(good.sum()), 1)
             row[1] = float(wilson(int(kept.sum()), good.size, confidence)[1])
             row[2] = float(wilson(int(kept.sum()) + failed, good.size, confidence)[2])
@@ -146,19 +146,22 @@ class DesignProblem:
             if isinstance(value, float)
         }
         whole = fixed | columns | found
-        if "cycles_to_settle" in {*(goal.of for goal in self.goals), *(limit.of for limit in self.limits)}:
+        if "cycles_to_settle" in {
+            *(goal.quantity for goal in self.goals),
+            *(limit.quantity for limit in self.limits),
+        }:
             whole[CYCLE] = self.trials.cycles(columns)
         return [{name: values[each == i] for name, values in whole.items()} for i in range(len(x))]
 
     @property
     def _needs_runs(self) -> bool:
         kinds = {
-            *(goal.quantity.kind for goal in self.goals),
-            *(limit.quantity.kind for limit in self.limits),
+            *(goal._quantity.kind for goal in self.goals),
+            *(limit._quantity.kind for limit in self.limits),
         }
         return kinds != {"design"}
 
-    def _own(self, of: Goal | Limit, x: _Array) -> _Array:
+    def _own(self, of: Objective | Constraint, x: _Array) -> _Array:
         """A quantity of designs themselves, in units of the nominal system of each."""
         values = np.empty(len(x))
         structural = [name for name in self.bounds if not lookup(name).is_run]
@@ -167,11 +170,11 @@ class DesignProblem:
             changes = {name: point[name] for name in structural}
             system = self.trials.system.replace(**changes) if changes else self.trials.system
             plain = {name: np.array([value]) for name, value in point.items()}
-            values[i] = float(np.ravel(of.quantity.of(system, plain))[0])
+            values[i] = float(np.ravel(of._quantity.of(system, plain))[0])
         return values
 
     def _own_excess(self, x: _Array) -> _Array:
-        own = [limit for limit in self.limits if limit.quantity.kind == "design"]
+        own = [limit for limit in self.limits if limit._quantity.kind == "design"]
         found = np.zeros(len(x))
         for limit in own:
             found += limit.excess(self._own(limit, x))
@@ -182,17 +185,17 @@ class DesignProblem:
         return np.stack([self._sign(goal) * self._own(goal, x) for goal in self.goals], axis=1)
 
     @staticmethod
-    def _sign(goal: Goal) -> float:
-        return -1.0 if goal.largest else 1.0
+    def _sign(goal: Objective) -> float:
+        return -1.0 if goal.maximize else 1.0
 
     def _goals_of(self, x: _Array, found: dict[str, NDArray[Any]]) -> _Array:
         good = reached(found)
         values = []
         for goal in self.goals:
-            if goal.quantity.kind == "design":
+            if goal._quantity.kind == "design":
                 values.append(float(self._own(goal, x)[0]))
             else:
-                runs = goal.quantity.of(self.trials.system, found)[good]
+                runs = goal._quantity.of(self.trials.system, found)[good]
                 values.append(goal.estimate(runs, 0, 0.95)[0] if runs.size else np.inf)
         signed = np.array([self._sign(goal) * value for goal, value in zip(self.goals, values, strict=True)])
         return np.where(np.isfinite(signed), signed, np.inf)
@@ -205,9 +208,9 @@ class DesignProblem:
         good = reached(found)
         total = 0.0
         for limit in self.limits:
-            if limit.quantity.kind == "design":
+            if limit._quantity.kind == "design":
                 continue
-            kept = limit.kept(limit.quantity.of(self.trials.system, found)) & good
+            kept = limit.kept(limit._quantity.of(self.trials.system, found)) & good
             share = float(kept.mean())
             wanted = limit.required + self.margin * (1.0 - limit.required)
             if hopeful:
@@ -250,7 +253,7 @@ def problem_of(
             raise InputError(f"{name}: stands twice among the variables")
         bounds[row.name] = (low, high)
     made, kept = require_kinds(goals, limits)
-    require_held([*(goal.of for goal in made), *(limit.of for limit in kept)], trials.system)
+    require_held([*(goal.quantity for goal in made), *(limit.quantity for limit in kept)], trials.system)
     integer("draws", draws, 8, 10**6)
     if trials.spread.is_empty:
         raise InputError("spread: nothing differs, so no probability can be promised; give tolerances")

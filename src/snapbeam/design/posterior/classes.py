@@ -13,14 +13,14 @@ from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, integer
 from snapbeam.design.events import reached
 from snapbeam.design.posterior.posterior import Posterior
-from snapbeam.design.spread import Spread
+from snapbeam.design.spread import ParameterUncertainty
 from snapbeam.design.trials import trials_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.sweeps.stored import Keeping
+from snapbeam.sweeps.stored import CheckpointOptions
 
 if TYPE_CHECKING:
-    from snapbeam.lab.compare.dots import Dots
+    from snapbeam.lab.compare.dots import MeasuredPoints
 
 __all__ = ["class_likelihood"]
 
@@ -38,12 +38,12 @@ _PRIOR = 0.5
 def class_likelihood(
     posterior: Posterior,
     system: System,
-    dots: Dots,
-    spread: Spread,
+    measurements: MeasuredPoints,
+    uncertainty: ParameterUncertainty,
     *,
     runs: int = 16,
     integration: Integration | None = None,
-    store: str | os.PathLike[str] | Keeping | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
 ) -> _Array:
     """Log likelihood of measured classes under every sample of a posterior, for :meth:`Posterior.updated`.
 
@@ -57,9 +57,9 @@ def class_likelihood(
         Few samples: :meth:`Posterior.resampled` first.
     system : System
         The nominal one, by which Omega and V of the dots are normalised.
-    dots : Dots
+    measurements : Dots
         Struck with the same Hz and m/s whatever the sample; those of unknown class are left out.
-    spread : Spread
+    uncertainty : Spread
         What differs from test to test, such as ``Spread(displacement=3.5e-6)``: no parameter of the posterior.
     runs : int
         Of each dot and sample, the same draws for all.
@@ -76,13 +76,13 @@ def class_likelihood(
         For bad input, a spread that draws a parameter of the posterior, and dots without a class.
     """
     integer("runs", runs, 2, 10**6)
-    shared = sorted(set(posterior.parameters) & set(spread.of))
+    shared = sorted(set(posterior.parameters) & set(uncertainty.of))
     if shared:
         raise InputError(f"spread: draws {', '.join(shared)}, which the posterior says")
-    known = np.isin(dots.response, _KINDS)
+    known = np.isin(measurements.response_class, _KINDS)
     if not known.any():
         raise InputError("dots: none has a known class")
-    trials = trials_of(system, spread, integration, store=store)
+    trials = trials_of(system, uncertainty, integration, store=checkpoint)
     samples, count = len(posterior.values), int(known.sum())
     sample, dot, number = (
         each.ravel()
@@ -90,14 +90,14 @@ def class_likelihood(
     )
     points = {name: posterior.values[sample, j] for j, name in enumerate(posterior.parameters)}
     points |= {
-        "drive.frequency_ratio": dots.frequency_ratio[known][dot],
-        "drive.velocity_amplitude": dots.velocity_amplitude[known][dot],
+        "drive.frequency_ratio": measurements.frequency_ratio[known][dot],
+        "drive.velocity_amplitude": measurements.velocity_amplitude[known][dot],
     }
-    place = dots.location[known]
+    place = measurements.location[known]
     if np.isfinite(place).all():
         points["striker.location"] = place[dot]
     found = trials.statistics(trials.in_hz(points), number)
-    mine = (found["response"] == dots.response[known][dot]) & reached(found)
+    mine = (found["response_class"] == measurements.response_class[known][dot]) & reached(found)
     hits = mine.reshape(samples, count, runs).sum(axis=-1)
     total = reached(found).reshape(samples, count, runs).sum(axis=-1)
     return np.asarray(np.log((hits + _PRIOR) / (total + _PRIOR * len(_KINDS))).sum(axis=-1))

@@ -72,12 +72,12 @@ class Forward:
             model = ReducedModel.from_beam(own, self.modes)
             shapes = getattr(self.measured, f"{state}_shape", ())
             if not shapes:
-                found += model.natural_freq[:count].tolist()
+                found += model.natural_frequencies[:count].tolist()
                 continue
             seen = {1: 0, -1: 0}
             for shape in shapes:
                 parity = 1 if shape == "symmetric" else -1
-                found.append(float(model.natural_freq[model.parity == parity][seen[parity]]))
+                found.append(float(model.natural_frequencies[model.parity == parity][seen[parity]]))
                 seen[parity] += 1
         return np.array(found)
 

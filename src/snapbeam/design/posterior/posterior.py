@@ -17,14 +17,14 @@ from snapbeam.core.validate import InputError, InputTypeError, finite_array, int
 from snapbeam.design.distributions import Distribution, Empirical
 from snapbeam.design.posterior.forward import Forward
 from snapbeam.design.posterior.waveforms import Waveform
-from snapbeam.design.spread import Spread
+from snapbeam.design.spread import ParameterUncertainty
 from snapbeam.lab.calibration.measurements import Measurements
 from snapbeam.model.beam import Beam
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Posterior", "posterior"]
+__all__ = ["Posterior", "estimate_posterior"]
 
 _Array = NDArray[np.float64]
 _FREEDOM = 5.0
@@ -58,14 +58,14 @@ class Posterior:
     weights: _Array
 
     @property
-    def effective(self) -> float:
+    def effective_sample_size(self) -> float:
         """Samples of equal weight that they are worth (Kish)."""
         return float(1.0 / np.sum(self.weights**2))
 
     @property
     def is_doubtful(self) -> bool:
         """Whether too few samples carry the weight for an interval to be trusted."""
-        return self.effective < _FEWEST
+        return self.effective_sample_size < _FEWEST
 
     def interval(self, confidence: float = 0.95) -> dict[str, tuple[float, float, float]]:
         """Median, lower and upper limit of each parameter.
@@ -78,7 +78,7 @@ class Posterior:
         within("confidence", confidence, 0.0, 1.0)
         if self.is_doubtful:
             raise InputError(
-                f"posterior: its samples are worth {self.effective:.0f}, fewer than {_FEWEST:.0f}; ask for more draws"
+                f"posterior: its samples are worth {self.effective_sample_size:.0f}, fewer than {_FEWEST:.0f}; ask for more draws"
             )
         shares = (0.5, 0.5 * (1.0 - confidence), 0.5 * (1.0 + confidence))
         return {
@@ -109,7 +109,7 @@ class Posterior:
         which = np.minimum(np.searchsorted(np.cumsum(self.weights), ranks), self.weights.size - 1)
         return Posterior(self.parameters, self.values[which], np.full(count, 1.0 / count))
 
-    def spread(self, **more: Any) -> Spread:
+    def spread(self, **more: Any) -> ParameterUncertainty:
         """What it leaves open, to be drawn from: the samples' own distributions, tied by correlations of their ranks.
 
         *more* are other arguments of :class:`snapbeam.Spread`; distributions in *of* stand beside.
@@ -125,7 +125,7 @@ class Posterior:
         if count > 1:
             ranks = stats.rankdata(even.values, axis=0) / (len(even.values) + 1.0)
             matrix[:count, :count] = np.corrcoef(special.ndtri(ranks).T)
-        return Spread(of=of | beside, correlation=matrix, **more)
+        return ParameterUncertainty(of=of | beside, correlation=matrix, **more)
 
     def to_dataset(self) -> xr.Dataset:
         """Samples and weights, labelled."""
@@ -134,26 +134,26 @@ class Posterior:
         dataset = xr.Dataset(
             attrs={
                 "title": "what is known of a beam after it was measured",
-                "effective_samples": self.effective,
+                "effective_samples": self.effective_sample_size,
             }
         )
         for name, column in zip(self.parameters, self.values.T, strict=True):
             row = lookup(name)
-            labels = {"units": row.quantity.unit, "long_name": row.quantity.words, "parameter": name}
+            labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": name}
             dataset[row.short] = (("sample",), column, labels)
         dataset["weight"] = (("sample",), self.weights, {"units": "1", "long_name": "weight of the sample"})
         return dataset
 
 
 @checked
-def posterior(
+def estimate_posterior(
     measured: Measurements | None,
     beam: Beam,
     prior: Mapping[str, float],
     *,
     waveforms: Sequence[Waveform] | Waveform = (),
     modes: int = 8,
-    draws: int = 2000,
+    samples: int = 2000,
     seed: int = 0,
 ) -> Posterior:
     """What measured frequencies, decays, collisions and waveforms say of a beam, beside what was known before.
@@ -173,7 +173,7 @@ def posterior(
         Tracked motions of the beam under a striker; each counts as far as its conditioning lets it.
     modes : int
         For the frequencies; a waveform has those of its system.
-    draws : int
+    samples : int
         Samples, at least 200.
     seed : int
 
@@ -201,7 +201,7 @@ def posterior(
         raise InputError("measured = None: give measurements, waveforms, or both")
     names = _checked_prior(prior, measured, tracked)
     known = np.array([positive(f"prior[{name}]", prior[name]) for name in names])
-    integer("draws", draws, 200, 10**6)
+    integer("samples", samples, 200, 10**6)
     integer("seed", seed, 0, 2**63 - 1)
     forward = None
     if measured is not None and (not tracked or _has_frequencies(measured)):
@@ -217,13 +217,13 @@ def posterior(
         found += [waveform.misfit(dotted) for waveform in tracked]
         return np.concatenate(found)
 
-    logs, weights = _population(terms, begin, draws, seed, _STEP if tracked else None)
+    logs, weights = _population(terms, begin, samples, seed, _STEP if tracked else None)
     values, listed = np.exp(logs), [_dotted(name) for name in names]
     if measured is not None:
         for column, (name, given, errors) in enumerate(_known_by_themselves(measured)):
             if given:
                 generator = np.random.Generator(np.random.Philox(key=[seed, 10**6 + column]))
-                values = np.column_stack([values, _positive(name, given, errors, draws, generator)])
+                values = np.column_stack([values, _positive(name, given, errors, samples, generator)])
                 listed.append(name)
     return Posterior(tuple(listed), values, weights)
 
@@ -237,7 +237,9 @@ def _known_by_themselves(measured: Measurements) -> list[tuple[str, Any, Any]]:
 
 
 def _has_frequencies(measured: Measurements) -> bool:
-    return bool(measured.straight_freq or measured.lower_well_freq or measured.upper_well_freq)
+    return bool(
+        measured.straight_frequency or measured.lower_well_frequencies or measured.upper_well_frequencies
+    )
 
 
 def _dotted(name: str) -> str:

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from snapbeam.config.physical import unit_of
-from snapbeam.core.findings import PlausibilityWarning
+from snapbeam.core.findings import DiagnosticWarning
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, InputTypeError, choice, finite_array, positive, shown
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.runs.simulate import simulate
-from snapbeam.runs.tolerance import conditioning
+from snapbeam.runs.tolerance import perturbation_growth
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +31,7 @@ _TINY = 1e-13
 """Relative change of the drive whose response is measured."""
 _LOST = 1e3
 """Standard errors of a run that fails, at every sample."""
-_SEEN = {"contact": "displacement", "center": "center_displacement"}
+_SEEN = {"contact": "displacement_at_striker", "center": "midspan_displacement"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -121,7 +121,7 @@ class Waveform:
         """Up to when it counts, s.  Refused (InputError) if that is before its second sample."""
         cycles = int(np.ceil(np.asarray(self.time)[-1] / self.period - 1e-9)) or 1
         with _untold():
-            change = conditioning(self.system, Integration(cycles=cycles))
+            change = perturbation_growth(self.system, Integration(cycles=cycles))
         moved = change["separation"].values * self.system.scale.length * (self.drive_error / _TINY)
         late = np.flatnonzero(moved > self.standard_error)
         until = float(change["time"][late[0] - 1]) if late.size and late[0] else float(change["time"][-1])
@@ -164,5 +164,5 @@ class Waveform:
 def _untold() -> Iterator[None]:
     """What is doubtful of a system was said when it was made; not of each of its neighbours."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PlausibilityWarning)
+        warnings.simplefilter("ignore", DiagnosticWarning)
         yield

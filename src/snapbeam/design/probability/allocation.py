@@ -13,7 +13,7 @@ from snapbeam.core.validate import InputError, choice, integer, within
 from snapbeam.design.events import OUTCOMES
 from snapbeam.design.proportion import INTERVALS, interval_of
 
-__all__ = ["Allocation", "Counts", "allocate"]
+__all__ = ["SamplingPlan", "Counts", "allocate"]
 
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int64]
@@ -22,21 +22,21 @@ Ask = Callable[[_Index, _Index], tuple[NDArray[np.bool_], NDArray[np.bool_]]]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Allocation:
+class SamplingPlan:
     """How runs are spent on the points of a probability map.
 
     Parameters
     ----------
     half_width : float, optional
-        Half the width of the interval of *outcome* that every point is to reach, in (0, 0.5); None: *first* runs for
+        Half the width of the interval of *outcome* that every point is to reach, in (0, 0.5); None: *initial_runs* runs for
         every point.
     outcome : str
         Whose interval is looked at: ``"snap"``, ``"continuous"``, ``"first_well"`` or ``"other_well"``.
-    first : int
+    initial_runs : int
         Runs that every point has to begin with, at least 8 where more follow.
-    most : int
+    max_runs : int
         Runs of a point at most.
-    total : int, optional
+    total_runs : int, optional
         Runs of all points together at most; those with the widest intervals come first.
     confidence : float
         Of the intervals, in (0, 1).
@@ -50,9 +50,9 @@ class Allocation:
 
     half_width: float | None = 0.05
     outcome: str = "snap"
-    first: int = 32
-    most: int = 10_000
-    total: int | None = None
+    initial_runs: int = 32
+    max_runs: int = 10_000
+    total_runs: int | None = None
     confidence: float = 0.95
     interval: str = "wilson"
 
@@ -60,12 +60,14 @@ class Allocation:
         choice("outcome", self.outcome, tuple(OUTCOMES))
         if self.half_width is not None:
             within("half_width", self.half_width, 0.0, 0.5)
-        integer("first", self.first, 1 if self.half_width is None else 8, 10**7)
-        integer("most", self.most, 1, 10**7)
-        if self.half_width is not None and self.most < self.first:
-            raise InputError(f"most = {self.most} with first = {self.first}: must be at least that")
-        if self.total is not None:
-            integer("total", self.total, 1, 10**12)
+        integer("initial_runs", self.initial_runs, 1 if self.half_width is None else 8, 10**7)
+        integer("max_runs", self.max_runs, 1, 10**7)
+        if self.half_width is not None and self.max_runs < self.initial_runs:
+            raise InputError(
+                f"most = {self.max_runs} with initial_runs = {self.initial_runs}: must be at least that"
+            )
+        if self.total_runs is not None:
+            integer("total_runs", self.total_runs, 1, 10**12)
         within("confidence", self.confidence, 0.0, 1.0)
         choice("interval", self.interval, INTERVALS)
 
@@ -83,7 +85,7 @@ class Counts:
     open: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     """Points that have not reached the half width."""
 
-    def limits(self, allocation: Allocation, outcome: int) -> tuple[_Array, _Array, _Array]:
+    def limits(self, allocation: SamplingPlan, outcome: int) -> tuple[_Array, _Array, _Array]:
         """Probability of an outcome and its interval, at every point."""
         return interval_of(
             self.hits[outcome], self.runs, self.failed,
@@ -92,7 +94,7 @@ class Counts:
 
 
 def allocate(
-    ask: Ask, points: int, allocation: Allocation, tell: Callable[[int, int], object] | None = None
+    ask: Ask, points: int, allocation: SamplingPlan, tell: Callable[[int, int], object] | None = None
 ) -> Counts:
     """Spend runs on points until the interval of each is narrow enough.
 
@@ -104,7 +106,7 @@ def allocate(
     watched = outcomes.index(allocation.outcome)
     zeros = np.zeros(points, dtype=np.int64)
     counts = Counts(np.zeros((len(outcomes), points), dtype=np.int64), zeros.copy(), zeros.copy())
-    wanted = np.full(points, allocation.first)
+    wanted = np.full(points, allocation.initial_runs)
     made = 0
     while True:
         wanted = _affordable(counts, wanted, allocation, made, watched)
@@ -128,18 +130,18 @@ def allocate(
     return counts
 
 
-def _half_widths(counts: Counts, allocation: Allocation, watched: int) -> _Array:
+def _half_widths(counts: Counts, allocation: SamplingPlan, watched: int) -> _Array:
     _, low, high = counts.limits(allocation, watched)
     return np.asarray(0.5 * (high - low))
 
 
-def _is_open(counts: Counts, allocation: Allocation, watched: int) -> NDArray[np.bool_]:
+def _is_open(counts: Counts, allocation: SamplingPlan, watched: int) -> NDArray[np.bool_]:
     if allocation.half_width is None:
         return np.zeros(counts.runs.size, dtype=bool)
     return np.asarray(_half_widths(counts, allocation, watched) > allocation.half_width)
 
 
-def _lacking(counts: Counts, allocation: Allocation, watched: int) -> _Index:
+def _lacking(counts: Counts, allocation: SamplingPlan, watched: int) -> _Index:
     """Runs that each point is given next."""
     if allocation.half_width is None:
         return np.zeros_like(counts.runs)
@@ -148,16 +150,16 @@ def _lacking(counts: Counts, allocation: Allocation, watched: int) -> _Index:
     middle = (counts.hits[watched] + 0.5 * z * z) / (made + z * z)
     need = z * z * middle * (1.0 - middle) / allocation.half_width**2
     more = np.clip(np.ceil(0.5 * (need - made)), 8, np.maximum(made, 8)).astype(np.int64)
-    more = np.minimum(more, allocation.most - made)
+    more = np.minimum(more, allocation.max_runs - made)
     return np.where(_is_open(counts, allocation, watched), np.maximum(more, 0), 0)
 
 
-def _affordable(counts: Counts, wanted: _Index, allocation: Allocation, made: int, watched: int) -> _Index:
+def _affordable(counts: Counts, wanted: _Index, allocation: SamplingPlan, made: int, watched: int) -> _Index:
     """What of the runs wanted the total allows, the widest intervals first."""
-    if allocation.total is None or made + wanted.sum() <= allocation.total:
+    if allocation.total_runs is None or made + wanted.sum() <= allocation.total_runs:
         return wanted
     order = np.argsort(-_half_widths(counts, allocation, watched), kind="stable")
-    left = allocation.total - made
+    left = allocation.total_runs - made
     granted = np.zeros_like(wanted)
     before = np.cumsum(wanted[order]) - wanted[order]
     granted[order] = np.clip(left - before, 0, wanted[order])

@@ -16,9 +16,9 @@ from snapbeam.runs.save import code_flags
 if TYPE_CHECKING:
     import xarray as xr
 
-    from snapbeam.lab.compare.dots import Dots
+    from snapbeam.lab.compare.dots import MeasuredPoints
 
-__all__ = ["class_counts", "judge_dots"]
+__all__ = ["class_counts", "score_measurements"]
 
 _KINDS = (
     ResponseClass.INTRAWELL,
@@ -44,7 +44,9 @@ def class_counts(dataset: xr.Dataset) -> NDArray[np.int64]:
 
 
 @checked
-def judge_dots(dataset: xr.Dataset, dots: Dots, *, samples: int = 10_000, seed: int = 0) -> xr.Dataset:
+def score_measurements(
+    dataset: xr.Dataset, measurements: MeasuredPoints, *, samples: int = 10_000, seed: int = 0
+) -> xr.Dataset:
     """How likely a probability map makes measured responses, one by one and all together.
 
     Parameters
@@ -52,8 +54,8 @@ def judge_dots(dataset: xr.Dataset, dots: Dots, *, samples: int = 10_000, seed: 
     dataset : xarray.Dataset
         Of :func:`snapbeam.probability_map` over frequency ratio, velocity amplitude and location, or some of them, as
         a grid; a dot belongs to the nearest point, and must lie within half a spacing of the grid.
-    dots : Dots
-        As :func:`snapbeam.figures.read_dots` reads them; dots of unknown class are left out.
+    measurements : Dots
+        As :func:`snapbeam.figures.read_measured_points` reads them; dots of unknown class are left out.
     samples : int
         Sets of responses drawn from the map, with which the measured ones are compared.
     seed : int
@@ -74,19 +76,19 @@ def judge_dots(dataset: xr.Dataset, dots: Dots, *, samples: int = 10_000, seed: 
     """
     import xarray as xr
 
-    if not hasattr(dots, "response") or not hasattr(dots, "frequency_ratio"):
-        raise InputTypeError("dots: must be Dots, as read_dots reads them")
+    if not hasattr(measurements, "response_class") or not hasattr(measurements, "frequency_ratio"):
+        raise InputTypeError("dots: must be Dots, as read_measured_points reads them")
     integer("samples", samples, 100, 10**7)
     integer("seed", seed, 0, 2**63 - 1)
     counts = class_counts(dataset)
-    known = np.isin(dots.response, _KINDS)
+    known = np.isin(measurements.response_class, _KINDS)
     if not known.any():
         raise InputError("dots: none has a known class")
-    at = _nearest(dataset, dots, known)
+    at = _nearest(dataset, measurements, known)
     mine = counts[at]
     total = mine.sum(axis=-1)
     share = (mine + _PRIOR) / (total + _PRIOR * len(_KINDS))[:, None]
-    kind = np.searchsorted(_KINDS, dots.response[known])
+    kind = np.searchsorted(_KINDS, measurements.response_class[known])
     rows = np.arange(kind.size)
     _, low, high = interval_of(mine[rows, kind], total, method="jeffreys")
     generator = np.random.Generator(np.random.Philox(key=[seed, 0]))
@@ -101,7 +103,7 @@ def judge_dots(dataset: xr.Dataset, dots: Dots, *, samples: int = 10_000, seed: 
     flags = code_flags(ResponseClass)
     return xr.Dataset(
         {
-            "response": ("dot", dots.response[known], labels | {"long_name": "measured response class"} | flags),
+            "response_class": ("dot", measurements.response_class[known], labels | {"long_name": "measured response class"} | flags),
             "probability": ("dot", share[rows, kind], labels | {"long_name": "probability of that class"}),
             "probability_low": ("dot", low, labels | {"long_name": "its lower limit"}),
             "probability_high": ("dot", high, labels | {"long_name": "its upper limit"}),
@@ -110,7 +112,7 @@ def judge_dots(dataset: xr.Dataset, dots: Dots, *, samples: int = 10_000, seed: 
             ),
             "best": ("dot", share[rows, best], labels | {"long_name": "its probability"}),
         },
-        {name: ("dot", getattr(dots, name)[known]) for name in _COORDINATES},
+        {name: ("dot", getattr(measurements, name)[known]) for name in _COORDINATES},
         {
             "title": "measured responses under a probability map",
             "log_likelihood": measured,
@@ -120,12 +122,14 @@ def judge_dots(dataset: xr.Dataset, dots: Dots, *, samples: int = 10_000, seed: 
             "p_value": float(((likelihood <= measured).sum() + 1) / (samples + 1)),
             "agree": int((best == kind).sum()),
             "agree_expected": float(share[rows, best].sum()),
-            "dots": int(kind.size),
+            "measurements": int(kind.size),
         },
     )  # fmt: skip
 
 
-def _nearest(dataset: xr.Dataset, dots: Dots, known: NDArray[np.bool_]) -> tuple[NDArray[np.int64], ...]:
+def _nearest(
+    dataset: xr.Dataset, dots: MeasuredPoints, known: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], ...]:
     """The point of the grid that each dot belongs to."""
     dims = [str(name) for name in dataset["runs"].dims]
     found = []

@@ -14,14 +14,14 @@ from snapbeam.core.provenance import canonical_json
 from snapbeam.core.reporting import counting
 from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.design.events import OUTCOMES, reached
-from snapbeam.design.probability.allocation import Allocation, Counts, allocate
-from snapbeam.design.spread import Spread
+from snapbeam.design.probability.allocation import SamplingPlan, Counts, allocate
+from snapbeam.design.spread import ParameterUncertainty
 from snapbeam.design.trials import Trials, trials_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.sweeps.points import Points, points_of
 from snapbeam.sweeps.setup import SweepSetup, sweep_setup
-from snapbeam.sweeps.stored import Keeping
+from snapbeam.sweeps.stored import CheckpointOptions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,11 +36,11 @@ OUTCOME = "outcome"
 def probability_map(
     system: System,
     axes: Mapping[str, Any] | xr.Dataset | Any,
-    spread: Spread | None = None,
-    runs: Allocation | int | None = None,
+    uncertainty: ParameterUncertainty | None = None,
+    runs: SamplingPlan | int | None = None,
     *,
     integration: Integration | None = None,
-    store: str | os.PathLike[str] | Keeping | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
     cluster: str | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
@@ -55,14 +55,14 @@ def probability_map(
     axes : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
         As of :func:`snapbeam.sweep`: a grid, or a list of points.  A parameter that is drawn too is drawn about the
         value of the point.
-    spread : Spread
+    uncertainty : Spread
         What differs.
     runs : Allocation or int, optional
         How runs are spent, or the same number of runs for every point; by default until the half width of the 95 %
         interval of P(snap) is 0.05 everywhere.
     integration : Integration, optional
         Runs end once their class is certain, whatever it says.
-    store : path or Keeping, optional
+    checkpoint : path or Keeping, optional
         Folder that keeps the runs; one that exists is resumed.
     cluster, progress
         As of :func:`snapbeam.sweep`; progress is told of runs, of which the total grows.
@@ -78,7 +78,7 @@ def probability_map(
     ------
     InputError
         For bad input, a spread in which nothing differs, and for a store that holds something else.
-    StoreError
+    CheckpointError
         If the store is in use, cannot be written or is damaged beyond repair.
 
     Notes
@@ -93,7 +93,7 @@ def probability_map(
     >>> ds = sb.probability_map(system, {"velocity_amplitude": v, "location": x}, spread)  # doctest: +SKIP
     """
     allocation = allocation_of(runs)
-    trials = trials_of(system, spread, integration, store=store, cluster=cluster)
+    trials = trials_of(system, uncertainty, integration, store=checkpoint, cluster=cluster)
     if trials.spread.is_empty:
         raise InputError("spread: nothing differs, so every probability is 0 or 1; use sb.sweep")
     points = axes if isinstance(axes, Points) else points_of(axes)
@@ -102,7 +102,7 @@ def probability_map(
     return _dataset(setup, trials, counts, allocation)
 
 
-def allocation_of(runs: Allocation | int | None) -> Allocation:
+def allocation_of(runs: SamplingPlan | int | None) -> SamplingPlan:
     """How runs are spent, from what was given.
 
     Raises
@@ -110,18 +110,18 @@ def allocation_of(runs: Allocation | int | None) -> Allocation:
     InputTypeError
     """
     if runs is None:
-        return Allocation()
-    if isinstance(runs, Allocation):
+        return SamplingPlan()
+    if isinstance(runs, SamplingPlan):
         return runs
     if isinstance(runs, (bool, np.bool_)) or not isinstance(runs, (int, np.integer)):
         raise InputTypeError(f"runs = {shown(runs)}: must be a number of runs a point, or an Allocation")
-    return Allocation(half_width=None, first=int(runs), most=max(int(runs), 1))
+    return SamplingPlan(half_width=None, initial_runs=int(runs), max_runs=max(int(runs), 1))
 
 
 def _counted(
     trials: Trials,
     points: Points,
-    allocation: Allocation,
+    allocation: SamplingPlan,
     tell: Callable[[int, int], object] | None,
 ) -> Counts:
     told = [0, 0]
@@ -145,13 +145,13 @@ def _counted(
     return allocate(ask, points.size, allocation, more)
 
 
-def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: Allocation) -> xr.Dataset:
+def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: SamplingPlan) -> xr.Dataset:
     import xarray as xr
 
     points = setup.points
     drawn = dict(trials.spread.describe())
     more: dict[str, Any] = {
-        "spread": canonical_json(drawn),
+        "uncertainty": canonical_json(drawn),
         "seed": trials.spread.seed,
         "confidence": allocation.confidence,
         "interval": allocation.interval,

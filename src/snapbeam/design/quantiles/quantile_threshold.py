@@ -17,14 +17,14 @@ from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.design.events import OUTCOMES, reached
 from snapbeam.design.quantiles.isotonic import crossing, rises, spans
 from snapbeam.design.quantiles.local import local_crossing
-from snapbeam.design.quantiles.search import Runs, Search, search
-from snapbeam.design.spread import Spread
+from snapbeam.design.quantiles.search import Runs, QuantileSearchSettings, search
+from snapbeam.design.spread import ParameterUncertainty
 from snapbeam.design.trials import Trials, trials_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.sweeps.points import Grid, PointList, points_of
 from snapbeam.sweeps.setup import sweep_setup
-from snapbeam.sweeps.stored import Keeping
+from snapbeam.sweeps.stored import CheckpointOptions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,14 +43,14 @@ _FOUND = "found not_reached_in_range exceeded_in_whole_range"
 @checked
 def quantile_threshold(
     system: System,
-    along: str,
-    between: tuple[float, float],
-    over: Mapping[str, ArrayLike] | None = None,
-    spread: Spread | None = None,
-    how: Search | None = None,
+    parameter: str,
+    bounds: tuple[float, float],
+    axes: Mapping[str, ArrayLike] | None = None,
+    uncertainty: ParameterUncertainty | None = None,
+    options: QuantileSearchSettings | None = None,
     *,
     integration: Integration | None = None,
-    store: str | os.PathLike[str] | Keeping | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
     """Where the probability of snapping passes given values along one parameter, over any others, with intervals.
@@ -65,19 +65,19 @@ def quantile_threshold(
     ----------
     system : System
         The nominal one.
-    along : str
+    parameter : str
         Parameter to raise, such as ``"velocity_amplitude"``: a number that may differ between the runs of an ensemble.
-    between : tuple of two floats
+    bounds : tuple of two floats
         Range in which it is sought.
-    over : mapping of str to array_like, optional
+    axes : mapping of str to array_like, optional
         Axes, as of :func:`snapbeam.sweep`; one point, the system as it stands, by default.
-    spread : Spread, optional
+    uncertainty : Spread, optional
         What differs from run to run.  Without one the response is what it is, and all quantiles are one threshold.
-    how : Search, optional
+    options : Search, optional
         Probabilities, runs and rounds.
     integration : Integration, optional
         Runs end once their class is certain, whatever it says.
-    store : path or Keeping, optional
+    checkpoint : path or Keeping, optional
         Folder that keeps the runs; one that exists is resumed.
     progress : callable, optional
         Called as ``progress(done, total)`` with runs; True writes a line to standard error.
@@ -87,7 +87,7 @@ def quantile_threshold(
     xarray.Dataset
         ``threshold`` with ``threshold_low`` and ``threshold_high`` over the axes and ``quantile``; infinite limits
         where no run bounds it, NaN where ``outcome_of_search`` says why.  ``monotone``, with the probability
-        ``rise_p`` of so much falling if it rises; ``runs``, ``runs_failed``.
+        ``monotonicity_p_value`` of so much falling if it rises; ``runs``, ``runs_failed``.
 
     Raises
     ------
@@ -100,36 +100,38 @@ def quantile_threshold(
     ...     system, "velocity_amplitude", (0.01, 0.6), {"frequency_ratio": omega}, spread
     ... )
     """
-    row = lookup(along)
+    row = lookup(parameter)
     if not row.is_run or row.quantity.kind is not float or row.section == "start":
         raise InputError(
-            f"along = {shown(along)}: must be a number that may differ between runs, such as velocity_amplitude"
+            f"along = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
         )
-    low, high = _range(row.name, between)
-    how = Search() if how is None else how
-    if not isinstance(how, Search):
-        raise InputTypeError(f"how = {shown(how)}: must be a Search")
-    trials = trials_of(system, spread, integration, store=store)
-    if over is not None and not isinstance(over, Mapping):
-        raise InputTypeError(f"over = {shown(over)}: must map parameters to arrays of values")
-    points = points_of(over) if over else PointList({row.name: np.array([low])})
+    low, high = _range(row.name, bounds)
+    options = QuantileSearchSettings() if options is None else options
+    if not isinstance(options, QuantileSearchSettings):
+        raise InputTypeError(f"how = {shown(options)}: must be a Search")
+    trials = trials_of(system, uncertainty, integration, store=checkpoint)
+    if axes is not None and not isinstance(axes, Mapping):
+        raise InputTypeError(f"over = {shown(axes)}: must map parameters to arrays of values")
+    points = points_of(axes) if axes else PointList({row.name: np.array([low])})
     assert isinstance(points, (Grid, PointList))
-    if over and row.name in points.names:
+    if axes and row.name in points.names:
         raise InputError(f"over: has {row.name}, which is what is raised")
     sweep_setup(
         trials.system, PointList(points.take(np.arange(points.size)) | {row.name: np.full(points.size, high)})
     )
     setup = sweep_setup(trials.system, points, trials.integration)
     report = counting(progress, "quantile threshold", "runs")
-    found = _searched(trials, points, row.name, (low, high), how, report)
-    columns = [_column(runs, how, (low, high)) for runs in found]
+    found = _searched(trials, points, row.name, (low, high), options, report)
+    columns = [_column(runs, options, (low, high)) for runs in found]
     more = {
-        "along": row.short, "between": [low, high], "confidence": how.confidence, "watched_outcome": how.outcome,
-        "spread": canonical_json(trials.spread.describe()), "rounds": how.rounds, "runs_made": trials.runs,
-        "seed": trials.spread.seed, "search_seed": how.seed,
+        "parameter": row.short, "bounds": [low, high], "confidence": options.confidence, "watched_outcome": options.outcome,
+        "uncertainty": canonical_json(trials.spread.describe()), "rounds": options.rounds, "runs_made": trials.runs,
+        "seed": trials.spread.seed, "search_seed": options.seed,
     }  # fmt: skip
-    dataset = _labelled(setup.coordinates(), setup.attributes(TITLE, more), points, columns, how, row.name)
-    return dataset if over else dataset.isel(point=0).drop_vars(row.short)
+    dataset = _labelled(
+        setup.coordinates(), setup.attributes(TITLE, more), points, columns, options, row.name
+    )
+    return dataset if axes else dataset.isel(point=0).drop_vars(row.short)
 
 
 def _range(name: str, between: Any) -> tuple[float, float]:
@@ -138,7 +140,7 @@ def _range(name: str, between: Any) -> tuple[float, float]:
         low, high = between
     except (TypeError, ValueError):
         raise InputTypeError(f"between = {shown(between)}: must be two numbers") from None
-    low, high = (float(quantity.check("between", each)) for each in (low, high))
+    low, high = (float(quantity.check("bounds", each)) for each in (low, high))
     if not low < high:
         raise InputError(f"between = ({low:g}, {high:g}): the first must be less than the second")
     return low, high
@@ -149,7 +151,7 @@ def _searched(
     points: Grid | PointList,
     along: str,
     between: tuple[float, float],
-    how: Search,
+    how: QuantileSearchSettings,
     report: Callable[[int, int], object] | None,
 ) -> list[Runs]:
     total, before = points.size * how.runs, [0]
@@ -168,7 +170,7 @@ def _searched(
     return search(ask, points.size, between, how, report)
 
 
-def _column(runs: Runs, how: Search, between: tuple[float, float]) -> dict[str, Any]:
+def _column(runs: Runs, how: QuantileSearchSettings, between: tuple[float, float]) -> dict[str, Any]:
     """Thresholds of one column, with their intervals."""
     size = len(how.probabilities)
     table = np.full((3, size), np.nan)
@@ -202,7 +204,7 @@ def _labelled(
     attributes: dict[str, Any],
     points: Grid | PointList,
     columns: list[dict[str, Any]],
-    how: Search,
+    how: QuantileSearchSettings,
     along: str,
 ) -> xr.Dataset:
     import xarray as xr
@@ -212,7 +214,7 @@ def _labelled(
     dataset[LEVEL] = ((LEVEL,), list(how.probabilities), {"units": "1", "long_name": "probability"})
     table = np.array([column["table"] for column in columns])
     for k, (ending, text) in enumerate((("", ""), ("_low", "lower limit: "), ("_high", "upper limit: "))):
-        words = f"{text}{row.quantity.words} at which the probability is passed"
+        words = f"{text}{row.quantity.long_name} at which the probability is passed"
         labels = {"units": row.quantity.unit, "long_name": words}
         dataset[f"threshold{ending}"] = ((*points.dims, LEVEL), points.arranged(table[:, k]), labels)
     flags = {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": _FOUND}
@@ -226,7 +228,7 @@ def _labelled(
         "monotone": (
             np.array([bool(column["monotone"]) for column in columns]), "whether the probability is not seen to fall"
         ),
-        "rise_p": (np.array([column["p"] for column in columns]), "probability of so much falling if it rises"),
+        "monotonicity_p_value": (np.array([column["p"] for column in columns]), "probability of so much falling if it rises"),
         "runs": (np.array([column["runs"].values.size for column in columns]), "runs that came to an end"),
         "runs_failed": (np.array([column["runs"].failed for column in columns]), "runs that failed and are left out"),
     }  # fmt: skip

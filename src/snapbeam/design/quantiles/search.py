@@ -12,7 +12,7 @@ from snapbeam.core.validate import InputError, choice, finite_array, integer, wi
 from snapbeam.design.events import OUTCOMES
 from snapbeam.design.quantiles.isotonic import crossing
 
-__all__ = ["Runs", "Search", "search"]
+__all__ = ["Runs", "QuantileSearchSettings", "search"]
 
 _Array = NDArray[np.float64]
 _Index = NDArray[np.int64]
@@ -24,7 +24,7 @@ _SURE = 0.99
 
 
 @dataclass(frozen=True, kw_only=True)
-class Search:
+class QuantileSearchSettings:
     """How quantile thresholds are sought.
 
     Parameters
@@ -77,7 +77,7 @@ def search(
     ask: Ask,
     columns: int,
     between: tuple[float, float],
-    how: Search,
+    how: QuantileSearchSettings,
     tell: Callable[[int, int], object] | None = None,
 ) -> list[Runs]:
     """Make the runs of every column.
@@ -106,7 +106,12 @@ def search(
 
 
 def _values(
-    column: Runs, between: tuple[float, float], how: Search, number: int, count: int, place: int
+    column: Runs,
+    between: tuple[float, float],
+    how: QuantileSearchSettings,
+    number: int,
+    count: int,
+    place: int,
 ) -> _Array:
     """Values of the runs of one round."""
     generator = np.random.Generator(np.random.Philox(key=[how.seed, place * 64 + number]))
@@ -118,7 +123,9 @@ def _values(
     return np.concatenate(parts)
 
 
-def _windows(column: Runs, between: tuple[float, float], how: Search) -> list[tuple[float, float]]:
+def _windows(
+    column: Runs, between: tuple[float, float], how: QuantileSearchSettings
+) -> list[tuple[float, float]]:
     """A little more than the interval of each probability."""
     found = []
     for probability in how.probabilities:

@@ -14,13 +14,13 @@ from snapbeam.core.validate import InputError, axis, choice, integer, shown
 from snapbeam.design.events import OUTCOMES, reached, require_held
 from snapbeam.design.trials import Trials
 from snapbeam.dynamics.lifetimes.lifetime_map import lifetime_map
-from snapbeam.dynamics.lifetimes.survival import Survival
-from snapbeam.dynamics.starts import Starts
+from snapbeam.dynamics.lifetimes.survival import LifetimeSettings
+from snapbeam.dynamics.starts import InitialConditions
 from snapbeam.engines.each import of_one_named
 from snapbeam.engines.outcomes import STATISTICS
 from snapbeam.sweeps.points import PointList
 
-__all__ = ["Answer", "LifetimeOf", "NotchOf", "StatisticOf", "ThresholdOf", "answer_of"]
+__all__ = ["Answer", "LifetimeQoI", "NotchQoI", "StatisticQoI", "ThresholdQoI", "answer_of"]
 
 _Array = NDArray[np.float64]
 _Numbers = NDArray[np.int64]
@@ -41,7 +41,7 @@ class Answer(Protocol):
 
 
 @dataclass(frozen=True)
-class StatisticOf:
+class StatisticQoI:
     """A statistic of the run of each draw, such as ``peak_force``.
 
     Parameters
@@ -66,7 +66,7 @@ class StatisticOf:
     @property
     def words(self) -> str:
         """What it is."""
-        return STATISTICS[self.name].words if self.name in STATISTICS else OUTCOMES[self.name].words
+        return STATISTICS[self.name].long_name if self.name in STATISTICS else OUTCOMES[self.name].words
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
         """One run a draw."""
@@ -77,14 +77,14 @@ class StatisticOf:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ThresholdOf:
+class ThresholdQoI:
     """The least value of a parameter at which a draw snaps, on a row of values and then by halving.
 
     Parameters
     ----------
-    along : str
+    parameter : str
         Parameter to raise, such as ``"velocity_amplitude"``.
-    between : tuple of two floats
+    bounds : tuple of two floats
     values : int
         Values tried first, evenly spaced: a window of snapping narrower than their spacing may be missed.
     halvings : int
@@ -93,39 +93,41 @@ class ThresholdOf:
         Other parameters, as they are meant to be.
     """
 
-    along: str = "velocity_amplitude"
-    between: tuple[float, float] = (0.005, 0.65)
+    parameter: str = "velocity_amplitude"
+    bounds: tuple[float, float] = (0.005, 0.65)
     values: int = 25
     halvings: int = 8
     at: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        row = lookup(self.along)
+        row = lookup(self.parameter)
         if not row.is_run or row.quantity.kind is not float:
-            raise InputError(f"along = {shown(self.along)}: must be a number that may differ between runs")
-        axis("between", self.between, -np.inf, np.inf)
+            raise InputError(
+                f"along = {shown(self.parameter)}: must be a number that may differ between runs"
+            )
+        axis("bounds", self.bounds, -np.inf, np.inf)
         integer("values", self.values, 2, 100_000)
         integer("halvings", self.halvings, 0, 40)
 
     @property
     def unit(self) -> str:
         """Of the parameter."""
-        return lookup(self.along).quantity.unit
+        return lookup(self.parameter).quantity.unit
 
     @property
     def words(self) -> str:
         """What it is."""
-        return f"least {lookup(self.along).quantity.words} that snaps"
+        return f"least {lookup(self.parameter).quantity.long_name} that snaps"
 
     @property
     def error(self) -> float:
         """Half of the last step."""
-        return (self.between[1] - self.between[0]) / (self.values - 1) / 2.0 ** (self.halvings + 1)
+        return (self.bounds[1] - self.bounds[0]) / (self.values - 1) / 2.0 ** (self.halvings + 1)
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
         """All draws at once: every value, then as many rounds as there are halvings."""
-        row, size = lookup(self.along).name, numbers.size
-        tried = np.linspace(*self.between, self.values)
+        row, size = lookup(self.parameter).name, numbers.size
+        tried = np.linspace(*self.bounds, self.values)
         each = np.repeat(np.arange(size), tried.size)
         snaps = self._snaps(trials, scores[each], numbers[each], row, np.tile(tried, size))
         table = snaps.reshape(size, tried.size)
@@ -143,43 +145,43 @@ class ThresholdOf:
     ) -> NDArray[np.bool_]:
         points = {lookup(name).name: np.full(values.size, float(value)) for name, value in self.at.items()}
         found = trials.statistics(points | {row: values}, numbers, scores=scores)
-        return np.asarray(found["response"] > 0)
+        return np.asarray(found["response_class"] > 0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class NotchOf:
+class NotchQoI:
     """Where the threshold is lowest along a parameter, or how low it is there.
 
     Parameters
     ----------
-    over : str
+    parameter : str
         Parameter along which thresholds are compared, such as ``"frequency_ratio"``.
     values : array_like
         Its values, strictly increasing, at least 3; the place is that of the parabola through the lowest three.
-    threshold : ThresholdOf
+    threshold : ThresholdQoI
     depth : bool
         Whether the threshold there is meant, and not the place.
     """
 
-    over: str = "frequency_ratio"
+    parameter: str = "frequency_ratio"
     values: ArrayLike = tuple(np.linspace(1.0, 1.8, 9).tolist())
-    threshold: ThresholdOf = field(default_factory=ThresholdOf)
+    threshold: ThresholdQoI = field(default_factory=ThresholdQoI)
     depth: bool = False
 
     def __post_init__(self) -> None:
-        row = lookup(self.over)
-        if axis(self.over, self.values, row.quantity.low, row.quantity.high).size < 3:
+        row = lookup(self.parameter)
+        if axis(self.parameter, self.values, row.quantity.low, row.quantity.high).size < 3:
             raise InputError(f"values = {shown(self.values)}: must be at least 3")
 
     @property
     def unit(self) -> str:
         """Of what it is along, or of the threshold."""
-        return self.threshold.unit if self.depth else lookup(self.over).quantity.unit
+        return self.threshold.unit if self.depth else lookup(self.parameter).quantity.unit
 
     @property
     def words(self) -> str:
         """What it is."""
-        place = lookup(self.over).quantity.words
+        place = lookup(self.parameter).quantity.long_name
         return f"lowest threshold over {place}" if self.depth else f"{place} at which the threshold is lowest"
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
@@ -200,9 +202,9 @@ class NotchOf:
 
     def _threshold(self, value: float, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
         own = self.threshold
-        there = ThresholdOf(
-            along=own.along, between=own.between, values=own.values, halvings=own.halvings,
-            at={**own.at, self.over: value},
+        there = ThresholdQoI(
+            parameter=own.parameter, bounds=own.bounds, values=own.values, halvings=own.halvings,
+            at={**own.at, self.parameter: value},
         )  # fmt: skip
         return there.of(trials, scores, numbers)
 
@@ -217,18 +219,18 @@ def _vertex(x: _Array, y: _Array) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class LifetimeOf:
+class LifetimeQoI:
     """How long snapping lasts, from many starts of each draw, in cycles.
 
     Parameters
     ----------
-    starts : Starts
+    initial_conditions : Starts
         The same for every draw.
-    survival : Survival, optional
+    settings : Survival, optional
     """
 
-    starts: Starts = field(default_factory=lambda: Starts(count=16))
-    survival: Survival = field(default_factory=Survival)
+    initial_conditions: InitialConditions = field(default_factory=lambda: InitialConditions(count=16))
+    settings: LifetimeSettings = field(default_factory=LifetimeSettings)
 
     @property
     def unit(self) -> str:
@@ -245,12 +247,16 @@ class LifetimeOf:
         columns = trials.columns({}, numbers, scores)
         if any(name.startswith("start.") for name in columns):
             raise InputError(
-                "displacement: lifetimes have the starts of LifetimeOf; leave it out of the spread"
+                "displacement: lifetimes have the starts of LifetimeQoI; leave it out of the spread"
             )
         found = lifetime_map(
-            trials.system, _listed(columns), trials.integration, starts=self.starts, survival=self.survival
+            trials.system,
+            _listed(columns),
+            trials.integration,
+            initial_conditions=self.initial_conditions,
+            settings=self.settings,
         )
-        trials.runs += numbers.size * self.starts.count
+        trials.runs += numbers.size * self.initial_conditions.count
         return np.asarray(found["lifetime"].values, dtype=np.float64)
 
 
@@ -266,9 +272,9 @@ def answer_of(given: Answer | str) -> Answer:
     InputError
     """
     if isinstance(given, str):
-        return StatisticOf(given)
+        return StatisticQoI(given)
     if not hasattr(given, "of") or not hasattr(given, "unit"):
         raise InputError(
-            f"answer = {shown(given)}: must be the name of a statistic, a ThresholdOf, a NotchOf or a LifetimeOf"
+            f"answer = {shown(given)}: must be the name of a statistic, a ThresholdQoI, a NotchQoI or a LifetimeQoI"
         )
     return given

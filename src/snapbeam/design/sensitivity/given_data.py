@@ -11,7 +11,7 @@ from scipy import stats
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, finite_array, integer, within
 
-__all__ = ["Indices", "given_data_indices"]
+__all__ = ["Indices", "sobol_indices_from_samples"]
 
 _Array = NDArray[np.float64]
 _GROUPS = 20
@@ -26,7 +26,7 @@ class Indices(NamedTuple):
 
 
 @checked
-def given_data_indices(
+def sobol_indices_from_samples(
     inputs: ArrayLike, output: ArrayLike, *, confidence: float = 0.95, bins: int | None = None, seed: int = 0
 ) -> Indices:
     """First-order indices Var(E[y | x_j])/Var(y) of a sample, however it was drawn, of correlated inputs too.

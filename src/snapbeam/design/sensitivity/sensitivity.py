@@ -14,13 +14,13 @@ from snapbeam.core.kinds import checked
 from snapbeam.core.provenance import canonical_json
 from snapbeam.core.validate import InputError, choice, integer, within
 from snapbeam.design.sensitivity.answers import Answer, answer_of
-from snapbeam.design.sensitivity.given_data import given_data_indices
-from snapbeam.design.sensitivity.variance import sobol
-from snapbeam.design.spread import Spread
+from snapbeam.design.sensitivity.given_data import sobol_indices_from_samples
+from snapbeam.design.sensitivity.variance import sobol_indices
+from snapbeam.design.spread import ParameterUncertainty
 from snapbeam.design.trials import Trials, trials_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.sweeps.stored import Keeping
+from snapbeam.sweeps.stored import CheckpointOptions
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,14 +37,14 @@ PARAMETER = "parameter"
 @checked
 def sensitivity(
     system: System,
-    answer: Answer | str,
-    spread: Spread,
+    quantity: Answer | str,
+    uncertainty: ParameterUncertainty,
     method: str = "local",
     *,
-    size: int | None = None,
+    samples: int | None = None,
     confidence: float = 0.95,
     integration: Integration | None = None,
-    store: str | os.PathLike[str] | Keeping | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
 ) -> xr.Dataset:
     """Which parameter of a spread moves an answer most, with intervals.
 
@@ -52,20 +52,20 @@ def sensitivity(
     ----------
     system : System
         The nominal one.
-    answer : str or ThresholdOf or NotchOf or LifetimeOf
+    quantity : str or ThresholdQoI or NotchQoI or LifetimeQoI
         What is asked: a statistic by its name, such as ``"peak_force"``, an outcome, or one of these.
-    spread : Spread
+    uncertainty : Spread
         What differs, at least one parameter.
     method : {"local", "sobol", "given_data"}
         ``"local"``: half the difference of the answers with a parameter one standard normal score up and down, the
-        others and the start as in *size* draws (common random numbers).  ``"sobol"``: indices of the first order and
-        in total over sixteen scrambled sequences of *size* points, all from one start.  ``"given_data"``: indices of
-        the first order from *size* plain draws, which may be correlated.
-    size : int, optional
+        others and the start as in *samples* draws (common random numbers).  ``"sobol"``: indices of the first order and
+        in total over sixteen scrambled sequences of *samples* points, all from one start.  ``"given_data"``: indices of
+        the first order from *samples* plain draws, which may be correlated.
+    samples : int, optional
         16, 32 and 1000 by default.
     confidence : float
     integration : Integration, optional
-    store : path or Keeping, optional
+    checkpoint : path or Keeping, optional
         Folder that keeps the runs of all answers but lifetimes; one that exists is resumed.
 
     Returns
@@ -83,12 +83,14 @@ def sensitivity(
     """
     choice("method", method, METHODS)
     within("confidence", confidence, 0.0, 1.0)
-    asked = answer_of(answer)
-    trials = trials_of(system, spread, integration, store=store, early=not isinstance(answer, str))
+    asked = answer_of(quantity)
+    trials = trials_of(
+        system, uncertainty, integration, store=checkpoint, early=not isinstance(quantity, str)
+    )
     names = trials.spread.parameters
     if not names:
         raise InputError("spread: draws no parameter, so there is nothing to compare")
-    count = integer("size", _DEFAULT[method] if size is None else size, 2, 2**24)
+    count = integer("samples", _DEFAULT[method] if samples is None else samples, 2, 2**24)
     if trials.spread.correlation is not None and method == "sobol":
         raise InputError(
             "correlation with method = 'sobol': its indices are of independent parameters; use 'given_data'"
@@ -151,7 +153,7 @@ def _sobol(trials: Trials, answer: Answer, count: int, confidence: float) -> tup
         kept.append(values)
         return values
 
-    found = sobol(
+    found = sobol_indices(
         function, len(trials.spread.of), count, replicates=_REPLICATES, confidence=confidence, seed=trials.spread.seed
     )  # fmt: skip
     table: dict[str, _Array] = {}
@@ -166,7 +168,7 @@ def _given_data(
     numbers = np.arange(count)
     scores = trials.spread.normals(numbers)
     values = _ask(trials, answer, scores, numbers)
-    found = given_data_indices(scores, values, confidence=confidence, seed=trials.spread.seed)
+    found = sobol_indices_from_samples(scores, values, confidence=confidence, seed=trials.spread.seed)
     return {
         "first_order": found.estimate,
         "first_order_low": found.low,
@@ -198,10 +200,10 @@ def _dataset(
 
     names = list(trials.spread.of)
     attrs: dict[str, Any] = {
-        "title": "sensitivity of a struck bistable beam", "method": method, "size": count, "runs_made": trials.runs,
-        "confidence": confidence, "answer": answer.words, "answer_units": answer.unit,
+        "title": "sensitivity of a struck bistable beam", "method": method, "samples": count, "runs_made": trials.runs,
+        "confidence": confidence, "quantity": answer.words, "answer_units": answer.unit,
         "answer_mean": float(values.mean()), "answer_sd": float(values.std(ddof=1)),
-        "spread": canonical_json(trials.spread.describe()), "system": trials.system.hash, "seed": trials.spread.seed,
+        "uncertainty": canonical_json(trials.spread.describe()), "system": trials.system.hash, "seed": trials.spread.seed,
     }  # fmt: skip
     dataset = xr.Dataset(attrs=attrs)
     dataset[PARAMETER] = ((PARAMETER,), names, {"long_name": "parameter"})

@@ -13,7 +13,7 @@ from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, integer, within
 from snapbeam.design.sensitivity.given_data import Indices
 
-__all__ = ["Sobol", "sobol"]
+__all__ = ["Sobol", "sobol_indices"]
 
 _Array = NDArray[np.float64]
 
@@ -27,10 +27,10 @@ class Sobol(NamedTuple):
 
 
 @checked
-def sobol(
+def sobol_indices(
     function: Callable[[_Array], _Array],
     inputs: int,
-    size: int = 64,
+    samples: int = 64,
     *,
     replicates: int = 16,
     confidence: float = 0.95,
@@ -46,8 +46,8 @@ def sobol(
     function : callable
         From ranks in (0, 1) of shape (inputs, points) to numbers of shape (points,); called once.
     inputs : int
-    size : int
-        Points of a sequence, a power of 2; *replicates* times *size* times (*inputs* + 2) points in all.
+    samples : int
+        Points of a sequence, a power of 2; *replicates* times *samples* times (*inputs* + 2) points in all.
     replicates : int
         At least 4.
     confidence : float
@@ -62,17 +62,17 @@ def sobol(
     integer("replicates", replicates, 4, 10_000)
     within("confidence", confidence, 0.0, 1.0)
     integer("seed", seed, 0, 2**63 - 1)
-    if integer("size", size, 2, 2**24) & (size - 1):
-        raise InputError(f"size = {size}: must be a power of 2")
-    blocks = np.concatenate([_matrices(inputs, size, seed, r) for r in range(replicates)], axis=1)
+    if integer("samples", samples, 2, 2**24) & (samples - 1):
+        raise InputError(f"size = {samples}: must be a power of 2")
+    blocks = np.concatenate([_matrices(inputs, samples, seed, r) for r in range(replicates)], axis=1)
     values = np.asarray(function(blocks), dtype=np.float64)
-    table = values.reshape(replicates, inputs + 2, size)
+    table = values.reshape(replicates, inputs + 2, samples)
     if not np.isfinite(table).all():
         raise InputError("function: gave numbers that are not finite")
     if not (table[:, :2].reshape(replicates, -1).std(axis=1) > 0.0).all():
         raise InputError("function: does not vary over the inputs, so there is nothing to share out")
     found = [
-        stats.sobol_indices(func={"f_A": row[None, 0], "f_B": row[None, 1], "f_AB": row[2:, None]}, n=size)
+        stats.sobol_indices(func={"f_A": row[None, 0], "f_B": row[None, 1], "f_AB": row[2:, None]}, n=samples)
         for row in table
     ]
     first = np.array([np.ravel(each.first_order) for each in found])

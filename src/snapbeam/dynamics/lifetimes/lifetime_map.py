@@ -12,16 +12,16 @@ from numpy.typing import ArrayLike, NDArray
 from snapbeam.core.codes import RunStatus
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, InputTypeError, shown
-from snapbeam.dynamics.lifetimes.survival import Survival, checked_cycles, fit_lifetime, proportion
+from snapbeam.dynamics.lifetimes.survival import LifetimeSettings, checked_cycles, fit_lifetime, proportion
 from snapbeam.dynamics.lifetimes.work import LifetimeWork
-from snapbeam.dynamics.starts import Starts, held_in_space, starts_of
+from snapbeam.dynamics.starts import InitialConditions, held_in_space, starts_of
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.runs.save import code_flags
 from snapbeam.sweeps.compute.task import ResultTable
 from snapbeam.sweeps.points import PointList
 from snapbeam.sweeps.setup import SweepSetup, sweep_setup
-from snapbeam.sweeps.stored import Keeping, compute_table
+from snapbeam.sweeps.stored import CheckpointOptions, compute_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,7 +33,7 @@ CYCLES = 1000
 """Cycles of a run unless others are asked for."""
 WELLS = ("first", "other")
 START, WELL, AFTER = "start", "well", "after"
-_REACHED = (int(RunStatus.OK), int(RunStatus.DECIDED))
+_REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
 
 
 @checked
@@ -42,10 +42,10 @@ def lifetime_map(
     axes: Mapping[str, Any] | xr.Dataset | Any = None,
     integration: Integration | None = None,
     *,
-    starts: Starts | int = 32,
-    survival: Survival | None = None,
+    initial_conditions: InitialConditions | int = 32,
+    settings: LifetimeSettings | None = None,
     after: ArrayLike | None = None,
-    store: str | os.PathLike[str] | Keeping | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
     cluster: str | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
@@ -63,9 +63,9 @@ def lifetime_map(
         As of :func:`snapbeam.sweep`; one point, the system as it stands, by default.
     integration : Integration, optional
         1000 cycles by default.  Runs end early once they provably snap no more, whatever it says.
-    starts : Starts or int
+    initial_conditions : Starts or int
         Starts of each point, the same for all of them.
-    survival : Survival, optional
+    settings : Survival, optional
         Delay, quiet cycles and confidence.
     after : array_like of int, optional
         Cycles n for the probability that a run still snaps then; an eighth, a quarter and a half of the cycles, and
@@ -80,13 +80,13 @@ def lifetime_map(
         ``goodness`` (the probability of so great a distance from an exponential), ``runs_ended``, ``runs_snapping``,
         ``runs_never`` (never crossed) and ``runs_failed``; ``end_probability`` over ``well`` and
         ``snapping_probability`` over ``after``, each with ``_low`` and ``_high``; and for every ``start``:
-        ``last_snap``, ``well`` the run ended about, ``end_is_final`` and ``status``.
+        ``last_snap``, ``well`` the run ended about, ``final_well_proven`` and ``status``.
 
     Raises
     ------
     InputError
         For bad input, and for a store that holds something else.
-    StoreError
+    CheckpointError
         If the store is in use, cannot be written or is damaged beyond repair.
 
     Examples
@@ -95,35 +95,35 @@ def lifetime_map(
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
-    if system.striker is None or system.has_surroundings:
+    if system.striker is None or system.has_environment:
         raise InputError(
             "base, axial, harvester: starts differ by the phase of a striker, and what else moves has a phase to it; "
             "march a batch of states by sb.advance(system, every=True) and count"
-            if system.has_surroundings
+            if system.has_environment
             else "striker = None: a beam that nothing strikes does not go on snapping"
         )
     integration = Integration() if integration is None else integration
     if not isinstance(integration, Integration):
         raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
-    survival = Survival() if survival is None else survival
-    if not isinstance(survival, Survival):
-        raise InputTypeError(f"survival = {shown(survival)}: must be a Survival")
+    settings = LifetimeSettings() if settings is None else settings
+    if not isinstance(settings, LifetimeSettings):
+        raise InputTypeError(f"survival = {shown(settings)}: must be a Survival")
     cycles = CYCLES if integration.cycles is None else integration.cycles
-    asked = _after(after, cycles, survival)
-    integration = integration.replace(cycles=cycles, early_decision=True)
+    kernel_input = _after(after, cycles, settings)
+    integration = integration.replace(cycles=cycles, early_termination=True)
     setup = _setup(held_in_space(system), axes, integration)
-    work = LifetimeWork(setup, None, starts_of(starts))
-    keeping = store if isinstance(store, Keeping) else Keeping(store)
+    work = LifetimeWork(setup, None, starts_of(initial_conditions))
+    keeping = checkpoint if isinstance(checkpoint, CheckpointOptions) else CheckpointOptions(checkpoint)
     table, made = compute_table(work, keeping, cluster=cluster, progress=progress)
     dataset = _runs(work, table, made)
-    return _single(setup, refit(dataset, survival, asked))
+    return _single(setup, refit(dataset, settings, kernel_input))
 
 
-def _after(after: ArrayLike | None, cycles: int, survival: Survival) -> NDArray[np.int64]:
-    observed = cycles - survival.quiet
+def _after(after: ArrayLike | None, cycles: int, survival: LifetimeSettings) -> NDArray[np.int64]:
+    observed = cycles - survival.settling_cycles
     if observed <= 0.0:
         raise InputError(
-            f"cycles = {cycles} with quiet = {survival.quiet:g}: must be more than the quiet cycles"
+            f"cycles = {cycles} with quiet = {survival.settling_cycles:g}: must be more than the quiet cycles"
         )
     if after is None:
         after = sorted(
@@ -157,16 +157,16 @@ def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Da
     failed = ~np.isin(kept["status"], _REACHED)
     columns: dict[str, tuple[Any, str, str, dict[str, Any]]] = {
         "last_snap": (kept["last_snap"], "1", "cycle of the last crossing; NaN: never, or not known", {}),
-        "snaps": (kept["crossings"], "1", "crossings of the centre", {}),
+        "snaps": (kept["zero_crossings"], "1", "crossings of the centre", {}),
         "late_snaps": (kept["late_crossings"], "1", "crossings in the last quarter of the run", {}),
         "end_well": (
             np.where(failed, 0, kept["well"]), "1", "well that the run ended about",
             {"flag_values": np.array([-1, 0, 1], dtype=np.int8), "flag_meanings": "first unknown other"},
         ),
-        "end_is_final": (kept["final"] != 0, "1", "whether the run provably ends there", {}),
+        "final_well_proven": (kept["final"] != 0, "1", "whether the run provably ends there", {}),
         "status": (kept["status"], "1", "status of the run", code_flags(RunStatus)),
     }  # fmt: skip
-    kinds = {"last_snap": "float64", "snaps": "int32", "late_snaps": "int32", "end_is_final": "bool"}
+    kinds = {"last_snap": "float64", "snaps": "int32", "late_snaps": "int32", "final_well_proven": "bool"}
     for name, (values, unit, words, labels) in columns.items():
         if name == "last_snap":
             values = np.where(failed, np.nan, values)
@@ -180,7 +180,7 @@ def _plain(value: Any) -> Any:
 
 
 def refit(
-    dataset: xr.Dataset, survival: Survival | None = None, after: ArrayLike | None = None
+    dataset: xr.Dataset, survival: LifetimeSettings | None = None, after: ArrayLike | None = None
 ) -> xr.Dataset:
     """The lifetimes and probabilities of a lifetime map again, with another delay, quiet time or confidence.
 
@@ -188,7 +188,7 @@ def refit(
     ----------
     dataset : xarray.Dataset
         Of :func:`lifetime_map`.
-    survival : Survival, optional
+    settings : Survival, optional
     after : array_like of int, optional
         As of :func:`lifetime_map`; those of the dataset by default.
 
@@ -198,11 +198,11 @@ def refit(
     """
     if "last_snap" not in dataset or START not in dataset["last_snap"].dims:
         raise InputError("dataset: holds no lifetimes of starts")
-    survival = Survival() if survival is None else survival
+    survival = LifetimeSettings() if survival is None else survival
     cycles = float(dataset.attrs["cycles"])
     if after is None:
         after = dataset[AFTER].values if AFTER in dataset.coords else None
-    asked = _after(after, int(cycles), survival)
+    kernel_input = _after(after, int(cycles), survival)
     result = dataset.drop_dims([name for name in (AFTER, WELL) if name in dataset.dims])
     runs = result.transpose(..., START)
     dims = runs["last_snap"].dims[:-1]
@@ -210,8 +210,8 @@ def refit(
     good = np.isin(status, _REACHED)
     snapped = good & np.isfinite(last)
     # what ended early provably snaps no more
-    settled = runs["end_is_final"].values.astype(bool) | (status == int(RunStatus.DECIDED))
-    observed = cycles - survival.quiet
+    settled = runs["final_well_proven"].values.astype(bool) | (status == int(RunStatus.EARLY_STOP))
+    observed = cycles - survival.settling_cycles
     lasting = snapped & ~settled & (last > observed)
     time = np.where(snapped, np.where(lasting, np.minimum(last, observed), last), np.nan)
     fit = fit_lifetime(time, snapped & ~lasting, survival.delay, survival.confidence)
@@ -228,8 +228,8 @@ def refit(
     }
     for name, (values, text) in words.items():
         result[name] = (dims, values, {"units": "1", "long_name": text})
-    _probabilities(result, dims, good, time, lasting, runs["end_well"].values, asked, survival)
-    result.attrs |= {"quiet": survival.quiet, "confidence": survival.confidence}
+    _probabilities(result, dims, good, time, lasting, runs["end_well"].values, kernel_input, survival)
+    result.attrs |= {"quiet": survival.settling_cycles, "confidence": survival.confidence}
     return result
 
 
@@ -240,8 +240,8 @@ def _probabilities(
     time: NDArray[np.float64],
     lasting: NDArray[np.bool_],
     well: NDArray[np.int8],
-    asked: NDArray[np.int64],
-    survival: Survival,
+    kernel_input: NDArray[np.int64],
+    survival: LifetimeSettings,
 ) -> None:
     """Enter the probability of each end, and of snapping on after some cycles."""
     total = good.sum(axis=-1)
@@ -250,8 +250,8 @@ def _probabilities(
     result[WELL] = ((WELL,), list(WELLS), {"long_name": "well that a run ends about"})
     _enter(result, "end_probability", (*dims, WELL), hits, total, "probability of ending in a well", survival)
     on = np.stack([(good & (time > cycle)).sum(axis=-1) + (lasting & (time == cycle)).sum(axis=-1)
-                   for cycle in asked], axis=-1)  # fmt: skip
-    result[AFTER] = ((AFTER,), asked, {"units": "1", "long_name": "cycles"})
+                   for cycle in kernel_input], axis=-1)  # fmt: skip
+    result[AFTER] = ((AFTER,), kernel_input, {"units": "1", "long_name": "cycles"})
     words = "probability of snapping on after so many cycles"
     _enter(result, "snapping_probability", (*dims, AFTER), on, total, words, survival)
 
@@ -263,7 +263,7 @@ def _enter(
     hits: NDArray[np.int64],
     total: NDArray[np.int64],
     words: str,
-    survival: Survival,
+    survival: LifetimeSettings,
 ) -> None:
     parts = proportion(hits, np.broadcast_to(total[..., None], hits.shape), survival.confidence)
     for ending, values, text in zip(

@@ -16,7 +16,7 @@ from scipy import stats
 
 from snapbeam.core.validate import InputError, integer, nonnegative, shown, within
 
-__all__ = ["LifetimeFit", "Survival", "fit_lifetime", "proportion"]
+__all__ = ["LifetimeFit", "LifetimeSettings", "fit_lifetime", "proportion"]
 
 _Array = NDArray[np.float64]
 _JEFFREYS = 0.5
@@ -27,7 +27,7 @@ _FEWEST, _TRIALS = 8, 40
 
 
 @dataclass(frozen=True, kw_only=True)
-class Survival:
+class LifetimeSettings:
     """How lifetimes are read from runs.
 
     Parameters
@@ -36,7 +36,7 @@ class Survival:
         Cycles t0 from which on ends are counted; by default the first end from which on the exponential is not
         refused at 1 %, at most half of them left out.  That end says when ends begin and is none of those that say
         how often they are.
-    quiet : float
+    settling_cycles : float
         Cycles without a crossing after which snapping is taken to have ended, greater than 0.  A run that crossed
         within the last of them is still snapping: its lifetime is only known to be longer.
     confidence : float
@@ -44,14 +44,14 @@ class Survival:
     """
 
     delay: float | None = None
-    quiet: float = 50.0
+    settling_cycles: float = 50.0
     confidence: float = 0.95
 
     def __post_init__(self) -> None:
         if self.delay is not None:
             nonnegative("delay", self.delay, "cycles")
-        if not nonnegative("quiet", self.quiet, "cycles") > 0.0:
-            raise InputError(f"quiet = {shown(self.quiet)}: must be greater than 0 cycles")
+        if not nonnegative("settling_cycles", self.settling_cycles, "cycles") > 0.0:
+            raise InputError(f"quiet = {shown(self.settling_cycles)}: must be greater than 0 cycles")
         within("confidence", self.confidence, 0.0, 1.0)
 
 

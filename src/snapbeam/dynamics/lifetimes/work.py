@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.dynamics.starts import Starts
+from snapbeam.dynamics.starts import InitialConditions
 from snapbeam.engines.answer import statistics_of
 from snapbeam.engines.assemble import cycles_of, make_ensemble, run_columns
 from snapbeam.engines.registry import resolve
@@ -21,7 +21,7 @@ from snapbeam.sweeps.setup import Progress
 
 __all__ = ["LifetimeWork"]
 
-_PER_START = ("status", "crossings", "late_crossings", "well", "final")
+_PER_START = ("status", "zero_crossings", "late_crossings", "well", "final")
 """Whole numbers kept of each run: how it ended, crossings in all and in the last quarter, +1 for the well opposite to
 the first one and -1 for that, and whether that end is proved."""
 
@@ -30,7 +30,7 @@ the first one and -1 for that, and whether that end is proved."""
 class LifetimeWork(PointWork):
     """The points of a sweep, each run from many starts."""
 
-    starts: Starts = field(default_factory=Starts)
+    starts: InitialConditions = field(default_factory=InitialConditions)
 
     @cached_property
     def integers(self) -> tuple[str, ...]:
@@ -69,11 +69,11 @@ class LifetimeWork(PointWork):
                     progress((s * size + done) // count, size)
 
             found = self._march(points, s, threads, report)
-            integers[0, s], integers[1, s] = found["status"], found["crossings"]
-            integers[2, s] = found["crossings_last_quarter"]
+            integers[0, s], integers[1, s] = found["status"], found["zero_crossings"]
+            integers[2, s] = found["zero_crossings_last_quarter"]
             integers[3, s] = np.where(found["final_well"] == side, -1, 1)
-            integers[4, s] = found["end_is_final"]
-            numbers[s] = found["last_crossing"] / cycle
+            integers[4, s] = found["final_well_proven"]
+            numbers[s] = found["last_zero_crossing"] / cycle
         return ResultTable(integers.reshape(-1, size).T.copy(), numbers.T.copy())
 
     def _march(
@@ -100,8 +100,8 @@ class LifetimeWork(PointWork):
             def inside(finished: int, _: int, before: int = done) -> object:
                 return report(before + finished)
 
-            books = engine.run_ensemble(ensemble, threads, inside)
-            for name, values in statistics_of(ensemble, books).items():
+            accumulators_of_runs = engine.run_ensemble(ensemble, threads, inside)
+            for name, values in statistics_of(ensemble, accumulators_of_runs).items():
                 found.setdefault(name, np.zeros(size, dtype=values.dtype))[which] = values
             done += which.size
         return found

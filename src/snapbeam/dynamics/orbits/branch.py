@@ -12,26 +12,26 @@ from numpy.typing import NDArray
 
 from snapbeam.core.findings import to_json
 from snapbeam.dynamics.flow import Stroboscope
-from snapbeam.dynamics.orbits.orbit import Orbit
+from snapbeam.dynamics.orbits.orbit import PeriodicOrbit
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["EVENTS", "Branch", "Event"]
+__all__ = ["EVENTS", "Branch", "SpecialPoint"]
 
 EVENTS = ("fold", "flip", "Neimark-Sacker", "branch point", "grazing")
 
 
 @dataclass(frozen=True, eq=False)
-class Event:
+class SpecialPoint:
     """Something that happens on a branch."""
 
     kind: str
     """One of :data:`EVENTS`."""
-    orbit: Orbit
+    orbit: PeriodicOrbit
     value: float
     """Of the parameter."""
-    after: int
+    index: int
     """Number of the orbit of the branch that it comes after."""
     error: float = math.nan
     """By how much the value may be off at these steps; NaN: not known."""
@@ -47,9 +47,9 @@ class Branch:
 
     name: str
     """The parameter."""
-    orbits: list[Orbit]
-    events: list[Event]
-    end: str
+    orbits: list[PeriodicOrbit]
+    special_points: list[SpecialPoint]
+    termination_reason: str
     """Why it ends."""
     impacts: list[int]
     """Of each orbit within its period."""
@@ -58,7 +58,7 @@ class Branch:
     def __repr__(self) -> str:
         low, high = self.values.min(), self.values.max()
         text = f"{len(self.orbits)} orbits of period {self.orbits[0].period}, {self.name} from {low:.6g} to {high:.6g}"
-        return f"<Branch: {text}, {len(self.events)} events, end: {self.end}>"
+        return f"<Branch: {text}, {len(self.special_points)} events, end: {self.termination_reason}>"
 
     @cached_property
     def values(self) -> NDArray[np.float64]:
@@ -83,7 +83,7 @@ class Branch:
         short, unit, words = self.name, "1", self.name
         if isinstance(first.flow, Stroboscope):
             row = lookup(self.name)
-            short, unit, words = row.short, row.quantity.unit, row.quantity.words
+            short, unit, words = row.short, row.quantity.unit, row.quantity.long_name
         states = np.array([orbit.coordinates for orbit in self.orbits])
         steps = np.linalg.norm(np.diff(states, axis=0), axis=1)
         dataset = xr.Dataset(
@@ -111,21 +111,31 @@ class Branch:
                     _labels("length of the branch in states"),
                 ),
                 "residual": ("orbit", [orbit.residual for orbit in self.orbits], _labels("of the return")),
-                "event_kind": ("event", [event.kind for event in self.events], {"long_name": "what happens"}),
-                "event_after": ("event", [event.after for event in self.events], _labels("orbit before it")),
+                "event_kind": (
+                    "event",
+                    [event.kind for event in self.special_points],
+                    {"long_name": "what happens"},
+                ),
+                "event_after": (
+                    "event",
+                    [event.index for event in self.special_points],
+                    _labels("orbit before it"),
+                ),
                 "event_value": (
                     "event",
-                    [event.value for event in self.events],
+                    [event.value for event in self.special_points],
                     {"units": unit, "long_name": words},
                 ),
                 "event_error": (
                     "event",
-                    np.array([event.error for event in self.events], dtype=np.float64),
+                    np.array([event.error for event in self.special_points], dtype=np.float64),
                     {"units": unit, "long_name": f"by how much it may be off at these steps: {words}"},
                 ),
                 "event_state": (
                     ("event", "coordinate"),
-                    np.array([event.orbit.coordinates for event in self.events]).reshape(-1, states.shape[1]),
+                    np.array([event.orbit.coordinates for event in self.special_points]).reshape(
+                        -1, states.shape[1]
+                    ),
                     _labels("state of the orbit there"),
                 ),
             },
@@ -137,13 +147,13 @@ class Branch:
                 "title": "branch of periodic orbits",
                 "along": short,
                 "period": first.period,
-                "end": self.end,
-                "findings": to_json(first.findings),
+                "termination_reason": self.termination_reason,
+                "diagnostics": to_json(first.diagnostics),
             },
         )
         if isinstance(first.flow, Stroboscope):
             centers = np.array([_centers(orbit) for orbit in self.orbits])
-            dataset["center_displacement"] = (
+            dataset["midspan_displacement"] = (
                 "orbit",
                 centers[:, 0],
                 _labels("centre displacement there, over b"),
@@ -156,7 +166,7 @@ class Branch:
         return dataset
 
 
-def _centers(orbit: Orbit) -> NDArray[np.float64]:
+def _centers(orbit: PeriodicOrbit) -> NDArray[np.float64]:
     """Centre displacement over b, once a period of the drive."""
     flow = orbit.flow
     assert isinstance(flow, Stroboscope)
@@ -166,7 +176,7 @@ def _centers(orbit: Orbit) -> NDArray[np.float64]:
         assert later is not None
         states = np.concatenate([states, later[0]])
     amplitudes = states[:, : flow.modes] * flow.scales[: flow.modes]
-    return np.asarray(amplitudes @ flow.system.model.center_shape / flow.system.scale.length)
+    return np.asarray(amplitudes @ flow.system.model.midspan_shape / flow.system.scale.length)
 
 
 def _labels(words: str) -> dict[str, str]:

@@ -13,14 +13,14 @@ from snapbeam.core.findings import tell
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, choice, integer, positive, shown
 from snapbeam.dynamics.flow import Flow
-from snapbeam.dynamics.orbits.branch import Branch, Event
+from snapbeam.dynamics.orbits.branch import Branch, SpecialPoint
 from snapbeam.dynamics.orbits.corrector import Corrector, Spot
 from snapbeam.dynamics.orbits.events import between as events_between
 from snapbeam.dynamics.orbits.events import grazing_end
-from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit
+from snapbeam.dynamics.orbits.orbit import OrbitNotFoundError, PeriodicOrbit
 from snapbeam.dynamics.orbits.shooting import Family
 
-__all__ = ["continue_orbit", "switch_branch"]
+__all__ = ["continuation", "switch_branch"]
 
 _Array = NDArray[np.float64]
 _TOLERANCE = 1e-10
@@ -29,21 +29,21 @@ _EASY, _HARD = 4, 9
 
 
 @checked
-def continue_orbit(
-    orbit: Orbit,
+def continuation(
+    orbit: PeriodicOrbit,
     name: str,
-    between: tuple[float, float],
+    bounds: tuple[float, float],
     *,
     direction: str = "up",
-    most: int = 500,
+    max_points: int = 500,
     step: float = 0.01,
-    longest: float = 0.02,
+    max_step: float = 0.02,
     tolerance: float = _TOLERANCE,
 ) -> Branch:
     """Follow a periodic orbit, stable or not, along one parameter.
 
     Folds, period doublings (flips), Neimark-Sacker bifurcations, branch points and grazing are located between the
-    orbits that they are found between.  The branch ends at a limit of the parameter, when it closes, at *most* orbits,
+    orbits that they are found between.  The branch ends at a limit of the parameter, when it closes, at *max_points* orbits,
     or where no orbit is found, as under a law of restitution where it grazes; ``branch.end`` says which.
 
     Parameters
@@ -52,13 +52,13 @@ def continue_orbit(
         Of :func:`periodic_orbit`, or of a branch.
     name : str
         Parameter, by dotted name or the name in datasets.
-    between : pair of float
+    bounds : pair of float
         Least and greatest value.
     direction : {"up", "down"}
         Which way the parameter goes at first.
-    most : int
+    max_points : int
         Orbits at most.
-    step, longest : float
+    step, max_step : float
         First and greatest distance between orbits, in units of the well's amplitude for the state and of the range
         for the parameter.
     tolerance : float
@@ -73,14 +73,14 @@ def continue_orbit(
     InputError
         For bad input.
     """
-    low, high = _limits(between)
+    low, high = _limits(bounds)
     begun = orbit.flow.value(name)
     if not low <= begun <= high:
         raise InputError(f"between = ({low:g}, {high:g}): must hold the orbit's own {name} = {begun:g}")
     choice("direction", direction, ("up", "down"))
-    count = integer("most", most, 2, 10**6)
-    length, longest = positive("step", step), positive("longest", longest)
-    tell(orbit.findings)
+    count = integer("max_points", max_points, 2, 10**6)
+    length, max_step = positive("step", step), positive("max_step", max_step)
+    tell(orbit.diagnostics)
     corrector = Corrector(
         Family(orbit.flow, name), orbit.period, high - low, positive("tolerance", tolerance)
     )
@@ -89,7 +89,7 @@ def continue_orbit(
     sign = np.zeros(y.size)
     sign[-1] = 1.0 if direction == "up" else -1.0
     first = Spot(y, corrector.tangent(came, slope, sign), came, slope, orbit.iterations)
-    return _follow(corrector, first, (low, high), count, min(length, longest), longest)
+    return _follow(corrector, first, (low, high), count, min(length, max_step), max_step)
 
 
 def _limits(between: tuple[float, float]) -> tuple[float, float]:
@@ -105,7 +105,7 @@ def _limits(between: tuple[float, float]) -> tuple[float, float]:
 def _follow(
     corrector: Corrector, first: Spot, limits: tuple[float, float], most: int, length: float, longest: float
 ) -> Branch:
-    spots, events = [first], list[Event]()
+    spots, events = [first], list[SpecialPoint]()
     end = f"{most} orbits"
     shortest = 1e-7 * longest
     limit = tuple(value / corrector.span for value in limits)
@@ -122,12 +122,12 @@ def _follow(
             spot = corrector.correct(guess, row, last.tangent, (last.came, last.slope))
             turned = float(spot.tangent @ last.tangent)
             if np.linalg.norm(spot.y - last.y) > 3.0 * length or turned < 0.5:
-                raise NoOrbit("the next orbit is too far away, or on another branch")
+                raise OrbitNotFoundError("the next orbit is too far away, or on another branch")
             if over is None and not limit[0] <= spot.y[-1] <= limit[1]:
-                raise NoOrbit("the corrected orbit is beyond the limit")
+                raise OrbitNotFoundError("the corrected orbit is beyond the limit")
             if not corrector.family.flow.smooth and spot.came.impacts != last.came.impacts:
-                raise NoOrbit("another number of impacts: it grazes")
-        except NoOrbit as error:
+                raise OrbitNotFoundError("another number of impacts: it grazes")
+        except OrbitNotFoundError as error:
             length *= 0.5
             if length < shortest:
                 end = f"no further orbit: {error}"
@@ -159,41 +159,43 @@ def _follow(
     return Branch(corrector.family.name, orbits, events, end, impacts, [spot.tangent for spot in spots])
 
 
-def switch_branch(event: Event, name: str, between: tuple[float, float], *, size: float = 0.01) -> Orbit:
+def switch_branch(
+    special_point: SpecialPoint, name: str, bounds: tuple[float, float], *, size: float = 0.01
+) -> PeriodicOrbit:
     """An orbit of the branch that is born at a flip or a branch point, *size* away from it.
 
     At a flip it has twice the period.  It is sought on the plane at that distance along the critical eigenvector.
 
     Parameters
     ----------
-    event : Event
+    special_point : Event
     name, between
-        As of :func:`continue_orbit`.
+        As of :func:`continuation`.
     size : float
         Distance, in units of the well's amplitude.
 
     Returns
     -------
     Orbit
-        From which :func:`continue_orbit` goes on.
+        From which :func:`continuation` goes on.
 
     Raises
     ------
     InputError
         For an event at which no other branch is born.
-    NoOrbit
+    OrbitNotFoundError
         If there is none at that distance; try another.
     """
-    if not isinstance(event, Event) or event.kind not in ("flip", "branch point"):
-        raise InputError(f"event = {shown(event)}: must be a flip or a branch point")
-    low, high = _limits(between)
-    orbit, span = event.orbit, high - low
-    doubled = event.kind == "flip"
+    if not isinstance(special_point, SpecialPoint) or special_point.kind not in ("flip", "branch point"):
+        raise InputError(f"event = {shown(special_point)}: must be a flip or a branch point")
+    low, high = _limits(bounds)
+    orbit, span = special_point.orbit, high - low
+    doubled = special_point.kind == "flip"
     values, vectors = np.linalg.eig(orbit.jacobian)
     vector = vectors[:, np.argmin(np.abs(values - (-1.0 if doubled else 1.0)))].real
     row = np.append(vector / np.linalg.norm(vector), 0.0)
     flow: Flow = orbit.flow
     corrector = Corrector(Family(flow, name), orbit.period * (2 if doubled else 1), span, _TOLERANCE)
-    guess = np.append(orbit.coordinates, event.value / span) + positive("size", size) * row
+    guess = np.append(orbit.coordinates, special_point.value / span) + positive("size", size) * row
     spot = corrector.correct(guess, row, row)
     return corrector.orbit(spot)

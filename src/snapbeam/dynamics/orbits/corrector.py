@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit
+from snapbeam.dynamics.orbits.orbit import OrbitNotFoundError, PeriodicOrbit
 from snapbeam.dynamics.orbits.shooting import Family, Return, jacobian, newton
 
 __all__ = ["Corrector", "Spot"]
@@ -63,7 +63,7 @@ class Corrector:
 
         Raises
         ------
-        NoOrbit
+        OrbitNotFoundError
         """
 
         def residual(y: _Array) -> _Array:
@@ -79,7 +79,7 @@ class Corrector:
         shot = newton(residual, derivative, guess, self.tolerance, _ITERATIONS, first)
         came, slope = self.derivatives(shot.x)
         if not np.isfinite(came.jacobian).all() or not np.isfinite(slope).all():
-            raise NoOrbit("a run beside the orbit failed")
+            raise OrbitNotFoundError("a run beside the orbit failed")
         return Spot(shot.x, self.tangent(came, slope, before), came, slope, shot.iterations)
 
     def tangent(self, came: Return, slope: _Array, before: _Array) -> _Array:
@@ -92,9 +92,9 @@ class Corrector:
             return before
         return found / np.linalg.norm(found)
 
-    def orbit(self, spot: Spot) -> Orbit:
+    def orbit(self, spot: Spot) -> PeriodicOrbit:
         """As an orbit of the flow at its value."""
         came, x = spot.came, spot.y[:-1]
         residual = float(np.abs(came.x - x).max())
         flow = self.family.at(float(spot.y[-1]) * self.span)
-        return Orbit(flow, x, self.period, came.jacobian, residual, spot.iterations)
+        return PeriodicOrbit(flow, x, self.period, came.jacobian, residual, spot.iterations)

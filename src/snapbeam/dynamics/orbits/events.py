@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from snapbeam.dynamics.flow import Flow, Stroboscope
-from snapbeam.dynamics.orbits.branch import Event
+from snapbeam.dynamics.orbits.branch import SpecialPoint
 from snapbeam.dynamics.orbits.corrector import Corrector, Spot
-from snapbeam.dynamics.orbits.orbit import NoOrbit, Orbit
+from snapbeam.dynamics.orbits.orbit import OrbitNotFoundError, PeriodicOrbit
 from snapbeam.dynamics.orbits.shooting import Return
 
 __all__ = ["between", "grazing_end"]
@@ -37,7 +37,7 @@ def _counts(came: Return) -> tuple[int, int, int]:
     )  # fmt: skip
 
 
-def between(corrector: Corrector, one: Spot, other: Spot, at: int) -> list[Event]:
+def between(corrector: Corrector, one: Spot, other: Spot, at: int) -> list[SpecialPoint]:
     """What happens between two orbits of a branch, located."""
     found = []
     up, flip, pair = (b - a for a, b in zip(_counts(one.came), _counts(other.came), strict=True))
@@ -77,7 +77,7 @@ def _between_at(corrector: Corrector, one: Spot, other: Spot, part: float) -> Sp
     return corrector.correct(one.y + part * along, row, one.tangent, (nearer.came, nearer.slope))
 
 
-def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -> Event | None:
+def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -> SpecialPoint | None:
     """An event between two orbits, by the Illinois form of false position."""
     low, high, f_low, f_high = 0.0, 1.0, _test(one, kind), _test(other, kind)
     if not f_low * f_high < 0.0:
@@ -89,7 +89,7 @@ def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -
         tried = low - f_low / steep
         try:
             spot = _between_at(corrector, one, other, tried)
-        except NoOrbit:
+        except OrbitNotFoundError:
             off = high - low
             break
         value = _test(spot, kind)
@@ -113,14 +113,14 @@ def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -
     )
     found = float(best.y[-1]) * corrector.span
     error = _moved(corrector, (one, best, other), part, off) + corrector.span * _unsettled(corrector, best)
-    return Event(kind, orbit, found, at, error)
+    return SpecialPoint(kind, orbit, found, at, error)
 
 
-def _derivative_error(flow: Flow, orbit: Orbit) -> float:
+def _derivative_error(flow: Flow, orbit: PeriodicOrbit) -> float:
     """Relative error of the return map's derivative."""
     if not isinstance(flow, Stroboscope):
         return _ROUNDING
-    return max([_FINE, *(float(told.numbers["relative_error"]) for told in orbit.findings)])
+    return max([_FINE, *(float(told.numbers["relative_error"]) for told in orbit.diagnostics)])
 
 
 def _moved(corrector: Corrector, spots: tuple[Spot, Spot, Spot], part: float, off: float) -> float:
@@ -145,7 +145,7 @@ def _unsettled(corrector: Corrector, spot: Spot) -> float:
     return residual / least if least > 0.0 else float("nan")
 
 
-def _grazing(corrector: Corrector, one: Spot, other: Spot, at: int) -> Event:
+def _grazing(corrector: Corrector, one: Spot, other: Spot, at: int) -> SpecialPoint:
     """Where the number of impacts changes between two orbits, by halving."""
     sides = [one, other]
     low, high = 0.0, 1.0
@@ -153,7 +153,7 @@ def _grazing(corrector: Corrector, one: Spot, other: Spot, at: int) -> Event:
         part = 0.5 * (low + high)
         try:
             spot = _between_at(corrector, one, other, part)
-        except NoOrbit:
+        except OrbitNotFoundError:
             break
         if spot.came.impacts == one.came.impacts:
             low, sides[0] = part, spot
@@ -162,10 +162,10 @@ def _grazing(corrector: Corrector, one: Spot, other: Spot, at: int) -> Event:
     width = abs(float(sides[1].y[-1] - sides[0].y[-1])) * corrector.span
     found = float(sides[1].y[-1]) * corrector.span
     error = width + corrector.span * _unsettled(corrector, sides[1])
-    return Event("grazing", corrector.orbit(sides[1]), found, at, error)
+    return SpecialPoint("grazing", corrector.orbit(sides[1]), found, at, error)
 
 
-def grazing_end(corrector: Corrector, spots: list[Spot]) -> Event | None:
+def grazing_end(corrector: Corrector, spots: list[Spot]) -> SpecialPoint | None:
     """The grazing that a branch ends at, if its last orbit passes the tip without room to spare.
 
     The room left, over how fast it went along the branch, is by how much the place is off.
@@ -174,14 +174,14 @@ def grazing_end(corrector: Corrector, spots: list[Spot]) -> Event | None:
     if not isinstance(corrector.family.flow, Stroboscope):
         return None
     orbit = corrector.orbit(last)
-    room = orbit.passage.clearance
-    if not room < _TOUCHES:
+    scratch = orbit.contact_summary.clearance
+    if not scratch < _TOUCHES:
         return None
     error, found = float("nan"), float(last.y[-1]) * corrector.span
     for before in reversed(spots[:-1]):
         way = abs(float(before.y[-1]) * corrector.span - found)
-        fell = corrector.orbit(before).passage.clearance - room
-        if fell > max(room, _ROUNDING):
-            error = 2.0 * room * way / fell + corrector.span * _unsettled(corrector, last)
+        fell = corrector.orbit(before).contact_summary.clearance - scratch
+        if fell > max(scratch, _ROUNDING):
+            error = 2.0 * scratch * way / fell + corrector.span * _unsettled(corrector, last)
             break
-    return Event("grazing", orbit, found, len(spots) - 1, error)
+    return SpecialPoint("grazing", orbit, found, len(spots) - 1, error)

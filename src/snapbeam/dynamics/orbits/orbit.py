@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.findings import Finding, tell, to_json
+from snapbeam.core.findings import Diagnostic, tell, to_json
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive, shown
 from snapbeam.dynamics.flow import Flow, Stroboscope, flow_of
 from snapbeam.dynamics.orbits.passage import Passage, passage_of
-from snapbeam.dynamics.orbits.shooting import Family, NoOrbit, jacobian, newton
+from snapbeam.dynamics.orbits.shooting import Family, OrbitNotFoundError, jacobian, newton
 from snapbeam.model.integration import Integration
 from snapbeam.model.state import State
 from snapbeam.model.system import System
@@ -23,7 +23,7 @@ from snapbeam.model.system import System
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["NoOrbit", "Orbit", "periodic_orbit", "shoot"]
+__all__ = ["OrbitNotFoundError", "PeriodicOrbit", "periodic_orbit", "shoot"]
 
 _Array = NDArray[np.float64]
 _Complex = NDArray[np.complex128]
@@ -32,7 +32,7 @@ _SAME = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
-class Orbit:
+class PeriodicOrbit:
     """A state that comes back after some periods of the drive."""
 
     flow: Flow
@@ -76,7 +76,7 @@ class Orbit:
         return np.concatenate([self.coordinates[None], marched.every[0, :-1]])
 
     @cached_property
-    def least_period(self) -> int:
+    def minimal_period(self) -> int:
         """The fewest periods of the drive after which it closes already."""
         for divisor in range(1, self.period):
             if self.period % divisor == 0:
@@ -96,14 +96,14 @@ class Orbit:
         return self._stroboscope.starting(self.state)
 
     @cached_property
-    def passage(self) -> Passage:
+    def contact_summary(self) -> Passage:
         """What it does on its way: impacts, how near it passes the tip, how far it goes."""
         return passage_of(self._stroboscope, self.coordinates, self.period)
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
         """What is doubtful about the multipliers."""
-        return getattr(self.flow, "findings", ())
+        return getattr(self.flow, "diagnostics", ())
 
     @property
     def _stroboscope(self) -> Stroboscope:
@@ -140,7 +140,7 @@ class Orbit:
                 "period": self.period,
                 "residual": self.residual,
                 "stable": int(self.is_stable),
-                "findings": to_json(self.findings),
+                "diagnostics": to_json(self.diagnostics),
             },
         )
 
@@ -153,7 +153,7 @@ class Orbit:
 @checked
 def periodic_orbit(
     system: System | Flow,
-    guess: State | ArrayLike | Orbit | None = None,
+    guess: State | ArrayLike | PeriodicOrbit | None = None,
     period: int = 1,
     integration: Integration | None = None,
     *,
@@ -161,8 +161,8 @@ def periodic_orbit(
     transient: int = 0,
     tolerance: float = 1e-11,
     iterations: int = 40,
-    deflate: Sequence[Orbit] = (),
-) -> Orbit:
+    deflate: Sequence[PeriodicOrbit] = (),
+) -> PeriodicOrbit:
     """The periodic orbit near a state, stable or not, by Newton shooting with the tangent flow.
 
     The tip's mid-position is fixed in space, where it is at the system's start.  Solves P^m(x) = x for the map P over
@@ -177,7 +177,7 @@ def periodic_orbit(
         Periods of the drive after which it closes, m.
     integration : Integration, optional
         ``accuracy="reference"`` by default: a derivative is no better than the steps it is taken of.  At level
-        ``"map"`` it is off by up to 2 %, which is warned of.
+        ``"standard"`` it is off by up to 2 %, which is warned of.
     phase : float, optional
         Of the drive at which the orbit is seen, rad; where no contact begins, ends or lasts no time.
     transient : int
@@ -196,12 +196,12 @@ def periodic_orbit(
     ------
     InputError
         For bad input.
-    NoOrbit
+    OrbitNotFoundError
         If none is found: the message says why, and what to try.
     """
     flow = flow_of(system, integration, "reference")
     if isinstance(flow, Stroboscope):
-        if flow.system.leads is None:
+        if flow.system.primary_excitation is None:
             raise InputError("striker = None: a beam that nothing moves has no orbit but rest")
         if phase is not None:
             flow = Stroboscope(flow.system, flow.integration, phase)
@@ -214,16 +214,16 @@ def periodic_orbit(
     if before:
         x = flow.march(x[None], before).states[0]
         if not np.isfinite(x).all():
-            raise NoOrbit("the run from the guess failed; see its status with sb.advance")
-    tell(getattr(flow, "findings", ()))
-    if not all(isinstance(orbit, Orbit) for orbit in deflate):
+            raise OrbitNotFoundError("the run from the guess failed; see its status with sb.advance")
+    tell(getattr(flow, "diagnostics", ()))
+    if not all(isinstance(orbit, PeriodicOrbit) for orbit in deflate):
         raise InputTypeError(f"deflate = {shown(deflate)}: must be orbits, as periodic_orbit gives")
     known = tuple(point for orbit in deflate for point in orbit.points)
     return shoot(flow, x, periods, allowed, integer("iterations", iterations, 1, 10_000), deflate=known)
 
 
-def _guess_of(flow: Flow, guess: State | ArrayLike | Orbit | None) -> _Array:
-    if isinstance(guess, Orbit):
+def _guess_of(flow: Flow, guess: State | ArrayLike | PeriodicOrbit | None) -> _Array:
+    if isinstance(guess, PeriodicOrbit):
         return np.array(guess.coordinates)
     if guess is None or isinstance(guess, State):
         if not isinstance(flow, Stroboscope):
@@ -245,7 +245,7 @@ def shoot(
     iterations: int,
     first: _Array | None = None,
     deflate: tuple[_Array, ...] = (),
-) -> Orbit:
+) -> PeriodicOrbit:
     """Newton's method for P^m(x) = x; *first* is a derivative of P^m to begin with."""
     one, family = np.eye(x.size), Family(flow)
 
@@ -260,4 +260,6 @@ def shoot(
         residual, derivative, x, tolerance, iterations, None if first is None else first - one, deflate
     )
     came = jacobian(family, shot.x, period)
-    return Orbit(flow, shot.x, period, came.jacobian, float(np.abs(came.x - shot.x).max()), shot.iterations)
+    return PeriodicOrbit(
+        flow, shot.x, period, came.jacobian, float(np.abs(came.x - shot.x).max()), shot.iterations
+    )

@@ -35,13 +35,13 @@ class Passage(NamedTuple):
 def passage_of(flow: Stroboscope, coordinates: _Array, periods: int) -> Passage:
     """Follow one state for some periods and look at every approach."""
     system = flow.starting(flow.state(coordinates))
-    integration = flow.integration.replace(cycles=periods, early_decision=False)
+    integration = flow.integration.replace(cycles=periods, early_termination=False)
     run = simulate(
         system, integration, sample_times=np.linspace(0.0, periods * flow.period, _SAMPLES * periods + 1)
     )
     data = run.dataset
     time = data["time"].values
-    depth = data["penetration"].values
+    depth = data["penetration_normalised"].values
     held, spacing = np.zeros(time.size, dtype=bool), 1.000001 * (time[1] - time[0])
     onset, duration = run.impacts["onset"].values, run.impacts["duration"].values
     for begun, lasted in zip(onset, duration, strict=True):
@@ -56,8 +56,8 @@ def passage_of(flow: Stroboscope, coordinates: _Array, periods: int) -> Passage:
         least = float(run.impacts["impulse"].values.min())
     return Passage(
         int(onset.size), _turn_back(time, depth, held), lightest, least,
-        float(np.abs(data["displacement"].values).max()),
-        int(run.outcome.crossings),
+        float(np.abs(data["displacement_at_striker"].values).max()),
+        int(run.summary.zero_crossings),
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from snapbeam.config.parameters import lookup
 from snapbeam.dynamics.flow import Flow, Marched, Stroboscope
 from snapbeam.engines.cpu.driver import usable_cores
 
-__all__ = ["Family", "NoOrbit", "Return", "Shot", "jacobian", "newton"]
+__all__ = ["Family", "OrbitNotFoundError", "Return", "Shot", "jacobian", "newton"]
 
 _Array = NDArray[np.float64]
 _STENCIL = ((1, 3.0 / 4.0), (2, -3.0 / 20.0), (3, 1.0 / 60.0))
@@ -28,7 +28,7 @@ _SLOW = 0.25
 """Factor by which a step must lessen the residual, or else the derivative is taken anew."""
 
 
-class NoOrbit(RuntimeError):
+class OrbitNotFoundError(RuntimeError):
     """No orbit was found: the message says why, and what to try."""
 
 
@@ -118,8 +118,8 @@ def _by_differences(family: Family, x: _Array, periods: int, value: float | None
     for _ in range(_SHRINKINGS):
         moves = np.concatenate([sign * k * step * np.eye(size) for k, _ in _STENCIL for sign in (1.0, -1.0)])
         marched = family.march(np.concatenate([x[None], x + moves]), periods, value)
-        met = marched.statistics.get("impacts")
-        if met is None or (met == met[0]).all():
+        contact_event = marched.statistics.get("impacts")
+        if contact_event is None or (contact_event == contact_event[0]).all():
             break
         step *= 0.25
     table = marched.states[1:].reshape(len(_STENCIL), 2, size, size)
@@ -153,7 +153,7 @@ def newton(
 
     Raises
     ------
-    NoOrbit
+    OrbitNotFoundError
     """
     fresh = first is None
     if first is None:
@@ -163,7 +163,7 @@ def newton(
     size = float(np.abs(r).max())
     for count in range(iterations):
         if not np.isfinite(size):
-            raise NoOrbit(
+            raise OrbitNotFoundError(
                 "a run failed on the way; begin nearer to the orbit, or with accuracy = 'reference'"
             )
         if size <= tolerance and not (deflate and _near(x, deflate)):
@@ -171,7 +171,7 @@ def newton(
         try:
             step: NDArray[Any] = np.linalg.solve(slope, -r)
         except np.linalg.LinAlgError:
-            raise NoOrbit(
+            raise OrbitNotFoundError(
                 "the derivative is singular, as it is at a fold; change the parameter a little"
             ) from None
         step = _deflated(x, step, deflate)
@@ -193,13 +193,13 @@ def newton(
                 found = residual(x + step)
                 new = float(np.abs(found).max())
             else:
-                raise NoOrbit(
+                raise OrbitNotFoundError(
                     f"Newton's method stands still at a residual of {size:.2g}, in units of the well's amplitude; "
                     "begin nearer to the orbit (transient=..., another period), or with accuracy = 'reference'"
                 )
         slope = slope + np.outer(found - r - slope @ step, step) / float(step @ step)
         x, r, size, fresh = x + step, found, new, False
-    raise NoOrbit(
+    raise OrbitNotFoundError(
         f"no convergence in {iterations} iterations, the residual is {size:.2g} in units of the well's amplitude; "
         "begin nearer to the orbit (transient=...), try another period, or more iterations"
     )
@@ -216,7 +216,7 @@ def _deflated(x: _Array, step: _Array, known: tuple[_Array, ...]) -> _Array:
         away = x - other
         square = float(away @ away)
         if square == 0.0:
-            raise NoOrbit("the guess is an orbit that is to be left out; begin elsewhere")
+            raise OrbitNotFoundError("the guess is an orbit that is to be left out; begin elsewhere")
         along += -2.0 * float(away @ step) / (square * (square + 1.0))
     if along == 1.0:
         return step

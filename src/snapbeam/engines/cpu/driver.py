@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.cpu.few.march import march_few
+from snapbeam.engines.cpu.few.march import integrate_run_lanes
 from snapbeam.engines.cpu.few.memory import lay_out_few, suits
-from snapbeam.engines.cpu.march import Kept, march_many
-from snapbeam.engines.cpu.march_one import march_one
+from snapbeam.engines.cpu.march import KernelOutput, integrate_ensemble
+from snapbeam.engines.cpu.march_one import integrate_recorded
 from snapbeam.engines.cpu.memory import Memory, Packed, lay_out, pack
 from snapbeam.engines.cpu.recording import MARKS, REALS, VALUES, Outputs
-from snapbeam.engines.cpu.state import Asked, Room
-from snapbeam.engines.cpu.tangent import TANGENT_ROWS, march_tangent
+from snapbeam.engines.cpu.state import KernelInput, Scratch
+from snapbeam.engines.cpu.tangent import TANGENT_ROWS, integrate_tangent
 from snapbeam.engines.ensemble import Ensemble
-from snapbeam.engines.outcomes import empty_books
+from snapbeam.engines.outcomes import empty_accumulators
 from snapbeam.engines.outputs import Landings, Last, Recorded
 from snapbeam.engines.scalar.compile import kernel, ready
 from snapbeam.engines.scalar.decisions import PIECES
@@ -31,7 +31,7 @@ from snapbeam.engines.scalar.lanes import WIDTH
 from snapbeam.engines.scalar.several import several
 from snapbeam.model.drive.joined import MOST_STRIKERS
 
-__all__ = ["march_landing", "march_tangents", "record", "run_ensemble", "usable_cores"]
+__all__ = ["integrate_to_landing", "integrate_tangents", "record", "run_ensemble", "usable_cores"]
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
@@ -67,10 +67,10 @@ def _packed(ensemble: Ensemble) -> Packed:
     return pack(ensemble.structure, ensemble.high_omega, forced=ensemble.forced, several=others)
 
 
-def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> Asked:
+def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> KernelInput:
     """The ensemble in this engine's layout; without *memory*, of a drive that looks nothing up."""
     law, drive = ensemble.law.numbers_type(), ensemble.drive.numbers_type()
-    return Asked(
+    return KernelInput(
         runs=ensemble.runs,
         law_numbers=ensemble.law_numbers,
         drive_numbers=ensemble.drive_numbers if memory is None else memory.drive_numbers,
@@ -87,10 +87,10 @@ def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> Asked:
     )
 
 
-def _room(ensemble: Ensemble) -> Room:
+def _room(ensemble: Ensemble) -> Scratch:
     longest = float(ensemble.step_times.max())
     pieces = 2 * max(8, math.ceil(PIECES * ensemble.fastest * longest / (2.0 * math.pi)) + 1)
-    return Room(np.empty((pieces + 1, 4)), np.empty(pieces * 4 * WIDTH))
+    return Scratch(np.empty((pieces + 1, 4)), np.empty(pieces * 4 * WIDTH))
 
 
 def _kernel(march: Callable[..., Any], ensemble: Ensemble) -> Any:
@@ -118,10 +118,10 @@ def run_ensemble(
     Runs are handed out longest first, a chunk at a time; what a run gives does not depend on which thread
     marched it or on what it was marched with.
     """
-    return _march(ensemble, threads, progress, landings=0).books
+    return _march(ensemble, threads, progress, landings=0).accumulators_of_runs
 
 
-def march_landing(
+def integrate_to_landing(
     ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
 ) -> Landings:
     """As :func:`run_ensemble`, and the states at every landing."""
@@ -129,13 +129,13 @@ def march_landing(
     return _march(ensemble, threads, progress, landings)
 
 
-def march_tangents(
+def integrate_tangents(
     ensemble: Ensemble,
     tangents: _Array,
     threads: int | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> tuple[Landings, _Array]:
-    """As :func:`march_landing`, with tangents carried along to the end.
+    """As :func:`integrate_to_landing`, with tangents carried along to the end.
 
     Parameters
     ----------
@@ -151,22 +151,22 @@ def march_tangents(
     packed = _packed(ensemble)
     size = packed.layout.size
     spread = packed.spread(tangents).reshape(*tangents.shape[:2], 2 * size)
-    march = _kernel(march_tangent, ensemble)
+    march = _kernel(integrate_tangent, ensemble)
     rows = TANGENT_ROWS + 2 * tangents.shape[1]
 
-    def arguments(which: _Integers, kept: Kept) -> tuple[Any, ...]:
+    def arguments(which: _Integers, kernel_output: KernelOutput) -> tuple[Any, ...]:
         memory = lay_out(ensemble, packed, rows)
         first = memory.layouts[1].g - rows * size + TANGENT_ROWS * size
-        asked, room = _asked(ensemble, packed, memory), _room(ensemble)
+        kernel_input, scratch = _asked(ensemble, packed, memory), _room(ensemble)
         return (
             memory.memory,
             memory.blocks,
             memory.layouts[0],
             memory.stages,
-            asked,
+            kernel_input,
             which,
-            room,
-            kept,
+            scratch,
+            kernel_output,
             spread,
             first,
         )
@@ -184,12 +184,21 @@ def _march(
     packed = _packed(ensemble)
     if landings == 0 and _few_modes_pay(ensemble, packed):
         return _spread_over(ensemble, packed, *_side_by_side(ensemble, packed), threads, progress, landings)
-    march = _kernel(march_many, ensemble)
+    march = _kernel(integrate_ensemble, ensemble)
 
-    def arguments(which: _Integers, kept: Kept) -> tuple[Any, ...]:
+    def arguments(which: _Integers, kernel_output: KernelOutput) -> tuple[Any, ...]:
         memory = lay_out(ensemble, packed)
-        asked, room = _asked(ensemble, packed, memory), _room(ensemble)
-        return memory.memory, memory.blocks, memory.layouts, memory.stages, asked, which, room, kept
+        kernel_input, scratch = _asked(ensemble, packed, memory), _room(ensemble)
+        return (
+            memory.memory,
+            memory.blocks,
+            memory.layouts,
+            memory.stages,
+            kernel_input,
+            which,
+            scratch,
+            kernel_output,
+        )
 
     return _spread_over(ensemble, packed, march, arguments, threads, progress, landings)
 
@@ -209,52 +218,62 @@ def _few_modes_pay(ensemble: Ensemble, packed: Packed) -> bool:
 
 def _side_by_side(
     ensemble: Ensemble, packed: Packed
-) -> tuple[Callable[..., None], Callable[[_Integers, Kept], tuple[Any, ...]]]:
+) -> tuple[Callable[..., None], Callable[[_Integers, KernelOutput], tuple[Any, ...]]]:
     """The march of eight runs in a register, and its arguments."""
     order = np.argsort(packed.rows)
-    asked = _asked(ensemble, packed, None)._replace(
+    kernel_input = _asked(ensemble, packed, None)._replace(
         contact_rows=np.ascontiguousarray(ensemble.contact_rows[:, order]),
         starts=np.ascontiguousarray(ensemble.starts[..., order]),
     )
 
-    def arguments(which: _Integers, kept: Kept) -> tuple[Any, ...]:
-        room = _room(ensemble)
-        memory = lay_out_few(ensemble, packed, room.looked.shape[0] - 1)
-        return memory.m, memory.n, memory.shape, memory.world, asked, which, room, kept, empty_books(1)
+    def arguments(which: _Integers, kernel_output: KernelOutput) -> tuple[Any, ...]:
+        scratch = _room(ensemble)
+        memory = lay_out_few(ensemble, packed, scratch.looked.shape[0] - 1)
+        return (
+            memory.m,
+            memory.n,
+            memory.shape,
+            memory.world,
+            kernel_input,
+            which,
+            scratch,
+            kernel_output,
+            empty_accumulators(1),
+        )
 
-    return _kernel(march_few, ensemble), arguments
+    return _kernel(integrate_run_lanes, ensemble), arguments
 
 
 def _spread_over(
     ensemble: Ensemble,
     packed: Packed,
     march: Callable[..., None],
-    arguments: Callable[[_Integers, Kept], tuple[Any, ...]],
+    arguments: Callable[[_Integers, KernelOutput], tuple[Any, ...]],
     threads: int | None,
     progress: Callable[[int, int], object] | None,
     landings: int,
 ) -> Landings:
     """Hand the runs to threads, in chunks; *arguments* are those of *march*, whose memory is a thread's own."""
     size = packed.layout.size
-    kept = Kept(
-        empty_books(ensemble.size, _beside(ensemble)),
+    kernel_output = KernelOutput(
+        empty_accumulators(ensemble.size, _beside(ensemble)),
         np.empty((ensemble.size, landings, 2 * size)),
         np.empty((ensemble.size, landings, 2), dtype=np.int64),
         np.zeros(1, dtype=np.int64),
     )
     threads = threads or usable_cores()
-    ready(march, *arguments(np.zeros(1, dtype=np.int64), kept))
+    ready(march, *arguments(np.zeros(1, dtype=np.int64), kernel_output))
     if progress is not None:
         progress(0, ensemble.size)
 
-    def march_chunk(which: _Integers) -> int:
-        march(*arguments(which, kept))
+    def integrate_chunk(which: _Integers) -> int:
+        march(*arguments(which, kernel_output))
         return which.size
 
     done = 0
     with ThreadPoolExecutor(threads) as pool:
         pending: set[Future[int]] = {
-            pool.submit(march_chunk, chunk) for chunk in _chunks(ensemble.work, threads)
+            pool.submit(integrate_chunk, chunk) for chunk in _chunks(ensemble.work, threads)
         }
         try:
             while pending:
@@ -263,18 +282,22 @@ def _spread_over(
                 if progress is not None and finished:
                     progress(done, ensemble.size)
         except BaseException:
-            kept.pulse[0] = 1
+            kernel_output.pulse[0] = 1
             pool.shutdown(wait=True, cancel_futures=True)
             raise
-    q, p = kept.states[..., packed.rows], kept.states[..., size + packed.rows]
-    return Landings(kept.books, q, p, kept.homes[..., 0], kept.homes[..., 1])
+    q, p = kernel_output.states[..., packed.rows], kernel_output.states[..., size + packed.rows]
+    return Landings(
+        kernel_output.accumulators_of_runs, q, p, kernel_output.homes[..., 0], kernel_output.homes[..., 1]
+    )
 
 
-def _last(memory: _Array, packed: Packed, aside: tuple[_Integers, _Array], books: NDArray[Any]) -> Last:
+def _last(
+    memory: _Array, packed: Packed, aside: tuple[_Integers, _Array], accumulators_of_runs: NDArray[Any]
+) -> Last:
     """Where a run that was laid aside stands."""
     marks, reals = aside
     q, p = memory[marks[4] : marks[4] + packed.layout.size], memory[marks[5] : marks[5] + packed.layout.size]
-    since = int(marks[0] - books["onset"][0]) if marks[10] else -1
+    since = int(marks[0] - accumulators_of_runs["onset"][0]) if marks[10] else -1
     return Last(q[packed.rows], p[packed.rows], int(reals[0]), since)
 
 
@@ -323,34 +346,34 @@ def record(
         Called with the share of the run that is done, several times a second.
     """
     packed = _packed(ensemble)
-    size, march = packed.layout.size, _kernel(march_one, ensemble)
-    memory, books = lay_out(ensemble, packed), empty_books(1, _beside(ensemble))
-    asked, room = _asked(ensemble, packed, memory), _room(ensemble)
+    size, march = packed.layout.size, _kernel(integrate_recorded, ensemble)
+    memory, accumulators_of_runs = lay_out(ensemble, packed), empty_accumulators(1, _beside(ensemble))
+    kernel_input, scratch = _asked(ensemble, packed, memory), _room(ensemble)
     buffers = _buffers(ensemble, times, size)
     aside = np.zeros(MARKS, dtype=np.int64), np.zeros(REALS)
     aside[0][0] = -1
     marks = np.zeros(3, dtype=np.int64)
-    book, end = books[0], float(ensemble.runs["end"][0])
+    accumulators, end = accumulators_of_runs[0], float(ensemble.runs["end"][0])
     outputs = Outputs(
         times, np.empty(buffers.samples), np.empty((buffers.samples, 2 * size)),
         np.empty((buffers.samples, VALUES)), _impact_rows(ensemble, buffers), marks, buffers.most, in_contact,
     )  # fmt: skip
     arguments = (
-        memory.memory, memory.blocks, memory.layouts[0], memory.stages, asked, room, book, outputs, aside, _SLICE_STEPS,
+        memory.memory, memory.blocks, memory.layouts[0], memory.stages, kernel_input, scratch, accumulators, outputs, aside, _SLICE_STEPS,
     )  # fmt: skip
     ready(march, *arguments)
     while True:
         march(*arguments)
-        running = books["status"][0] == RunStatus.RUNNING
-        full = books["samples"][0] + buffers.most + 3 > buffers.samples
-        held = int(books["impacts"][0] - marks[1])
+        running = accumulators_of_runs["status"][0] == RunStatus.INTERRUPTED
+        full = accumulators_of_runs["samples"][0] + buffers.most + 3 > buffers.samples
+        held = int(accumulators_of_runs["impacts"][0] - marks[1])
         if not running or full or held >= buffers.impacts:
-            count = int(books["samples"][0])
+            count = int(accumulators_of_runs["samples"][0])
             rows = outputs.rows[:count]
             yield Recorded(
                 outputs.at[:count].copy(), rows[:, packed.rows], rows[:, size + packed.rows],
-                outputs.values[:count].copy(), outputs.impacts[:held].copy(), books.copy(),
-                _last(memory.memory, packed, aside, books),
+                outputs.values[:count].copy(), outputs.impacts[:held].copy(), accumulators_of_runs.copy(),
+                _last(memory.memory, packed, aside, accumulators_of_runs),
             )  # fmt: skip
             if not running:
                 return
@@ -358,4 +381,4 @@ def record(
             outputs.impacts[:, 4:] = 1.0
             aside[0][1] = 0
         if progress is not None:
-            progress(float(books["time"][0]) / end)
+            progress(float(accumulators_of_runs["time"][0]) / end)

@@ -16,41 +16,43 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.cpu.settling.after import after_step
+from snapbeam.engines.cpu.settling.after import accept_any_step
 from snapbeam.engines.cpu.state import (
-    Now,
-    Place,
-    Watch,
+    IntegratorState,
+    Workspace,
+    StepControl,
     begin,
-    change_well,
+    change_origin,
     cut_slot,
     finish,
-    land,
+    restart_from_state,
     phase_at,
 )
-from snapbeam.engines.cpu.step import Done, Step, prepare, take_step, take_two
-from snapbeam.engines.cpu.strikers.force import press, put_others
-from snapbeam.engines.cpu.strikers.meet import close_others, level_of_others
-from snapbeam.engines.cpu.uneven import turn_over
-from snapbeam.engines.cpu.world.circuit import Tap
-from snapbeam.engines.cpu.world.edges import up_to_edge
-from snapbeam.engines.cpu.world.forced import Given, enter_forces
+from snapbeam.engines.cpu.step import StepIncrement, Step, prepare, take_step, take_two
+from snapbeam.engines.cpu.strikers.force import evaluate_contacts, mirror_further_contacts
+from snapbeam.engines.cpu.strikers.meet import close_further_contacts, further_contacts_step_level
+from snapbeam.engines.cpu.uneven import has_crossed_to_other_well
+from snapbeam.engines.cpu.world.circuit import CircuitIncrement
+from snapbeam.engines.cpu.world.edges import up_to_discontinuity
+from snapbeam.engines.cpu.world.forced import ExternalWork, enter_forces
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import released_at
 from snapbeam.engines.scalar.decisions import contact_level, flight_level, ticks_of
 from snapbeam.engines.scalar.tip import seen_from
 
-__all__ = ["Kept", "choose", "march_many"]
+__all__ = ["KernelOutput", "propose_step", "integrate_ensemble"]
 
-_RUNNING = int(RunStatus.RUNNING)
+_RUNNING = int(RunStatus.INTERRUPTED)
 _NO_STEP = Step(0, 0, 0.0, 0.0, False, 0, 0, 0, 0, 0, 0, 0)
-_NOTHING_DONE = Done(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, Given(0.0, 0.0, 0.0), Tap(0.0, 0.0, 0.0, 0.0))
+_NOTHING_DONE = StepIncrement(
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ExternalWork(0.0, 0.0, 0.0), CircuitIncrement(0.0, 0.0, 0.0, 0.0)
+)
 
 
-class Kept(NamedTuple):
+class KernelOutput(NamedTuple):
     """Where a march of many puts what it finds."""
 
-    books: Any
+    accumulators_of_runs: Any
     """A record a run."""
     states: Any
     """States at landings, q and p about the well at hand, shape (runs, landings, 2 rows); none if of length 0."""
@@ -61,100 +63,107 @@ class Kept(NamedTuple):
 
 
 @inlined
-def choose(memory, blocks, place, run, now, book):
+def propose_step(memory, blocks, workspace, run, now, accumulators):
     """The next step of a run, and where it stands: about the other well, if it has crossed over."""
-    layout, clock, home, stretch, t = place.layout, run.clock, now.home, now.stretch, now.t
-    rows, seen, watch = now.rows, now.seen, now.watch
+    layout, clock, well_sign, stretch, t = workspace.layout, run.clock, now.well_sign, now.stretch, now.t
+    rows, seen, control = now.rows, now.seen, now.control
     r = layout.work + 9 * layout.size
-    if layout.stretch > 0.0 and turn_over(layout.uneven, seen.c, home, run.rest_center):
+    if layout.stretch > 0.0 and has_crossed_to_other_well(layout.uneven, seen.c, well_sign, run.rest_center):
         there = phase_at(run, t)
         enter_forces(layout.forced, memory, run.struck.drive, there)
-        press(memory, layout.size, layout.others, run.struck.drive, there, rows.q, 0.0, False)
-        put_others(memory, layout.others, -home)
-        stretch = change_well(memory, blocks, layout, home, rows.q, rows.k, r)
-        home = -home
-    book.steps += 1
-    level = flight_level(clock, watch.quiet, stretch, layout.stretch)
-    if watch.touching:
+        evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, there, rows.q, 0.0, False)
+        mirror_further_contacts(memory, layout.others, -well_sign)
+        stretch = change_origin(memory, blocks, layout, well_sign, rows.q, rows.k, r)
+        well_sign = -well_sign
+    accumulators.steps += 1
+    level = flight_level(clock, control.quiet, stretch, layout.stretch)
+    if control.touching:
         left = released_at(run.struck.law, seen.d, seen.dv)
-        level = max(level, contact_level(clock, (t - book.onset) * clock.tick, left, seen.dv))
-    level = level_of_others(memory, layout.others, clock, t, watch.touching, level)
+        level = max(level, contact_level(clock, (t - accumulators.onset) * clock.tick, left, seen.dv))
+    level = further_contacts_step_level(memory, layout.others, clock, t, control.touching, level)
     ticks, at = ticks_of(clock, level), run.coefficients + (level + 1) * run.slot
     # up to the next state that is handed out, to a jump of the drive's velocity, or to the end
     limit = min((now.landed + 1) * clock.landing, clock.end)
-    limit = up_to_edge(run.struck.drive, run.phase, clock.period, t, limit)
+    limit = up_to_discontinuity(run.struck.drive, run.phase, clock.period, t, limit)
     if t + ticks > limit:
         ticks, at = limit - t, cut_slot(run)
-        prepare(memory, layout, place.stages, run.struck.drive, ticks * clock.tick, at)
+        prepare(memory, layout, workspace.stages, run.struck.drive, ticks * clock.tick, at)
     length, phase = ticks * clock.tick, phase_at(run, t)
     step = Step(
-        ticks, at, length, phase, watch.touching, rows.q, rows.p, rows.k, rows.q1, rows.p1, rows.k1, r
+        ticks, at, length, phase, control.touching, rows.q, rows.p, rows.k, rows.q1, rows.p1, rows.k1, r
     )
-    return Now(t, home, stretch, rows, seen, _beaten(watch), now.sample, now.landed, now.status), step
+    return IntegratorState(
+        t, well_sign, stretch, rows, seen, _beaten(control), now.sample, now.landed, now.status
+    ), step
 
 
 @inlined
-def _beaten(watch):
+def _beaten(control):
     """One step more."""
-    return Watch(
-        watch.touching, watch.quiet, watch.safe_gap, watch.safe_center, watch.weighed, watch.beat + 1
+    return StepControl(
+        control.touching,
+        control.quiet,
+        control.safe_gap,
+        control.safe_center,
+        control.monitor_energy,
+        control.beat + 1,
     )
 
 
 @inlined
-def hand_out(memory, blocks, layout, run, now, book, i, kept):
+def store_state(memory, blocks, layout, run, now, accumulators, i, kernel_output):
     """Keep the state of a run that has come to a landing, and begin again from it alone."""
-    if kept.states.shape[1] == 0 or now.t < min((now.landed + 1) * run.clock.landing, run.clock.end):
+    if kernel_output.states.shape[1] == 0 or now.t < min((now.landed + 1) * run.clock.landing, run.clock.end):
         return now
     size, rows, landed = layout.size, now.rows, now.landed
     for row in range(size):
-        kept.states[i, landed, row] = memory[rows.q + row]
-        kept.states[i, landed, size + row] = memory[rows.p + row]
-    kept.homes[i, landed, 0] = int(now.home)
-    kept.homes[i, landed, 1] = now.t - book.onset if now.watch.touching else -1
+        kernel_output.states[i, landed, row] = memory[rows.q + row]
+        kernel_output.states[i, landed, size + row] = memory[rows.p + row]
+    kernel_output.homes[i, landed, 0] = int(now.well_sign)
+    kernel_output.homes[i, landed, 1] = now.t - accumulators.onset if now.control.touching else -1
     if now.status != _RUNNING:
         return now
-    again, _ = land(
-        memory, blocks, layout, run, now.t, now.home, rows, now.watch.touching, landed + 1, now.sample
+    again, _ = restart_from_state(
+        memory, blocks, layout, run, now.t, now.well_sign, rows, now.control.touching, landed + 1, now.sample
     )
     return again
 
 
 @compiled
-def march_many(memory, blocks, layouts, stages, asked, which, room, kept):
+def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scratch, kernel_output):
     """March the runs *which*, two at a time; *memory* and *room* belong to the caller's thread.
 
     *layouts* are two places in memory that share the rows of the structure.
     """
-    place_a, place_b = Place(layouts[0], stages), Place(layouts[1], stages)
-    books, goes_on = kept.books, kept.states.shape[1] > 0
+    place_a, place_b = Workspace(layouts[0], stages), Workspace(layouts[1], stages)
+    accumulators_of_runs, goes_on = kernel_output.accumulators_of_runs, kernel_output.states.shape[1] > 0
     live_a, live_b, following = True, False, 1
     i_a = which[0]
     i_b = i_a
-    book_a = books[i_a]
+    book_a = accumulators_of_runs[i_a]
     book_b = book_a
-    run_a, now_a = begin(memory, blocks, place_a, asked, i_a, book_a)
+    run_a, now_a = begin(memory, blocks, place_a, kernel_input, i_a, book_a)
     run_b, now_b = run_a, now_a
     step_a, step_b, done_a, done_b = _NO_STEP, _NO_STEP, _NOTHING_DONE, _NOTHING_DONE
     while live_a or live_b or following < which.size:
-        if kept.pulse[0] != 0:
+        if kernel_output.pulse[0] != 0:
             break
         if not live_a and following < which.size:
             i_a = which[following]
-            book_a = books[i_a]
-            run_a, now_a = begin(memory, blocks, place_a, asked, i_a, book_a)
+            book_a = accumulators_of_runs[i_a]
+            run_a, now_a = begin(memory, blocks, place_a, kernel_input, i_a, book_a)
             live_a, following = True, following + 1
         if not live_b and following < which.size:
             i_b = which[following]
-            book_b = books[i_b]
-            run_b, now_b = begin(memory, blocks, place_b, asked, i_b, book_b)
+            book_b = accumulators_of_runs[i_b]
+            run_b, now_b = begin(memory, blocks, place_b, kernel_input, i_b, book_b)
             live_b, following = True, following + 1
         if live_a:
-            now_a, step_a = choose(memory, blocks, place_a, run_a, now_a, book_a)
+            now_a, step_a = propose_step(memory, blocks, place_a, run_a, now_a, book_a)
         if live_b:
-            now_b, step_b = choose(memory, blocks, place_b, run_b, now_b, book_b)
-        tip_a = seen_from(run_a.struck, now_a.home, run_a.rest_contact)
-        tip_b = seen_from(run_b.struck, now_b.home, run_b.rest_contact)
+            now_b, step_b = propose_step(memory, blocks, place_b, run_b, now_b, book_b)
+        tip_a = seen_from(run_a.struck, now_a.well_sign, run_a.rest_contact)
+        tip_b = seen_from(run_b.struck, now_b.well_sign, run_b.rest_contact)
         if live_a and live_b:
             done_a, done_b = take_two(
                 memory, blocks, stages, layouts[0], tip_a, step_a, layouts[1], tip_b, step_b
@@ -164,23 +173,23 @@ def march_many(memory, blocks, layouts, stages, asked, which, room, kept):
         else:
             done_b = take_step(memory, blocks, layouts[1], stages, tip_b, step_b, None)
         if live_a:
-            now_a, _ = after_step(
-                memory, blocks, place_a, run_a, now_a, step_a, done_a, room, book_a, asked, None
+            now_a, _ = accept_any_step(
+                memory, blocks, place_a, run_a, now_a, step_a, done_a, scratch, book_a, kernel_input, None
             )
-            now_a = hand_out(memory, blocks, layouts[0], run_a, now_a, book_a, i_a, kept)
+            now_a = store_state(memory, blocks, layouts[0], run_a, now_a, book_a, i_a, kernel_output)
             if now_a.status != _RUNNING:
                 if not goes_on:
-                    close_others(memory, layouts[0].others, book_a, None, now_a.t, run_a.clock.tick)
+                    close_further_contacts(memory, layouts[0].others, book_a, None, now_a.t, run_a.clock.tick)
                 finish(memory, blocks, layouts[0], run_a, now_a, book_a, None, 0, goes_on)
                 live_a = False
         if live_b:
-            now_b, _ = after_step(
-                memory, blocks, place_b, run_b, now_b, step_b, done_b, room, book_b, asked, None
+            now_b, _ = accept_any_step(
+                memory, blocks, place_b, run_b, now_b, step_b, done_b, scratch, book_b, kernel_input, None
             )
-            now_b = hand_out(memory, blocks, layouts[1], run_b, now_b, book_b, i_b, kept)
+            now_b = store_state(memory, blocks, layouts[1], run_b, now_b, book_b, i_b, kernel_output)
             if now_b.status != _RUNNING:
                 if not goes_on:
-                    close_others(memory, layouts[1].others, book_b, None, now_b.t, run_b.clock.tick)
+                    close_further_contacts(memory, layouts[1].others, book_b, None, now_b.t, run_b.clock.tick)
                 finish(memory, blocks, layouts[1], run_b, now_b, book_b, None, 0, goes_on)
                 live_b = False
     if live_a:

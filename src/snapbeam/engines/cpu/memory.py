@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.engines.cpu.rows import Layout
-from snapbeam.engines.cpu.strikers.force import Others
+from snapbeam.engines.cpu.strikers.force import FurtherContacts
 from snapbeam.engines.cpu.uneven import Uneven
 from snapbeam.engines.cpu.world.circuit import Circuit
-from snapbeam.engines.cpu.world.forced import Forced
+from snapbeam.engines.cpu.world.forced import TimeDependentForces
 from snapbeam.engines.ensemble import Ensemble
 from snapbeam.engines.scalar.composition import Stages, in_memory, slot_length
 from snapbeam.engines.scalar.lanes import WIDTH
@@ -122,7 +122,11 @@ def pack(
     if away is not None:
         pieces |= {"far": padded(away.force), "second": padded(away.second), "here": np.zeros(size + WIDTH)}
     if forced:
-        pieces["shaken"] = padded(np.zeros(omega.size) if structure.shaken is None else structure.shaken)
+        pieces["shaken"] = padded(
+            np.zeros(omega.size)
+            if structure.add_base_acceleration is None
+            else structure.add_base_acceleration
+        )
         pieces["now"] = np.zeros(WIDTH)
     if structure.tapped is not None:
         pieces |= {"tapped": padded(structure.tapped), "rate": np.zeros(WIDTH)}
@@ -136,12 +140,12 @@ def pack(
     uneven, forces, circuit, others = None, None, None, None
     kick = placed.pop("kick", 0)
     if forced:
-        forces = Forced(placed.pop("shaken"), placed.pop("now"), kick)
+        forces = TimeDependentForces(placed.pop("shaken"), placed.pop("now"), kick)
     if structure.tapped is not None:
         element = int(rows[-1]) if structure.circuit else None
         circuit = Circuit(placed.pop("tapped"), placed.pop("rate"), kick, element)
     if several is not None:
-        others = Others(placed.pop("striker_rows"), placed.pop("strikers"), several.numbers_type()())
+        others = FurtherContacts(placed.pop("striker_rows"), placed.pop("strikers"), several.numbers_type()())
     if away is not None:
         own = placed.pop("far"), placed.pop("second"), placed.pop("here")
         uneven = Uneven(*own, away.lift, away.depth, away.level)
@@ -151,7 +155,7 @@ def pack(
         size=size,
         **placed,
         work=int(starts[-1]),
-        gamma=structure.tension_stiffness,
+        gamma=structure.nonlinear_stiffness,
         stretch=structure.stretch,
         gentle=gentle,
         uneven=uneven,
@@ -209,7 +213,7 @@ def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
         )
     at = second.work + WORK_ROWS * size + slots
     stages, weights = in_memory(
-        ensemble.order, at, general=ensemble.law.lossy, coupled=first.circuit is not None
+        ensemble.order, at, general=ensemble.law.rate_dependent, coupled=first.circuit is not None
     )
     table = stages.flow + weights.size
     length = table + ensemble.samples.size

@@ -13,10 +13,10 @@ from snapbeam.engines.cpu.world.forced import shaken_along
 from snapbeam.engines.scalar.compile import INLINE_HERE, inlined
 from snapbeam.engines.scalar.contact import kick_force
 
-__all__ = ["Push", "damped", "no_push"]
+__all__ = ["ContactIncrement", "apply_contact_loss", "no_contact_increment"]
 
 
-class Push(NamedTuple):
+class ContactIncrement(NamedTuple):
     """The contact within a step: the force at the present kick, and its quadratures so far."""
 
     force: float
@@ -30,12 +30,12 @@ class Push(NamedTuple):
 
 
 @inlined
-def no_push():
+def no_contact_increment():
     """The contact of a step that has not begun."""
-    return Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return ContactIncrement(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def damped(
+def apply_contact_loss(
     memory: Any,
     layout: Any,
     tip: Any,
@@ -56,7 +56,9 @@ def damped(
 @inlined
 def _damped(memory, layout, tip, step, stage, weight, along_g, along_r, push):
     if not step.touching:
-        return Push(0.0, push.impulse, push.work, push.gross, push.lost, push.penetration, push.velocity)
+        return ContactIncrement(
+            0.0, push.impulse, push.work, push.gross, push.lost, push.penetration, push.velocity
+        )
     size, contact = layout.size, layout.contact
     if stage == 0:
         rate, along = dot(memory, size, contact, step.p), dot(memory, size, contact, step.k)
@@ -69,7 +71,7 @@ def _damped(memory, layout, tip, step, stage, weight, along_g, along_r, push):
     mobility = dot(memory, size, contact, contact)
     given = kick_force(tip.law, push.penetration, push.velocity - rate, mobility, along, weight)
     force, velocity = given.impulse, push.velocity
-    return Push(
+    return ContactIncrement(
         force,
         push.impulse + weight * force,
         push.work + weight * force * velocity,
@@ -80,10 +82,10 @@ def _damped(memory, layout, tip, step, stage, weight, along_g, along_r, push):
     )
 
 
-@overload(damped, jit_options=INLINE_HERE)
+@overload(apply_contact_loss, jit_options=INLINE_HERE)
 def _damped_by_law(memory, layout, tip, step, stage, weight, along_g, along_r, push):
     law = tip.types[tip.fields.index("law")]
-    if not law.instance_class.owner.lossy:
+    if not law.instance_class.owner.rate_dependent:
         return lambda memory, layout, tip, step, stage, weight, along_g, along_r, push: push
 
     def implementation(memory, layout, tip, step, stage, weight, along_g, along_r, push):

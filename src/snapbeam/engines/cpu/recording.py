@@ -6,13 +6,13 @@ from typing import Any, NamedTuple
 
 from snapbeam.engines.cpu.rows import modal_energy
 from snapbeam.engines.cpu.settling.hold import held_for, hold
-from snapbeam.engines.cpu.state import Now, Rows, Watch, cut_slot
+from snapbeam.engines.cpu.state import IntegratorState, Rows, StepControl, cut_slot
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.cpu.strikers.meet import any_touches
-from snapbeam.engines.cpu.uneven import lifted
+from snapbeam.engines.cpu.uneven import add_potential_energy
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import contact_energy, felt_force
-from snapbeam.engines.scalar.decisions import Seen
+from snapbeam.engines.scalar.decisions import ContactKinematics
 from snapbeam.engines.scalar.physics import tension_energy
 from snapbeam.model.drive.joined import MOST_STRIKERS
 
@@ -22,12 +22,12 @@ __all__ = [
     "VALUES",
     "Outputs",
     "has_room",
-    "lay_aside",
+    "save_state",
     "record_aside",
     "record_contact",
     "record_held",
     "record_instants",
-    "take_up",
+    "restore_state",
 ]
 
 VALUES = 10
@@ -35,7 +35,7 @@ VALUES = 10
 the axial load, and energy lost in the circuit, of a sample."""
 MARKS, REALS = 24, 10
 """Integers and floats of a run that was laid aside."""
-_TOGETHER = Seen(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_TOGETHER = ContactKinematics(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _MOST_IN_CONTACT = 96
 """Steps of one contact whose ends are recorded."""
 
@@ -63,10 +63,10 @@ class Outputs(NamedTuple):
 
 
 @inlined
-def has_room(now, book, outputs):
+def has_room(now, accumulators, outputs):
     """Whether another step's samples and impact fit."""
     rows = now.sample + outputs.most + 3 <= outputs.at.size
-    return rows and book.impacts - outputs.marks[1] < outputs.impacts.shape[0] - MOST_STRIKERS
+    return rows and accumulators.impacts - outputs.marks[1] < outputs.impacts.shape[0] - MOST_STRIKERS
 
 
 class _Instant(NamedTuple):
@@ -77,7 +77,7 @@ class _Instant(NamedTuple):
     q: int
     """Where the state stands in memory."""
     p: int
-    seen: Seen
+    seen: ContactKinematics
     energy: float
     """Of the beam, J."""
 
@@ -94,27 +94,34 @@ class _Sums(NamedTuple):
 
 
 @inlined
-def _sums(book):
+def _sums(accumulators):
     """As a run's book has them."""
-    return _Sums(book.work, book.dissipated, book.lost, book.base_work, book.load_work, book.circuit_energy)
+    return _Sums(
+        accumulators.work,
+        accumulators.dissipated,
+        accumulators.lost,
+        accumulators.base_work,
+        accumulators.load_work,
+        accumulators.circuit_energy,
+    )
 
 
 @inlined
-def _sums_with(book, done):
+def _sums_with(accumulators, done):
     """The same with what a part of a step gave."""
     return _Sums(
-        book.work + done.work, book.dissipated + done.dissipated + done.lost, book.lost + done.lost,
-        book.base_work + done.given.base, book.load_work + done.given.load, book.circuit_energy + done.tap.energy,
+        accumulators.work + done.work, accumulators.dissipated + done.dissipated + done.lost, accumulators.lost + done.lost,
+        accumulators.base_work + done.given.base, accumulators.load_work + done.given.load, accumulators.circuit_energy + done.tap.energy,
     )  # fmt: skip
 
 
 @inlined
-def _write(memory, layout, home, law, outputs, sample, instant, sums):
+def _write(memory, layout, well_sign, law, outputs, sample, instant, sums):
     """One sample, about the first well."""
     size, seen = layout.size, instant.seen
     for row in range(size):
         outputs.rows[sample, row] = memory[instant.q + row]
-        if home < 0.0:
+        if well_sign < 0.0:
             outputs.rows[sample, row] += memory[layout.shift + row]
         outputs.rows[sample, size + row] = memory[instant.p + row]
     outputs.at[sample] = instant.when
@@ -131,7 +138,7 @@ def _write(memory, layout, home, law, outputs, sample, instant, sums):
 
 
 @compiled
-def record_instants(memory, blocks, layout, stages, run, tip, now, step, book, outputs):
+def record_instants(memory, blocks, layout, stages, run, tip, now, step, accumulators, outputs):
     """Write down what happens at the instants inside a step; returns how many samples there are then."""
     clock, sample, size = run.clock, now.sample, layout.size
     times, done = outputs.times, outputs.marks[0]
@@ -148,9 +155,11 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, book, o
         here = take_step(memory, blocks, layout, stages, tip, short, True)
         about = observe(memory, layout, tip, step.phase + tip.drive.omega * part, q2, p2)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, here.gq, here.qr)
-        energy = lifted(memory, size, layout.uneven, q2, energy)
+        energy = add_potential_energy(memory, size, layout.uneven, q2, energy)
         instant = _Instant(times[done], q2, p2, about, energy)
-        _write(memory, layout, now.home, tip.law, outputs, sample, instant, _sums_with(book, here))
+        _write(
+            memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums_with(accumulators, here)
+        )
         sample, done = sample + 1, done + 1
     outputs.marks[0] = done
     # the slot for steps of any length holds the present step again, should it be a cut one
@@ -160,7 +169,7 @@ def record_instants(memory, blocks, layout, stages, run, tip, now, step, book, o
 
 
 @inlined
-def record_held(memory, blocks, layout, run, tip, now, step, book, outputs):
+def record_held(memory, blocks, layout, run, tip, now, step, accumulators, outputs):
     """As :func:`record_instants`, of a step in which the tip carries a single mode."""
     clock, sample, size, done = run.clock, now.sample, layout.size, outputs.marks[0]
     times, q2, p2 = outputs.times, run.spare, run.spare + size
@@ -172,8 +181,8 @@ def record_held(memory, blocks, layout, run, tip, now, step, book, outputs):
         _, work, _, dissipated, _ = held_for(memory, blocks, layout, run, tip, step.phase, part)
         force, gq, qr = hold(memory, blocks, layout, tip, phase, q2, p2, run.spare + 2 * size)
         energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, gq, qr)
-        energy = lifted(memory, size, layout.uneven, q2, energy)
-        so_far = _sums(book)
+        energy = add_potential_energy(memory, size, layout.uneven, q2, energy)
+        so_far = _sums(accumulators)
         sums = _Sums(
             so_far.work + work,
             so_far.dissipated + dissipated,
@@ -183,7 +192,7 @@ def record_held(memory, blocks, layout, run, tip, now, step, book, outputs):
             so_far.circuit,
         )
         instant = _Instant(times[done], q2, p2, _TOGETHER, energy)
-        _write(memory, layout, now.home, tip.law, outputs, sample, instant, sums)
+        _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, sums)
         outputs.values[sample, 1] = force
         sample, done = sample + 1, done + 1
     outputs.marks[0] = done
@@ -191,21 +200,21 @@ def record_held(memory, blocks, layout, run, tip, now, step, book, outputs):
 
 
 @inlined
-def record_aside(memory, layout, tip, now, short, here, when, about, sample, book, outputs):
+def record_aside(memory, layout, tip, now, short, here, when, about, sample, accumulators, outputs):
     """Write down the end of a look ahead in contact; returns how many samples there are."""
     if not outputs.in_contact:
         return sample
     energy = modal_energy(memory, layout, short.q1, short.p1) + tension_energy(layout.gamma, here.gq, here.qr)
-    energy = lifted(memory, layout.size, layout.uneven, short.q1, energy)
+    energy = add_potential_energy(memory, layout.size, layout.uneven, short.q1, energy)
     instant = _Instant(when, short.q1, short.p1, about, energy)
-    _write(memory, layout, now.home, tip.law, outputs, sample, instant, _sums_with(book, here))
+    _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums_with(accumulators, here))
     return sample + 1
 
 
 @inlined
-def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, book, outputs):
+def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, accumulators, outputs):
     """Write down the end of a step in contact, of the first ones of each; returns how many samples there are."""
-    others, now_touching = layout.others, book.touching != 0
+    others, now_touching = layout.others, accumulators.touching != 0
     if not outputs.in_contact or not any_touches(memory, others, step.touching or now_touching):
         return sample
     if not any_touches(memory, others, step.touching):
@@ -215,30 +224,35 @@ def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, boo
         return sample
     outputs.marks[2] += 1
     energy = modal_energy(memory, layout, step.q1, step.p1) + tension_energy(layout.gamma, done.gq, done.qr)
-    energy = lifted(memory, layout.size, layout.uneven, step.q1, energy)
+    energy = add_potential_energy(memory, layout.size, layout.uneven, step.q1, energy)
     instant = _Instant(when, step.q1, step.p1, seen1, energy)
-    _write(memory, layout, now.home, tip.law, outputs, sample, instant, _sums(book))
+    _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums(accumulators))
     return sample + 1
 
 
 @compiled
-def lay_aside(now, marks, reals):
+def save_state(now, marks, reals):
     """Where a run stands, written down."""
-    rows, seen, watch = now.rows, now.seen, now.watch
+    rows, seen, control = now.rows, now.seen, now.control
     marks[0], marks[1], marks[2], marks[3] = now.t, now.sample, now.landed, now.status
     marks[4], marks[5], marks[6] = rows.q, rows.p, rows.k
     marks[7], marks[8], marks[9] = rows.q1, rows.p1, rows.k1
-    marks[10], marks[11] = int(watch.touching), int(watch.quiet)
-    marks[12], marks[13], marks[14], marks[15] = watch.safe_gap, watch.safe_center, watch.weighed, watch.beat
-    reals[0], reals[1] = now.home, now.stretch
+    marks[10], marks[11] = int(control.touching), int(control.quiet)
+    marks[12], marks[13], marks[14], marks[15] = (
+        control.safe_gap,
+        control.safe_center,
+        control.monitor_energy,
+        control.beat,
+    )
+    reals[0], reals[1] = now.well_sign, now.stretch
     reals[2], reals[3], reals[4] = seen.w, seen.wv, seen.d
     reals[5], reals[6], reals[7] = seen.dv, seen.c, seen.cv
 
 
 @compiled
-def take_up(marks, reals):
+def restore_state(marks, reals):
     """Where a run stood when it was laid aside."""
     rows = Rows(marks[4], marks[5], marks[6], marks[7], marks[8], marks[9])
-    seen = Seen(reals[2], reals[3], reals[4], reals[5], reals[6], reals[7])
-    watch = Watch(marks[10] != 0, marks[11] != 0, marks[12], marks[13], marks[14], marks[15])
-    return Now(marks[0], reals[0], reals[1], rows, seen, watch, marks[1], marks[2], marks[3])
+    seen = ContactKinematics(reals[2], reals[3], reals[4], reals[5], reals[6], reals[7])
+    control = StepControl(marks[10] != 0, marks[11] != 0, marks[12], marks[13], marks[14], marks[15])
+    return IntegratorState(marks[0], reals[0], reals[1], rows, seen, control, marks[1], marks[2], marks[3])

@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 from snapbeam.engines.cpu.dot import dot
 from snapbeam.engines.cpu.strikers.force import struck
-from snapbeam.engines.cpu.uneven import pushed
+from snapbeam.engines.cpu.uneven import add_static_load
 from snapbeam.engines.cpu.world.circuit import without_circuit
-from snapbeam.engines.cpu.world.forced import shaken
+from snapbeam.engines.cpu.world.forced import add_base_acceleration
 from snapbeam.engines.scalar.compile import called, inlined
 from snapbeam.engines.scalar.lanes import (
     WIDTH,
@@ -23,12 +23,12 @@ from snapbeam.engines.scalar.lanes import (
     lanes_sum,
     load,
     splat,
-    spread_at,
+    broadcast_load,
     store,
     vabs,
 )
 from snapbeam.engines.scalar.physics import (
-    circle,
+    sincos_cosm1,
     decay_less_one,
     mode_energy,
     rotation,
@@ -44,7 +44,7 @@ __all__ = [
     "dot",
     "flow_coefficients",
     "flow_rows",
-    "glide",
+    "propagate_free",
     "kick_and_flow",
     "kick_rows",
     "modal_energies",
@@ -89,11 +89,11 @@ class Layout(NamedTuple):
     uneven: Any
     """Of unequal wells, an :class:`~snapbeam.engines.cpu.uneven.Uneven`; else None."""
     forced: Any
-    """Of a moving base or a changing load, a :class:`~snapbeam.engines.cpu.world.forced.Forced`; else None."""
+    """Of a moving base or a changing load, a :class:`~snapbeam.engines.cpu.world.forced.TimeDependentForces`; else None."""
     circuit: Any
     """Of a harvester, a :class:`~snapbeam.engines.cpu.world.circuit.Circuit`; else None."""
     others: Any
-    """Of several strikers, an :class:`~snapbeam.engines.cpu.strikers.force.Others`; else None."""
+    """Of several strikers, an :class:`~snapbeam.engines.cpu.strikers.force.FurtherContacts`; else None."""
     body: Any
     """Element of a row that holds the mode of a striker with mass; None without one."""
 
@@ -123,8 +123,8 @@ def tension_rows(memory, blocks, layout, q, r):
             low2, high2, low3, high3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
             here = column
             while here < last:
-                q0, q1 = spread_at(memory, here), spread_at(memory, here + 1)
-                q2, q3 = spread_at(memory, here + 2), spread_at(memory, here + 3)
+                q0, q1 = broadcast_load(memory, here), broadcast_load(memory, here + 1)
+                q2, q3 = broadcast_load(memory, here + 2), broadcast_load(memory, here + 3)
                 low0 = fma(load(memory, at), q0, low0)
                 high0 = fma(load(memory, at + WIDTH), q0, high0)
                 low1 = fma(load(memory, at + 2 * WIDTH), q1, low1)
@@ -143,8 +143,8 @@ def tension_rows(memory, blocks, layout, q, r):
             even_sum, odd_sum = splat(0.0), splat(0.0)
             here = column
             while here < last:
-                even_sum = fma(load(memory, at), spread_at(memory, here), even_sum)
-                odd_sum = fma(load(memory, at + WIDTH), spread_at(memory, here + 1), odd_sum)
+                even_sum = fma(load(memory, at), broadcast_load(memory, here), even_sum)
+                odd_sum = fma(load(memory, at + WIDTH), broadcast_load(memory, here + 1), odd_sum)
                 at += 2 * WIDTH
                 here += 2
             total_g, total_r = _close_rows(memory, g, q, r, row, even_sum + odd_sum, total_g, total_r)
@@ -166,8 +166,8 @@ def tension_rows_twice(memory, blocks, layout_a, q_a, r_a, layout_b, q_b, r_b):
             bl2, bh2, bl3, bh3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
             column = first
             while column < last:
-                a0, a1 = spread_at(memory, q_a + column), spread_at(memory, q_a + column + 1)
-                b0, b1 = spread_at(memory, q_b + column), spread_at(memory, q_b + column + 1)
+                a0, a1 = broadcast_load(memory, q_a + column), broadcast_load(memory, q_a + column + 1)
+                b0, b1 = broadcast_load(memory, q_b + column), broadcast_load(memory, q_b + column + 1)
                 low, high = load(memory, at), load(memory, at + WIDTH)
                 al0, ah0, bl0, bh0 = (
                     fma(low, a0, al0),
@@ -182,8 +182,8 @@ def tension_rows_twice(memory, blocks, layout_a, q_a, r_a, layout_b, q_b, r_b):
                     fma(low, b1, bl1),
                     fma(high, b1, bh1),
                 )
-                a2, a3 = spread_at(memory, q_a + column + 2), spread_at(memory, q_a + column + 3)
-                b2, b3 = spread_at(memory, q_b + column + 2), spread_at(memory, q_b + column + 3)
+                a2, a3 = broadcast_load(memory, q_a + column + 2), broadcast_load(memory, q_a + column + 3)
+                b2, b3 = broadcast_load(memory, q_b + column + 2), broadcast_load(memory, q_b + column + 3)
                 low, high = load(memory, at + 4 * WIDTH), load(memory, at + 5 * WIDTH)
                 al2, ah2, bl2, bh2 = (
                     fma(low, a2, al2),
@@ -212,10 +212,10 @@ def tension_rows_twice(memory, blocks, layout_a, q_a, r_a, layout_b, q_b, r_b):
             column = first
             while column < last:
                 even, odd = load(memory, at), load(memory, at + WIDTH)
-                a_even = fma(even, spread_at(memory, q_a + column), a_even)
-                b_even = fma(even, spread_at(memory, q_b + column), b_even)
-                a_odd = fma(odd, spread_at(memory, q_a + column + 1), a_odd)
-                b_odd = fma(odd, spread_at(memory, q_b + column + 1), b_odd)
+                a_even = fma(even, broadcast_load(memory, q_a + column), a_even)
+                b_even = fma(even, broadcast_load(memory, q_b + column), b_even)
+                a_odd = fma(odd, broadcast_load(memory, q_a + column + 1), a_odd)
+                b_odd = fma(odd, broadcast_load(memory, q_b + column + 1), b_odd)
                 at += 2 * WIDTH
                 column += 2
             g_a, ar = _close_rows(memory, layout_a.g, q_a, r_a, row, a_even + a_odd, g_a, ar)
@@ -229,9 +229,9 @@ def acceleration_rows(memory, layout, along_g, along_r, r, k):
     for row in range(0, layout.size, WIDTH):
         g_row = load(memory, layout.g + row)
         tension = tension_acceleration(along_g, along_r, g_row, load(memory, r + row))
-        tension = pushed(memory, layout.uneven, row, tension)
+        tension = add_static_load(memory, layout.uneven, row, tension)
         tension = struck(memory, layout.size, layout.others, row, tension)
-        store(memory, k + row, shaken(memory, layout.forced, row, tension))
+        store(memory, k + row, add_base_acceleration(memory, layout.forced, row, tension))
 
 
 @inlined
@@ -248,9 +248,9 @@ def kick_and_flow(memory, layout, flow, weight, along_g, along_r, r, force, q, p
     size = layout.size
     for row in range(0, size, WIDTH):
         k = tension_acceleration(along_g, along_r, load(memory, layout.g + row), load(memory, r + row))
-        k = pushed(memory, layout.uneven, row, k)
+        k = add_static_load(memory, layout.uneven, row, k)
         k = struck(memory, size, layout.others, row, k)
-        k = shaken(memory, layout.forced, row, k)
+        k = add_base_acceleration(memory, layout.forced, row, k)
         k = fma(force, load(memory, layout.contact + row), k)
         kicked = fma(weight, k, load(memory, p + row))
         q_row, at = load(memory, q + row), flow + row
@@ -345,7 +345,7 @@ def _without_energy_of(memory, body, omega, q, p, energy):
 
 
 @inlined
-def glide(memory, layout, contact, flow, pieces, piece, q, p, k0, k1, center, parts):
+def propagate_free(memory, layout, contact, flow, pieces, piece, q, p, k0, k1, center, parts):
     """A free step in short pieces: signals at the end of each, one mode a lane, into *parts*; c is the row *contact*.
 
     Row by row of modes, so that a row stays in registers all the way.  At the border of pieces i and i + 1
@@ -381,20 +381,23 @@ def flow_coefficients(memory, layout, length, at):
     size = layout.size
     if abs(length) < layout.gentle:
         for row in range(0, size, WIDTH):
-            damped, sigma = load(memory, layout.omega_damped + row), load(memory, layout.damping + row)
+            apply_contact_loss, sigma = (
+                load(memory, layout.omega_damped + row),
+                load(memory, layout.damping + row),
+            )
             squared = load(memory, layout.omega_squared + row)
-            sine, _, less_one = circle(damped * length)
+            sine, _, less_one = sincos_cosm1(apply_contact_loss * length)
             lost = decay_less_one(sigma * length)
-            a11, a12, a21, a22 = rotation(sigma, squared, sine / damped, less_one, lost)
+            a11, a12, a21, a22 = rotation(sigma, squared, sine / apply_contact_loss, less_one, lost)
             store(memory, at + row, a11)
             store(memory, at + size + row, a12)
             store(memory, at + 2 * size + row, a21)
             store(memory, at + 3 * size + row, a22)
         return
     for j in range(size):
-        damped, sigma = memory[layout.omega_damped + j], memory[layout.damping + j]
-        sine, _, less_one = circle(damped * length)
-        over = sine / damped if damped > 0.0 else length
+        apply_contact_loss, sigma = memory[layout.omega_damped + j], memory[layout.damping + j]
+        sine, _, less_one = sincos_cosm1(apply_contact_loss * length)
+        over = sine / apply_contact_loss if apply_contact_loss > 0.0 else length
         squared = memory[layout.omega_squared + j]
         a11, a12, a21, a22 = rotation(sigma, squared, over, less_one, math.expm1(-sigma * length))
         memory[at + j] = a11

@@ -14,10 +14,10 @@ from snapbeam.engines.cpu.rows import (
     tension_rows,
 )
 from snapbeam.engines.cpu.step import observe, prepare
-from snapbeam.engines.cpu.strikers.force import press, stored_by_others
-from snapbeam.engines.cpu.strikers.meet import begin_others
-from snapbeam.engines.cpu.uneven import about_level, above_own_well, lifted, put
-from snapbeam.engines.cpu.world.circuit import calm, put_rate
+from snapbeam.engines.cpu.strikers.force import evaluate_contacts, with_further_contact_energy
+from snapbeam.engines.cpu.strikers.meet import begin_further_contacts
+from snapbeam.engines.cpu.uneven import about_level, above_own_well, add_potential_energy, put
+from snapbeam.engines.cpu.world.circuit import disable_long_steps, put_rate
 from snapbeam.engines.cpu.world.forced import changed_load, enter_forces
 from snapbeam.engines.scalar.compile import called, compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS, Stages
@@ -25,23 +25,35 @@ from snapbeam.engines.scalar.contact import contact_energy, is_impulsive
 from snapbeam.engines.scalar.decisions import (
     PIECES,
     Clock,
-    Seen,
+    ContactKinematics,
     clock_of,
-    finish_impact,
-    is_quiet,
-    leave_contact_open,
-    open_book,
+    close_impact,
+    is_low_energy,
+    accumulate_open_contact,
+    begin_statistics,
 )
 from snapbeam.engines.scalar.physics import tension_energy, tension_factors
 from snapbeam.engines.scalar.tip import Tip, drive_rate, numbers_of, seen_from
 
-__all__ = ["Asked", "Now", "Place", "Room", "Rows", "Run", "Watch", "begin", "change_well", "finish", "land"]
+__all__ = [
+    "KernelInput",
+    "IntegratorState",
+    "Workspace",
+    "Scratch",
+    "Rows",
+    "Run",
+    "StepControl",
+    "begin",
+    "change_origin",
+    "finish",
+    "restart_from_state",
+]
 
-_OK, _DECIDED, _RUNNING = int(RunStatus.OK), int(RunStatus.DECIDED), int(RunStatus.RUNNING)
+_OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
 _TWO_PI = 2.0 * math.pi
 
 
-class Asked(NamedTuple):
+class KernelInput(NamedTuple):
     """What is asked of the runs of an ensemble."""
 
     runs: Any
@@ -63,14 +75,14 @@ class Asked(NamedTuple):
     """Whether some modes count as high."""
 
 
-class Place(NamedTuple):
+class Workspace(NamedTuple):
     """Where in memory a run is marched."""
 
     layout: Layout
     stages: Stages
 
 
-class Room(NamedTuple):
+class Scratch(NamedTuple):
     """What a thread works in beside memory: what a look inside a step saw, and partial sums."""
 
     looked: Any
@@ -88,7 +100,7 @@ class Rows(NamedTuple):
     k1: int
 
 
-class Watch(NamedTuple):
+class StepControl(NamedTuple):
     """What a march keeps in mind from step to step."""
 
     touching: bool
@@ -132,18 +144,18 @@ class Run(NamedTuple):
     """Height of a flight that is too low to be seen, m: under Newton's law, where chatter ends."""
 
 
-class Now(NamedTuple):
+class IntegratorState(NamedTuple):
     """Where a run stands."""
 
     t: int
     """Ticks."""
-    home: float
+    well_sign: float
     """+1 in the first well, -1 in the other: the origin of q."""
     stretch: float
     """Squared slopes beyond those of the well."""
     rows: Rows
-    seen: Seen
-    watch: Watch
+    seen: ContactKinematics
+    control: StepControl
     sample: int
     """Instants recorded so far."""
     landed: int
@@ -170,16 +182,16 @@ def phase_at(run, t):
 
 
 @inlined
-def run_of(memory, layout, stages, asked, i):
+def run_of(memory, layout, stages, kernel_input, i):
     """What stays the same in run *i*; its prepared steps go into memory."""
-    record = asked.runs[i]
+    record = kernel_input.runs[i]
     size, work = layout.size, layout.work
     struck = Tip(
         record.offset,
-        numbers_of(asked.law, asked.law_numbers, i),
-        numbers_of(asked.drive, asked.drive_numbers, i),
+        numbers_of(kernel_input.law, kernel_input.law_numbers, i),
+        numbers_of(kernel_input.drive, kernel_input.drive_numbers, i),
     )
-    clock = clock_of(record, asked.max_steps)
+    clock = clock_of(record, kernel_input.max_steps)
     coefficients, slot = work + 10 * size, (stages.flows + 1) // 2 * 4 * size + 2 * TURNS
     step_time = clock.step * clock.tick
     for level in range(clock.finest + 2):
@@ -210,67 +222,79 @@ def run_of(memory, layout, stages, asked, i):
 
 
 @called
-def land(memory, blocks, layout, run, t, home, rows, touching, landed, sample):
+def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching, landed, sample):
     """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from a landing."""
     q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size
     enter_forces(layout.forced, memory, run.struck.drive, phase_at(run, t))
-    press(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), q, 0.0, False)
+    evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), q, 0.0, False)
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
     along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
     acceleration_rows(memory, layout, along_g, along_r, r, k)
-    tip = seen_from(run.struck, home, run.rest_contact)
+    tip = seen_from(run.struck, well_sign, run.rest_contact)
     about = observe(memory, layout, tip, phase_at(run, t), q, p)
-    rest_contact, rest_center = home * run.rest_contact, home * run.rest_center
-    seen = Seen(about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv)
+    rest_contact, rest_center = well_sign * run.rest_contact, well_sign * run.rest_center
+    seen = ContactKinematics(
+        about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv
+    )
     energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
-    energy = lifted(memory, layout.size, layout.uneven, q, energy)
-    quiet = is_quiet(above_own_well(layout.uneven, home, energy), layout.gamma, layout.stretch)
+    energy = add_potential_energy(memory, layout.size, layout.uneven, q, energy)
+    quiet = is_low_energy(above_own_well(layout.uneven, well_sign, energy), layout.gamma, layout.stretch)
     status = _RUNNING if t < run.clock.end else _OK
-    watch = Watch(touching, calm(layout.circuit, quiet), t, t, t, 0)
-    return Now(t, home, 2.0 * gq + qr, rows, seen, watch, sample, landed, status), energy
+    control = StepControl(touching, disable_long_steps(layout.circuit, quiet), t, t, t, 0)
+    return IntegratorState(t, well_sign, 2.0 * gq + qr, rows, seen, control, sample, landed, status), energy
 
 
 @compiled
-def begin(memory, blocks, place, asked, i, book):
+def begin(memory, blocks, workspace, kernel_input, i, accumulators):
     """Put run *i* into its place in memory; returns what stays and where it stands."""
-    layout, record = place.layout, asked.runs[i]
+    layout, record = workspace.layout, kernel_input.runs[i]
     size, work = layout.size, layout.work
     for row in range(size):
-        memory[layout.contact + row] = asked.contact_rows[record.contact_row, row]
-        memory[work + row] = asked.starts[record.start_row, 0, row]
-        memory[work + size + row] = asked.starts[record.start_row, 1, row]
-    run = run_of(memory, layout, place.stages, asked, i)
+        memory[layout.contact + row] = kernel_input.contact_rows[record.contact_row, row]
+        memory[work + row] = kernel_input.starts[record.start_row, 0, row]
+        memory[work + size + row] = kernel_input.starts[record.start_row, 1, row]
+    run = run_of(memory, layout, workspace.stages, kernel_input, i)
     rows = Rows(work, work + size, work + 2 * size, work + 3 * size, work + 4 * size, work + 5 * size)
-    if record.home < 0.0:
+    if record.well_sign < 0.0:
         for row in range(size):
             memory[layout.g + row] = -memory[layout.g + row]
-    put(memory, size, layout.uneven, record.home)
+    put(memory, size, layout.uneven, record.well_sign)
     put_rate(memory, layout.circuit, record.circuit_rate)
-    begin_others(memory, size, layout.others, run.struck.drive, asked, i, phase_at(run, 0), record.home, work)
-    now, energy = land(memory, blocks, layout, run, 0, record.home, rows, False, 0, 0)
+    begin_further_contacts(
+        memory,
+        size,
+        layout.others,
+        run.struck.drive,
+        kernel_input,
+        i,
+        phase_at(run, 0),
+        record.well_sign,
+        work,
+    )
+    now, energy = restart_from_state(memory, blocks, layout, run, 0, record.well_sign, rows, False, 0, 0)
     seen, since = now.seen, record.contact_time
     touching = since >= 0.0
     if not math.isfinite(since):
         # under a law whose impacts last no time, what is in touch and closing is about to hit
         pressed = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
         touching = pressed and not is_impulsive(run.struck.law)
-    book.touching, book.onset = int(touching), 0
+    accumulators.touching, accumulators.onset = int(touching), 0
     if math.isfinite(since) and since > 0.0:
-        book.onset = -int(since / run.clock.tick + 0.5)
-    open_book(
-        book,
+        accumulators.onset = -int(since / run.clock.tick + 0.5)
+    begin_statistics(
+        accumulators,
         about_level(layout.uneven, seen).c,
         seen,
         run.struck.law,
-        stored_by_others(memory, layout.others, energy + contact_energy(run.struck.law, seen.d)),
+        with_further_contact_energy(memory, layout.others, energy + contact_energy(run.struck.law, seen.d)),
     )
-    watch = Watch(touching, now.watch.quiet, 0, 0, 0, 0)
-    return run, Now(0, now.home, now.stretch, rows, seen, watch, 0, 0, now.status)
+    control = StepControl(touching, now.control.quiet, 0, 0, 0, 0)
+    return run, IntegratorState(0, now.well_sign, now.stretch, rows, seen, control, 0, 0, now.status)
 
 
 @compiled
-def change_well(memory, blocks, layout, home, q, k, r):
+def change_origin(memory, blocks, layout, well_sign, q, k, r):
     """Take the other well, or where it would be if the two were equal, as the origin: exact, since the structure is the
     same about both, but for a constant force if they are not.
 
@@ -278,9 +302,9 @@ def change_well(memory, blocks, layout, home, q, k, r):
     the far one, modes faster than the step would be held in place by kicks alone.
     """
     for row in range(layout.size):
-        memory[q + row] -= home * memory[layout.shift + row]
+        memory[q + row] -= well_sign * memory[layout.shift + row]
         memory[layout.g + row] = -memory[layout.g + row]
-    put(memory, layout.size, layout.uneven, -home)
+    put(memory, layout.size, layout.uneven, -well_sign)
     gq, qr = tension_rows(memory, blocks, layout, q, r)
     along_g, along_r = tension_factors(layout.gamma, gq, qr)
     along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
@@ -289,24 +313,24 @@ def change_well(memory, blocks, layout, home, q, k, r):
 
 
 @compiled
-def finish(memory, blocks, layout, run, now, book, impacts, before, goes_on):
+def finish(memory, blocks, layout, run, now, accumulators, impacts, before, goes_on):
     """Close a run's book; its last contact too, unless the run is to go on from here."""
     q, p, tick = now.rows.q, now.rows.p, run.clock.tick
-    if now.watch.touching:
+    if now.control.touching:
         if goes_on:
-            leave_contact_open(book, run.struck.law, now.t, tick)
+            accumulate_open_contact(accumulators, run.struck.law, now.t, tick)
         else:
-            finish_impact(book, impacts, before, run.struck.law, now.t, tick)
-    if now.status == _DECIDED:
-        book.decided_at = now.t * tick
+            close_impact(accumulators, impacts, before, run.struck.law, now.t, tick)
+    if now.status == _EARLY_STOP:
+        accumulators.early_stop_time = now.t * tick
     gq, qr = tension_rows(memory, blocks, layout, q, layout.work + 9 * layout.size)
     stored = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
-    stored = lifted(memory, layout.size, layout.uneven, q, stored)
+    stored = add_potential_energy(memory, layout.size, layout.uneven, q, stored)
     stored = stored + contact_energy(run.struck.law, now.seen.d)
-    book.energy = stored_by_others(memory, layout.others, stored)
-    book.displacement, book.center = now.seen.w, now.seen.c
-    if now.home < 0.0:
+    accumulators.energy = with_further_contact_energy(memory, layout.others, stored)
+    accumulators.displacement, accumulators.center = now.seen.w, now.seen.c
+    if now.well_sign < 0.0:
         # the place in memory is left as it was found
         for row in range(layout.size):
             memory[layout.g + row] = -memory[layout.g + row]
-    book.time, book.status, book.samples = now.t, now.status, now.sample
+    accumulators.time, accumulators.status, accumulators.samples = now.t, now.status, now.sample

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from snapbeam.engines.cpu.push import Push, damped, no_push
+from snapbeam.engines.cpu.push import ContactIncrement, apply_contact_loss, no_contact_increment
 from snapbeam.engines.cpu.rows import (
     acceleration_rows,
     beam_signals,
@@ -18,19 +18,36 @@ from snapbeam.engines.cpu.rows import (
     tension_rows,
     tension_rows_twice,
 )
-from snapbeam.engines.cpu.strikers.force import given_by_others, gross_of_others, press
+from snapbeam.engines.cpu.strikers.force import (
+    with_further_contact_work,
+    with_further_contact_gross_work,
+    evaluate_contacts,
+)
 from snapbeam.engines.cpu.world.around import around_kick
-from snapbeam.engines.cpu.world.circuit import Tap, kick_source, no_tap, tapped_rows
-from snapbeam.engines.cpu.world.forced import Given, changed_load, enter_forces, no_given
+from snapbeam.engines.cpu.world.circuit import (
+    CircuitIncrement,
+    kick_source,
+    no_circuit_increment,
+    circuit_acceleration_rows,
+)
+from snapbeam.engines.cpu.world.forced import ExternalWork, changed_load, enter_forces, no_external_work
 from snapbeam.engines.scalar.compile import called, compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS
-from snapbeam.engines.scalar.contact import contact_force, is_lossy
-from snapbeam.engines.scalar.decisions import Seen
+from snapbeam.engines.scalar.contact import contact_force, is_rate_dependent
+from snapbeam.engines.scalar.decisions import ContactKinematics
 from snapbeam.engines.scalar.lanes import WIDTH, load, store
 from snapbeam.engines.scalar.physics import sincos, tension_factors
 from snapbeam.engines.scalar.tip import tip_motion, turned_motion
 
-__all__ = ["Done", "Step", "observe", "prepare", "take_step", "take_two", "tapped_step"]
+__all__ = [
+    "StepIncrement",
+    "Step",
+    "observe",
+    "prepare",
+    "take_step",
+    "take_two",
+    "with_circuit_acceleration",
+]
 
 
 class Step(NamedTuple):
@@ -53,7 +70,7 @@ class Step(NamedTuple):
     r: int
 
 
-class Done(NamedTuple):
+class StepIncrement(NamedTuple):
     """What a step gave: g.q and q.Gq at its end, and quadratures of the order of the step."""
 
     gq: float
@@ -65,9 +82,9 @@ class Done(NamedTuple):
     lost: float
     """In the contact."""
     dissipated: float
-    given: Given
+    given: ExternalWork
     """By a moving base and a changing axial load."""
-    tap: Tap
+    tap: CircuitIncrement
     """What a circuit did."""
 
 
@@ -90,7 +107,7 @@ def observe(memory, layout, tip, phase, q, p):
     motion, velocity = tip_motion(tip.drive, memory, phase)
     w, rate, c, c_rate = signals(memory, layout, q, p)
     beam, beam_rate = beam_signals(memory, layout, q, p, w, rate)
-    return Seen(beam, beam_rate, tip.offset + motion - w, velocity - rate, c, c_rate)
+    return ContactKinematics(beam, beam_rate, tip.offset + motion - w, velocity - rate, c, c_rate)
 
 
 @inlined
@@ -106,7 +123,7 @@ def _begin_push(step, stages, size):
 def _push(memory, layout, stages, tip, step, drive0, stage, weight, push):
     """The contact at a stage of a step in contact; *push* as it was if the step is a free one.
 
-    Of a law that loses energy, what its force is to follow from, in :func:`~snapbeam.engines.cpu.push.damped`.
+    Of a law that loses energy, what its force is to follow from, in :func:`~snapbeam.engines.cpu.push.apply_contact_loss`.
     """
     if not step.touching:
         return push
@@ -117,10 +134,10 @@ def _push(memory, layout, stages, tip, step, drive0, stage, weight, push):
     now = step.phase + memory[stages.elapsed + stage] * step.length * tip.drive.omega
     motion, velocity = turned_motion(tip.drive, memory, now, sine, cosine)
     penetration = tip.offset + motion - dot(memory, layout.size, layout.contact, here)
-    if is_lossy(tip.law):
-        return Push(0.0, push.impulse, push.work, push.gross, push.lost, penetration, velocity)
+    if is_rate_dependent(tip.law):
+        return ContactIncrement(0.0, push.impulse, push.work, push.gross, push.lost, penetration, velocity)
     force = contact_force(tip.law, penetration)
-    return Push(
+    return ContactIncrement(
         force,
         push.impulse + weight * force,
         push.work + weight * force * velocity,
@@ -170,21 +187,21 @@ def _forces(memory, layout, stages, tip, step, stage):
     enter_forces(layout.forced, memory, tip.drive, now)
     here = step.q1 if stage > 0 else step.q
     weight = memory[stages.kick + stage] * step.length
-    press(memory, layout.size, layout.others, tip.drive, now, here, weight, stage == 0)
+    evaluate_contacts(memory, layout.size, layout.others, tip.drive, now, here, weight, stage == 0)
 
 
 @inlined
 def _done(memory, layout, gq, qr, push, dissipated, given):
     """What a step gave, other strikers included."""
-    work = given_by_others(memory, layout.others, push.work)
-    gross = gross_of_others(memory, layout.others, push.gross)
-    return Done(gq, qr, push.impulse, work, gross, push.lost, dissipated, given[0], given[1])
+    work = with_further_contact_work(memory, layout.others, push.work)
+    gross = with_further_contact_gross_work(memory, layout.others, push.gross)
+    return StepIncrement(gq, qr, push.impulse, work, gross, push.lost, dissipated, given[0], given[1])
 
 
 @inlined
-def tapped_step(memory, layout, spare, step):
+def with_circuit_acceleration(memory, layout, spare, step):
     """A free step as it is looked into: with the circuit's part in the accelerations of its ends, if there is one."""
-    k, k1 = tapped_rows(memory, layout.size, layout.circuit, spare, step)
+    k, k1 = circuit_acceleration_rows(memory, layout.size, layout.circuit, spare, step)
     return Step(
         step.ticks, step.at, step.length, step.phase, step.touching, step.q, step.p, k, step.q1, step.p1, k1, step.r
     )  # fmt: skip
@@ -197,13 +214,19 @@ def take_step(memory, blocks, layout, stages, tip, step, ledger):
     Dissipation is added up unless *ledger* is None; nothing else depends on it, to the last bit.
     """
     drive0 = _begin_push(step, stages, layout.size)
-    push, gq, qr, dissipated, given = no_push(), 0.0, 0.0, 0.0, (no_given(), no_tap())
+    push, gq, qr, dissipated, given = (
+        no_contact_increment(),
+        0.0,
+        0.0,
+        0.0,
+        (no_external_work(), no_circuit_increment()),
+    )
     for stage in range(stages.flows + 1):
         weight = memory[stages.kick + stage] * step.length
         push = _push(memory, layout, stages, tip, step, drive0, stage, weight, push)
         _forces(memory, layout, stages, tip, step, stage)
         if stage == 0:
-            push = damped(memory, layout, tip, step, stage, weight, 0.0, 0.0, push)
+            push = apply_contact_loss(memory, layout, tip, step, stage, weight, 0.0, 0.0, push)
             given = around_kick(
                 memory, blocks, layout, tip, step, stage, weight, (0.0, 0.0, push.force), given
             )
@@ -212,7 +235,7 @@ def take_step(memory, blocks, layout, stages, tip, step, ledger):
         gq, qr = tension_rows(memory, blocks, layout, step.q1, step.r)
         along_g, along_r = tension_factors(layout.gamma, gq, qr)
         along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
-        push = damped(memory, layout, tip, step, stage, weight, along_g, along_r, push)
+        push = apply_contact_loss(memory, layout, tip, step, stage, weight, along_g, along_r, push)
         given = around_kick(
             memory, blocks, layout, tip, step, stage, weight, (along_g, along_r, push.force), given
         )
@@ -227,9 +250,9 @@ def take_two(memory, blocks, stages, layout_a, tip_a, a, layout_b, tip_b, b):
     A single trajectory leaves the processor waiting for sums most of the time; the other one uses that time.
     """
     drive_a, drive_b = _begin_push(a, stages, layout_a.size), _begin_push(b, stages, layout_b.size)
-    push_a, gq_a, qr_a = no_push(), 0.0, 0.0
+    push_a, gq_a, qr_a = no_contact_increment(), 0.0, 0.0
     push_b, gq_b, qr_b = push_a, 0.0, 0.0
-    given_a = (no_given(), no_tap())
+    given_a = (no_external_work(), no_circuit_increment())
     given_b = given_a
     for stage in range(stages.flows + 1):
         weight_a, weight_b = memory[stages.kick + stage] * a.length, memory[stages.kick + stage] * b.length
@@ -238,8 +261,8 @@ def take_two(memory, blocks, stages, layout_a, tip_a, a, layout_b, tip_b, b):
         _forces(memory, layout_a, stages, tip_a, a, stage)
         _forces(memory, layout_b, stages, tip_b, b, stage)
         if stage == 0:
-            push_a = damped(memory, layout_a, tip_a, a, stage, weight_a, 0.0, 0.0, push_a)
-            push_b = damped(memory, layout_b, tip_b, b, stage, weight_b, 0.0, 0.0, push_b)
+            push_a = apply_contact_loss(memory, layout_a, tip_a, a, stage, weight_a, 0.0, 0.0, push_a)
+            push_b = apply_contact_loss(memory, layout_b, tip_b, b, stage, weight_b, 0.0, 0.0, push_b)
             given_a = around_kick(
                 memory, blocks, layout_a, tip_a, a, stage, weight_a, (0.0, 0.0, push_a.force), given_a
             )
@@ -254,8 +277,8 @@ def take_two(memory, blocks, stages, layout_a, tip_a, a, layout_b, tip_b, b):
         g_b, r_b = tension_factors(layout_b.gamma, gq_b, qr_b)
         g_a, r_a = changed_load(memory, layout_a.forced, g_a, r_a)
         g_b, r_b = changed_load(memory, layout_b.forced, g_b, r_b)
-        push_a = damped(memory, layout_a, tip_a, a, stage, weight_a, g_a, r_a, push_a)
-        push_b = damped(memory, layout_b, tip_b, b, stage, weight_b, g_b, r_b, push_b)
+        push_a = apply_contact_loss(memory, layout_a, tip_a, a, stage, weight_a, g_a, r_a, push_a)
+        push_b = apply_contact_loss(memory, layout_b, tip_b, b, stage, weight_b, g_b, r_b, push_b)
         given_a = around_kick(
             memory, blocks, layout_a, tip_a, a, stage, weight_a, (g_a, r_a, push_a.force), given_a
         )

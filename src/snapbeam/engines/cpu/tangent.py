@@ -13,10 +13,10 @@ contact that are let in here have a force without a jump, so that nothing else h
 from __future__ import annotations
 
 from snapbeam.core.codes import RunStatus
-from snapbeam.engines.cpu.march import choose, hand_out
+from snapbeam.engines.cpu.march import propose_step, store_state
 from snapbeam.engines.cpu.rows import acceleration_rows, dot, flow_rows, kick_rows, tension_rows
-from snapbeam.engines.cpu.settling.after import after_step
-from snapbeam.engines.cpu.state import Place, begin, cut_slot, finish
+from snapbeam.engines.cpu.settling.after import accept_any_step
+from snapbeam.engines.cpu.state import Workspace, begin, cut_slot, finish
 from snapbeam.engines.cpu.step import prepare, take_step
 from snapbeam.engines.cpu.world.forced import changed_load, enter_forces
 from snapbeam.engines.scalar.compile import compiled
@@ -25,9 +25,9 @@ from snapbeam.engines.scalar.lanes import WIDTH, fma, load, store
 from snapbeam.engines.scalar.physics import tension_factors
 from snapbeam.engines.scalar.tip import seen_from, tip_motion
 
-__all__ = ["TANGENT_ROWS", "march_tangent"]
+__all__ = ["TANGENT_ROWS", "integrate_tangent"]
 
-_RUNNING = int(RunStatus.RUNNING)
+_RUNNING = int(RunStatus.INTERRUPTED)
 TANGENT_ROWS = 8
 """Rows beside the tangents themselves: the state of the step that is gone through again, and room."""
 
@@ -46,9 +46,9 @@ def _kick_tangent(memory, layout, weight, along_r, slope, r, dq, dp, dr, gdq, rd
 
 
 @compiled
-def carry_tangents(memory, blocks, place, run, tip, step, first, count):
+def carry_tangents(memory, blocks, workspace, run, tip, step, first, count):
     """Go through a step again, with the *count* tangents that stand from row *first* on."""
-    layout, stages, size = place.layout, place.stages, place.layout.size
+    layout, stages, size = workspace.layout, workspace.stages, workspace.layout.size
     if step.at == cut_slot(run):
         prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
     q, p, k, r = first - 4 * size, first - 3 * size, first - 2 * size, first - size
@@ -85,32 +85,36 @@ def carry_tangents(memory, blocks, place, run, tip, step, first, count):
 
 
 @compiled
-def march_tangent(memory, blocks, layout, stages, asked, which, room, kept, tangents, first):
+def integrate_tangent(
+    memory, blocks, layout, stages, kernel_input, which, scratch, kernel_output, tangents, first
+):
     """March the runs *which* one after the other, with their tangents, shape (runs, k, 2 rows), from row *first* on.
 
     Tangents are handed out as they are at the end of a run.
     """
-    place, size, count = Place(layout, stages), layout.size, tangents.shape[1]
+    workspace, size, count = Workspace(layout, stages), layout.size, tangents.shape[1]
     for i in which:
-        book = kept.books[i]
-        run, now = begin(memory, blocks, place, asked, i, book)
+        accumulators = kernel_output.accumulators_of_runs[i]
+        run, now = begin(memory, blocks, workspace, kernel_input, i, accumulators)
         for j in range(count):
             for row in range(2 * size):
                 memory[first + 2 * j * size + row] = tangents[i, j, row]
         while now.status == _RUNNING:
-            if kept.pulse[0] != 0:
-                book.time, book.status = now.t, _RUNNING
+            if kernel_output.pulse[0] != 0:
+                accumulators.time, accumulators.status = now.t, _RUNNING
                 return
             before = now.t
-            now, step = choose(memory, blocks, place, run, now, book)
-            home = now.home
-            tip = seen_from(run.struck, home, run.rest_contact)
+            now, step = propose_step(memory, blocks, workspace, run, now, accumulators)
+            well_sign = now.well_sign
+            tip = seen_from(run.struck, well_sign, run.rest_contact)
             done = take_step(memory, blocks, layout, stages, tip, step, None)
-            now, step = after_step(memory, blocks, place, run, now, step, done, room, book, asked, None)
+            now, step = accept_any_step(
+                memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, None
+            )
             if now.t > before:
-                carry_tangents(memory, blocks, place, run, tip, step, first, count)
-            now = hand_out(memory, blocks, layout, run, now, book, i, kept)
-        finish(memory, blocks, layout, run, now, book, None, 0, True)
+                carry_tangents(memory, blocks, workspace, run, tip, step, first, count)
+            now = store_state(memory, blocks, layout, run, now, accumulators, i, kernel_output)
+        finish(memory, blocks, layout, run, now, accumulators, None, 0, True)
         for j in range(count):
             for row in range(2 * size):
                 tangents[i, j, row] = memory[first + 2 * j * size + row]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from snapbeam.engines.scalar.compile import inlined
-from snapbeam.engines.scalar.decisions import Seen
+from snapbeam.engines.scalar.decisions import ContactKinematics
 from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, splat, store
 
 __all__ = [
@@ -16,12 +16,12 @@ __all__ = [
     "about_level",
     "above_own_well",
     "at_center",
-    "lifted",
-    "pushed",
+    "add_potential_energy",
+    "add_static_load",
     "pushed_along",
     "put",
     "second_well",
-    "turn_over",
+    "has_crossed_to_other_well",
 ]
 
 
@@ -40,7 +40,7 @@ class Uneven(NamedTuple):
 
 
 @inlined
-def pushed(memory, uneven, row, k):
+def add_static_load(memory, uneven, row, k):
     """An acceleration with the force at hand."""
     if uneven is None:
         return k
@@ -59,18 +59,18 @@ def pushed_along(memory, size, uneven, contact, along):
 
 
 @inlined
-def put(memory, size, uneven, home):
+def put(memory, size, uneven, well_sign):
     """The force at hand, for the origin of q."""
     if uneven is None:
         return
-    far = 1.0 if home < 0.0 else 0.0
+    far = 1.0 if well_sign < 0.0 else 0.0
     for row in range(0, size, WIDTH):
         store(memory, uneven.here + row, far * load(memory, uneven.force + row))
     memory[uneven.here + size] = far * uneven.lift
 
 
 @inlined
-def lifted(memory, size, uneven, q, energy):
+def add_potential_energy(memory, size, uneven, q, energy):
     """The energy above the first well, of that which linear modes and tension have about the origin at hand."""
     if uneven is None:
         return energy
@@ -81,19 +81,19 @@ def lifted(memory, size, uneven, q, energy):
 
 
 @inlined
-def above_own_well(uneven, home, energy):
+def above_own_well(uneven, well_sign, energy):
     """The energy above the well that the beam is near."""
     if uneven is None:
         return energy
-    return energy - uneven.depth if home < 0.0 else energy
+    return energy - uneven.depth if well_sign < 0.0 else energy
 
 
 @inlined
-def second_well(memory, size, uneven, home, q, spare):
+def second_well(memory, size, uneven, well_sign, q, spare):
     """Where q is measured from the well that the beam is near: *q* itself, or *spare*."""
     if uneven is None:
         return q
-    if home > 0.0:
+    if well_sign > 0.0:
         return q
     for row in range(0, size, WIDTH):
         store(memory, spare + row, load(memory, q + row) - load(memory, uneven.second + row))
@@ -105,7 +105,7 @@ def about_level(uneven, seen):
     """What is seen, the centre from the height that divides the wells."""
     if uneven is None:
         return seen
-    return Seen(seen.w, seen.wv, seen.d, seen.dv, seen.c - uneven.level, seen.cv)
+    return ContactKinematics(seen.w, seen.wv, seen.d, seen.dv, seen.c - uneven.level, seen.cv)
 
 
 @inlined
@@ -117,8 +117,8 @@ def at_center(uneven, center):
 
 
 @inlined
-def turn_over(uneven, center, home, rest_center):
+def has_crossed_to_other_well(uneven, center, well_sign, rest_center):
     """Whether the centre has come to the other side."""
     if uneven is None:
-        return center * (home * rest_center) < 0.0
-    return (center - uneven.level) * home > 0.0
+        return center * (well_sign * rest_center) < 0.0
+    return (center - uneven.level) * well_sign > 0.0

@@ -10,43 +10,55 @@ from snapbeam.engines.cuda.block import device, shared
 from snapbeam.engines.cuda.run import Held, Standing
 from snapbeam.engines.cuda.step import Functions
 from snapbeam.engines.scalar.decisions import (
-    Seen,
+    ContactKinematics,
     contact_level,
-    count_in_step,
-    entry_again,
-    finish_impact,
-    first_entry,
+    count_zero_crossings_in_step,
+    refine_onset,
+    close_impact,
+    first_contact_onset,
     flight_level,
-    is_quiet,
-    safe_for,
+    is_low_energy,
+    safe_interval,
     ticks_of,
-    track,
-    track_energy,
+    accumulate_displacement,
+    accumulate_energy,
 )
 from snapbeam.engines.scalar.physics import mode_energy, tension_acceleration, tension_energy, tension_factors
-from snapbeam.engines.scalar.signals import first_fall, turning_point, widened
+from snapbeam.engines.scalar.signals import first_downcrossing, turning_point, update_extrema
 from snapbeam.engines.scalar.tip import seen_from
 
 __all__ = ["step_function"]
 
-_OK, _DECIDED, _RUNNING = int(RunStatus.OK), int(RunStatus.DECIDED), int(RunStatus.RUNNING)
-_NOT_FINITE, _STEP_LIMIT = int(RunStatus.NOT_FINITE), int(RunStatus.STEP_LIMIT)
+_OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
+_DIVERGED, _STEP_LIMIT = int(RunStatus.DIVERGED), int(RunStatus.STEP_LIMIT)
 _TWO_PI = 2.0 * math.pi
 # What a pass through a step is for.
 _WHOLE, _CUT, _DEEPEST = 0, 1, 2
 
-_first_entry, _count_in_step, _entry_again = shared(first_entry), shared(count_in_step), shared(entry_again)
-_finish_impact, _track, _track_energy = shared(finish_impact), shared(track), shared(track_energy)
-_safe_for, _is_quiet, _ticks_of = shared(safe_for), shared(is_quiet), shared(ticks_of)
+_first_entry, _count_in_step, _entry_again = (
+    shared(first_contact_onset),
+    shared(count_zero_crossings_in_step),
+    shared(refine_onset),
+)
+_finish_impact, _track, _track_energy = (
+    shared(close_impact),
+    shared(accumulate_displacement),
+    shared(accumulate_energy),
+)
+_safe_for, _is_quiet, _ticks_of = shared(safe_interval), shared(is_low_energy), shared(ticks_of)
 _flight_level, _contact_level, _seen_from = shared(flight_level), shared(contact_level), shared(seen_from)
-_first_fall, _turning_point, _widened = shared(first_fall), shared(turning_point), shared(widened)
+_first_fall, _turning_point, _widened = (
+    shared(first_downcrossing),
+    shared(turning_point),
+    shared(update_extrema),
+)
 
 
 class Taken(NamedTuple):
     """A step that was taken: what it gave, where it was cut and how it was looked into."""
 
     own: Standing
-    seen: Seen
+    seen: ContactKinematics
     span: int
     length: float
     event: bool
@@ -65,19 +77,19 @@ class Taken(NamedTuple):
 def _watching(functions: Functions) -> tuple[Any, Any, Any]:
     """Device functions of what is watched for: a change of well, how long nothing can happen, what is in a step."""
     sum_four, tension = functions.sum_four, functions.tension
-    look_inside, flow_into = functions.look_inside, functions.flow_into
+    sample_inside_step, flow_into = functions.sample_inside_step, functions.flow_into
 
     @device
     def home_again(block, fixed, held):
         """The other well becomes the origin, if the centre has crossed over; see change_well."""
-        own, home = held.own, held.home
-        if not (fixed.rest_stretch > 0.0 and held.seen.c * (home * fixed.rest_center) < 0.0):
-            return own, home
-        q, home = own.q - home * fixed.shift, -home
-        g, r = home * fixed.g, tension(block, q)
+        own, well_sign = held.own, held.well_sign
+        if not (fixed.rest_stretch > 0.0 and held.seen.c * (well_sign * fixed.rest_center) < 0.0):
+            return own, well_sign
+        q, well_sign = own.q - well_sign * fixed.shift, -well_sign
+        g, r = well_sign * fixed.g, tension(block, q)
         gq, qr, _, _ = sum_four(block, g * q, r * q, 0.0, 0.0)
         along_g, along_r = tension_factors(fixed.gamma, gq, qr)
-        return Standing(q, own.p, tension_acceleration(along_g, along_r, g, r), gq, qr), home
+        return Standing(q, own.p, tension_acceleration(along_g, along_r, g, r), gq, qr), well_sign
 
     @device
     def safe_until(block, fixed, held, own, after):
@@ -112,7 +124,7 @@ def _watching(functions: Functions) -> tuple[Any, Any, Any]:
             pieces = max(2, math.ceil(length / fixed.finest_look))
             flow_into(block, fixed.mode, length / pieces, look)
         piece = length / pieces
-        look_inside(block, fixed.mode, tip, look, pieces, piece, phase, own.q, own.p, own.k, k1)
+        sample_inside_step(block, fixed.mode, tip, look, pieces, piece, phase, own.q, own.p, own.k, k1)
         return pieces, piece
 
     return home_again, safe_until, looked
@@ -123,11 +135,11 @@ def _taking(functions: Functions, safe_until: Any, looked: Any) -> Any:
     observe, take_step, prepare = functions.observe, functions.take_step, functions.prepare
 
     @device
-    def taken(block, fixed, held, own, home, span, slot, phase):
+    def taken(block, fixed, held, own, well_sign, span, slot, phase):
         """Take a step, cut it short at an event, and look for the deepest point: one text for all three."""
         clock, seen, touching = fixed.clock, held.seen, held.touching
-        tip = _seen_from(fixed.struck, home, fixed.rest_contact)
-        g, tick = home * fixed.g, clock.tick
+        tip = _seen_from(fixed.struck, well_sign, fixed.rest_contact)
+        g, tick = well_sign * fixed.g, clock.tick
         length = span * tick
         here, purpose = length, _WHOLE
         event, entered, failed, deepest = False, False, False, held.deepest
@@ -146,9 +158,9 @@ def _taking(functions: Functions, safe_until: Any, looked: Any) -> Any:
                 deepest = max(deepest, about.d)
                 break
             own1 = Standing(q2, p2, k2, gq2, qr2)
-            seen1 = Seen(
-                about.w + home * fixed.rest_contact, about.wv, about.d, about.dv,
-                about.c + home * fixed.rest_center, about.cv,
+            seen1 = ContactKinematics(
+                about.w + well_sign * fixed.rest_contact, about.wv, about.d, about.dv,
+                about.c + well_sign * fixed.rest_center, about.cv,
             )  # fmt: skip
             impulse, work, gross = impulse2, work2, gross2
             if purpose == _WHOLE:
@@ -208,38 +220,38 @@ def _keeping(functions: Functions) -> tuple[Any, Any]:
     sum_four = functions.sum_four
 
     @device
-    def keep(block, fixed, held, home, step, counted, book):
+    def keep(block, fixed, held, well_sign, step, counted, accumulators):
         """Enter a step in the statistics; the first thread keeps the book."""
         if block.lane == 0:
             if held.touching:
-                book.impulse += step.impulse
-                book.work += step.work
-                book.gross_work += step.gross
-                book.deepest = step.deepest
-            _track(book, held.seen, step.seen, step.length)
+                accumulators.impulse += step.impulse
+                accumulators.work += step.work
+                accumulators.gross_work += step.gross
+                accumulators.deepest = step.deepest
+            _track(accumulators, held.seen, step.seen, step.length)
             if counted:
                 _count_in_step(
-                    book, fixed.clock, held.t, step.length, held.seen, step.seen, block.seen,
-                    home * fixed.rest_center, step.pieces, step.piece,
+                    accumulators, fixed.clock, held.t, step.length, held.seen, step.seen, block.seen,
+                    well_sign * fixed.rest_center, step.pieces, step.piece,
                 )  # fmt: skip
 
     @device
-    def weigh(block, fixed, held, step, t, home, touching, released, status, book):
+    def weigh(block, fixed, held, step, t, well_sign, touching, released, status, accumulators):
         """After some steps, or a release, the energy is looked at."""
-        quiet, weighed, own = held.quiet, held.weighed, step.own
+        quiet, monitor_energy, own = held.quiet, held.monitor_energy, step.own
         if released or (held.steps & 7) == 0:
             energy = mode_energy(fixed.mode.omega, own.q, own.p)
             linear, high, _, _ = sum_four(block, energy, fixed.mode.high * energy, 0.0, 0.0)
             if block.lane == 0:
-                _track_energy(book, linear, high, (t - weighed) * fixed.clock.tick)
-            weighed = t
+                _track_energy(accumulators, linear, high, (t - monitor_energy) * fixed.clock.tick)
+            monitor_energy = t
             if not touching:
                 energy = linear + tension_energy(fixed.gamma, own.gq, own.qr)
                 quiet = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
-                far = home < 0.0 and step.seen.w > fixed.clock.decide_reach and step.seen.c > 0.0
+                far = well_sign < 0.0 and step.seen.w > fixed.clock.decide_reach and step.seen.c > 0.0
                 if not step.event and far and (held.steps & 15) == 0 and energy < fixed.clock.decide_energy:
-                    status = _DECIDED
-        return quiet, weighed, status
+                    status = _EARLY_STOP
+        return quiet, monitor_energy, status
 
     return keep, weigh
 
@@ -252,10 +264,10 @@ def step_function(functions: Functions) -> Any:
     synchronise = functions.synchronise
 
     @device
-    def further(block, fixed, held, book):
+    def further(block, fixed, held, accumulators):
         """The run after one more step."""
         clock = fixed.clock
-        own, home = home_again(block, fixed, held)
+        own, well_sign = home_again(block, fixed, held)
         steps = held.steps + 1
         level = _flight_level(clock, held.quiet, 2.0 * own.gq + own.qr, fixed.rest_stretch)
         if held.touching:
@@ -265,18 +277,18 @@ def step_function(functions: Functions) -> Any:
         if held.t + span > clock.end:
             span, slot = clock.end - held.t, fixed.cut_slot
         phase = fixed.phase + _TWO_PI * ((held.t % clock.period) / clock.period)
-        step = taken(block, fixed, held, own, home, span, slot, phase)
+        step = taken(block, fixed, held, own, well_sign, span, slot, phase)
         if step.failed or step.entered:
-            status = _NOT_FINITE if step.failed else _STEP_LIMIT if steps >= clock.max_steps else _RUNNING
+            status = _DIVERGED if step.failed else _STEP_LIMIT if steps >= clock.max_steps else _RUNNING
             onset = held.t if step.entered else held.onset
             if block.lane == 0 and step.entered:
-                book.touching, book.onset = 1, held.t
+                accumulators.touching, accumulators.onset = 1, held.t
             return Held(
-                held.t, home, own, held.seen, held.touching or step.entered, held.quiet, step.safe_gap,
-                step.safe_center, onset, held.deepest, held.weighed, steps, status,
+                held.t, well_sign, own, held.seen, held.touching or step.entered, held.quiet, step.safe_gap,
+                step.safe_center, onset, held.deepest, held.monitor_energy, steps, status,
             )  # fmt: skip
         counted = held.touching or held.t + step.span > step.safe_center
-        keep(block, fixed, held, home, step, counted, book)
+        keep(block, fixed, held, well_sign, step, counted, accumulators)
         t, seen = held.t + step.span, step.seen
         status = _RUNNING if t < clock.end else _OK
         touching, onset, deepest = held.touching != step.event, held.onset, step.deepest
@@ -286,29 +298,29 @@ def step_function(functions: Functions) -> Any:
             safe_gap, safe_center = t, t
             if held.touching:
                 if block.lane == 0:
-                    _finish_impact(book, None, 0, fixed.struck.law, t, clock.tick)
+                    _finish_impact(accumulators, None, 0, fixed.struck.law, t, clock.tick)
                 deepest = 0.0
-                seen = Seen(seen.w, seen.wv, min(seen.d, 0.0), seen.dv, seen.c, seen.cv)
+                seen = ContactKinematics(seen.w, seen.wv, min(seen.d, 0.0), seen.dv, seen.c, seen.cv)
             else:
                 onset = t
                 if block.lane == 0:
-                    book.touching, book.onset = 1, t
+                    accumulators.touching, accumulators.onset = 1, t
         counting = Held(
-            held.t, held.home, held.own, held.seen, held.touching, held.quiet, held.safe_gap, held.safe_center,
-            held.onset, held.deepest, held.weighed, steps, held.status,
+            held.t, held.well_sign, held.own, held.seen, held.touching, held.quiet, held.safe_gap, held.safe_center,
+            held.onset, held.deepest, held.monitor_energy, steps, held.status,
         )  # fmt: skip
-        quiet, weighed, status = weigh(
-            block, fixed, counting, step, t, home, touching, released, status, book
+        quiet, monitor_energy, status = weigh(
+            block, fixed, counting, step, t, well_sign, touching, released, status, accumulators
         )
         if counted and clock.decide_crossings >= 0:
             synchronise()
-            if book.crossings_last_quarter > clock.decide_crossings:
-                status = _DECIDED
+            if accumulators.zero_crossings_last_quarter > clock.decide_crossings:
+                status = _EARLY_STOP
         if status == _RUNNING and steps >= clock.max_steps:
             status = _STEP_LIMIT
         return Held(
             t,
-            home,
+            well_sign,
             step.own,
             seen,
             touching,
@@ -317,7 +329,7 @@ def step_function(functions: Functions) -> Any:
             safe_center,
             onset,
             deepest,
-            weighed,
+            monitor_energy,
             steps,
             status,
         )

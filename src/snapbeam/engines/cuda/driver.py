@@ -23,14 +23,22 @@ from snapbeam.engines.cuda.layout import (
     device_structure,
 )
 from snapbeam.engines.ensemble import Ensemble
-from snapbeam.engines.outcomes import empty_books, updated
+from snapbeam.engines.outcomes import empty_accumulators, updated
 from snapbeam.engines.outputs import Landings, Recorded
 from snapbeam.engines.scalar.composition import COMPOSITIONS, TURNS
 from snapbeam.engines.scalar.decisions import PIECES
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.drive import Drive, Sine
 
-__all__ = ["Options", "march_landing", "march_tangents", "record", "refusal", "run_ensemble", "simulated"]
+__all__ = [
+    "Options",
+    "integrate_to_landing",
+    "integrate_tangents",
+    "record",
+    "refusal",
+    "run_ensemble",
+    "simulated",
+]
 
 _Array = NDArray[np.float64]
 _Integers = NDArray[np.int64]
@@ -70,7 +78,7 @@ def refusal(modes: int, law: type[ContactLaw] | None = None, drive: type[Drive] 
         return (
             f"the law of contact {law.name!r}, whose impacts last no time, is marched by the CPU engine alone"
         )
-    if law is not None and law.lossy:
+    if law is not None and law.rate_dependent:
         return f"the law of contact {law.name!r}, which loses energy, is marched by the CPU engine alone"
     if not drive.harmonic:
         return f"the drive {drive.name!r} is marched by the CPU engine alone"
@@ -106,14 +114,14 @@ class _Launch:
     def __init__(self, ensemble: Ensemble, options: Options) -> None:
         from numba import cuda
 
-        from snapbeam.engines.cuda.march import march_kernel
+        from snapbeam.engines.cuda.march import integrate_kernel
 
         self.ensemble = ensemble
         self.finest = ensemble.finest
         self.structure = device_structure(
             ensemble, options.fewest_threads or (1 if simulated() else FEWEST_THREADS)
         )
-        self.kernel = march_kernel(
+        self.kernel = integrate_kernel(
             ensemble.order, self.structure.threads, self.structure.columns, self.finest,
             options.warps or RESIDENT_WARPS,
         )  # fmt: skip
@@ -126,18 +134,18 @@ class _Launch:
         self.starts = cuda.to_device(self.structure.across(ensemble.starts))
         self.pieces = _most_pieces(ensemble)
         self.blocks = 1
-        self.kept, self.work = self._room()
+        self.kernel_output, self.work = self._room()
         # a march of no steps: the kernel is compiled, and the driver knows how many blocks fit
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", NumbaPerformanceWarning)
-            self._call(self._runs(np.zeros(1, dtype=np.int64), empty_books(1)), 0)
+            self._call(self._runs(np.zeros(1, dtype=np.int64), empty_accumulators(1)), 0)
         fitting = [
             one.max_cooperative_grid_blocks(self.structure.threads) for one in self.kernel.overloads.values()
         ]
         self.blocks = max(
             1, min(max(fitting, default=1), options.most_blocks or ensemble.size, ensemble.size)
         )
-        self.kept, self.work = self._room()
+        self.kernel_output, self.work = self._room()
 
     def _room(self) -> tuple[Any, Any]:
         """What blocks keep of their own: marks and state of the run laid down, and work arrays."""
@@ -148,7 +156,7 @@ class _Launch:
         threads, blocks = self.structure.threads, self.blocks
         distinct = (COMPOSITIONS[self.ensemble.order].flow.size + 1) // 2
         flows = (self.finest + 3) * distinct + 2
-        kept = DeviceKept(
+        kernel_output = DeviceKept(
             cuda.to_device(np.full(blocks, -1, dtype=np.int64)),
             cuda.to_device(np.zeros((blocks, MARKS), dtype=np.int64)),
             cuda.to_device(np.zeros((blocks, KEPT))),
@@ -159,9 +167,9 @@ class _Launch:
             cuda.device_array((blocks, self.finest + 3, 2, TURNS), dtype=np.float64),
             cuda.device_array((blocks, self.pieces + 1, 4), dtype=np.float64),
         )
-        return kept, work
+        return kernel_output, work
 
-    def _runs(self, which: _Integers, books: NDArray[Any]) -> tuple[Any, ...]:
+    def _runs(self, which: _Integers, accumulators_of_runs: NDArray[Any]) -> tuple[Any, ...]:
         """The columns of the runs *which*, their queue, and where their results go."""
         from numba import cuda
 
@@ -169,7 +177,7 @@ class _Launch:
 
         ensemble = self.ensemble
         law, drive = ensemble.law.numbers_type(), ensemble.drive.numbers_type()
-        asked = DeviceAsked(
+        kernel_input = DeviceAsked(
             runs=cuda.to_device(np.ascontiguousarray(ensemble.runs[which]).view(np.recarray)),
             law_numbers=cuda.to_device(np.ascontiguousarray(ensemble.law_numbers[which])),
             drive_numbers=cuda.to_device(np.ascontiguousarray(ensemble.drive_numbers[which])),
@@ -177,31 +185,42 @@ class _Launch:
             starts=self.starts,
             law=law(*[0.0] * len(law._fields)),
             drive=drive(*[0.0] * len(drive._fields)),
-            gamma=float(ensemble.structure.tension_stiffness),
+            gamma=float(ensemble.structure.nonlinear_stiffness),
             stretch=float(ensemble.structure.stretch),
             max_steps=ensemble.max_steps,
         )
         return (
-            asked,
+            kernel_input,
             cuda.to_device(np.arange(which.size, dtype=np.int64)),
             cuda.to_device(np.zeros(2, dtype=np.int64)),
-            cuda.to_device(books.view(np.recarray)),
+            cuda.to_device(accumulators_of_runs.view(np.recarray)),
         )
 
     def _call(self, runs: tuple[Any, ...], budget: int) -> _Integers:
         """March every block for *budget* steps; returns how many runs were drawn and how many ended."""
-        asked, order, queue, books = runs
+        kernel_input, order, queue, accumulators_of_runs = runs
         self.kernel[self.blocks, self.structure.threads](
-            *self.fixed, asked, order, queue, self.kept, self.work, books, budget
+            *self.fixed,
+            kernel_input,
+            order,
+            queue,
+            self.kernel_output,
+            self.work,
+            accumulators_of_runs,
+            budget,
         )
         state: _Integers = queue.copy_to_host()
         return state
 
     def march(
-        self, which: _Integers, books: NDArray[Any], ended: Callable[[int], object], budget: int
+        self,
+        which: _Integers,
+        accumulators_of_runs: NDArray[Any],
+        ended: Callable[[int], object],
+        budget: int,
     ) -> int:
         """March the runs *which*, in this order, into *books*; returns the last budget."""
-        runs = self._runs(which, books[which])
+        runs = self._runs(which, accumulators_of_runs[which])
         done = 0
         while done < which.size:
             began = time.perf_counter()
@@ -211,7 +230,7 @@ class _Launch:
             if now > done:
                 ended(now - done)
             done = now
-        books[which] = runs[3].copy_to_host()
+        accumulators_of_runs[which] = runs[3].copy_to_host()
         return budget
 
 
@@ -247,7 +266,7 @@ def run_ensemble(
     reason = refusal(ensemble.structure.omega.size, ensemble.law, ensemble.drive)
     if reason is not None:
         raise InputError(f"engine = 'cuda': {reason}; use engine='cpu'")
-    books = empty_books(ensemble.size)
+    accumulators_of_runs = empty_accumulators(ensemble.size)
     done = 0
 
     def ended(more: int) -> None:
@@ -261,20 +280,20 @@ def run_ensemble(
     order = np.argsort(-ensemble.work, kind="stable")
     budget = options.first_budget
     for first in range(0, order.size, _CHUNK):
-        budget = launch.march(order[first : first + _CHUNK], books, ended, budget)
-    return books
+        budget = launch.march(order[first : first + _CHUNK], accumulators_of_runs, ended, budget)
+    return accumulators_of_runs
 
 
 def _cpu_only(what: str) -> InputError:
     return InputError(f"engine = 'cuda': {what} by the CPU engine alone; use engine='cpu'")
 
 
-def march_landing(ensemble: Ensemble, threads: int | None = None, progress: Any = None) -> Landings:
+def integrate_to_landing(ensemble: Ensemble, threads: int | None = None, progress: Any = None) -> Landings:
     """Refused: states are handed out by the CPU engine."""
     raise _cpu_only("states are handed out")
 
 
-def march_tangents(
+def integrate_tangents(
     ensemble: Ensemble, tangents: _Array, threads: int | None = None, progress: Any = None
 ) -> tuple[Landings, _Array]:
     """Refused: tangents are carried by the CPU engine."""

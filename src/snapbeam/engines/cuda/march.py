@@ -23,13 +23,13 @@ from snapbeam.engines.cuda.block import PARTS, SIMULATED, Block, stride_of
 from snapbeam.engines.cuda.layout import RESIDENT_WARPS, launch_bounds
 from snapbeam.engines.cuda.run import run_functions
 from snapbeam.engines.cuda.step import functions
-from snapbeam.engines.outcomes import empty_books
+from snapbeam.engines.outcomes import empty_accumulators
 from snapbeam.model.contact import ContactLaw
 from snapbeam.model.drive import Drive
 
-__all__ = ["DeviceAsked", "DeviceKept", "DeviceRoom", "march_kernel", "signature"]
+__all__ = ["DeviceAsked", "DeviceKept", "DeviceRoom", "integrate_kernel", "signature"]
 
-_RUNNING = int(RunStatus.RUNNING)
+_RUNNING = int(RunStatus.INTERRUPTED)
 
 
 class DeviceAsked(NamedTuple):
@@ -66,25 +66,36 @@ class DeviceRoom(NamedTuple):
 
 
 @cache
-def march_kernel(order: int, threads: int, columns: int, finest: int, warps: int = RESIDENT_WARPS) -> Any:
+def integrate_kernel(order: int, threads: int, columns: int, finest: int, warps: int = RESIDENT_WARPS) -> Any:
     """The kernel for a composition, a number of threads, of coupled modes (at most) and of halvings."""
     step_functions = functions(order, threads, columns)
-    fixed_of, begin, take_up, lay_down, finish = run_functions(step_functions, threads, finest)
+    fixed_of, begin, restore_state, lay_down, finish = run_functions(step_functions, threads, finest)
     further, synchronise = step_function(step_functions), step_functions.synchronise
-    stride, partial, room = stride_of(threads), 4 * PARTS, 2 * threads + columns
+    stride, partial, scratch = stride_of(threads), 4 * PARTS, 2 * threads + columns
     sums = 4 * stride
 
-    def march(structure, places, coupling, asked, queue_order, queue, kept, work, books, budget):
+    def march(
+        structure,
+        places,
+        coupling,
+        kernel_input,
+        queue_order,
+        queue,
+        kernel_output,
+        work,
+        accumulators_of_runs,
+        budget,
+    ):
         lane, index = cuda.threadIdx.x, cuda.blockIdx.x
         terms = cuda.shared.array(sums, float64)
         parts = cuda.shared.array(partial, float64)
-        values = cuda.shared.array(room, float64)
+        values = cuda.shared.array(scratch, float64)
         drawn = cuda.shared.array(1, int64)
         i = lane
-        while i < max(sums, room):
+        while i < max(sums, scratch):
             if i < sums:
                 terms[i] = 0.0
-            if i < room:
+            if i < scratch:
                 values[i] = 0.0
             i += threads
         column = cuda.local.array(columns, float64)
@@ -95,7 +106,7 @@ def march_kernel(order: int, threads: int, columns: int, finest: int, warps: int
             values[places[0, lane] :], values[places[1, lane] :], column,
             work.flows[index], work.turns[index], work.seen[index],
         )  # fmt: skip
-        run = kept.slots[index]
+        run = kernel_output.slots[index]
         left = budget
         synchronise()
         while left > 0:
@@ -109,25 +120,25 @@ def march_kernel(order: int, threads: int, columns: int, finest: int, warps: int
                 if place >= queue_order.size:
                     break
                 run = queue_order[place]
-            book = books[run]
-            fixed = fixed_of(block, structure, asked, run, fresh)
+            accumulators = accumulators_of_runs[run]
+            fixed = fixed_of(block, structure, kernel_input, run, fresh)
             if fresh:
-                held = begin(block, fixed, asked, run, book)
+                held = begin(block, fixed, kernel_input, run, accumulators)
             else:
-                held = take_up(block, index, kept, book)
+                held = restore_state(block, index, kernel_output, accumulators)
             synchronise()
             while held.status == _RUNNING and left > 0:
                 left -= 1
-                held = further(block, fixed, held, book)
+                held = further(block, fixed, held, accumulators)
             if held.status == _RUNNING:
-                lay_down(block, index, kept, book, held)
+                lay_down(block, index, kernel_output, accumulators, held)
             else:
-                finish(block, fixed, held, book)
+                finish(block, fixed, held, accumulators)
                 if lane == 0:
                     cuda.atomic.add(queue, 1, 1)
                 run = -1
         if lane == 0:
-            kept.slots[index] = run
+            kernel_output.slots[index] = run
 
     bounds = {} if SIMULATED else {"launch_bounds": launch_bounds(threads, columns, warps)}
     return cuda.jit(**bounds)(march)
@@ -140,12 +151,23 @@ def signature(law: type[ContactLaw], drive: type[Drive]) -> tuple[Any, ...]:
     def table(dimensions: int, kind: Any = np.float64) -> Any:
         return np.zeros((1,) * dimensions, dtype=kind)
 
-    asked = DeviceAsked(
+    kernel_input = DeviceAsked(
         np.zeros(1, dtype=RUN), table(2), table(2), table(2), table(3), laws(*[0.0] * len(laws._fields)),
         drives(*[0.0] * len(drives._fields)), 0.0, 0.0, 0,
     )  # fmt: skip
-    kept = DeviceKept(table(1, np.int64), table(2, np.int64), table(2), table(3))
+    kernel_output = DeviceKept(table(1, np.int64), table(2, np.int64), table(2), table(3))
     work = DeviceRoom(table(4), table(4), table(3))
     whole = table(1, np.int64)
-    arguments = (table(2), table(2, np.int64), table(2), asked, whole, whole, kept, work, empty_books(1), 0)
+    arguments = (
+        table(2),
+        table(2, np.int64),
+        table(2),
+        kernel_input,
+        whole,
+        whole,
+        kernel_output,
+        work,
+        empty_accumulators(1),
+        0,
+    )
     return tuple(typeof(argument) for argument in arguments)

@@ -12,22 +12,22 @@ from snapbeam.engines.scalar.contact import contact_energy
 from snapbeam.engines.scalar.decisions import (
     PIECES,
     Clock,
-    Seen,
+    ContactKinematics,
     clock_of,
-    finish_impact,
-    is_quiet,
-    open_book,
+    close_impact,
+    is_low_energy,
+    begin_statistics,
 )
 from snapbeam.engines.scalar.physics import mode_energy, tension_acceleration, tension_energy, tension_factors
 from snapbeam.engines.scalar.tip import Tip, numbers_of, seen_from
 
 __all__ = ["Fixed", "Held", "Standing", "run_functions"]
 
-_OK, _DECIDED, _RUNNING = int(RunStatus.OK), int(RunStatus.DECIDED), int(RunStatus.RUNNING)
+_OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
 _TWO_PI = 2.0 * math.pi
 
-_finish_impact, _open_book = shared(finish_impact), shared(open_book)
-_clock_of, _seen_from, _is_quiet = shared(clock_of), shared(seen_from), shared(is_quiet)
+_finish_impact, _open_book = shared(close_impact), shared(begin_statistics)
+_clock_of, _seen_from, _is_quiet = shared(clock_of), shared(seen_from), shared(is_low_energy)
 
 
 class Fixed(NamedTuple):
@@ -66,16 +66,16 @@ class Held(NamedTuple):
     """Where a run stands."""
 
     t: int
-    home: float
+    well_sign: float
     own: Standing
-    seen: Seen
+    seen: ContactKinematics
     touching: bool
     quiet: bool
     safe_gap: int
     safe_center: int
     onset: int
     deepest: float
-    weighed: int
+    monitor_energy: int
     steps: int
     status: int
 
@@ -83,9 +83,9 @@ class Held(NamedTuple):
 def run_functions(functions: Functions, threads: int, finest: int) -> tuple[Any, Any, Any, Any, Any]:
     """Device functions: fixed_of, begin, take_up, lay_down, finish."""
     begin, finish = _ends(functions)
-    take_up, lay_down = _pauses()
+    restore_state, lay_down = _pauses()
 
-    return _fixing(functions, threads, finest), begin, take_up, lay_down, finish
+    return _fixing(functions, threads, finest), begin, restore_state, lay_down, finish
 
 
 def _fixing(functions: Functions, threads: int, finest: int) -> Any:
@@ -93,19 +93,19 @@ def _fixing(functions: Functions, threads: int, finest: int) -> Any:
     prepare, flow_into, distinct = functions.prepare, functions.flow_into, functions.distinct
 
     @device
-    def fixed_of(block, structure, asked, i, fresh):
+    def fixed_of(block, structure, kernel_input, i, fresh):
         """What stays the same in run *i*; its prepared steps, if it is *fresh*."""
-        lane, record = block.lane, asked.runs[i]
+        lane, record = block.lane, kernel_input.runs[i]
         mode = Mode(
             structure[0, lane], structure[1, lane], structure[2, lane], structure[3, lane],
-            structure[5, lane], asked.contact_rows[record.contact_row, lane], structure[7, lane],
+            structure[5, lane], kernel_input.contact_rows[record.contact_row, lane], structure[7, lane],
         )  # fmt: skip
         struck = Tip(
             record.offset,
-            numbers_of(asked.law, asked.law_numbers, i),
-            numbers_of(asked.drive, asked.drive_numbers, i),
+            numbers_of(kernel_input.law, kernel_input.law_numbers, i),
+            numbers_of(kernel_input.drive, kernel_input.drive_numbers, i),
         )
-        clock = _clock_of(record, asked.max_steps)
+        clock = _clock_of(record, kernel_input.max_steps)
         step_time = clock.step * clock.tick
         fastest = struck.drive.omega
         for j in range(threads):
@@ -120,7 +120,7 @@ def _fixing(functions: Functions, threads: int, finest: int) -> Any:
         return Fixed(
             struck, clock, record.phase, record.rest_contact, record.rest_center, record.tip_speed,
             finest_look, step_pieces, step_time, mode, structure[4, lane], structure[6, lane],
-            asked.gamma, asked.stretch, finest + 2, whole_look,
+            kernel_input.gamma, kernel_input.stretch, finest + 2, whole_look,
         )  # fmt: skip
 
     return fixed_of
@@ -132,25 +132,25 @@ def _ends(functions: Functions) -> tuple[Any, Any]:
     observe = functions.observe
 
     @device
-    def tensioned(block, fixed, home, q, p):
+    def tensioned(block, fixed, well_sign, q, p):
         """This thread's part of a state, with the tension's sums."""
-        g = home * fixed.g
+        g = well_sign * fixed.g
         r = tension(block, q)
         gq, qr, _, _ = sum_four(block, g * q, r * q, 0.0, 0.0)
         along_g, along_r = tension_factors(fixed.gamma, gq, qr)
         return Standing(q, p, tension_acceleration(along_g, along_r, g, r), gq, qr)
 
     @device
-    def begin(block, fixed, asked, i, book):
-        lane, record = block.lane, asked.runs[i]
-        q, p = asked.starts[record.start_row, 0, lane], asked.starts[record.start_row, 1, lane]
-        home = record.home
-        own = tensioned(block, fixed, home, q, p)
-        tip = _seen_from(fixed.struck, home, fixed.rest_contact)
+    def begin(block, fixed, kernel_input, i, accumulators):
+        lane, record = block.lane, kernel_input.runs[i]
+        q, p = kernel_input.starts[record.start_row, 0, lane], kernel_input.starts[record.start_row, 1, lane]
+        well_sign = record.well_sign
+        own = tensioned(block, fixed, well_sign, q, p)
+        tip = _seen_from(fixed.struck, well_sign, fixed.rest_contact)
         about = observe(block, fixed.mode, tip, fixed.phase, q, p)
-        seen = Seen(
-            about.w + home * fixed.rest_contact, about.wv, about.d, about.dv,
-            about.c + home * fixed.rest_center, about.cv,
+        seen = ContactKinematics(
+            about.w + well_sign * fixed.rest_contact, about.wv, about.d, about.dv,
+            about.c + well_sign * fixed.rest_center, about.cv,
         )  # fmt: skip
         energy = sum_one(block, mode_energy(fixed.mode.omega, q, p)) + tension_energy(
             fixed.gamma, own.gq, own.qr
@@ -158,28 +158,32 @@ def _ends(functions: Functions) -> tuple[Any, Any]:
         quiet = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
         touching = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
         if lane == 0:
-            book.status, book.touching, book.onset = _RUNNING, int(touching), 0
+            accumulators.status, accumulators.touching, accumulators.onset = _RUNNING, int(touching), 0
             _open_book(
-                book, seen.c, seen, fixed.struck.law, energy + contact_energy(fixed.struck.law, seen.d)
+                accumulators,
+                seen.c,
+                seen,
+                fixed.struck.law,
+                energy + contact_energy(fixed.struck.law, seen.d),
             )
-        return Held(0, home, own, seen, touching, quiet, 0, 0, 0, max(seen.d, 0.0), 0, 0, _RUNNING)
+        return Held(0, well_sign, own, seen, touching, quiet, 0, 0, 0, max(seen.d, 0.0), 0, 0, _RUNNING)
 
     @device
-    def finish(block, fixed, held, book):
+    def finish(block, fixed, held, accumulators):
         linear = sum_one(block, mode_energy(fixed.mode.omega, held.own.q, held.own.p))
         if block.lane == 0:
             clock, law = fixed.clock, fixed.struck.law
             if held.touching:
-                _finish_impact(book, None, 0, law, held.t, clock.tick)
-            if held.status == _DECIDED:
-                book.decided_at = held.t * clock.tick
-            book.energy = (
+                _finish_impact(accumulators, None, 0, law, held.t, clock.tick)
+            if held.status == _EARLY_STOP:
+                accumulators.early_stop_time = held.t * clock.tick
+            accumulators.energy = (
                 linear
                 + tension_energy(fixed.gamma, held.own.gq, held.own.qr)
                 + contact_energy(law, held.seen.d)
             )
-            book.displacement, book.center = held.seen.w, held.seen.c
-            book.time, book.status, book.steps = held.t, held.status, held.steps
+            accumulators.displacement, accumulators.center = held.seen.w, held.seen.c
+            accumulators.time, accumulators.status, accumulators.steps = held.t, held.status, held.steps
 
     return begin, finish
 
@@ -188,9 +192,9 @@ def _pauses() -> tuple[Any, Any]:
     """Device functions: a run is taken up where it stood, and laid down."""
 
     @device
-    def take_up(block, index, kept, book):
+    def restore_state(block, index, kernel_output, accumulators):
         """Where a run stood when it was laid down."""
-        lane, marks, reals, modes = block.lane, kept.marks, kept.reals, kept.modes
+        lane, marks, reals, modes = block.lane, kernel_output.marks, kernel_output.reals, kernel_output.modes
         own = Standing(
             modes[index, 0, lane],
             modes[index, 1, lane],
@@ -198,7 +202,7 @@ def _pauses() -> tuple[Any, Any]:
             reals[index, 6],
             reals[index, 7],
         )
-        seen = Seen(
+        seen = ContactKinematics(
             reals[index, 0],
             reals[index, 1],
             reals[index, 2],
@@ -207,31 +211,35 @@ def _pauses() -> tuple[Any, Any]:
             reals[index, 5],
         )
         return Held(
-            book.time, float(marks[index, 2]), own, seen, book.touching != 0, marks[index, 3] != 0,
-            marks[index, 0], marks[index, 1], book.onset, reals[index, 8], marks[index, 4], book.steps, _RUNNING,
+            accumulators.time, float(marks[index, 2]), own, seen, accumulators.touching != 0, marks[index, 3] != 0,
+            marks[index, 0], marks[index, 1], accumulators.onset, reals[index, 8], marks[index, 4], accumulators.steps, _RUNNING,
         )  # fmt: skip
 
     @device
-    def lay_down(block, index, kept, book, held):
+    def lay_down(block, index, kernel_output, accumulators, held):
         lane = block.lane
         own, seen = held.own, held.seen
-        kept.modes[index, 0, lane], kept.modes[index, 1, lane], kept.modes[index, 2, lane] = (
+        (
+            kernel_output.modes[index, 0, lane],
+            kernel_output.modes[index, 1, lane],
+            kernel_output.modes[index, 2, lane],
+        ) = (
             own.q,
             own.p,
             own.k,
         )
         if lane == 0:
-            marks, reals = kept.marks, kept.reals
+            marks, reals = kernel_output.marks, kernel_output.reals
             marks[index, 0], marks[index, 1], marks[index, 2] = (
                 held.safe_gap,
                 held.safe_center,
-                int(held.home),
+                int(held.well_sign),
             )
-            marks[index, 3], marks[index, 4] = int(held.quiet), held.weighed
+            marks[index, 3], marks[index, 4] = int(held.quiet), held.monitor_energy
             reals[index, 0], reals[index, 1], reals[index, 2] = seen.w, seen.wv, seen.d
             reals[index, 3], reals[index, 4], reals[index, 5] = seen.dv, seen.c, seen.cv
             reals[index, 6], reals[index, 7], reals[index, 8] = own.gq, own.qr, held.deepest
-            book.time, book.status, book.steps = held.t, held.status, held.steps
-            book.touching, book.onset = int(held.touching), held.onset
+            accumulators.time, accumulators.status, accumulators.steps = held.t, held.status, held.steps
+            accumulators.touching, accumulators.onset = int(held.touching), held.onset
 
-    return take_up, lay_down
+    return restore_state, lay_down

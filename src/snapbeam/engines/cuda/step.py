@@ -17,10 +17,10 @@ from numba import cuda
 from snapbeam.engines.cuda.block import device, sums, synchroniser
 from snapbeam.engines.scalar.composition import COMPOSITIONS
 from snapbeam.engines.scalar.contact import contact_force
-from snapbeam.engines.scalar.decisions import Seen
+from snapbeam.engines.scalar.decisions import ContactKinematics
 from snapbeam.engines.scalar.lanes import fma
 from snapbeam.engines.scalar.physics import (
-    circle,
+    sincos_cosm1,
     decay_less_one,
     rotation,
     shaker_motion,
@@ -58,7 +58,7 @@ class Functions(NamedTuple):
     prepare: Any
     observe: Any
     take_step: Any
-    look_inside: Any
+    sample_inside_step: Any
 
 
 def _flows(order: int, threads: int, synchronise: Any) -> tuple[Any, Any]:
@@ -69,7 +69,7 @@ def _flows(order: int, threads: int, synchronise: Any) -> tuple[Any, Any]:
 
     @device
     def flow_into(block, mode, length, at):
-        sine, _, less_one = circle(mode.omega_damped * length)
+        sine, _, less_one = sincos_cosm1(mode.omega_damped * length)
         if mode.damping * abs(length) > 4.0 or mode.omega_damped == 0.0:
             over = sine / mode.omega_damped if mode.omega_damped > 0.0 else length
             lost = math.expm1(-mode.damping * length)
@@ -129,10 +129,10 @@ def functions(order: int, threads: int, columns: int) -> Functions:
         w, rate, c, c_rate = sum_four(
             block, mode.contact * q, mode.contact * p, mode.center * q, mode.center * p
         )
-        return Seen(w, rate, tip.offset + motion - w, velocity - rate, c, c_rate)
+        return ContactKinematics(w, rate, tip.offset + motion - w, velocity - rate, c, c_rate)
 
     @device
-    def press(block, tip, slot, stage, sine0, cosine0, cq):
+    def evaluate_contacts(block, tip, slot, stage, sine0, cosine0, cq):
         """Contact force at a kick, and the velocity of the tip."""
         sine, cosine = block.turns[slot, 0, stage], block.turns[slot, 1, stage]
         sine, cosine = sine0 * cosine + cosine0 * sine, cosine0 * cosine - sine0 * sine
@@ -153,7 +153,7 @@ def functions(order: int, threads: int, columns: int) -> Functions:
         if touching:
             sine0, cosine0 = sincos(phase)
             cq = sum_one(block, mode.contact * q)
-            force, velocity = press(block, tip, slot, 0, sine0, cosine0, cq)
+            force, velocity = evaluate_contacts(block, tip, slot, 0, sine0, cosine0, cq)
             impulse = weight * force
             work = weight * force * velocity
             gross = weight * abs(force * velocity)
@@ -168,7 +168,7 @@ def functions(order: int, threads: int, columns: int) -> Functions:
             weight = kick[stage] * length
             if touching:
                 gq, qr, cq = sum_three(block, g * q, r * q, mode.contact * q)
-                force, velocity = press(block, tip, slot, stage, sine0, cosine0, cq)
+                force, velocity = evaluate_contacts(block, tip, slot, stage, sine0, cosine0, cq)
                 impulse += weight * force
                 work += weight * force * velocity
                 gross += weight * abs(force * velocity)
@@ -180,8 +180,8 @@ def functions(order: int, threads: int, columns: int) -> Functions:
         return q, p, k, gq, qr, impulse, work, gross
 
     @device
-    def look_inside(block, mode, tip, at, pieces, piece, phase, q, p, k, k1):
-        """As :func:`snapbeam.engines.cpu.step.look_inside`; *at* is the flow over one piece."""
+    def sample_inside_step(block, mode, tip, at, pieces, piece, phase, q, p, k, k1):
+        """As :func:`snapbeam.engines.cpu.step.sample_inside_step`; *at* is the flow over one piece."""
         contact0, contact1, center0, center1 = sum_four(
             block, mode.contact * k, mode.contact * k1, mode.center * k, mode.center * k1
         )
@@ -209,5 +209,14 @@ def functions(order: int, threads: int, columns: int) -> Functions:
         synchronise()
 
     return Functions(
-        distinct, synchronise, sum_one, sum_four, tension, flow_into, prepare, observe, take_step, look_inside
+        distinct,
+        synchronise,
+        sum_one,
+        sum_four,
+        tension,
+        flow_into,
+        prepare,
+        observe,
+        take_step,
+        sample_inside_step,
     )

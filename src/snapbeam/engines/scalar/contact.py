@@ -20,14 +20,14 @@ __all__ = [
     "contact_slope",
     "felt_force",
     "is_impulsive",
-    "is_lossy",
+    "is_rate_dependent",
     "jumps",
     "kick_force",
     "mark_of",
     "peak_force",
     "released_at",
     "scalar_function",
-    "slack_at",
+    "zero_force_crossing",
 ]
 
 
@@ -88,13 +88,13 @@ def peak_force(law: Any, deepest: float) -> float:
     the penetration is, the greatest force while the bodies stay together.
     """
     owner = type(law).owner
-    return deepest if owner.impulsive or owner.lossy else contact_force(law, deepest)
+    return deepest if owner.impulsive or owner.rate_dependent else contact_force(law, deepest)
 
 
 @overloaded(peak_force)
 def _peak_force(law, deepest):
     owner = law.instance_class.owner
-    if owner.impulsive or owner.lossy:
+    if owner.impulsive or owner.rate_dependent:
         return lambda law, deepest: deepest
     return lambda law, deepest: contact_force(law, deepest)
 
@@ -110,44 +110,44 @@ def _is_impulsive(law):
     return lambda law: impulsive
 
 
-def is_lossy(law: Any) -> bool:
+def is_rate_dependent(law: Any) -> bool:
     """Whether the force under the law depends on the rate of penetration."""
-    return bool(type(law).owner.lossy)
+    return bool(type(law).owner.rate_dependent)
 
 
-@overloaded(is_lossy)
-def _is_lossy(law):
-    lossy = bool(law.instance_class.owner.lossy)
-    return lambda law: lossy
+@overloaded(is_rate_dependent)
+def _is_rate_dependent(law):
+    rate_dependent = bool(law.instance_class.owner.rate_dependent)
+    return lambda law: rate_dependent
 
 
 def jumps(law: Any) -> bool:
     """Whether a force that is integrated begins with a jump, so that it matters when exactly it begins."""
     owner = type(law).owner
-    return bool(owner.lossy and not owner.keeps.smooth)
+    return bool(owner.rate_dependent and not owner.properties.smooth)
 
 
 @overloaded(jumps)
 def _jumps(law):
     owner = law.instance_class.owner
-    found = bool(owner.lossy and not owner.keeps.smooth)
+    found = bool(owner.rate_dependent and not owner.properties.smooth)
     return lambda law: found
 
 
 def felt_force(law: Any, penetration: float, rate: float) -> float:
     """The force on tip and beam, N, at a penetration and its rate."""
     owner: Any = type(law).owner
-    if not owner.lossy or penetration <= 0.0:
+    if not owner.rate_dependent or penetration <= 0.0:
         return contact_force(law, penetration)
-    return max(0.0, float(owner.force(law, penetration) + owner.damping(law, penetration) * rate))
+    return max(0.0, float(owner.force(law, penetration) + owner.damping_coefficient(law, penetration) * rate))
 
 
 @overloaded(felt_force)
 def _felt_force(law, penetration, rate):
     owner = law.instance_class.owner
-    if not owner.lossy:
+    if not owner.rate_dependent:
         return lambda law, penetration, rate: contact_force(law, penetration)
-    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping")
+    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping_coefficient")
 
     def implementation(law, penetration, rate):
         if penetration > 0.0:
@@ -168,7 +168,7 @@ def kick_force(law: Any, penetration: float, rate: float, mobility: float, push:
 @overloaded(kick_force)
 def _kick_force(law, penetration, rate, mobility, push, weight):
     owner = law.instance_class.owner
-    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping")
+    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping_coefficient")
 
     def implementation(law, penetration, rate, mobility, push, weight):
         if weight == 0.0:
@@ -183,17 +183,17 @@ def _kick_force(law, penetration, rate, mobility, push, weight):
 
 def mark_of(law: Any, penetration: float, rate: float) -> float:
     """What a book keeps the greatest of in a contact: the penetration, or the force of a law that loses energy."""
-    return max(penetration, 0.0) if not type(law).owner.lossy else felt_force(law, penetration, rate)
+    return max(penetration, 0.0) if not type(law).owner.rate_dependent else felt_force(law, penetration, rate)
 
 
 @overloaded(mark_of)
 def _mark_of(law, penetration, rate):
-    if law.instance_class.owner.lossy:
+    if law.instance_class.owner.rate_dependent:
         return lambda law, penetration, rate: felt_force(law, penetration, rate)
     return lambda law, penetration, rate: max(penetration, 0.0)
 
 
-def slack_at(law: Any, d0: float, v0: float, d1: float, v1: float, length: float) -> float:
+def zero_force_crossing(law: Any, d0: float, v0: float, d1: float, v1: float, length: float) -> float:
     """Where in (0, 1) of a step in contact the force vanishes or begins, though the penetration does not; -1: nowhere.
 
     Penetration and rate are those at the two ends, the cubic through them is followed.
@@ -201,12 +201,12 @@ def slack_at(law: Any, d0: float, v0: float, d1: float, v1: float, length: float
     raise TypeError("slack_at runs in compiled code only")
 
 
-@overloaded(slack_at)
+@overloaded(zero_force_crossing)
 def _slack_at(law, d0, v0, d1, v1, length):
     owner = law.instance_class.owner
-    if not owner.lossy:
+    if not owner.rate_dependent:
         return lambda law, d0, v0, d1, v1, length: -1.0
-    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping")
+    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping_coefficient")
 
     def implementation(law, d0, v0, d1, v1, length):
         if d0 <= 0.0:
@@ -241,9 +241,9 @@ def released_at(law: Any, penetration: float, rate: float) -> float:
 @overloaded(released_at)
 def _released_at(law, penetration, rate):
     owner = law.instance_class.owner
-    if not owner.lossy:
+    if not owner.rate_dependent:
         return lambda law, penetration, rate: penetration
-    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping")
+    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping_coefficient")
 
     def implementation(law, penetration, rate):
         if penetration > 0.0 and rate < 0.0:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import mark_of, peak_force
 from snapbeam.engines.scalar.lanes import select_less
-from snapbeam.engines.scalar.signals import count_crossings, first_rise, sign_of, widened
+from snapbeam.engines.scalar.signals import count_zero_crossings, first_upcrossing, sign_of, update_extrema
 
 __all__ = [
     "GRADING",
@@ -16,22 +16,22 @@ __all__ = [
     "STRETCHED",
     "TRUST",
     "Clock",
-    "Seen",
+    "ContactKinematics",
     "clock_of",
     "contact_level",
-    "count_in_step",
-    "entry_again",
-    "finish_impact",
-    "first_entry",
+    "count_zero_crossings_in_step",
+    "refine_onset",
+    "close_impact",
+    "first_contact_onset",
     "flight_level",
-    "is_quiet",
-    "leave_contact_open",
-    "open_book",
-    "quiet_energy",
-    "safe_for",
+    "is_low_energy",
+    "accumulate_open_contact",
+    "begin_statistics",
+    "low_energy_limit",
+    "safe_interval",
     "ticks_of",
-    "track",
-    "track_energy",
+    "accumulate_displacement",
+    "accumulate_energy",
 ]
 
 
@@ -61,7 +61,7 @@ class Clock(NamedTuple):
     """Crossings in the last quarter beyond which the response is continuous; -1: never decide."""
 
 
-class Seen(NamedTuple):
+class ContactKinematics(NamedTuple):
     """What is seen of a run at an instant, from the striker's side."""
 
     w: float
@@ -112,55 +112,55 @@ def clock_of(run, max_steps):
 
 
 @compiled
-def open_book(book, center, seen, law, energy):
+def begin_statistics(accumulators, center, seen, law, energy):
     """Begin a run's statistics with what is seen of it at the start.
 
     *center* is where the centre is from the height that divides the wells.
     """
-    book.side = sign_of(center, 0)
-    book.min_displacement, book.max_displacement = seen.w, seen.w
-    book.min_center, book.max_center = seen.c, seen.c
-    book.deepest = mark_of(law, seen.d, seen.dv)
-    book.first_energy = energy
+    accumulators.side = sign_of(center, 0)
+    accumulators.min_displacement, accumulators.max_displacement = seen.w, seen.w
+    accumulators.min_center, accumulators.max_center = seen.c, seen.c
+    accumulators.deepest = mark_of(law, seen.d, seen.dv)
+    accumulators.first_energy = energy
 
 
 @compiled
-def finish_impact(book, impacts, before, law, end, tick):
+def close_impact(accumulators, impacts, before, law, end, tick):
     """Enter the contact that ends at tick *end* in the statistics, unless nothing was pressed.
 
     *impacts* is a table that begins after *before* impacts, or None.
     """
-    deepest = book.deepest
+    deepest = accumulators.deepest
     if deepest > 0.0:
-        duration = (end - book.onset) * tick
+        duration = (end - accumulators.onset) * tick
         force = peak_force(law, deepest)
         if impacts is not None:
-            at = book.impacts - before
+            at = accumulators.impacts - before
             if at < impacts.shape[0]:
-                impacts[at, 0] = book.onset * tick
+                impacts[at, 0] = accumulators.onset * tick
                 impacts[at, 1] = duration
                 impacts[at, 2] = force
-                impacts[at, 3] = book.impulse
-        book.impacts += 1
+                impacts[at, 3] = accumulators.impulse
+        accumulators.impacts += 1
         # of a contact that began before the run, what falls into it
-        book.contact_time += duration if book.onset >= 0 else end * tick
-        book.peak_force = max(book.peak_force, force)
-    book.total_impulse += book.impulse
-    book.touching = 0
-    book.deepest = 0.0
-    book.impulse = 0.0
+        accumulators.contact_time += duration if accumulators.onset >= 0 else end * tick
+        accumulators.peak_force = max(accumulators.peak_force, force)
+    accumulators.total_impulse += accumulators.impulse
+    accumulators.touching = 0
+    accumulators.deepest = 0.0
+    accumulators.impulse = 0.0
 
 
 @compiled
-def leave_contact_open(book, law, end, tick):
+def accumulate_open_contact(accumulators, law, end, tick):
     """Enter what a contact gave so far, of a run that is to go on from tick *end*."""
-    book.contact_time += (end - max(book.onset, 0)) * tick
-    book.total_impulse += book.impulse
-    book.peak_force = max(book.peak_force, peak_force(law, book.deepest))
+    accumulators.contact_time += (end - max(accumulators.onset, 0)) * tick
+    accumulators.total_impulse += accumulators.impulse
+    accumulators.peak_force = max(accumulators.peak_force, peak_force(law, accumulators.deepest))
 
 
 @compiled
-def safe_for(distance, bound, tip_speed, acceleration, step):
+def safe_interval(distance, bound, tip_speed, acceleration, step):
     """For how long a signal at *distance* from zero cannot reach it, at most a few steps."""
     horizon = TRUST * step
     speed = _MARGIN * bound + tip_speed + abs(acceleration) * horizon
@@ -180,16 +180,16 @@ def contact_level(clock, elapsed, d, dv):
 
 
 @compiled
-def is_quiet(energy, gamma, stretch_at_rest):
+def is_low_energy(energy, gamma, stretch_at_rest):
     """Whether a beam of this energy above the well stays far below the barrier, gamma s^2 / 4 for squared slopes s.
 
     Without impact and damping the energy is constant, so that the length of the steps is.
     """
-    return energy < quiet_energy(gamma, stretch_at_rest)
+    return energy < low_energy_limit(gamma, stretch_at_rest)
 
 
 @inlined
-def quiet_energy(gamma, stretch_at_rest):
+def low_energy_limit(gamma, stretch_at_rest):
     """The energy below which a beam is quiet."""
     return _QUIET * 0.25 * gamma * stretch_at_rest * stretch_at_rest
 
@@ -214,17 +214,17 @@ def flight_level(clock, quiet, stretch, stretch_at_rest):
 
 
 @compiled
-def first_entry(looked, pieces, piece):
+def first_contact_onset(looked, pieces, piece):
     """When the penetration first becomes positive inside a step that was looked into; -1 if it does not."""
     for i in range(pieces):
-        rise = first_rise(looked[i, 0], looked[i, 1], looked[i + 1, 0], looked[i + 1, 1], piece)
+        rise = first_upcrossing(looked[i, 0], looked[i, 1], looked[i + 1, 0], looked[i + 1, 1], piece)
         if rise >= 0.0:
             return (i + rise) * piece
     return -1.0
 
 
 @compiled
-def entry_again(clock, cut, whole, seen, least):
+def refine_onset(clock, cut, whole, seen, least):
     """Where a step of *whole* ticks is to be cut that was cut at *cut*, where the gap has not just closed.
 
     What was seen inside the step was seen by linear modes under a tension that changes evenly; a step that ends there
@@ -238,7 +238,9 @@ def entry_again(clock, cut, whole, seen, least):
 
 
 @compiled
-def count_in_step(book, clock, start, length, seen, seen1, looked, rest, pieces, piece):
+def count_zero_crossings_in_step(
+    accumulators, clock, start, length, seen, seen1, looked, rest, pieces, piece
+):
     """Count zero crossings of the centre in a step, through what was seen when it was looked into."""
     left, left_rate, begun = seen.c, seen.cv, 0.0
     i = 1
@@ -247,14 +249,16 @@ def count_in_step(book, clock, start, length, seen, seen1, looked, rest, pieces,
             right, right_rate, ended = rest + looked[i, 2], looked[i, 3], i * piece
         else:
             right, right_rate, ended = seen1.c, seen1.cv, length
-        found, last, side = count_crossings(book.side, left, left_rate, right, right_rate, ended - begun)
-        book.side = side
+        found, last, side = count_zero_crossings(
+            accumulators.side, left, left_rate, right, right_rate, ended - begun
+        )
+        accumulators.side = side
         if found > 0:
             when = start * clock.tick + begun + last * (ended - begun)
-            book.crossings += found
-            book.last_crossing = when
+            accumulators.zero_crossings += found
+            accumulators.last_zero_crossing = when
             if when > clock.last_quarter * clock.tick:
-                book.crossings_last_quarter += found
+                accumulators.zero_crossings_last_quarter += found
         if ended >= length:
             return
         left, left_rate, begun = right, right_rate, ended
@@ -262,25 +266,31 @@ def count_in_step(book, clock, start, length, seen, seen1, looked, rest, pieces,
 
 
 @compiled
-def track(book, seen, seen1, length):
+def accumulate_displacement(accumulators, seen, seen1, length):
     """Widen the extremes of the beam at the striker and at the centre by a step, and add to their mean squares."""
-    book.min_displacement, book.max_displacement = widened(
-        book.min_displacement, book.max_displacement, seen.w, seen.wv, seen1.w, seen1.wv, length
+    accumulators.min_displacement, accumulators.max_displacement = update_extrema(
+        accumulators.min_displacement,
+        accumulators.max_displacement,
+        seen.w,
+        seen.wv,
+        seen1.w,
+        seen1.wv,
+        length,
     )
-    book.min_center, book.max_center = widened(
-        book.min_center, book.max_center, seen.c, seen.cv, seen1.c, seen1.cv, length
+    accumulators.min_center, accumulators.max_center = update_extrema(
+        accumulators.min_center, accumulators.max_center, seen.c, seen.cv, seen1.c, seen1.cv, length
     )
-    book.peak_velocity = max(book.peak_velocity, abs(seen1.wv))
-    book.peak_center_velocity = max(book.peak_center_velocity, abs(seen1.cv))
+    accumulators.peak_velocity = max(accumulators.peak_velocity, abs(seen1.wv))
+    accumulators.peak_midspan_velocity = max(accumulators.peak_midspan_velocity, abs(seen1.cv))
     half = 0.5 * length
-    book.square_displacement += half * (seen.w * seen.w + seen1.w * seen1.w)
-    book.square_center += half * (seen.c * seen.c + seen1.c * seen1.c)
-    book.square_velocity += half * (seen.wv * seen.wv + seen1.wv * seen1.wv)
-    book.square_center_velocity += half * (seen.cv * seen.cv + seen1.cv * seen1.cv)
+    accumulators.square_displacement += half * (seen.w * seen.w + seen1.w * seen1.w)
+    accumulators.square_center += half * (seen.c * seen.c + seen1.c * seen1.c)
+    accumulators.square_velocity += half * (seen.wv * seen.wv + seen1.wv * seen1.wv)
+    accumulators.square_midspan_velocity += half * (seen.cv * seen.cv + seen1.cv * seen1.cv)
 
 
 @compiled
-def track_energy(book, whole, high, span):
+def accumulate_energy(accumulators, whole, high, span):
     """Add to the energy of the modes over time, all of them and those above a frequency."""
-    book.energy_time += whole * span
-    book.high_energy_time += high * span
+    accumulators.energy_time += whole * span
+    accumulators.high_energy_time += high * span

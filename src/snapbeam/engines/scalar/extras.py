@@ -37,13 +37,15 @@ def extras_of_table() -> Any:
 
 
 def observe(
-    extras: Any, book: Any, time: float, length: float, seen: Any, seen1: Any, touching: bool
+    extras: Any, accumulators: Any, time: float, length: float, seen: Any, seen1: Any, touching: bool
 ) -> None:
     """Update every registered statistic by a step."""
     rows = type(extras).owner.rows
     for row in rows:
         name = f"own_{row.name}"
-        book[name] = row.update(book[name], _passed.py_func(time, length, seen, seen1, touching))
+        accumulators[name] = row.update(
+            accumulators[name], _passed.py_func(time, length, seen, seen1, touching)
+        )
 
 
 @inlined
@@ -59,7 +61,7 @@ def _chain(rows: tuple[Statistic, ...]) -> Any:
     if not rows:
 
         @inlined
-        def nothing(book, passed):
+        def nothing(accumulators, passed):
             return
 
         return nothing
@@ -67,21 +69,21 @@ def _chain(rows: tuple[Statistic, ...]) -> Any:
     name, update, rest = f"own_{rows[0].name}", inlined(rows[0].update), _chain(rows[1:])
 
     @inlined
-    def one_and_rest(book, passed):
-        book[name] = update(book[name], passed)
-        rest(book, passed)
+    def one_and_rest(accumulators, passed):
+        accumulators[name] = update(accumulators[name], passed)
+        rest(accumulators, passed)
 
     return one_and_rest
 
 
 @overloaded(observe)
-def _observe(extras, book, time, length, seen, seen1, touching):
+def _observe(extras, accumulators, time, length, seen, seen1, touching):
     rows = extras.instance_class.owner.rows
     if not rows:
-        return lambda extras, book, time, length, seen, seen1, touching: None
+        return lambda extras, accumulators, time, length, seen, seen1, touching: None
     apply = _chain(rows)
 
-    def implementation(extras, book, time, length, seen, seen1, touching):
-        apply(book, _passed(time, length, seen, seen1, touching))
+    def implementation(extras, accumulators, time, length, seen, seen1, touching):
+        apply(accumulators, _passed(time, length, seen, seen1, touching))
 
     return implementation

@@ -33,7 +33,7 @@ __all__ = [
     "move",
     "select_less",
     "splat",
-    "spread_at",
+    "broadcast_load",
     "store",
     "vabs",
     "vfloor",
@@ -87,7 +87,7 @@ def load(typingctx: Any, array: Any, index: Any) -> Any:
 
 
 @intrinsic
-def spread_at(typingctx: Any, array: Any, index: Any) -> Any:
+def broadcast_load(typingctx: Any, array: Any, index: Any) -> Any:
     """``array[index]`` in every lane, unchecked."""
 
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:

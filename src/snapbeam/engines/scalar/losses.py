@@ -93,10 +93,10 @@ def lossy_kick(force, damping, mobility, push, rate, weight):
         v = rate - push * span - mobility * pressed.impulse
         return Loss(pressed.impulse, pressed.lost - force * (v * rest - 0.5 * push * rest * rest))
     # apart; the rate changes by the push alone until the bodies press, if they do
-    meets = felt / (damping * push) if damping * push != 0.0 else math.inf
+    detect_contact_event = felt / (damping * push) if damping * push != 0.0 else math.inf
     span = weight
-    if meets / weight >= 0.0 and meets / weight < 1.0:
-        span = meets
+    if detect_contact_event / weight >= 0.0 and detect_contact_event / weight < 1.0:
+        span = detect_contact_event
     lost = -force * (rate * span - 0.5 * push * span * span)
     rest = weight - span
     if rest == 0.0:

@@ -15,7 +15,7 @@ from snapbeam.engines.scalar.compile import inlined
 from snapbeam.engines.scalar.lanes import fma, select_less, vfloor
 
 __all__ = [
-    "circle",
+    "sincos_cosm1",
     "decay_less_one",
     "mode_energy",
     "rotation",
@@ -90,13 +90,13 @@ def rotation(damping, omega_squared, sine_over, cosine_less_one, decay_less_one)
 
 @inlined
 def sincos(x):
-    """Sine and cosine from additions and multiplications alone; see :func:`circle`."""
-    sine, cosine, _ = circle(x)
+    """Sine and cosine from additions and multiplications alone; see :func:`sincos_cosm1`."""
+    sine, cosine, _ = sincos_cosm1(x)
     return sine, cosine
 
 
 @inlined
-def circle(x):
+def sincos_cosm1(x):
     """Sine, cosine and cosine - 1 from additions and multiplications alone, the same in lanes and in scalars.
 
     Argument reduction in three steps and Taylor polynomials on [-pi/4, pi/4]; within 3e-16 for

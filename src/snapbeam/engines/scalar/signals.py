@@ -12,14 +12,22 @@ import math
 
 from snapbeam.engines.scalar.compile import called, inlined
 
-__all__ = ["bulge", "count_crossings", "first_fall", "first_rise", "sign_of", "turning_point", "widened"]
+__all__ = [
+    "hermite_overshoot_bound",
+    "count_zero_crossings",
+    "first_downcrossing",
+    "first_upcrossing",
+    "sign_of",
+    "turning_point",
+    "update_extrema",
+]
 
 _BULGE = 0.15
 """Times h and the sum of both slopes: a Hermite cubic stays that close to its ends (4/27, rounded up)."""
 
 
 @inlined
-def bulge(v0, v1, h):
+def hermite_overshoot_bound(v0, v1, h):
     """How far the cubic can at most pass the greater and the lesser of its end values."""
     return _BULGE * h * (abs(v0) + abs(v1))
 
@@ -87,9 +95,9 @@ def root(c0, c1, c2, c3, low, high):
 
 
 @inlined
-def first_rise(u0, v0, u1, v1, h):
+def first_upcrossing(u0, v0, u1, v1, h):
     """Where in [0, 1] the cubic first rises through zero, starting at or below it; -1 if nowhere."""
-    if max(u0, u1) + bulge(v0, v1, h) <= 0.0:
+    if max(u0, u1) + hermite_overshoot_bound(v0, v1, h) <= 0.0:
         return -1.0
     c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
     c0 = min(c0, 0.0)
@@ -108,7 +116,7 @@ def first_rise(u0, v0, u1, v1, h):
 
 
 @inlined
-def first_fall(u0, v0, u1, v1, h):
+def first_downcrossing(u0, v0, u1, v1, h):
     """Where in (0, 1) the cubic first falls through zero, given that it starts above and ends at or below."""
     c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
     return root(c0, c1, c2, c3, 0.0, 1.0)
@@ -125,14 +133,14 @@ def sign_of(u, otherwise):
 
 
 @inlined
-def count_crossings(side, u0, v0, u1, v1, h):
+def count_zero_crossings(side, u0, v0, u1, v1, h):
     """Zero crossings of the cubic, given the *side* (-1, 1; 0: none yet) it was last seen on.
 
     Returns how many, where in [0, 1] the last one is (-1 if none), and the side at the end.  A value
     of exactly zero is on the side that the signal was on before.
     """
     count, last = 0, -1.0
-    if min(side * u0, side * u1) > bulge(v0, v1, h):
+    if min(side * u0, side * u1) > hermite_overshoot_bound(v0, v1, h):
         return count, last, side
     turn = turning_point(u0, v0, u1, v1, h)
     c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
@@ -152,9 +160,9 @@ def count_crossings(side, u0, v0, u1, v1, h):
 
 
 @inlined
-def widened(low, high, u0, v0, u1, v1, h):
+def update_extrema(low, high, u0, v0, u1, v1, h):
     """The range [low, high], widened to hold the cubic on [0, 1]."""
-    lesser, greater, swell = min(u0, u1), max(u0, u1), bulge(v0, v1, h)
+    lesser, greater, swell = min(u0, u1), max(u0, u1), hermite_overshoot_bound(v0, v1, h)
     if greater + swell > high or lesser - swell < low:
         turn = turning_point(u0, v0, u1, v1, h)
         if turn > 0.0:

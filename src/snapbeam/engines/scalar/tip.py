@@ -30,9 +30,9 @@ class Tip(NamedTuple):
 
 
 @inlined
-def seen_from(tip, home, rest):
+def seen_from(tip, well_sign, rest):
     """The tip as seen from the well *home*: +1 the one that rest is measured in, -1 the other."""
-    return Tip(tip.offset + (1.0 - home) * rest, tip.law, tip.drive)
+    return Tip(tip.offset + (1.0 - well_sign) * rest, tip.law, tip.drive)
 
 
 def tip_motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:

@@ -223,7 +223,7 @@ class MapCard:
         limits = self._limits(name, values)
         label, unit = self.source.label(name)
         title = f"{label}{'' if unit == '1' else f' ({unit})'}"
-        title = "" if name == "response" else title
+        title = "" if name == "response_class" else title
         if self.source.is_list and values is not None:
             self.view.show_list(self.plane.x.at, self.plane.y.at, name, values, limits, title)
         else:
@@ -236,11 +236,11 @@ class MapCard:
         if "threshold" in layers and self.source.is_list:
             words.append("the threshold is that of the columns of a grid; these are points")
         wanted = "threshold" in layers and values is not None and not self.source.is_list
-        kinds = self.plane.values("response") if wanted else None
+        kinds = self.plane.values("response_class") if wanted else None
         self.view.show_threshold(kinds)
         self._draw_dots("dots" in layers, words)
         self._draw_marks()
-        self._legend(values if name == "response" else None)
+        self._legend(values if name == "response_class" else None)
         if any(words):
             self._words = [each for each in words if each]
         self.tell()
@@ -249,7 +249,7 @@ class MapCard:
     def show_windows(self) -> None:
         """Draw the windows over the map."""
         shown = self.windows() if "windows" in self.layers.value or not self.source.skeleton.data_vars else []
-        if shown and self.show.value != "response" and not self.source.skeleton.data_vars:
+        if shown and self.show.value != "response_class" and not self.source.skeleton.data_vars:
             known = [w.values[self.show.value][w.stride > 0] for w in shown if self.show.value in w.values]
             self.view.limits = _span(np.concatenate(known)) if known else (0.0, 1.0)
             self.view.mapper.update(
@@ -258,7 +258,7 @@ class MapCard:
         self._drawn = self.view.show_windows(shown, self.show.value)
 
     def _limits(self, name: str, values: NDArray[Any] | None) -> tuple[float, float]:
-        return (0.0, 1.0) if values is None or name == "response" else _span(values)
+        return (0.0, 1.0) if values is None or name == "response_class" else _span(values)
 
     def _fixed_short(self) -> dict[str, Any]:
         from snapbeam.config import lookup
@@ -279,7 +279,7 @@ class MapCard:
             return
         keep = ~np.isnan(getattr(dots, names[0])) & ~np.isnan(getattr(dots, names[1]))
         x, y = (getattr(dots, name)[keep] for name in names)
-        self.view.show_dots(x, y, dots.response[keep])
+        self.view.show_dots(x, y, dots.response_class[keep])
 
     def _draw_marks(self) -> None:
         places = [(self.plane.place(values), text) for values, text in self.marks]
@@ -299,7 +299,7 @@ class MapCard:
                 f'<span class="swatch" style="background:{CLASS_COLORS[kind]}"></span>{kind.label}{share}'
             )
         self.key.object = (
-            f'<div class="key">{" &nbsp; ".join(items)}</div>' if self.show.value == "response" else ""
+            f'<div class="key">{" &nbsp; ".join(items)}</div>' if self.show.value == "response_class" else ""
         )
 
     def say(self, words: str) -> None:
@@ -364,7 +364,9 @@ class MapCard:
         if not held and not self.changed:
             place = self.plane.index(x, y)
             held = {}
-            for each in {"response", "crossings", "peak_force", name} & set(self.source.variables()):
+            for each in {"response_class", "zero_crossings", "peak_force", name} & set(
+                self.source.variables()
+            ):
                 try:
                     values = self.plane.values(each)
                 except InputError:
@@ -372,10 +374,10 @@ class MapCard:
                 if values is not None:
                     held[each] = values[place].item()
         parts = [html.escape(point.words())]
-        if "response" in held:
+        if "response_class" in held:
             parts.append(f"<b>{ResponseClass(int(held['response'])).label}</b>")
-        for each in dict.fromkeys((name, "crossings", "peak_force")):
-            if each in held and each != "response":
+        for each in dict.fromkeys((name, "zero_crossings", "peak_force")):
+            if each in held and each != "response_class":
                 unit = self.source.label(each)[1]
                 parts.append(f"{each.replace('_', ' ')} {held[each]:.5g}{'' if unit == '1' else f' {unit}'}")
         self.hover.object = " &nbsp;·&nbsp; ".join(parts)

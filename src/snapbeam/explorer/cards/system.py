@@ -25,7 +25,7 @@ _SECTIONS = {
     "beam": "Beam", "model": "Reduced model", "contact": "Contact", "striker": "Striker", "drive": "Drive",
     "run": "Integration",
 }  # fmt: skip
-_RUN = ("run.cycles", "run.accuracy", "run.step", "run.early_decision")
+_RUN = ("integration.cycles", "integration.accuracy", "integration.step", "integration.early_termination")
 _PRESETS: dict[str, dict[str, dict[str, Any]]] = {
     "the paper's beam": {},
     "the paper's, one mode": {"model": {"modes": 1}},
@@ -95,7 +95,7 @@ class SystemCard:
 
     def _rows(self) -> list[Parameter]:
         held = self.system.parameters
-        drive = str(held.get("drive.kind", "sine"))
+        drive = str(held.get("drive.type", "sine"))
         rows = []
         for row in parameters().values():
             kinds = {"contact": self.law.value, "drive": drive}
@@ -112,7 +112,7 @@ class SystemCard:
 
     def _fill(self) -> None:
         """Make the fields of the system that is held."""
-        law = str(self.system.parameters.get("contact.law", "hertz"))
+        law = str(self.system.parameters.get("contact.type", "hertz"))
         if self.law.value != law and law in self.law.options:
             self.law.value = law
         self._make_fields()
@@ -122,7 +122,7 @@ class SystemCard:
         held = dict(self.system.parameters)
         held |= {f"run.{name}": value for name, value in integration_mapping(self.integration).items()}
         if self.integration.cycles is None:
-            held["run.cycles"] = self.integration.cycles_or_default
+            held["integration.cycles"] = self.integration.cycles_or_default
         self.fields = {}
         parts: list[Any] = []
         for section, title in _SECTIONS.items():
@@ -139,7 +139,7 @@ class SystemCard:
     def _field(self, row: Parameter, value: Any) -> Any:
         unit = "" if row.quantity.unit == "1" else f" ({row.quantity.unit})"
         name = f"{row.name.partition('.')[2].replace('_', ' ')}{unit}"
-        words = f"{row.quantity.words}; allowed: {row.limits or 'any'}"
+        words = f"{row.quantity.long_name}; allowed: {row.limits or 'any'}"
         common: dict[str, Any] = {"name": name, "width": 160, "description": words}
         if row.quantity.choices:
             field = pn.widgets.Select(options=list(row.quantity.choices), value=value, **common)
@@ -170,11 +170,11 @@ class SystemCard:
                 if row.quantity.kind is int and value == int(value):
                     value = int(value)
             found.setdefault(section, {})[key] = row.quantity.check(name, value)
-        found.setdefault("contact", {})["law"] = self.law.value
+        found.setdefault("contact", {})["type"] = self.law.value
         if found.get("model", {}).get("modes", 1) > MODES:
             raise InputError(f"model.modes: a page may ask for at most {MODES}")
         if found.get("run", {}).get("cycles", 1) > CYCLES:
-            raise InputError(f"run.cycles: a page may ask for at most {CYCLES}")
+            raise InputError(f"integration.cycles: a page may ask for at most {CYCLES}")
         return found
 
     # ------------------------------------------------------------------ doing
@@ -185,8 +185,8 @@ class SystemCard:
             sections = self.sections()
             run = {name: value for name, value in sections.pop("run", {}).items() if value is not None}
             kept = self.system.to_mapping()
-            sections.setdefault("drive", {})["kind"] = kept.get("drive", {}).get("kind", "sine")
-            if sections["drive"]["kind"] != "sine" or "start" in kept or "mass" in kept.get("model", {}):
+            sections.setdefault("drive", {})["type"] = kept.get("drive", {}).get("type", "sine")
+            if sections["drive"]["type"] != "sine" or "start" in kept or "mass" in kept.get("model", {}):
                 raise InputError(
                     "a system with a record, a start of its own or matrices is changed from Python"
                 )
@@ -203,7 +203,7 @@ class SystemCard:
         self.used(system, integration)
 
     def _law_changed(self) -> None:
-        if str(self.system.parameters.get("contact.law")) != self.law.value:
+        if str(self.system.parameters.get("contact.type")) != self.law.value:
             self._make_fields()
 
     def _chosen(self, name: str) -> None:
@@ -241,9 +241,12 @@ class SystemCard:
     def _show_facts(self) -> None:
         model = self.system.model
         facts = [
-            ("f₁", f"{model.reference_freq:.6g} Hz"),
-            ("natural frequencies", ", ".join(f"{value:.4g}" for value in model.natural_freq[:4]) + " Hz"),
-            ("barrier", f"{1e6 * (model.barrier_energy - model.well_energy):.4g} µJ"),
+            ("f₁", f"{model.reference_frequency:.6g} Hz"),
+            (
+                "natural frequencies",
+                ", ".join(f"{value:.4g}" for value in model.natural_frequencies[:4]) + " Hz",
+            ),
+            ("barrier", f"{1e6 * (model.saddle_energy - model.well_energy):.4g} µJ"),
         ]
         beam = model.beam
         if beam is not None:
@@ -252,7 +255,7 @@ class SystemCard:
                 ("P/P_cr", f"{beam.axial_load / beam.critical_load:.5g}"),
             ]
         cells = "".join(f"<td><span class=faint>{name}</span> <b>{value}</b></td>" for name, value in facts)
-        found = [each.words for each in self.system.findings()]
+        found = [each.message for each in self.system.diagnostics()]
         doubts = "".join(f'<p class="bad">{html.escape(each)}</p>' for each in found)
         self.facts.object = f'<table class="facts"><tr>{cells}</tr></table>{doubts}'
 

@@ -168,7 +168,7 @@ class TakeCard:
         quasi = "quasi" in self.page.card.layers.value
         dots = self.page.card.dots if "dots" in self.page.card.layers.value else None
         name = self.page.card.show.value
-        label = name if name != "response" else "map"
+        label = name if name != "response_class" else "map"
         if self.page.card.source.is_list:
             plane = self.page.card.plane
             along = str(plane.x.name), str(plane.y.name)
@@ -186,7 +186,7 @@ class TakeCard:
                 raise InputError("there is no map yet")
             return window_dataset(window)
         cut = source.skeleton.drop_vars(list(source.skeleton.data_vars)).isel(card.plane.fixed)
-        for name in dict.fromkeys(("response", card.show.value)):
+        for name in dict.fromkeys(("response_class", card.show.value)):
             values = source.values(name)
             if values is not None:
                 cut[name] = values.isel(card.plane.fixed)
@@ -240,7 +240,7 @@ class TakeCard:
         self._make("window", ".nc", lambda path, _: write_netcdf(dataset, path))
 
     def _dots(self, content: bytes | None) -> None:
-        from snapbeam.figures import read_dots
+        from snapbeam.figures import read_measured_points
 
         if not content:
             return
@@ -252,7 +252,9 @@ class TakeCard:
                 path = Path(folder) / "dots.csv"
                 path.write_bytes(content)
                 level = attrs.get("beam_buckling_level")
-                dots = read_dots(path, reference_freq=attrs.get("reference_freq"), buckling_level=level)
+                dots = read_measured_points(
+                    path, reference_frequency=attrs.get("reference_frequency"), buckling_level=level
+                )
         except (InputError, UnicodeDecodeError) as error:
             self.refuse(str(error))
             return
@@ -277,7 +279,7 @@ def _draw_map(cut: xr.Dataset, name: str, quasi: bool, dots: Any, path: Any) -> 
     from snapbeam.figures import plot_response_map, plot_statistic, save_figure
 
     with drawing:
-        if name == "response":
+        if name == "response_class":
             ax = plot_response_map(cut, threshold_line=quasi, dots=dots)
         else:
             ax = plot_statistic(cut, name)
@@ -319,10 +321,10 @@ def window_dataset(window: Any) -> xr.Dataset:
     for name, values in window.values.items():
         row = STATISTICS[name]
         held = values.astype(np.float64) if values.dtype.kind == "f" else values.copy()
-        held[~own] = np.nan if held.dtype.kind == "f" else -1 if name == "response" else 0
+        held[~own] = np.nan if held.dtype.kind == "f" else -1 if name == "response_class" else 0
         if name == "status":
             held[~own] = 5
-        dataset[name] = (dims, held, {"units": row.unit, "long_name": row.words})
+        dataset[name] = (dims, held, {"units": row.unit, "long_name": row.long_name})
     dataset["computed"] = (
         dims,
         own.astype(np.int8),

@@ -59,8 +59,8 @@ def parameter_name(skeleton: xr.Dataset, name: str) -> str | None:
 def parameter_dims(skeleton: xr.Dataset) -> list[str]:
     """The dimensions that are swept; one of them is ``point`` for a list."""
     names = [str(name) for name in skeleton.dims]
-    if "response" in skeleton:
-        names = [str(name) for name in skeleton["response"].dims]
+    if "response_class" in skeleton:
+        names = [str(name) for name in skeleton["response_class"].dims]
     return [name for name in names if name == POINT or parameter_name(skeleton, name) is not None]
 
 
@@ -88,7 +88,11 @@ def layers_of(skeleton: xr.Dataset) -> dict[str, Layer]:
     def place(name: str) -> tuple[bool, int, str]:
         # those of one of several strikers after those of all
         whole = name.partition("_striker_")[0] if name in STATISTICS else name
-        return name != "response", order.index(whole) if whole in order else -1, name if whole != name else ""
+        return (
+            name != "response_class",
+            order.index(whole) if whole in order else -1,
+            name if whole != name else "",
+        )
 
     return dict(sorted(found.items(), key=lambda each: place(each[0])))
 
@@ -112,7 +116,7 @@ def chances(layers: dict[str, Layer], held: dict[str, Any]) -> str:
         if isinstance(value, float) and np.isnan(value) and np.isnan(low):
             continue
         parts.append(f"{layer.words} {_number(value)} ({_number(low)} to {_number(high)})")
-    shares = {name: layer for name, layer in layers.items() if layer.variable == "class_share"}
+    shares = {name: layer for name, layer in layers.items() if layer.variable == "class_fraction"}
     some = [
         f"{layer.words.rpartition(': ')[2]} {100.0 * held[name]:.0f} %"
         for name, layer in shares.items()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam import InputError, Integration, Outcome, System
+from snapbeam import InputError, Integration, RunSummary, System
 from snapbeam.config import lookup
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def parameter_of(skeleton: xr.Dataset, name: str) -> str:
     return lookup(str(attrs.get("parameter", name))).name
 
 
-def compared(expected: Mapping[str, Any], outcome: Outcome, engine: str) -> tuple[bool, str]:
+def compared(expected: Mapping[str, Any], outcome: RunSummary, engine: str) -> tuple[bool, str]:
     """Whether a run is what a map holds of it, bit for bit, and words for it."""
     expected = {name: value for name, value in expected.items() if name in outcome}
     if not expected:
@@ -103,13 +103,13 @@ def compared(expected: Mapping[str, Any], outcome: Outcome, engine: str) -> tupl
     differing = []
     for name, value in expected.items():
         found = outcome[name]
-        found = int(found) if name in ("response", "status") else found
+        found = int(found) if name in ("response_class", "status") else found
         same = found == value or (_is_nan(found) and _is_nan(value))
         if not same and name not in ("steps",):
             differing.append(name)
     if not differing:
         return True, f"bit for bit what the map holds ({len(expected)} numbers)"
-    if "response" in differing:
+    if "response_class" in differing:
         return False, "another class than the map's" + _why(expected, engine)
     return True, f"the map's class; differs in {', '.join(differing[:4])}" + _why(expected, engine)
 

@@ -96,7 +96,7 @@ class Source:
             attrs = self.skeleton[name].attrs
             return str(attrs.get("long_name", name)), str(attrs.get("units", "1"))
         row = STATISTICS.get(name)
-        return (name, "1") if row is None else (row.words, row.unit)
+        return (name, "1") if row is None else (row.long_name, row.unit)
 
     def values(self, name: str) -> xr.DataArray | None:
         """A number over the parameters, in memory; None if there are no numbers yet.
@@ -154,7 +154,7 @@ class SystemSource(Source):
     def __init__(self, system: System, axes: Mapping[str, Any], integration: Integration, name: str) -> None:
         self.skeleton = axes_dataset(system, axes, integration)
         self.name = name
-        self.strikers = 1 + len(system.others)
+        self.strikers = 1 + len(system.further_contacts)
 
     def variables(self) -> list[str]:
         """All that a sweep gives."""
@@ -279,17 +279,17 @@ def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integrati
     coords: dict[str, Any] = {}
     for name, values in axes.items():
         row = lookup(name)
-        labels = {"units": row.quantity.unit, "long_name": row.quantity.words, "parameter": row.name}
+        labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
         coords[row.short] = ((row.short,), np.asarray(values), labels)
     for name in ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location"):
         row = lookup(name)
         if row.short not in coords and name in system.parameters:
-            labels = {"units": row.quantity.unit, "long_name": row.quantity.words, "parameter": row.name}
+            labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
             coords[row.short] = ((), system.parameters[name], labels)
     attrs = {
         "modes": system.model.modes,
         "cycles": integration.cycles_or_default,
-        "reference_freq": system.model.reference_freq,
+        "reference_frequency": system.model.reference_frequency,
         "system": json.dumps(_plain(system.to_mapping())),
         "integration": json.dumps(integration_mapping(integration)),
         "snapbeam_version": "",

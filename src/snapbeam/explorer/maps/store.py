@@ -19,7 +19,7 @@ class StoreSource(DatasetSource):
     def __init__(self, path: Path) -> None:
         self._path = path
         self._stamp = self._stamped()
-        super().__init__(sb.read_store(path), path.name)
+        super().__init__(sb.read_checkpoint(path), path.name)
         self._read = time.monotonic()
 
     def _stamped(self) -> tuple[int, int]:
@@ -37,6 +37,6 @@ class StoreSource(DatasetSource):
         if stamp == self._stamp:
             return False
         self._stamp = stamp
-        self.skeleton = sb.read_store(self._path)
+        self.skeleton = sb.read_checkpoint(self._path)
         self.version += 1
         return True

@@ -203,8 +203,8 @@ class BeamView(Part):
             "q": dataset["modal_amplitude"].values[part, :kept].astype(np.float32).ravel()
         }
         shown = (
-            dataset["shaker_displacement"].values[part]
-            if "shaker_displacement" in dataset
+            dataset["striker_displacement"].values[part]
+            if "striker_displacement" in dataset
             else np.full(x[part].size, -1e3)
         )
         self.frames.data = {
@@ -212,7 +212,7 @@ class BeamView(Part):
             "striker": (scale * shown).astype(np.float64),
             "force": np.nan_to_num(force),
         }
-        self.reach = 1.35 * scale * max(1.0, float(np.nanmax(np.abs(dataset["center_displacement"].values))))
+        self.reach = 1.35 * scale * max(1.0, float(np.nanmax(np.abs(dataset["midspan_displacement"].values))))
         if (
             self.fresh
         ):  # the browser draws when it is told of a change, which what comes with the figure is not

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 __all__ = ["Energy"]
 
 _CURVES = {
-    "work_shaker": "work of the striker",
+    "striker_work": "work of the striker",
     "energy_dissipated": "dissipated",
     "energy_beam": "in the beam, above its well",
     "energy_contact": "in the contact",
@@ -33,7 +33,7 @@ class Energy(Part):
         look = self.look
         colors = (look.striker, look.faint, look.center, look.second)
         self.sources = {name: columns(x=[], y=[]) for name in _CURVES}
-        self.sources["work_shaker"].name = self.named("energy")
+        self.sources["striker_work"].name = self.named("energy")
         self.plot = figure(
             look, height=360, x_range=self.cursor.range, y_axis_label="energy (µJ)", y_range=(0.0, 1.0),
             tools="xpan,xbox_zoom,xwheel_zoom,reset", active_drag="xbox_zoom", active_scroll="xwheel_zoom",
@@ -62,10 +62,10 @@ class Energy(Part):
             begun = float(dataset["energy_beam"][0] + dataset["energy_contact"][0])
             parts = {name: float(dataset[name][-1]) for name in _CURVES}
             left = (
-                parts["work_shaker"] + begun - sum(parts[name] for name in _CURVES if name != "work_shaker")
+                parts["striker_work"] + begun - sum(parts[name] for name in _CURVES if name != "striker_work")
             )
-            scale = max(abs(parts["work_shaker"]), parts["energy_dissipated"], 1e-300)
-            barrier = run.system.model.barrier_energy - run.system.model.well_energy
+            scale = max(abs(parts["striker_work"]), parts["energy_dissipated"], 1e-300)
+            barrier = run.system.model.saddle_energy - run.system.model.well_energy
             self.words.object = (
                 f'<p class="note">At the end the books balance to {left:.2g} J, {abs(left) / scale:.1g} of the work. '
                 f"The barrier between the wells is {1e6 * barrier:.4g} µJ.</p>"

@@ -95,13 +95,13 @@ class Numbers(Part):
 
     def show(self, run: Run, low: float, high: float) -> None:
         rows = []
-        for name, value in run.outcome.items():
+        for name, value in run.summary.items():
             row = STATISTICS.get(name)
             shown = getattr(value, "label", None) or getattr(value, "name", None) or value
             text = f"{shown:.8g}" if isinstance(shown, float) else str(shown)
             text = "–" if isinstance(shown, float) and np.isnan(shown) else text
             unit = "" if row is None or row.unit == "1" else row.unit
-            words = "" if row is None else row.words
+            words = "" if row is None else row.long_name
             cells = (
                 html.escape(words),
                 html.escape(text),

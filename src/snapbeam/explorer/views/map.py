@@ -183,7 +183,7 @@ class MapView:
     def show(self, name: str, values: NDArray[Any] | None, limits: tuple[float, float], title: str) -> None:
         """Show a variable, an array of shape (y, x)."""
         self.limits = limits
-        is_class = name == "response"
+        is_class = name == "response_class"
         self.bar.update(visible=not is_class, title=None)
         if not is_class:
             self.mapper.update(low=limits[0], high=limits[1] if limits[1] > limits[0] else limits[0] + 1.0)
@@ -236,7 +236,7 @@ class MapView:
         self.limits = limits
         self.plot.title.text = title
         packed = colors_of(name, values[None, :], limits)[0].view(np.uint8).reshape(-1, 4)
-        self.bar.update(visible=name != "response")
+        self.bar.update(visible=name != "response_class")
         self.mapper.update(low=limits[0], high=limits[1] if limits[1] > limits[0] else limits[0] + 1.0)
         self.list.data = {
             "x": x,

@@ -77,7 +77,9 @@ class Phase(Part):
         x, _ = across(self.run)
         inside = within(x, *self.span)
         step = max(1, -(-(inside.stop - inside.start) // _MOST))
-        w, v = (dataset[f"{before}{name}"].values for name in ("displacement", "velocity"))
+        w, v = (
+            dataset[f"{before}{name}"].values for name in ("displacement_at_striker", "velocity_at_striker")
+        )
         part = slice(inside.start, inside.stop, step)
         for axis_range, values in ((self.section.x_range, w[inside]), (self.section.y_range, v[inside])):
             good = values[np.isfinite(values)]

@@ -111,12 +111,14 @@ class RunView:
         """Show a run; *fresh* if it is not the one before with more samples."""
         self.run = run
         self._write_notes()
-        answer = run.outcome
-        if answer.status in (RunStatus.OK, RunStatus.DECIDED):
+        answer = run.summary
+        if answer.status in (RunStatus.OK, RunStatus.EARLY_STOP):
             well = "upper" if answer.final_well > 0 else "lower"
-            final = ", for good" if answer.end_is_final else ""
-            counts = f"{answer.crossings} crossings, {answer.impacts} impacts, ends in the {well} well{final}"
-            self._head(class_chip(answer.response), words, f'<span class="faint">{counts}</span>')
+            final = ", for good" if answer.final_well_proven else ""
+            counts = (
+                f"{answer.zero_crossings} crossings, {answer.impacts} impacts, ends in the {well} well{final}"
+            )
+            self._head(class_chip(answer.response_class), words, f'<span class="faint">{counts}</span>')
         else:
             why = f'<span class="bad">{answer.status.name}: {html.escape(answer.status.advice)}</span>'
             self._head(class_chip(ResponseClass.UNKNOWN), words, why)

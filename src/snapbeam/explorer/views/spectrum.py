@@ -41,8 +41,10 @@ class Spectrum(Part):
 
     def build(self) -> list[Any]:
         look = self.look
-        self.sources = {name: columns(x=[], y=[]) for name in ("center_displacement", "displacement")}
-        self.sources["center_displacement"].name = self.named("spectrum")
+        self.sources = {
+            name: columns(x=[], y=[]) for name in ("midspan_displacement", "displacement_at_striker")
+        }
+        self.sources["midspan_displacement"].name = self.named("spectrum")
         plot = figure(
             look, height=420, title=" ", y_axis_type="log", y_axis_label="amplitude (b)",
             x_axis_label="frequency over f₁", x_range=(0.0, 12.0), y_range=(1e-7, 1.0),
@@ -66,7 +68,7 @@ class Spectrum(Part):
     def show(self, run: Run, low: float, high: float) -> None:
         x, _ = across(run)
         inside = within(x, low, high)
-        time, first = run.dataset["time"].values[inside], run.system.model.reference_freq
+        time, first = run.dataset["time"].values[inside], run.system.model.reference_frequency
         striker = run.system.striker
         ratio = getattr(striker.drive, "frequency_ratio", None) if striker is not None else None
         self.drive.location = ratio

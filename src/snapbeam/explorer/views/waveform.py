@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Waveform"]
 
-_CURVES = ("center_displacement", "displacement", "shaker_displacement")
+_CURVES = ("midspan_displacement", "displacement_at_striker", "striker_displacement")
 
 
 class Waveform(Part):
@@ -26,7 +26,7 @@ class Waveform(Part):
     def build(self) -> list[Any]:
         look = self.look
         self.sources = {name: columns(x=[], y=[]) for name in (*_CURVES, "contact_force")}
-        self.sources["center_displacement"].name = self.named("waveform")
+        self.sources["midspan_displacement"].name = self.named("waveform")
         common: dict[str, Any] = {
             "x_range": self.cursor.range, "tools": "xpan,xbox_zoom,xwheel_zoom,reset",
             "active_drag": "xbox_zoom", "active_scroll": "xwheel_zoom", "output_backend": "canvas",

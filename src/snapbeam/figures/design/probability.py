@@ -18,7 +18,7 @@ from snapbeam.figures.style import CLASS_COLORS, fix_ticks, house_style, new_fig
 if TYPE_CHECKING:
     import xarray as xr
 
-    from snapbeam.lab.compare.dots import Dots
+    from snapbeam.lab.compare.dots import MeasuredPoints
 
 __all__ = ["plot_probability"]
 
@@ -38,7 +38,7 @@ def plot_probability(
     outcome: str = "snap",
     ax: Axes | None = None,
     *,
-    dots: Dots | None = None,
+    dots: MeasuredPoints | None = None,
     levels: tuple[float, ...] = _LEVELS,
 ) -> Axes:
     """Draw a probability map of one outcome.
@@ -144,9 +144,9 @@ def _cells(data: xr.Dataset, ax: Axes, dims: list[str], outcome: str, levels: tu
         ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
 
 
-def _lay_dots(ax: Axes, dims: list[str], dots: Dots) -> None:
+def _lay_dots(ax: Axes, dims: list[str], dots: MeasuredPoints) -> None:
     for kind in ResponseClass:
-        own = dots.response == kind
+        own = dots.response_class == kind
         if own.any():
             ax.scatter(
                 getattr(dots, dims[0])[own], getattr(dots, dims[1])[own], s=12, color=CLASS_COLORS[kind],

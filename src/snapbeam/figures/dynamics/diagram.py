@@ -30,7 +30,7 @@ def plot_diagram(
     ax: Axes | None = None,
     *,
     branches: Sequence[xr.Dataset] = (),
-    variable: str = "center_displacement",
+    variable: str = "midspan_displacement",
 ) -> Axes:
     """Draw a bifurcation diagram, swept up and down, with branches of orbits over it.
 
@@ -41,7 +41,7 @@ def plot_diagram(
     branches : sequence of xarray.Dataset
         Of :meth:`snapbeam.Branch.to_dataset`: stable solid, unstable dashed, events as marks.
     variable : str
-        What is drawn of the diagram; branches have ``center_displacement`` alone, at every return.
+        What is drawn of the diagram; branches have ``midspan_displacement`` alone, at every return.
 
     Raises
     ------
@@ -50,9 +50,9 @@ def plot_diagram(
     """
     if dataset is None and not branches:
         raise InputError("dataset: give a diagram or at least one branch")
-    if branches and variable != "center_displacement":
+    if branches and variable != "midspan_displacement":
         raise InputError(
-            f"variable = {variable!r}: branches have center_displacement alone; draw one or the other"
+            f"variable = {variable!r}: branches have midspan_displacement alone; draw one or the other"
         )
     first = dataset if dataset is not None else branches[0]
     along = str(first.attrs.get("along", ""))
@@ -68,7 +68,7 @@ def plot_diagram(
             handles += _branch(branch, ax, along)
         if dataset is None:
             dress(ax.xaxis, branches[0].swap_dims(orbit=along).drop_duplicates(along), along)
-        words = {"center_displacement": "Centre displacement once a period, over $b$"}
+        words = {"midspan_displacement": "Centre displacement once a period, over $b$"}
         ax.set_ylabel(words.get(variable, variable.replace("_", " ")))
         unique = {handle.get_label(): handle for handle in handles}
         ax.legend(handles=list(unique.values()), loc="best", ncols=2)

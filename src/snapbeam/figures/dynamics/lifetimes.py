@@ -114,7 +114,9 @@ def plot_survival(
     with house_style():
         ax = axes_or_new(ax)
         seen = float(dataset.attrs["cycles"]) - float(dataset.attrs["quiet"])
-        settled = runs["end_is_final"].values.astype(bool) | (runs["status"].values == int(RunStatus.DECIDED))
+        settled = runs["final_well_proven"].values.astype(bool) | (
+            runs["status"].values == int(RunStatus.EARLY_STOP)
+        )
         settled = np.atleast_2d(settled).reshape(rows.shape)
         good = rows.shape[1] - np.atleast_1d(runs["runs_failed"].values).ravel()
         open_ends = False

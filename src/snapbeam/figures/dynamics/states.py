@@ -68,9 +68,9 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 
 @checked
-def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "center_displacement") -> Axes:
+def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_displacement") -> Axes:
     """Draw a Poincare section: a displacement against its velocity."""
-    y = x.replace("displacement", "velocity")
+    y = x.replace("displacement_at_striker", "velocity_at_striker")
     if x not in dataset or y not in dataset:
         raise InputError(f"no {x} and {y} among {list(map(str, dataset.variables))}")
     with house_style():

@@ -51,7 +51,7 @@ def plot_campaign(results: list[TestResult], folder: Path) -> Figure:
         handles = [
             axes[0].plot([], [], "s", color=CLASS_COLORS[kind], label=kind.label)[0]
             for kind in ResponseClass
-            if any(result.response == kind.label for result in results)
+            if any(result.response_class == kind.label for result in results)
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
         fix_ticks(*axes[: len(results)])
@@ -59,7 +59,7 @@ def plot_campaign(results: list[TestResult], folder: Path) -> Figure:
 
 
 def _thumbnail(ax: Axes, result: TestResult, path: Path) -> None:
-    color = CLASS_COLORS[_LABELS.get(result.response, ResponseClass.UNKNOWN)]
+    color = CLASS_COLORS[_LABELS.get(result.response_class, ResponseClass.UNKNOWN)]
     if path.exists():
         import xarray as xr
 
@@ -68,7 +68,7 @@ def _thumbnail(ax: Axes, result: TestResult, path: Path) -> None:
             step = max(1, time.size // 2000)
             faint = 1.0 if result.status == "measured" else 0.25
             for name, line, width in (
-                ("shaker_displacement", SHAKER_COLOR, 0.4), ("displacement", BEAM_COLOR, 0.5)
+                ("striker_displacement", SHAKER_COLOR, 0.4), ("displacement_at_striker", BEAM_COLOR, 0.5)
             ):  # fmt: skip
                 if name in run:
                     shown = run[name].values[::step]
@@ -83,7 +83,7 @@ def _thumbnail(ax: Axes, result: TestResult, path: Path) -> None:
     if np.isfinite(result.frequency_hz):
         title += f": {result.frequency_hz:.4g} Hz, {1e3 * result.velocity_m_s:.3g} mm/s"
     ax.set_title(title, fontsize=6, loc="left")
-    codes = dict.fromkeys(code for code, severity, _ in result.findings if severity != "note")
+    codes = dict.fromkeys(code for code, severity, _ in result.diagnostics if severity != "note")
     if result.status != "measured":
         lines = textwrap.wrap("spoiled: " + result.reason, 44)
         text = "\n".join(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from snapbeam.figures.response_map import plot_response_map
 from snapbeam.figures.style import fix_ticks, house_style, new_figure
-from snapbeam.lab.compare.dots import Dots
+from snapbeam.lab.compare.dots import MeasuredPoints
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,7 +23,7 @@ __all__ = ["plot_dot_comparison"]
 _DRAWN = ("frequency_ratio", "location", "velocity_amplitude")  # across first, then upward
 
 
-def plot_dot_comparison(dataset: xr.Dataset, dots: Dots, result: DotComparison) -> Figure:
+def plot_dot_comparison(dataset: xr.Dataset, dots: MeasuredPoints, result: DotComparison) -> Figure:
     """Draw measured responses on a map, and the table of measured against simulated classes beside it.
 
     Dots whose class is not that of the map are crossed out.  In the table what agrees is grey, on the diagonal,
@@ -77,7 +77,7 @@ def _mark_disagreeing(ax: Axes, dataset: xr.Dataset, result: DotComparison) -> N
     wrong = (table["used"].values == 1) & (table["measured"].values != table["simulated"].values)
     if not wrong.any():
         return
-    across, upward = (name for name in _DRAWN if name in dataset["response"].squeeze().dims)
+    across, upward = (name for name in _DRAWN if name in dataset["response_class"].squeeze().dims)
     ax.plot(
         table[across].values[wrong], table[upward].values[wrong], "x", color="black", markersize=8.5,
         markeredgewidth=1.1, zorder=2.9,

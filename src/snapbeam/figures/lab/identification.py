@@ -47,10 +47,10 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
     time, values = samples.time[part], samples.values[part]
     scale, unit = _SCALE.get(fit.units, (1.0, fit.units))
     mode = fit.modes[0]
-    rate = 2.0 * np.pi * mode.natural_freq * mode.damping_ratio
+    rate = 2.0 * np.pi * mode.natural_frequencies * mode.damping_ratio
     envelope = mode.amplitude * law_envelope(mode.law, time - fit.start, rate, mode.law_strength)
     middle = float(values.mean())
-    told = fit.findings
+    told = fit.diagnostics
     with house_style():
         figure = new_figure("double", 105.0 + findings_height(told, COLUMN_WIDTHS["double"]))
         draw_findings(figure, told)
@@ -72,19 +72,21 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
 
         right = figure.add_subplot(grid[1, 1])
         right.errorbar(
-            scale * fit.backbone_amplitude, fit.backbone_freq, 2.0 * fit.backbone_freq_se,
+            scale * fit.backbone_amplitude, fit.backbone_frequency, 2.0 * fit.backbone_freq_se,
             fmt="o", color=BEAM_COLOR, markersize=3, linewidth=0.7, capsize=1.5, label="parts of the decay",
         )  # fmt: skip
         a = np.linspace(0.0, 1.05 * float(fit.backbone_amplitude.max()), 200)
-        law = mode.natural_freq * (1.0 - mode.softening * a**2)
+        law = mode.natural_frequencies * (1.0 - mode.softening * a**2)
         right.plot(scale * a, law, color=SHAKER_COLOR, label=r"$f_0\,(1 - \kappa a^2)$")
         right.errorbar(
-            [0.0], [mode.natural_freq], [2.0 * mode.natural_freq_se], fmt="s", color=CENTER_COLOR,
+            [0.0], [mode.natural_frequencies], [2.0 * mode.natural_freq_se], fmt="s", color=CENTER_COLOR,
             markeredgecolor=BEAM_COLOR, markersize=4, linewidth=0.9, capsize=2.0, label="zero amplitude",
         )  # fmt: skip
         right.set(xlabel=f"Amplitude ({unit})", ylabel="Frequency (Hz)")
         right.margins(x=0.03)
-        right.set_title(f"$f_0$ = {mode.natural_freq:.3f} $\\pm$ {mode.natural_freq_se:.3f} Hz", loc="left")
+        right.set_title(
+            f"$f_0$ = {mode.natural_frequencies:.3f} $\\pm$ {mode.natural_freq_se:.3f} Hz", loc="left"
+        )
         right.legend(loc="best")
         fix_ticks(top, left, right)
     return figure
@@ -104,12 +106,12 @@ def plot_stabilisation(signal: xr.DataArray, fit: DecayFit) -> Figure:
     """
     samples = check_signal(signal)
     part = (samples.time >= fit.start) & (samples.time <= fit.stop)
-    cut = SignalSamples(samples.values[part], samples.time[part], samples.sampling_freq)
+    cut = SignalSamples(samples.values[part], samples.time[part], samples.sampling_frequency)
     poles = fit.poles if fit.poles is not None else find_poles(cut, noise_level(cut))[1]
     n = cut.values.size
     window = np.cos(0.5 * np.pi * np.arange(n) / n) ** 2
     level = np.abs(np.fft.rfft((cut.values - cut.values.mean()) * window))
-    freq = np.fft.rfftfreq(n, 1.0 / cut.sampling_freq)
+    freq = np.fft.rfftfreq(n, 1.0 / cut.sampling_frequency)
     with house_style():
         figure = new_figure("double", 80.0)
         ax = figure.subplots()
@@ -142,15 +144,17 @@ def plot_stabilisation(signal: xr.DataArray, fit: DecayFit) -> Figure:
         )
         for k, mode in enumerate(fit.modes):
             ax.axvline(
-                mode.natural_freq,
+                mode.natural_frequencies,
                 color=CENTER_COLOR,
                 linewidth=1.2,
                 zorder=0,
                 label="identified" if k == 0 else None,
             )
-        highest = max(mode.natural_freq for mode in fit.modes)
+        highest = max(mode.natural_frequencies for mode in fit.modes)
         ax.set(
-            xlabel="Frequency (Hz)", ylabel="Order", xlim=(0.0, min(3.0 * highest, cut.sampling_freq / 2.0))
+            xlabel="Frequency (Hz)",
+            ylabel="Order",
+            xlim=(0.0, min(3.0 * highest, cut.sampling_frequency / 2.0)),
         )
         figure.legend(loc="outside upper right", ncols=3)
         fix_ticks(ax, back)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from snapbeam.core.findings import doubtful, findings_of
+from snapbeam.core.findings import doubtful, diagnostics_of
 from snapbeam.core.validate import InputError, integer
 from snapbeam.figures.findings import draw_findings, findings_height
 from snapbeam.figures.style import BEAM_COLOR, COLUMN_WIDTHS, SHAKER_COLOR, house_style, new_figure
@@ -87,7 +87,7 @@ def plot_frame(recording: Recording, dataset: xr.Dataset, frame: int = 0) -> Fig
     index, at = _check_pair(recording, dataset, frame)
     picture = recording.frame(at)
     height, width = picture.shape
-    told = doubtful(findings_of(dataset))
+    told = doubtful(diagnostics_of(dataset))
     size = (
         77.0 * min(max(height / width, 0.12), 1.4) + 26.0 + findings_height(told, COLUMN_WIDTHS["single"], 3)
     )
@@ -131,7 +131,7 @@ def plot_tracking_quality(dataset: xr.Dataset) -> Figure:
     time = 1e3 * dataset["time"].values
     pixel = dataset.attrs["pixel_size"] * 1e3
     shaker = "shaker_displacement_mm" in dataset
-    told = findings_of(dataset)
+    told = diagnostics_of(dataset)
     with house_style():
         figure = new_figure("double", 120.0 + findings_height(told, COLUMN_WIDTHS["double"]))
         draw_findings(figure, told)

@@ -45,7 +45,7 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
     scale, unit, word = _SCALE[drive.units]
     fit = drive.steady
     begin = fit.start if drive.startup is None else drive.startup.onset
-    told = drive.findings
+    told = drive.diagnostics
     with house_style():
         figure = new_figure("double", 105.0 + findings_height(told, COLUMN_WIDTHS["double"]))
         draw_findings(figure, told)
@@ -108,4 +108,4 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
 
 def _parts(signal: xr.DataArray) -> tuple[np.ndarray, np.ndarray, float]:
     samples = check_signal(signal)
-    return samples.time, samples.values, samples.sampling_freq
+    return samples.time, samples.values, samples.sampling_frequency

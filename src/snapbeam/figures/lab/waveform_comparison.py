@@ -50,7 +50,7 @@ def plot_waveform_comparison(
         ("simulated", "simulated_displacement", "simulated_shaker", result.simulated_impacts),
     )
     with house_style():
-        told = result.findings
+        told = result.diagnostics
         figure = new_figure("double", 100.0 + findings_height(told, COLUMN_WIDTHS["double"], 3))
         draw_findings(figure, told, 3)
         axes = figure.subplots(2, 2, sharey="row", height_ratios=(1.5, 1.0))
@@ -94,13 +94,13 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
     if waveforms.sizes["cycle"] < 2:
         raise InputError(f"window = {window}: holds none of the compared cycles")
     cycle = waveforms["cycle"].values
-    told = result.findings
+    told = result.diagnostics
     with house_style():
         figure = new_figure("double", 105.0 + findings_height(told, COLUMN_WIDTHS["double"], 3))
         draw_findings(figure, told, 3)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
         pairs = (
-            (top, "displacement", "beam, at the shaker"),
+            (top, "displacement_at_striker", "beam, at the shaker"),
             (middle, "shaker", "shaker"),
         )
         for ax, name, word in pairs:

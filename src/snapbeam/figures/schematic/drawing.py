@@ -16,7 +16,7 @@ from snapbeam.figures.schematic.strikers import draw_tips, motion_of
 from snapbeam.figures.schematic.surroundings import FRAME, draw_surroundings
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR, SHAKER_COLOR, house_style, new_figure
 from snapbeam.model.contact import ContactLaw
-from snapbeam.model.drive import Flight, Still
+from snapbeam.model.drive import ConstantVelocity, FixedStop
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.striker import Striker
 from snapbeam.model.system import System
@@ -66,22 +66,24 @@ def plot_system(system: System, title: str = "") -> Figure:
     figure = new_figure("double", 52.0)
     with house_style():
         striker = system.striker
-        widths = [2.4, 1.0] if striker is not None or system.leads is not None else [1.0]
+        widths = [2.4, 1.0] if striker is not None or system.primary_excitation is not None else [1.0]
         axes = figure.subplots(1, len(widths), squeeze=False, width_ratios=widths)[0]
         _draw_beam(axes[0], system)
         if striker is not None:
             assert system.contact is not None
-            _draw_striker(axes[0], system, striker, system.contact, 1 if system.others else 0)
-        for number, each in enumerate(system.others, 2):
+            _draw_striker(axes[0], system, striker, system.contact, 1 if system.further_contacts else 0)
+        for number, each in enumerate(system.further_contacts, 2):
             _draw_striker(axes[0], system, each.striker, each.contact, number)
         tips = [(int(name[6:] or 1), drive) for name, drive in system.moving if name.startswith("drive")]
         if len(tips) > 1:
             draw_tips(axes[1], system, tips)
-        elif system.leads is not None:
-            _draw_drive(axes[1], system, *system.leads)
+        elif system.primary_excitation is not None:
+            _draw_drive(axes[1], system, *system.primary_excitation)
         if title:
             axes[0].set_title(title, loc="left")
-        both = any(each.striker.side != striker.side for each in system.others if striker is not None)
+        both = any(
+            each.striker.side != striker.side for each in system.further_contacts if striker is not None
+        )
         outward, inward = (2.0, 1.7) if both else (2.55, 1.25)
         axes[0].set_xlim(-0.85, _WIDE + 0.85)
         axes[0].set_ylim(*((-outward, inward) if _sign(striker) > 0.0 else (-inward, outward)))
@@ -117,7 +119,10 @@ def _draw_beam(ax: Axes, system: System) -> None:
     clamp: Any = {"facecolor": "0.85", "edgecolor": BEAM_COLOR, "linewidth": 0.6, "hatch": "////"}
     beam = system.model.beam
     assert beam is not None
-    for at, outward, stiffness in ((0.0, -1.0, beam.ends.left), (_WIDE, 1.0, beam.ends.right)):
+    for at, outward, stiffness in (
+        (0.0, -1.0, beam.boundary.left_rotational_stiffness),
+        (_WIDE, 1.0, beam.boundary.right_rotational_stiffness),
+    ):
         if stiffness is None:
             ax.add_patch(Rectangle((min(at, at + 0.3 * outward), -0.35), 0.3, 0.7, **clamp))
         else:
@@ -125,7 +130,7 @@ def _draw_beam(ax: Axes, system: System) -> None:
     arrow: Any = {"arrowstyle": "-|>", "lw": 0.8, "color": BEAM_COLOR}
     for x, toward in ((-0.85, 0.5), (_WIDE + 0.85, -0.5)):
         ax.annotate("", (x + toward, 0.0), (x, 0.0), arrowprops=arrow)
-    changes = system.axial is not None
+    changes = system.axial_load is not None
     ax.text(
         -0.62, 0.14, "$P(t)$" if changes else "$P$", ha="center", va="bottom",
         color=_LOAD_COLOR if changes else BEAM_COLOR,
@@ -191,13 +196,13 @@ def _draw_striker(ax: Axes, system: System, striker: Striker, contact: ContactLa
     below = center - sign * _RADIUS
     if striker.mass is None:
         _rod(ax, at, below, below - sign * 0.45)
-        stands = isinstance(striker.drive, Still)
+        stands = isinstance(striker.drive, FixedStop)
         _block(ax, at, below - sign * 0.45, sign, "stop" if stands else "drive", moves=not stands)
-        if stands and system.base is not None and system.base.carries_striker:
+        if stands and system.base_excitation is not None and system.base_excitation.striker_on_base:
             _rod(ax, at, below - sign * 0.67, -sign * FRAME)
         return
-    if striker.spring == 0.0:
-        if isinstance(striker.drive, Flight):
+    if striker.suspension_stiffness == 0.0:
+        if isinstance(striker.drive, ConstantVelocity):
             arrow: Any = {"arrowstyle": "-|>", "lw": 1.0, "color": SHAKER_COLOR}
             ax.annotate("", (at, below - sign * 0.08), (at, below - sign * 0.75), arrowprops=arrow)
             ax.text(at - 0.15, below - sign * 0.45, "$v$", ha="right", va="center", color=SHAKER_COLOR)
@@ -208,7 +213,7 @@ def _draw_striker(ax: Axes, system: System, striker: Striker, contact: ContactLa
     ax.add_patch(Rectangle(corner, 0.56, 0.26, facecolor="0.9", edgecolor=BEAM_COLOR, lw=0.7))
     under = edge - sign * 0.26
     foot = under - sign * 0.5
-    if striker.damper > 0.0:
+    if striker.suspension_damping > 0.0:
         _spring(ax, at - 0.15, under, foot)
         _damper(ax, at + 0.15, under, foot)
     else:
@@ -281,11 +286,15 @@ def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     scale = system.scale
     columns = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
     period = float(drive.cycle(columns, scale)[0])
-    cycles = np.linspace(0.0, 2.0 if isinstance(drive, Flight) else _CYCLES, 1601)
+    cycles = np.linspace(0.0, 2.0 if isinstance(drive, ConstantVelocity) else _CYCLES, 1601)
     phase = float(columns.get("phase", np.zeros(1))[0])
     moved = motion_of(drive, columns, scale, cycles * period, phase)
     per = 1.0 if section == "axial" else scale.length
-    down = section == "base" and system.base is not None and system.base.direction == "down"
+    down = (
+        section == "base"
+        and system.base_excitation is not None
+        and system.base_excitation.direction == "down"
+    )
     color = SHAKER_COLOR if section == "drive" else _LOAD_COLOR
     ax.plot(cycles, (-moved if down else moved) / per, color=color)
     ax.set_xlabel("Cycles of the drive" if section == "drive" else "Cycles")

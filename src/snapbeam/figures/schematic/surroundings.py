@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from snapbeam.figures.style import BEAM_COLOR, CENTER_COLOR
 from snapbeam.model.system import System
-from snapbeam.model.world import Coil, Piezo
+from snapbeam.model.world import ElectromagneticHarvester, PiezoelectricHarvester
 
 __all__ = ["FRAME", "draw_surroundings"]
 
@@ -25,47 +25,47 @@ _COLOR = CENTER_COLOR
 
 def draw_surroundings(ax: Axes, system: System, x: _Array, w: _Array, sign: float, wide: float) -> None:
     """Draw what surrounds the beam; *x* and *w* are its shape at rest, *sign* the striker's side."""
-    if system.base is not None:
+    if system.base_excitation is not None:
         _base(ax, system, sign, wide)
-    if isinstance(system.harvester, Piezo):
+    if isinstance(system.harvester, PiezoelectricHarvester):
         _layers(ax, system.harvester, x, w, sign, wide)
-    if isinstance(system.harvester, Coil):
+    if isinstance(system.harvester, ElectromagneticHarvester):
         _coil(ax, system.harvester, x, w, sign, wide)
 
 
 def _base(ax: Axes, system: System, sign: float, wide: float) -> None:
     """A frame under the clamps, and the arrow of its motion."""
-    assert system.base is not None
+    assert system.base_excitation is not None
     foot = -sign * FRAME
     bar: Any = {"facecolor": "0.88", "edgecolor": BEAM_COLOR, "linewidth": 0.6}
     for left in (-0.3, wide + 0.06):
         ax.add_patch(Rectangle((left, min(foot, -0.35 * sign)), 0.24, FRAME - 0.35, zorder=0, **bar))
     ax.add_patch(Rectangle((-0.3, min(foot, foot - 0.16 * sign)), wide + 0.6, 0.16, zorder=0, **bar))
-    up = 1.0 if system.base.direction == "up" else -1.0
+    up = 1.0 if system.base_excitation.direction == "up" else -1.0
     arrow: Any = {"arrowstyle": "-|>", "lw": 1.0, "color": _COLOR}
     middle = -sign * (FRAME - 0.75)
     ax.annotate("", (0.62, middle + 0.4 * up), (0.62, middle - 0.4 * up), arrowprops=arrow)
     ax.text(0.76, middle, "$y(t)$", ha="left", va="center", color=_COLOR)
-    if system.striker is not None and not system.base.carries_striker:
+    if system.striker is not None and not system.base_excitation.striker_on_base:
         at = system.striker.location * wide
         ax.text(at + 0.75, -sign * 2.05, "not on the base", ha="left", va="center", color=_COLOR)
 
 
-def _layers(ax: Axes, piezo: Piezo, x: _Array, w: _Array, sign: float, wide: float) -> None:
+def _layers(ax: Axes, piezo: PiezoelectricHarvester, x: _Array, w: _Array, sign: float, wide: float) -> None:
     """Both layers along the beam, and wires to a resistor on the other side than the striker."""
-    inside = (x >= piezo.start * wide) & (x <= piezo.stop * wide)
+    inside = (x >= piezo.patch_start * wide) & (x <= piezo.patch_end * wide)
     for away in (1.0, -1.0):
         outline = np.concatenate((
             np.stack((x[inside], w[inside] + 0.03 * away), axis=1),
             np.stack((x[inside], w[inside] + (0.03 + _LAYER) * away), axis=1)[::-1],
         ))  # fmt: skip
         ax.add_patch(Polygon(outline, closed=True, facecolor=_COLOR, alpha=0.75, edgecolor="none", zorder=4))
-    at = 0.5 * (piezo.start + piezo.stop) * wide
+    at = 0.5 * (piezo.patch_start + piezo.patch_end) * wide
     there = float(np.interp(at, x, w))
     _resistor(ax, at, there + sign * (0.03 + _LAYER), sign, f"{_ohms(piezo.resistance)}")
 
 
-def _coil(ax: Axes, coil: Coil, x: _Array, w: _Array, sign: float, wide: float) -> None:
+def _coil(ax: Axes, coil: ElectromagneticHarvester, x: _Array, w: _Array, sign: float, wide: float) -> None:
     """A magnet on the beam and the windings beside it."""
     at = coil.location * wide
     there = float(np.interp(at, x, w))

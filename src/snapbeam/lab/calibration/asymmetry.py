@@ -9,7 +9,7 @@ from snapbeam.lab.calibration.measurements import Measurements
 from snapbeam.model.beam import Beam
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.imperfection import Imperfection
-from snapbeam.model.imperfection.fitted import fit_wells
+from snapbeam.model.imperfection.fitted import identify_imperfection
 
 __all__ = ["ends_section", "imperfection_section", "uneven_beam", "uneven_words"]
 
@@ -20,11 +20,14 @@ def uneven_beam(beam: Beam, measured: Measurements, kind: str, modes: int) -> Re
     """The calibrated beam with the imperfection that gives each well its own first frequency.
 
     Of the beam, the buckling level alone changes: two numbers from two frequencies, see
-    :func:`snapbeam.model.imperfection.fitted.fit_wells`.
+    :func:`snapbeam.model.imperfection.fitted.identify_imperfection`.
     """
     both = {}
     for well in ("lower", "upper"):
-        values, shapes = getattr(measured, f"{well}_well_freq"), getattr(measured, f"{well}_well_shape")
+        values, shapes = (
+            getattr(measured, f"{well}_well_frequencies"),
+            getattr(measured, f"{well}_well_shape"),
+        )
         own = (
             [f for f, shape in zip(values, shapes, strict=True) if shape == "symmetric"] if shapes else values
         )
@@ -33,7 +36,7 @@ def uneven_beam(beam: Beam, measured: Measurements, kind: str, modes: int) -> Re
                 f"imperfection = {kind!r}: needs the first frequency about both wells; the {well} one's is not given"
             )
         both[well] = float(own[0])
-    return fit_wells(beam, both["lower"], both["upper"], kind, modes)
+    return identify_imperfection(beam, both["lower"], both["upper"], kind, modes)
 
 
 def uneven_words(kind: str, model: ReducedModel) -> str:
@@ -56,7 +59,7 @@ def imperfection_section(imperfection: Imperfection | None) -> dict[str, Any]:
 
 def ends_section(beam: Beam) -> dict[str, Any]:
     """Ends that are no clamps, as the section of a parameter file."""
-    return {name: float(value) for name, value in vars(beam.ends).items() if value is not None}
+    return {name: float(value) for name, value in vars(beam.boundary).items() if value is not None}
 
 
 def _same(value: Any, other: Any) -> bool:

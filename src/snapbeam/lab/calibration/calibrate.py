@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.config import config_from_mapping, dump_config
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.validate import InputError, InputTypeError, choice, integer, shown
 from snapbeam.lab.calibration import wording as words
 from snapbeam.lab.calibration.asymmetry import (
@@ -30,7 +30,7 @@ from snapbeam.lab.calibration.measurements import ContactTest, Measurements, loa
 from snapbeam.lab.calibration.parity import either_well, shape_findings
 from snapbeam.lab.plausibility.calibration import KINDS
 from snapbeam.model.beam import Beam
-from snapbeam.model.ends import Ends
+from snapbeam.model.ends import BoundaryConditions
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.imperfection import Imperfection
 from snapbeam.model.paper_values import BEAM, MODES
@@ -63,11 +63,11 @@ class Calibration:
     ``beam`` is the result; ``values`` and ``standard_errors`` hold the fitted parameters by name (SI), in the
     order of ``correlation``; a parameter that the data do not determine has no entry in ``standard_errors``
     and is named in ``undetermined``.  ``scatter`` is the root of chi-square per degree of freedom by which
-    standard errors were raised, 1 if the data agree.  ``well_freq``, ``start_well_freq``, ``gauge_well_freq``
+    standard errors were raised, 1 if the data agree.  ``well_frequencies``, ``start_well_frequencies``, ``gauge_well_frequencies``
     [Hz] are the first frequency about a well of the result, of the beam the fit started from, and of the
     result with the gauge's geometry; ``either_well`` holds the buckling level [m] that each well alone would
     ask for.  ``imperfection``, if one was asked for, gives each well its own first frequency; ``beam`` then has
-    the buckling level that goes with it.  ``remarks`` say in words what was found, ``findings`` what to beware of.
+    the buckling level that goes with it.  ``remarks`` say in words what was found, ``diagnostics`` what to beware of.
     """
 
     beam: Beam
@@ -84,18 +84,18 @@ class Calibration:
     damping_ratio_se: float | None
     contact_stiffness: float | None
     contact_stiffness_se: float | None
-    well_freq: float | None
-    start_well_freq: float | None
-    gauge_well_freq: float | None
+    well_frequencies: float | None
+    start_well_frequencies: float | None
+    gauge_well_frequencies: float | None
     either_well: tuple[float, ...]
     remarks: tuple[str, ...]
-    findings: tuple[Finding, ...]
+    diagnostics: tuple[Diagnostic, ...]
     imperfection: Imperfection | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """The findings in words."""
-        return tuple(one.words for one in self.findings)
+        """The diagnostics in words."""
+        return tuple(one.message for one in self.diagnostics)
 
     def sections(self) -> dict[str, dict[str, Any]]:
         """The result as the sections of a parameter file."""
@@ -108,7 +108,7 @@ class Calibration:
         else:
             beam["axial_load"] = float(self.beam.axial_load)
         sections: dict[str, dict[str, Any]] = {"beam": beam, "model": {"modes": self.modes}}
-        sections |= {"ends": ends_section(self.beam)} if self.beam.ends != Ends() else {}
+        sections |= {"ends": ends_section(self.beam)} if self.beam.boundary != BoundaryConditions() else {}
         sections |= {"imperfection": imperfection_section(self.imperfection)} if self.imperfection else {}
         if self.damping_ratio is not None:
             sections["model"]["damping_ratio"] = self.damping_ratio
@@ -130,17 +130,17 @@ class Calibration:
             "damping_ratio_se": self.damping_ratio_se,
             "contact_stiffness": self.contact_stiffness,
             "contact_stiffness_se": self.contact_stiffness_se,
-            "well_freq": self.well_freq,
-            "start_well_freq": self.start_well_freq,
-            "gauge_well_freq": self.gauge_well_freq,
+            "well_frequencies": self.well_frequencies,
+            "start_well_frequencies": self.start_well_frequencies,
+            "gauge_well_frequencies": self.gauge_well_frequencies,
             "either_well": list(self.either_well),
             "imperfection": imperfection_section(self.imperfection),
             "remarks": list(self.remarks),
-            "findings": [one.plain() for one in self.findings],
+            "diagnostics": [one.plain() for one in self.diagnostics],
         }
 
     def write_config(self, path: str | os.PathLike[str]) -> None:
-        """Write the parameter file that ``snapbeam map --config`` reads, with the findings as comments."""
+        """Write the parameter file that ``snapbeam map --config`` reads, with the diagnostics as comments."""
         told = [f"{name} = {words.with_error(self, name)}" for name in self.values]
         comment = ["Calibrated from measurements.", *told, *self.remarks]
         comment += [f"Warning: {text}" for text in self.warnings]
@@ -162,7 +162,7 @@ def calibrate(
     measured : Measurements
     beam : Beam
         What is known of the beam, and where the fit starts; parameters that are not fitted are kept.  Its own
-        frequencies are compared with the measured ones in the findings.
+        frequencies are compared with the measured ones in the diagnostics.
     fit : tuple of str, optional
         Which of thickness, young_modulus, density, length and buckling_level to fit.  By default the
         thickness if there are frequencies of the straight beam, and the buckling level if there are any
@@ -198,18 +198,20 @@ def calibrate(
     names = _fitted(measured, fit)
     if not data and names:
         raise InputError(f"measured: no frequency to fit {', '.join(names)} to")
-    wells = bool(measured.lower_well_freq or measured.upper_well_freq)
+    wells = bool(measured.lower_well_frequencies or measured.upper_well_frequencies)
     if wells and not beam.is_buckled:
         raise InputError(
             "beam: is straight, but frequencies about wells were measured; give a buckling_level (in the file of "
             "--config)"
         )
-    if beam.ends.left != beam.ends.right and any(item.parity for item in data):
+    if beam.boundary.left_rotational_stiffness != beam.boundary.right_rotational_stiffness and any(
+        item.parity for item in data
+    ):
         raise InputError(
             "lower_well_shape, upper_well_shape: between unequal ends no mode is symmetric; give frequencies by order"
         )
     fitted_to = _fit(beam, data, names, count)
-    findings = list(fitted_to.findings)
+    diagnostics = list(fitted_to.diagnostics)
     result = _changed(beam, names, fitted_to.logs)
     fitted = _model(result, data, count)
     residuals = tuple(
@@ -238,21 +240,23 @@ def calibrate(
         damping_ratio_se=damping_se,
         contact_stiffness=contact,
         contact_stiffness_se=contact_se,
-        well_freq=_first_freq(result, count) if wells else None,
-        start_well_freq=_first_freq(beam, count) if wells else None,
-        gauge_well_freq=_first_freq(result.replace(**gauges), count) if wells and gauges else None,
+        well_frequencies=_first_frequency(result, count) if wells else None,
+        start_well_frequencies=_first_frequency(beam, count) if wells else None,
+        gauge_well_frequencies=_first_frequency(result.replace(**gauges), count)
+        if wells and gauges
+        else None,
         either_well=either_well(result, measured, count),
         remarks=(),
-        findings=(),
+        diagnostics=(),
     )
-    findings += shape_findings(result, measured, count) if wells else []
-    findings += words.doubts(answer, measured)
+    diagnostics += shape_findings(result, measured, count) if wells else []
+    diagnostics += words.doubts(answer, measured)
     told = words.remarks(answer, measured)
     if uneven is not None and imperfection is not None:
         assert uneven.beam is not None
         told.append(uneven_words(imperfection, uneven))
         answer = dataclasses.replace(answer, beam=uneven.beam, imperfection=uneven.imperfection)
-    return dataclasses.replace(answer, remarks=tuple(told), findings=tuple(findings))
+    return dataclasses.replace(answer, remarks=tuple(told), diagnostics=tuple(diagnostics))
 
 
 @dataclass(frozen=True)
@@ -264,7 +268,7 @@ class _Fitted:
     undetermined: tuple[str, ...]
     scatter: float
     freedom: int
-    findings: tuple[Finding, ...]
+    diagnostics: tuple[Diagnostic, ...]
 
     def values(self, names: list[str]) -> tuple[dict[str, float], dict[str, float], _Array]:
         """Values and standard errors by name, and the correlations."""
@@ -307,13 +311,13 @@ def _fit(beam: Beam, data: list[_Datum], names: list[str], modes: int) -> _Fitte
     inner = np.linalg.inv((jacobian @ keep).T @ (jacobian @ keep))
     covariance = keep @ inner @ keep.T * scatter**2
     undetermined = tuple(name for i, name in enumerate(names) if (keep @ keep.T)[i, i] < 1.0 - 1e-4)
-    findings = list(words.links(names, covariance, undetermined))
+    diagnostics = list(words.links(names, covariance, undetermined))
     if "buckling_level" not in undetermined and open_upwards(residual, logs, names):
         undetermined += ("buckling_level",)
-        findings.append(words.at_least(math.exp(logs[names.index("buckling_level")])))
+        diagnostics.append(words.at_least(math.exp(logs[names.index("buckling_level")])))
     if freedom <= 0:
-        findings.append(KINDS["no_check"].found())
-    return _Fitted(logs, covariance, undetermined, scatter, freedom, tuple(findings))
+        diagnostics.append(KINDS["no_check"].found())
+    return _Fitted(logs, covariance, undetermined, scatter, freedom, tuple(diagnostics))
 
 
 @dataclass(frozen=True)
@@ -347,9 +351,9 @@ def _data(measured: Measurements, modes: int) -> list[_Datum]:
 
 
 def _fitted(measured: Measurements, fit: tuple[str, ...] | None) -> list[str]:
-    wells = bool(measured.lower_well_freq or measured.upper_well_freq)
+    wells = bool(measured.lower_well_frequencies or measured.upper_well_frequencies)
     if fit is None:
-        return ["thickness"] * bool(measured.straight_freq) + ["buckling_level"] * wells
+        return ["thickness"] * bool(measured.straight_frequency) + ["buckling_level"] * wells
     if isinstance(fit, str) or len(set(fit)) < len(fit):
         raise InputError(f"fit = {shown(fit)}: must be a tuple of different names among {', '.join(FITTED)}")
     for name in fit:
@@ -372,15 +376,15 @@ def _model(beam: Beam, data: list[_Datum], modes: int) -> _Array:
     out = []
     for item in data:
         model = models[item.state == "straight"]
-        freq = model.natural_freq
+        freq = model.natural_frequencies
         if item.parity:
             freq = freq[model.parity == item.parity]
         out.append(freq[item.mode])
     return np.array(out)
 
 
-def _first_freq(beam: Beam, modes: int) -> float:
-    return float(ReducedModel.from_beam(beam, modes).natural_freq[0])
+def _first_frequency(beam: Beam, modes: int) -> float:
+    return float(ReducedModel.from_beam(beam, modes).natural_frequencies[0])
 
 
 def _mean(

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.validate import InputError, InputTypeError, positive
 from snapbeam.lab.calibration.measurements import HERTZ_TIME
 from snapbeam.lab.plausibility.calibration import KINDS
@@ -43,7 +43,7 @@ class ContactStiffness:
     exponent: float
     exponent_se: float
     impacts: int
-    findings: tuple[Finding, ...]
+    diagnostics: tuple[Diagnostic, ...]
 
 
 def stiffness_from_impacts(impacts: xr.Dataset, effective_mass: float) -> ContactStiffness:

@@ -83,9 +83,9 @@ class Measurements:
 
     Parameters
     ----------
-    straight_freq : sequence of float
+    straight_frequency : sequence of float
         Natural frequencies without axial load, Hz.
-    lower_well_freq, upper_well_freq : sequence of float
+    lower_well_frequencies, upper_well_frequencies : sequence of float
         Natural frequencies about either well, Hz.
     straight_freq_se, lower_well_freq_se, upper_well_freq_se : float or sequence of float, optional
         Their standard errors, Hz.
@@ -101,11 +101,11 @@ class Measurements:
     contact : sequence of ContactTest
     """
 
-    straight_freq: Sequence[float] = ()
+    straight_frequency: Sequence[float] = ()
     straight_freq_se: float | Sequence[float] | None = None
-    lower_well_freq: Sequence[float] = ()
+    lower_well_frequencies: Sequence[float] = ()
     lower_well_freq_se: float | Sequence[float] | None = None
-    upper_well_freq: Sequence[float] = ()
+    upper_well_frequencies: Sequence[float] = ()
     upper_well_freq_se: float | Sequence[float] | None = None
     lower_well_shape: Sequence[str] = ()
     upper_well_shape: Sequence[str] = ()
@@ -116,7 +116,12 @@ class Measurements:
     contact: Sequence[ContactTest] = ()
 
     def __post_init__(self) -> None:
-        for name in ("straight_freq", "lower_well_freq", "upper_well_freq", "damping_ratio"):
+        for name in (
+            "straight_frequency",
+            "lower_well_frequencies",
+            "upper_well_frequencies",
+            "damping_ratio",
+        ):
             values = _numbers(name, getattr(self, name))
             object.__setattr__(self, name, values)
             errors = getattr(self, f"{name}_se")

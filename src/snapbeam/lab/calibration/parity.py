@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.lab.calibration.measurements import Measurements
 from snapbeam.lab.plausibility.calibration import KINDS
 from snapbeam.model.beam import Beam
@@ -13,17 +13,17 @@ __all__ = ["either_well", "shape_findings"]
 _CROSSING = 0.05  # share within which the first two frequencies may be in the other order
 
 
-def shape_findings(beam: Beam, measured: Measurements, modes: int) -> list[Finding]:
+def shape_findings(beam: Beam, measured: Measurements, modes: int) -> list[Diagnostic]:
     """Whether the order of the modes about a well is in doubt where nothing else tells them apart."""
     told = [measured.lower_well_shape, measured.upper_well_shape]
-    given = [freq for freq in (measured.lower_well_freq, measured.upper_well_freq) if freq]
+    given = [freq for freq in (measured.lower_well_frequencies, measured.upper_well_frequencies) if freq]
     if modes < 2 or any(told) or not given:
         return []
     model = ReducedModel.from_beam(beam, modes)
     if not (model.parity > 0).any():  # unequal ends: no mode is either
         return []
-    symmetric = float(model.natural_freq[model.parity > 0][0])
-    other = model.natural_freq[model.parity < 0]
+    symmetric = float(model.natural_frequencies[model.parity > 0][0])
+    other = model.natural_frequencies[model.parity < 0]
     if not other.size:
         return []
     antisymmetric = float(other[0])
@@ -51,7 +51,11 @@ def either_well(beam: Beam, measured: Measurements, modes: int) -> tuple[float, 
 
     def symmetric(at: float) -> float:
         model = ReducedModel.from_beam(beam.replace(buckling_level=abs(at) * level), modes)
-        own = model.natural_freq[model.parity > 0] if (model.parity > 0).any() else model.natural_freq
+        own = (
+            model.natural_frequencies[model.parity > 0]
+            if (model.parity > 0).any()
+            else model.natural_frequencies
+        )
         return float(own[0])
 
     here = symmetric(1.0)

@@ -1,4 +1,4 @@
-"""What a calibration says in words: remarks on what was found, findings on what to beware of."""
+"""What a calibration says in words: remarks on what was found, diagnostics on what to beware of."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.lab.plausibility.calibration import KINDS
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def with_error(result: Calibration, name: str) -> str:
     return f"{value:.5g} +- {result.standard_errors[name] * scale:.2g} {unit}"
 
 
-def links(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, ...]) -> list[Finding]:
+def links(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, ...]) -> list[Diagnostic]:
     """What to say of parameters that the data do not determine, link, or hardly tell."""
     told = []
     if len(hidden) == 1:
@@ -75,7 +75,7 @@ def links(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, 
     return told
 
 
-def at_least(level: float) -> Finding:
+def at_least(level: float) -> Diagnostic:
     """What to say where any buckling level [m] above the one found meets the data as well."""
     text = (
         f"any buckling_level above {level * 1e3:.4g} mm meets the measured frequencies as well: the first one about "
@@ -87,14 +87,16 @@ def at_least(level: float) -> Finding:
 def remarks(result: Calibration, measured: Measurements) -> list[str]:
     """What was found: the frequencies about the wells, and the measured geometry beside the model's."""
     told = []
-    first = [values[0] for values in (measured.lower_well_freq, measured.upper_well_freq) if values]
-    if first and result.well_freq is not None:
+    first = [
+        values[0] for values in (measured.lower_well_frequencies, measured.upper_well_frequencies) if values
+    ]
+    if first and result.well_frequencies is not None:
         mean = float(np.mean(first))
         told.append(
-            f"the model's first frequency about either well is {result.well_freq:.2f} Hz; measured mean "
+            f"the model's first frequency about either well is {result.well_frequencies:.2f} Hz; measured mean "
             f"{mean:.2f} Hz"
         )
-        other = result.start_well_freq
+        other = result.start_well_frequencies
         if other is not None and abs(other / mean - 1.0) > 0.002:
             told.append(
                 f"the buckling level the fit started from, {result.start.buckling_level * 1e3:.4g} mm "
@@ -108,19 +110,19 @@ def remarks(result: Calibration, measured: Measurements) -> list[str]:
                 f"{name}: {value * 1e3:.4g} mm in the model, {gauge * 1e3:.4g} mm measured "
                 f"({value / gauge - 1.0:+.1%})"
             )
-    if result.gauge_well_freq is not None:
+    if result.gauge_well_frequencies is not None:
         told.append(
             f"with the measured geometry the model's first frequency about a well would be "
-            f"{result.gauge_well_freq:.1f} Hz: the fitted numbers stand for all that the ideal clamped beam "
+            f"{result.gauge_well_frequencies:.1f} Hz: the fitted numbers stand for all that the ideal clamped beam "
             "leaves out, and are no gauge readings"
         )
     return told
 
 
-def doubts(result: Calibration, measured: Measurements) -> list[Finding]:
+def doubts(result: Calibration, measured: Measurements) -> list[Diagnostic]:
     """What to beware of: unequal wells, assumed errors, data the model does not meet."""
     told = []
-    pairs = zip(measured.lower_well_freq, measured.upper_well_freq, strict=False)
+    pairs = zip(measured.lower_well_frequencies, measured.upper_well_frequencies, strict=False)
     for i, (one, two) in enumerate(pairs):
         if one != two:
             text = (
@@ -134,7 +136,7 @@ def doubts(result: Calibration, measured: Measurements) -> list[Finding]:
             told.append(KINDS["unequal_wells"].found(told=text, first=one, second=two))
     assumed = [
         state
-        for state in ("straight_freq", "lower_well_freq", "upper_well_freq")
+        for state in ("straight_frequency", "lower_well_frequencies", "upper_well_frequencies")
         if getattr(measured, state) and getattr(measured, f"{state}_se") is None
     ]
     if assumed:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.validate import InputError, InputTypeError, file_path, integer, positive, shown
 from snapbeam.lab.camera.sources.base import FrameSource
 from snapbeam.lab.camera.sources.opening import open_source
@@ -45,7 +45,7 @@ class Recording:
         Grey level at which a pixel is saturated.
     metadata
         What else the file says.
-    findings
+    diagnostics
         What in the file makes measurements in it doubtful.
     edge_error
         Standard error [px] that the way the file stores pictures adds to every edge.
@@ -58,7 +58,7 @@ class Recording:
         frame_rate: float,
         pixel_size: float,
         region: tuple[int, int, int, int],
-        findings: tuple[Finding, ...] = (),
+        diagnostics: tuple[Diagnostic, ...] = (),
     ) -> None:
         if not isinstance(source, FrameSource):
             raise InputTypeError(
@@ -76,7 +76,7 @@ class Recording:
         self.exposure = source.exposure
         self.max_value = source.max_value
         self.metadata: dict[str, Any] = dict(source.metadata)
-        self.findings = findings
+        self.diagnostics = diagnostics
         self.edge_error = source.edge_error
 
     def __len__(self) -> int:
@@ -147,7 +147,7 @@ def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> 
     return (top, bottom, left, integer("region[3]", value[3], left + 1, shape[1]))
 
 
-def _rate_findings(source: FrameSource, given: float | None) -> tuple[Finding, ...]:
+def _rate_findings(source: FrameSource, given: float | None) -> tuple[Diagnostic, ...]:
     """What to say of a frame rate that was given although the file says something."""
     if given is None:
         return ()
@@ -213,8 +213,8 @@ def open_recording(
                 f"pixel_size (--pixel-size) = {size:g}: a pixel of {size:g} m; must be at most {_LARGEST_PIXEL:g} m, "
                 "in metres, such as 12e-6 for 12 um"
             )
-        findings = (*source.findings, *_rate_findings(source, given))
-        return Recording(path, source, rate, size, _region(region, source.shape), findings)
+        diagnostics = (*source.diagnostics, *_rate_findings(source, given))
+        return Recording(path, source, rate, size, _region(region, source.shape), diagnostics)
     except BaseException:
         source.close()
         raise

@@ -19,8 +19,8 @@ __all__ = ["COLUMNS", "run_campaign", "write_table"]
 
 COLUMNS = (
     "test", "recording", "vibrometer", "status", "frequency_hz", "frequency_se_hz", "velocity_m_s", "velocity_se_m_s",
-    "location", "response", "crossings", "cycles", "snr_db", "measured_share", "delay_s", "polarity", "gain",
-    "findings", "comment",
+    "location", "response_class", "zero_crossings", "cycles", "snr_db", "measured_share", "delay_s", "polarity", "gain",
+    "diagnostics", "comment",
 )  # fmt: skip
 
 
@@ -50,7 +50,7 @@ def run_campaign(
     table
         Which files are which test; by their names if left out.
     strict
-        Whether a test with any doubtful finding counts as spoiled.
+        Whether a test with any doubtful diagnostic counts as spoiled.
     progress
         Called with (tests done, tests in all, the last one's result).
 
@@ -85,7 +85,7 @@ def strictly(result: TestResult) -> TestResult:
     """A result that is spoiled if anything makes it doubtful."""
     if result.status != "measured" or not result.doubtful:
         return result
-    words = next(words for _, severity, words in result.findings if severity != "note")
+    words = next(words for _, severity, words in result.diagnostics if severity != "note")
     return dataclasses.replace(result, status="spoiled", reason=words)
 
 
@@ -111,7 +111,7 @@ def write_table(path: Path, results: list[TestResult]) -> None:
         writer.writerow(COLUMNS)
         for result in results:
             values = asdict(result)
-            values["findings"] = " ".join(code for code, _, _ in result.findings)
+            values["diagnostics"] = " ".join(code for code, _, _ in result.diagnostics)
             values["comment"] = result.reason
             writer.writerow([_cell(values[name]) for name in COLUMNS])
 

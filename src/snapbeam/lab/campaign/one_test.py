@@ -13,7 +13,7 @@ import numpy as np
 
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.files import atomic_path
-from snapbeam.core.findings import Finding, Severity, findings_of
+from snapbeam.core.findings import Diagnostic, Severity, diagnostics_of
 from snapbeam.core.netcdf import write_netcdf
 from snapbeam.core.validate import InputError
 from snapbeam.lab.camera.recording import open_recording
@@ -39,7 +39,7 @@ class TestResult:
     """One row of the table of tests.
 
     ``status`` is "measured", or "spoiled" where the test gives no number to be trusted, and then ``reason``
-    says why; ``findings`` are those of camera, vibrometer and alignment, as codes and words.  Numbers that
+    says why; ``diagnostics`` are those of camera, vibrometer and alignment, as codes and words.  Numbers that
     were not measured are NaN.
     """
 
@@ -55,7 +55,7 @@ class TestResult:
     velocity_m_s: float = _NAN
     velocity_se_m_s: float = _NAN
     location: float = _NAN
-    response: str = ResponseClass.UNKNOWN.label
+    response_class: str = ResponseClass.UNKNOWN.label
     crossings: int = 0
     cycles: float = _NAN
     snr_db: float = _NAN
@@ -63,13 +63,13 @@ class TestResult:
     delay_s: float = _NAN
     polarity: float = _NAN
     gain: float = _NAN
-    findings: tuple[tuple[str, str, str], ...] = ()
+    diagnostics: tuple[tuple[str, str, str], ...] = ()
     fingerprint: str = ""
 
     @property
     def doubtful(self) -> bool:
-        """Whether any finding is more than a note."""
-        return any(severity != Severity.NOTE.value for _, severity, _ in self.findings)
+        """Whether any diagnostic is more than a note."""
+        return any(severity != Severity.INFO.value for _, severity, _ in self.diagnostics)
 
 
 def kept_result(path: Path, fingerprint: str) -> TestResult | None:
@@ -78,7 +78,7 @@ def kept_result(path: Path, fingerprint: str) -> TestResult | None:
         values = json.loads(path.read_text(encoding="utf-8"))
         if values.get("fingerprint") != fingerprint:
             return None
-        values["findings"] = tuple((str(a), str(b), str(c)) for a, b, c in values["findings"])
+        values["diagnostics"] = tuple((str(a), str(b), str(c)) for a, b, c in values["diagnostics"])
         filled: dict[str, Any] = {name: _NAN if value is None else value for name, value in values.items()}
         return TestResult(**filled)
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
@@ -87,14 +87,16 @@ def kept_result(path: Path, fingerprint: str) -> TestResult | None:
 
 def run_test(test: Test, settings: CampaignSettings, folder: Path, fingerprint: str) -> TestResult:
     """Measure one test and keep its tracked run and its result in *folder*."""
-    findings: list[Finding] = []
+    diagnostics: list[Diagnostic] = []
     try:
-        result = _measured(test, settings, folder, findings)
+        result = _measured(test, settings, folder, diagnostics)
     except (InputError, OSError) as error:
         if isinstance(error, OSError):
             fingerprint = ""  # perhaps it can be read the next time
-        reason = _wrong(findings) or _short(str(error), test)
-        result = _row(test, status="spoiled", reason=reason, findings=tuple(_plain(one) for one in findings))
+        reason = _wrong(diagnostics) or _short(str(error), test)
+        result = _row(
+            test, status="spoiled", reason=reason, diagnostics=tuple(_plain(one) for one in diagnostics)
+        )
     result = replace(result, fingerprint=fingerprint)
     plain = {
         name: None if isinstance(value, float) and not math.isfinite(value) else value
@@ -119,34 +121,36 @@ def _short(message: str, test: Test) -> str:
     return message.replace(f"{test.recording.parent}{os.sep}", "")
 
 
-def _wrong(findings: list[Finding]) -> str:
-    """The first finding that leaves nothing to trust, in words; empty if there is none."""
-    return next((one.words for one in findings if one.severity is Severity.WRONG), "")
+def _wrong(diagnostics: list[Diagnostic]) -> str:
+    """The first diagnostic that leaves nothing to trust, in words; empty if there is none."""
+    return next((one.message for one in diagnostics if one.severity is Severity.ERROR), "")
 
 
-def _measured(test: Test, settings: CampaignSettings, folder: Path, findings: list[Finding]) -> TestResult:
-    """The row of a test; *findings* is filled as they come, for a test that ends half way."""
+def _measured(
+    test: Test, settings: CampaignSettings, folder: Path, diagnostics: list[Diagnostic]
+) -> TestResult:
+    """The row of a test; *diagnostics* is filled as they come, for a test that ends half way."""
     tracking = settings.tracking
     if test.location is not None:
         tracking = tracking.changed(location=test.location)
     with open_recording(test.recording, **settings.camera) as recording:
         tracked = track(recording, tracking)
     write_netcdf(tracked, folder / f"{test.name}.nc")
-    findings += findings_of(tracked)
+    diagnostics += diagnostics_of(tracked)
     seen = measure_drive(shaker_signal(tracked), test.frequency)
     drive, alignment = seen, None
     if test.vibrometer is not None:
         signal = read_signal(test.vibrometer, **settings.signal)
         drive = measure_drive(signal, test.frequency, amplitude=_stated(signal, test))
-        findings += drive.findings
+        diagnostics += drive.diagnostics
         alignment = align(shaker_signal(tracked), signal, test.frequency)
-        findings += alignment.findings
+        diagnostics += alignment.diagnostics
     response = measure_response(
         tracked, drive.steady.frequency, cycles=settings.cycles, start=_start(seen, drive, alignment)
     )
     speed = 1.0 if drive.units == "m/s" else 2.0 * math.pi * drive.steady.frequency
-    reason = _wrong(findings)
-    if not reason and response.response is ResponseClass.UNKNOWN:
+    reason = _wrong(diagnostics)
+    if not reason and response.response_class is ResponseClass.UNKNOWN:
         reason = "class not told: " + "; ".join(response.reasons)
     valid = tracked["valid"].values.astype(bool)
     return _row(
@@ -158,20 +162,20 @@ def _measured(test: Test, settings: CampaignSettings, folder: Path, findings: li
         velocity_m_s=speed * drive.steady.amplitude,
         velocity_se_m_s=speed * drive.steady.amplitude_se,
         location=float(tracked.attrs["location"]),
-        response=response.response.label,
-        crossings=response.crossings,
+        response=response.response_class.label,
+        crossings=response.zero_crossings,
         cycles=response.cycles,
         snr_db=drive.steady.sinad,
         measured_share=float(np.mean(valid)),
         delay_s=_NAN if alignment is None else alignment.delay,
         polarity=_NAN if alignment is None else alignment.polarity,
         gain=_NAN if alignment is None else alignment.gain,
-        findings=tuple(_plain(one) for one in findings),
+        diagnostics=tuple(_plain(one) for one in diagnostics),
     )
 
 
-def _plain(finding: Finding) -> tuple[str, str, str]:
-    return finding.code, finding.severity.value, finding.words
+def _plain(diagnostic: Diagnostic) -> tuple[str, str, str]:
+    return diagnostic.code, diagnostic.severity.value, diagnostic.message
 
 
 def _stated(signal: xr.DataArray, test: Test) -> float | None:

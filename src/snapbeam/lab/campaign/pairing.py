@@ -45,7 +45,7 @@ def find_tests(folder: Path, table: Path | None = None, besides: Path | None = N
     """The tests of a folder, in the order of their names or of the table.
 
     A recording and a vibrometer file are one test if their names are the same but for the ending and words
-    such as "vib", "velocity" or "camera".  A folder of numbered images is a recording.
+    such as "vib", "velocity_at_striker" or "camera".  A folder of numbered images is a recording.
 
     Parameters
     ----------

@@ -18,7 +18,7 @@ from snapbeam.lab.tracking.settings import TrackingSettings
 __all__ = ["CampaignSettings", "load_settings"]
 
 _CAMERA = ("frame_rate", "pixel_size", "region")
-_SIGNAL = ("channel", "units", "sensitivity", "sampling_freq", "columns")
+_SIGNAL = ("channel", "units", "sensitivity", "sampling_frequency", "columns")
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class CampaignSettings:
     tracking
         How to track; the buckling level is needed for the response.
     signal
-        ``channel``, ``units``, ``sensitivity``, ``sampling_freq`` and ``columns`` as for
+        ``channel``, ``units``, ``sensitivity``, ``sampling_frequency`` and ``columns`` as for
         :func:`snapbeam.lab.read_signal`.
     cycles
         Cycles of excitation that the response class is asked for; the rule needs 20.

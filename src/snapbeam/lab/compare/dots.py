@@ -14,18 +14,18 @@ from numpy.typing import NDArray
 from snapbeam.core.codes import ResponseClass
 from snapbeam.core.validate import InputError, file_path, positive
 
-__all__ = ["Dots", "read_dots"]
+__all__ = ["MeasuredPoints", "read_measured_points"]
 
 _Array = NDArray[np.float64]
 
 # One of each pair is wanted; the last column of all may be left out.
 _FREQUENCY = ("frequency_ratio", "frequency_hz")
 _VELOCITY = ("velocity_amplitude", "velocity_m_s")
-_COLUMNS = (*_FREQUENCY, *_VELOCITY, "location", "response")
+_COLUMNS = (*_FREQUENCY, *_VELOCITY, "location", "response_class")
 # What a table of tests says beside; read over here.
 _BESIDE = (
-    "test", "recording", "vibrometer", "frequency_se_hz", "velocity_se_m_s", "crossings", "cycles", "snr_db",
-    "measured_share", "delay_s", "polarity", "gain", "status", "findings", "comment",
+    "test", "recording", "vibrometer", "frequency_se_hz", "velocity_se_m_s", "zero_crossings", "cycles", "snr_db",
+    "measured_share", "delay_s", "polarity", "gain", "status", "diagnostics", "comment",
 )  # fmt: skip
 
 _CLASSES = {kind.label: kind for kind in ResponseClass}
@@ -34,36 +34,36 @@ _CLASSES |= {str(kind.value): kind for kind in ResponseClass}
 
 
 @dataclass(frozen=True)
-class Dots:
+class MeasuredPoints:
     """Measured responses, in the coordinates of a map.
 
     Attributes
     ----------
     frequency_ratio, velocity_amplitude, location : array of shape (points,)
         Omega, V and x_s; the location is NaN where the table does not give it.
-    response : int8 array of shape (points,)
+    response_class : int8 array of shape (points,)
         :class:`~snapbeam.ResponseClass` of each.
     """
 
     frequency_ratio: _Array
     velocity_amplitude: _Array
     location: _Array
-    response: NDArray[np.int8]
+    response_class: NDArray[np.int8]
 
     def __len__(self) -> int:
-        return len(self.response)
+        return len(self.response_class)
 
 
-def read_dots(
+def read_measured_points(
     path: str | os.PathLike[str],
     *,
-    reference_freq: float | None = None,
+    reference_frequency: float | None = None,
     buckling_level: float | None = None,
-) -> Dots:
+) -> MeasuredPoints:
     """Read measured responses from a CSV file with a header.
 
     Columns: ``frequency_ratio`` or ``frequency_hz``; ``velocity_amplitude`` (V) or ``velocity_m_s`` (the
-    amplitude in m/s); ``location`` (x_s, may be left out); ``response``, one of intrawell, transient 1,
+    amplitude in m/s); ``location`` (x_s, may be left out); ``response_class``, one of intrawell, transient 1,
     transient 2, continuous, unknown, or the number of the class; and those beside which
     ``snapbeam campaign`` writes.  Cells are separated by commas, semicolons or tabs; with the latter two the
     decimal sign may be a comma.  Lines that start with ``#`` are comments.
@@ -72,7 +72,7 @@ def read_dots(
     ----------
     path : path
         The file.
-    reference_freq : float, optional
+    reference_frequency : float, optional
         First natural frequency, Hz, wanted for ``frequency_hz`` and ``velocity_m_s``.
     buckling_level : float, optional
         Buckling level b, m, wanted for ``velocity_m_s``: V = velocity / (2 pi b f_1).
@@ -103,9 +103,11 @@ def read_dots(
     _check_header(file.name, header)
     frequency_scale, velocity_scale = 1.0, 1.0
     if "frequency_hz" in header:
-        frequency_scale = 1.0 / _wanted(file.name, "frequency_hz", "reference_freq", reference_freq, "Hz")
+        frequency_scale = 1.0 / _wanted(
+            file.name, "frequency_hz", "reference_frequency", reference_frequency, "Hz"
+        )
     if "velocity_m_s" in header:
-        freq = _wanted(file.name, "velocity_m_s", "reference_freq", reference_freq, "Hz")
+        freq = _wanted(file.name, "velocity_m_s", "reference_frequency", reference_frequency, "Hz")
         level = _wanted(file.name, "velocity_m_s", "buckling_level", buckling_level, "m")
         velocity_scale = 1.0 / (2.0 * math.pi * freq * level)
     frequency = header.index(next(name for name in _FREQUENCY if name in header))
@@ -131,9 +133,9 @@ def read_dots(
                 location,
             )
         )
-        kinds.append(_kind(file.name, number, cells[header.index("response")]))
+        kinds.append(_kind(file.name, number, cells[header.index("response_class")]))
     columns = np.array(points, dtype=np.float64).reshape(-1, 3).T
-    return Dots(columns[0], columns[1], columns[2], np.array(kinds, dtype=np.int8))
+    return MeasuredPoints(columns[0], columns[1], columns[2], np.array(kinds, dtype=np.int8))
 
 
 def _check_header(name: str, header: list[str]) -> None:
@@ -142,7 +144,7 @@ def _check_header(name: str, header: list[str]) -> None:
             raise InputError(f"{name}: unknown column {column!r}; must be among {', '.join(_COLUMNS)}")
         if header.count(column) > 1:
             raise InputError(f"{name}: column {column!r} stands there twice")
-    for pair in (_FREQUENCY, _VELOCITY, ("response",)):
+    for pair in (_FREQUENCY, _VELOCITY, ("response_class",)):
         found = [column for column in pair if column in header]
         if len(found) != 1:
             raise InputError(f"{name}: must have one column {' or '.join(pair)}, not {found}")

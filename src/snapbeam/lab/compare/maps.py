@@ -15,7 +15,7 @@ from snapbeam.core.validate import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["DotComparison", "MeasuredDots", "compare_dots"]
+__all__ = ["DotComparison", "MeasuredPointsComparison", "compare_measured_points"]
 
 _Array = NDArray[np.float64]
 _AXES = ("frequency_ratio", "velocity_amplitude", "location")
@@ -23,8 +23,8 @@ _NEAR = 0.02  # a dot belongs to a map if its fixed coordinate is within this sh
 _CLASSES = tuple(kind for kind in ResponseClass if kind is not ResponseClass.UNKNOWN)
 
 
-class MeasuredDots(Protocol):
-    """Measured responses: arrays of one entry a test, as ``snapbeam.lab.compare.dots.read_dots`` returns them."""
+class MeasuredPointsComparison(Protocol):
+    """Measured responses: arrays of one entry a test, as ``snapbeam.lab.compare.dots.read_measured_points`` returns them."""
 
     @property
     def frequency_ratio(self) -> NDArray[np.float64]: ...
@@ -33,7 +33,7 @@ class MeasuredDots(Protocol):
     @property
     def location(self) -> NDArray[np.float64]: ...
     @property
-    def response(self) -> NDArray[np.int8]: ...
+    def response_class(self) -> NDArray[np.int8]: ...
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,14 @@ def _wilson(successes: int, total: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-def compare_dots(dots: MeasuredDots, dataset: xr.Dataset) -> DotComparison:
+def compare_measured_points(dots: MeasuredPointsComparison, dataset: xr.Dataset) -> DotComparison:
     """Compare measured responses with a simulated map.
 
     Parameters
     ----------
     dots : MeasuredDots
     dataset : xarray.Dataset
-        A map: ``response`` over some of frequency_ratio, velocity_amplitude and location; the others are
+        A map: ``response_class`` over some of frequency_ratio, velocity_amplitude and location; the others are
         scalar coordinates or attributes.
 
     Raises
@@ -121,14 +121,14 @@ def compare_dots(dots: MeasuredDots, dataset: xr.Dataset) -> DotComparison:
     """
     import xarray as xr
 
-    if not isinstance(dataset, xr.Dataset) or "response" not in dataset:
+    if not isinstance(dataset, xr.Dataset) or "response_class" not in dataset:
         raise InputError("dataset: must be a map with the variable response")
-    response = dataset["response"]
+    response = dataset["response_class"]
     dims = [str(name) for name in response.dims]
     if not dims or any(name not in _AXES for name in dims):
         raise InputError(f"response with dimensions {dims}: must be among {', '.join(_AXES)}")
     where = {name: np.asarray(getattr(dots, name), dtype=np.float64) for name in _AXES}
-    measured = np.asarray(dots.response, dtype=np.int8)
+    measured = np.asarray(dots.response_class, dtype=np.int8)
     count = measured.size
     inside, belongs = np.ones(count, dtype=bool), np.ones(count, dtype=bool)
     place: dict[str, _Array] = {}

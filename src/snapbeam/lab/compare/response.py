@@ -33,15 +33,15 @@ _WHOLE = 0.98  # share of the wanted cycles that counts as all of them
 class MeasuredResponse:
     """Class and counts of a measured run.
 
-    ``response`` is UNKNOWN where ``reasons`` say why.  ``crossings`` is at least what happened: more may
+    ``response_class`` is UNKNOWN where ``reasons`` say why.  ``zero_crossings`` is at least what happened: more may
     hide in dropouts.  ``noise`` and ``hysteresis`` are in units of b; ``final_well`` is -1 or 1, the sign
     at the end.
     """
 
-    response: ResponseClass
-    crossings: int
-    crossings_last_quarter: int
-    last_crossing: float
+    response_class: ResponseClass
+    zero_crossings: int
+    zero_crossings_last_quarter: int
+    last_zero_crossing: float
     final_well: int
     cycles: float
     noise: float
@@ -52,10 +52,12 @@ class MeasuredResponse:
     @property
     def description(self) -> str:
         """The result in words."""
-        counts = f"{self.crossings} crossing(s) in {self.cycles:.1f} cycles"
-        if self.response is ResponseClass.UNKNOWN:
+        counts = f"{self.zero_crossings} crossing(s) in {self.cycles:.1f} cycles"
+        if self.response_class is ResponseClass.UNKNOWN:
             return f"class not told: {'; '.join(self.reasons)} ({counts})"
-        return f"{self.response.label} ({counts}, {self.crossings_last_quarter} in the last quarter)"
+        return (
+            f"{self.response_class.label} ({counts}, {self.zero_crossings_last_quarter} in the last quarter)"
+        )
 
 
 def measure_response(
@@ -63,7 +65,7 @@ def measure_response(
     frequency: float | None = None,
     *,
     cycles: int = 200,
-    at: str = "displacement",
+    at: str = "displacement_at_striker",
     noise: float | None = None,
     start: float | None = None,
 ) -> MeasuredResponse:
@@ -78,7 +80,7 @@ def measure_response(
         Excitation frequency [Hz]; not needed if the run has the coordinate ``cycle``.
     cycles : int
         Cycles of excitation the class is asked for; the paper's experiments have 200.
-    at : {"displacement", "center_displacement"}
+    at : {"displacement_at_striker", "midspan_displacement"}
         Where to count: at the shaker, which for a shaker near the centre serves as well, or at the centre.
     noise : float, optional
         Standard deviation of the displacement's noise, in units of b; estimated from its third differences if
@@ -91,7 +93,7 @@ def measure_response(
     InputError
         If the dataset is no run, or neither *frequency* nor ``cycle`` says how long a cycle is.
     """
-    choice("at", at, ("displacement", "center_displacement"))
+    choice("at", at, ("displacement_at_striker", "midspan_displacement"))
     check_trajectory(run, require=(at,))
     wanted = integer("cycles", cycles, 1)
     time = np.asarray(run["time"].values, dtype=np.float64)
@@ -142,10 +144,10 @@ def measure_response(
     if not reasons:
         response = ResponseClass(int(classify(crossed.size, late, wanted, -first * final)))
     return MeasuredResponse(
-        response=response,
-        crossings=int(crossed.size),
-        crossings_last_quarter=late,
-        last_crossing=float(when[crossed[-1]]) if crossed.size else math.nan,
+        response_class=response,
+        zero_crossings=int(crossed.size),
+        zero_crossings_last_quarter=late,
+        last_zero_crossing=float(when[crossed[-1]]) if crossed.size else math.nan,
         final_well=final,
         cycles=total,
         noise=sigma,

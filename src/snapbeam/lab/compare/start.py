@@ -22,12 +22,12 @@ def start_of_shaker(run: xr.Dataset, frequency: float) -> float | None:
     Parameters
     ----------
     run : xarray.Dataset
-        A run with ``shaker_displacement`` over ``time`` [s].
+        A run with ``striker_displacement`` over ``time`` [s].
     frequency : float
         Of the excitation [Hz].
     """
     time = np.asarray(run["time"].values, dtype=np.float64)
-    values = np.asarray(run["shaker_displacement"].values, dtype=np.float64)
+    values = np.asarray(run["striker_displacement"].values, dtype=np.float64)
     known = np.isfinite(values)
     if np.count_nonzero(known) < 64:
         return None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.validate import InputError, positive
 from snapbeam.lab.compare.start import start_of_shaker
 from snapbeam.lab.plausibility.comparison import KINDS
@@ -37,7 +37,7 @@ class WaveformComparison:
     ``shift`` [cycles] was added to the measured clock.  ``rms_difference`` [b] and ``correlation`` are
     those of the beam, ``shaker_rms_difference`` [b] that of the shaker; ``measured_rms`` and
     ``simulated_rms`` [b] are the beam's motion about its mean.  ``parted`` [cycles] is where the two beams
-    first stay more than ``apart`` [b] from each other for half a cycle, NaN if they never do.  ``findings``
+    first stay more than ``apart`` [b] from each other for half a cycle, NaN if they never do.  ``diagnostics``
     is what makes the comparison doubtful.
     """
 
@@ -54,7 +54,7 @@ class WaveformComparison:
     apart: float
     measured_impacts: _Array
     simulated_impacts: _Array
-    findings: tuple[Finding, ...]
+    diagnostics: tuple[Diagnostic, ...]
 
 
 def compare_waveforms(
@@ -72,7 +72,7 @@ def compare_waveforms(
     Parameters
     ----------
     measured, simulated : xarray.Dataset
-        Runs (see :mod:`snapbeam.runs.schema`) with ``displacement`` and ``shaker_displacement`` [b].
+        Runs (see :mod:`snapbeam.runs.schema`) with ``displacement_at_striker`` and ``striker_displacement`` [b].
     frequency : float, optional
         Excitation frequency [Hz] of the measured run, where it has no coordinate ``cycle``.
     start : float, optional
@@ -92,7 +92,7 @@ def compare_waveforms(
 
     for name, run in (("measured", measured), ("simulated", simulated)):
         try:
-            check_trajectory(run, require=("displacement", "shaker_displacement"))
+            check_trajectory(run, require=("displacement_at_striker", "striker_displacement"))
         except InputError as error:
             raise InputError(f"{name}: {error}") from error
     if start is None and frequency is not None:
@@ -116,10 +116,10 @@ def compare_waveforms(
     step = max(float(np.median(np.diff(clock))), 1.0 / 400.0)
     grid = low + step * np.arange(int((high - low) / step + 1e-9) + 1)
     columns = {
-        "measured_displacement": _on(grid, clock, measured["displacement"].values),
-        "simulated_displacement": _on(grid, model_clock, simulated["displacement"].values),
-        "measured_shaker": _on(grid, clock, measured["shaker_displacement"].values),
-        "simulated_shaker": _on(grid, model_clock, simulated["shaker_displacement"].values),
+        "measured_displacement": _on(grid, clock, measured["displacement_at_striker"].values),
+        "simulated_displacement": _on(grid, model_clock, simulated["displacement_at_striker"].values),
+        "measured_shaker": _on(grid, clock, measured["striker_displacement"].values),
+        "simulated_shaker": _on(grid, model_clock, simulated["striker_displacement"].values),
     }
     waveforms = xr.Dataset(
         {name: ("cycle", value, {"units": "1"}) for name, value in columns.items()},
@@ -134,7 +134,7 @@ def compare_waveforms(
     spread = float(np.std(one[both])), float(np.std(two[both]))
     same = float(np.corrcoef(one[both], two[both])[0, 1]) if min(spread) > 0.0 else math.nan
     apart = max(_APART, 5.0 * float(measured.attrs.get("displacement_error_b", 0.0)))
-    findings = _findings(
+    diagnostics = _findings(
         columns, grid, shift, seen.amplitude / wanted.amplitude, start is not None or frequency is None
     )
     return WaveformComparison(
@@ -149,7 +149,7 @@ def compare_waveforms(
         amplitude_ratio=seen.amplitude / wanted.amplitude,
         parted=_parted(grid, one - two, apart),
         apart=apart,
-        findings=tuple(findings),
+        diagnostics=tuple(diagnostics),
         measured_impacts=_impacts(
             measured_onsets, start or float(measured["time"][0]), rate, shift, low, high
         ),
@@ -159,7 +159,7 @@ def compare_waveforms(
 
 def _findings(
     columns: dict[str, _Array], grid: _Array, shift: float, ratio: float, started: bool
-) -> list[Finding]:
+) -> list[Diagnostic]:
     """What the two shakers say of the comparison; *started* says that their first cycle is known."""
     told = []
     if not started:
@@ -217,7 +217,7 @@ def _cycles_per_second(run: xr.Dataset) -> float:
 
 def _shaker_sine(run: xr.Dataset, clock: _Array) -> SineFit:
     """The shaker's sine over cycles, fitted to the later two thirds of the run."""
-    values = np.asarray(run["shaker_displacement"].values, dtype=np.float64)
+    values = np.asarray(run["striker_displacement"].values, dtype=np.float64)
     good = np.isfinite(values) & (clock >= 0.0)
     if good.sum() < 64:
         raise InputError("run: the shaker was measured in fewer than 64 samples after the start")

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.validate import InputError
 from snapbeam.lab.decay.cycles import noise_level
 from snapbeam.lab.decay.poles import Pole, Stabilisation, find_poles
@@ -35,13 +35,13 @@ class Centres(NamedTuple):
     near: list[Pole]
     far: list[Pole]
     diagram: Stabilisation | None
-    told: list[Finding]
+    told: list[Diagnostic]
 
 
 def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres:
     """The modes wanted, and the others that the record holds."""
     samples = decay.samples
-    span = samples.values.size / samples.sampling_freq
+    span = samples.values.size / samples.sampling_frequency
     sigma = noise_level(samples)
     if asked is None and count == 1:
         center = dominant(samples)
@@ -53,7 +53,7 @@ def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres
         return Centres([center], [], [], [], None, [])
     poles, diagram = find_poles(samples, sigma)
     modes = [pole for pole in poles if _is_mode(pole, span)]
-    told: list[Finding] = []
+    told: list[Diagnostic] = []
     wanted: list[float] = []
     own: list[Pole] = []
     if asked is None:
@@ -71,7 +71,7 @@ def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres
         hum = [line for line in decay.lines if abs(line.frequency / frequency - 1.0) < 2.5 * _ASKED]
         if hum:
             raise InputError(
-                "signal: " + KINDS["hum_asked"].found(asked=frequency, frequency=hum[0].frequency).words
+                "signal: " + KINDS["hum_asked"].found(asked=frequency, frequency=hum[0].frequency).message
             )
         center = dominant(samples, 0.8 * frequency, 1.2 * frequency)
         _stands_out(samples, center, sigma)
@@ -84,13 +84,13 @@ def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres
     return Centres(wanted, own, near, far, diagram, told)
 
 
-def unexplained(residual: NDArray[np.float64], sampling_freq: float) -> bool:
+def unexplained(residual: NDArray[np.float64], sampling_frequency: float) -> bool:
     """Whether what a fit leaves still holds an oscillation that noise would not make."""
     n = residual.size
     window = np.cos(0.5 * math.pi * np.arange(n) / n) ** 2
     power = np.abs(np.fft.rfft(residual * window)) ** 2
-    freq = np.fft.rfftfreq(n, 1.0 / sampling_freq)
-    power[freq * n < 6.0 * sampling_freq] = 0.0
+    freq = np.fft.rfftfreq(n, 1.0 / sampling_frequency)
+    power[freq * n < 6.0 * sampling_frequency] = 0.0
     # noise may be of any colour: each line against its surroundings
     width = max(min(power.size // 8, 101), 9) | 1
     around = median_filter(power, width, mode="nearest") / math.log(2.0)
@@ -105,11 +105,11 @@ def _is_mode(pole: Pole, span: float) -> bool:
 def _stands_out(samples: SignalSamples, frequency: float, sigma: float) -> None:
     """Refuse a peak of the spectrum that noise alone could make."""
     n = samples.values.size
-    span = n / samples.sampling_freq
+    span = n / samples.sampling_frequency
     window = np.cos(0.5 * math.pi * np.arange(n) / n) ** 2
     values = samples.values - float((samples.values * window).sum() / window.sum())
     spectrum = np.abs(np.fft.rfft(values * window, 4 * n)) ** 2
-    freq = np.fft.rfftfreq(4 * n, 1.0 / samples.sampling_freq)
+    freq = np.fft.rfftfreq(4 * n, 1.0 / samples.sampling_frequency)
     floor = sigma**2 * float(np.sum(window**2))
     if spectrum[np.abs(freq - frequency) <= 1.0 / span].max() < 20.0 * floor:
         raise InputError("signal: no further mode stands out of the noise (found: none)")

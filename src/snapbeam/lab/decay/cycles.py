@@ -43,9 +43,9 @@ def _band(samples: SignalSamples, frequency: float) -> _Array:
     """The part of a signal between 0.5 and 1.5 times *frequency*, without phase shift."""
     from scipy.signal import butter, sosfiltfilt
 
-    high = min(1.5 * frequency, 0.49 * samples.sampling_freq)
-    sections = butter(3, (0.5 * frequency, high), "bandpass", fs=samples.sampling_freq, output="sos")
-    pad = min(samples.values.size - 1, int(3 * samples.sampling_freq / frequency))
+    high = min(1.5 * frequency, 0.49 * samples.sampling_frequency)
+    sections = butter(3, (0.5 * frequency, high), "bandpass", fs=samples.sampling_frequency, output="sos")
+    pad = min(samples.values.size - 1, int(3 * samples.sampling_frequency / frequency))
     filtered: _Array = sosfiltfilt(sections, samples.values - samples.values.mean(), padlen=pad)
     return filtered
 
@@ -58,14 +58,14 @@ def hilbert_cycles(samples: SignalSamples, frequency: float, sigma: float) -> Cy
     from scipy.signal import hilbert
 
     n = samples.values.size
-    width = samples.sampling_freq / frequency
+    width = samples.sampling_frequency / frequency
     turn = np.exp(-2j * math.pi * frequency * (samples.time - samples.time[0]))
     slow = hilbert(_band(samples, frequency)) * turn
     count = int((n - 1) / width)
     borders = np.round(np.arange(count + 1) * width).astype(np.int64)
     sums = np.concatenate(([0.0], np.cumsum(slow)))
     mean = (sums[borders[1:]] - sums[borders[:-1]]) / np.diff(borders)
-    middle = samples.time[0] + (borders[1:] + borders[:-1] - 1) / (2.0 * samples.sampling_freq)
+    middle = samples.time[0] + (borders[1:] + borders[:-1] - 1) / (2.0 * samples.sampling_frequency)
     phase = np.unwrap(np.angle(mean)) + 2.0 * math.pi * frequency * (middle - samples.time[0])
     noise = sigma * math.sqrt(2.0 / width)
     return _usable(Cycles(middle[3:-3], np.abs(mean[3:-3]), phase[3:-3], noise))
@@ -76,7 +76,7 @@ def peak_cycles(samples: SignalSamples, frequency: float, sigma: float) -> Cycle
     from scipy.signal import find_peaks
 
     y = _band(samples, frequency)
-    period = samples.sampling_freq / frequency
+    period = samples.sampling_frequency / frequency
     at, _ = find_peaks(y, height=0.0, distance=max(1, int(0.7 * period)))
     at = at[(at > 3 * period) & (at < y.size - 3 * period)]
     if at.size < 4:
@@ -84,10 +84,10 @@ def peak_cycles(samples: SignalSamples, frequency: float, sigma: float) -> Cycle
     a, b, c = y[at - 1], y[at], y[at + 1]
     bend = np.minimum(a - 2.0 * b + c, -1e-300)
     shift = np.clip(0.5 * (a - c) / bend, -0.5, 0.5)
-    time = samples.time[0] + (at + shift) / samples.sampling_freq
+    time = samples.time[0] + (at + shift) / samples.sampling_frequency
     height = b - 0.25 * (a - c) * shift
     turns = np.concatenate(([0.0], np.cumsum(np.round(np.diff(time) * frequency))))
-    noise = sigma * math.sqrt(2.0 * frequency / samples.sampling_freq)
+    noise = sigma * math.sqrt(2.0 * frequency / samples.sampling_frequency)
     return _usable(Cycles(time, height, 2.0 * math.pi * turns, noise))
 
 
@@ -121,7 +121,7 @@ def regress(cycles: Cycles, start: float, units: str, method: str, soften: bool 
     if not (omega > 0.0 and math.isfinite(amplitude)):
         raise InputError("signal: the cycles follow no decaying oscillation")
     return ModeEstimate(
-        natural_freq=natural / (2.0 * math.pi),
+        natural_frequencies=natural / (2.0 * math.pi),
         natural_freq_se=math.sqrt(freq_var) / (2.0 * math.pi),
         damping_ratio=delta / natural,
         damping_ratio_se=math.sqrt(delta_var) / natural,

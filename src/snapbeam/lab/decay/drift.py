@@ -51,13 +51,13 @@ def find_drift(samples: SignalSamples, frequency: float, decay_rate: float) -> t
     """
     n = samples.values.size
     nothing: _Array = np.zeros(n)
-    width = round(samples.sampling_freq / frequency)
+    width = round(samples.sampling_frequency / frequency)
     if n < 10 * width:
         return nothing, 0
     bell = np.hanning(2 * width + 1)
     mean = fftconvolve(samples.values, bell / bell.sum(), mode="valid")[::width]
     at = np.arange(mean.size) * width + width
-    fall = np.column_stack([np.ones(mean.size), np.exp(-2.0 * decay_rate * at / samples.sampling_freq)])
+    fall = np.column_stack([np.ones(mean.size), np.exp(-2.0 * decay_rate * at / samples.sampling_frequency)])
     rest = mean - fall @ np.linalg.lstsq(fall, mean, rcond=None)[0]
     x = 2.0 * (at + 0.5) / n - 1.0
     largest = float(np.percentile(np.abs(samples.values - np.median(samples.values)), 99))
@@ -86,14 +86,14 @@ def find_lines(samples: SignalSamples, decay_rate: float) -> list[Line]:
     """
     n = samples.values.size
     first = 2 * n // 3
-    rest = SignalSamples(samples.values[first:].copy(), samples.time[first:], samples.sampling_freq)
+    rest = SignalSamples(samples.values[first:].copy(), samples.time[first:], samples.sampling_frequency)
     found: list[Line] = []
     for _ in range(_MOST_LINES):
         line = _strongest(rest, decay_rate)
         if line is None:
             break
         found.append(line)
-        rest = SignalSamples(rest.values - line.waveform(rest.time), rest.time, rest.sampling_freq)
+        rest = SignalSamples(rest.values - line.waveform(rest.time), rest.time, rest.sampling_frequency)
     return found
 
 
@@ -101,8 +101,8 @@ def _strongest(part: SignalSamples, decay_rate: float) -> Line | None:
     n = part.values.size
     values = part.values - part.values.mean()
     spectrum = np.abs(np.fft.rfft(values * np.hanning(n))) ** 2
-    freq = np.fft.rfftfreq(n, 1.0 / part.sampling_freq)
-    span = n / part.sampling_freq
+    freq = np.fft.rfftfreq(n, 1.0 / part.sampling_frequency)
+    span = n / part.sampling_frequency
     left = np.where(freq * span < 4.0, 0.0, spectrum)
     for _ in range(_PEAKS):
         at = int(np.argmax(left))
@@ -113,7 +113,7 @@ def _strongest(part: SignalSamples, decay_rate: float) -> Line | None:
         try:
             whole = fit_sine(part, float(freq[at]), 1)
             parts = [
-                SignalSamples(part.values[cut], part.time[cut], part.sampling_freq)
+                SignalSamples(part.values[cut], part.time[cut], part.sampling_frequency)
                 for cut in (slice(0, n // 2), slice(n // 2, n))
             ]
             halves = [fit_sine(one, whole.frequency, 1, fixed=True) for one in parts]
@@ -135,4 +135,4 @@ def without_lines(samples: SignalSamples, lines: list[Line]) -> SignalSamples:
     values = samples.values
     for line in lines:
         values = values - line.waveform(samples.time)
-    return SignalSamples(values, samples.time, samples.sampling_freq)
+    return SignalSamples(values, samples.time, samples.sampling_frequency)

@@ -83,7 +83,10 @@ def fit_decay(
     parameters = lmfit.Parameters()
     for i, guess in enumerate(guesses):
         parameters.add(
-            f"f{i}", guess.natural_freq, min=0.5 * guess.natural_freq, max=1.5 * guess.natural_freq
+            f"f{i}",
+            guess.natural_frequencies,
+            min=0.5 * guess.natural_frequencies,
+            max=1.5 * guess.natural_frequencies,
         )
         parameters.add(f"z{i}", max(guess.damping_ratio, 1e-6), min=1e-9, max=0.5)
         if soften:
@@ -120,7 +123,7 @@ def fit_decay(
     fitted = [value[f"f{i}"] for i in range(len(guesses))]
     lines = [0.0, *fitted, *(2.0 * f for f in fitted)]
     free = design.shape[1] + len(parameters)
-    near = [math.sqrt(white_variance(rest, samples.sampling_freq, f, lines, free)) for f in fitted]
+    near = [math.sqrt(white_variance(rest, samples.sampling_frequency, f, lines, free)) for f in fitted]
     sigma = max(near[0], trifle)
     error = _errors(residual, value)
     linear = _linear_errors(design, sigma)
@@ -133,7 +136,7 @@ def fit_decay(
         first = math.hypot(solution[1], solution[2])
         modes.append(
             ModeEstimate(
-                natural_freq=value[f"f{i}"],
+                natural_frequencies=value[f"f{i}"],
                 natural_freq_se=error[f"f{i}"] * stretch,
                 damping_ratio=value[f"z{i}"],
                 damping_ratio_se=error[f"z{i}"] * stretch,
@@ -159,15 +162,19 @@ def explain(samples: SignalSamples, modes: list[ModeEstimate], units: str, softe
     first = modes[0].amplitude ** 2
     value = {name: mean for name, (mean, _) in law_priors(units).items()}
     for i, mode in enumerate(modes):
-        value |= {f"f{i}": mode.natural_freq, f"z{i}": mode.damping_ratio, f"s{i}": mode.softening * first}
+        value |= {
+            f"f{i}": mode.natural_frequencies,
+            f"z{i}": mode.damping_ratio,
+            f"s{i}": mode.softening * first,
+        }
     value["h"] = modes[0].law_strength
     design = _design(t, value, len(modes), soften, modes[0].law)
     solution = _solve(design, samples.values)
     rest = samples.values - design @ solution
     free = design.shape[1] + 3 * len(modes)
-    frequencies = [mode.natural_freq for mode in modes]
+    frequencies = [mode.natural_frequencies for mode in modes]
     lines = [0.0, *frequencies, *(2.0 * f for f in frequencies)]
-    near = math.sqrt(white_variance(rest, samples.sampling_freq, frequencies[-1], lines, free))
+    near = math.sqrt(white_variance(rest, samples.sampling_frequency, frequencies[-1], lines, free))
     alone = _alone(design, solution, rest, _columns(len(modes), soften))
     return FitResult(modes, rest, alone, near, math.sqrt(float(rest @ rest) / max(t.size - free, 1)))
 

@@ -83,7 +83,7 @@ def identify_decay(
         The truth is the frequency of vanishing amplitude, and the viscous damping ratio: where the amplitude
         of the first mode shows dry friction or quadratic drag beside it, its strength is fitted too.
         Standard errors follow the noise near each mode and include what is not known of the law of softening;
-        where the fit leaves more than noise, they hold what parts of the decay differ by, and a finding says so.
+        where the fit leaves more than noise, they hold what parts of the decay differ by, and a diagnostic says so.
 
     Raises
     ------
@@ -110,9 +110,9 @@ def identify_decay(
     if method == "fit":
         samples, result, cycles, more, diagram = fit_modes(decay, centres, units, soften, known)
         told += more
-        if diagram is None and unexplained(result.residual, samples.sampling_freq):
+        if diagram is None and unexplained(result.residual, samples.sampling_frequency):
             # other modes are in the record: once more with them known
-            centres = find_centres(decay, 1, [result.modes[0].natural_freq])
+            centres = find_centres(decay, 1, [result.modes[0].natural_frequencies])
             samples, result, cycles, told, diagram = fit_modes(decay, centres, units, soften, known)
     else:
         samples = without_poles(decay.samples, centres.far, centres.own)
@@ -123,19 +123,19 @@ def identify_decay(
     estimates, doubts = judged(samples, result, cycles, misfit, soften)
     wanted = tuple(estimates[: len(centres.wanted)])
     doubts += findings_about(samples, wanted, result.noise_near, soften)
-    doubts += sampled_findings(wanted, decay.samples.sampling_freq)
-    left = SignalSamples(result.residual, samples.time, samples.sampling_freq)
-    falls = noise_fall(left, wanted[0].natural_freq)
+    doubts += sampled_findings(wanted, decay.samples.sampling_frequency)
+    left = SignalSamples(result.residual, samples.time, samples.sampling_frequency)
+    falls = noise_fall(left, wanted[0].natural_frequencies)
     if falls is not None:
-        added = 100.0 * falls.rate / (2.0 * math.pi * wanted[0].natural_freq)
+        added = 100.0 * falls.rate / (2.0 * math.pi * wanted[0].natural_frequencies)
         doubts.append(
             KINDS["window"].found(factor=falls.factor, constant=1.0 / falls.rate, added_percent=added)
         )
     wanted = widened(wanted, decay.drift, falls.rate if falls is not None else 0.0)
-    free = [mode.natural_freq for mode in wanted]
+    free = [mode.natural_frequencies for mode in wanted]
     lines = [0.0, *free, *(2.0 * f for f in free)]
-    near = white_variance(result.residual, samples.sampling_freq, free[0], lines, 3 * len(free))
-    top = noise_level(SignalSamples(result.residual, samples.time, samples.sampling_freq))
+    near = white_variance(result.residual, samples.sampling_frequency, free[0], lines, 3 * len(free))
+    top = noise_level(SignalSamples(result.residual, samples.time, samples.sampling_frequency))
     amplitude, freq, freq_se = backbone(cycles)
     power = wanted[0].amplitude ** 2 / 2.0
     return DecayFit(
@@ -149,9 +149,9 @@ def identify_decay(
         misfit=misfit.ratio,
         lines=decay.lines,
         poles=diagram,
-        findings=(*decay.findings, *told, *doubts),
+        diagnostics=(*decay.diagnostics, *told, *doubts),
         backbone_amplitude=amplitude,
-        backbone_freq=freq,
+        backbone_frequency=freq,
         backbone_freq_se=freq_se,
         envelope_time=cycles.time,
         envelope=cycles.amplitude,
@@ -176,7 +176,7 @@ def _by_cycles(
         heard = cycles._replace(noise=cycles.noise * result.noise_near / sigma) if sigma > 0.0 else cycles
         found[-1] = regress(heard, float(samples.time[0]), units, method, soften and len(found) == 1)
         result = result._replace(modes=list(found))
-        rest = SignalSamples(result.residual, samples.time, samples.sampling_freq)
+        rest = SignalSamples(result.residual, samples.time, samples.sampling_frequency)
     assert kept is not None and result is not None
     return result, kept
 

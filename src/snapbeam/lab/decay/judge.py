@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.lab.decay.cycles import Cycles
 from snapbeam.lab.decay.fit import FitResult
 from snapbeam.lab.decay.laws import envelope
@@ -43,22 +43,24 @@ def misfit_of(samples: SignalSamples, residual: _Array, modes: list[ModeEstimate
     """
     first = modes[0]
     n = residual.size
-    span = n / samples.sampling_freq
-    rate = first.damping_ratio * 2.0 * math.pi * first.natural_freq
+    span = n / samples.sampling_frequency
+    rate = first.damping_ratio * 2.0 * math.pi * first.natural_frequencies
     half = max(5.0 / span, 3.0 * rate / (2.0 * math.pi))
     power = np.abs(np.fft.rfft(residual)) ** 2 / n
-    freq = np.fft.rfftfreq(n, 1.0 / samples.sampling_freq)
-    away = np.abs(freq - first.natural_freq)
+    freq = np.fft.rfftfreq(n, 1.0 / samples.sampling_frequency)
+    away = np.abs(freq - first.natural_frequencies)
     inside = away <= half
     beside = (
         (away > half)
-        & (away < max(12.0 * half, 0.5 * first.natural_freq))
-        & (freq > 0.3 * first.natural_freq)
+        & (away < max(12.0 * half, 0.5 * first.natural_frequencies))
+        & (freq > 0.3 * first.natural_frequencies)
     )
     for mode in modes[1:]:
-        own = np.abs(freq - mode.natural_freq) < max(5.0 / span, 2.0 * mode.damping_ratio * mode.natural_freq)
+        own = np.abs(freq - mode.natural_frequencies) < max(
+            5.0 / span, 2.0 * mode.damping_ratio * mode.natural_frequencies
+        )
         beside &= ~own
-    beside &= np.abs(freq - 2.0 * first.natural_freq) > half
+    beside &= np.abs(freq - 2.0 * first.natural_frequencies) > half
     if beside.sum() < 8 or inside.sum() < 3:
         return Misfit(1.0, 0.0)
     noise = float(np.median(power[beside])) / math.log(2.0)
@@ -68,27 +70,30 @@ def misfit_of(samples: SignalSamples, residual: _Array, modes: list[ModeEstimate
     # what is left as an amplitude over the time the mode lives
     alive = min(span, 0.5 / max(rate, 1e-9))
     excess = max(float(power[inside].sum()) - noise * float(inside.sum()), 0.0)
-    share = math.sqrt(4.0 * excess / (alive * samples.sampling_freq)) / first.amplitude
+    share = math.sqrt(4.0 * excess / (alive * samples.sampling_frequency)) / first.amplitude
     return Misfit(ratio, share)
 
 
 def judged(
     samples: SignalSamples, result: FitResult, cycles: Cycles, misfit: Misfit, soften: bool
-) -> tuple[list[ModeEstimate], list[Finding]]:
+) -> tuple[list[ModeEstimate], list[Diagnostic]]:
     """The modes with standard errors that hold what the fit leaves, and what is to be said of that."""
-    told: list[Finding] = []
+    told: list[Diagnostic] = []
     first = result.modes[0]
     rates, turns = _halves(cycles, first, float(samples.time[0]), soften)
-    omega = 2.0 * math.pi * first.natural_freq
+    omega = 2.0 * math.pi * first.natural_frequencies
     damping_apart = abs(rates[0]) / omega
     freq_apart = abs(turns[0]) / (2.0 * math.pi)
-    worse_damping, worse_freq = abs(rates[0]) / max(rates[1], 1e-300), abs(turns[0]) / max(turns[1], 1e-300)
+    worse_damping, worse_frequency = (
+        abs(rates[0]) / max(rates[1], 1e-300),
+        abs(turns[0]) / max(turns[1], 1e-300),
+    )
     doubtful = misfit.ratio > _RATIO and misfit.share > _MATTERS
     if doubtful:
         told.append(KINDS["misfit"].found(ratio=misfit.ratio, share_percent=100.0 * misfit.share))
-    matters = damping_apart > 0.03 * first.damping_ratio or freq_apart > 3e-4 * first.natural_freq
-    if max(worse_damping, worse_freq) > _APART and matters:
-        told.append(KINDS["parts_differ"].found(frequency_se=worse_freq, damping_se=worse_damping))
+    matters = damping_apart > 0.03 * first.damping_ratio or freq_apart > 3e-4 * first.natural_frequencies
+    if max(worse_damping, worse_frequency) > _APART and matters:
+        told.append(KINDS["parts_differ"].found(frequency_se=worse_frequency, damping_se=worse_damping))
         doubtful = True
     if not doubtful:
         return list(result.modes), told
@@ -96,7 +101,7 @@ def judged(
     missed = misfit.share * first.damping_ratio
     raised = dataclasses.replace(
         first,
-        natural_freq_se=max(first.natural_freq_se * grown, freq_apart, missed * first.natural_freq),
+        natural_freq_se=max(first.natural_freq_se * grown, freq_apart, missed * first.natural_frequencies),
         damping_ratio_se=max(first.damping_ratio_se * grown, damping_apart, missed),
     )
     others = [
@@ -118,7 +123,7 @@ def _halves(
     t = cycles.time - start
     if t.size < 12:
         return (0.0, math.inf), (0.0, math.inf)
-    omega = 2.0 * math.pi * mode.natural_freq
+    omega = 2.0 * math.pi * mode.natural_frequencies
     rate = mode.damping_ratio * omega
     shape = envelope(mode.law, t, rate, mode.law_strength)
     log_rest = np.log(cycles.amplitude) - np.log(shape)
@@ -144,15 +149,17 @@ def _halves(
     return out[0], out[1]
 
 
-def sampled_findings(modes: tuple[ModeEstimate, ...], sampling_freq: float) -> list[Finding]:
+def sampled_findings(modes: tuple[ModeEstimate, ...], sampling_frequency: float) -> list[Diagnostic]:
     """What is to be said of modes above the band that filters against aliasing keep clean."""
-    limit = sampling_freq / _BAND
+    limit = sampling_frequency / _BAND
     return [
         KINDS["above_band"].found(
-            frequency=mode.natural_freq, limit_hz=limit, folded=sampling_freq - mode.natural_freq
+            frequency=mode.natural_frequencies,
+            limit_hz=limit,
+            folded=sampling_frequency - mode.natural_frequencies,
         )
         for mode in modes
-        if mode.natural_freq > limit
+        if mode.natural_frequencies > limit
     ]
 
 
@@ -164,10 +171,10 @@ def widened(modes: tuple[ModeEstimate, ...], drift: float, added: float) -> tupl
     return tuple(
         dataclasses.replace(
             mode,
-            natural_freq_se=math.hypot(mode.natural_freq_se, drift * mode.natural_freq),
+            natural_freq_se=math.hypot(mode.natural_freq_se, drift * mode.natural_frequencies),
             damping_ratio_se=math.hypot(
                 mode.damping_ratio_se,
-                added / (2.0 * math.pi * mode.natural_freq),
+                added / (2.0 * math.pi * mode.natural_frequencies),
                 drift * mode.damping_ratio,
             ),
             softening_se=math.hypot(mode.softening_se, drift / first if mode.softening_se > 0.0 else 0.0),
@@ -178,12 +185,12 @@ def widened(modes: tuple[ModeEstimate, ...], drift: float, added: float) -> tupl
 
 def findings_about(
     samples: SignalSamples, modes: tuple[ModeEstimate, ...], noise: float, soften: bool
-) -> list[Finding]:
+) -> list[Diagnostic]:
     """What the numbers of a decay alone make doubtful."""
     told = []
-    span = samples.values.size / samples.sampling_freq
+    span = samples.values.size / samples.sampling_frequency
     first = modes[0]
-    left = math.exp(-first.damping_ratio * 2.0 * math.pi * first.natural_freq * span)
+    left = math.exp(-first.damping_ratio * 2.0 * math.pi * first.natural_frequencies * span)
     if left > 0.7:
         told.append(KINDS["short"].found(left_percent=100.0 * left))
     change = abs(first.softening) * first.amplitude**2
@@ -192,7 +199,7 @@ def findings_about(
     rise = -first.softening * first.amplitude**2
     certain = -first.softening / first.softening_se if first.softening_se > 0.0 else 0.0
     if soften and certain > _HARDENS and rise > _RISE:
-        half = 0.5 * samples.sampling_freq
+        half = 0.5 * samples.sampling_frequency
         told.append(KINDS["hardening"].found(rise_percent=100.0 * rise, certain=certain, half_hz=half))
     if first.amplitude < 5.0 * noise:
         told.append(KINDS["faint"].found())

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.findings import Finding, doubtful
+from snapbeam.core.findings import Diagnostic, doubtful
 from snapbeam.lab.decay.drift import Line
 from snapbeam.lab.decay.poles import Stabilisation
 
@@ -33,14 +33,14 @@ _Array = NDArray[np.float64]
 class ModeEstimate:
     """One mode of a free decay, as one method sees it.
 
-    ``natural_freq`` [Hz] at zero amplitude and ``damping_ratio``, with standard errors; ``amplitude`` at
-    the start of the analysed part, in the unit of the signal; ``softening`` kappa in f = natural_freq (1 -
+    ``natural_frequencies`` [Hz] at zero amplitude and ``damping_ratio``, with standard errors; ``amplitude`` at
+    the start of the analysed part, in the unit of the signal; ``softening`` kappa in f = natural_frequencies (1 -
     kappa a^2), per squared unit of the signal, where a is the amplitude of the first mode.  ``law`` is how it
     is damped, "viscous", "dry" or "quadratic", the latter two beside viscous damping and ``law_strength``
     times as strong at the start; the damping ratio is that of the viscous part.
     """
 
-    natural_freq: float
+    natural_frequencies: float
     natural_freq_se: float
     damping_ratio: float
     damping_ratio_se: float
@@ -59,12 +59,12 @@ class ModeEstimate:
 class DecayFit:
     """The modes of a free decay, strongest first, with what is needed to judge and to draw the result.
 
-    ``snr`` [dB] is that of the first mode at the start; ``backbone_amplitude`` and ``backbone_freq`` [Hz],
+    ``snr`` [dB] is that of the first mode at the start; ``backbone_amplitude`` and ``backbone_frequency`` [Hz],
     with ``backbone_freq_se``, are the amplitude and frequency of the first mode over successive parts of
     the decay; ``envelope_time``, ``envelope`` its amplitude cycle by cycle; ``residual_whiteness`` the
     noise near the first mode over the noise elsewhere; ``misfit`` what the fit leaves at the first mode over
     what the noise about it explains, 1 if the model says it all.  ``lines`` are sines that do not decay, taken
-    out; ``poles`` the stabilisation diagram, where one was needed; ``findings`` what makes the result doubtful.
+    out; ``poles`` the stabilisation diagram, where one was needed; ``diagnostics`` what makes the result doubtful.
     """
 
     modes: tuple[ModeEstimate, ...]
@@ -77,22 +77,22 @@ class DecayFit:
     misfit: float
     lines: tuple[Line, ...]
     poles: Stabilisation | None = field(repr=False)
-    findings: tuple[Finding, ...]
+    diagnostics: tuple[Diagnostic, ...]
     backbone_amplitude: _Array = field(repr=False)
-    backbone_freq: _Array = field(repr=False)
+    backbone_frequency: _Array = field(repr=False)
     backbone_freq_se: _Array = field(repr=False)
     envelope_time: _Array = field(repr=False)
     envelope: _Array = field(repr=False)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The findings that make the result doubtful, in words."""
-        return tuple(one.words for one in doubtful(self.findings))
+        """The diagnostics that make the result doubtful, in words."""
+        return tuple(one.message for one in doubtful(self.diagnostics))
 
     @property
-    def natural_freq(self) -> float:
+    def natural_frequencies(self) -> float:
         """Natural frequency of the first mode at zero amplitude [Hz]."""
-        return self.modes[0].natural_freq
+        return self.modes[0].natural_frequencies
 
     @property
     def damping_ratio(self) -> float:
@@ -102,7 +102,7 @@ class DecayFit:
     def summary(self) -> dict[str, Any]:
         """The figures as plain numbers and words, for a table or a JSON file."""
         names = (
-            "natural_freq",
+            "natural_frequencies",
             "natural_freq_se",
             "damping_ratio",
             "damping_ratio_se",
@@ -127,7 +127,7 @@ class DecayFit:
             "residual_whiteness": self.residual_whiteness,
             "misfit": self.misfit,
             "lines_hz": [line.frequency for line in self.lines],
-            "findings": [one.plain() for one in self.findings],
+            "diagnostics": [one.plain() for one in self.diagnostics],
         }
 
 

@@ -45,7 +45,7 @@ def noise_fall(rest: SignalSamples, frequency: float) -> NoiseFall | None:
         Of the first mode [Hz]; noise is sought above one and a half times it.
     """
     size = rest.values.size // _PARTS
-    freq = np.fft.rfftfreq(size, 1.0 / rest.sampling_freq)
+    freq = np.fft.rfftfreq(size, 1.0 / rest.sampling_frequency)
     inside = freq > 1.5 * frequency
     count = int(np.count_nonzero(inside))
     if count < _LEAST:
@@ -57,13 +57,13 @@ def noise_fall(rest: SignalSamples, frequency: float) -> NoiseFall | None:
     if not level.min() > floor * size:
         return None
     y = 0.5 * np.log(level)
-    t = (np.arange(_PARTS) + 0.5) * size / rest.sampling_freq
+    t = (np.arange(_PARTS) + 0.5) * size / rest.sampling_frequency
     # a quantile q of the exponential distribution that a periodogram has, with lines that share a window of Hann
     spread = -math.sqrt(_QUANTILE / (1.0 - _QUANTILE)) / math.log(1.0 - _QUANTILE)
     error = 0.5 * spread * math.sqrt(1.5 / count)
     slope, base = np.polyfit(t, y, 1)
     off = float(np.sqrt(np.mean((y - base - slope * t) ** 2)))
-    fall = -float(slope) * rest.values.size / rest.sampling_freq
+    fall = -float(slope) * rest.values.size / rest.sampling_frequency
     certain = -float(slope) > _CERTAIN * max(error, off) / math.sqrt(float(((t - t.mean()) ** 2).sum()))
     straight = off < max(2.5 * error, 0.08 * fall)
     return NoiseFall(-float(slope), math.exp(fall)) if certain and straight and fall > _FALL else None
@@ -72,4 +72,4 @@ def noise_fall(rest: SignalSamples, frequency: float) -> NoiseFall | None:
 def undone(samples: SignalSamples, constant: float) -> SignalSamples:
     """A record before it was multiplied by an exponential window of *constant* [s] from its first sample on."""
     values: NDArray[np.float64] = samples.values * np.exp((samples.time - samples.time[0]) / constant)
-    return SignalSamples(values, samples.time, samples.sampling_freq)
+    return SignalSamples(values, samples.time, samples.sampling_frequency)

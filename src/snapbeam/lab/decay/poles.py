@@ -67,7 +67,7 @@ def thinned(samples: SignalSamples, factor: int) -> SignalSamples:
     taps = firwin(2 * half + 1, 0.8 / factor, window="hamming")
     smooth = oaconvolve(samples.values, taps, mode="valid")
     time = samples.time[half : samples.time.size - half]
-    return SignalSamples(smooth[::factor], time[::factor], samples.sampling_freq / factor)
+    return SignalSamples(smooth[::factor], time[::factor], samples.sampling_frequency / factor)
 
 
 def find_poles(samples: SignalSamples, noise: float) -> tuple[list[Pole], Stabilisation]:
@@ -91,11 +91,11 @@ def find_poles(samples: SignalSamples, noise: float) -> tuple[list[Pole], Stabil
         if stage.values.size < 96:
             break
         low = _BANDS[0] if samples.values.size // (4 * factor) < 160 else 0.25 * _BANDS[1]
-        poles, table = _stage(stage, low * stage.sampling_freq, _BANDS[1] * stage.sampling_freq)
+        poles, table = _stage(stage, low * stage.sampling_frequency, _BANDS[1] * stage.sampling_frequency)
         rows += table
         found += poles
         factor *= 4
-    lowest = 4.0 * samples.sampling_freq / samples.values.size
+    lowest = 4.0 * samples.sampling_frequency / samples.values.size
     merged = _merged([pole for pole in found if pole.frequency > lowest])
     weighed = _weighed(samples, merged, noise)
     diagram = Stabilisation(
@@ -137,7 +137,7 @@ def _stage(
         part = shifted[:order, :order]
         turn = part + np.outer(end, end @ part) / max(1.0 - float(end @ end), 1e-12)
         roots = np.linalg.eigvals(turn)
-        s = np.log(roots.astype(np.complex128)) * samples.sampling_freq
+        s = np.log(roots.astype(np.complex128)) * samples.sampling_frequency
         poles = [
             (abs(one) / (2.0 * math.pi), -one.real / abs(one))
             for one in s
@@ -198,7 +198,7 @@ def without_poles(samples: SignalSamples, poles: list[Pole], others: list[Pole])
     if not poles:
         return samples
     _, parts = _parts(samples, [*poles, *others])
-    return SignalSamples(samples.values - sum(parts[: len(poles)]), samples.time, samples.sampling_freq)
+    return SignalSamples(samples.values - sum(parts[: len(poles)]), samples.time, samples.sampling_frequency)
 
 
 def _parts(samples: SignalSamples, poles: list[Pole]) -> tuple[list[float], list[_Array]]:

@@ -39,7 +39,7 @@ def find_release(samples: SignalSamples, frequency: float) -> int:
     0 where the record begins with it.  The swing is that of the rate of change, so that the deflection before
     a release, a constant, is none.
     """
-    width = max(3, round(samples.sampling_freq / frequency))
+    width = max(3, round(samples.sampling_frequency / frequency))
     if samples.values.size < 6 * width:
         return 0
     smooth = uniform_filter1d(samples.values, max(1, width // 8))
@@ -71,7 +71,7 @@ def find_ceiling(samples: SignalSamples, frequency: float) -> Ceiling | None:
     cycles stay level, and flat, where the later ones fall.
     """
     values = samples.values
-    width = max(4, round(samples.sampling_freq / frequency))
+    width = max(4, round(samples.sampling_frequency / frequency))
     until = 0
     for extreme in (values.max(), values.min()):
         runs = [run for run in stuck_runs(values, 3) if values[run.first] == extreme]

@@ -41,10 +41,13 @@ def mode_shapes(first: xr.DataArray, second: xr.DataArray, fit: DecayFit) -> tup
         If the records differ in length or rate.
     """
     one, two = check_signal(first, (), "first"), check_signal(second, (), "second")
-    if one.values.size != two.values.size or abs(one.sampling_freq / two.sampling_freq - 1.0) > 1e-9:
+    if (
+        one.values.size != two.values.size
+        or abs(one.sampling_frequency / two.sampling_frequency - 1.0) > 1e-9
+    ):
         raise InputError(
-            f"second: {two.values.size} samples at {two.sampling_freq:g} Hz, first has {one.values.size} at "
-            f"{one.sampling_freq:g} Hz: must be one recording"
+            f"second: {two.values.size} samples at {two.sampling_frequency:g} Hz, first has {one.values.size} at "
+            f"{one.sampling_frequency:g} Hz: must be one recording"
         )
     amplitudes = [_complex_amplitudes(samples, fit) for samples in (one, two)]
     out = []
@@ -62,7 +65,7 @@ def _complex_amplitudes(samples: SignalSamples, fit: DecayFit) -> list[complex]:
     t, y = samples.time[inside] - fit.start, samples.values[inside]
     columns = [np.ones_like(t)]
     for mode in fit.modes:
-        omega = 2.0 * math.pi * mode.natural_freq
+        omega = 2.0 * math.pi * mode.natural_frequencies
         turn = omega * math.sqrt(1.0 - mode.damping_ratio**2)
         wave = np.exp((-mode.damping_ratio * omega + 1j * turn) * t)
         columns += [wave.real, wave.imag]

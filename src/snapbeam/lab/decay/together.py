@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.validate import InputError
 from snapbeam.lab.decay.centres import CLOSE, ENERGY, Centres
 from snapbeam.lab.decay.cycles import Cycles, hilbert_cycles, noise_level, peak_cycles, regress
@@ -28,7 +28,7 @@ _MANY = 12_000  # samples from which a record is thinned before it is fitted
 
 def _thinned(samples: SignalSamples, highest: float) -> SignalSamples:
     """A long record at fourteen samples or more to the shortest period."""
-    factor = int(samples.sampling_freq / (14.0 * highest))
+    factor = int(samples.sampling_frequency / (14.0 * highest))
     if samples.values.size < _MANY or factor < 2:
         return samples
     return thinned(samples, max(min(factor, samples.values.size // 3000), 1))
@@ -40,7 +40,7 @@ def fit_modes(
     units: str,
     soften: bool,
     known: tuple[float, float] | None,
-) -> tuple[SignalSamples, FitResult, Cycles, list[Finding], Stabilisation | None]:
+) -> tuple[SignalSamples, FitResult, Cycles, list[Diagnostic], Stabilisation | None]:
     """The modes fitted, those that lie close together and, in a short record, all of them, at once.
 
     Modes that are not asked for are taken out first if they lie far away, and fitted beside if they do not.
@@ -50,7 +50,7 @@ def fit_modes(
     if clean.values.size >= _MANY and len(centres.wanted) > 1:
         groups = _groups(centres.wanted)
     diagram = centres.diagram
-    told: list[Finding] = []
+    told: list[Diagnostic] = []
     first: tuple[SignalSamples, FitResult, Cycles] | None = None
     found: dict[float, ModeEstimate] = {}
     for group in groups:
@@ -95,18 +95,18 @@ def _lines_again(
     """The fit once more, lines that do not decay fitted to what the modes left; as it was without such lines."""
     if not decay.lines:
         return samples, result, cycles, False
-    rest = SignalSamples(result.residual, samples.time, samples.sampling_freq)
+    rest = SignalSamples(result.residual, samples.time, samples.sampling_frequency)
     for line in decay.lines:
-        if line.frequency > 0.45 * samples.sampling_freq:
+        if line.frequency > 0.45 * samples.sampling_frequency:
             continue
         try:
             left = fit_sine(rest, line.frequency, 1, fixed=True)
         except InputError:
             continue
         wave = left.amplitude * np.cos(2.0 * math.pi * left.frequency * rest.time + left.phase)
-        rest = SignalSamples(rest.values - wave, rest.time, rest.sampling_freq)
+        rest = SignalSamples(rest.values - wave, rest.time, rest.sampling_frequency)
     change = rest.values - result.residual
-    better = SignalSamples(samples.values + change, samples.time, samples.sampling_freq)
+    better = SignalSamples(samples.values + change, samples.time, samples.sampling_frequency)
     law = None
     if result.modes[0].law != "viscous":
         mode = result.modes[0]
@@ -124,16 +124,18 @@ def _group_fit(
     soften: bool,
     known: tuple[float, float] | None,
     diagram: Stabilisation | None,
-) -> tuple[FitResult, Cycles, list[Finding], Stabilisation | None]:
+) -> tuple[FitResult, Cycles, list[Diagnostic], Stabilisation | None]:
     """Modes fitted together; where they leave more than noise, a second law of damping or a close mode."""
     start = float(samples.time[0])
     guesses, cycles = _guesses(samples, centres, own, units, soften)
-    told: list[Finding] = []
+    told: list[Diagnostic] = []
     apart = [pole for pole in beside if _apart(samples, pole, guesses)]
     guesses = [*guesses, *(_of_pole(pole) for pole in apart)]
     result = fit_decay(samples, guesses, units, soften=soften, known=known)
     alone = _own_cycles(samples, result, cycles)
-    law = find_law(alone, start, 2.0 * math.pi * result.modes[0].natural_freq * result.modes[0].damping_ratio)
+    law = find_law(
+        alone, start, 2.0 * math.pi * result.modes[0].natural_frequencies * result.modes[0].damping_ratio
+    )
     left = misfit_of(samples, result.residual, result.modes).ratio
     if law is not None:
         result, left, told = _with_law(samples, result, left, units, soften, known, law)
@@ -142,18 +144,22 @@ def _group_fit(
         better, diagram = _with_close_mode(samples, result, near, units, diagram)
         if better is not None:
             result = better
-            first = better.modes[0].natural_freq
-            second = min((mode.natural_freq for mode in better.modes[1:]), key=lambda f: abs(f - first))
+            first = better.modes[0].natural_frequencies
+            second = min(
+                (mode.natural_frequencies for mode in better.modes[1:]), key=lambda f: abs(f - first)
+            )
             told = [KINDS["close_modes"].found(first=first, second=second)]
     return result, _own_cycles(samples, result, cycles), told, diagram
 
 
 def _apart(samples: SignalSamples, pole: Pole, modes: list[ModeEstimate]) -> bool:
     """Whether a pole lies so far from all modes that it is none of the poles into which one that softens splits."""
-    span = samples.values.size / samples.sampling_freq
+    span = samples.values.size / samples.sampling_frequency
     return all(
-        abs(pole.frequency - mode.natural_freq)
-        > max(8.0 / span, 2.0 * mode.damping_ratio * mode.natural_freq, 0.06 * mode.natural_freq)
+        abs(pole.frequency - mode.natural_frequencies)
+        > max(
+            8.0 / span, 2.0 * mode.damping_ratio * mode.natural_frequencies, 0.06 * mode.natural_frequencies
+        )
         for mode in modes
     )
 
@@ -166,7 +172,7 @@ def _with_law(
     soften: bool,
     known: tuple[float, float] | None,
     law: DampingLaw,
-) -> tuple[FitResult, float, list[Finding]]:
+) -> tuple[FitResult, float, list[Diagnostic]]:
     """The fit with a second law of damping where that is told apart and leaves less; else as it was."""
     try:
         other = fit_decay(samples, result.modes, units, soften=soften, known=known, law=law)
@@ -177,10 +183,10 @@ def _with_law(
     told_apart = first.law_strength > 3.0 * first.law_strength_se
     if not told_apart or other.noise_rms >= 0.999 * result.noise_rms or rest >= max(0.8 * left, _MISFIT):
         return result, left, []
-    finding = KINDS["damping_law"].found(
+    diagnostic = KINDS["damping_law"].found(
         told=first.law, strength=first.law_strength, error=first.law_strength_se
     )
-    return other, rest, [finding]
+    return other, rest, [diagnostic]
 
 
 def _of_pole(pole: Pole) -> ModeEstimate:
@@ -210,7 +216,7 @@ def _guesses(
         found.append(estimate)
         if len(centres) > 1:
             rest = SignalSamples(
-                explain(samples, found, units, soften).residual, samples.time, samples.sampling_freq
+                explain(samples, found, units, soften).residual, samples.time, samples.sampling_frequency
             )
     assert kept is not None
     return found, kept
@@ -237,8 +243,8 @@ def _own_cycles(samples: SignalSamples, result: FitResult, otherwise: Cycles) ->
     if len(result.modes) == 1:
         return otherwise
     try:
-        alone = SignalSamples(result.alone, samples.time, samples.sampling_freq)
-        return hilbert_cycles(alone, first.natural_freq, noise_level(samples))
+        alone = SignalSamples(result.alone, samples.time, samples.sampling_frequency)
+        return hilbert_cycles(alone, first.natural_frequencies, noise_level(samples))
     except InputError:
         return otherwise
 
@@ -251,7 +257,7 @@ def _with_close_mode(
     diagram: Stabilisation | None,
 ) -> tuple[FitResult | None, Stabilisation | None]:
     """The fit with one mode more, close to the first, if the pencil sees one and it explains what is left."""
-    first = result.modes[0].natural_freq
+    first = result.modes[0].natural_frequencies
     if len(near) < 2:
         poles, fresh = find_poles(samples, noise_level(samples))
         diagram = diagram or fresh
@@ -264,7 +270,7 @@ def _with_close_mode(
         ]
     if len(near) < 2:
         return None, diagram
-    others = [mode for mode in result.modes[1:] if abs(mode.natural_freq / first - 1.0) > CLOSE]
+    others = [mode for mode in result.modes[1:] if abs(mode.natural_frequencies / first - 1.0) > CLOSE]
     pair = [_of_pole(pole) for pole in near[:2]]
     try:
         better = fit_decay(samples, [pair[0], *others, pair[1]], units, soften=False)

@@ -68,6 +68,6 @@ def steadied(samples: SignalSamples, share: float) -> SignalSamples:
     """
     t = samples.time - samples.time[0]
     clock = t + 0.5 * share * t * t / t[-1]
-    even = np.arange(int(clock[-1] * samples.sampling_freq + 1e-9) + 1) / samples.sampling_freq
+    even = np.arange(int(clock[-1] * samples.sampling_frequency + 1e-9) + 1) / samples.sampling_frequency
     values = CubicSpline(clock, samples.values)(even)
-    return SignalSamples(values, samples.time[0] + even, samples.sampling_freq)
+    return SignalSamples(values, samples.time[0] + even, samples.sampling_frequency)

@@ -61,7 +61,7 @@ def compare_wells(
     values, errors = [], []
     for name, well, se in (("lower", lower, lower_se), ("upper", upper, upper_se)):
         if isinstance(well, DecayFit):
-            values.append(well.natural_freq)
+            values.append(well.natural_frequencies)
             errors.append(well.modes[0].natural_freq_se)
         else:
             values.append(positive(name, well, "Hz"))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.validate import InputError, finite
 from snapbeam.lab.decay.cycles import hilbert_cycles, noise_level, regress
 from snapbeam.lab.decay.drift import Line, find_drift, find_lines, without_lines
@@ -32,7 +32,7 @@ class Decay:
 
     samples: SignalSamples
     lines: tuple[Line, ...]
-    findings: tuple[Finding, ...]
+    diagnostics: tuple[Diagnostic, ...]
     drift: float
 
 
@@ -50,12 +50,12 @@ def dominant(samples: SignalSamples, low: float = 0.0, high: float | None = None
     values = samples.values - samples.values.mean()
     window = np.cos(0.5 * math.pi * np.arange(n) / n) ** 2
     values = values - float((values * window).sum() / window.sum())
-    freq = np.fft.rfftfreq(4 * n, 1.0 / samples.sampling_freq)
+    freq = np.fft.rfftfreq(4 * n, 1.0 / samples.sampling_frequency)
     # what passes fewer than eight times is rather a drift
-    slow = np.minimum(freq * n / samples.sampling_freq / _LEAST_CYCLES, 1.0) ** 2
+    slow = np.minimum(freq * n / samples.sampling_frequency / _LEAST_CYCLES, 1.0) ** 2
     spectrum = np.abs(np.fft.rfft(values * window, 4 * n)) * slow
-    top = samples.sampling_freq / 2.0 if high is None else high
-    inside = np.flatnonzero((freq >= max(low, 3.0 * samples.sampling_freq / n)) & (freq <= top))
+    top = samples.sampling_frequency / 2.0 if high is None else high
+    inside = np.flatnonzero((freq >= max(low, 3.0 * samples.sampling_frequency / n)) & (freq <= top))
     if inside.size == 0 or not spectrum[inside].max() > 1e-14 * float(np.abs(samples.values).max() + 1e-300):
         raise InputError(f"signal: no oscillation between {low:g} and {top:g} Hz")
     at = int(inside[np.argmax(spectrum[inside])])
@@ -82,31 +82,31 @@ def prepared(samples: SignalSamples, start: float | None, stop: float | None) ->
         If fewer than 64 samples or 8 cycles are left.
     """
     part = _cut(samples, start, stop)
-    findings: list[Finding] = []
+    diagnostics: list[Diagnostic] = []
     frequency = dominant(part)
     if start is None:
         first = find_release(part, frequency)
         if first:
             part = _sliced(part, first, None)
-            findings.append(KINDS["release"].found(start=float(part.time[0])))
+            diagnostics.append(KINDS["release"].found(start=float(part.time[0])))
             frequency = dominant(part)
     _enough(part, frequency)
     part, told = _below_ceiling(part, frequency)
-    findings += told
+    diagnostics += told
     rate = _decay_rate(part, frequency)
     lines = find_lines(part, rate)
     clean = without_lines(part, lines)
     largest = max(float(np.percentile(np.abs(clean.values - np.median(clean.values)), 99)), 1e-300)
     for line in lines:
-        findings.append(
+        diagnostics.append(
             KINDS["hum"].found(frequency=line.frequency, amplitude_percent=100.0 * line.amplitude / largest)
         )
     frequency = dominant(clean)
     rate = _decay_rate(clean, frequency)
     drift, degree = find_drift(clean, frequency, rate)
     if degree:
-        clean = SignalSamples(clean.values - drift, clean.time, clean.sampling_freq)
-        findings.append(
+        clean = SignalSamples(clean.values - drift, clean.time, clean.sampling_frequency)
+        diagnostics.append(
             KINDS["drift"].found(drift_percent=100.0 * float(np.ptp(drift)) / largest, degree=degree)
         )
         frequency = dominant(clean)
@@ -114,7 +114,7 @@ def prepared(samples: SignalSamples, start: float | None, stop: float | None) ->
     clean, share = _steady(clean, frequency)
     if share:
         told.append(KINDS["frequency_drift"].found(share_percent=100.0 * share))
-    return Decay(clean, tuple(lines), (*findings, *told), share)
+    return Decay(clean, tuple(lines), (*diagnostics, *told), share)
 
 
 def _cut(samples: SignalSamples, start: float | None, stop: float | None) -> SignalSamples:
@@ -126,25 +126,25 @@ def _cut(samples: SignalSamples, start: float | None, stop: float | None) -> Sig
             f"start = {low:g}, stop = {high:g}: hold {inside.sum()} samples of the signal, which runs from "
             f"{samples.time[0]:g} to {samples.time[-1]:g} s: must hold at least 64"
         )
-    return SignalSamples(samples.values[inside], samples.time[inside], samples.sampling_freq)
+    return SignalSamples(samples.values[inside], samples.time[inside], samples.sampling_frequency)
 
 
 def _sliced(samples: SignalSamples, first: int, last: int | None) -> SignalSamples:
-    return SignalSamples(samples.values[first:last], samples.time[first:last], samples.sampling_freq)
+    return SignalSamples(samples.values[first:last], samples.time[first:last], samples.sampling_frequency)
 
 
 def _enough(samples: SignalSamples, frequency: float) -> None:
-    cycles = frequency * samples.values.size / samples.sampling_freq
+    cycles = frequency * samples.values.size / samples.sampling_frequency
     if cycles < _LEAST_CYCLES:
         raise InputError(f"signal spans {cycles:.1f} cycles of {frequency:g} Hz: must span at least 8")
 
 
-def _below_ceiling(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, list[Finding]]:
+def _below_ceiling(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, list[Diagnostic]]:
     """The decay from where its tops are no longer cut off."""
     ceiling = find_ceiling(samples, frequency)
     if ceiling is None:
         return samples, []
-    left = frequency * (samples.values.size - ceiling.until) / samples.sampling_freq
+    left = frequency * (samples.values.size - ceiling.until) / samples.sampling_frequency
     if left < 1.5 * _LEAST_CYCLES:
         return samples, [KINDS["clipped_throughout"].found()]
     rest = _sliced(samples, ceiling.until, None)
@@ -158,7 +158,7 @@ def _decay_rate(samples: SignalSamples, frequency: float) -> float:
         mode = regress(cycles, float(samples.time[0]), "1", "hilbert", soften=False)
     except InputError:
         return 0.0
-    return max(2.0 * math.pi * mode.natural_freq * mode.damping_ratio, 0.0)
+    return max(2.0 * math.pi * mode.natural_frequencies * mode.damping_ratio, 0.0)
 
 
 def _steady(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, float]:
@@ -174,7 +174,7 @@ def _steady(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, fl
     return steadied(samples, share), share
 
 
-def _undisturbed(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, list[Finding]]:
+def _undisturbed(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, list[Diagnostic]]:
     """The decay up to a jump of its amplitude or phase, or from it on where that is longer."""
     try:
         cycles = hilbert_cycles(samples, frequency, noise_level(samples))
@@ -184,9 +184,9 @@ def _undisturbed(samples: SignalSamples, frequency: float) -> tuple[SignalSample
     if jump is None:
         return samples, []
     at = int(np.searchsorted(samples.time, jump.time))
-    margin = int(2.5 * samples.sampling_freq / frequency)
+    margin = int(2.5 * samples.sampling_frequency / frequency)
     before, after = at - margin, samples.values.size - at - margin
-    least = 1.5 * _LEAST_CYCLES * samples.sampling_freq / frequency
+    least = 1.5 * _LEAST_CYCLES * samples.sampling_frequency / frequency
     if max(before, after) < least:
         return samples, [
             KINDS["disturbed"].found(told="about", at=jump.time, jump_percent=100.0 * jump.share)

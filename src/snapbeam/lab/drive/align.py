@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.validate import InputError, finite, shown
 from snapbeam.lab.drive.displacement import displacement_from_velocity
 from snapbeam.lab.drive.vibrometer import DriveMeasurement, measure_drive
@@ -39,7 +39,7 @@ class Alignment:
     the other; ``gain``, the camera's amplitude over the vibrometer's, is 1 if both are calibrated;
     ``clock_difference``, the camera's frequency over the vibrometer's less 1, and its standard error;
     ``certain`` says whether the start of the motion told the cycle, ``margin`` by what chi-square;
-    ``findings`` what makes the alignment doubtful.
+    ``diagnostics`` what makes the alignment doubtful.
     """
 
     delay: float
@@ -52,7 +52,7 @@ class Alignment:
     certain: bool
     margin: float
     period: float
-    findings: tuple[Finding, ...]
+    diagnostics: tuple[Diagnostic, ...]
 
     @property
     def description(self) -> str:
@@ -149,13 +149,13 @@ def align(
         certain=certain,
         margin=margin,
         period=period,
-        findings=tuple(_findings(told)),
+        diagnostics=tuple(_findings(told)),
     )
 
 
 @dataclass(frozen=True)
 class _Told:
-    """What the findings of an alignment are drawn from; ``turned`` says that the start told the polarity."""
+    """What the diagnostics of an alignment are drawn from; ``turned`` says that the start told the polarity."""
 
     polarity: int
     given: bool
@@ -168,7 +168,7 @@ class _Told:
     clocks_se: float
 
 
-def _findings(told: _Told) -> list[Finding]:
+def _findings(told: _Told) -> list[Diagnostic]:
     found = []
     if not told.given and not told.turned:
         found.append(KINDS["polarity_open"].found())
@@ -186,7 +186,7 @@ def _findings(told: _Told) -> list[Finding]:
 def _window(signal: xr.DataArray, start: float, stop: float) -> SignalSamples:
     samples = check_signal(signal)
     inside = (samples.time >= start) & (samples.time < stop)
-    return SignalSamples(samples.values[inside], samples.time[inside], samples.sampling_freq)
+    return SignalSamples(samples.values[inside], samples.time[inside], samples.sampling_frequency)
 
 
 def _candidates(

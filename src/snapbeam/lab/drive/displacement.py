@@ -66,7 +66,7 @@ def displacement_from_velocity(
     return make_signal(
         values,
         "m",
-        samples.sampling_freq,
+        samples.sampling_frequency,
         start=float(time[0]),
         name="shaker displacement",
         attrs={key: value for key, value in velocity.attrs.items() if key not in ("units", "long_name")},
@@ -93,7 +93,7 @@ def mended(samples: SignalSamples, drive: DriveMeasurement) -> SignalSamples:
     values[late] = model[late]
     for first, last in _stretches(early):
         values[first:last] = _about(samples, drive, first, last, ~(cut | bad))
-    return SignalSamples(values, samples.time, samples.sampling_freq)
+    return SignalSamples(values, samples.time, samples.sampling_frequency)
 
 
 def _stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -49,18 +49,21 @@ def find_drive_lines(samples: SignalSamples, first: int, last: int, rough: SineF
         The sine of its last two thirds.
     """
     begin = first + (last - first) // 3
-    part = SignalSamples(samples.values[begin:last], samples.time[begin:last], samples.sampling_freq)
+    part = SignalSamples(samples.values[begin:last], samples.time[begin:last], samples.sampling_frequency)
     sound = sound_samples(part.values.size, find_flaws(part, rough))
-    rest = slice(0, max(first - 3 * round(samples.sampling_freq / rough.frequency), 0))
+    rest = slice(0, max(first - 3 * round(samples.sampling_frequency / rough.frequency), 0))
     base = rough.frequency
     found: list[float] = []
     for _ in range(_MOST):
         left = _left(part, [base, *found], sound)[0]
-        peak = _peak(left, part.sampling_freq, rough)
+        peak = _peak(left, part.sampling_frequency, rough)
         if peak is None:
             break
         base, *found = _refined(part, [base, *found, peak], sound)
-        if min(abs(found[-1] - f) for f in (base, *found[:-1])) * part.values.size < 0.5 * part.sampling_freq:
+        if (
+            min(abs(found[-1] - f) for f in (base, *found[:-1])) * part.values.size
+            < 0.5 * part.sampling_frequency
+        ):
             return DriveLines((), ())  # two that cannot be parted are a motion that wanders
     if not found:
         return DriveLines((), ())
@@ -156,7 +159,7 @@ def _refined(part: SignalSamples, frequencies: list[float], sound: NDArray[np.bo
     """Frequencies of lines by least squares, amplitudes eliminated."""
     from scipy.optimize import least_squares
 
-    step = part.sampling_freq / part.values.size
+    step = part.sampling_frequency / part.values.size
     start = np.array(frequencies)
 
     def left(off: _Array) -> _Array:

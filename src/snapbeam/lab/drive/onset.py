@@ -40,7 +40,7 @@ def moving_part(samples: SignalSamples, frequency: float) -> tuple[int, int]:
     Gaps of less than ten cycles are no end of the motion.
     """
     n = samples.values.size
-    width = max(3, round(samples.sampling_freq / frequency))
+    width = max(3, round(samples.sampling_frequency / frequency))
     if width >= n:
         return 0, n
     level = _level(samples, frequency, width)
@@ -58,13 +58,13 @@ def moving_part(samples: SignalSamples, frequency: float) -> tuple[int, int]:
 
 def moves_outside(samples: SignalSamples, frequency: float, first: int, last: int) -> float:
     """How long [s] the record oscillates at *frequency* before *first* and after *last*, by a third as much."""
-    width = max(3, round(samples.sampling_freq / frequency))
+    width = max(3, round(samples.sampling_frequency / frequency))
     if width >= samples.values.size:
         return 0.0
     level = _level(samples, frequency, width)
     on = level > 0.3 * np.quantile(level, 0.9)
     on[max(first - width, 0) : last + width] = False
-    return float(np.count_nonzero(on)) / samples.sampling_freq
+    return float(np.count_nonzero(on)) / samples.sampling_frequency
 
 
 def find_onset(samples: SignalSamples, first: int, rough: SineFit) -> tuple[float | None, float]:
@@ -79,7 +79,7 @@ def find_onset(samples: SignalSamples, first: int, rough: SineFit) -> tuple[floa
     rough
         The steady sine.
     """
-    width = round(samples.sampling_freq / rough.frequency)
+    width = round(samples.sampling_frequency / rough.frequency)
     if first < max(8, width // 8):
         return None, 0.0
     early = _quiet_end(samples, first, rough, width)
@@ -100,7 +100,7 @@ def find_onset(samples: SignalSamples, first: int, rough: SineFit) -> tuple[floa
     ]
     coarse = candidates[:: max(1, candidates.size // 160)]
     scans = [_scan(time, values, coarse, rough.frequency, degree, noise) for degree in _DEGREES]
-    step = float(coarse[1] - coarse[0]) if coarse.size > 1 else 1.0 / samples.sampling_freq
+    step = float(coarse[1] - coarse[0]) if coarse.size > 1 else 1.0 / samples.sampling_frequency
     # once more about the best instants, sample by sample
     best = {float(coarse[int(np.argmin(scan))]) for scan in scans}
     near = np.zeros(candidates.size, dtype=bool)
@@ -108,7 +108,7 @@ def find_onset(samples: SignalSamples, first: int, rough: SineFit) -> tuple[floa
         near |= np.abs(candidates - at) <= 2.0 * step
     fine = np.union1d(coarse, candidates[near])
     scans = [_scan(time, values, fine, rough.frequency, degree, noise) for degree in _DEGREES]
-    return _weighed(fine, scans, values.size, every / samples.sampling_freq, width / every)
+    return _weighed(fine, scans, values.size, every / samples.sampling_frequency, width / every)
 
 
 def _baseline(time: _Array, quiet: _Array) -> np.polynomial.Polynomial:

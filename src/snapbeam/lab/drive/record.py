@@ -22,7 +22,7 @@ __all__ = ["recorded_drive"]
 
 def recorded_drive(
     velocity: xr.DataArray,
-    sampling_freq: float,
+    sampling_frequency: float,
     *,
     bandwidth: float | None = None,
     measurement: DriveMeasurement | None = None,
@@ -41,7 +41,7 @@ def recorded_drive(
     ----------
     velocity : xarray.DataArray
         Velocity of the shaker [m/s].
-    sampling_freq : float
+    sampling_frequency : float
         Samples per second [Hz] of the result.
     bandwidth : float, optional
         Highest frequency kept [Hz]; ten times the excitation frequency if left out, and never more than 0.4
@@ -72,13 +72,15 @@ def recorded_drive(
     from scipy.signal import fftconvolve, firwin, kaiserord, resample_poly
 
     samples = check_signal(velocity, "m/s", "velocity")
-    rate = positive("sampling_freq", sampling_freq, "Hz")
+    rate = positive("sampling_frequency", sampling_frequency, "Hz")
     drive = measurement or measure_drive(velocity)
     if drive.startup is not None and not drive.has_start:
-        words = next(one.words for one in drive.findings if one.code == VIBROMETER["dropout_in_start"].code)
+        words = next(
+            one.message for one in drive.diagnostics if one.code == VIBROMETER["dropout_in_start"].code
+        )
         raise InputError(f"velocity: {words}; cut the record after its start-up, or record again")
     scale = _scale(alignment, polarity, amplitude_from)
-    top = 0.4 * samples.sampling_freq
+    top = 0.4 * samples.sampling_frequency
     wanted = 10.0 * drive.steady.frequency if bandwidth is None else positive("bandwidth", bandwidth, "Hz")
     band = min(wanted, top)
     if band < 1.5 * drive.steady.frequency:
@@ -87,23 +89,23 @@ def recorded_drive(
         )
     if rate < 2.5 * band:
         raise InputError(
-            f"sampling_freq = {rate:g} Hz: must be at least 2.5 times the bandwidth, {band:g} Hz"
+            f"sampling_frequency = {rate:g} Hz: must be at least 2.5 times the bandwidth, {band:g} Hz"
         )
     position = scale * displacement_from_velocity(velocity, drive).values
-    nyquist = samples.sampling_freq / 2.0
+    nyquist = samples.sampling_frequency / 2.0
     width = 0.25 * band
     length, beta = kaiserord(80.0, width / nyquist)
     length |= 1
     half = length // 2
     if position.size < 4 * length:
         raise InputError(f"velocity: {position.size} samples: must be {4 * length} for {band:g} Hz")
-    taps = firwin(length, band + width / 2.0, window=("kaiser", beta), fs=samples.sampling_freq)
+    taps = firwin(length, band + width / 2.0, window=("kaiser", beta), fs=samples.sampling_frequency)
     taps /= np.abs(np.fft.rfft(taps, 16 * length)).max()
     smooth = fftconvolve(np.pad(position, half, mode="edge"), taps, mode="valid")
     fine = resample_poly(smooth, 8, 1, window=("kaiser", 8.0), padtype="line")
-    grid = samples.time[0] + np.arange(fine.size) / (8.0 * samples.sampling_freq)
+    grid = samples.time[0] + np.arange(fine.size) / (8.0 * samples.sampling_frequency)
     spline = CubicSpline(grid, fine)
-    trim = (half + 16) / samples.sampling_freq
+    trim = (half + 16) / samples.sampling_frequency
     last = samples.time[-1]
     end = float(last if last - drive.stop > trim else last - trim)
     start = drive.startup.onset if drive.startup else float(samples.time[0]) + trim
@@ -121,7 +123,7 @@ def recorded_drive(
             "velocity_amplitude": abs(scale) * drive.steady.amplitude,
             "polarity": 1 if scale > 0.0 else -1,
             "amplitude_from": amplitude_from,
-            "findings": to_json((*drive.findings, *(alignment.findings if alignment else ()))),
+            "diagnostics": to_json((*drive.diagnostics, *(alignment.diagnostics if alignment else ()))),
             "bandwidth": band,
             "begins_at_rest": int(drive.startup is not None),
             "source_start": start,

@@ -50,7 +50,7 @@ def steady_fit(samples: SignalSamples, frequency: float) -> tuple[SineFit, list[
         return dataclasses.replace(fit, amplitude_se=0.5 * fit.amplitude), [], clipping
     inner = fit_sine(samples, fit.frequency, 1, keep=keep)
     whole = SignalSamples(
-        np.where(cut, inner.waveform(samples.time), samples.values), samples.time, samples.sampling_freq
+        np.where(cut, inner.waveform(samples.time), samples.values), samples.time, samples.sampling_frequency
     )
     flaws = find_flaws(whole, inner, keep)
     keep &= sound_samples(keep.size, flaws)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.findings import Finding, doubtful
+from snapbeam.core.findings import Diagnostic, doubtful
 from snapbeam.core.validate import InputError, finite, positive, within
 from snapbeam.lab.drive.lines import DriveLines, beside_lines, find_drive_lines, without_hum
 from snapbeam.lab.drive.onset import find_onset, moves_outside, moving_part
@@ -70,7 +70,7 @@ class DriveMeasurement:
     ``stop`` [s] is the end of the motion or of the record; ``cycle_time`` [s] and ``cycle_amplitude`` follow
     the amplitude cycle by cycle; ``accepted`` says whether ``steady.sinad`` exceeds ``snr_limit`` [dB].
     ``flaws`` are samples (first, one past the last) that are no part of the motion, ``lines`` hum, which is taken
-    out, and lines beside the sine; ``clipping`` the levels at which tops are cut off; ``findings`` what makes the
+    out, and lines beside the sine; ``clipping`` the levels at which tops are cut off; ``diagnostics`` what makes the
     result doubtful.
     """
 
@@ -82,7 +82,7 @@ class DriveMeasurement:
     flaws: tuple[Flaw, ...]
     lines: DriveLines
     clipping: Clipping
-    findings: tuple[Finding, ...]
+    diagnostics: tuple[Diagnostic, ...]
     cycle_time: _Array = field(repr=False)
     cycle_amplitude: _Array = field(repr=False)
 
@@ -93,14 +93,14 @@ class DriveMeasurement:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The findings that make the result doubtful, in words."""
-        return tuple(one.words for one in doubtful(self.findings))
+        """The diagnostics that make the result doubtful, in words."""
+        return tuple(one.message for one in doubtful(self.diagnostics))
 
     @property
     def has_start(self) -> bool:
         """Whether the start-up is in the record and sound."""
         broken = KINDS["dropout_in_start"].code
-        return self.startup is not None and all(one.code != broken for one in self.findings)
+        return self.startup is not None and all(one.code != broken for one in self.diagnostics)
 
     def summary(self) -> dict[str, Any]:
         """The figures as plain numbers and words, in SI, for a table or a JSON file."""
@@ -129,7 +129,7 @@ class DriveMeasurement:
             "overshoot": None if start is None else start.overshoot,
             "first_cycle_ratio": None if start is None else start.first_cycle_ratio,
             "startup": "the record begins in motion" if start is None else start.description,
-            "findings": [one.plain() for one in self.findings],
+            "diagnostics": [one.plain() for one in self.diagnostics],
         }
 
 
@@ -177,7 +177,7 @@ def measure_drive(
     first, last = moving_part(samples, guess)
     moving = _slice(samples, first, last)
     outside = moves_outside(samples, guess, first, last)
-    span = moving.values.size / samples.sampling_freq * guess
+    span = moving.values.size / samples.sampling_frequency * guess
     if span < 8.0:
         raise InputError(
             f"signal: the shaker moves for {span:.1f} cycles of {guess:g} Hz: must be at least 8"
@@ -192,9 +192,9 @@ def measure_drive(
     onset, uncertainty = find_onset(samples, first, rough)
     start = float(samples.time[0]) if onset is None else onset
     period = 1.0 / rough.frequency
-    stop = float(moving.time[-1]) + 1.0 / samples.sampling_freq
+    stop = float(moving.time[-1]) + 1.0 / samples.sampling_frequency
     times, cycles = _cycle_phasors(samples, rough, start, stop)
-    noise = rough.noise_rms * math.sqrt(2.0 / (period * samples.sampling_freq))
+    noise = rough.noise_rms * math.sqrt(2.0 / (period * samples.sampling_frequency))
     tol = max(tol, 4.0 * noise / rough.amplitude)
     settled, stray = settled_cycles(cycles, tol)
     margin = 1 if settled == 0 else max(2 * settled, 5)
@@ -203,7 +203,7 @@ def measure_drive(
     steady, flaws, clipping = steady_fit(part, rough.frequency)
     if steady.cycles < 5.0:
         raise InputError(f"signal: only {steady.cycles:.1f} cycles of steady motion: must be at least 5")
-    shift = int(np.searchsorted(samples.time, part.time[0] - 0.25 / samples.sampling_freq))
+    shift = int(np.searchsorted(samples.time, part.time[0] - 0.25 / samples.sampling_frequency))
     everywhere = [Flaw(flaw.first + shift, flaw.last + shift) for flaw in flaws]
     steady, wander = with_wander(steady, times, cycles, everywhere, samples, begin)
     steady = beside_lines(steady, lines)
@@ -213,7 +213,7 @@ def measure_drive(
     if onset is not None:
         startup = _start_up(onset, uncertainty, settled, period, amplitudes, steady.amplitude, tol)
         broken = _broken_start(samples, onset, onset + settled * period, steady, clipping)
-    findings = [
+    diagnostics = [
         *_flaw_findings(samples, everywhere, broken, clipping),
         *_doubts(steady, limit, wander, stray, frequency, stated),
         *_start_findings(startup, period),
@@ -229,7 +229,7 @@ def measure_drive(
         flaws=(*broken, *everywhere),
         lines=lines,
         clipping=clipping,
-        findings=tuple(findings),
+        diagnostics=tuple(diagnostics),
         cycle_time=times,
         cycle_amplitude=amplitudes,
     )
@@ -269,10 +269,10 @@ def _broken_start(
         return []
     first = int(inside[0])
     values = samples.values[inside]
-    fastest = 2.0 * math.pi * steady.frequency / samples.sampling_freq * 2.5 * steady.amplitude
+    fastest = 2.0 * math.pi * steady.frequency / samples.sampling_frequency * 2.5 * steady.amplitude
     steps = np.abs(np.diff(values))
     jumps = np.flatnonzero(steps > max(fastest, 0.3 * steady.amplitude) + 8.0 * steady.noise_rms)
-    least = max(5, int(0.06 * samples.sampling_freq / steady.frequency))
+    least = max(5, int(0.06 * samples.sampling_frequency / steady.frequency))
     cut = clipping.touches(values)
     found = [run for run in stuck_runs(values, least) if not cut[run.first]]
     if jumps.size >= 2:
@@ -284,11 +284,11 @@ def _broken_start(
 
 def _flaw_findings(
     samples: SignalSamples, flaws: list[Flaw], broken: list[Flaw], clipping: Clipping
-) -> list[Finding]:
+) -> list[Diagnostic]:
     told = []
     for name, some in (("dropout", flaws), ("dropout_in_start", broken)):
         if some:
-            total = sum(flaw.last - flaw.first for flaw in some) / samples.sampling_freq
+            total = sum(flaw.last - flaw.first for flaw in some) / samples.sampling_frequency
             at = float(samples.time[some[0].first])
             told.append(KINDS[name].found(count=len(some), total_ms=1e3 * total, at=at))
     if clipping.found:
@@ -303,7 +303,7 @@ def _doubts(
     stray: float,
     frequency: float | None,
     stated: float | None,
-) -> list[Finding]:
+) -> list[Diagnostic]:
     told = []
     noise = steady.noise_rms * math.sqrt(2.0 * steady.cycles / steady.samples) / steady.amplitude
     if wander > max(_STEADY, 3.0 * noise) or stray > 0.05:
@@ -321,7 +321,7 @@ def _doubts(
     return told
 
 
-def _line_findings(lines: DriveLines, steady: SineFit) -> list[Finding]:
+def _line_findings(lines: DriveLines, steady: SineFit) -> list[Diagnostic]:
     told = []
     for name, some in (("hum", lines.hum), ("second_line", lines.beside)):
         for line in some:
@@ -330,7 +330,7 @@ def _line_findings(lines: DriveLines, steady: SineFit) -> list[Finding]:
     return told
 
 
-def _start_findings(startup: StartUp | None, period: float) -> list[Finding]:
+def _start_findings(startup: StartUp | None, period: float) -> list[Diagnostic]:
     if startup is None:
         return [KINDS["no_rest"].found()]
     if startup.onset_uncertainty > 0.05 * period:
@@ -339,7 +339,7 @@ def _start_findings(startup: StartUp | None, period: float) -> list[Finding]:
 
 
 def _slice(samples: SignalSamples, first: int, last: int | None) -> SignalSamples:
-    return SignalSamples(samples.values[first:last], samples.time[first:last], samples.sampling_freq)
+    return SignalSamples(samples.values[first:last], samples.time[first:last], samples.sampling_frequency)
 
 
 def _between(samples: SignalSamples, start: float, stop: float) -> SignalSamples:

@@ -1,1 +1,1 @@
-"""What a measurement says against itself: findings as data, one module an instrument."""
+"""What a measurement says against itself: diagnostics as data, one module an instrument."""

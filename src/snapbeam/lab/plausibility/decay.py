@@ -7,7 +7,7 @@ from snapbeam.lab.plausibility.kinds import Kind, table
 
 __all__ = ["KINDS"]
 
-NOTE, DOUBT, WRONG = Severity.NOTE, Severity.DOUBT, Severity.WRONG
+NOTE, DOUBT, WRONG = Severity.INFO, Severity.WARNING, Severity.ERROR
 
 KINDS = table(
     Kind(

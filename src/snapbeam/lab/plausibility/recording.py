@@ -7,14 +7,14 @@ from snapbeam.lab.plausibility.kinds import Kind, table
 
 __all__ = ["KINDS", "LOSSY_ERROR"]
 
-NOTE, DOUBT = Severity.NOTE, Severity.DOUBT
+NOTE, DOUBT = Severity.INFO, Severity.WARNING
 
 LOSSY_ERROR = 0.15
 """Standard error [px] of an edge in a video that throws detail away; measured 0.06 to 0.14 px."""
 
 KINDS = table(
     Kind(
-        "recording.lossy", DOUBT,
+        "recording.rate_dependent", DOUBT,
         "the compression of a video or of images",
         "the file's compression throws detail away: edges lie 0.06 to 0.14 px off however little they scatter; "
         "standard errors are raised to {error_px:.2f} px; save the recording uncompressed",

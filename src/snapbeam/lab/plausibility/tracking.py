@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from snapbeam.core.findings import Finding, Severity
+from snapbeam.core.findings import Diagnostic, Severity
 from snapbeam.lab.plausibility.kinds import Kind, table
 from snapbeam.lab.tracking.flags import FrameFlag
 from snapbeam.lab.tracking.measure.follower import TrackedRows
@@ -24,7 +24,7 @@ __all__ = [
     "tracking_findings",
 ]
 
-NOTE, DOUBT, WRONG = Severity.NOTE, Severity.DOUBT, Severity.WRONG
+NOTE, DOUBT, WRONG = Severity.INFO, Severity.WARNING, Severity.ERROR
 
 KINDS = table(
     Kind(
@@ -190,7 +190,7 @@ _RARE = 0.05  # share of frames that may jump or be distorted without more than 
 
 @dataclass(frozen=True)
 class SeenMotion:
-    """What the findings of a tracked recording are drawn from, beside the scene.
+    """What the diagnostics of a tracked recording are drawn from, beside the scene.
 
     ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
     [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video.
@@ -207,7 +207,7 @@ class SeenMotion:
 
 def tracking_findings(
     scene: Scene, seen: SeenMotion, settings: TrackingSettings, offset_mm: float
-) -> tuple[Finding, ...]:
+) -> tuple[Diagnostic, ...]:
     """What a tracked recording says against itself; *offset_mm* is the error of the rest position."""
     told = [*_of_the_beam(scene, seen, settings), *_of_the_rest(seen, settings, offset_mm)]
     told += _of_the_edges(scene.shape, settings)
@@ -249,7 +249,7 @@ def never_touching(penetration: np.ndarray, row: np.ndarray) -> float:
     return closest if closest > 3.0 else 0.0
 
 
-def _of_the_beam(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> list[Finding]:
+def _of_the_beam(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> list[Diagnostic]:
     told = []
     beam = scene.beam
     if beam.fixtures:
@@ -269,7 +269,7 @@ def _of_the_beam(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> 
     return told
 
 
-def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float) -> list[Finding]:
+def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float) -> list[Diagnostic]:
     if seen.rest.found:
         return []
     if settings.rest_frames is not None:
@@ -277,7 +277,7 @@ def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float)
     return [KINDS["no_rest"].found(quiet=2 * seen.rest.indices.size, shift_mm=offset_mm)]
 
 
-def _of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Finding]:
+def _of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Diagnostic]:
     if shape.clipped > CLIPPED:
         return [
             KINDS["overexposed"].found(share_percent=100.0 * shape.clipped, shift_px=2.0 * abs(shape.shift))
@@ -291,7 +291,7 @@ def _of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Finding]
     return []
 
 
-def _of_the_pixels(scene: Scene, fields: Fields) -> list[Finding]:
+def _of_the_pixels(scene: Scene, fields: Fields) -> list[Diagnostic]:
     told = []
     if fields.apart > 0.0:
         told.append(KINDS["interlaced"].found(share=fields.apart))
@@ -309,7 +309,7 @@ def _of_the_pixels(scene: Scene, fields: Fields) -> list[Finding]:
     return told
 
 
-def _of_the_frames(rows: TrackedRows) -> list[Finding]:
+def _of_the_frames(rows: TrackedRows) -> list[Diagnostic]:
     told = []
     count = rows.row.size
     for name, flag in (("jumps", FrameFlag.JUMP), ("distorted", FrameFlag.DISTORTED)):
@@ -324,10 +324,10 @@ def _of_the_frames(rows: TrackedRows) -> list[Finding]:
     return told
 
 
-def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Finding]:
+def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
     shaker = scene.shaker
     assert shaker is not None
-    told: list[Finding] = []
+    told: list[Diagnostic] = []
     gap = -seen.penetration
     known = np.isfinite(gap)
     if not known.any():

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.findings import PlausibilityWarning
+from snapbeam.core.findings import DiagnosticWarning
 from snapbeam.core.validate import InputError, InputTypeError, positive, shown
 from snapbeam.lab.signals.formats.channel import Channel, Told
 from snapbeam.lab.signals.formats.registry import READERS, WRITERS
@@ -29,7 +29,7 @@ __all__ = ["read_channels", "read_signal", "write_signal"]
 
 
 def read_channels(
-    path: str | os.PathLike[str], sampling_freq: float | None = None, columns: str | None = None
+    path: str | os.PathLike[str], sampling_frequency: float | None = None, columns: str | None = None
 ) -> list[Channel]:
     """Return every channel of a file as a dictionary, in the units of the file.
 
@@ -37,9 +37,9 @@ def read_channels(
     ----------
     path : path
         ``.csv``/``.txt`` (a header names the columns, units in brackets; a column ``time`` or a comment
-        ``# sampling_freq: 12000 Hz``), ``.wav``, ``.uff``/``.unv`` (dataset 58, ASCII or binary), ``.tdms``,
+        ``# sampling_frequency: 12000 Hz``), ``.wav``, ``.uff``/``.unv`` (dataset 58, ASCII or binary), ``.tdms``,
         ``.h5``/``.hdf5``/``.nc``, ``.npz``/``.npy``.
-    sampling_freq : float, optional
+    sampling_frequency : float, optional
         Samples per second [Hz] where the file does not say.
 
     Returns
@@ -63,11 +63,11 @@ def read_channels(
         raise InputError(f"{source}: no such file")
     if source.stat().st_size == 0:
         raise InputError(f"{source}: the file is empty")
-    rate = None if sampling_freq is None else positive("sampling_freq", sampling_freq, "Hz")
+    rate = None if sampling_frequency is None else positive("sampling_frequency", sampling_frequency, "Hz")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            warnings.simplefilter("default", PlausibilityWarning)
+            warnings.simplefilter("default", DiagnosticWarning)
             channels = reader(source, Told(rate, columns))
     except InputError as error:
         raise InputError(error.args[0] if str(source) in str(error) else f"{source}: {error}") from error
@@ -86,13 +86,13 @@ def read_channels(
         told = channel.get("fs")
         if rate is not None and told is not None and abs(told / rate - 1.0) > 1e-5:
             raise InputError(
-                f"{source}: {channel['name']} is sampled at {told:.9g} Hz but sampling_freq = {rate:g} "
+                f"{source}: {channel['name']} is sampled at {told:.9g} Hz but sampling_frequency = {rate:g} "
                 "was given"
             )
         if told is None and "time" not in channel:
             if rate is None:
                 raise InputError(
-                    f"{source}: {channel['name']} has no sampling rate; state sampling_freq (--sampling-freq) in Hz"
+                    f"{source}: {channel['name']} has no sampling rate; state sampling_frequency (--sampling-freq) in Hz"
                 )
             channel["fs"] = rate
     return channels
@@ -104,7 +104,7 @@ def read_signal(
     *,
     units: str | None = None,
     sensitivity: str | None = None,
-    sampling_freq: float | None = None,
+    sampling_frequency: float | None = None,
     columns: str | None = None,
 ) -> xr.DataArray:
     """Read one channel of a file as a signal in SI.
@@ -120,7 +120,7 @@ def read_signal(
     sensitivity : str, optional
         What a volt or full scale stands for, such as ``"125 mm/s/V"`` or ``"0.5 m/s/FS"``; needed for
         channels in volts that are to become velocities, and for sound files of integers.
-    sampling_freq : float, optional
+    sampling_frequency : float, optional
         Samples per second [Hz] where the file does not say.
 
     Returns
@@ -134,7 +134,7 @@ def read_signal(
         Naming the file and the field: a missing or contradicting unit, an unknown channel, NaN, times that
         do not increase or have gaps, a truncated file.
     """
-    channels = read_channels(path, sampling_freq, columns)
+    channels = read_channels(path, sampling_frequency, columns)
     names = [entry["name"] for entry in channels]
     listing = ", ".join(repr(name) for name in names)
     if channel is None:
@@ -184,7 +184,7 @@ def _to_signal(entry: Channel, units: str | None, sensitivity: str | None, sourc
         )
     kwargs: dict[str, Any] = {"time": entry["time"]} if "time" in entry else {}
     if not kwargs:
-        kwargs = {"sampling_freq": entry["fs"], "start": entry.get("time_offset", 0.0)}
+        kwargs = {"sampling_frequency": entry["fs"], "start": entry.get("time_offset", 0.0)}
     signal = make_signal(data * factor, base, name=name, attrs={"source": source}, **kwargs)
     check_signal(signal, name=name)
     return signal

@@ -65,7 +65,7 @@ def find_flaws(samples: SignalSamples, fit: SineFit, measured: NDArray[np.bool_]
     at = np.flatnonzero(far & ~single)
     if not at.size:
         return []
-    half = 0.5 * samples.sampling_freq / fit.frequency
+    half = 0.5 * samples.sampling_frequency / fit.frequency
     groups = np.split(at, np.flatnonzero(np.diff(at) > half) + 1)
     near = np.abs(rest) > 3.0 * sigma
     found = []

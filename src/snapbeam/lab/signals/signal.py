@@ -36,7 +36,7 @@ class SignalSamples(NamedTuple):
 
     values: NDArray[np.float64]
     time: NDArray[np.float64]
-    sampling_freq: float
+    sampling_frequency: float
 
 
 def even_sampling(name: str, time: ArrayLike) -> tuple[float, float]:
@@ -82,7 +82,7 @@ def even_sampling(name: str, time: ArrayLike) -> tuple[float, float]:
 def make_signal(
     values: ArrayLike,
     units: str,
-    sampling_freq: float | None = None,
+    sampling_frequency: float | None = None,
     *,
     time: ArrayLike | None = None,
     start: float = 0.0,
@@ -96,12 +96,12 @@ def make_signal(
     values : array_like, shape (samples,)
     units : str
         The unit of *values*, such as ``"mm/s"``; the signal is converted to SI.
-    sampling_freq : float, optional
+    sampling_frequency : float, optional
         Samples per second [Hz]; exactly one of this and *time*.
     time : array_like, shape (samples,), optional
         Times [s], evenly spaced.
     start : float
-        Time of the first sample [s], with *sampling_freq*.
+        Time of the first sample [s], with *sampling_frequency*.
     name : str
         Name of the channel.
     attrs : mapping, optional
@@ -116,8 +116,8 @@ def make_signal(
 
     array = finite_array(name, values, 1)
     factor, unit = si_unit(name, units)
-    if (time is None) == (sampling_freq is None):
-        raise InputError(f"{name}: must have exactly one of sampling_freq (Hz) and time (s)")
+    if (time is None) == (sampling_frequency is None):
+        raise InputError(f"{name}: must have exactly one of sampling_frequency (Hz) and time (s)")
     if time is not None:
         if np.shape(time) != array.shape:
             raise InputError(
@@ -125,7 +125,7 @@ def make_signal(
             )
         start, rate = even_sampling(name, time)
     else:
-        rate = positive("sampling_freq", sampling_freq, "Hz")
+        rate = positive("sampling_frequency", sampling_frequency, "Hz")
         start = finite("start", start)
     long_name = _LONG_NAMES.get(unit, name)
     return xr.DataArray(

@@ -102,9 +102,9 @@ def spectral_peak(samples: SignalSamples, low: float = 0.0, high: float | None =
     y = samples.values - samples.values.mean()
     n = y.size
     spectrum = np.abs(np.fft.rfft(y * np.hanning(n), 4 * n))
-    freq = np.fft.rfftfreq(4 * n, 1.0 / samples.sampling_freq)
-    top = samples.sampling_freq / 2 if high is None else high
-    inside = np.flatnonzero((freq >= max(low, samples.sampling_freq / n)) & (freq <= top))
+    freq = np.fft.rfftfreq(4 * n, 1.0 / samples.sampling_frequency)
+    top = samples.sampling_frequency / 2 if high is None else high
+    inside = np.flatnonzero((freq >= max(low, samples.sampling_frequency / n)) & (freq <= top))
     if inside.size == 0 or not spectrum[inside].max() > 0.0:
         raise InputError(f"signal: no oscillation between {low:g} and {top:g} Hz")
     at = int(inside[np.argmax(spectrum[inside])])
@@ -118,7 +118,7 @@ def spectral_peak(samples: SignalSamples, low: float = 0.0, high: float | None =
 
 
 def white_variance(
-    residual: _Array, sampling_freq: float, frequency: float, fitted: ArrayLike, free: int
+    residual: _Array, sampling_frequency: float, frequency: float, fitted: ArrayLike, free: int
 ) -> float:
     """Variance of the white noise that is as strong as *residual* near *frequency* [Hz].
 
@@ -129,10 +129,10 @@ def white_variance(
     """
     n = residual.size
     power = np.abs(np.fft.rfft(residual)) ** 2 / n
-    center = frequency * n / sampling_freq
+    center = frequency * n / sampling_frequency
     line = np.arange(power.size)
     near = (np.abs(line - center) <= 25.0) & (line > 1) & (2 * line < n - 1)
-    for other in np.atleast_1d(np.asarray(fitted, dtype=np.float64)) * n / sampling_freq:
+    for other in np.atleast_1d(np.asarray(fitted, dtype=np.float64)) * n / sampling_frequency:
         near &= np.abs(line - other) > 2.0
     if near.sum() < 16:
         return float(residual @ residual / max(n - free, 1))

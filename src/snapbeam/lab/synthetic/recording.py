@@ -191,7 +191,7 @@ def _turn_back(turn: Orientation, picture: NDArray[np.uint16]) -> NDArray[np.uin
 def render_recording(
     time: ArrayLike,
     beam_displacement: ArrayLike,
-    shaker_displacement: ArrayLike,
+    striker_displacement: ArrayLike,
     *,
     camera: SyntheticCamera | None = None,
     stage: SyntheticStage | None = None,
@@ -208,7 +208,7 @@ def render_recording(
     time
         Instants [s], shape (samples,), strictly increasing; several to a frame, for the motion is taken as
         linear between them.
-    beam_displacement, shaker_displacement
+    beam_displacement, striker_displacement
         Displacement of the beam at the contact and of the shaker's tip [m], shape (samples,); they touch
         where equal.
     camera, stage
@@ -250,8 +250,8 @@ def render_recording(
     if instants.size < 2:
         raise InputError(f"time of {instants.size} sample: must hold at least 2")
     beam = finite_array("beam_displacement", beam_displacement, 1)
-    shaker = finite_array("shaker_displacement", shaker_displacement, 1)
-    for name, values in (("beam_displacement", beam), ("shaker_displacement", shaker)):
+    shaker = finite_array("striker_displacement", striker_displacement, 1)
+    for name, values in (("beam_displacement", beam), ("striker_displacement", shaker)):
         if values.size != instants.size:
             raise InputError(f"{name} of {values.size} samples: time has {instants.size}")
     rest = integer("rest_frames", rest_frames, 0)

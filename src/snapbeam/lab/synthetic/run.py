@@ -32,13 +32,15 @@ def render_run(
     Parameters
     ----------
     run
-        A run, or its dataset, with ``displacement``, ``shaker_displacement`` and the attribute
+        A run, or its dataset, with ``displacement_at_striker``, ``striker_displacement`` and the attribute
         ``length_scale``, the buckling level b [m].
     camera, stage, seed, **options
         As for :func:`render_recording`.  Unless a stage is given, its beam is as thick as the run's and the
         shaker stands on the run's side.
     """
-    dataset = check_trajectory(getattr(run, "dataset", run), ("displacement", "shaker_displacement"))
+    dataset = check_trajectory(
+        getattr(run, "dataset", run), ("displacement_at_striker", "striker_displacement")
+    )
     attrs = dataset.attrs
     if "length_scale" not in attrs:
         raise InputError("run without the attribute length_scale: must say how many metres its unit b is")
@@ -51,14 +53,14 @@ def render_run(
         )
     recording = render_recording(
         dataset["time"].values,
-        scale * dataset["displacement"].values,
-        scale * dataset["shaker_displacement"].values,
+        scale * dataset["displacement_at_striker"].values,
+        scale * dataset["striker_displacement"].values,
         camera=camera,
         stage=stage,
         seed=seed,
         **options,
     )
-    for name in ("displacement", "shaker_displacement", "penetration"):
+    for name in ("displacement_at_striker", "striker_displacement", "penetration_normalised"):
         values = recording.truth[f"{name}_mm"]
         recording.truth[name] = ("time", values.values / (scale * 1e3), {**values.attrs, "units": "1"})
     recording.truth.attrs["buckling_level"] = scale
@@ -70,7 +72,7 @@ def render_vibrometer(
     velocity_amplitude: float,
     *,
     duration: float,
-    sampling_freq: float = 20_000.0,
+    sampling_frequency: float = 20_000.0,
     onset: float = 0.1,
     start_up: float = 0.05,
     start_up_share: float = 0.4,
@@ -88,7 +90,7 @@ def render_vibrometer(
     ----------
     frequency, velocity_amplitude
         Of the steady motion [Hz], [m/s].
-    duration, sampling_freq
+    duration, sampling_frequency
         Length [s] and rate [Hz] of the record.
     onset, start_up, start_up_share
         t0 [s], T [s] and s; 0 for a start-up that is over at once.
@@ -106,10 +108,10 @@ def render_vibrometer(
     """
     freq = positive("frequency", frequency, "Hz")
     amplitude = positive("velocity_amplitude", velocity_amplitude, "m/s")
-    rate = positive("sampling_freq", sampling_freq, "Hz")
+    rate = positive("sampling_frequency", sampling_frequency, "Hz")
     if rate <= 4.0 * freq:
         raise InputError(
-            f"sampling_freq = {rate:g}: must be more than 4 times the frequency, {4 * freq:g} Hz"
+            f"sampling_frequency = {rate:g}: must be more than 4 times the frequency, {4 * freq:g} Hz"
         )
     length = positive("duration", duration, "s")
     begin = within("onset", onset, 0.0, length, closed="left", unit="s")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam.core.findings import findings_of
+from snapbeam.core.findings import diagnostics_of
 from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.lab.tracking.flags import FrameFlag
 
@@ -80,8 +80,8 @@ def _median(values: np.ndarray) -> float:
     return float(np.nanmedian(values)) if np.isfinite(values).any() else float("nan")
 
 
-def tracking_report(dataset: xr.Dataset, *, findings: bool = True) -> str:
-    """The quality of a tracked recording in plain lines: advice for every kind of trouble met, and *findings*."""
+def tracking_report(dataset: xr.Dataset, *, diagnostics: bool = True) -> str:
+    """The quality of a tracked recording in plain lines: advice for every kind of trouble met, and *diagnostics*."""
     quality = tracking_quality(dataset)
     attrs = dataset.attrs
     pixel = attrs["pixel_size"] * 1e6
@@ -106,5 +106,5 @@ def tracking_report(dataset: xr.Dataset, *, findings: bool = True) -> str:
             lines.append(f"{name}: {count} frame{'s' if count > 1 else ''} - {flag.advice}")
     if quality["longest_gap"]:
         lines.append(f"longest stretch without a measurement, in frames: {quality['longest_gap']}")
-    lines += [str(finding) for finding in findings_of(dataset)] if findings else []
+    lines += [str(diagnostic) for diagnostic in diagnostics_of(dataset)] if diagnostics else []
     return "\n".join(lines)

@@ -63,14 +63,14 @@ def track(
     Returns
     -------
     xarray.Dataset
-        Over ``time`` [s]: ``displacement``, ``shaker_displacement``, ``penetration`` in b and, with
+        Over ``time`` [s]: ``displacement``, ``striker_displacement``, ``penetration`` in b and, with
         ``_mm``, in mm; ``displacement_stderr_mm`` and ``shaker_stderr_mm`` from the scatter of the columns,
-        the rest position and what the findings widen; ``confidence`` from 0 to 1; ``flags``
+        the rest position and what the diagnostics widen; ``confidence`` from 0 to 1; ``flags``
         (:class:`FrameFlag`); ``valid``; ``edge_width`` [px]; and, for drawing, ``beam_row``, ``beam_slope``,
         ``tip_row``, ``marker_row`` [px, turned picture], with the noise of the first and third in
         ``beam_row_stderr`` and ``tip_row_stderr``.  What could not be measured is NaN and flagged, never
-        filled in; frames missing from the numbering appear so.  The attribute ``findings`` holds what makes
-        the result doubtful; :func:`snapbeam.lab.findings_of` reads it.
+        filled in; frames missing from the numbering appear so.  The attribute ``diagnostics`` holds what makes
+        the result doubtful; :func:`snapbeam.lab.diagnostics_of` reads it.
 
     Raises
     ------

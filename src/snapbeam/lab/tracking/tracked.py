@@ -1,4 +1,4 @@
-"""From rows of pixels to a labelled dataset: the common scale of beam and shaker, errors and findings."""
+"""From rows of pixels to a labelled dataset: the common scale of beam and shaker, errors and diagnostics."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.findings import Finding, to_json
+from snapbeam.core.findings import Diagnostic, to_json
 from snapbeam.core.validate import InputError
 from snapbeam.lab.camera.recording import Recording
 from snapbeam.lab.plausibility.tracking import (
@@ -66,7 +66,7 @@ def tracked_dataset(
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
     seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields)
-    findings = (*recording.findings, *tracking_findings(scene, seen, settings, scale * offset))
+    diagnostics = (*recording.diagnostics, *tracking_findings(scene, seen, settings, scale * offset))
     # a shift of the edges by the camera's curve moves the shaker against the beam, not the beam against itself
     placed = scene.placed_error
     bent = math.hypot(2.0 * scene.shape.shift, contact_shift(touch, placed), placed)
@@ -83,12 +83,12 @@ def tracked_dataset(
     scaled: dict[str, NDArray] = {}
     if settings.buckling_level is not None:
         unit = settings.buckling_level * 1e3
-        scaled["displacement"] = beam_mm / unit
+        scaled["displacement_at_striker"] = beam_mm / unit
         if shaker is not None:
-            scaled["shaker_displacement"] = shaker_mm / unit
-            scaled["penetration"] = closing_mm / unit
+            scaled["striker_displacement"] = shaker_mm / unit
+            scaled["penetration_normalised"] = closing_mm / unit
     time = np.arange(rows.row.size) / recording.frame_rate
-    attrs = _attributes(recording, scene, settings, rest, findings)
+    attrs = _attributes(recording, scene, settings, rest, diagnostics)
     dataset = trajectory_dataset(time, attrs=attrs, valid=valid, **scaled)
     own = {
         "displacement_mm": (beam_mm, "mm", "beam displacement at the shaker"),
@@ -102,7 +102,7 @@ def tracked_dataset(
     }
     if shaker is not None:
         own["shaker_displacement_mm"] = (shaker_mm, "mm", "shaker displacement")
-        own["penetration_mm"] = (closing_mm, "mm", "penetration")
+        own["penetration_mm"] = (closing_mm, "mm", "penetration_normalised")
         own["shaker_stderr_mm"] = (scale * shaker_error, "mm", "standard error of the shaker displacement")
         own["tip_row"] = (tip, "px", "row of the shaker's tip at the contact column")
         own["tip_row_stderr"] = (rows.shaker_error, "px", "noise of the tip's row, standard error")
@@ -144,7 +144,7 @@ def _attributes(
     scene: Scene,
     settings: TrackingSettings,
     rest: Rest,
-    findings: tuple[Finding, ...],
+    diagnostics: tuple[Diagnostic, ...],
 ) -> dict[str, Any]:
     beam, shaker = scene.beam, scene.shaker
     attrs: dict[str, Any] = {
@@ -175,7 +175,7 @@ def _attributes(
         "rest_frames": int(rest.indices.size),
         "rest_row": rest.row,
         "location": settings.location,
-        "findings": to_json(findings),
+        "diagnostics": to_json(diagnostics),
     }
     if settings.buckling_level is not None:
         attrs["buckling_level"] = settings.buckling_level

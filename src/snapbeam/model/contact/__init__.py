@@ -1,6 +1,6 @@
 """Laws of contact, one a file: what happens where the striker touches the beam."""
 
-from snapbeam.model.contact.base import LAWS, ContactLaw, Keeps
+from snapbeam.model.contact.base import LAWS, ContactLaw, LawProperties
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.hunt_crossley import HuntCrossley
 from snapbeam.model.contact.kelvin_voigt import KelvinVoigt
@@ -14,7 +14,7 @@ __all__ = [
     "ContactLaw",
     "HertzContact",
     "HuntCrossley",
-    "Keeps",
+    "LawProperties",
     "KelvinVoigt",
     "LayeredHertz",
     "PowerLaw",

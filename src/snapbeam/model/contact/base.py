@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 from snapbeam.model.numbers import numbers_type
 from snapbeam.model.quantity import check_fields
 
-__all__ = ["LAWS", "ContactLaw", "Keeps", "hertzian_time"]
+__all__ = ["LAWS", "ContactLaw", "LawProperties", "hertzian_time"]
 
 LAWS: dict[str, type[ContactLaw]] = {}
 """Every law by the name it has in parameter files."""
@@ -27,7 +27,7 @@ def hertzian_time(slope: float, mass: float) -> float:
 
 
 @dataclass(frozen=True)
-class Keeps:
+class LawProperties:
     """What a law of contact leaves intact; what it does not is refused, or switched off, where it is needed."""
 
     mirror: bool = True
@@ -50,7 +50,7 @@ class ContactLaw:
     - ``energy(law, penetration)``: energy stored in the contact, J, whose derivative is the force;
     - ``slope(law, penetration)``: derivative of the force, N/m, for the tangent flow.
 
-    A law that loses energy (``lossy``) has ``damping(law, penetration)`` besides, N s/m: its force is
+    A law that loses energy (``rate_dependent``) has ``damping(law, penetration)`` besides, N s/m: its force is
     max(0, force + damping times the rate of penetration).
 
     They are written with ``+``, ``-``, ``*``, ``/`` and :mod:`math` alone, and never allocate.
@@ -58,14 +58,14 @@ class ContactLaw:
 
     name: ClassVar[str] = ""
     """In parameter files and attributes."""
-    keeps: ClassVar[Keeps] = Keeps()
+    properties: ClassVar[LawProperties] = LawProperties()
     impulsive: ClassVar[bool] = False
     """Whether an impact lasts no time: a jump of the velocity instead of a force."""
-    lossy: ClassVar[bool] = False
+    rate_dependent: ClassVar[bool] = False
     """Whether the force depends on the rate of penetration too."""
-    side_by_side: ClassVar[bool] = False
+    vectorizable: ClassVar[bool] = False
     """Whether its force is plain arithmetic and square roots, without branches, so that eight are computed at once."""
-    most_modes: ClassVar[int | None] = None
+    max_modes: ClassVar[int | None] = None
     """Modes of a model that may be struck under this law."""
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -77,7 +77,7 @@ class ContactLaw:
         check_fields(self)
 
     @staticmethod
-    def damping(law: Any, penetration: float) -> float:
+    def damping_coefficient(law: Any, penetration: float) -> float:
         """Force per rate of penetration, N s/m; none is lost."""
         return 0.0
 
@@ -88,14 +88,14 @@ class ContactLaw:
         return numbers_type(cls, (item.name for item in fields))
 
     @property
-    def loses(self) -> bool:
+    def is_dissipative(self) -> bool:
         """Whether contacts under it may lose energy."""
-        return self.impulsive or self.lossy
+        return self.impulsive or self.rate_dependent
 
     def impact_duration(self, mass: float, velocity: float) -> float:
         """Duration, s, of the impact of a free *mass* (kg) that arrives with *velocity* (m/s); 0 if none is known."""
         return 0.0
 
-    def resolved_time(self, mass: float, velocity: float) -> float:
+    def time_scale(self, mass: float, velocity: float) -> float:
         """Time, s, that steps in contact are planned by: the duration, or less where the force acts in a part of it."""
         return self.impact_duration(mass, velocity)

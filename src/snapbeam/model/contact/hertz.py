@@ -35,7 +35,7 @@ class HertzContact(ContactLaw):
     )  # fmt: skip
 
     name = "hertz"
-    side_by_side = True
+    vectorizable = True
 
     @staticmethod
     def force(law: Any, penetration: float) -> float:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from snapbeam.core.validate import positive
-from snapbeam.model.contact.base import ContactLaw, Keeps
+from snapbeam.model.contact.base import ContactLaw, LawProperties
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.loss import loss_number, preset_loss, restitution_of_loss
 from snapbeam.model.quantity import RUN, quantity
@@ -29,7 +29,7 @@ class HuntCrossley(ContactLaw):
     ----------
     stiffness : float
         Contact stiffness k_c, N/m^1.5.
-    loss : float
+    damping_factor : float
         chi, s/m; 0 is Hertz's law.
     """
 
@@ -37,14 +37,14 @@ class HuntCrossley(ContactLaw):
         "N/m^1.5", "contact stiffness", low=0.0, scope=RUN, symbol="k_c", short="contact_stiffness",
         plausible=(1.0, 1e15, "N/mm^1.5"),
     )  # fmt: skip
-    loss: float = quantity(
+    damping_factor: float = quantity(
         "s/m", "loss of the contact per speed of penetration", low=0.0, closed="left", scope=RUN, symbol=r"\chi",
-        short="contact_loss_factor",
+        short="contact_damping_factor",
     )  # fmt: skip
 
     name = "hunt_crossley"
-    lossy = True
-    keeps = Keeps(tangent=False)
+    rate_dependent = True
+    properties = LawProperties(tangent=False)
 
     @staticmethod
     def force(law: Any, penetration: float) -> float:
@@ -52,9 +52,9 @@ class HuntCrossley(ContactLaw):
         return law.stiffness * penetration * math.sqrt(penetration)
 
     @staticmethod
-    def damping(law: Any, penetration: float) -> float:
+    def damping_coefficient(law: Any, penetration: float) -> float:
         """The part that is lost, per speed: chi k_c d^(3/2)."""
-        return law.loss * law.stiffness * penetration * math.sqrt(penetration)
+        return law.damping_factor * law.stiffness * penetration * math.sqrt(penetration)
 
     @staticmethod
     def energy(law: Any, penetration: float) -> float:
@@ -88,11 +88,11 @@ class HuntCrossley(ContactLaw):
 
     def restitution(self, speed: float) -> float:
         """Share of its speed that a free mass keeps when it arrives with *speed* (m/s)."""
-        return restitution_of_loss(self.loss * positive("speed", speed, "m/s"))
+        return restitution_of_loss(self.damping_factor * positive("speed", speed, "m/s"))
 
     def speed_for(self, restitution: float) -> float:
         """The speed, m/s, at which a free mass keeps the share *restitution* of it; infinite without loss."""
-        return math.inf if self.loss == 0.0 else loss_number(restitution) / self.loss
+        return math.inf if self.damping_factor == 0.0 else loss_number(restitution) / self.damping_factor
 
     def impact_duration(self, mass: float, velocity: float) -> float:
         """As of Hertz's law, s: a loss shortens the approach and lengthens the departure."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from snapbeam.core.validate import positive, within
-from snapbeam.model.contact.base import ContactLaw, Keeps
+from snapbeam.model.contact.base import ContactLaw, LawProperties
 from snapbeam.model.quantity import RUN, quantity
 
 __all__ = ["KelvinVoigt"]
@@ -26,56 +26,56 @@ class KelvinVoigt(ContactLaw):
 
     Parameters
     ----------
-    spring : float
+    linear_stiffness : float
         k, N/m.
-    damper : float
+    linear_damping : float
         c, N s/m; 0 is a spring alone.
     """
 
-    spring: float = quantity(
+    linear_stiffness: float = quantity(
         "N/m",
         "stiffness of the spring in the contact",
         low=0.0,
         scope=RUN,
         symbol="k",
-        short="contact_spring",
+        short="contact_linear_stiffness",
     )
-    damper: float = quantity(
+    linear_damping: float = quantity(
         "N s/m",
-        "damper in the contact",
+        "damping coefficient of the contact",
         low=0.0,
         closed="left",
         scope=RUN,
         symbol="c",
-        short="contact_damper",
+        short="contact_linear_damping",
     )
 
     name = "kelvin_voigt"
-    lossy = True
-    keeps = Keeps(smooth=False, tangent=False)
+    rate_dependent = True
+    properties = LawProperties(smooth=False, tangent=False)
 
     @staticmethod
     def force(law: Any, penetration: float) -> float:
         """The spring's part, k d."""
-        return law.spring * penetration
+        return law.linear_stiffness * penetration
 
     @staticmethod
-    def damping(law: Any, penetration: float) -> float:
+    def damping_coefficient(law: Any, penetration: float) -> float:
         """The damper, c."""
-        return law.damper
+        return law.linear_damping
 
     @staticmethod
     def energy(law: Any, penetration: float) -> float:
         """k d^2 / 2."""
-        return 0.5 * law.spring * penetration * penetration
+        return 0.5 * law.linear_stiffness * penetration * penetration
 
     @staticmethod
     def slope(law: Any, penetration: float) -> float:
         """k."""
-        return law.spring
+        return law.linear_stiffness
 
     @classmethod
-    def from_restitution(cls, spring: float, restitution: float, mass: float) -> KelvinVoigt:
+    def from_restitution(cls, linear_stiffness: float, restitution: float, mass: float) -> KelvinVoigt:
         """The law under which a free *mass* (kg) keeps the share *restitution* (in (0, 1]) of its speed.
 
         Of a beam the mass that counts is the one met at the contact, ``model.contact_mass(location)``.
@@ -83,27 +83,30 @@ class KelvinVoigt(ContactLaw):
         from scipy.optimize import brentq
 
         e = within("restitution", restitution, 0.0, 1.0, closed="right")
-        spring, mass = positive("spring", spring, "N/m"), positive("mass", mass, "kg")
+        linear_stiffness, mass = (
+            positive("linear_stiffness", linear_stiffness, "N/m"),
+            positive("mass", mass, "kg"),
+        )
         if e == 1.0:
-            return cls(spring, 0.0)
+            return cls(linear_stiffness, 0.0)
         # it falls with zeta, without an end
         high = 2.0
         while _restitution(high) > e:
             high *= 2.0
         zeta = brentq(lambda z: _restitution(z) - e, 0.0, high, xtol=1e-300, rtol=1e-15)
-        return cls(spring, 2.0 * float(zeta) * math.sqrt(spring * mass))
+        return cls(linear_stiffness, 2.0 * float(zeta) * math.sqrt(linear_stiffness * mass))
 
     def restitution(self, mass: float) -> float:
         """Share of its speed that a free *mass* (kg) keeps, at any speed."""
         mass = positive("mass", mass, "kg")
-        return _restitution(self.damper / (2.0 * math.sqrt(self.spring * mass)))
+        return _restitution(self.linear_damping / (2.0 * math.sqrt(self.linear_stiffness * mass)))
 
     def impact_duration(self, mass: float, velocity: float) -> float:
         """Half a period of the undamped mass on its spring, s, shorter where the damper is what stops it."""
-        half = math.pi * math.sqrt(mass / self.spring)
-        if self.damper == 0.0:
+        half = math.pi * math.sqrt(mass / self.linear_stiffness)
+        if self.linear_damping == 0.0:
             return half
-        return min(half, 4.0 * math.pi * mass / self.damper)
+        return min(half, 4.0 * math.pi * mass / self.linear_damping)
 
 
 def _restitution(zeta: float) -> float:

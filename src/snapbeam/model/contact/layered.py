@@ -112,7 +112,7 @@ class LayeredHertz(ContactLaw):
             total += float(weight * 2.0 * most * node / math.sqrt(max(left, 1e-300)))
         return 2.0 * total
 
-    def resolved_time(self, mass: float, velocity: float) -> float:
+    def time_scale(self, mass: float, velocity: float) -> float:
         """The duration, or that of Hertz's contact with the same greatest slope, which is less."""
         law = self.numbers_type()(self.stiffness, self.layer_stiffness)
         slope = self.slope(law, self.max_penetration(mass, velocity))

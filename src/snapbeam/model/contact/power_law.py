@@ -25,13 +25,13 @@ class PowerLaw(ContactLaw):
 
     Parameters
     ----------
-    force_at_micrometre : float
+    force_at_1um : float
         f_1, N.
     exponent : float
         p, in [1, 10].
     """
 
-    force_at_micrometre: float = quantity(
+    force_at_1um: float = quantity(
         "N", "force at a penetration of one micrometre", low=0.0, scope=RUN, symbol="f_1"
     )
     exponent: float = quantity(
@@ -44,19 +44,19 @@ class PowerLaw(ContactLaw):
     @staticmethod
     def force(law: Any, penetration: float) -> float:
         """f_1 (d/1 um)^p."""
-        return law.force_at_micrometre * math.pow(1e6 * penetration, law.exponent)
+        return law.force_at_1um * math.pow(1e6 * penetration, law.exponent)
 
     @staticmethod
     def energy(law: Any, penetration: float) -> float:
         """f d/(p + 1)."""
-        force = law.force_at_micrometre * math.pow(1e6 * penetration, law.exponent)
+        force = law.force_at_1um * math.pow(1e6 * penetration, law.exponent)
         return force * penetration / (law.exponent + 1.0)
 
     @staticmethod
     def slope(law: Any, penetration: float) -> float:
         """f p/d."""
         power = math.pow(1e6 * penetration, law.exponent - 1.0)
-        return 1e6 * law.force_at_micrometre * law.exponent * power
+        return 1e6 * law.force_at_1um * law.exponent * power
 
     @classmethod
     @checked
@@ -68,7 +68,7 @@ class PowerLaw(ContactLaw):
     def max_penetration(self, mass: float, velocity: float) -> float:
         """Greatest penetration, m, of a free *mass* (kg) that arrives with *velocity* (m/s): f d/(p + 1) = m v^2/2."""
         n = self.exponent + 1.0
-        at_one = self.force_at_micrometre * _MICROMETRE
+        at_one = self.force_at_1um * _MICROMETRE
         return float(_MICROMETRE * (0.5 * n * mass * velocity**2 / at_one) ** (1.0 / n))
 
     def impact_duration(self, mass: float, velocity: float) -> float:
@@ -77,8 +77,8 @@ class PowerLaw(ContactLaw):
         beta = math.sqrt(math.pi) * math.gamma(1.0 / n) / math.gamma(1.0 / n + 0.5)
         return 2.0 * self.max_penetration(mass, velocity) / velocity * beta / n
 
-    def resolved_time(self, mass: float, velocity: float) -> float:
+    def time_scale(self, mass: float, velocity: float) -> float:
         """The duration, or, of an exponent above 3/2, that of Hertz's contact with the same greatest slope."""
-        law = self.numbers_type()(self.force_at_micrometre, self.exponent)
+        law = self.numbers_type()(self.force_at_1um, self.exponent)
         slope = self.slope(law, self.max_penetration(mass, velocity))
         return min(self.impact_duration(mass, velocity), hertzian_time(slope, mass))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.model.contact.base import ContactLaw, Keeps
+from snapbeam.model.contact.base import ContactLaw, LawProperties
 from snapbeam.model.quantity import RUN, quantity
 
 __all__ = ["Restitution"]
@@ -30,9 +30,9 @@ class Restitution(ContactLaw):
     )  # fmt: skip
 
     name = "restitution"
-    keeps = Keeps(smooth=False)
+    properties = LawProperties(smooth=False)
     impulsive = True
-    most_modes = 1
+    max_modes = 1
 
     @staticmethod
     def force(law: Any, penetration: float) -> float:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.kinds import checked
 from snapbeam.core.validate import (
     InputError,
@@ -48,12 +48,12 @@ class HertzStress:
     yield_force: float | None
     force: float
 
-    def findings(self) -> tuple[Finding, ...]:
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
         """That the elastic law is left, if it is."""
         if self.yield_force is None or self.force <= self.yield_force:
             return ()
         return (
-            Finding(
+            Diagnostic(
                 "contact-yields",
                 f"the contact force of {self.force:.3g} N presses with {1e-9 * self.pressure:.3g} GPa, beyond the "
                 f"onset of yield at {self.yield_force:.3g} N: Hertz's law is elastic, and the contact is softer "

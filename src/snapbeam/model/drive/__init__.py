@@ -3,15 +3,15 @@
 from snapbeam.model.drive.base import DRIVES, Drive, Scale
 from snapbeam.model.drive.burst import Burst
 from snapbeam.model.drive.chirp import Chirp
-from snapbeam.model.drive.flight import Flight
+from snapbeam.model.drive.flight import ConstantVelocity
 from snapbeam.model.drive.half_sine import HalfSine
-from snapbeam.model.drive.noise import Noise
-from snapbeam.model.drive.recorded import Recorded
+from snapbeam.model.drive.noise import BandLimitedNoise
+from snapbeam.model.drive.recorded import RecordedMotion
 from snapbeam.model.drive.sine import Sine
-from snapbeam.model.drive.still import AccelerationSine, DisplacementSine, Still
-from snapbeam.model.drive.sum import Sum
+from snapbeam.model.drive.still import AccelerationSine, DisplacementSine, FixedStop
+from snapbeam.model.drive.sum import SumDrive
 from snapbeam.model.drive.timed import HORIZON, Timed
-from snapbeam.model.drive.two_sines import TwoSines
+from snapbeam.model.drive.two_sines import TwoTone
 
 __all__ = [
     "DRIVES",
@@ -21,14 +21,14 @@ __all__ = [
     "Chirp",
     "DisplacementSine",
     "Drive",
-    "Flight",
+    "ConstantVelocity",
     "HalfSine",
-    "Noise",
-    "Recorded",
+    "BandLimitedNoise",
+    "RecordedMotion",
     "Scale",
     "Sine",
-    "Still",
-    "Sum",
+    "FixedStop",
+    "SumDrive",
     "Timed",
-    "TwoSines",
+    "TwoTone",
 ]

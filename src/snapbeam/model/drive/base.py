@@ -50,9 +50,9 @@ class Drive:
     """In parameter files and attributes."""
     harmonic: ClassVar[bool] = False
     """Whether it is the sine that engines know by themselves."""
-    repeats: ClassVar[bool] = True
+    is_periodic: ClassVar[bool] = True
     """Whether the motion repeats after a turn of its argument; if not, that turn is longer than any run."""
-    marched_as: ClassVar[type[Drive] | None] = None
+    integrated_as: ClassVar[type[Drive] | None] = None
     """The drive whose kernels march it, where that is another one."""
     number_names: ClassVar[tuple[str, ...]] = ("omega",)
     parts: ClassVar[tuple[tuple[str, type[Drive]], ...]] = ()
@@ -61,7 +61,7 @@ class Drive:
     """The kinds that it is a sum of."""
     amplitudes: ClassVar[tuple[str, ...]] = ("amplitude",)
     """Numbers that the motion is proportional to, all together."""
-    edges: ClassVar[tuple[str, ...]] = ()
+    discontinuities: ClassVar[tuple[str, ...]] = ()
     """Numbers that are times at which the velocity jumps, s since the drive began: steps end there."""
     registry: ClassVar[dict[str, type[Drive]]] = DRIVES
     """Where it is entered by its name."""
@@ -76,9 +76,9 @@ class Drive:
 
     def __add__(self, other: Drive) -> Drive:
         """One over the other, a :class:`~snapbeam.Sum`."""
-        from snapbeam.model.drive.sum import Sum
+        from snapbeam.model.drive.sum import SumDrive
 
-        return Sum.of(self, other)
+        return SumDrive.of(self, other)
 
     @classmethod
     def numbers_type(cls) -> Any:
@@ -108,11 +108,11 @@ class Drive:
         return self.bounds(columns, scale)[0]
 
     @classmethod
-    def shakes(cls) -> bool:
+    def can_excite_base(cls) -> bool:
         """Whether a base may move so: its acceleration has a known bound."""
-        return cls.hardest is not Drive.hardest
+        return cls.peak_acceleration is not Drive.peak_acceleration
 
-    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Greatest acceleration (m/s^2) ever, shape (runs,): of a motion that a base may have."""
         raise NotImplementedError
 

@@ -31,18 +31,18 @@ class Burst(Timed):
         w_s(t) = w_0 + E(t) (V b omega_1/omega) sin(omega t),
 
     with E = x^3 (10 - 15 x + 6 x^2) of the share x of the rise or of the fall: displacement, velocity and
-    acceleration have no jump.  Afterwards the tip stays at its mid-position or, with *retreat*, leaves the beam.
+    acceleration have no jump.  Afterwards the tip stays at its mid-position or, with *retraction*, leaves the beam.
     A burst longer than the run is a start-up.
 
     Parameters
     ----------
     frequency_ratio, velocity_amplitude : float
         Omega and V, as of a :class:`~snapbeam.Sine`.
-    length : float
+    duration_cycles : float
         Cycles from the beginning of the rise to the end of the fall.
-    rise, fall : float
-        Cycles that they take, each greater than 0, together at most *length*.
-    retreat : float
+    ramp_up_cycles, ramp_down_cycles : float
+        Cycles that they take, each greater than 0, together at most *duration_cycles*.
+    retraction : float
         How far the tip withdraws in the cycle after the burst, over b: a beam released after so many cycles.
     """
 
@@ -52,27 +52,36 @@ class Burst(Timed):
     velocity_amplitude: float = quantity(
         "1", "velocity amplitude over b omega_1", low=0.0, closed="left", scope=RUN, symbol="V"
     )
-    length: float = quantity("1", "cycles of the burst", low=0.0, scope=RUN, short="burst_length")
-    rise: float = quantity(
+    duration_cycles: float = quantity("1", "cycles of the burst", low=0.0, scope=RUN, short="burst_length")
+    ramp_up_cycles: float = quantity(
         "1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN, short="drive_rise"
     )
-    fall: float = quantity(
+    ramp_down_cycles: float = quantity(
         "1", "cycles in which the drive falls", default=1.0, low=0.0, scope=RUN, short="drive_fall"
     )
-    retreat: float = quantity(
+    retraction: float = quantity(
         "1", "distance that the tip withdraws after the burst, over b", default=0.0, low=0.0, closed="left", scope=RUN,
         short="drive_retreat",
     )  # fmt: skip
 
     name = "burst"
-    number_names = ("omega", "fastest", "rate", "amplitude", "length", "rise", "fall", "retreat")
-    amplitudes = ("amplitude", "retreat")
+    number_names = (
+        "omega",
+        "fastest",
+        "rate",
+        "amplitude",
+        "duration_cycles",
+        "ramp_up_cycles",
+        "ramp_down_cycles",
+        "retraction",
+    )
+    amplitudes = ("amplitude", "retraction")
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.rise + self.fall > self.length * (1.0 + 1e-12):
+        if self.ramp_up_cycles + self.ramp_down_cycles > self.duration_cycles * (1.0 + 1e-12):
             raise InputError(
-                f"rise = {self.rise:g}, fall = {self.fall:g} with length = {self.length:g}: together at most the length"
+                f"rise = {self.ramp_up_cycles:g}, ramp_down_cycles = {self.ramp_down_cycles:g} with duration_cycles = {self.duration_cycles:g}: together at most the length"
             )
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
@@ -83,25 +92,25 @@ class Burst(Timed):
         """Rates in rad/s, lengths in m, times in cycles."""
         rate = columns["frequency_ratio"] * scale.omega
         amplitude = columns["velocity_amplitude"] * scale.length * scale.omega / rate
-        shape = {name: columns[name] for name in ("length", "rise", "fall")}
-        retreat = columns["retreat"] * scale.length
-        return {"fastest": rate, "rate": rate, "amplitude": amplitude, "retreat": retreat} | shape
+        shape = {name: columns[name] for name in ("duration_cycles", "ramp_up_cycles", "ramp_down_cycles")}
+        retreat = columns["retraction"] * scale.length
+        return {"fastest": rate, "rate": rate, "amplitude": amplitude, "retraction": retreat} | shape
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
         """The amplitude, and the speed with the steepest envelope."""
         found = self.shape_numbers(columns, scale)
         steep = _STEEPEST * found["rate"] / (2.0 * math.pi)
-        shortest = np.minimum(found["rise"], found["fall"])
-        speed = found["amplitude"] * (found["rate"] + steep / shortest) + found["retreat"] * steep
+        shortest = np.minimum(found["ramp_up_cycles"], found["ramp_down_cycles"])
+        speed = found["amplitude"] * (found["rate"] + steep / shortest) + found["retraction"] * steep
         return found["amplitude"], speed
 
     def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """That of the sine with the steepest and the sharpest envelope, and that of the retreat."""
         found = self.shape_numbers(columns, scale)
         per, rate = found["rate"] / (2.0 * math.pi), found["rate"]
-        shortest = np.minimum(found["rise"], found["fall"])
+        shortest = np.minimum(found["ramp_up_cycles"], found["ramp_down_cycles"])
         shape = rate**2 + 2.0 * rate * _STEEPEST * per / shortest + _SHARPEST * (per / shortest) ** 2
-        return np.asarray(found["amplitude"] * shape + found["retreat"] * _SHARPEST * per**2)
+        return np.asarray(found["amplitude"] * shape + found["retraction"] * _SHARPEST * per**2)
 
     @staticmethod
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
@@ -109,23 +118,23 @@ class Burst(Timed):
         per = drive.rate / 6.283185307179586
         cycles = argument / drive.omega * per
         e, slope = 1.0, 0.0
-        if cycles < drive.rise:
-            x = cycles / drive.rise
+        if cycles < drive.ramp_up_cycles:
+            x = cycles / drive.ramp_up_cycles
             e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-            slope = 30.0 * x * x * (1.0 - x) * (1.0 - x) * per / drive.rise
-        elif cycles >= drive.length:
+            slope = 30.0 * x * x * (1.0 - x) * (1.0 - x) * per / drive.ramp_up_cycles
+        elif cycles >= drive.duration_cycles:
             e = 0.0
-        elif cycles > drive.length - drive.fall:
-            x = (drive.length - cycles) / drive.fall
+        elif cycles > drive.duration_cycles - drive.ramp_down_cycles:
+            x = (drive.duration_cycles - cycles) / drive.ramp_down_cycles
             e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-            slope = -30.0 * x * x * (1.0 - x) * (1.0 - x) * per / drive.fall
+            slope = -30.0 * x * x * (1.0 - x) * (1.0 - x) * per / drive.ramp_down_cycles
         turn = 6.283185307179586 * (cycles - math.floor(cycles))
         sine, cosine = math.sin(turn), math.cos(turn)
         a, away, speed = drive.amplitude, 0.0, 0.0
-        if cycles > drive.length:
-            x = min(cycles - drive.length, 1.0)
-            away = drive.retreat * x * x * x * (10.0 + x * (6.0 * x - 15.0))
-            speed = drive.retreat * 30.0 * x * x * (1.0 - x) * (1.0 - x) * per
+        if cycles > drive.duration_cycles:
+            x = min(cycles - drive.duration_cycles, 1.0)
+            away = drive.retraction * x * x * x * (10.0 + x * (6.0 * x - 15.0))
+            speed = drive.retraction * 30.0 * x * x * (1.0 - x) * (1.0 - x) * per
         return a * e * sine - away, a * (slope * sine + e * drive.rate * cosine) - speed
 
     @staticmethod
@@ -135,12 +144,16 @@ class Burst(Timed):
         cycles = argument / drive.omega * per
         e, slope, bend = 1.0, 0.0, 0.0
         x, over, turned = -1.0, 1.0, 1.0
-        if cycles < drive.rise:
-            x, over = cycles / drive.rise, drive.rise
-        elif cycles >= drive.length:
+        if cycles < drive.ramp_up_cycles:
+            x, over = cycles / drive.ramp_up_cycles, drive.ramp_up_cycles
+        elif cycles >= drive.duration_cycles:
             e = 0.0
-        elif cycles > drive.length - drive.fall:
-            x, over, turned = (drive.length - cycles) / drive.fall, drive.fall, -1.0
+        elif cycles > drive.duration_cycles - drive.ramp_down_cycles:
+            x, over, turned = (
+                (drive.duration_cycles - cycles) / drive.ramp_down_cycles,
+                drive.ramp_down_cycles,
+                -1.0,
+            )
         if x >= 0.0:
             e = x * x * x * (10.0 + x * (6.0 * x - 15.0))
             slope = turned * 30.0 * x * x * (1.0 - x) * (1.0 - x) * per / over
@@ -148,7 +161,7 @@ class Burst(Timed):
         turn = 6.283185307179586 * (cycles - math.floor(cycles))
         sine, cosine, rate = math.sin(turn), math.cos(turn), drive.rate
         away = 0.0
-        if drive.length < cycles < drive.length + 1.0:
-            y = cycles - drive.length
-            away = drive.retreat * 60.0 * y * (1.0 - y) * (1.0 - 2.0 * y) * per * per
+        if drive.duration_cycles < cycles < drive.duration_cycles + 1.0:
+            y = cycles - drive.duration_cycles
+            away = drive.retraction * 60.0 * y * (1.0 - y) * (1.0 - 2.0 * y) * per * per
         return drive.amplitude * ((bend - e * rate * rate) * sine + 2.0 * slope * rate * cosine) - away

@@ -34,9 +34,9 @@ class Chirp(Timed):
         Omega at the beginning and at the end, either may be the greater.
     velocity_amplitude : float
         V.
-    sweep_length : float
+    sweep_cycles : float
         Duration over the first period 2 pi/(start_ratio omega_1): the cycles of the run are counted in these.
-    spacing : {"linear", "log"}
+    sweep_type : {"linear", "log"}
     """
 
     start_ratio: float = quantity("1", "frequency ratio at the start of the sweep", low=0.0, scope=RUN)
@@ -44,8 +44,8 @@ class Chirp(Timed):
     velocity_amplitude: float = quantity(
         "1", "velocity amplitude over b omega_1", low=0.0, closed="left", scope=RUN, symbol="V"
     )
-    sweep_length: float = quantity("1", "duration of the sweep, in its first period", low=0.0, scope=RUN)
-    spacing: str = quantity(
+    sweep_cycles: float = quantity("1", "duration of the sweep, in its first period", low=0.0, scope=RUN)
+    sweep_type: str = quantity(
         "1", "how the frequency wanders", default="linear", kind=str, choices=("linear", "log"), scope=STRUCTURE,
         short="sweep_spacing",
     )  # fmt: skip
@@ -67,8 +67,8 @@ class Chirp(Timed):
             "first": first,
             "last": last,
             "speed": columns["velocity_amplitude"] * scale.length * scale.omega,
-            "duration": columns["sweep_length"] * self.cycle(columns, scale),
-            "logarithmic": np.full(first.size, float(self.spacing == "log")),
+            "duration": columns["sweep_cycles"] * self.cycle(columns, scale),
+            "logarithmic": np.full(first.size, float(self.sweep_type == "log")),
         }
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:

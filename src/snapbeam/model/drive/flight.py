@@ -14,13 +14,13 @@ from snapbeam.model.drive.base import Scale
 from snapbeam.model.drive.timed import Timed
 from snapbeam.model.quantity import RUN, quantity
 
-__all__ = ["Flight"]
+__all__ = ["ConstantVelocity"]
 
 _Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flight(Timed):
+class ConstantVelocity(Timed):
     """A constant velocity towards the beam, w_s(t) = w_0 + v t, v = speed b omega_1.
 
     Of a striker with a mass and no spring, that is a body thrown at the beam; without a mass it is a slow press, or a
@@ -36,7 +36,7 @@ class Flight(Timed):
         "1", "speed of the striker over b omega_1", low=0.0, closed="left", scope=RUN, short="striker_speed"
     )
 
-    name = "flight"
+    name = "constant_velocity"
     number_names = ("omega", "fastest", "speed")
     amplitudes = ("speed",)
 

@@ -15,7 +15,7 @@ from snapbeam.model.drive.base import Scale
 from snapbeam.model.drive.timed import Timed
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
 
-__all__ = ["Noise"]
+__all__ = ["BandLimitedNoise"]
 
 _Array = NDArray[np.float64]
 LINES = 32
@@ -26,7 +26,7 @@ _SHARPEST = 5.7736
 
 
 @dataclass(frozen=True, kw_only=True)
-class Noise(Timed):
+class BandLimitedNoise(Timed):
     """A tip whose velocity is band-limited noise, the sum of 32 sines of equal strength and random phases,
 
         w_s(t) = w_0 + E(t) sum_j (a/omega_j) sin(omega_j t + phase_j),    a = V_rms b omega_1 sqrt(2/32),
@@ -43,7 +43,7 @@ class Noise(Timed):
         Root mean square velocity over b omega_1.
     seed : int
         0 to 2^31 - 1.
-    rise : float
+    ramp_up_cycles : float
         Cycles of the middle of the band in which the noise rises.
     """
 
@@ -71,12 +71,12 @@ class Noise(Timed):
         scope=STRUCTURE,
         short="noise_seed",
     )
-    rise: float = quantity(
+    ramp_up_cycles: float = quantity(
         "1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN, short="drive_rise"
     )
 
-    name = "noise"
-    number_names = ("omega", "fastest", "low", "high", "strength", "rise", "seed")
+    name = "band_limited_noise"
+    number_names = ("omega", "fastest", "low", "high", "strength", "ramp_up_cycles", "seed")
     amplitudes = ("strength",)
 
     def __post_init__(self) -> None:
@@ -98,7 +98,7 @@ class Noise(Timed):
             "low": low,
             "high": high,
             "strength": columns["velocity_rms"] * scale.length * scale.omega * math.sqrt(2.0 / LINES),
-            "rise": columns["rise"] * self.cycle(columns, scale),
+            "ramp_up_cycles": columns["ramp_up_cycles"] * self.cycle(columns, scale),
             "seed": np.full(low.size, float(self.seed)),
         }
 
@@ -108,7 +108,7 @@ class Noise(Timed):
         parts = (np.arange(LINES) / LINES)[:, None]
         lowest = found["low"] + parts * (found["high"] - found["low"])
         highest = found["strength"] * np.sum(1.0 / lowest, axis=0)
-        return highest, LINES * found["strength"] + highest * _STEEPEST / found["rise"]
+        return highest, LINES * found["strength"] + highest * _STEEPEST / found["ramp_up_cycles"]
 
     def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """All sines at their hardest at once, with what the envelope adds."""
@@ -116,8 +116,10 @@ class Noise(Timed):
         parts = ((np.arange(LINES) + 1) / LINES)[:, None]
         fastest = found["low"] + parts * (found["high"] - found["low"])
         own = found["strength"] * np.sum(fastest, axis=0)
-        rising = 2.0 * _STEEPEST * LINES * found["strength"] / found["rise"]
-        return np.asarray(own + rising + _SHARPEST * self.bounds(columns, scale)[0] / found["rise"] ** 2)
+        rising = 2.0 * _STEEPEST * LINES * found["strength"] / found["ramp_up_cycles"]
+        return np.asarray(
+            own + rising + _SHARPEST * self.bounds(columns, scale)[0] / found["ramp_up_cycles"] ** 2
+        )
 
     @staticmethod
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
@@ -138,11 +140,11 @@ class Noise(Timed):
                 moved += math.sin(angle) / rate
                 speed += math.cos(angle)
         moved, speed = moved * drive.strength, speed * drive.strength
-        if t >= drive.rise:
+        if t >= drive.ramp_up_cycles:
             return moved, speed
-        s = t / drive.rise
+        s = t / drive.ramp_up_cycles
         e = s * s * s * (10.0 + s * (6.0 * s - 15.0))
-        return e * moved, e * speed + 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.rise * moved
+        return e * moved, e * speed + 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.ramp_up_cycles * moved
 
     @staticmethod
     def acceleration(drive: Any, memory: Any, argument: float) -> float:
@@ -164,10 +166,10 @@ class Noise(Timed):
                 speed += math.cos(angle)
                 bent -= math.sin(angle) * rate
         moved, speed, bent = moved * drive.strength, speed * drive.strength, bent * drive.strength
-        if t >= drive.rise:
+        if t >= drive.ramp_up_cycles:
             return bent
-        s = t / drive.rise
+        s = t / drive.ramp_up_cycles
         e = s * s * s * (10.0 + s * (6.0 * s - 15.0))
-        first = 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.rise
-        second = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (drive.rise * drive.rise)
+        first = 30.0 * s * s * (1.0 - s) * (1.0 - s) / drive.ramp_up_cycles
+        second = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / (drive.ramp_up_cycles * drive.ramp_up_cycles)
         return e * bent + 2.0 * first * speed + second * moved

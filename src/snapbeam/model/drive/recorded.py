@@ -17,7 +17,7 @@ from snapbeam.model.quantity import check_fields, quantity
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Recorded"]
+__all__ = ["RecordedMotion"]
 
 _Array = NDArray[np.float64]
 _SPEED_MARGIN = 1.5
@@ -25,7 +25,7 @@ _SPEED_MARGIN = 1.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Recorded(Drive):
+class RecordedMotion(Drive):
     """A measured motion of the tip, its start-up transient included.
 
     The motion between samples is the cubic that matches displacement and velocity at both; the displacement of the
@@ -37,7 +37,7 @@ class Recorded(Drive):
         Displacement (m) and velocity (m/s), positive towards the beam's upper well; they must belong
         together: over each interval the displacement changes by the velocities' mean, within a tenth
         of the greatest change.
-    sampling_freq : float
+    sampling_frequency : float
         Samples per second, Hz.
     frequency : float
         Nominal frequency of the excitation, Hz: what a cycle is.
@@ -45,21 +45,21 @@ class Recorded(Drive):
 
     displacement: NDArray[np.float64] = quantity("m", "displacement of the tip, sampled", kind=object)
     velocity: NDArray[np.float64] = quantity("m/s", "velocity of the tip, sampled", kind=object)
-    sampling_freq: float = quantity("Hz", "samples per second", low=0.0)
+    sampling_frequency: float = quantity("Hz", "samples per second", low=0.0)
     frequency: float = quantity("Hz", "nominal frequency of the excitation", low=0.0, short="drive_frequency")
 
-    name = "recorded"
+    name = "recorded_motion"
     number_names = ("omega", "table", "samples", "interval")
     amplitudes = ()
 
     def __post_init__(self) -> None:
         check_fields(self)
-        displacement, velocity = checked_record(self.displacement, self.velocity, self.sampling_freq)
+        displacement, velocity = checked_record(self.displacement, self.velocity, self.sampling_frequency)
         object.__setattr__(self, "displacement", displacement)
         object.__setattr__(self, "velocity", velocity)
 
     @classmethod
-    def from_dataset(cls, dataset: xr.Dataset) -> Recorded:
+    def from_dataset(cls, dataset: xr.Dataset) -> RecordedMotion:
         """A drive from what :func:`snapbeam.lab.recorded_drive` returns, or from a file of it.
 
         *dataset* has ``displacement`` (m) and ``velocity`` (m/s) over an even ``time`` (s), and the nominal
@@ -85,16 +85,16 @@ class Recorded(Drive):
         if not interval > 0.0 or np.abs(np.diff(time) - interval).max() > 1e-6 * interval:
             raise InputError("time: must be evenly spaced and increasing")
         return cls(
-            displacement=dataset["displacement"].values,
-            velocity=dataset["velocity"].values,
-            sampling_freq=1.0 / interval,
+            displacement=dataset["displacement_at_striker"].values,
+            velocity=dataset["velocity_at_striker"].values,
+            sampling_frequency=1.0 / interval,
             frequency=float(dataset.attrs["frequency"]),
         )
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Recorded):
+        if not isinstance(other, RecordedMotion):
             return NotImplemented
-        numbers = (self.sampling_freq, self.frequency) == (other.sampling_freq, other.frequency)
+        numbers = (self.sampling_frequency, self.frequency) == (other.sampling_frequency, other.frequency)
         return numbers and bool(
             np.array_equal(self.displacement, other.displacement)
             and np.array_equal(self.velocity, other.velocity)
@@ -102,13 +102,13 @@ class Recorded(Drive):
 
     def __hash__(self) -> int:
         return hash(
-            (self.sampling_freq, self.frequency, self.displacement.tobytes(), self.velocity.tobytes())
+            (self.sampling_frequency, self.frequency, self.displacement.tobytes(), self.velocity.tobytes())
         )
 
     @property
     def duration(self) -> float:
         """Length of the record, s."""
-        return (self.displacement.size - 1) / self.sampling_freq
+        return (self.displacement.size - 1) / self.sampling_frequency
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """The argument of a record makes one turn over the whole of it."""
@@ -117,7 +117,7 @@ class Recorded(Drive):
             "omega": 2.0 * math.pi / self.duration,
             "table": 0.0,
             "samples": float(self.displacement.size),
-            "interval": 1.0 / self.sampling_freq,
+            "interval": 1.0 / self.sampling_frequency,
         }
         return {name: np.full(runs, value) for name, value in fixed.items()}
 
@@ -129,14 +129,14 @@ class Recorded(Drive):
         """What was recorded, with a margin for what lies between the samples."""
         runs = next(iter(columns.values())).size
         speed = _SPEED_MARGIN * float(np.abs(self.velocity).max())
-        highest = float((self.displacement - self.displacement[0]).max()) + speed / self.sampling_freq
+        highest = float((self.displacement - self.displacement[0]).max()) + speed / self.sampling_frequency
         return np.full(runs, highest), np.full(runs, speed)
 
     def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """What was recorded in the other direction."""
         runs = next(iter(columns.values())).size
         speed = _SPEED_MARGIN * float(np.abs(self.velocity).max())
-        lowest = float((self.displacement - self.displacement[0]).min()) - speed / self.sampling_freq
+        lowest = float((self.displacement - self.displacement[0]).min()) - speed / self.sampling_frequency
         return np.full(runs, -lowest)
 
     def samples(self) -> _Array:

@@ -14,19 +14,19 @@ from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.sine import Sine
 from snapbeam.model.quantity import RUN, quantity
 
-__all__ = ["AccelerationSine", "DisplacementSine", "Still"]
+__all__ = ["AccelerationSine", "DisplacementSine", "FixedStop"]
 
 _Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Still(Drive):
+class FixedStop(Drive):
     """No motion: a stop.  A cycle is a period of the first mode."""
 
-    name = "still"
+    name = "fixed"
     harmonic = True
     number_names = ("omega", "amplitude")
-    marched_as: ClassVar[type[Drive] | None] = Sine
+    integrated_as: ClassVar[type[Drive] | None] = Sine
 
     def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """The first natural frequency and no amplitude."""
@@ -52,7 +52,7 @@ class _OwnAmplitude(Drive):
     )
     harmonic = True
     number_names = ("omega", "amplitude")
-    marched_as: ClassVar[type[Drive] | None] = Sine
+    integrated_as: ClassVar[type[Drive] | None] = Sine
 
     def _amplitude(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         raise NotImplementedError

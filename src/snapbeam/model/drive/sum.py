@@ -14,7 +14,7 @@ from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.model.drive.base import DRIVES, Drive, Scale
 from snapbeam.model.drive.timed import Timed
 
-__all__ = ["MOST_TERMS", "Sum"]
+__all__ = ["MOST_TERMS", "SumDrive"]
 
 _Array = NDArray[np.float64]
 _SEPARATOR = "__"
@@ -22,7 +22,7 @@ _JOIN = "+"
 MOST_TERMS = 4
 
 
-class Sum(Timed):
+class SumDrive(Timed):
     """Several drives one over the other,
 
         w_s(t) = w_0 + sum_i [w_i(t) - w_i(0)],
@@ -37,7 +37,7 @@ class Sum(Timed):
     terms: ClassVar[tuple[type[Drive], ...]] = ()
 
     @classmethod
-    def of(cls, *drives: Drive) -> Sum:
+    def of(cls, *drives: Drive) -> SumDrive:
         """The sum of two to four drives, sums included, in their order.
 
         Raises
@@ -49,7 +49,7 @@ class Sum(Timed):
         for drive in drives:
             if not isinstance(drive, Drive):
                 raise InputTypeError(f"drive = {shown(drive)}: must be a drive, such as Sine(...)")
-            flat += drive.parts_of_sum if isinstance(drive, Sum) else [drive]
+            flat += drive.parts_of_sum if isinstance(drive, SumDrive) else [drive]
         made = mixture(tuple(type(each) for each in flat))
         values = {
             f"{item.name}_{i}": getattr(each, item.name)
@@ -73,7 +73,7 @@ class Sum(Timed):
     @classmethod
     def shakes(cls) -> bool:
         """Whether every term has a bounded acceleration."""
-        return all(kind.shakes() for kind in cls.terms)
+        return all(kind.can_excite_base() for kind in cls.terms)
 
     def _each(self, columns: Mapping[str, _Array]) -> list[tuple[int, Drive, dict[str, _Array]]]:
         """Number, drive and columns of every term."""
@@ -127,7 +127,7 @@ class Sum(Timed):
 
     def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """All terms at their hardest at once."""
-        return np.asarray(sum(drive.hardest(own, scale) for _, drive, own in self._each(columns)))
+        return np.asarray(sum(drive.peak_acceleration(own, scale) for _, drive, own in self._each(columns)))
 
     @classmethod
     def motion(cls, drive: Any, memory: Any, argument: float) -> tuple[float, float]:
@@ -148,7 +148,7 @@ def _names(kind: type[Drive]) -> list[str]:
     return [item.name for item in dataclasses.fields(kind)]  # type: ignore[arg-type]
 
 
-def mixture(kinds: tuple[type[Drive], ...]) -> type[Sum]:
+def mixture(kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
     """The class of the sums of such kinds of drives.
 
     Raises
@@ -160,18 +160,18 @@ def mixture(kinds: tuple[type[Drive], ...]) -> type[Sum]:
     if not 2 <= len(kinds) <= MOST_TERMS:
         raise InputError(f"{words or 'no drive'}: a sum has 2 to {MOST_TERMS} terms")
     for kind in kinds:
-        if kind.name in ("recorded", "still") or DRIVES.get(kind.name) is not kind:
+        if kind.name in ("recorded_motion", "fixed") or DRIVES.get(kind.name) is not kind:
             raise InputError(
                 f"{words}: {kind.name!r} is no term of a sum; a record has a clock of its own, and a stop adds nothing"
             )
-    name = _SEPARATOR.join(["Sum", *(kind.name for kind in kinds)])
+    name = _SEPARATOR.join(["SumDrive", *(kind.name for kind in kinds)])
     if name not in globals():
         globals()[name] = _made(name, kinds)
-    found: type[Sum] = globals()[name]
+    found: type[SumDrive] = globals()[name]
     return found
 
 
-def _made(name: str, kinds: tuple[type[Drive], ...]) -> type[Sum]:
+def _made(name: str, kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
     fields: list[tuple[str, Any, Any]] = []
     numbers = ["omega", "fastest"]
     for i, kind in enumerate(kinds, 1):
@@ -194,16 +194,16 @@ def _made(name: str, kinds: tuple[type[Drive], ...]) -> type[Sum]:
         ),
     }
     found: Any = dataclasses.make_dataclass(
-        name, fields, bases=(Sum,), namespace=body, frozen=True, kw_only=True
+        name, fields, bases=(SumDrive,), namespace=body, frozen=True, kw_only=True
     )
     found.name = _JOIN.join(
         kind.name for kind in kinds
     )  # later than the class, so that no table of drives has it
-    mixed: type[Sum] = found
+    mixed: type[SumDrive] = found
     return mixed
 
 
-def named(name: str) -> type[Sum] | None:
+def named(name: str) -> type[SumDrive] | None:
     """The class of a kind such as ``"sine+burst"``; None if it is none."""
     words = name.split(_JOIN) if isinstance(name, str) else []
     if len(words) < 2 or not all(word in DRIVES for word in words):
@@ -211,7 +211,7 @@ def named(name: str) -> type[Sum] | None:
     return mixture(tuple(DRIVES[word] for word in words))
 
 
-def __getattr__(name: str) -> type[Sum]:
+def __getattr__(name: str) -> type[SumDrive]:
     """A mixture by its name, as another process knows it."""
     words = _words(name)
     if words is None:
@@ -221,4 +221,4 @@ def __getattr__(name: str) -> type[Sum]:
 
 def _words(name: str) -> list[str] | None:
     first, *words = name.split(_SEPARATOR)
-    return words if first == "Sum" and len(words) > 1 and all(word in DRIVES for word in words) else None
+    return words if first == "SumDrive" and len(words) > 1 and all(word in DRIVES for word in words) else None

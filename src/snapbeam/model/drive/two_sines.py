@@ -14,13 +14,13 @@ from snapbeam.model.drive.base import Scale
 from snapbeam.model.drive.timed import Timed
 from snapbeam.model.quantity import RUN, quantity
 
-__all__ = ["TwoSines"]
+__all__ = ["TwoTone"]
 
 _Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoSines(Timed):
+class TwoTone(Timed):
     """A sine and another one, a harmonic or any other tone,
 
         w_s(t) = w_0 + (V b omega_1/omega) sin(omega t) + A_2 [sin(omega_2 t + phase_2) - sin(phase_2)],
@@ -59,7 +59,7 @@ class TwoSines(Timed):
         scope=RUN,
     )
 
-    name = "two_sines"
+    name = "two_tone"
     number_names = (
         "omega",
         "fastest",

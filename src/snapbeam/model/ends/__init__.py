@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from snapbeam.model.ends.ends import CLAMPED, Ends
+from snapbeam.model.ends.ends import CLAMPED, BoundaryConditions
 
-__all__ = ["CLAMPED", "Ends"]
+__all__ = ["CLAMPED", "BoundaryConditions"]

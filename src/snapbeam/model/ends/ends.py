@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 from snapbeam.model.quantity import check_fields, quantity
 
-__all__ = ["CLAMPED", "Ends"]
+__all__ = ["CLAMPED", "BoundaryConditions"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ends:
+class BoundaryConditions:
     """Ends that do not move sideways, each on a rotational spring.
 
     E I phi'' = k_left phi' at the left end and -k_right phi' at the right one.  The buckling modes under these
@@ -22,21 +22,21 @@ class Ends:
 
     Parameters
     ----------
-    left, right : float, optional
+    left_rotational_stiffness, right_rotational_stiffness : float, optional
         Rotational stiffness, N m/rad: 0 is a pinned end, and clamped is what nothing is given for.
-    axial : float, optional
+    axial_support_stiffness : float, optional
         K, N/m; rigid by default.
     """
 
-    left: float | None = quantity(
-        "N m/rad", "rotational stiffness of the left end", default=None, optional=True, low=0.0, closed="left",
+    left_rotational_stiffness: float | None = quantity(
+        "N m/rad", "rotational stiffness of the left end", default=None, optional=True, low=0.0, closed="left_rotational_stiffness",
         symbol=r"k_\theta", short="ends_left",
     )  # fmt: skip
-    right: float | None = quantity(
-        "N m/rad", "rotational stiffness of the right end", default=None, optional=True, low=0.0, closed="left",
+    right_rotational_stiffness: float | None = quantity(
+        "N m/rad", "rotational stiffness of the right end", default=None, optional=True, low=0.0, closed="left_rotational_stiffness",
         short="ends_right",
     )  # fmt: skip
-    axial: float | None = quantity(
+    axial_support_stiffness: float | None = quantity(
         "N/m", "axial stiffness of the supports", default=None, optional=True, low=0.0, short="ends_axial"
     )
 
@@ -44,20 +44,20 @@ class Ends:
         check_fields(self)
 
     @property
-    def turn(self) -> bool:
+    def rotational_stiffness(self) -> bool:
         """Whether an end gives way to rotation."""
-        return self.left is not None or self.right is not None
+        return self.left_rotational_stiffness is not None or self.right_rotational_stiffness is not None
 
     @property
-    def are_alike(self) -> bool:
+    def is_symmetric(self) -> bool:
         """Whether both ends are held alike, so that modes are symmetric or antisymmetric."""
-        return self.left == self.right
+        return self.left_rotational_stiffness == self.right_rotational_stiffness
 
     @property
-    def is_ideal(self) -> bool:
+    def is_clamped(self) -> bool:
         """Whether both ends are clamped and rigid."""
-        return not self.turn and self.axial is None
+        return not self.rotational_stiffness and self.axial_support_stiffness is None
 
 
-CLAMPED = Ends()
+CLAMPED = BoundaryConditions()
 """The paper's."""

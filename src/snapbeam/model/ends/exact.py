@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from snapbeam.core.validate import InputError
 from snapbeam.model.beam import Beam
 
-__all__ = ["spring_natural_freq"]
+__all__ = ["spring_natural_frequency"]
 
 _Array = NDArray[np.float64]
 _NODES = 16
@@ -29,7 +29,7 @@ _ABOVE = 1e-8
 _STEPS = 60
 
 
-def spring_natural_freq(beam: Beam, count: int, reduced: _Array) -> _Array:
+def spring_natural_frequency(beam: Beam, count: int, reduced: _Array) -> _Array:
     """The first *count* frequencies, Hz, near those of a reduced model, which are upper bounds of them.
 
     Raises
@@ -62,7 +62,10 @@ def _balance_of(beam: Beam) -> Callable[[float], float]:
     unit = math.sqrt(stiff / beam.mass_per_length) / length**2
     modes = beam.buckling_modes(1)
     load = min(beam.axial_load, beam.critical_load) * length**2 / stiff
-    springs = [None if each is None else each * length / stiff for each in (beam.ends.left, beam.ends.right)]
+    springs = [
+        None if each is None else each * length / stiff
+        for each in (beam.boundary.left_rotational_stiffness, beam.boundary.right_rotational_stiffness)
+    ]
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     panels = np.linspace(0.0, 1.0, 257)
     half = 0.5 * np.diff(panels)
@@ -74,7 +77,7 @@ def _balance_of(beam: Beam) -> Callable[[float], float]:
     bent = bent / norm
     if beam.is_buckled:
         alpha = beam.buckling_level / float(modes.shape(0.5 * length)[0])
-        sigma = 2.0 * beam.tension_stiffness * alpha**2 * norm**2 * length**5 / stiff
+        sigma = 2.0 * beam.nonlinear_stiffness * alpha**2 * norm**2 * length**5 / stiff
     else:
         sigma = 0.0
     wave = float(modes.wavenumber[0]) * length

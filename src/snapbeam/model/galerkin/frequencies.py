@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 
 from snapbeam.core.validate import InputTypeError, integer, shown
 from snapbeam.model.beam import Beam
-from snapbeam.model.ends.exact import spring_natural_freq
+from snapbeam.model.ends.exact import spring_natural_frequency
 from snapbeam.model.galerkin.modes import MAX_MODES
 
-__all__ = ["exact_natural_freq"]
+__all__ = ["exact_natural_frequencies"]
 
 _Array = NDArray[np.float64]
 _CRITICAL = 4.0 * math.pi**2
@@ -32,7 +32,7 @@ _RELATIVE = 4.0 * np.finfo(np.float64).eps
 _MAX_COUNT = 1000
 
 
-def exact_natural_freq(beam: Beam, count: int = 10) -> _Array:
+def exact_natural_frequencies(beam: Beam, count: int = 10) -> _Array:
     """Natural frequencies of the beam about its equilibrium, Hz, ascending, without any truncation.
 
     Of a beam whose ends turn, :mod:`snapbeam.model.ends.exact`; between clamps:
@@ -63,13 +63,13 @@ def exact_natural_freq(beam: Beam, count: int = 10) -> _Array:
     if not isinstance(beam, Beam):
         raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
     count = integer("count", count, 1, _MAX_COUNT)
-    if beam.ends.turn:
+    if beam.boundary.rotational_stiffness:
         return _between_springs(beam, integer("count", count, 1, MAX_MODES // 4))
     unit = math.sqrt(beam.bending_stiffness / beam.mass_per_length) / beam.length**2
     if beam.is_buckled:
         sigma = 4.0 * math.pi**4 * (beam.buckling_level / beam.radius_of_gyration) ** 2
-        if beam.ends.axial is not None:
-            sigma *= beam.tension_stiffness / (beam.young_modulus * beam.area / (2.0 * beam.length))
+        if beam.boundary.axial_support_stiffness is not None:
+            sigma *= beam.nonlinear_stiffness / (beam.young_modulus * beam.area / (2.0 * beam.length))
         omega = _antisymmetric(_CRITICAL, count) + _symmetric_buckled(sigma, count)
     else:
         p = min(beam.axial_load * beam.length**2 / beam.bending_stiffness, _CRITICAL)
@@ -81,7 +81,9 @@ def _between_springs(beam: Beam, count: int) -> _Array:
     from snapbeam.model.galerkin.reduction import ReducedModel
 
     modes = min(MAX_MODES, max(4 * count, 24))
-    return spring_natural_freq(beam, count, ReducedModel.from_beam(beam, modes=modes).natural_freq)
+    return spring_natural_frequency(
+        beam, count, ReducedModel.from_beam(beam, modes=modes).natural_frequencies
+    )
 
 
 def _wavenumbers(p: float, eta: float) -> tuple[float, float]:

@@ -42,7 +42,7 @@ def linear_modes_of_beam(beam: Beam, count: int) -> LinearModes:
     if beam.is_buckled:
         tangent = beam.bending_stiffness * (k**2 - k[0] ** 2)
         # gamma a^2 = P - P_cr with a^2 = pi^2 b^2/(2 L)
-        tangent[0] = beam.tension_stiffness * (math.pi * beam.buckling_level) ** 2 / beam.length
+        tangent[0] = beam.nonlinear_stiffness * (math.pi * beam.buckling_level) ** 2 / beam.length
     else:
         tangent = beam.bending_stiffness * k**2 - beam.axial_load
     diagonal = k**2 * tangent / beam.mass_per_length
@@ -58,7 +58,7 @@ def linear_modes_of_beam(beam: Beam, count: int) -> LinearModes:
 
 
 def linear_modes_of_structure(
-    mass: _Array, stiffness: _Array, tension_stiffness: float, equilibrium: _Array
+    mass: _Array, stiffness: _Array, nonlinear_stiffness: float, equilibrium: _Array
 ) -> LinearModes:
     """Linear modes of the tangent K0 + gamma (|a|^2 Id + 2 a a^T) at the equilibrium a.
 
@@ -73,7 +73,7 @@ def linear_modes_of_structure(
 
     a = equilibrium
     tangent = np.diag(stiffness) if stiffness.ndim == 1 else stiffness
-    tangent = tangent + tension_stiffness * (a @ a * np.eye(a.size) + 2.0 * np.outer(a, a))
+    tangent = tangent + nonlinear_stiffness * (a @ a * np.eye(a.size) + 2.0 * np.outer(a, a))
     eigenvalue, vectors = scipy.linalg.eigh(tangent, mass)
     rounding = 8.0 * a.size * np.finfo(np.float64).eps * np.abs(eigenvalue).max()
     if eigenvalue[0] < -rounding:

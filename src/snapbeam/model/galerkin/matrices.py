@@ -25,13 +25,13 @@ class Structure:
     mass: ArrayLike
     stiffness: ArrayLike
     contact_shape: ArrayLike
-    center_shape: ArrayLike | None
-    tension_stiffness: float
+    midspan_shape: ArrayLike | None
+    nonlinear_stiffness: float
     equilibrium: ArrayLike | None
     length_scale: float
     damping_ratio: ArrayLike
-    reference_freq: float | None
-    side_force: ArrayLike | None = None
+    reference_frequency: float | None
+    transverse_force: ArrayLike | None = None
 
 
 def damping_ratios(value: ArrayLike, count: int) -> _Array:
@@ -69,53 +69,57 @@ def checked_structure(given: Structure) -> dict[str, Any]:
         _require_shape("stiffness", stiffness, (count,), "a diagonal (N,) or a matrix (N, N)")
 
     contact_shape = _shape("contact_shape", given.contact_shape, count)
-    center_shape = contact_shape.copy()
-    if given.center_shape is not None:
-        center_shape = _shape("center_shape", given.center_shape, count)
-    gamma = nonnegative("tension_stiffness", given.tension_stiffness)
-    reference = given.reference_freq
+    midspan_shape = contact_shape.copy()
+    if given.midspan_shape is not None:
+        midspan_shape = _shape("midspan_shape", given.midspan_shape, count)
+    gamma = nonnegative("nonlinear_stiffness", given.nonlinear_stiffness)
+    reference = given.reference_frequency
     force = None
-    if given.side_force is not None:
-        force = finite_array("side_force", given.side_force)
-        _require_shape("side_force", force, (count,), "one number for each coordinate")
+    if given.transverse_force is not None:
+        force = finite_array("transverse_force", given.transverse_force)
+        _require_shape("transverse_force", force, (count,), "one number for each coordinate")
         if not force.any():
             force = None
     if force is not None and given.equilibrium is not None:
-        raise InputError("equilibrium beside side_force: leave it out, the equilibria follow from the force")
+        raise InputError(
+            "equilibrium beside transverse_force: leave it out, the equilibria follow from the force"
+        )
     if force is None:
-        equilibrium = _equilibrium(given.equilibrium, stiffness, gamma, center_shape)
+        equilibrium = _equilibrium(given.equilibrium, stiffness, gamma, midspan_shape)
     else:
-        equilibrium = landscape_of(stiffness, gamma, force, center_shape).lower.amplitude
+        equilibrium = landscape_of(stiffness, gamma, force, midspan_shape).lower.amplitude
     return {
         "mass": mass,
         "stiffness": stiffness,
-        "tension_stiffness": gamma,
+        "nonlinear_stiffness": gamma,
         "equilibrium": equilibrium,
-        "side_force": force,
+        "transverse_force": force,
         "length_scale": positive("length_scale", given.length_scale, "m"),
         "damping_ratio": damping_ratios(given.damping_ratio, count),
-        "center_shape": center_shape,
+        "midspan_shape": midspan_shape,
         "contact_shape": contact_shape,
-        "given_reference_freq": None if reference is None else positive("reference_freq", reference, "Hz"),
+        "given_reference_frequency": None
+        if reference is None
+        else positive("reference_frequency", reference, "Hz"),
     }
 
 
-def _equilibrium(value: ArrayLike | None, stiffness: _Array, gamma: float, center_shape: _Array) -> _Array:
+def _equilibrium(value: ArrayLike | None, stiffness: _Array, gamma: float, midspan_shape: _Array) -> _Array:
     if value is None:
-        return np.zeros(center_shape.size)
+        return np.zeros(midspan_shape.size)
     a = finite_array("equilibrium", value)
-    _require_shape("equilibrium", a, center_shape.shape, "one number for each coordinate")
+    _require_shape("equilibrium", a, midspan_shape.shape, "one number for each coordinate")
     if not a.any():
         return a
     given = f"equilibrium = {a.tolist()}"
     if gamma == 0.0:
-        raise InputError(f"{given}: must be zero unless tension_stiffness is greater than 0")
+        raise InputError(f"{given}: must be zero unless nonlinear_stiffness is greater than 0")
     bent = stiffness * a if stiffness.ndim == 1 else stiffness @ a
     stretched = gamma * (a @ a) * a
     residual = float(np.abs(bent + stretched).max())
     if residual > _BALANCE * max(float(np.abs(bent).max()), float(np.abs(stretched).max())):
         raise InputError(f"{given}: must satisfy K0 a + gamma (a . a) a = 0, but leaves {residual:g}")
-    lift = float(center_shape @ a)
+    lift = float(midspan_shape @ a)
     if lift >= 0.0:
         raise InputError(
             f"{given}: must be the lower well, but displaces the centre by {lift:g}, not downward"

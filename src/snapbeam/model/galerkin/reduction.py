@@ -23,26 +23,26 @@ from snapbeam.model.galerkin.modes import MAX_MODES, BucklingModes
 from snapbeam.model.galerkin.wells import Wells
 from snapbeam.model.imperfection.imperfection import Imperfection
 from snapbeam.model.imperfection.landscape import landscape_of, tangent_stiffness
-from snapbeam.model.quantity import Quantity
+from snapbeam.model.quantity import ParameterField
 
 __all__ = ["MODEL_QUANTITIES", "ReducedModel"]
 
 _Array = NDArray[np.float64]
 
-MODEL_QUANTITIES: dict[str, tuple[Quantity, Any]] = {
+MODEL_QUANTITIES: dict[str, tuple[ParameterField, Any]] = {
     "modes": (
-        Quantity("1", "number of buckling modes", kind=int, low=1, high=MAX_MODES, symbol="N"),
+        ParameterField("1", "number of buckling modes", kind=int, low=1, high=MAX_MODES, symbol="N"),
         32,
     ),
     "damping_ratio": (
-        Quantity(
+        ParameterField(
             "1", "damping ratio of every linear mode", low=0.0, high=1.0, closed="left", symbol=r"\zeta",
             plausible=(0.0, 1.0, "percent"),
         ),
         0.005,
     ),
-    "reference_freq": (
-        Quantity("Hz", "frequency that Omega and V are normalised by", low=0.0, optional=True, symbol="f_1"),
+    "reference_frequency": (
+        ParameterField("Hz", "frequency that Omega and V are normalised by", low=0.0, optional=True, symbol="f_1"),
         None,
     ),
 }  # fmt: skip
@@ -69,9 +69,9 @@ class ReducedModel(Wells):
     stiffness : array of shape (N,) or (N, N)
         Linear stiffness K0 of the straight structure, N for a beam: its diagonal, or the full matrix if one
         was given.
-    tension_stiffness : float
+    nonlinear_stiffness : float
         gamma, N/m for a beam.
-    equilibrium : array of shape (N,)
+    well_amplitude : array of shape (N,)
         Amplitudes at rest in the lower well, (-sqrt((P - P_cr)/gamma), 0, ...); of a structure with one equilibrium
         that one, zeros if it is perfect.
     length_scale : float or None
@@ -79,15 +79,15 @@ class ReducedModel(Wells):
         the height of the centre in the well of least energy; None for a straight beam.
     damping_ratio : array of shape (N,)
         Damping ratio of each linear mode about a well, by ascending frequency.
-    center_shape : array of shape (N,)
+    midspan_shape : array of shape (N,)
         phi_i at the centre, whose displacement tells the wells apart.
     contact_shape : array of shape (N,) or None
         phi_i at the shaker if it does not depend on the location (given by matrices).
     beam : Beam or None
         What the model was reduced from.
-    given_reference_freq : float or None
+    given_reference_frequency : float or None
         Frequency to normalise with, Hz, if it is not the first natural frequency.
-    side_force : array of shape (N,) or None
+    transverse_force : array of shape (N,) or None
         B, of a structure whose wells are unequal.
     imperfection : Imperfection or None
         What B follows from.
@@ -95,15 +95,15 @@ class ReducedModel(Wells):
 
     mass: _Array
     stiffness: _Array
-    tension_stiffness: float
-    equilibrium: _Array
+    nonlinear_stiffness: float
+    well_amplitude: _Array
     length_scale: float | None
     damping_ratio: _Array
-    center_shape: _Array
+    midspan_shape: _Array
     contact_shape: _Array | None = None
     beam: Beam | None = None
-    given_reference_freq: float | None = None
-    side_force: _Array | None = None
+    given_reference_frequency: float | None = None
+    transverse_force: _Array | None = None
     imperfection: Imperfection | None = None
 
     def __post_init__(self) -> None:
@@ -114,7 +114,7 @@ class ReducedModel(Wells):
     def __repr__(self) -> str:
         wells = "two wells" if self.is_bistable else "one equilibrium"
         of = "given by matrices" if self.beam is None else f"of {self.beam!r}"
-        return f"<ReducedModel: {self.modes} modes, {wells}, first at {self.natural_freq[0]:.4g} Hz, {of}>"
+        return f"<ReducedModel: {self.modes} modes, {wells}, first at {self.natural_frequencies[0]:.4g} Hz, {of}>"
 
     @classmethod
     def from_beam(
@@ -122,7 +122,7 @@ class ReducedModel(Wells):
         beam: Beam,
         modes: int = 32,
         damping_ratio: ArrayLike = 0.005,
-        reference_freq: float | None = None,
+        reference_frequency: float | None = None,
         imperfection: Imperfection | None = None,
     ) -> ReducedModel:
         """Galerkin reduction of a beam on its first buckling modes (Eqs. 10-15).
@@ -139,7 +139,7 @@ class ReducedModel(Wells):
             Number of modes N, 1 to 256.
         damping_ratio : float or array of shape (N,)
             Damping ratio of the linear modes about a well, each in [0, 1).
-        reference_freq : float, optional
+        reference_frequency : float, optional
             Frequency that normalises the excitation, Hz; the first natural frequency by default, of unequal wells about
             the one of least energy.
         imperfection : Imperfection, optional
@@ -160,7 +160,7 @@ class ReducedModel(Wells):
             mass = beam.mass_per_length * (np.eye(count) + _coupling(shapes.parity)) / np.outer(k, k)
         else:
             mass = beam.mass_per_length * shapes.overlap
-        gamma = beam.tension_stiffness
+        gamma = beam.nonlinear_stiffness
         equilibrium = np.zeros(count)
         # alpha_1 = -b/phi_1(1/2); K0 from E I (k_i^2 - k_1^2) - (P - P_cr), free of cancellation
         if isinstance(shapes, BucklingModes):
@@ -178,7 +178,7 @@ class ReducedModel(Wells):
             imperfection = None
         if imperfection is not None:
             initial = imperfection.initial_shape(shapes)
-            force = beam.bending_stiffness * k**2 * initial + imperfection.side_load(shapes, beam)
+            force = beam.bending_stiffness * k**2 * initial + imperfection.transverse_load(shapes, beam)
             # an initial shape acts as a side force, and as a load of gamma s0 more
             stiffness = stiffness - gamma * float(initial @ initial)
             found = landscape_of(stiffness, gamma, force, shapes.shape(0.5 * beam.length))
@@ -189,16 +189,16 @@ class ReducedModel(Wells):
         return cls(
             mass=mass,
             stiffness=stiffness,
-            tension_stiffness=gamma,
-            equilibrium=equilibrium,
+            nonlinear_stiffness=gamma,
+            well_amplitude=equilibrium,
             length_scale=length_scale,
             damping_ratio=damping_ratios(damping_ratio, count),
-            center_shape=shapes.shape(0.5 * beam.length),
+            midspan_shape=shapes.shape(0.5 * beam.length),
             beam=beam,
-            given_reference_freq=None
-            if reference_freq is None
-            else positive("reference_freq", reference_freq, "Hz"),
-            side_force=force,
+            given_reference_frequency=None
+            if reference_frequency is None
+            else positive("reference_frequency", reference_frequency, "Hz"),
+            transverse_force=force,
             imperfection=imperfection,
         )
 
@@ -209,13 +209,13 @@ class ReducedModel(Wells):
         stiffness: ArrayLike,
         *,
         contact_shape: ArrayLike,
-        center_shape: ArrayLike | None = None,
-        tension_stiffness: float = 0.0,
+        midspan_shape: ArrayLike | None = None,
+        nonlinear_stiffness: float = 0.0,
         equilibrium: ArrayLike | None = None,
         length_scale: float = 1.0,
         damping_ratio: ArrayLike = 0.0,
-        reference_freq: float | None = None,
-        side_force: ArrayLike | None = None,
+        reference_frequency: float | None = None,
+        transverse_force: ArrayLike | None = None,
     ) -> ReducedModel:
         """A model of any structure, given by its matrices; a free mass (stiffness 0) is one.
 
@@ -227,20 +227,20 @@ class ReducedModel(Wells):
             Linear stiffness of the unstressed structure: a diagonal or a symmetric matrix.
         contact_shape : array of shape (N,)
             Displacement under the shaker per unit of each coordinate.
-        center_shape : array of shape (N,), optional
+        midspan_shape : array of shape (N,), optional
             The same for the point whose sign tells the wells apart; the contact point if not given.
-        tension_stiffness : float
+        nonlinear_stiffness : float
             gamma of the term gamma (alpha . alpha) alpha, at least 0.
-        equilibrium : array of shape (N,), optional
+        well_amplitude : array of shape (N,), optional
             Coordinates at rest in the lower well (where the displacement of the centre is not
             positive); zeros if not given.  It must be a stable equilibrium.
         length_scale : float
             Length that normalises displacements, m.
         damping_ratio : float or array of shape (N,)
             Damping ratio of each linear mode about the equilibrium, each in [0, 1).
-        reference_freq : float, optional
+        reference_frequency : float, optional
             Frequency that normalises the excitation, Hz; needed if the first natural frequency is 0.
-        side_force : array of shape (N,), optional
+        transverse_force : array of shape (N,), optional
             Constant force B that makes the wells unequal; the equilibria then follow from it and are not given.
 
         Raises
@@ -254,13 +254,13 @@ class ReducedModel(Wells):
                 mass=mass,
                 stiffness=stiffness,
                 contact_shape=contact_shape,
-                center_shape=center_shape,
-                tension_stiffness=tension_stiffness,
-                equilibrium=equilibrium,
+                midspan_shape=midspan_shape,
+                nonlinear_stiffness=nonlinear_stiffness,
+                well_amplitude=equilibrium,
                 length_scale=length_scale,
                 damping_ratio=damping_ratio,
-                reference_freq=reference_freq,
-                side_force=side_force,
+                reference_frequency=reference_frequency,
+                transverse_force=transverse_force,
             )
         )
         model = cls(**given)
@@ -272,7 +272,7 @@ class ReducedModel(Wells):
     @property
     def modes(self) -> int:
         """Number of modes N."""
-        return self.equilibrium.size
+        return self.well_amplitude.size
 
     def shape_at(self, location: ArrayLike) -> _Array:
         """phi_i at a location x_s in [0, 1] of the length, or at each of several; shape (..., N), m^0.5.
@@ -296,7 +296,7 @@ class ReducedModel(Wells):
 
         The other half of a beam is the mirror image of the first.
         """
-        last = 0.5 if self.beam is None or self.beam.ends.are_alike else 0.98
+        last = 0.5 if self.beam is None or self.beam.boundary.is_symmetric else 0.98
         return min(self.contact_mass(location) for location in np.linspace(0.02, last, 25).tolist())
 
     def contact_mass(self, location: float) -> float:
@@ -315,13 +315,17 @@ class ReducedModel(Wells):
     # ------------------------------------------------------------------ linear modes about a well
 
     def _linear_modes(self) -> LinearModes:
-        if self.side_force is not None or (self.beam is not None and self.beam.ends.turn):
-            tangent = tangent_stiffness(self.stiffness, self.tension_stiffness, self.equilibrium)
+        if self.transverse_force is not None or (
+            self.beam is not None and self.beam.boundary.rotational_stiffness
+        ):
+            tangent = tangent_stiffness(self.stiffness, self.nonlinear_stiffness, self.well_amplitude)
             parity = None if self.beam is None else self.beam.buckling_modes(self.modes).parity
             return linear_modes_about(self.mass, tangent, parity)
         if self.beam is not None:
             return linear_modes_of_beam(self.beam, self.modes)
-        return linear_modes_of_structure(self.mass, self.stiffness, self.tension_stiffness, self.equilibrium)
+        return linear_modes_of_structure(
+            self.mass, self.stiffness, self.nonlinear_stiffness, self.well_amplitude
+        )
 
     @cached_property
     def _linear(self) -> LinearModes:
@@ -333,7 +337,7 @@ class ReducedModel(Wells):
         return self._linear.omega
 
     @cached_property
-    def natural_freq(self) -> _Array:
+    def natural_frequencies(self) -> _Array:
         """Natural frequencies about a well, Hz, ascending, shape (N,)."""
         freq: _Array = self.omega / (2.0 * math.pi)
         freq.setflags(write=False)
@@ -361,18 +365,18 @@ class ReducedModel(Wells):
         return _symmetric((mv * (2.0 * self.damping_ratio * self.omega)) @ mv.T)
 
     @property
-    def reference_freq(self) -> float:
+    def reference_frequency(self) -> float:
         """Frequency that normalises the excitation, Hz: the first natural one unless one was given.
 
         Refused (InputError) if that frequency is 0, of a free mass or a beam at its critical load, and none was given.
         """
-        if self.given_reference_freq is not None:
-            return self.given_reference_freq
-        first = float(self._about_deepest.natural_freq[0])
+        if self.given_reference_frequency is not None:
+            return self.given_reference_frequency
+        first = float(self._about_deepest.natural_frequencies[0])
         if first == 0.0:
             raise InputError(
-                "reference_freq is not given and the first natural frequency is 0: "
-                "give reference_freq in Hz, greater than 0"
+                "reference_frequency is not given and the first natural frequency is 0: "
+                "give reference_frequency in Hz, greater than 0"
             )
         return first
 

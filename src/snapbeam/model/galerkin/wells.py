@@ -25,13 +25,13 @@ class Wells:
     """What follows from the potential energy of a reduced model."""
 
     stiffness: _Array
-    tension_stiffness: float
+    nonlinear_stiffness: float
     equilibrium: _Array
-    center_shape: _Array
-    side_force: _Array | None
+    midspan_shape: _Array
+    transverse_force: _Array | None
     imperfection: Imperfection | None
     beam: Beam | None
-    natural_freq: Any
+    natural_frequencies: Any
     mass: _Array
 
     def potential_energy(self, alpha: ArrayLike) -> _Array:
@@ -39,8 +39,8 @@ class Wells:
         a = self._amplitudes("alpha", alpha)
         bent = a * self.stiffness if self.stiffness.ndim == 1 else a @ self.stiffness
         square = np.sum(a * a, axis=-1)
-        energy: _Array = 0.5 * np.sum(a * bent, axis=-1) + 0.25 * self.tension_stiffness * square**2
-        return energy if self.side_force is None else energy - a @ self.side_force
+        energy: _Array = 0.5 * np.sum(a * bent, axis=-1) + 0.25 * self.nonlinear_stiffness * square**2
+        return energy if self.transverse_force is None else energy - a @ self.transverse_force
 
     def kinetic_energy(self, alpha_velocity: ArrayLike) -> _Array:
         """Kinetic energy, J, of amplitude velocities of shape (..., N)."""
@@ -59,16 +59,18 @@ class Wells:
     @cached_property
     def landscape(self) -> Landscape | None:
         """The wells and the saddle of a structure with a side force; None without one."""
-        if self.side_force is None:
+        if self.transverse_force is None:
             return None
-        return landscape_of(self.stiffness, self.tension_stiffness, self.side_force, self.center_shape)
+        return landscape_of(
+            self.stiffness, self.nonlinear_stiffness, self.transverse_force, self.midspan_shape
+        )
 
     @cached_property
     def equilibria(self) -> tuple[Equilibrium, ...]:
         """Every shape in which the structure can rest, by energy, with its stability."""
         if self.landscape is not None:
             return self.landscape.equilibria
-        return perfect_equilibria(self.stiffness, self.tension_stiffness)
+        return perfect_equilibria(self.stiffness, self.nonlinear_stiffness)
 
     @property
     def wells(self) -> _Array:
@@ -80,11 +82,11 @@ class Wells:
     @cached_property
     def mirrored(self) -> Self:
         """The mirror image, upper and lower exchanged: the model itself if its wells are equal."""
-        if self.landscape is None or self.side_force is None:
+        if self.landscape is None or self.transverse_force is None:
             return self
         return dataclasses.replace(  # type: ignore[type-var]
             self,
-            side_force=-self.side_force,
+            transverse_force=-self.transverse_force,
             equilibrium=-self.landscape.upper.amplitude,
             imperfection=None if self.imperfection is None else self.imperfection.mirrored,
         )
@@ -96,20 +98,20 @@ class Wells:
             return self
         own, other = (each.energy for each in (self.landscape.lower, self.landscape.upper))
         if own == other:  # by symmetry, though not that of the model's mirror image
-            return max(self, self.mirrored, key=lambda model: float(model.natural_freq[0]))
+            return max(self, self.mirrored, key=lambda model: float(model.natural_frequencies[0]))
         return self if own < other else self.mirrored
 
     @property
-    def well_freq(self) -> _Array:
+    def well_frequencies(self) -> _Array:
         """Natural frequencies about the lower and about the upper well, Hz, ascending, shape (2, N)."""
-        return np.stack((self.natural_freq, self.mirrored.natural_freq))
+        return np.stack((self.natural_frequencies, self.mirrored.natural_frequencies))
 
     @property
     def dividing_height(self) -> float:
         """Displacement of the centre that divides the wells, m: that of the lowest saddle; 0 between equal wells."""
         if self.landscape is None or self.landscape.saddle is None:
             return 0.0
-        return float(self.center_shape @ self.landscape.saddle.amplitude)
+        return float(self.midspan_shape @ self.landscape.saddle.amplitude)
 
     @property
     def is_bistable(self) -> bool:
@@ -143,7 +145,7 @@ class Wells:
         return float(self.potential_energy(self.equilibrium))
 
     @cached_property
-    def barrier_energy(self) -> float:
+    def saddle_energy(self) -> float:
         """Energy of the lowest saddle between the wells, J.
 
         Every equilibrium lies along an eigenvector of K0 with an eigenvalue kappa < 0, at the energy
@@ -151,9 +153,9 @@ class Wells:
         to the second, E I k_2^2 - P, if it is negative; otherwise it is the straight state, at 0.
         Refused (InputError) if the structure has no second well.
         """
-        self.require_bistable("barrier_energy")
+        self.require_bistable("saddle_energy")
         if self.landscape is not None and self.landscape.saddle is not None:
             return self.landscape.saddle.energy
         kappa = np.sort(self.stiffness if self.stiffness.ndim == 1 else np.linalg.eigvalsh(self.stiffness))
         second = min(float(kappa[1]), 0.0) if kappa.size > 1 else 0.0
-        return -(second**2) / (4.0 * self.tension_stiffness) + 0.0
+        return -(second**2) / (4.0 * self.nonlinear_stiffness) + 0.0

@@ -13,17 +13,17 @@ from snapbeam.model.galerkin.modes import MAX_MODES
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.imperfection.imperfection import Imperfection
 
-__all__ = ["FITTED", "fit_wells"]
+__all__ = ["FITTED", "identify_imperfection"]
 
 FITTED = ("rise", "point_load", "uniform_load")
 _TOLERANCE = 1e-9
 _TRIES = 60
 
 
-def fit_wells(
+def identify_imperfection(
     beam: Beam,
-    lower_freq: float,
-    upper_freq: float,
+    lower_frequencies: float,
+    upper_frequencies: float,
     kind: str = "rise",
     modes: int = 32,
     imperfection: Imperfection | None = None,
@@ -37,7 +37,7 @@ def fit_wells(
     ----------
     beam : Beam
         All of it but the load is kept.
-    lower_freq, upper_freq : float
+    lower_frequencies, upper_frequencies : float
         First natural frequency about the lower and about the upper well, Hz.
     kind : {"rise", "point_load", "uniform_load"}
         What makes the wells unequal.
@@ -48,7 +48,7 @@ def fit_wells(
     Returns
     -------
     ReducedModel
-        With ``beam``, ``imperfection`` and ``well_freq``.
+        With ``beam``, ``imperfection`` and ``well_frequencies``.
 
     Raises
     ------
@@ -56,7 +56,12 @@ def fit_wells(
         If no load and imperfection give these frequencies.
     """
     instance("beam", beam, Beam, "a Beam")
-    wanted = np.array([positive("lower_freq", lower_freq, "Hz"), positive("upper_freq", upper_freq, "Hz")])
+    wanted = np.array(
+        [
+            positive("lower_frequencies", lower_frequencies, "Hz"),
+            positive("upper_frequencies", upper_frequencies, "Hz"),
+        ]
+    )
     choice("kind", kind, FITTED)
     modes = integer("modes", modes, 1, MAX_MODES)
     base = (
@@ -79,7 +84,7 @@ def fit_wells(
         model = model_at(at)
         if not model.is_bistable:
             return None
-        return model.well_freq[:, 0] / wanted - 1.0
+        return model.well_frequencies[:, 0] / wanted - 1.0
 
     at = np.array([1.0, getattr(base, kind) / sizes[1]])
     # the mean of the two frequencies goes with the level, nearly, and their difference with the imperfection
@@ -104,7 +109,7 @@ def fit_wells(
         at, found = at + change, new
     if found is None or not np.abs(found).max() < 1e-6:
         raise InputError(
-            f"lower_freq = {wanted[0]:g} Hz, upper_freq = {wanted[1]:g} Hz: no load of this beam with a {kind} gives "
+            f"lower_frequencies = {wanted[0]:g} Hz, upper_frequencies = {wanted[1]:g} Hz: no load of this beam with a {kind} gives "
             "them; are thickness and length as measured?"
         )
     return model_at(at)

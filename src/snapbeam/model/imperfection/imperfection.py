@@ -35,11 +35,11 @@ class Imperfection:
 
     Parameters
     ----------
-    rise : float
-        Height at the centre, m, of an initial shape of the given *form*.
-    form : {"mode", "sine"}
-        Of *rise*: the first buckling mode, or a single half sine, of which the modes take the part that they hold.
-    skew : float
+    midspan_amplitude : float
+        Height at the centre, m, of an initial shape of the given *shape*.
+    shape : {"mode", "sine"}
+        Of *midspan_amplitude*: the first buckling mode, or a single half sine, of which the modes take the part that they hold.
+    antisymmetric_amplitude : float
         Greatest height, m, of an initial shape of the form of the second buckling mode, on the left half.
     profile : array_like of shape (2, points), optional
         A measured initial shape: places over the length, ascending from 0 to 1, and heights, m.  The straight line
@@ -59,14 +59,14 @@ class Imperfection:
         For values that are not finite or out of range, and for a profile that does not go from end to end.
     """
 
-    rise: float = quantity(
+    midspan_amplitude: float = quantity(
         "m", "height at the centre of the initial shape", default=0.0, symbol="a_0", short="imperfection_rise",
         plausible=(0.0, 1.0, "mm"),
     )  # fmt: skip
-    form: str = quantity(
+    shape: str = quantity(
         "1", "form of the initial shape", default="mode", kind=str, choices=FORMS, short="imperfection_form"
     )
-    skew: float = quantity(
+    antisymmetric_amplitude: float = quantity(
         "m", "greatest height of the antisymmetric part of the initial shape", default=0.0,
         short="imperfection_skew", plausible=(0.0, 1.0, "mm"),
     )  # fmt: skip
@@ -97,13 +97,19 @@ class Imperfection:
     def is_none(self) -> bool:
         """Whether the beam is perfect after all."""
         profile = self.profile is not None and bool(np.any(self.profile[1] != self.profile[1, 0]))
-        loads = (self.rise, self.skew, self.point_load, self.uniform_load, self.gravity)
+        loads = (
+            self.midspan_amplitude,
+            self.antisymmetric_amplitude,
+            self.point_load,
+            self.uniform_load,
+            self.gravity,
+        )
         return not profile and not any(loads)
 
     @property
     def mirrored(self) -> Imperfection:
         """The mirror image, upper and lower exchanged."""
-        names = ("rise", "skew", "point_load", "uniform_load", "gravity")
+        names = ("midspan_amplitude", "antisymmetric_amplitude", "point_load", "uniform_load", "gravity")
         negated: dict[str, Any] = {name: -getattr(self, name) for name in names}
         if self.profile is not None:
             negated["profile"] = self.profile * np.array([[1.0], [-1.0]])
@@ -112,22 +118,26 @@ class Imperfection:
     def initial_shape(self, modes: Modes) -> _Array:
         """alpha0_i, the integrals of w0' phi_i', m^0.5, shape (N,)."""
         found = np.zeros(modes.count)
-        if self.rise != 0.0 and self.form == "mode":
-            found[0] += self.rise / float(modes.shape(0.5 * modes.length)[0])
-        elif self.rise != 0.0:
+        if self.midspan_amplitude != 0.0 and self.shape == "mode":
+            found[0] += self.midspan_amplitude / float(modes.shape(0.5 * modes.length)[0])
+        elif self.midspan_amplitude != 0.0:
             at = np.linspace(0.0, 1.0, _SINE_POINTS)
-            found += projected(modes, np.stack((at, self.rise * np.sin(np.pi * at))), symmetric=True)
-        if self.skew != 0.0:
+            found += projected(
+                modes, np.stack((at, self.midspan_amplitude * np.sin(np.pi * at))), symmetric=True
+            )
+        if self.antisymmetric_amplitude != 0.0:
             if modes.count < 2:
-                raise InputError(f"skew = {self.skew:g} m: needs a second mode; give modes = 2 or more")
+                raise InputError(
+                    f"skew = {self.antisymmetric_amplitude:g} m: needs a second mode; give modes = 2 or more"
+                )
             at = np.linspace(0.0, 0.5, _SEARCH) * modes.length
             heights = modes.shape(at)[1]
-            found[1] += self.skew / float(heights[np.argmax(np.abs(heights))])
+            found[1] += self.antisymmetric_amplitude / float(heights[np.argmax(np.abs(heights))])
         if self.profile is not None:
             found += projected(modes, self.profile)
         return found
 
-    def side_load(self, modes: Modes, beam: Beam) -> _Array:
+    def transverse_load(self, modes: Modes, beam: Beam) -> _Array:
         """F_i, the integrals of the side load times phi_i, N m^0.5, shape (N,)."""
         found = np.zeros(modes.count)
         if self.point_load != 0.0:

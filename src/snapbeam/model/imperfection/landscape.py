@@ -45,7 +45,7 @@ def tangent_stiffness(stiffness: _Array, gamma: float, alpha: _Array) -> _Array:
     return tangent
 
 
-def landscape_of(stiffness: _Array, gamma: float, force: _Array, center_shape: _Array) -> Landscape:
+def landscape_of(stiffness: _Array, gamma: float, force: _Array, midspan_shape: _Array) -> Landscape:
     """All equilibria under the side force B, told apart.
 
     At most two of them are stable: beyond the second eigenvalue of K0 + gamma s the term 2 gamma alpha alpha^T, of rank
@@ -66,13 +66,13 @@ def landscape_of(stiffness: _Array, gamma: float, force: _Array, center_shape: _
     found.sort(key=lambda each: each.energy)
     wells = [each for each in found if each.is_stable]
     if not wells:
-        raise InputError("side_force: no equilibrium is stable; must push a structure that stiffens")
+        raise InputError("transverse_force: no equilibrium is stable; must push a structure that stiffens")
     saddles = [each for each in found if each.unstable_directions == 1] or [
         each for each in found if not each.is_stable
     ]
     if len(wells) < 2:
         return Landscape(tuple(found), wells[0], wells[0], None)
-    lower, upper = sorted(wells[:2], key=lambda each: float(center_shape @ each.amplitude))
-    if not float(center_shape @ lower.amplitude) < float(center_shape @ upper.amplitude):
-        raise InputError("center_shape: must tell the two wells apart, but both lie at the same height")
+    lower, upper = sorted(wells[:2], key=lambda each: float(midspan_shape @ each.amplitude))
+    if not float(midspan_shape @ lower.amplitude) < float(midspan_shape @ upper.amplitude):
+        raise InputError("midspan_shape: must tell the two wells apart, but both lie at the same height")
     return Landscape(tuple(found), lower, upper, saddles[0])

@@ -9,18 +9,18 @@ from typing import Any
 
 from snapbeam.core.validate import InputError, InputTypeError, shown
 from snapbeam.model.contact import ContactLaw
-from snapbeam.model.drive import Recorded
+from snapbeam.model.drive import RecordedMotion
 from snapbeam.model.drive.joined import MOST_STRIKERS
 from snapbeam.model.striker.shaker import Shaker
 from snapbeam.model.striker.striker import Striker
 
-__all__ = ["Another", "check_others", "numbered", "parted"]
+__all__ = ["ContactPair", "check_others", "numbered", "parted"]
 
 _NUMBERED = re.compile(r"(striker|drive|contact)_([2-9])")
 
 
 @dataclass(frozen=True)
-class Another:
+class ContactPair:
     """A striker beside the first one, and the law by which it touches.
 
     Parameters
@@ -40,7 +40,7 @@ def numbered(section: str) -> tuple[str, int]:
     return (section, 1) if found is None else (found[1], int(found[2]))
 
 
-def parted(striker: Any, contact: Any, others: tuple[Another, ...]) -> dict[str, Any]:
+def parted(striker: Any, contact: Any, others: tuple[ContactPair, ...]) -> dict[str, Any]:
     """The first striker and its law, and the others with theirs, of a sequence of strikers.
 
     Raises
@@ -60,14 +60,14 @@ def parted(striker: Any, contact: Any, others: tuple[Another, ...]) -> dict[str,
             f"contact: {len(laws)} laws for {len(striker)} strikers; give one law for all, or one each"
         )
     made = [each.striker() if isinstance(each, Shaker) else each for each in striker]
-    rest = tuple(Another(*pair) for pair in zip(made[1:], laws[1:], strict=True))
+    rest = tuple(ContactPair(*pair) for pair in zip(made[1:], laws[1:], strict=True))
     return {"striker": made[0], "contact": laws[0], "others": rest}
 
 
 def check_others(system: Any) -> None:
     """Refuse strikers beside the first that are none, or that do not go with the rest of a system."""
-    others = system.others
-    if not isinstance(others, tuple) or not all(isinstance(each, Another) for each in others):
+    others = system.further_contacts
+    if not isinstance(others, tuple) or not all(isinstance(each, ContactPair) for each in others):
         raise InputTypeError(f"others = {shown(others)}: must be a tuple of Another; or give striker = [...]")
     if not others:
         return
@@ -80,7 +80,7 @@ def check_others(system: Any) -> None:
             f"contact = {system.contact!r} with several strikers: Newton's law knows one wall; use a HertzContact, or "
             "a HuntCrossley of the same restitution for the first striker"
         )
-    if isinstance(system.striker.drive, Recorded):
+    if isinstance(system.striker.drive, RecordedMotion):
         raise InputError(
             "drive = 'recorded' with several strikers: a record has a clock of its own; drive them by formulas"
         )
@@ -88,7 +88,7 @@ def check_others(system: Any) -> None:
         _check_one(number, each)
 
 
-def _check_one(number: int, another: Another) -> None:
+def _check_one(number: int, another: ContactPair) -> None:
     striker, contact = another.striker, another.contact
     if not isinstance(striker, Striker):
         raise InputTypeError(f"striker {number} = {shown(striker)}: must be a Striker or a Shaker")
@@ -96,7 +96,7 @@ def _check_one(number: int, another: Another) -> None:
         raise InputTypeError(
             f"contact {number} = {shown(contact)}: must be a law of contact, such as HertzContact(stiffness)"
         )
-    if contact.impulsive or contact.lossy:
+    if contact.impulsive or contact.rate_dependent:
         raise InputError(
             f"contact_{number} = {contact!r}: two forces that depend on the velocity have no exact kick together; of "
             "several strikers the first alone may lose energy, the others take a HertzContact or a PowerLaw"
@@ -106,7 +106,7 @@ def _check_one(number: int, another: Another) -> None:
             f"striker_{number}.mass = {striker.mass:g}: of several strikers the first alone may be a body; leave the "
             "mass out, or make this one the first"
         )
-    if isinstance(striker.drive, Recorded):
+    if isinstance(striker.drive, RecordedMotion):
         raise InputError(
             f"drive_{number} = 'recorded': a record has a clock of its own; drive it by a formula, or let it be still"
         )

@@ -34,9 +34,9 @@ class Striker:
         Mass of the striker, kg; infinite by default: the tip moves as its drive says, whatever it strikes.  With a
         mass the drive is the motion that the tip has as long as nothing touches it, and the contact force moves the
         body from it: m_s x'' + c_s x' + k_s x = -f.
-    spring : float
+    suspension_stiffness : float
         Stiffness k_s of its suspension, N/m; 0 is a free flying mass.
-    damper : float
+    suspension_damping : float
         Damper c_s of its suspension, N s/m, below critical; a coil of force factor K on a resistance R adds K^2/R.
     """
 
@@ -57,13 +57,13 @@ class Striker:
         "kg", "mass of the striker", default=None, optional=True, low=0.0, symbol=r"m_\mathrm{s}", short="striker_mass",
         plausible=(1e-15, 1e4, "g"),
     )  # fmt: skip
-    spring: float = quantity(
+    suspension_stiffness: float = quantity(
         "N/m", "stiffness of the striker's suspension", default=0.0, low=0.0, closed="left",
-        symbol=r"k_\mathrm{s}", short="striker_spring",
+        symbol=r"k_\mathrm{s}", short="striker_suspension_stiffness",
     )  # fmt: skip
-    damper: float = quantity(
+    suspension_damping: float = quantity(
         "N s/m", "damper of the striker's suspension", default=0.0, low=0.0, closed="left",
-        symbol=r"c_\mathrm{s}", short="striker_damper",
+        symbol=r"c_\mathrm{s}", short="striker_suspension_damping",
     )  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -73,21 +73,25 @@ class Striker:
             )
         check_fields(self)
         if self.mass is None:
-            for name in ("spring", "damper"):
+            for name in ("suspension_stiffness", "suspension_damping"):
                 if getattr(self, name) != 0.0:
                     raise InputError(
                         f"{name} = {getattr(self, name):g}: a striker without a mass moves as prescribed; give its mass"
                     )
         elif self.damping_ratio >= 1.0:
-            critical = 2.0 * math.sqrt(self.spring * self.mass)
+            critical = 2.0 * math.sqrt(self.suspension_stiffness * self.mass)
             raise InputError(
-                f"damper = {self.damper:g} N s/m: must be less than {critical:g} N s/m, critical for its mass and "
+                f"suspension_damping = {self.suspension_damping:g} N s/m: must be less than {critical:g} N s/m, critical for its mass and "
                 "spring; a stiffer spring lets it be greater"
             )
 
     @property
     def damping_ratio(self) -> float:
         """Of the suspension, c_s/(2 sqrt(k_s m_s)); infinite for a damper without a spring."""
-        if self.mass is None or self.damper == 0.0:
+        if self.mass is None or self.suspension_damping == 0.0:
             return 0.0
-        return self.damper / (2.0 * math.sqrt(self.spring * self.mass)) if self.spring > 0.0 else math.inf
+        return (
+            self.suspension_damping / (2.0 * math.sqrt(self.suspension_stiffness * self.mass))
+            if self.suspension_stiffness > 0.0
+            else math.inf
+        )

@@ -1,18 +1,23 @@
 """What surrounds a beam and moves or taps it: the base it is mounted on, a load that changes, a harvester."""
 
-from snapbeam.model.world.base import Base
-from snapbeam.model.world.harvester import HARVESTERS, Coil, Harvester, Piezo
-from snapbeam.model.world.load import LOADS, AxialLoad, LoadMotion, LoadRamp, LoadSine
+from snapbeam.model.world.base import BaseExcitation
+from snapbeam.model.world.harvester import (
+    HARVESTERS,
+    ElectromagneticHarvester,
+    Harvester,
+    PiezoelectricHarvester,
+)
+from snapbeam.model.world.load import LOADS, AxialLoadModulation, LoadMotion, LoadRamp, HarmonicLoad
 
 __all__ = [
     "HARVESTERS",
     "LOADS",
-    "AxialLoad",
-    "Base",
-    "Coil",
+    "AxialLoadModulation",
+    "BaseExcitation",
+    "ElectromagneticHarvester",
     "Harvester",
     "LoadMotion",
     "LoadRamp",
-    "LoadSine",
-    "Piezo",
+    "HarmonicLoad",
+    "PiezoelectricHarvester",
 ]

@@ -13,13 +13,13 @@ from snapbeam.model.ends.of_beam import modes_between
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.quantity import STRUCTURE, check_fields, quantity
 
-__all__ = ["DIRECTIONS", "Base", "rigid_mass"]
+__all__ = ["DIRECTIONS", "BaseExcitation", "rigid_mass"]
 
 DIRECTIONS = ("up", "down")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Base:
+class BaseExcitation:
     """The motion y(t) of both ends of the beam together, in its plane and across it.
 
     The beam is described in the frame of its ends, where every piece of it feels the inertial force
@@ -37,7 +37,7 @@ class Base:
         :class:`~snapbeam.Burst`; any drive that has an acceleration.
     direction : {"up", "down"}
         Whether y counts positive towards the upper well or towards the lower one.
-    carries_striker : bool
+    striker_on_base : bool
         Whether what the striker is mounted on moves with the base: a stop in the same frame.  If not it stays in
         space, and the tip moves by -y(t) in the frame of the ends.
 
@@ -52,7 +52,7 @@ class Base:
         "1", "way in which the base's motion counts positive", default="up", kind=str, choices=DIRECTIONS,
         scope=STRUCTURE,
     )  # fmt: skip
-    carries_striker: bool = quantity(
+    striker_on_base: bool = quantity(
         "1", "whether the striker is mounted on the base", default=True, kind=bool, scope=STRUCTURE
     )
 
@@ -62,15 +62,15 @@ class Base:
                 f"motion = {shown(self.motion)}: must be a drive, such as AccelerationSine(frequency_ratio=1.2, ...)"
             )
         check_fields(self)
-        if not self.motion.shakes():
-            known = ", ".join(repr(name) for name, kind in _shaking().items() if kind.shakes())
+        if not self.motion.can_excite_base():
+            known = ", ".join(repr(name) for name, kind in _shaking().items() if kind.can_excite_base())
             raise InputError(
                 f"motion = {self.motion.name!r}: a base needs a motion with a known bound on its acceleration; must be "
                 f"one of {known}"
             )
-        if self.motion.name == "chirp" and not self.carries_striker:
+        if self.motion.name == "chirp" and not self.striker_on_base:
             raise InputError(
-                "carries_striker = False with a chirp: at the end of its sweep the displacement has a kink that the "
+                "striker_on_base = False with a chirp: at the end of its sweep the displacement has a kink that the "
                 "acceleration leaves out; let the base carry the striker, or use another motion"
             )
 
@@ -88,7 +88,7 @@ def rigid_mass(model: ReducedModel) -> NDArray[np.float64]:
         raise InputError(
             "base: shakes a beam; how the frame's acceleration pulls at a structure given by matrices is not known"
         )
-    modes = modes_between(beam.ends, beam.length, beam.bending_stiffness, model.modes)
+    modes = modes_between(beam.boundary, beam.length, beam.bending_stiffness, model.modes)
     return np.asarray(beam.mass_per_length * modes.integral)
 
 

@@ -5,26 +5,26 @@ from __future__ import annotations
 from typing import Any
 
 from snapbeam.core.validate import InputError, InputTypeError, shown
-from snapbeam.model.drive import Recorded
-from snapbeam.model.world.base import Base, rigid_mass
+from snapbeam.model.drive import RecordedMotion
+from snapbeam.model.world.base import BaseExcitation, rigid_mass
 from snapbeam.model.world.harvester import Harvester
-from snapbeam.model.world.load import AxialLoad
+from snapbeam.model.world.load import AxialLoadModulation
 
 __all__ = ["check_world"]
 
 _A = {
     "base": "a Base(motion=AccelerationSine(...))",
-    "axial": "an AxialLoad(motion=LoadSine(...))",
+    "axial": "an AxialLoadModulation(motion=HarmonicLoad(...))",
     "harvester": "a Piezo(...) or a Coil(...)",
 }
 
 
 def check_world(system: Any) -> None:
     """Refuse surroundings that are none, or that do not go with the rest of a :class:`~snapbeam.System`."""
-    base, load, harvester = system.base, system.axial, system.harvester
+    base, load, harvester = system.base_excitation, system.axial_load, system.harvester
     for name, part, kind in (
-        ("base", base, Base),
-        ("axial", load, AxialLoad),
+        ("base", base, BaseExcitation),
+        ("axial", load, AxialLoadModulation),
         ("harvester", harvester, Harvester),
     ):
         if part is not None and not isinstance(part, kind):
@@ -43,12 +43,16 @@ def check_world(system: Any) -> None:
             f"contact = {contact!r} with {words}: the carried phase of Newton's law knows the tip's force alone; use a "
             "HertzContact, or a HuntCrossley with the same restitution"
         )
-    if contact is not None and contact.lossy and harvester is not None:
+    if contact is not None and contact.rate_dependent and harvester is not None:
         raise InputError(
             f"contact = {shown(contact)} with a harvester: two things that depend on the velocity at once; use a "
             "HertzContact or a PowerLaw, and let damping_ratio stand for the loss"
         )
-    if striker is not None and isinstance(striker.drive, Recorded) and (base is not None or load is not None):
+    if (
+        striker is not None
+        and isinstance(striker.drive, RecordedMotion)
+        and (base is not None or load is not None)
+    ):
         raise InputError(
             f"drive = 'recorded' with {words}: a record has a clock of its own; drive the striker by a formula, or let "
             "it stand still"

@@ -15,7 +15,7 @@ from snapbeam.model.ends.of_beam import modes_between
 from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.quantity import RUN, check_fields, quantity
 
-__all__ = ["HARVESTERS", "Coil", "Harvester", "Piezo"]
+__all__ = ["HARVESTERS", "ElectromagneticHarvester", "Harvester", "PiezoelectricHarvester"]
 
 _Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ class Harvester:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Piezo(Harvester):
+class PiezoelectricHarvester(Harvester):
     """Piezoelectric layers on both faces of the beam, from one place to another, on a load resistor,
 
         theta_i = Theta [phi_i'(x_2) - phi_i'(x_1)],     C v' = -v/R - theta . alpha',
@@ -82,20 +82,22 @@ class Piezo(Harvester):
 
     Parameters
     ----------
-    coupling : float
+    moment_per_volt : float
         Theta, N m/V.
     capacitance : float
         C, F.
     resistance : float
         R of the load, ohm.
-    start, stop : float
+    patch_start, patch_end : float
         x_1 and x_2 over the length.  A patch from clamp to clamp couples to nothing: the slopes at its ends are 0.
     """
 
-    coupling: float = quantity("N m/V", "moment of the piezoelectric layers per volt", symbol=r"\Theta")
+    moment_per_volt: float = quantity(
+        "N m/V", "moment of the piezoelectric layers per volt", symbol=r"\Theta"
+    )
     capacitance: float = quantity("F", "capacitance of the piezoelectric layers", low=0.0, symbol="C")
     resistance: float = quantity("ohm", "load resistance", low=0.0, scope=RUN, symbol="R")
-    start: float = quantity(
+    patch_start: float = quantity(
         "1",
         "where the layers begin, over the length",
         default=0.0,
@@ -104,7 +106,7 @@ class Piezo(Harvester):
         closed="both",
         short="patch_start",
     )
-    stop: float = quantity(
+    patch_end: float = quantity(
         "1",
         "where the layers end, over the length",
         default=0.25,
@@ -117,8 +119,10 @@ class Piezo(Harvester):
 
     def __post_init__(self) -> None:
         check_fields(self)
-        if self.start >= self.stop:
-            raise InputError(f"start = {self.start:g}: must be less than stop = {self.stop:g}")
+        if self.patch_start >= self.patch_end:
+            raise InputError(
+                f"start = {self.patch_start:g}: must be less than patch_end = {self.patch_end:g}"
+            )
 
     @classmethod
     def from_material(
@@ -133,7 +137,7 @@ class Piezo(Harvester):
         start: float = 0.0,
         stop: float = 0.25,
         wiring: str = "parallel",
-    ) -> Piezo:
+    ) -> PiezoelectricHarvester:
         """Two equal layers, one on each face, by their material (Erturk and Inman, Piezoelectric Energy Harvesting,
         Wiley 2011, ch. 3).
 
@@ -149,7 +153,7 @@ class Piezo(Harvester):
             Between them.
         resistance : float
             Of the load, ohm.
-        start, stop : float
+        patch_start, patch_end : float
             Over the length.
         wiring : {"parallel", "series"}
             Of the two layers: in parallel twice the moment per volt and twice the
@@ -159,24 +163,28 @@ class Piezo(Harvester):
         wide = positive("layer_width", layer_width, "m")
         two = 2.0 if choice("wiring", wiring, WIRINGS) == "parallel" else 0.5
         first, last = (
-            within(name, at, 0.0, 1.0, closed="both") for name, at in (("start", start), ("stop", stop))
+            within(name, at, 0.0, 1.0, closed="both")
+            for name, at in (("patch_start", start), ("patch_end", stop))
         )
         area = wide * (last - first) * instance("beam", beam, Beam, "a Beam").length
         arm = 0.5 * (beam.thickness + thick)
         return cls(
-            coupling=(2.0 if two == 2.0 else 1.0) * finite("stress_constant", stress_constant) * wide * arm,
+            moment_per_volt=(2.0 if two == 2.0 else 1.0)
+            * finite("stress_constant", stress_constant)
+            * wide
+            * arm,
             capacitance=two * positive("permittivity", permittivity, "F/m") * area / thick,
             resistance=resistance,
-            start=start,
-            stop=stop,
+            patch_start=start,
+            patch_end=stop,
         )
 
     def row(self, model: ReducedModel) -> _Array:
         """Theta times the difference of the slopes."""
         beam = _beam_of(model)
-        modes = modes_between(beam.ends, beam.length, beam.bending_stiffness, model.modes)
-        slopes = [modes.slope(place * beam.length) for place in (self.start, self.stop)]
-        return np.asarray(self.coupling * (slopes[1] - slopes[0]))
+        modes = modes_between(beam.boundary, beam.length, beam.bending_stiffness, model.modes)
+        slopes = [modes.slope(place * beam.length) for place in (self.patch_start, self.patch_end)]
+        return np.asarray(self.moment_per_volt * (slopes[1] - slopes[0]))
 
     @property
     def inertia(self) -> float:
@@ -197,7 +205,7 @@ class Piezo(Harvester):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coil(Harvester):
+class ElectromagneticHarvester(Harvester):
     """A magnet on the beam and a coil on the frame, on a load resistor,
 
         L_c i' = K w'(x_c) - (R + R_c) i,     f_c = -K i,
@@ -206,7 +214,7 @@ class Coil(Harvester):
 
     Parameters
     ----------
-    constant : float
+    force_factor : float
         K, N/A or V s/m.
     resistance : float
         R of the load, ohm.
@@ -216,7 +224,7 @@ class Coil(Harvester):
         x_c over the length.
     """
 
-    constant: float = quantity("N/A", "force of the coil per ampere", symbol="K")
+    force_factor: float = quantity("N/A", "force of the coil per ampere", symbol="K")
     resistance: float = quantity("ohm", "load resistance", low=0.0, scope=RUN, symbol="R")
     coil_resistance: float = quantity(
         "ohm", "resistance of the coil", default=0.0, low=0.0, closed="left", symbol=r"R_\mathrm{c}"
@@ -234,7 +242,7 @@ class Coil(Harvester):
 
     def row(self, model: ReducedModel) -> _Array:
         """K times the shape at the coil."""
-        return np.asarray(self.constant * model.shape_at(self.location))
+        return np.asarray(self.force_factor * model.shape_at(self.location))
 
     @property
     def inertia(self) -> float:

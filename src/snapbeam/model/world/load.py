@@ -15,7 +15,7 @@ from snapbeam.model.drive.base import Drive, Scale
 from snapbeam.model.drive.timed import Timed
 from snapbeam.model.quantity import RUN, quantity
 
-__all__ = ["LOADS", "AxialLoad", "LoadMotion", "LoadRamp", "LoadSine"]
+__all__ = ["LOADS", "AxialLoadModulation", "LoadMotion", "LoadRamp", "HarmonicLoad"]
 
 _Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ class LoadMotion(Drive):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoadSine(LoadMotion):
+class HarmonicLoad(LoadMotion):
     """Parametric excitation, P(t) = P + P_1 sin(omega t + phase).
 
     Parameters
@@ -92,7 +92,7 @@ class LoadRamp(LoadMotion, Timed):
         N, of either sign.
     duration : float
         Periods of the first mode that the change takes.
-    hold : float
+    hold_periods : float
         Periods that it stays; then it goes back as it came.  Infinite, as by default: it never goes back.
     """
 
@@ -104,12 +104,12 @@ class LoadRamp(LoadMotion, Timed):
         scope=RUN,
         short="load_duration",
     )
-    hold: float = quantity(
+    hold_periods: float = quantity(
         "1", "periods of the first mode after which the axial load goes back", default=1e9, low=0.0, closed="left",
         scope=RUN, short="load_hold",
     )  # fmt: skip
     name = "ramp"
-    number_names = ("omega", "fastest", "change", "duration", "hold")
+    number_names = ("omega", "fastest", "change", "duration", "hold_periods")
     amplitudes = ("change",)
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
@@ -124,7 +124,7 @@ class LoadRamp(LoadMotion, Timed):
             "fastest": math.pi / duration,
             "change": columns["change"],
             "duration": duration,
-            "hold": columns["hold"] * cycle,
+            "hold_periods": columns["hold_periods"] * cycle,
         }
 
     def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
@@ -137,8 +137,8 @@ class LoadRamp(LoadMotion, Timed):
         """Change of the load and its rate."""
         t = argument / drive.omega
         way = 1.0
-        if t > drive.duration + drive.hold:
-            t, way = 2.0 * drive.duration + drive.hold - t, -1.0
+        if t > drive.duration + drive.hold_periods:
+            t, way = 2.0 * drive.duration + drive.hold_periods - t, -1.0
         x = min(max(t / drive.duration, 0.0), 1.0)
         share = x * x * x * (10.0 + x * (6.0 * x - 15.0))
         rate = 30.0 * x * x * (1.0 - x) * (1.0 - x) / drive.duration
@@ -151,7 +151,7 @@ class LoadRamp(LoadMotion, Timed):
 
 
 @dataclass(frozen=True, kw_only=True)
-class AxialLoad:
+class AxialLoadModulation:
     """An axial load P(t) = P + motion(t), P that under which the beam was reduced.
 
     The beam's linear stiffness then is E I k_i^2 - P(t): beside the tension, m alpha'' + ... = (P(t) - P) alpha.  The
@@ -160,7 +160,7 @@ class AxialLoad:
     Parameters
     ----------
     motion : LoadMotion
-        :class:`~snapbeam.LoadSine` or :class:`~snapbeam.LoadRamp`.
+        :class:`~snapbeam.HarmonicLoad` or :class:`~snapbeam.LoadRamp`.
     """
 
     motion: Drive
@@ -168,5 +168,5 @@ class AxialLoad:
     def __post_init__(self) -> None:
         if not isinstance(self.motion, LoadMotion):
             raise InputTypeError(
-                f"motion = {shown(self.motion)}: must be a LoadSine(frequency_ratio=2.0, amplitude=...) or a LoadRamp"
+                f"motion = {shown(self.motion)}: must be a HarmonicLoad(frequency_ratio=2.0, amplitude=...) or a LoadRamp"
             )

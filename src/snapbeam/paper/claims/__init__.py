@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from snapbeam.core.validate import InputError
-from snapbeam.paper.claims.finding import VERDICTS, Finding
+from snapbeam.paper.claims.finding import VERDICTS, ClaimResult
 from snapbeam.paper.claims.prose import fill, read_topic
 from snapbeam.paper.claims.table import Claim, summary, write_table
 from snapbeam.paper.recipe import MissingResults
@@ -41,9 +41,9 @@ TOPICS = (
 """The topics in the order of the table."""
 
 
-def measurements(topic: str) -> Mapping[str, Callable[[Results], Finding]]:
+def measurements(topic: str) -> Mapping[str, Callable[[Results], ClaimResult]]:
     """The functions of a topic by the numbers of its rows."""
-    rows: Mapping[str, Callable[[Results], Finding]] = import_module(f"{__name__}.topics.{topic}").ROWS
+    rows: Mapping[str, Callable[[Results], ClaimResult]] = import_module(f"{__name__}.topics.{topic}").ROWS
     return rows
 
 
@@ -64,14 +64,14 @@ def measure_claims(results: Results, sketch: Results | None = None) -> list[Clai
         for number, entry in topic.entries.items():
             used = results
             try:
-                finding = functions[number](results)
+                diagnostic = functions[number](results)
             except MissingResults:
                 if sketch is None:
                     raise
                 used = sketch
-                finding = functions[number](sketch)
+                diagnostic = functions[number](sketch)
             filled = {
-                part: fill(getattr(entry, part), finding)
+                part: fill(getattr(entry, part), diagnostic)
                 for part in ("measured", "uncertainty", "rule", "fails", "note")
             }
             rows.append(
@@ -82,9 +82,9 @@ def measure_claims(results: Results, sketch: Results | None = None) -> list[Clai
                     paper=entry.paper,
                     source=entry.source,
                     figure=entry.figure,
-                    verdict=finding.verdict,
-                    close=finding.close,
-                    quantities=finding.quantities,
+                    verdict=diagnostic.verdict,
+                    close=diagnostic.close,
+                    quantities=diagnostic.quantities,
                     size=used.size,
                     **filled,
                 )

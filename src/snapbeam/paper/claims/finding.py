@@ -11,7 +11,7 @@ __all__ = [
     "FAIL",
     "VERDICTS",
     "Check",
-    "Finding",
+    "ClaimResult",
     "Number",
     "Quantity",
     "above",
@@ -73,7 +73,7 @@ def near(value: Quantity | float, target: float, allowed: float) -> Check:
 
 
 @dataclass(frozen=True)
-class Finding:
+class ClaimResult:
     """What was measured of one claim.
 
     ``close``: whether the verdict would be another somewhere within the uncertainties.  The first of the
@@ -86,8 +86,8 @@ class Finding:
     numbers: Mapping[str, Number] = field(default_factory=dict)
 
 
-def found(holds: Check, in_part: Check = FAIL, /, **named: Quantity | Number) -> Finding:
-    """The finding on a claim that *holds* by one condition and, where it does not, *in part* by another."""
+def found(holds: Check, in_part: Check = FAIL, /, **named: Quantity | Number) -> ClaimResult:
+    """The diagnostic on a claim that *holds* by one condition and, where it does not, *in part* by another."""
 
     def verdict(reading: int) -> str:
         return "holds" if holds[reading] else "in part" if in_part[reading] else "fails"
@@ -96,18 +96,18 @@ def found(holds: Check, in_part: Check = FAIL, /, **named: Quantity | Number) ->
     return _finding(now, worst != best, named)
 
 
-def measured(matters: Check, /, **named: Quantity | Number) -> Finding:
-    """The finding on an open question, whose influence is measured.
+def measured(matters: Check, /, **named: Quantity | Number) -> ClaimResult:
+    """The diagnostic on an open question, whose influence is measured.
 
     ``matters`` is 1 where it shows, beyond the uncertainty.
     """
     return _finding("open", matters.must != matters.does, {**named, "matters": int(matters.must)})
 
 
-def _finding(verdict: str, close: bool, named: Mapping[str, Quantity | Number]) -> Finding:
+def _finding(verdict: str, close: bool, named: Mapping[str, Quantity | Number]) -> ClaimResult:
     quantities = {name: value for name, value in named.items() if isinstance(value, Quantity)}
     for name, quantity in quantities.items():
         if not (quantity.uncertainty >= 0.0 or math.isnan(quantity.value)):
             raise ValueError(f"{name} = {quantity}: must have an uncertainty of at least 0")
     numbers = {name: value for name, value in named.items() if not isinstance(value, Quantity)}
-    return Finding(verdict, close, quantities, numbers)
+    return ClaimResult(verdict, close, quantities, numbers)

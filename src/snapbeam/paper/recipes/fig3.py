@@ -36,7 +36,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     run = paper_run(
         modes, FREQUENCY_RATIO, VELOCITY_AMPLITUDE, _WINDOW, sample_times=times, tolerance=TOLERANCE
     )
-    names = ["displacement", "shaker_displacement", "penetration", "contact_force"]
+    names = ["displacement_at_striker", "striker_displacement", "penetration_normalised", "contact_force"]
     return {"run": run.dataset[names], "impact": hit}
 
 
@@ -54,18 +54,20 @@ def draw(results: Results) -> Figure:
         wave = figure.add_subplot(grid[:, 0])
         close = figure.add_subplot(grid[0, 1])
         force = figure.add_subplot(grid[1, 1], sharex=close)
-        wave.plot(cycle, run.displacement, color=BEAM_COLOR, label=r"beam $w_\mathrm{b}(x_\mathrm{s})$")
-        wave.plot(cycle, run.shaker_displacement, color=SHAKER_COLOR, label=r"shaker $w_\mathrm{s}$")
+        wave.plot(
+            cycle, run.displacement_at_striker, color=BEAM_COLOR, label=r"beam $w_\mathrm{b}(x_\mathrm{s})$"
+        )
+        wave.plot(cycle, run.striker_displacement, color=SHAKER_COLOR, label=r"shaker $w_\mathrm{s}$")
         wave.set(xlabel=r"Cycles of excitation $\tau$", ylabel="Displacement $w$", xlim=(0.0, cycle[-1]))
-        low, top = float(run.displacement.min()), float(run.displacement.max())
+        low, top = float(run.displacement_at_striker.min()), float(run.displacement_at_striker.max())
         wave.set_ylim(low - 0.22 * (top - low), top + 0.18 * (top - low))
         wave.legend(loc="upper right", ncols=2)
         at = onset / period
         wave.annotate(
-            "B, C", (at, float(np.interp(onset, time, run.displacement.values))), (-9, -20),
+            "B, C", (at, float(np.interp(onset, time, run.displacement_at_striker.values))), (-9, -20),
             textcoords="offset points", arrowprops={"arrowstyle": "-", "linewidth": 0.5}, ha="center",
         )  # fmt: skip
-        beam, tip = run.displacement.values[near], run.shaker_displacement.values[near]
+        beam, tip = run.displacement_at_striker.values[near], run.striker_displacement.values[near]
         close.fill_between(micro[near], beam, tip, where=tip >= beam, color=SHAKER_COLOR, alpha=0.25, lw=0)
         close.plot(micro[near], beam, color=BEAM_COLOR)
         close.plot(micro[near], tip, color=SHAKER_COLOR)

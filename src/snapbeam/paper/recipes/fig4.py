@@ -66,7 +66,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     found = {"searched": searched}
     for kind, (omega, drive) in chosen.items():
         run = paper_run(modes, omega, drive, _SHOWN, tolerance=TOLERANCE)
-        names = ["displacement", "center_displacement", "shaker_displacement"]
+        names = ["displacement_at_striker", "midspan_displacement", "striker_displacement"]
         found[kind] = run.dataset[names]
         found[f"{kind}_recorded"] = _recorded(run.dataset)
     return found
@@ -82,7 +82,7 @@ def _choose(searched: xr.Dataset, modes: int, cycles: int) -> dict[str, tuple[fl
     best: tuple[float, dict[str, tuple[float, float]]] | None = None
     for omega in searched.frequency_ratio.values:
         column = searched.sel(frequency_ratio=omega)
-        kind, crossings = column.response.values, column.crossings.values
+        kind, crossings = column.response_class.values, column.zero_crossings.values
         drive = column.velocity_amplitude.values
         snapped = np.flatnonzero(kind > sb.ResponseClass.INTRAWELL)
         settled = kind == sb.ResponseClass.TRANSIENT_2
@@ -116,20 +116,22 @@ def _swings(modes: int, omega: float, drive: float) -> int:
     A well is reached half way from the straight beam, so that grazing zero is no snap-through.
     """
     run = paper_run(modes, float(omega), float(drive), _SHOWN, accuracy="reference")
-    response = run.outcome
-    if not response.end_is_final or response.last_crossing > 0.8 * float(run.dataset.time[-1]):
+    response = run.summary
+    if not response.final_well_proven or response.last_zero_crossing > 0.8 * float(run.dataset.time[-1]):
         return 0
-    centre = run.dataset.center_displacement.values
+    centre = run.dataset.midspan_displacement.values
     wells = np.sign(centre[np.abs(centre) > 0.5])
     return int((wells[1:] != wells[:-1]).sum())
 
 
 def _scatter(modes: int, omega: float, drive: float, cycles: int) -> float:
     """Standard deviation of the displacement once a cycle, over the second half of a run, in b."""
-    period = 1.0 / (omega * paper_model(modes).reference_freq)
+    period = 1.0 / (omega * paper_model(modes).reference_frequency)
     times = period * np.arange(cycles // 2, cycles)
     return float(
-        paper_run(modes, float(omega), float(drive), cycles, sample_times=times).dataset.displacement.std()
+        paper_run(
+            modes, float(omega), float(drive), cycles, sample_times=times
+        ).dataset.displacement_at_striker.std()
     )
 
 
@@ -148,8 +150,8 @@ def _recorded(run: xr.Dataset) -> xr.Dataset:
             tracked = track(
                 frames, buckling_level=BEAM.buckling_level, location=LOCATION, rest_frames=_REST_FRAMES
             )
-    tracked = tracked[["displacement", "shaker_displacement", "valid"]]
-    frequency = float(run.attrs["frequency_ratio"]) * float(run.attrs["reference_freq"])
+    tracked = tracked[["displacement_at_striker", "striker_displacement", "valid"]]
+    frequency = float(run.attrs["frequency_ratio"]) * float(run.attrs["reference_frequency"])
     cycle = (tracked.time.values - _REST_FRAMES / _FRAME_RATE) * frequency
     tracked = tracked.assign_coords(
         cycle=("time", cycle, {"units": "1", "long_name": "cycles of excitation"})
@@ -159,9 +161,9 @@ def _recorded(run: xr.Dataset) -> xr.Dataset:
 
 
 def read_measured(path: str | os.PathLike[str]) -> xr.Dataset:
-    """A measured run: NetCDF with ``displacement`` and ``shaker_displacement``, in b, over ``time``."""
+    """A measured run: NetCDF with ``displacement_at_striker`` and ``striker_displacement``, in b, over ``time``."""
     dataset = read_netcdf(path, "measured")
-    return check_trajectory(dataset, require=("displacement", "shaker_displacement"))
+    return check_trajectory(dataset, require=("displacement_at_striker", "striker_displacement"))
 
 
 def draw(results: Results, measured: Sequence[str | os.PathLike[str]] | None = None) -> Figure:
@@ -200,8 +202,14 @@ def _waveform(ax: Axes, run: Any) -> None:
     cycles = "cycle" in run.variables
     x = run["cycle"].values if cycles else 1e3 * run["time"].values
     ax.axhline(0.0, color="0.75", linewidth=0.5)
-    ax.plot(x, run.displacement, color=BEAM_COLOR, label=r"beam $w_\mathrm{b}(x_\mathrm{s})$", linewidth=0.8)
-    ax.plot(x, run.shaker_displacement, color=SHAKER_COLOR, label=r"shaker $w_\mathrm{s}$", linewidth=0.8)
+    ax.plot(
+        x,
+        run.displacement_at_striker,
+        color=BEAM_COLOR,
+        label=r"beam $w_\mathrm{b}(x_\mathrm{s})$",
+        linewidth=0.8,
+    )
+    ax.plot(x, run.striker_displacement, color=SHAKER_COLOR, label=r"shaker $w_\mathrm{s}$", linewidth=0.8)
     ax.set_xlim(0.0 if cycles else x[0], min(x[-1], _SHOWN) if cycles else x[-1])
     ax.set_gid("cycles" if cycles else "time")
 

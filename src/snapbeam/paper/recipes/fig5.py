@@ -39,17 +39,23 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 
     modes = MODES  # a sketch too: with half of them the beam does not snap within these cycles
     model = paper_model(modes)
-    period = 1.0 / (FREQUENCY_RATIO * model.reference_freq)
+    period = 1.0 / (FREQUENCY_RATIO * model.reference_frequency)
     times = np.linspace(0.0, _CYCLES * period, _CYCLES * _SAMPLES + 1)
     run = paper_run(
         modes, FREQUENCY_RATIO, VELOCITY_AMPLITUDE, _CYCLES, sample_times=times, tolerance=TOLERANCE
     )
-    names = ["displacement", "center_displacement", "shaker_displacement", "contact_force", "modal_amplitude"]
+    names = [
+        "displacement_at_striker",
+        "midspan_displacement",
+        "striker_displacement",
+        "contact_force",
+        "modal_amplitude",
+    ]
     x, shapes = shapes_along(model, 161)
     along = xr.Dataset(
         {"shape": (("position", "mode"), shapes, {"units": "m^0.5", "long_name": "buckling modes phi"})},
         {"position": ("position", x, {"units": "L"}), "mode": run.dataset.mode},
-        {"length_scale": model.length_scale, "rest_amplitude": float(model.equilibrium[0])},
+        {"length_scale": model.length_scale, "rest_amplitude": float(model.well_amplitude[0])},
     )
     return {"run": run.dataset[names], "shapes": along}
 
@@ -72,7 +78,7 @@ def draw(results: Results) -> Figure:
         raise InputError("fig5: the run does not snap through, so that there is nothing to show")
     first = snaps[0] / period
     inside = snaps[snaps < snaps[0] + 0.5 * period] / period
-    marks = _instants(cycle, run.center_displacement.values.astype(float), inside)
+    marks = _instants(cycle, run.midspan_displacement.values.astype(float), inside)
     rest = abs(float(along.attrs["rest_amplitude"]))
     with house_style():
         figure = new_figure("double", 125.0)
@@ -102,9 +108,9 @@ def _instants(cycle: _Array, w: _Array, zeros: _Array) -> _Array:
 
 
 def _waveform(ax: Axes, run: xr.Dataset, marks: _Array, first: float) -> None:
-    cycle, w = run.cycle.values, run.center_displacement.values
+    cycle, w = run.cycle.values, run.midspan_displacement.values
     ax.plot(cycle, w, color=BEAM_COLOR, label="beam, centre")
-    ax.plot(cycle, run.shaker_displacement, color=SHAKER_COLOR, label=r"shaker $w_\mathrm{s}$")
+    ax.plot(cycle, run.striker_displacement, color=SHAKER_COLOR, label=r"shaker $w_\mathrm{s}$")
     ax.set(xlabel=r"Cycles of excitation $\tau$", ylabel="Displacement $w$", xlim=(cycle[0], cycle[-1]))
     ax.set_ylim(-1.35, 2.0)
     ax.legend(loc="upper right", ncols=2)

@@ -9,7 +9,7 @@ import numpy as np
 from snapbeam.figures.panels import figure_legend, panel_letters
 from snapbeam.figures.response_map import plot_response_map
 from snapbeam.figures.style import house_style, new_figure
-from snapbeam.lab.compare.dots import Dots
+from snapbeam.lab.compare.dots import MeasuredPoints
 from snapbeam.model.paper_values import BEAM, CYCLES
 from snapbeam.paper.system import class_map, legend_handles, paper_model
 
@@ -44,13 +44,15 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     return frequency_maps(results, "fig6", results.pick(40, CYCLES))
 
 
-def measured_dots(dots: str | os.PathLike[str] | None, ds: xr.Dataset) -> Dots | None:
+def measured_dots(dots: str | os.PathLike[str] | None, ds: xr.Dataset) -> MeasuredPoints | None:
     """The measured responses of a CSV table, normalised as the map is."""
-    from snapbeam.lab.compare.dots import read_dots
+    from snapbeam.lab.compare.dots import read_measured_points
 
     if dots is None:
         return None
-    return read_dots(dots, reference_freq=ds.attrs["reference_freq"], buckling_level=BEAM.buckling_level)
+    return read_measured_points(
+        dots, reference_frequency=ds.attrs["reference_frequency"], buckling_level=BEAM.buckling_level
+    )
 
 
 def draw(results: Results, dots: str | os.PathLike[str] | None = None) -> Figure:
@@ -63,5 +65,5 @@ def draw(results: Results, dots: str | os.PathLike[str] | None = None) -> Figure
             plot_response_map(ds, ax, dots=measured_dots(dots, ds), legend=False)
         axes[1].set_ylabel("")
         panel_letters(axes)
-        figure_legend(figure, legend_handles(np.stack([ds.response.values for ds in data.values()])))
+        figure_legend(figure, legend_handles(np.stack([ds.response_class.values for ds in data.values()])))
     return figure

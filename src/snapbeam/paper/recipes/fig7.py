@@ -40,9 +40,12 @@ def draw(results: Results, dots: str | os.PathLike[str] | None = None) -> Figure
         for (above, below), name in zip(axes.T, long, strict=True):
             ds = long[name]
             plot_response_map(ds, above, dots=measured_dots(dots, ds), threshold_line=True, legend=False)
-            changed = ds.response.values != short[name].response.values
+            changed = ds.response_class.values != short[name].response_class.values
             plot_response_map(
-                ds.assign(response=ds.response.where(changed)), below, threshold_line=True, legend=False
+                ds.assign(response_class=ds.response_class.where(changed)),
+                below,
+                threshold_line=True,
+                legend=False,
             )
             cycles = int(short[name].attrs["cycles"])
             below.set_title(
@@ -54,6 +57,6 @@ def draw(results: Results, dots: str | os.PathLike[str] | None = None) -> Figure
         line = axes[0, 0].lines[-1]
         line.set_label(r"$V_\mathrm{QS1}$ (Eq. 21)")
         panel_letters(axes.ravel())
-        kinds = np.stack([ds.response.values for ds in long.values()])
+        kinds = np.stack([ds.response_class.values for ds in long.values()])
         figure_legend(figure, [*legend_handles(kinds), line], 5)
     return figure

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam.figures.panels import cell_edges, class_cells, figure_legend, panel_letters
 from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.lab.compare.dots import Dots
+from snapbeam.lab.compare.dots import MeasuredPoints
 from snapbeam.model.paper_values import CYCLES, LOCATION
 from snapbeam.paper.recipes.fig6 import measured_dots
 from snapbeam.paper.system import legend_handles, paper_model, relative_map, shapes_along
@@ -67,7 +67,7 @@ def draw_relative_map(ax: Axes, ds: xr.Dataset) -> list[Artist]:
     static = np.zeros_like(edges)
     static[edges > 0.0] = sb.quasi_static_threshold(edges[edges > 0.0], ratio)
     class_cells(ax, np.broadcast_to(edges, (relative.size, edges.size)), np.outer(relative, static),
-                ds.response.transpose("relative_amplitude", "location").values)  # fmt: skip
+                ds.response_class.transpose("relative_amplitude", "location").values)  # fmt: skip
     x = np.linspace(0.002, 0.5, 250)
     curve = sb.quasi_static_threshold(x, ratio)
     lines: list[tuple[float, tuple[float, ...], str]] = [(1.0, (4, 2), r"$V_\mathrm{QS1}$")]
@@ -104,7 +104,7 @@ def draw(results: Results, dots: str | os.PathLike[str] | None = None) -> Figure
                 _lay_dots(ax, measured_dots(dots, ds), float(ds.frequency_ratio))
             axes.append(ax)
         panel_letters([top, *axes])
-        kinds = np.concatenate([ds.response.values.ravel() for ds in data.values()])
+        kinds = np.concatenate([ds.response_class.values.ravel() for ds in data.values()])
         figure_legend(figure, [*legend_handles(kinds), *handles.values()], 3)
     return figure
 
@@ -131,12 +131,12 @@ def _starts(ax: Axes) -> None:
     ax.set_axis_off()
 
 
-def _lay_dots(ax: Axes, dots: Dots | None, ratio: float) -> None:
+def _lay_dots(ax: Axes, dots: MeasuredPoints | None, ratio: float) -> None:
     from snapbeam.figures.style import CLASS_COLORS
 
     if dots is None:
         return
     keep = np.isfinite(dots.location) & (np.abs(dots.frequency_ratio - ratio) <= 0.02 * ratio)
     x, y = dots.location[keep], dots.velocity_amplitude[keep]
-    colors = [CLASS_COLORS[sb.ResponseClass(int(kind))] for kind in dots.response[keep]]
+    colors = [CLASS_COLORS[sb.ResponseClass(int(kind))] for kind in dots.response_class[keep]]
     ax.scatter(np.minimum(x, 1.0 - x), y, s=14, c=colors, edgecolors="black", linewidths=0.6, zorder=4)

@@ -28,10 +28,10 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     import xarray as xr
 
     modes = np.arange(1, results.pick(32, 64) + 1)
-    exact = sb.exact_natural_freq(BEAM, _COUNT)
+    exact = sb.exact_natural_frequencies(BEAM, _COUNT)
     error = np.full((modes.size, _COUNT), np.nan)
     for row, count in zip(error, modes, strict=True):
-        freq = paper_model(int(count)).natural_freq[:_COUNT]
+        freq = paper_model(int(count)).natural_frequencies[:_COUNT]
         row[: freq.size] = freq / exact[: freq.size] - 1.0
     words = {"units": "1", "long_name": "relative error of the natural frequency"}
     return {

@@ -60,7 +60,7 @@ def draw(results: Results) -> Figure:
             ax.set_xlabel(r"Shaker location $x_\mathrm{s}$")
         handles[-1].set_label(r"0.05 $V_\mathrm{QS1}$")
         panel_letters(axes.ravel())
-        kinds = np.concatenate([ds.response.values.ravel() for ds in data.values()])
+        kinds = np.concatenate([ds.response_class.values.ravel() for ds in data.values()])
         figure_legend(figure, [*legend_handles(kinds), *handles], 3)
     return figure
 
@@ -77,7 +77,7 @@ def write_video(results: Results, folder: Path) -> list[Path]:
                 handles = draw_relative_map(ax, ds)
                 handles[-1].set_label(r"0.05 $V_\mathrm{QS1}$")
                 ax.set(xlabel=r"Shaker location $x_\mathrm{s}$", ylabel="Velocity amplitude $V$")
-                figure_legend(figure, [*legend_handles(ds.response.values), *handles], 2)
+                figure_legend(figure, [*legend_handles(ds.response_class.values), *handles], 2)
             yield figure
 
     return [write_frames(frames(), folder / f"si5{suffix}", fps=1.0 / 1.5) for suffix in (".mp4", ".gif")]

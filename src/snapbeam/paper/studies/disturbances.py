@@ -56,21 +56,21 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
         for name, given in _variants(model, float(omega), float(drive), cycles).items():
             run = sb.simulate(
                 sb.System(model, CONTACT, **given),
-                sb.Integration(cycles=cycles, early_decision=True),
+                sb.Integration(cycles=cycles, early_termination=True),
                 sample_times=[0.0],
             )
-            kinds[name].append(int(run.outcome.response))
+            kinds[name].append(int(run.summary.response_class))
         border.append(_at_border(model, float(omega), float(drive), cycles))
         results.progress("disturbances, classes")(at + 1, count)
     impacts = _impacts(results, model, points)
     stamp: dict[str, Any] = made_by({"modes": modes, "seed": _SEED, "points": count})
-    stamp |= {"modes": modes, "cycles": cycles, "reference_freq": model.reference_freq}
+    stamp |= {"modes": modes, "cycles": cycles, "reference_frequency": model.reference_frequency}
     return {"classes": _class_table(points, kinds, border, stamp), "impacts": _impact_table(impacts, stamp)}
 
 
 def _variants(model: sb.ReducedModel, omega: float, drive: float, cycles: int) -> dict[str, dict[str, Any]]:
     """What each run is given.  All shakers are records, so that they differ in nothing else."""
-    rest = model.equilibrium
+    rest = model.well_amplitude
     steady = _record(model, omega, drive, cycles)
     return {
         "base": {"striker": steady},
@@ -84,7 +84,7 @@ def _record(
     model: sb.ReducedModel, omega: float, drive: float, cycles: int, excess: float = 0.0, phase: float = 0.0
 ) -> sb.Striker:
     """w_s' = V b omega_1 cos(omega t + phase), its displacement first (1 + *excess*) times as large, as samples."""
-    angular = 2.0 * math.pi * omega * model.reference_freq
+    angular = 2.0 * math.pi * omega * model.reference_frequency
     height = drive * float(model.length_scale or 0.0) / omega
     cycle = np.arange(cycles * _PER_CYCLE + 1) / _PER_CYCLE
     angle = 2.0 * math.pi * cycle + phase
@@ -92,11 +92,11 @@ def _record(
     slope = -excess * np.exp(-cycle) / (2.0 * math.pi)  # by the angle
     offset = math.sin(phase) * size[0]
     return sb.Striker(
-        drive=sb.Recorded(
+        drive=sb.RecordedMotion(
             displacement=height * (size * np.sin(angle) - offset),
             velocity=height * angular * (size * np.cos(angle) + slope * np.sin(angle)),
-            sampling_freq=_PER_CYCLE * omega * model.reference_freq,
-            frequency=omega * model.reference_freq,
+            sampling_frequency=_PER_CYCLE * omega * model.reference_frequency,
+            frequency=omega * model.reference_frequency,
         ),
         location=LOCATION,
     )
@@ -107,7 +107,7 @@ def _at_border(model: sb.ReducedModel, omega: float, drive: float, cycles: int) 
     around = sb.response_map(
         model, CONTACT, frequency_ratio=omega + _NEIGHBOUR[0] * np.array([-1.0, 0.0, 1.0]),
         velocity_amplitude=drive + _NEIGHBOUR[1] * np.array([-1.0, 0.0, 1.0]), location=LOCATION,
-        cycles=cycles, early_decision=True,
+        cycles=cycles, early_termination=True,
     ).response.values  # fmt: skip
     return bool((around != around[1, 1]).any())
 
@@ -128,7 +128,7 @@ def _repeat(model: sb.ReducedModel, omega: float, drive: float) -> list[float] |
 
     The impact is the one of the greatest impulse after four periods of the first mode; None if there is none.
     """
-    first = 1.0 / model.reference_freq
+    first = 1.0 / model.reference_frequency
     shaker = sb.Shaker(frequency_ratio=omega, velocity_amplitude=drive, location=LOCATION)
     cycles = max(math.ceil(8.0 * omega), 2)
     run = sb.simulate(
@@ -163,7 +163,7 @@ def _repeat(model: sb.ReducedModel, omega: float, drive: float) -> list[float] |
         later = hits[hits > 0.25 * first]
         found += [
             float(impulses[hits <= 0.25 * first].sum()),
-            float(again.dataset.work_shaker.values[-1]),
+            float(again.dataset.striker_work.values[-1]),
             float(later[0]) if later.size else math.nan,
         ]
     return found
@@ -190,7 +190,7 @@ def _class_table(
 
     names = list(kinds)
     data: dict[str, Any] = {
-        "response": (("variant", "point"), np.array([kinds[name] for name in names], dtype=np.int8)),
+        "response_class": (("variant", "point"), np.array([kinds[name] for name in names], dtype=np.int8)),
         "at_border": ("point", np.array(border)),
         "frequency_ratio": ("point", points[:, 0], {"units": "1"}),
         "velocity_amplitude": ("point", points[:, 1], {"units": "1"}),
@@ -222,10 +222,10 @@ def draw(results: Results) -> Figure:
 
 
 def _changes(ax: Axes, classes: xr.Dataset) -> None:
-    base = classes.response.sel(variant="base").values
+    base = classes.response_class.sel(variant="base").values
     border = classes.at_border.values.astype(bool)
     for at, name in enumerate(VARIANTS):
-        changed = classes.response.sel(variant=name).values != base
+        changed = classes.response_class.sel(variant=name).values != base
         for offset, where, color, words in (
             (-0.17, border, SHAKER_COLOR, "beside another class"),
             (0.17, ~border, BEAM_COLOR, "elsewhere"),

@@ -27,7 +27,9 @@ __all__ = ["PIEZO", "SPLIT", "compute", "draw", "power_above"]
 
 _Array = NDArray[np.float64]
 
-PIEZO = sb.Piezo(coupling=4e-3, capacitance=60e-9, resistance=2e4, start=0.0, stop=0.25)
+PIEZO = sb.PiezoelectricHarvester(
+    moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_start=0.0, patch_end=0.25
+)
 SPLIT = 5.0
 """Over the first natural frequency: what is above is up-converted."""
 _RATE = 400.0
@@ -52,7 +54,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     ratio = np.round(np.linspace(0.4, 3.6, results.pick(3, 14)), 6)
     drives = np.round(np.linspace(0.05, 0.6, results.pick(3, 10)), 6)
     model = sb.ReducedModel.from_beam(BEAM, modes=modes)
-    rate, freq = _RATE * model.reference_freq, model.reference_freq
+    rate, freq = _RATE * model.reference_frequency, model.reference_frequency
     found = np.zeros((ratio.size, drives.size, 4))
     for i, omega in enumerate(ratio):
         for j, velocity in enumerate(drives):
@@ -62,7 +64,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
             times = np.arange(0.5 * end, end * (1.0 - 1e-9), 1.0 / rate)
             run = sb.simulate(system, sb.Integration(cycles=cycles), sample_times=times)
             power, share = power_above(run.dataset.voltage.values, rate, PIEZO.resistance, SPLIT * freq)
-            found[i, j] = power, share, int(run.outcome.response), run.outcome.harvested_power
+            found[i, j] = power, share, int(run.summary.response_class), run.summary.harvested_power
         results.progress("harvesting")(i + 1, ratio.size)
     dims = ("frequency_ratio", "velocity_amplitude")
     ds = xr.Dataset(
@@ -73,7 +75,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
             "whole_power": (dims, found[..., 3], {"units": "W", "long_name": "mean power of the whole run"}),
         },
         {"frequency_ratio": ratio, "velocity_amplitude": drives},
-        {"modes": modes, "cycles": cycles, "reference_freq": freq},
+        {"modes": modes, "cycles": cycles, "reference_frequency": freq},
     )  # fmt: skip
     return {"power": ds}
 

@@ -51,34 +51,34 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 
     found = {}
     cycles = results.pick(120, LONG_CYCLES)
-    survival = sb.Survival(quiet=results.pick(20.0, 50.0))
+    survival = sb.LifetimeSettings(settling_cycles=results.pick(20.0, 50.0))
     axes = {
         "frequency_ratio": results.pick(np.linspace(0.5, 4.0, 3), np.linspace(0.25, 4.0, 16)),
         "velocity_amplitude": results.pick(np.linspace(0.1, 0.65, 3), np.linspace(0.1, 0.64, 10)),
     }
     for modes in results.pick((1, 2), (1, 2, 4, 8, 32)):
         found[f"modes_{modes}"] = sb.lifetime_map(
-            _system(modes, *ENDLESS), axes, sb.Integration(cycles=cycles), starts=results.pick(3, 8),
-            survival=survival, after=results.pick(None, (200, 500, 950)),
+            _system(modes, *ENDLESS), axes, sb.Integration(cycles=cycles), initial_conditions=results.pick(3, 8),
+            settings=survival, after=results.pick(None, (200, 500, 950)),
             progress=results.progress(f"lifetimes, N = {modes}"),
         )  # fmt: skip
     most = results.pick(2, 32)
     points = xr.Dataset({name: ("point", np.array(values)) for name, values in POINTS.items()})
     found["points"] = sb.lifetime_map(
-        _system(most, *ENDLESS), points, sb.Integration(cycles=cycles), starts=results.pick(8, 250),
-        survival=survival, progress=results.progress("lifetimes at four points"),
+        _system(most, *ENDLESS), points, sb.Integration(cycles=cycles), initial_conditions=results.pick(8, 250),
+        settings=survival, progress=results.progress("lifetimes at four points"),
     )  # fmt: skip
-    for accuracy in ("map", "reference"):
+    for accuracy in ("standard", "reference"):
         long = sb.Integration(cycles=results.pick(200, 10_000), accuracy=accuracy)
         found[f"long_{accuracy}"] = sb.lifetime_map(
-            _system(1, *ENDLESS), None, long, starts=results.pick(4, 24), survival=survival
+            _system(1, *ENDLESS), None, long, initial_conditions=results.pick(4, 24), settings=survival
         )
     found["exponents"] = _exponents(results, most)
     found["sensitivity"] = _sensitivity(results, most)
-    for accuracy in ("map", "reference"):
+    for accuracy in ("standard", "reference"):
         long = sb.Integration(cycles=results.pick(120, 10_000), accuracy=accuracy)
         found[f"long_many_{accuracy}"] = sb.lifetime_map(
-            _system(most, *LONGEST), None, long, starts=results.pick(2, 8), survival=survival,
+            _system(most, *LONGEST), None, long, initial_conditions=results.pick(2, 8), settings=survival,
             progress=results.progress(f"longest of {most} modes, {accuracy}"),
         )  # fmt: skip
     return found
@@ -87,13 +87,13 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 def _exponents(results: Results, modes: int) -> xr.Dataset:
     """The largest exponent while it snaps, of several runs."""
     system = _system(modes, *ENDLESS)
-    starts = sb.Starts(count=results.pick(2, 16))
+    starts = sb.InitialConditions(count=results.pick(2, 16))
     states = [starts.state(system, number) for number in range(starts.count)]
     batch = sb.State(
         amplitude=np.array([state.amplitude for state in states]),
         velocity=np.array([state.velocity for state in states]),
     )
-    return sb.lyapunov(system, 1, results.pick(20, 200), transient=0, states=batch)
+    return sb.lyapunov_spectrum(system, 1, results.pick(20, 200), transient=0, states=batch)
 
 
 def _sensitivity(results: Results, modes: int) -> xr.Dataset:
@@ -107,12 +107,12 @@ def _sensitivity(results: Results, modes: int) -> xr.Dataset:
     count, cycles = results.pick(6, 400), results.pick(30, LONG_CYCLES)
     base = np.random.default_rng(_SEED).uniform(0.27, 0.33, count)
     sizes = np.logspace(-12.0, -4.0, results.pick(2, 9))
-    system, how = _system(modes, *ENDLESS), sb.Integration(cycles=cycles, early_decision=True)
-    cycle = 1.0 / (system.model.reference_freq * ENDLESS[0])
+    system, how = _system(modes, *ENDLESS), sb.Integration(cycles=cycles, early_termination=True)
+    cycle = 1.0 / (system.model.reference_frequency * ENDLESS[0])
     ends = []
     for size in (0.0, *sizes):
         ds = sb.sweep(system, xr.Dataset({"velocity_amplitude": ("point", base * (1.0 + size))}), how)
-        ends.append(ds["last_crossing"].fillna(0.0).values / cycle)
+        ends.append(ds["last_zero_crossing"].fillna(0.0).values / cycle)
     changed = np.array([(np.abs(each - ends[0]) > _APART).sum() for each in ends[1:]])
     labels = {"units": "1", "long_name": "points whose last snap moves by more than a cycle"}
     return xr.Dataset(

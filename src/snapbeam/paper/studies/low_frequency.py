@@ -41,7 +41,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
                 frequency_ratio=ratio, velocity_amplitude=inside * static, cycles=results.pick(6, CYCLES),
             )  # fmt: skip
             columns.append(ds.assign_coords(velocity_amplitude=inside))
-        nothing = {"response": -1, "status": 5, "crossings": 0, "end_is_final": False}
+        nothing = {"response_class": -1, "status": 5, "zero_crossings": 0, "final_well_proven": False}
         joined = xr.concat(
             columns, dim="frequency_ratio", join="outer", combine_attrs="drop_conflicts", fill_value=nothing
         )

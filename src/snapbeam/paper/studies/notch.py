@@ -54,7 +54,7 @@ def _system(modes: int, beam: sb.Beam = BEAM, **parts: Any) -> sb.System:
 
 def _ended(**ends: float) -> sb.Beam:
     """The paper's beam between other ends."""
-    parts: dict[str, Any] = {"ends": sb.Ends(**ends)}
+    parts: dict[str, Any] = {"ends": sb.BoundaryConditions(**ends)}
     return BEAM.replace(**parts)
 
 
@@ -66,7 +66,13 @@ def _body(mass: float, frequency: float, zeta: float = 0.1) -> dict[str, Any]:
 
 def _start_up(rise: float) -> sb.Burst:
     """A sine that rises over some cycles and stays."""
-    return sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.1, length=1e6, rise=rise, fall=1.0)
+    return sb.Burst(
+        frequency_ratio=1.0,
+        velocity_amplitude=0.1,
+        duration_cycles=1e6,
+        ramp_up_cycles=rise,
+        ramp_down_cycles=1.0,
+    )
 
 
 _SOFT = {k: _ended(left=k * _UNIT, right=k * _UNIT) for k in (100.0, 30.0)}
@@ -85,9 +91,9 @@ VARIANTS: dict[str, tuple[str, Callable[[int], sb.System]]] = {
     r"$k_\theta = 100\,EI/L$": ("ends", lambda n: _system(n, _SOFT[100.0])),
     r"$k_\theta = 30\,EI/L$": ("ends", lambda n: _system(n, _SOFT[30.0])),
     "supports give as the beam": ("ends", lambda n: _system(n, _ended(axial=_GIVING))),
-    "higher well struck": ("asymmetry", lambda n: _system(n, imperfection=sb.Imperfection(rise=1.2e-6))),
-    "lower well struck": ("asymmetry", lambda n: _system(n, imperfection=sb.Imperfection(rise=-1.2e-6))),
-    "crooked by 5 µm": ("asymmetry", lambda n: _system(n, imperfection=sb.Imperfection(skew=5e-6))),
+    "higher well struck": ("asymmetry", lambda n: _system(n, imperfection=sb.Imperfection(midspan_amplitude=1.2e-6))),
+    "lower well struck": ("asymmetry", lambda n: _system(n, imperfection=sb.Imperfection(midspan_amplitude=-1.2e-6))),
+    "crooked by 5 µm": ("asymmetry", lambda n: _system(n, imperfection=sb.Imperfection(antisymmetric_amplitude=5e-6))),
     r"$k_\mathrm{c}$ tenfold": ("contact", lambda n: _system(n, contact=sb.HertzContact(4e9))),
     r"$k_\mathrm{c}$ a tenth": ("contact", lambda n: _system(n, contact=sb.HertzContact(4e7))),
     "tip of common PLA": ("contact", lambda n: _system(n, contact=tip_contact())),
@@ -119,15 +125,15 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
             system, "velocity_amplitude", drives, {"location": _PLACES, "frequency_ratio": ratio},
             sb.Integration(cycles=cycles), progress=results.progress(f"notch, {name}"),
         )  # fmt: skip
-        columns.append(found.first_interwell.transpose("location", "frequency_ratio").values)
-        freq.append(system.model.reference_freq)
+        columns.append(found.lower_threshold.transpose("location", "frequency_ratio").values)
+        freq.append(system.model.reference_frequency)
     ds = xr.Dataset(
         {
             "threshold": (
                 ("variant", "location", "frequency_ratio"), np.array(columns),
                 {"units": "1", "long_name": "lowest velocity amplitude that snaps"},
             ),
-            "reference_freq": ("variant", np.array(freq), {"units": "Hz", "long_name": "omega_1/(2 pi)"}),
+            "reference_frequency": ("variant", np.array(freq), {"units": "Hz", "long_name": "omega_1/(2 pi)"}),
         },
         {"variant": names, "location": _PLACES, "frequency_ratio": ratio},
         {"modes": modes, "cycles": cycles, "amplitude_step": float(drives[1] - drives[0])},

@@ -42,13 +42,13 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
             paper_model(modes), CONTACT, frequency_ratio=ratio, velocity_amplitude=drives, location=LOCATION,
             cycles=results.pick(60, 400), progress=results.progress(f"resonance, N = {modes}"),
         )  # fmt: skip
-        found[f"modes_{modes}"] = ds[["max_displacement", "response", "status"]]
+        found[f"modes_{modes}"] = ds[["max_displacement", "response_class", "status"]]
     return found
 
 
 def ridge(ds: xr.Dataset) -> tuple[_Array, _Array]:
     """The drives at which no frequency of the window snaps, and Omega of the greatest displacement at each."""
-    calm = ~is_interwell(ds.response.values).any(axis=0)
+    calm = ~is_interwell(ds.response_class.values).any(axis=0)
     # the lowest drives only: above the first that snaps somewhere the maximum is that of what is left
     count = int(np.argmin(calm)) if not calm.all() else calm.size
     at = np.argmax(ds.max_displacement.values[:, :count], axis=0)
@@ -64,7 +64,7 @@ def draw(results: Results) -> Figure:
         figure = new_figure("double", 78.0)
         axes = figure.subplots(1, 2)
         for ax, ds, whole in zip(axes, data.values(), maps.values(), strict=True):
-            height = np.where(is_interwell(ds.response.values), np.nan, ds.max_displacement.values)
+            height = np.where(is_interwell(ds.response_class.values), np.nan, ds.max_displacement.values)
             mesh = ax.pcolormesh(
                 ds.frequency_ratio, ds.velocity_amplitude, height.T, cmap=cm.oslo_r, vmin=-1.0, vmax=0.0,
                 rasterized=True, shading="nearest",

@@ -51,8 +51,8 @@ def buckling_mode_damping(model: sb.ReducedModel, ratio: float = DAMPING_RATIO) 
     well. Returned are its diagonal in the linear modes over 2 omega, which is what the engine can take, and
     the ratios of the exact eigenvalues with the whole of C, both by ascending frequency.
     """
-    tangent = model.stiffness + model.tension_stiffness * float(model.equilibrium @ model.equilibrium)
-    tangent[0] += 2.0 * model.tension_stiffness * float(model.equilibrium @ model.equilibrium)
+    tangent = model.stiffness + model.nonlinear_stiffness * float(model.well_amplitude @ model.well_amplitude)
+    tangent[0] += 2.0 * model.nonlinear_stiffness * float(model.well_amplitude @ model.well_amplitude)
     own = 2.0 * ratio * np.sqrt(tangent * np.diag(model.mass))
     whole = model.linear_modes.T @ (own[:, None] * model.linear_modes)
     projected = np.diag(whole) / (2.0 * model.omega)
@@ -92,10 +92,10 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     found["buckling_damping"] = run("buckling damping", paper_model(modes, projected))
     # Omega and V of the map stay those of the model it is compared with
     found["double_modes"] = run(
-        "twice the modes", paper_model(2 * modes), reference_freq=model.reference_freq
+        "twice the modes", paper_model(2 * modes), reference_frequency=model.reference_frequency
     )
     found["one_mode_reference"] = run(
-        "one mode, other omega_1", paper_model(1), reference_freq=model.reference_freq
+        "one mode, other omega_1", paper_model(1), reference_frequency=model.reference_frequency
     )
     return found
 
@@ -118,8 +118,10 @@ def draw(results: Results) -> Figure:
                 continue
             before = data[first]
             after = data[name].assign_coords(velocity_amplitude=before.velocity_amplitude)
-            changed = after.response.values != before.response.values
-            plot_response_map(after.assign(response=after.response.where(changed)), ax, legend=False)
+            changed = after.response_class.values != before.response_class.values
+            plot_response_map(
+                after.assign(response_class=after.response_class.where(changed)), ax, legend=False
+            )
             ax.set_title(f"{words}: {100.0 * changed.mean():.1f} % changed", loc="left")
             drawn.append(ax)
         for ax in axes[:, 1]:
@@ -127,5 +129,5 @@ def draw(results: Results) -> Figure:
         for ax in axes[:-1].ravel():
             ax.set_xlabel("")
         panel_letters(drawn)
-        figure_legend(figure, legend_handles(base.response.values))
+        figure_legend(figure, legend_handles(base.response_class.values))
     return figure

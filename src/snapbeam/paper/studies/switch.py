@@ -60,7 +60,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     rng = np.random.default_rng(5)
     draws = {name: rng.standard_normal(shape) for name in _OFF}
     columns = {
-        "drive.length": np.broadcast_to(lengths[:, None, None], shape),
+        "drive.duration_cycles": np.broadcast_to(lengths[:, None, None], shape),
         "drive.velocity_amplitude": drives[:, None]
         * (1.0 + _OFF["velocity_amplitude"] * draws["velocity_amplitude"]),
         "drive.frequency_ratio": OMEGA * (1.0 + _OFF["frequency_ratio"] * draws["frequency_ratio"]),
@@ -71,16 +71,21 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     for share in _SHARES:
         model = _model(modes, share * fold)
         burst = sb.Burst(
-            frequency_ratio=OMEGA, velocity_amplitude=0.1, length=1.0, rise=0.25, fall=0.25, retreat=1.0
+            frequency_ratio=OMEGA,
+            velocity_amplitude=0.1,
+            duration_cycles=1.0,
+            ramp_up_cycles=0.25,
+            ramp_down_cycles=0.25,
+            retraction=1.0,
         )
         system = sb.System(model, CONTACT, sb.Striker(drive=burst))
         ds = sb.sweep(system, points, sb.Integration(cycles=results.pick(30, 40)))
-        over = (ds.final_well.values > 0) & ds.end_is_final.values
-        open_ = ~ds.end_is_final.values
-        work = ds.shaker_work.values
+        over = (ds.final_well.values > 0) & ds.final_well_proven.values
+        open_ = ~ds.final_well_proven.values
+        work = ds.striker_work.values
         found.append([each.reshape(shape) for each in (over, open_, work)])
-        barriers.append(model.barrier_energy - float(model.potential_energy(model.wells[0])))
-        freq.append(model.reference_freq)
+        barriers.append(model.saddle_energy - float(model.potential_energy(model.wells[0])))
+        freq.append(model.reference_frequency)
         results.progress("switch")(len(found), len(_SHARES))
     dims = ("bias", "length", "velocity_amplitude")
     over, undecided, work = (np.array([row[i] for row in found]) for i in range(3))
@@ -90,7 +95,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
             "undecided": (dims, undecided.sum(axis=-1), {"units": "1", "long_name": "runs whose well is not final"}),
             "work": (dims, np.median(work, axis=-1), {"units": "J", "long_name": "median work of the striker"}),
             "barrier": ("bias", np.array(barriers), {"units": "J", "long_name": "barrier from the lower well"}),
-            "reference_freq": ("bias", np.array(freq), {"units": "Hz", "long_name": "omega_1/(2 pi)"}),
+            "reference_frequency": ("bias", np.array(freq), {"units": "Hz", "long_name": "omega_1/(2 pi)"}),
         },
         {"bias": list(_SHARES), "length": lengths, "velocity_amplitude": drives},
         {"modes": modes, "repeats": repeats, "fold_load": fold},

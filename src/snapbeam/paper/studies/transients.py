@@ -45,8 +45,10 @@ def draw(results: Results) -> Figure:
         figure = new_figure("double", 84.0)
         axes = figure.subplots(1, 2, sharey=True)
         for ax, before, after in zip(axes, maps[::2], maps[1::2], strict=True):
-            changed = after.response.values != before.response.values
-            plot_response_map(after.assign(response=after.response.where(changed)), ax, legend=False)
+            changed = after.response_class.values != before.response_class.values
+            plot_response_map(
+                after.assign(response_class=after.response_class.where(changed)), ax, legend=False
+            )
             ax.set_title(
                 f"$N$ = {int(after.attrs['modes'])}: {100.0 * changed.mean():.1f} % changed from "
                 f"{int(before.attrs['cycles'])} to {int(after.attrs['cycles'])} cycles",
@@ -54,5 +56,5 @@ def draw(results: Results) -> Figure:
             )
         axes[1].set_ylabel("")
         panel_letters(axes)
-        figure_legend(figure, legend_handles(np.stack([ds.response.values for ds in maps])))
+        figure_legend(figure, legend_handles(np.stack([ds.response_class.values for ds in maps])))
     return figure

@@ -140,8 +140,8 @@ def push(model: sb.ReducedModel, places: _Array, step: float = _STEP) -> Pushed:
     beam, level = model.beam, _size(model)
     unit = beam.bending_stiffness / beam.length**3
     rows = np.atleast_2d([model.shape_at(float(x)) for x in np.atleast_1d(places)])
-    press = _Press(model.stiffness / unit, model.tension_stiffness * level**2 / unit, rows)
-    a, active = model.equilibrium / level, [int(np.argmin(rows @ model.equilibrium))]
+    press = _Press(model.stiffness / unit, model.nonlinear_stiffness * level**2 / unit, rows)
+    a, active = model.well_amplitude / level, [int(np.argmin(rows @ model.well_amplitude))]
     at, highest = (
         float((rows @ a).min()),
         float((rows @ -a).max()),
@@ -215,7 +215,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
         np.full((first.size, first.size), np.nan),
         np.zeros((first.size, first.size), dtype=np.int8),
     )
-    shapes, places, lowest = [model.equilibrium / _size(model)], [np.nan, np.nan], np.inf
+    shapes, places, lowest = [model.well_amplitude / _size(model)], [np.nan, np.nan], np.inf
     for i, j in itertools.combinations(range(first.size), 2):
         found = push(model, first[[i, j]], step)
         height[i, j], tips[i, j] = found.height, found.tips
@@ -268,7 +268,7 @@ def draw(results: Results) -> Figure:
     with house_style():
         figure = new_figure("double", 60.0)
         axes = figure.subplots(1, 3)
-        rest = shapes @ model.equilibrium / _size(model)
+        rest = shapes @ model.well_amplitude / _size(model)
         axes[0].plot(x, rest, color="0.6", dashes=(4, 2), label="at rest")
         axes[0].axhline(0.0, color="0.4", linewidth=0.6, dashes=(1, 2))
         tips, colors = ds.place.values, (SHAKER_COLOR, BEAM_COLOR)

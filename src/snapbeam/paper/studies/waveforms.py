@@ -55,9 +55,9 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
         columns = [hits[name].values for name in ("onset", "duration", "peak_force", "impulse")]
         impacts.append(np.column_stack([np.full(hits.sizes["impact"], at), *columns]))
         results.progress(f"waveforms, N = {modes}")(at + 1, count)
-    calm = np.array([row["response"] == sb.ResponseClass.INTRAWELL for row in runs])
+    calm = np.array([row["response_class"] == sb.ResponseClass.INTRAWELL for row in runs])
     stamp: dict[str, Any] = made_by({"modes": modes, "seed": _SEED, "periods": _PERIODS, "runs": count})
-    stamp |= {"modes": modes, "reference_freq": paper_model(modes).reference_freq}
+    stamp |= {"modes": modes, "reference_frequency": paper_model(modes).reference_frequency}
     return {
         "runs": _run_table(points, runs, stamp),
         "snap_throughs": _table("snap_through", _SNAP_COLUMNS, np.concatenate(snaps), stamp),
@@ -67,7 +67,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 
 
 def _one(modes: int, omega: float, drive: float) -> sb.Run:
-    first = paper_model(modes).reference_freq
+    first = paper_model(modes).reference_frequency
     cycles = int(np.ceil(_PERIODS * omega))
     times = np.arange(_PERIODS * _SAMPLES) / (_SAMPLES * first)
     return paper_run(modes, omega, drive, cycles, sample_times=times, accuracy="reference")
@@ -111,7 +111,7 @@ def passages(alpha: _Array, time: _Array) -> _Array:
 
 def _shares(run: sb.Run, modes: int) -> tuple[dict[str, Any], _Array]:
     """How long |alpha_1| is in each bin, how long the other modes exceed it there, and the peak of each mode."""
-    rest = abs(float(paper_model(modes).equilibrium[0]))
+    rest = abs(float(paper_model(modes).well_amplitude[0]))
     alpha = run.dataset.modal_amplitude.values.astype(float) / rest
     first = np.abs(alpha[:, 0])
     higher = np.sqrt(np.sum(alpha[:, 1:] ** 2, axis=1))
@@ -121,7 +121,7 @@ def _shares(run: sb.Run, modes: int) -> tuple[dict[str, Any], _Array]:
         "higher_exceed": np.histogram(first[higher > first], BIN_EDGES)[0],
         "antisymmetric_exceed": np.histogram(first[uneven > first], BIN_EDGES)[0],
         "peak_amplitude": np.abs(alpha).max(axis=0),
-        "response": int(run.outcome.response),
+        "response_class": int(run.summary.response_class),
     }
     return counted, passages(alpha, run.dataset.time.values)
 
@@ -167,13 +167,13 @@ def _strobed(results: Results, modes: int, points: _Array, attrs: dict[str, Any]
     kept_cycles = min(cycles // 2, _STROBED)
     model, found, kept = paper_model(modes), [], []
     for at, (omega, drive) in enumerate(points):
-        period = 1.0 / (omega * model.reference_freq)
+        period = 1.0 / (omega * model.reference_frequency)
         steps = np.arange(_STROBE_PHASES * (cycles - kept_cycles), _STROBE_PHASES * cycles)
         run = paper_run(
             modes, float(omega), float(drive), cycles, sample_times=steps * period / _STROBE_PHASES
         )  # fmt: skip
-        if run.outcome.response == sb.ResponseClass.INTRAWELL:
-            found.append(run.dataset.displacement.values.reshape(-1, _STROBE_PHASES))
+        if run.summary.response_class == sb.ResponseClass.INTRAWELL:
+            found.append(run.dataset.displacement_at_striker.values.reshape(-1, _STROBE_PHASES))
             kept.append((omega, drive))
         results.progress(f"waveforms, {cycles} cycles")(at + 1, len(points))
     words = {"units": "b", "long_name": "beam displacement at the shaker"}
@@ -230,7 +230,7 @@ def _antisymmetry(ax: Axes, snaps: xr.Dataset) -> None:
 
 
 def _durations(ax: Axes, impacts: xr.Dataset) -> None:
-    share = impacts.duration.values * float(impacts.attrs["reference_freq"])
+    share = impacts.duration.values * float(impacts.attrs["reference_frequency"])
     ax.loglog(share, impacts.peak_force.values, ".", color=BEAM_COLOR, markersize=1.5, rasterized=True)
     ax.axvline(0.1, color="0.7", linewidth=0.5, zorder=0)
     ax.set(xlabel="Duration of an impact / first natural period", ylabel="Peak contact force (N)")

@@ -42,7 +42,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
         drives = np.linspace(0.0, 2.0 * ratio, count + 1)[1:]
         ds = sb.response_map(
             paper_model(modes), CONTACT, frequency_ratio=ratio, velocity_amplitude=drives,
-            location=locations, cycles=results.pick(30, CYCLES), early_decision=True,
+            location=locations, cycles=results.pick(30, CYCLES), early_termination=True,
             progress=results.progress(f"windows, Omega = {ratio:g}"),
         )  # fmt: skip
         found[f"omega_{ratio:g}"] = ds[list(KEPT)].transpose("location", "velocity_amplitude")
@@ -54,7 +54,7 @@ def longest_window(ds: xr.Dataset) -> tuple[_Array, _Array]:
 
     A stretch may hold amplitudes of another class as long as of any five in a row three are transient.
     """
-    kinds = ds.response.transpose("location", "velocity_amplitude").values
+    kinds = ds.response_class.transpose("location", "velocity_amplitude").values
     drives = ds.velocity_amplitude.values.astype(float)
     transient = (kinds == sb.ResponseClass.TRANSIENT_1) | (kinds == sb.ResponseClass.TRANSIENT_2)
     ends = []
@@ -82,7 +82,7 @@ def draw(results: Results) -> Figure:
             step = float(drives[1] - drives[0])
             columns = np.arange(ds.sizes["location"] + 1) - 0.5
             edges = np.concatenate([[0.5 * step], drives + 0.5 * step])
-            class_cells(ax, columns, edges, ds.response.values.T)
+            class_cells(ax, columns, edges, ds.response_class.values.T)
             low, high = longest_window(ds)
             for at, (bottom, top) in enumerate(zip(low, high, strict=True)):
                 ax.plot([at, at], [bottom, top], color="black", linewidth=1.2)
@@ -93,5 +93,5 @@ def draw(results: Results) -> Figure:
         axes[0].set_ylabel("Velocity amplitude $V$")
         fix_ticks(*axes)
         panel_letters(axes)
-        figure_legend(figure, legend_handles(np.stack([ds.response.values for ds in data.values()])))
+        figure_legend(figure, legend_handles(np.stack([ds.response_class.values for ds in data.values()])))
     return figure

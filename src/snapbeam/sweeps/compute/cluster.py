@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from snapbeam.core.validate import InputError, integer, shown
 from snapbeam.engines.cpu.driver import usable_cores
-from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.errors import CheckpointError
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -113,7 +113,7 @@ def open_client(cluster: Cluster) -> Iterator[Client]:
         try:
             client = Client(cluster.address, timeout="30s", set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
-            raise StoreError(
+            raise CheckpointError(
                 f"cluster = {shown(cluster.address)}: no scheduler answers there ({error})"
             ) from error
         try:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.errors import CheckpointError
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -49,7 +49,7 @@ class Crew:
 
         Raises
         ------
-        StoreError
+        CheckpointError
             If workers come and go and never finish anything, or none can be started.
         """
         before, self._known = self._known, set(there)
@@ -57,7 +57,7 @@ class Crew:
             self.note("waiting for workers" if not there else f"workers: {len(there)}")
         self._lost |= (before or set()) - self._known
         if len(self._lost) > _MOST_LOST * max(1, len(there)):
-            raise StoreError(
+            raise CheckpointError(
                 f"the workers cannot compute this map: {len(self._lost)} of them came and went and no task was "
                 "finished; they may have too little memory for one: give them more, or smaller tasks (chunk)"
             )
@@ -74,7 +74,7 @@ class Crew:
             self._whole_at = now
         elif now - self._whole_at > _PATIENCE * 2**self._mended:
             if self._mended >= _MOST_MENDED and not self._known:
-                raise StoreError("the workers cannot compute this map: none of them can be started")
+                raise CheckpointError("the workers cannot compute this map: none of them can be started")
             self._mended, self._whole_at = min(self._mended + 1, _MOST_MENDED), now
             self.note("starting workers anew")
             cluster.sync(_replace, cluster, self._known)

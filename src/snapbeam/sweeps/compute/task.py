@@ -19,7 +19,7 @@ from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.runs.save import code_flags
 from snapbeam.sweeps.points import Columns
-from snapbeam.sweeps.replicas import Replicas, perturbed_start
+from snapbeam.sweeps.replicas import Replicates, perturbed_start
 from snapbeam.sweeps.setup import Progress, SweepSetup, variable_attributes
 
 __all__ = ["CLASSES", "PointWork", "ResultTable"]
@@ -51,19 +51,19 @@ class PointWork:
     """How the points of a sweep become rows of results, repeats included."""
 
     setup: SweepSetup
-    replicas: Replicas | None = None
+    replicas: Replicates | None = None
 
     @cached_property
     def statistics(self) -> dict[str, Statistic]:
         """The table's rows, with those of each of several strikers."""
-        return rows_for(1 + len(self.setup.system.others))
+        return rows_for(1 + len(self.setup.system.further_contacts))
 
     @cached_property
     def integers(self) -> tuple[str, ...]:
         """Names of the columns of whole numbers."""
         names = [name for name, row in self.statistics.items() if row.dtype != "float64"]
         if self.replicas is not None:
-            names += [*_COUNTS, _HALVED] if self.replicas.halve_step else _COUNTS
+            names += [*_COUNTS, _HALVED] if self.replicas.check_half_step else _COUNTS
         return tuple(names)
 
     @cached_property
@@ -83,9 +83,9 @@ class PointWork:
         if self.replicas is not None:
             found["replicas"] = {
                 "count": self.replicas.count,
-                "size": self.replicas.size,
+                "size": self.replicas.perturbation_rms,
                 "seed": self.replicas.seed,
-                "halve_step": self.replicas.halve_step,
+                "check_half_step": self.replicas.check_half_step,
             }
         return found
 
@@ -103,7 +103,7 @@ class PointWork:
         """SHA-256 of the model's numbers, which may differ in their last digits between processors."""
         model = self.setup.system.model
         digest = hashlib.sha256()
-        for values in (model.mass, model.stiffness, model.omega, model.linear_modes, model.equilibrium):
+        for values in (model.mass, model.stiffness, model.omega, model.linear_modes, model.well_amplitude):
             digest.update(np.ascontiguousarray(values).tobytes())
         return digest.hexdigest()
 
@@ -121,17 +121,17 @@ class PointWork:
 
         results = setup.march(points, threads, report)
         if self.replicas is not None:
-            repeats, replicas = [results["response"]], self.replicas
+            repeats, replicas = [results["response_class"]], self.replicas
             for repeat in range(replicas.count):
                 before += size
 
                 def start(system: System, state: State | None, number: int = repeat) -> State:
                     return perturbed_start(system, replicas, number, state)
 
-                repeats.append(setup.march(points, threads, report, start=start)["response"])
-            if replicas.halve_step:
+                repeats.append(setup.march(points, threads, report, start=start)["response_class"])
+            if replicas.check_half_step:
                 before = total - size
-                repeats.append(setup.march(points, threads, report, step_factor=0.5)["response"])
+                repeats.append(setup.march(points, threads, report, step_factor=0.5)["response_class"])
                 results[_HALVED] = repeats[-1]
             kinds = np.array(repeats)
             results |= {
@@ -145,7 +145,7 @@ class PointWork:
     def unfinished(self, size: int, status: RunStatus = RunStatus.NOT_RUN) -> ResultTable:
         """Rows of points that were not computed: class unknown, and the status that says why."""
         integers = np.zeros((size, len(self.integers)), dtype=np.int32)
-        integers[:, self.integers.index("response")] = ResponseClass.UNKNOWN
+        integers[:, self.integers.index("response_class")] = ResponseClass.UNKNOWN
         integers[:, self.integers.index("status")] = status
         if _HALVED in self.integers:
             integers[:, self.integers.index(_HALVED)] = ResponseClass.UNKNOWN
@@ -158,15 +158,15 @@ class PointWork:
         }
         if self.replicas is not None:
             labels = {"units": "1", "long_name": "share of the runs of a point, by response class"}
-            variables["class_share"] = ("float64", True, labels)
-            if self.replicas.halve_step:
+            variables["class_fraction"] = ("float64", True, labels)
+            if self.replicas.check_half_step:
                 labels = {"units": "1", "long_name": "response class with the step halved"}
                 variables[_HALVED] = ("int8", False, labels | code_flags(ResponseClass))
         return variables
 
     def values(self, name: str, columns: ResultTable) -> NDArray[Any]:
         """One variable of the map from rows of results, shape (runs,) or (runs, classes)."""
-        if name == "class_share":
+        if name == "class_fraction":
             first = self.integers.index(_COUNTS[0])
             counts = columns.integers[:, first : first + len(CLASSES)]
             total = counts.sum(axis=1, keepdims=True)

@@ -16,7 +16,7 @@ from snapbeam.sweeps.compute.crew import Crew
 from snapbeam.sweeps.compute.maker import Maker, this_maker
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Stage
-from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.errors import CheckpointError
 from snapbeam.sweeps.points import Columns
 
 if TYPE_CHECKING:
@@ -129,7 +129,7 @@ class ClusterWorkers:
                         queue.append(task)
                         continue
                     if not crew.succeeded and outcome.reason.startswith("raised"):
-                        raise StoreError(f"the workers cannot compute this map: a task {outcome.reason}")
+                        raise CheckpointError(f"the workers cannot compute this map: a task {outcome.reason}")
                     yield task, Failure(f"{outcome.reason}, {ATTEMPTS} times")
         finally:
             if flying:
@@ -195,7 +195,7 @@ class ClusterWorkers:
                 return self._dropped(future, "lost its worker before its results came")
         maker = Maker(*by)
         if integers is None:
-            raise StoreError(
+            raise CheckpointError(
                 f"a worker runs snapbeam {maker.version} with code {maker.code}, this is {__version__} with code "
                 f"{code_hash()}: install the same in both places"
             )
@@ -207,8 +207,8 @@ class ClusterWorkers:
         return Failure(reason)
 
 
-def _gone(why: object) -> StoreError:
-    return StoreError(
+def _gone(why: object) -> CheckpointError:
+    return CheckpointError(
         f"the scheduler does not answer any more ({why}); no finished task is lost: give the same command again"
     )
 
@@ -218,7 +218,7 @@ def _answered() -> Iterator[None]:
     """Turn what is raised about a scheduler that is gone into words."""
     try:
         yield
-    except StoreError:
+    except CheckpointError:
         raise
     except _GONE as error:
         raise _gone(str(error) or type(error).__name__) from error

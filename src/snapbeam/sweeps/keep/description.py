@@ -9,7 +9,7 @@ from typing import Any
 
 from snapbeam.core.provenance import parameter_hash
 from snapbeam.core.validate import InputError, file_path, shown
-from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.errors import CheckpointError
 from snapbeam.sweeps.keep.durable import PARTIAL
 
 __all__ = [
@@ -52,7 +52,7 @@ def refuse_foreign(folder: Path) -> None:
 
 
 def read_description(file: Path) -> dict[str, Any]:
-    damaged = StoreError(
+    damaged = CheckpointError(
         f"store = {str(file.parent)!r}: map.json is damaged; put it back from a copy, or start another store"
     )
     try:

@@ -15,7 +15,7 @@ from typing import Self
 
 from snapbeam.core.files import lives
 from snapbeam.core.validate import InputError
-from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.errors import CheckpointError
 
 __all__ = ["PARTIAL", "StoreLock", "append_line", "durable_write", "member", "open_own", "refuse_links"]
 
@@ -130,7 +130,7 @@ class StoreLock:
         except OSError:
             holder = _holder(handle)
             os.close(handle)
-            raise StoreError(
+            raise CheckpointError(
                 f"store = {str(self.path.parent)!r}: is being written by another process ({holder}); "
                 "wait for it, or stop it"
             ) from None

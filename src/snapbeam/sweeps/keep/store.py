@@ -28,7 +28,7 @@ from snapbeam.core.validate import InputError, integer
 from snapbeam.sweeps.compute.maker import Maker, differences, this_maker
 from snapbeam.sweeps.compute.task import PointWork, ResultTable
 from snapbeam.sweeps.compute.tasks import Rows, Stage, chunk_size
-from snapbeam.sweeps.errors import StoreError
+from snapbeam.sweeps.errors import CheckpointError
 from snapbeam.sweeps.keep.description import (
     FORMAT,
     read_description,
@@ -69,7 +69,7 @@ class MapStore:
     InputError
         If the folder is no store, holds links, or holds a map of other parameters (the differences are
         listed).
-    StoreError
+    CheckpointError
         If another process writes it, or its description is damaged.
     """
 
@@ -235,7 +235,7 @@ class MapStore:
         """Write the results of a task, have them on the disk, and then say in the ledger that it is done."""
         start, stop = stage.bounds(task)
         if any(len(table) != stop - start for table in columns):
-            raise StoreError(
+            raise CheckpointError(
                 f"task {task} of stage {stage.name}: {len(columns.integers)} rows, not {stop - start}"
             )
         try:
@@ -268,9 +268,9 @@ class MapStore:
             )
         )
 
-    def _cannot_write(self, error: OSError) -> StoreError:
+    def _cannot_write(self, error: OSError) -> CheckpointError:
         what = "make room" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "make it writable"
-        return StoreError(
+        return CheckpointError(
             f"store = {str(self.path)!r}: cannot be written, {error.strerror or error}; no finished task is "
             f"lost: {what} and give the same command again"
         )
@@ -350,7 +350,7 @@ class StoredRows:
             if record is not None and record.state == "done":
                 columns = store._load(stage, task)
                 if columns is None:
-                    raise StoreError(
+                    raise CheckpointError(
                         f"store = {str(store.path)!r}: task {task} of stage {stage.name} was damaged after "
                         "it was checked; give the same command again to repair it"
                     )

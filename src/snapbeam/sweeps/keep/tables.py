@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["open_tables"]
 
-_MISSING = "zarr is needed for --store: install snapbeam[cluster]"
+_MISSING = "zarr is needed for --checkpoint: install snapbeam[cluster]"
 
 
 def open_tables(folder: Path, stage: Stage, work: PointWork, read_only: bool = False) -> dict[str, Any]:

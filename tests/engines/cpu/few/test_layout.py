@@ -14,7 +14,7 @@ from snapbeam.engines.assemble import make_ensemble
 from snapbeam.engines.cpu import driver
 from snapbeam.engines.cpu.few.memory import suits
 from snapbeam.engines.cpu.memory import pack
-from snapbeam.engines.outcomes import Statistic, register, withdraw
+from snapbeam.engines.outcomes import Statistic, register, unregister
 from snapbeam.model.paper_values import BEAM, CONTACT
 
 
@@ -56,20 +56,22 @@ def assert_equal(found, expected):
 
 
 def test_one_mode_is_the_same_to_the_bit(monkeypatch):
-    books = assert_same(monkeypatch, ensemble(1, cycles=40))
-    assert books["impacts"].min() > 0
-    assert np.unique(books["crossings"]).size > 5
-    assert (books["status"] == RunStatus.OK).all()
+    accumulators_of_runs = assert_same(monkeypatch, ensemble(1, cycles=40))
+    assert accumulators_of_runs["impacts"].min() > 0
+    assert np.unique(accumulators_of_runs["zero_crossings"]).size > 5
+    assert (accumulators_of_runs["status"] == RunStatus.OK).all()
 
 
 def test_decided_and_given_up_runs_are_the_same(monkeypatch):
-    books = assert_same(monkeypatch, ensemble(1, cycles=120, early_decision=True))
-    assert 3 < (books["status"] == RunStatus.DECIDED).sum() < 40
+    accumulators_of_runs = assert_same(monkeypatch, ensemble(1, cycles=120, early_termination=True))
+    assert 3 < (accumulators_of_runs["status"] == RunStatus.EARLY_STOP).sum() < 40
     # a limit that is met on the way; one that cannot but be met is refused before
-    books = assert_same(monkeypatch, dataclasses.replace(ensemble(1, cycles=20), max_steps=2000))
-    limited = books["status"] == RunStatus.STEP_LIMIT
+    accumulators_of_runs = assert_same(
+        monkeypatch, dataclasses.replace(ensemble(1, cycles=20), max_steps=2000)
+    )
+    limited = accumulators_of_runs["status"] == RunStatus.STEP_LIMIT
     assert limited.any()
-    assert (books["steps"][limited] == 2000).all()
+    assert (accumulators_of_runs["steps"][limited] == 2000).all()
 
 
 def test_a_gap_and_a_striker_above(monkeypatch):
@@ -81,11 +83,11 @@ def test_a_striker_with_mass(monkeypatch):
     body = {"mass": 0.02, "spring": 700.0, "damper": 0.1}
     made = ensemble(2, runs=16, cycles=8, striker=body, high_frequency_ratio=1.2)
     found = statistics_of(made, assert_same(monkeypatch, made))
-    assert (found["impacts"] > 0).all() and (found["high_frequency_share"] > 0.0).any()
+    assert (found["impacts"] > 0).all() and (found["high_frequency_energy_fraction"] > 0.0).any()
     model = made.structure.model
     for i in range(3):
         numbers = dict(zip(made.drive.number_names, made.drive_numbers[i], strict=True))
-        first = 2.0 * np.pi * model.reference_freq
+        first = 2.0 * np.pi * model.reference_frequency
         drive = sb.Sine(
             frequency_ratio=float(numbers["omega"] / first),
             velocity_amplitude=float(numbers["amplitude"] * numbers["omega"] / (model.length_scale * first)),
@@ -93,7 +95,9 @@ def test_a_striker_with_mass(monkeypatch):
         striker = sb.Striker(drive=drive, location=float(made.location[i]), **body)
         how = sb.Integration(cycles=8)
         times = np.linspace(0.0, 8 * 2.0 * np.pi / numbers["omega"] * (1.0 - 1e-12), 20001)
-        w = sb.simulate(sb.System(model, CONTACT, striker), how, sample_times=times).dataset.displacement
+        w = sb.simulate(
+            sb.System(model, CONTACT, striker), how, sample_times=times
+        ).dataset.displacement_at_striker
         assert found["min_displacement"][i] == pytest.approx(float(w.min()), abs=1e-3)
         assert found["max_displacement"][i] == pytest.approx(float(w.max()), abs=1e-3)
 
@@ -121,7 +125,7 @@ def test_neighbours_order_and_threads_do_not_matter(monkeypatch):
     [
         (2, {}),
         (3, {}),
-        (4, {"early_decision": True}),
+        (4, {"early_termination": True}),
         (8, {}),
         (13, {}),
         (16, {"cycles": 5}),
@@ -143,8 +147,8 @@ def test_what_it_does_not_serve_goes_to_the_other_layout():
     assert not serves(ensemble(13, cycles=2))
     assert not serves(ensemble(1, runs=1, cycles=2))
     assert not serves(ensemble(1, cycles=2, contact=sb.Restitution(coefficient=0.6)))
-    assert not serves(ensemble(1, cycles=2, contact=sb.HuntCrossley(stiffness=2e8, loss=0.5)))
-    assert not serves(ensemble(1, cycles=2, contact=sb.PowerLaw(force_at_micrometre=1.0, exponent=1.4)))
+    assert not serves(ensemble(1, cycles=2, contact=sb.HuntCrossley(stiffness=2e8, damping_factor=0.5)))
+    assert not serves(ensemble(1, cycles=2, contact=sb.PowerLaw(force_at_1um=1.0, exponent=1.4)))
     drive = sb.HalfSine(displacement_amplitude=0.5, duration=0.5)
     assert not serves(ensemble(1, cycles=2, drive=drive))
     register(
@@ -153,7 +157,7 @@ def test_what_it_does_not_serve_goes_to_the_other_layout():
     try:
         assert not serves(ensemble(1, cycles=2))
     finally:
-        withdraw("twice")
+        unregister("twice")
 
 
 def test_small_work_is_not_worth_another_kernel(monkeypatch):

@@ -45,16 +45,16 @@ def marched(runs):
     tracemalloc.start()
     try:
         made = many(runs)
-        books = driver.run_ensemble(made, 2, lambda done, total: told.append((done, total)))
+        accumulators_of_runs = driver.run_ensemble(made, 2, lambda done, total: told.append((done, total)))
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    return peak / runs, told, books
+    return peak / runs, told, accumulators_of_runs
 
 
-def assert_marched(runs, told, books):
-    assert (books["status"] == RunStatus.OK).all()
-    assert (books["time"] > 0).all()
+def assert_marched(runs, told, accumulators_of_runs):
+    assert (accumulators_of_runs["status"] == RunStatus.OK).all()
+    assert (accumulators_of_runs["time"] > 0).all()
     assert told[0] == (0, runs)
     assert told[-1] == (runs, runs)
     assert all(before[0] <= after[0] for before, after in pairwise(told))
@@ -63,8 +63,8 @@ def assert_marched(runs, told, books):
 def test_memory_of_a_run_does_not_depend_on_their_number():
     marched(100)  # what is compiled and measured once
     few, _, _ = marched(10_000)
-    more, told, books = marched(20_000)
-    assert_marched(20_000, told, books)
+    more, told, accumulators_of_runs = marched(20_000)
+    assert_marched(20_000, told, accumulators_of_runs)
     assert more < 1.05 * few
     assert more < MOST_BYTES
 
@@ -101,7 +101,7 @@ def test_an_interrupt_ends_them_at_once():
 @pytest.mark.slow
 def test_ten_million_runs():
     size = 10_000_000
-    bytes_a_run, told, books = marched(size)
-    assert_marched(size, told, books)
+    bytes_a_run, told, accumulators_of_runs = marched(size)
+    assert_marched(size, told, accumulators_of_runs)
     assert len(told) > 100
     assert bytes_a_run < MOST_BYTES

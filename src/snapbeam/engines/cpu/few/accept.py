@@ -6,11 +6,17 @@ from snapbeam.engines.cpu.few import places as at
 from snapbeam.engines.cpu.few.meet import look_at
 from snapbeam.engines.cpu.few.modes import modal_energy, modes_of
 from snapbeam.engines.scalar.compile import compiled, inlined
-from snapbeam.engines.scalar.decisions import Seen, clock_of, count_in_step, finish_impact, quiet_energy
-from snapbeam.engines.scalar.lanes import WIDTH, load, splat, spread_at, store, vabs, vfloor
+from snapbeam.engines.scalar.decisions import (
+    ContactKinematics,
+    clock_of,
+    count_zero_crossings_in_step,
+    close_impact,
+    low_energy_limit,
+)
+from snapbeam.engines.scalar.lanes import WIDTH, load, splat, broadcast_load, store, vabs, vfloor
 from snapbeam.engines.scalar.masks import bits, less, lowest, mask_of, pick, vmax, vmin
 from snapbeam.engines.scalar.physics import mode_energy, tension_energy
-from snapbeam.engines.scalar.signals import bulge, widened
+from snapbeam.engines.scalar.signals import hermite_overshoot_bound, update_extrema
 from snapbeam.engines.scalar.tip import numbers_of
 
 __all__ = ["accept", "end_contact"]
@@ -22,7 +28,7 @@ def _widen(m, low, high, u0, v0, which):
     while which:
         lane = lowest(which)
         which &= which - 1
-        m[low + lane], m[high + lane] = widened(
+        m[low + lane], m[high + lane] = update_extrema(
             m[low + lane], m[high + lane], m[u0 + lane], m[v0 + lane],
             m[at.TEMP + lane], m[at.TEMP1 + lane], m[at.LENGTH + lane],
         )  # fmt: skip
@@ -32,7 +38,7 @@ def _widen(m, low, high, u0, v0, which):
 def _extremes(m, low, high, u0, v0, u1, v1, length, which):
     before, rate = load(m, u0), load(m, v0)
     lesser, greater = vmin(before, u1), vmax(before, u1)
-    swell = bulge(rate, v1, length)
+    swell = hermite_overshoot_bound(rate, v1, length)
     least, most = load(m, low), load(m, high)
     past = (bits(less(most, greater + swell)) | bits(less(lesser - swell, least))) & which
     turning = bits(less(rate * v1, 0.0)) & past
@@ -52,7 +58,7 @@ def _add(m, row, which, more):
 
 @inlined
 def _track(m, seen1, length, which):
-    """Extremes and mean squares, as :func:`~snapbeam.engines.scalar.decisions.track` keeps them."""
+    """Extremes and mean squares, as :func:`~snapbeam.engines.scalar.decisions.accumulate_displacement` keeps them."""
     _extremes(m, at.MIN_W, at.MAX_W, at.W, at.WV, seen1.w, seen1.wv, length, which)
     _extremes(m, at.MIN_C, at.MAX_C, at.C, at.CV, seen1.c, seen1.cv, length, which)
     mask, half = mask_of(which), 0.5 * length
@@ -67,7 +73,7 @@ def _track(m, seen1, length, which):
 
 
 @compiled
-def _count(m, n, world, asked, books, c1, cv1, which, looked):
+def _count(m, n, world, kernel_input, accumulators_of_runs, c1, cv1, which, looked):
     """Count the crossings of the centre in the steps of some lanes."""
     store(m, at.TEMP, c1)
     store(m, at.TEMP1, cv1)
@@ -75,55 +81,57 @@ def _count(m, n, world, asked, books, c1, cv1, which, looked):
         lane = lowest(which)
         which &= which - 1
         i = n[at.RUNS + lane]
-        book, clock = books[i], clock_of(asked.runs[i], asked.max_steps)
+        accumulators, clock = accumulators_of_runs[i], clock_of(kernel_input.runs[i], kernel_input.max_steps)
         pieces = 0
         if not n[at.TOUCHING] & (1 << lane):
             pieces = look_at(m, world.look, lane, looked)
-        seen = Seen(0.0, 0.0, 0.0, 0.0, m[at.C + lane], m[at.CV + lane])
-        seen1 = Seen(0.0, 0.0, 0.0, 0.0, m[at.TEMP + lane], m[at.TEMP1 + lane])
+        seen = ContactKinematics(0.0, 0.0, 0.0, 0.0, m[at.C + lane], m[at.CV + lane])
+        seen1 = ContactKinematics(0.0, 0.0, 0.0, 0.0, m[at.TEMP + lane], m[at.TEMP1 + lane])
         rest = m[at.HOME + lane] * m[at.REST_CENTER + lane]
         start, length, piece = int(m[at.T + lane]), m[at.LENGTH + lane], m[at.LOOK_PIECE + lane]
-        count_in_step(book, clock, start, length, seen, seen1, looked, rest, pieces, piece)
-        m[at.SIDE + lane], m[at.LATE + lane] = book.side, book.crossings_last_quarter
+        count_zero_crossings_in_step(
+            accumulators, clock, start, length, seen, seen1, looked, rest, pieces, piece
+        )
+        m[at.SIDE + lane], m[at.LATE + lane] = accumulators.side, accumulators.zero_crossings_last_quarter
 
 
 @inlined
-def _crossings(m, n, world, asked, books, seen1, length, after, which, looked):
+def _crossings(m, n, world, kernel_input, accumulators_of_runs, seen1, length, after, which, looked):
     """Where the centre may have crossed, have it counted."""
     touching = which & n[at.TOUCHING]
     near = bits(less(load(m, at.SAFE_CENTER), after)) & which & ~touching
     if touching:
         side = load(m, at.SIDE)
         clear = vmin(side * load(m, at.C), side * seen1.c)
-        near |= touching & ~bits(less(bulge(load(m, at.CV), seen1.cv, length), clear))
+        near |= touching & ~bits(less(hermite_overshoot_bound(load(m, at.CV), seen1.cv, length), clear))
     if near:
-        _count(m, n, world, asked, books, seen1.c, seen1.cv, near, looked)
+        _count(m, n, world, kernel_input, accumulators_of_runs, seen1.c, seen1.cv, near, looked)
 
 
 @inlined
-def end_contact(m, asked, i, lane, book, end):
+def end_contact(m, kernel_input, i, lane, accumulators, end):
     """Enter the contact that ends at tick *end* in the book."""
-    law = numbers_of(asked.law, asked.law_numbers, i)
-    book.deepest, book.impulse = m[at.DEEPEST + lane], m[at.IMPULSE + lane]
-    finish_impact(book, None, 0, law, end, m[at.TICK + lane])
+    law = numbers_of(kernel_input.law, kernel_input.law_numbers, i)
+    accumulators.deepest, accumulators.impulse = m[at.DEEPEST + lane], m[at.IMPULSE + lane]
+    close_impact(accumulators, None, 0, law, end, m[at.TICK + lane])
     m[at.DEEPEST + lane] = m[at.IMPULSE + lane] = 0.0
 
 
 @compiled
-def _events(m, n, asked, books, which):
+def _events(m, n, kernel_input, accumulators_of_runs, which):
     """Contacts that begin and end where their lanes stand now."""
     n[at.TOUCHING] ^= which
     while which:
         lane = lowest(which)
         which &= which - 1
         i, t = n[at.RUNS + lane], int(m[at.T + lane])
-        book = books[i]
+        accumulators = accumulators_of_runs[i]
         m[at.SAFE_GAP + lane] = m[at.SAFE_CENTER + lane] = m[at.T + lane]
         if n[at.TOUCHING] & (1 << lane):
-            book.touching, book.onset = 1, t
+            accumulators.touching, accumulators.onset = 1, t
             m[at.ONSET + lane] = m[at.T + lane]
         else:
-            end_contact(m, asked, i, lane, book, t)
+            end_contact(m, kernel_input, i, lane, accumulators, t)
 
 
 @inlined
@@ -131,7 +139,7 @@ def _beam_energy(m, body, energy):
     """As :func:`~snapbeam.engines.cpu.rows.beam_energy` of the other layout, at the ends of the steps."""
     if body is None:
         return energy
-    omega = spread_at(m, body + at.OMEGA_I)
+    omega = broadcast_load(m, body + at.OMEGA_I)
     return energy - mode_energy(omega, load(m, body + at.Q1), load(m, body + at.P1))
 
 
@@ -151,7 +159,7 @@ def _weigh(m, n, shape, world, seen1, released, events, which):
     store(m, at.WEIGHED, pick(mask, t, load(m, at.WEIGHED)))
     apart = due & ~n[at.TOUCHING]
     energy = linear + tension_energy(world.gamma, load(m, at.GQ), load(m, at.QR))
-    quiet = bits(less(energy, quiet_energy(world.gamma, world.stretch)))
+    quiet = bits(less(energy, low_energy_limit(world.gamma, world.stretch)))
     n[at.QUIET] = (n[at.QUIET] & ~apart) | (quiet & apart)
     sixteenth = bits(less(beat - 16.0 * vfloor(0.0625 * beat), 0.5))
     sure = apart & ~events & sixteenth & bits(less(load(m, at.HOME), 0.0))
@@ -162,13 +170,13 @@ def _weigh(m, n, shape, world, seen1, released, events, which):
 
 
 @inlined
-def accept(m, n, shape, world, asked, books, about, given, which, looked):
+def accept(m, n, shape, world, kernel_input, accumulators_of_runs, about, given, which, looked):
     """Take the steps of the lanes *which*; returns those that are decided."""
     mask, length = mask_of(which), load(m, at.LENGTH)
-    home = load(m, at.HOME)
-    seen1 = Seen(
-        about.w + home * load(m, at.REST_CONTACT), about.wv, about.d, about.dv,
-        about.c + home * load(m, at.REST_CENTER), about.cv,
+    well_sign = load(m, at.HOME)
+    seen1 = ContactKinematics(
+        about.w + well_sign * load(m, at.REST_CONTACT), about.wv, about.d, about.dv,
+        about.c + well_sign * load(m, at.REST_CENTER), about.cv,
     )  # fmt: skip
     touching = which & n[at.TOUCHING]
     if touching:
@@ -182,7 +190,7 @@ def accept(m, n, shape, world, asked, books, about, given, which, looked):
     _track(m, seen1, length, which)
     ticks, period = load(m, at.TICKS), load(m, at.PERIOD)
     after = load(m, at.T) + ticks
-    _crossings(m, n, world, asked, books, seen1, length, after, which, looked)
+    _crossings(m, n, world, kernel_input, accumulators_of_runs, seen1, length, after, which, looked)
     store(m, at.T, pick(mask, after, load(m, at.T)))
     within = load(m, at.WITHIN)
     turned = within + ticks
@@ -191,7 +199,7 @@ def accept(m, n, shape, world, asked, books, about, given, which, looked):
     events = n[at.EVENT] & which
     released = events & touching
     if events:
-        _events(m, n, asked, books, events)
+        _events(m, n, kernel_input, accumulators_of_runs, events)
     for bit in (at.CUTTING, at.EVENT, at.LOOKS, at.PROBED):
         n[bit] &= ~which
     sure = _weigh(m, n, shape, world, seen1, released, events, which)

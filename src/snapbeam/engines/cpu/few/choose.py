@@ -7,7 +7,7 @@ from snapbeam.engines.cpu.few.modes import at_hand, modes_of, tension
 from snapbeam.engines.cpu.few.seat import TWO_PI, prepare, slot_of
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.decisions import GRADING, RELEASE, STRETCHED
-from snapbeam.engines.scalar.lanes import load, splat, spread_at, store, vabs
+from snapbeam.engines.scalar.lanes import load, splat, broadcast_load, store, vabs
 from snapbeam.engines.scalar.masks import (
     bits,
     halvings,
@@ -21,7 +21,7 @@ from snapbeam.engines.scalar.masks import (
 )
 from snapbeam.engines.scalar.physics import sincos
 
-__all__ = ["choose", "fetch"]
+__all__ = ["propose_step", "fetch"]
 
 _CUSTOM = -99.0
 """Key of flows that were made for a step of any length."""
@@ -30,13 +30,13 @@ _CUSTOM = -99.0
 @compiled
 def _change_wells(m, shape, world, which):
     """Take the other well as the origin, in some lanes."""
-    home, mask = load(m, at.HOME), mask_of(which)
+    well_sign, mask = load(m, at.HOME), mask_of(which)
     for i in range(modes_of(shape)):
         mode = at.MODE + i * at.MODE_ROWS
         q, well = load(m, mode + at.Q), load(m, mode + at.SEEN_WELL)
-        store(m, mode + at.Q, pick(mask, q - home * spread_at(m, mode + at.SHIFT), q))
+        store(m, mode + at.Q, pick(mask, q - well_sign * broadcast_load(m, mode + at.SHIFT), q))
         store(m, mode + at.SEEN_WELL, pick(mask, 0.0 - well, well))
-    store(m, at.HOME, pick(mask, 0.0 - home, home))
+    store(m, at.HOME, pick(mask, 0.0 - well_sign, well_sign))
     gq, qr = tension(m, shape, world.gamma, mask, at.Q)
     store(m, at.STRETCH, pick(mask, 2.0 * gq + qr, load(m, at.STRETCH)))
 
@@ -63,7 +63,7 @@ def _in_contact(m, level, touching):
 
 
 @inlined
-def choose(m, n, shape, world):
+def propose_step(m, n, shape, world):
     """The length of the next step of every lane that begins one; returns those."""
     fresh = n[at.LIVE] & ~(n[at.CUTTING] | n[at.ASIDE] | n[at.PROBED])
     if world.stretch > 0.0:

@@ -13,29 +13,29 @@ import math
 from snapbeam.core.codes import RunStatus
 from snapbeam.engines.cpu.few import places as at
 from snapbeam.engines.cpu.few.accept import accept, end_contact
-from snapbeam.engines.cpu.few.choose import choose, fetch
+from snapbeam.engines.cpu.few.choose import propose_step, fetch
 from snapbeam.engines.cpu.few.meet import About, cut_again, meet, probe
 from snapbeam.engines.cpu.few.modes import modal_energy, signals, take, tension
 from snapbeam.engines.cpu.few.seat import beam_signals, seat
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.contact import contact_energy
-from snapbeam.engines.scalar.decisions import leave_contact_open
+from snapbeam.engines.scalar.decisions import accumulate_open_contact
 from snapbeam.engines.scalar.lanes import WIDTH, load, store, vabs
 from snapbeam.engines.scalar.masks import bits, lanes_tuple, less, lowest, mask_of, pick, vmax
 from snapbeam.engines.scalar.physics import shaker_motion, sincos, tension_energy
 from snapbeam.engines.scalar.tip import numbers_of
 
-__all__ = ["march_few"]
+__all__ = ["integrate_run_lanes"]
 
-_OK, _DECIDED, _RUNNING = int(RunStatus.OK), int(RunStatus.DECIDED), int(RunStatus.RUNNING)
-_NOT_FINITE, _STEP_LIMIT = int(RunStatus.NOT_FINITE), int(RunStatus.STEP_LIMIT)
+_OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
+_DIVERGED, _STEP_LIMIT = int(RunStatus.DIVERGED), int(RunStatus.STEP_LIMIT)
 
 
 @inlined
 def _observe(m, shape, world):
     """What is seen at the ends of the steps."""
-    home = load(m, at.HOME)
-    offset = load(m, at.OFFSET) + (1.0 - home) * load(m, at.REST_CONTACT)
+    well_sign = load(m, at.HOME)
+    offset = load(m, at.OFFSET) + (1.0 - well_sign) * load(m, at.REST_CONTACT)
     omega = load(m, at.OMEGA)
     sine, cosine = sincos(load(m, at.PHASE) + omega * load(m, at.LENGTH))
     motion, velocity = shaker_motion(load(m, at.AMPLITUDE), omega, sine, cosine)
@@ -45,55 +45,64 @@ def _observe(m, shape, world):
 
 
 @compiled
-def _finish(m, n, shape, world, asked, lane, book, status, goes_on):
+def _finish(m, n, shape, world, kernel_input, lane, accumulators, status, goes_on):
     """Close the book of a lane; its last contact too, unless the run is to go on from here."""
     i, t, tick = n[at.RUNS + lane], int(m[at.T + lane]), m[at.TICK + lane]
-    law = numbers_of(asked.law, asked.law_numbers, i)
-    book.deepest, book.impulse = m[at.DEEPEST + lane], m[at.IMPULSE + lane]
+    law = numbers_of(kernel_input.law, kernel_input.law_numbers, i)
+    accumulators.deepest, accumulators.impulse = m[at.DEEPEST + lane], m[at.IMPULSE + lane]
     if n[at.TOUCHING] & (1 << lane):
         if goes_on:
-            leave_contact_open(book, law, t, tick)
+            accumulate_open_contact(accumulators, law, t, tick)
         else:
-            end_contact(m, asked, i, lane, book, t)
-    if status == _DECIDED:
-        book.decided_at = t * tick
+            end_contact(m, kernel_input, i, lane, accumulators, t)
+    if status == _EARLY_STOP:
+        accumulators.early_stop_time = t * tick
     gq, qr = tension(m, shape, world.gamma, mask_of(0), at.Q)
     linear, _ = modal_energy(m, shape, at.Q, at.P)
     store(m, at.TEMP, linear + tension_energy(world.gamma, gq, qr))
-    book.energy = m[at.TEMP + lane] + contact_energy(law, m[at.D + lane])
-    book.displacement, book.center = m[at.W + lane], m[at.C + lane]
-    book.min_displacement, book.max_displacement = m[at.MIN_W + lane], m[at.MAX_W + lane]
-    book.min_center, book.max_center = m[at.MIN_C + lane], m[at.MAX_C + lane]
-    book.peak_velocity, book.peak_center_velocity = m[at.PEAK_WV + lane], m[at.PEAK_CV + lane]
-    book.square_displacement, book.square_center = m[at.SQUARE_W + lane], m[at.SQUARE_C + lane]
-    book.square_velocity, book.square_center_velocity = m[at.SQUARE_WV + lane], m[at.SQUARE_CV + lane]
-    book.energy_time, book.high_energy_time = m[at.ENERGY_TIME + lane], m[at.HIGH_TIME + lane]
-    book.work, book.gross_work = m[at.WORK + lane], m[at.GROSS + lane]
-    book.steps = int(m[at.STEPS + lane])
-    book.time, book.status = t, status
+    accumulators.energy = m[at.TEMP + lane] + contact_energy(law, m[at.D + lane])
+    accumulators.displacement, accumulators.center = m[at.W + lane], m[at.C + lane]
+    accumulators.min_displacement, accumulators.max_displacement = m[at.MIN_W + lane], m[at.MAX_W + lane]
+    accumulators.min_center, accumulators.max_center = m[at.MIN_C + lane], m[at.MAX_C + lane]
+    accumulators.peak_velocity, accumulators.peak_midspan_velocity = (
+        m[at.PEAK_WV + lane],
+        m[at.PEAK_CV + lane],
+    )
+    accumulators.square_displacement, accumulators.square_center = (
+        m[at.SQUARE_W + lane],
+        m[at.SQUARE_C + lane],
+    )
+    accumulators.square_velocity, accumulators.square_midspan_velocity = (
+        m[at.SQUARE_WV + lane],
+        m[at.SQUARE_CV + lane],
+    )
+    accumulators.energy_time, accumulators.high_energy_time = m[at.ENERGY_TIME + lane], m[at.HIGH_TIME + lane]
+    accumulators.work, accumulators.gross_work = m[at.WORK + lane], m[at.GROSS + lane]
+    accumulators.steps = int(m[at.STEPS + lane])
+    accumulators.time, accumulators.status = t, status
     n[at.LIVE] &= ~(1 << lane)
 
 
 @inlined
-def _begin_at_once(m, n, books, which):
+def _begin_at_once(m, n, accumulators_of_runs, which):
     """Contacts that begin with the step: it is taken again, in contact."""
     n[at.TOUCHING] |= which
     while which:
         lane = lowest(which)
         which &= which - 1
-        book = books[n[at.RUNS + lane]]
-        book.touching, book.onset = 1, int(m[at.T + lane])
+        accumulators = accumulators_of_runs[n[at.RUNS + lane]]
+        accumulators.touching, accumulators.onset = 1, int(m[at.T + lane])
         m[at.ONSET + lane] = m[at.T + lane]
 
 
 @inlined
-def _pass(m, n, shape, world, asked, books, looked):
+def _pass(m, n, shape, world, kernel_input, accumulators_of_runs, looked):
     """A step of every lane; returns the lanes that are not finite, decided, over, and at their limit of steps."""
-    fresh = choose(m, n, shape, world)
+    fresh = propose_step(m, n, shape, world)
     fetch(m, n, shape, world)
     live = n[at.LIVE]
     touching = n[at.TOUCHING] & live
-    law = lanes_tuple(asked.law, m, at.LAW)
+    law = lanes_tuple(kernel_input.law, m, at.LAW)
     given = take(m, shape, world.stages, world.gamma, touching != 0, mask_of(touching), law)
     about = _observe(m, shape, world)
     going = live
@@ -110,9 +119,9 @@ def _pass(m, n, shape, world, asked, books, looked):
     ends, at_once = meet(m, n, shape, world, about, fresh & going, looked)
     going = (going & ~fresh) | ends
     if looks:
-        going &= ~cut_again(m, n, asked, about.d, about.dv, looks)
+        going &= ~cut_again(m, n, kernel_input, about.d, about.dv, looks)
     if at_once:
-        _begin_at_once(m, n, books, at_once)
+        _begin_at_once(m, n, accumulators_of_runs, at_once)
     pressed = going & n[at.TOUCHING] & ~n[at.PROBED]
     if pressed:
         turning = bits(less(load(m, at.DV) * about.dv, 0.0)) & bits(less(0.0, load(m, at.DV))) & pressed
@@ -120,30 +129,35 @@ def _pass(m, n, shape, world, asked, books, looked):
             going &= ~probe(m, n, about.d, about.dv, turning)
     sure, over = 0, 0
     if going:
-        sure = accept(m, n, shape, world, asked, books, about, given, going, looked)
+        sure = accept(m, n, shape, world, kernel_input, accumulators_of_runs, about, given, going, looked)
         over = going & ~bits(less(load(m, at.T), load(m, at.END)))
     spent = (going | at_once) & ~bits(less(load(m, at.STEPS), load(m, at.MAX_STEPS)))
     return failed, sure, over, spent
 
 
 @compiled
-def march_few(m, n, shape, world, asked, which, room, kept, spare):
+def integrate_run_lanes(m, n, shape, world, kernel_input, which, scratch, kernel_output, spare):
     """March the runs *which*, eight at a time; *m* and *n* are the calling thread's own, *spare* is nobody's book."""
-    books, looked, following, goes_on = kept.books, room.looked, 0, False
+    accumulators_of_runs, looked, following, goes_on = (
+        kernel_output.accumulators_of_runs,
+        scratch.looked,
+        0,
+        False,
+    )
     n[at.LIVE] = 0
     for lane in range(WIDTH):
         # lanes that stay empty march what the first run begins with, unseen
         i = which[min(lane, which.size - 1)]
         if lane < which.size:
-            seat(m, n, shape, world, asked, lane, i, books[i])
+            seat(m, n, shape, world, kernel_input, lane, i, accumulators_of_runs[i])
             following += 1
         else:
-            seat(m, n, shape, world, asked, lane, i, spare[0])
+            seat(m, n, shape, world, kernel_input, lane, i, spare[0])
             n[at.LIVE] &= ~(1 << lane)
     while n[at.LIVE]:
-        if kept.pulse[0] != 0:
+        if kernel_output.pulse[0] != 0:
             break
-        failed, sure, over, spent = _pass(m, n, shape, world, asked, books, looked)
+        failed, sure, over, spent = _pass(m, n, shape, world, kernel_input, accumulators_of_runs, looked)
         ended = failed | sure | over | spent
         while ended:
             lane = lowest(ended)
@@ -151,20 +165,20 @@ def march_few(m, n, shape, world, asked, which, room, kept, spare):
             bit = 1 << lane
             status = _STEP_LIMIT
             if failed & bit:
-                status = _NOT_FINITE
+                status = _DIVERGED
             elif sure & bit:
-                status = _DECIDED
+                status = _EARLY_STOP
             elif over & bit:
                 status = _OK
-            book = books[n[at.RUNS + lane]]
-            _finish(m, n, shape, world, asked, lane, book, status, goes_on)
+            accumulators = accumulators_of_runs[n[at.RUNS + lane]]
+            _finish(m, n, shape, world, kernel_input, lane, accumulators, status, goes_on)
             if following < which.size:
                 i = which[following]
                 following += 1
-                seat(m, n, shape, world, asked, lane, i, books[i])
+                seat(m, n, shape, world, kernel_input, lane, i, accumulators_of_runs[i])
     live = n[at.LIVE]
     while live:
         lane = lowest(live)
         live &= live - 1
-        book = books[n[at.RUNS + lane]]
-        book.time, book.status = int(m[at.T + lane]), _RUNNING
+        accumulators = accumulators_of_runs[n[at.RUNS + lane]]
+        accumulators.time, accumulators.status = int(m[at.T + lane]), _RUNNING

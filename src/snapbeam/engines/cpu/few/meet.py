@@ -5,13 +5,19 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from snapbeam.engines.cpu.few import places as at
-from snapbeam.engines.cpu.few.modes import bounds, glide
+from snapbeam.engines.cpu.few.modes import bounds, propagate_free
 from snapbeam.engines.cpu.few.seat import flows_over
 from snapbeam.engines.scalar.compile import compiled, inlined
-from snapbeam.engines.scalar.decisions import Seen, clock_of, entry_again, first_entry, safe_for
+from snapbeam.engines.scalar.decisions import (
+    ContactKinematics,
+    clock_of,
+    refine_onset,
+    first_contact_onset,
+    safe_interval,
+)
 from snapbeam.engines.scalar.lanes import WIDTH, load, splat, store, vabs, vfloor, vtrunc
 from snapbeam.engines.scalar.masks import bits, less, lowest, mask_of, pick, vmax
-from snapbeam.engines.scalar.signals import first_fall, turning_point, widened
+from snapbeam.engines.scalar.signals import first_downcrossing, turning_point, update_extrema
 
 __all__ = ["About", "cut_again", "look_at", "meet", "probe"]
 
@@ -43,9 +49,9 @@ def _safe(m, shape, late, early_center):
     bound, push, center_bound, center_push = bounds(m, shape)
     t, tick, step_time = load(m, at.T), load(m, at.TICK), load(m, at.STEP_TIME)
     zero = splat(0.0)
-    gap = safe_for(zero - load(m, at.D), bound, load(m, at.TIP_SPEED), push, step_time)
+    gap = safe_interval(zero - load(m, at.D), bound, load(m, at.TIP_SPEED), push, step_time)
     store(m, at.SAFE_GAP, pick(mask_of(late), t + vtrunc(gap / tick), load(m, at.SAFE_GAP)))
-    center = safe_for(vabs(load(m, at.C)), center_bound, zero, center_push, step_time)
+    center = safe_interval(vabs(load(m, at.C)), center_bound, zero, center_push, step_time)
     store(m, at.SAFE_CENTER, pick(mask_of(early_center), t + vtrunc(center / tick), load(m, at.SAFE_CENTER)))
 
 
@@ -71,7 +77,7 @@ def _look(m, shape, world, lookers, with_center):
     while left:
         most = max(most, int(m[at.LOOK_PIECES + lowest(left)]))
         left &= left - 1
-    return bits(less(0.0, glide(m, shape, world.look, which, with_center, most)))
+    return bits(less(0.0, propagate_free(m, shape, world.look, which, with_center, most)))
 
 
 @inlined
@@ -97,7 +103,9 @@ def _leave(m, n, about_d, about_dv, leaving):
         ticks, d = int(m[at.TICKS + lane]), m[at.D + lane]
         cut = ticks
         if d > 0.0:
-            fall = first_fall(d, m[at.DV + lane], m[at.TEMP + lane], m[at.TEMP1 + lane], m[at.LENGTH + lane])
+            fall = first_downcrossing(
+                d, m[at.DV + lane], m[at.TEMP + lane], m[at.TEMP1 + lane], m[at.LENGTH + lane]
+            )
             cut = max(1, int(fall * ticks))
         if cut != ticks:
             _cut(m, n, lane, cut)
@@ -115,7 +123,7 @@ def _enter(m, n, look, rising, looked):
         rising &= rising - 1
         bit = 1 << lane
         pieces = look_at(m, look, lane, looked)
-        entry = first_entry(looked, pieces, m[at.LOOK_PIECE + lane])
+        entry = first_contact_onset(looked, pieces, m[at.LOOK_PIECE + lane])
         if entry < 0.0:
             on |= bit
             continue
@@ -161,7 +169,7 @@ def meet(m, n, shape, world, about, whole, looked):
 
 
 @compiled
-def cut_again(m, n, asked, d, dv, which):
+def cut_again(m, n, kernel_input, d, dv, which):
     """Cut the steps of lanes once more that enter the contact, where they did not meet it; returns those that do."""
     store(m, at.TEMP, d)
     store(m, at.TEMP1, dv)
@@ -170,11 +178,11 @@ def cut_again(m, n, asked, d, dv, which):
         lane = lowest(which)
         which &= which - 1
         n[at.LOOKS] &= ~(1 << lane)
-        clock = clock_of(asked.runs[n[at.RUNS + lane]], asked.max_steps)
-        seen = Seen(0.0, 0.0, m[at.TEMP + lane], m[at.TEMP1 + lane], 0.0, 0.0)
+        clock = clock_of(kernel_input.runs[n[at.RUNS + lane]], kernel_input.max_steps)
+        seen = ContactKinematics(0.0, 0.0, m[at.TEMP + lane], m[at.TEMP1 + lane], 0.0, 0.0)
         least = (clock.step >> clock.finest) * clock.tick
         ticks = int(m[at.TICKS + lane])
-        cut = entry_again(clock, ticks, int(m[at.WHOLE + lane]), seen, least)
+        cut = refine_onset(clock, ticks, int(m[at.WHOLE + lane]), seen, least)
         if cut != ticks:
             m[at.TICKS + lane] = cut
             again |= 1 << lane
@@ -193,7 +201,7 @@ def probe(m, n, d, dv, turning):
         d0, v0, d1, v1 = m[at.D + lane], m[at.DV + lane], m[at.TEMP + lane], m[at.TEMP1 + lane]
         length, deepest = m[at.LENGTH + lane], max(m[at.DEEPEST + lane], m[at.TEMP + lane])
         turn = turning_point(d0, v0, d1, v1, length)
-        if turn > 0.0 and widened(d0, deepest, d0, v0, d1, v1, length)[1] > deepest:
+        if turn > 0.0 and update_extrema(d0, deepest, d0, v0, d1, v1, length)[1] > deepest:
             m[at.DEEPEST + lane] = deepest
             m[at.LENGTH + lane] = turn * length
             n[at.ASIDE] |= 1 << lane

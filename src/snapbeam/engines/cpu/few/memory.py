@@ -49,8 +49,8 @@ def suits(ensemble: Ensemble, packed: Packed, most: int = at.MOST) -> bool:
         and ensemble.others is None
         and ensemble.size > 1
         and ensemble.drive.harmonic
-        and law.side_by_side
-        and not (law.lossy or law.impulsive)
+        and law.vectorizable
+        and not (law.rate_dependent or law.impulsive)
         and ensemble.law_numbers.shape[1] <= _LAW_NUMBERS
         and ensemble.finest + 2 <= at.LEVELS
         and 2.0 * flow * longest < packed.layout.gentle
@@ -97,7 +97,7 @@ def lay_out_few(ensemble: Ensemble, packed: Packed, pieces: int) -> FewMemory:
     body = None
     if structure.body_mass is not None:
         body = at.MODE + int(np.flatnonzero(order == structure.equilibrium.size)[0]) * at.MODE_ROWS
-    world = World(stages, structure.tension_stiffness, structure.stretch, slot, look, body)
+    world = World(stages, structure.nonlinear_stiffness, structure.stretch, slot, look, body)
     return FewMemory(m, np.zeros(at.RUNS + 8, dtype=np.int64), shape_of(blocks, stages.flows), world)
 
 

@@ -14,7 +14,7 @@ from snapbeam.engines.scalar.compile import INLINE_HERE, inlined
 __all__ = [
     "at_hand",
     "bounds",
-    "glide",
+    "propagate_free",
     "groups_of",
     "modal_energy",
     "modes_of",
@@ -90,12 +90,12 @@ def _energy_of(m, shape, q, p):
     return lambda m, shape, q, p: written(m, shape, q, p)
 
 
-def glide(m: Any, shape: Any, look: int, which: Any, with_center: bool, most: int) -> Any:
+def propagate_free(m: Any, shape: Any, look: int, which: Any, with_center: bool, most: int) -> Any:
     """A free step in pieces, noted from *look* on; returns what the penetration cannot exceed after the start."""
     raise TypeError("glide runs in compiled code only")
 
 
-@overload(glide, jit_options=INLINE_HERE)
+@overload(propagate_free, jit_options=INLINE_HERE)
 def _glide_of(m, shape, look, which, with_center, most):
     written = _function("glide", shape.instance_class)
     return lambda m, shape, look, which, with_center, most: written(m, shape, look, which, with_center, most)

@@ -11,11 +11,11 @@ from snapbeam.engines.cpu.few.modes import groups_of, modal_energy, modes_of, si
 from snapbeam.engines.scalar.compile import called, compiled, inlined
 from snapbeam.engines.scalar.composition import TURNS, Stages
 from snapbeam.engines.scalar.contact import contact_energy, is_impulsive
-from snapbeam.engines.scalar.decisions import PIECES, Seen, is_quiet, open_book
-from snapbeam.engines.scalar.lanes import WIDTH, load, spread_at, store
+from snapbeam.engines.scalar.decisions import PIECES, ContactKinematics, is_low_energy, begin_statistics
+from snapbeam.engines.scalar.lanes import WIDTH, load, broadcast_load, store
 from snapbeam.engines.scalar.masks import mask_of, pick
 from snapbeam.engines.scalar.physics import (
-    circle,
+    sincos_cosm1,
     decay_less_one,
     rotation,
     shaker_motion,
@@ -27,7 +27,7 @@ from snapbeam.engines.scalar.tip import drive_rate, numbers_of
 __all__ = ["TWO_PI", "World", "beam_signals", "flows_over", "prepare", "seat", "slot_of", "stand"]
 
 TWO_PI = 2.0 * math.pi
-_OK, _RUNNING = int(RunStatus.OK), int(RunStatus.RUNNING)
+_OK, _RUNNING = int(RunStatus.OK), int(RunStatus.INTERRUPTED)
 
 
 class World(NamedTuple):
@@ -59,11 +59,14 @@ def flows_over(m, shape, length, place, which):
     """The exact flow of every mode over *length*, a time a lane, into the rows from *place* on of the lanes *which*."""
     for i in range(modes_of(shape)):
         mode = at.MODE + i * at.MODE_ROWS
-        damped, sigma = spread_at(m, mode + at.OMEGA_DAMPED), spread_at(m, mode + at.DAMPING)
-        sine, _, less_one = circle(damped * length)
+        apply_contact_loss, sigma = (
+            broadcast_load(m, mode + at.OMEGA_DAMPED),
+            broadcast_load(m, mode + at.DAMPING),
+        )
+        sine, _, less_one = sincos_cosm1(apply_contact_loss * length)
         lost = decay_less_one(sigma * length)
-        squared = spread_at(m, mode + at.OMEGA_SQUARED)
-        a11, a12, a21, a22 = rotation(sigma, squared, sine / damped, less_one, lost)
+        squared = broadcast_load(m, mode + at.OMEGA_SQUARED)
+        a11, a12, a21, a22 = rotation(sigma, squared, sine / apply_contact_loss, less_one, lost)
         row = mode + place
         store(m, row, pick(which, a11, load(m, row)))
         store(m, row + WIDTH, pick(which, a12, load(m, row + WIDTH)))
@@ -76,10 +79,16 @@ def prepare(m, shape, world, place, length, omega):
     """What a step of *length* needs, from *place* on: all modes' flows, and the turns of a drive of rate *omega*."""
     for group in range(groups_of(shape)):
         pairs = at.PAIRS + 4 * WIDTH * group
-        damped, sigma, squared = load(m, pairs), load(m, pairs + WIDTH), load(m, pairs + 2 * WIDTH)
+        apply_contact_loss, sigma, squared = (
+            load(m, pairs),
+            load(m, pairs + WIDTH),
+            load(m, pairs + 2 * WIDTH),
+        )
         part = load(m, pairs + 3 * WIDTH) * length
-        sine, _, less_one = circle(damped * part)
-        a11, a12, a21, a22 = rotation(sigma, squared, sine / damped, less_one, decay_less_one(sigma * part))
+        sine, _, less_one = sincos_cosm1(apply_contact_loss * part)
+        a11, a12, a21, a22 = rotation(
+            sigma, squared, sine / apply_contact_loss, less_one, decay_less_one(sigma * part)
+        )
         store(m, place, a11)
         store(m, place + WIDTH, a12)
         store(m, place + 2 * WIDTH, a21)
@@ -115,14 +124,14 @@ def stand(m, shape, world, lane):
     phase = load(m, at.PHASE0) + TWO_PI * (load(m, at.WITHIN) / load(m, at.PERIOD))
     sine, cosine = sincos(phase)
     motion, velocity = shaker_motion(load(m, at.AMPLITUDE), load(m, at.OMEGA), sine, cosine)
-    home, rest = load(m, at.HOME), load(m, at.REST_CONTACT)
-    offset = load(m, at.OFFSET) + (1.0 - home) * rest
+    well_sign, rest = load(m, at.HOME), load(m, at.REST_CONTACT)
+    offset = load(m, at.OFFSET) + (1.0 - well_sign) * rest
     beam, beam_rate = beam_signals(m, world.body, at.Q, at.P, w, wv)
-    store(m, at.W, pick(which, beam + home * rest, load(m, at.W)))
+    store(m, at.W, pick(which, beam + well_sign * rest, load(m, at.W)))
     store(m, at.WV, pick(which, beam_rate, load(m, at.WV)))
     store(m, at.D, pick(which, offset + motion - w, load(m, at.D)))
     store(m, at.DV, pick(which, velocity - wv, load(m, at.DV)))
-    store(m, at.C, pick(which, c + home * load(m, at.REST_CENTER), load(m, at.C)))
+    store(m, at.C, pick(which, c + well_sign * load(m, at.REST_CENTER), load(m, at.C)))
     store(m, at.CV, pick(which, cv, load(m, at.CV)))
     store(m, at.STRETCH, pick(which, 2.0 * gq + qr, load(m, at.STRETCH)))
     store(m, at.TEMP, linear + tension_energy(world.gamma, gq, qr))
@@ -130,13 +139,13 @@ def stand(m, shape, world, lane):
 
 
 @compiled
-def _constants(m, shape, asked, lane, i):
+def _constants(m, shape, kernel_input, lane, i):
     """What stays the same in run *i*."""
-    record = asked.runs[i]
-    drive = numbers_of(asked.drive, asked.drive_numbers, i)
+    record = kernel_input.runs[i]
+    drive = numbers_of(kernel_input.drive, kernel_input.drive_numbers, i)
     m[at.OMEGA + lane], m[at.AMPLITUDE + lane] = drive.omega, drive.amplitude
-    for f in range(asked.law_numbers.shape[1]):
-        m[at.LAW + f * WIDTH + lane] = asked.law_numbers[i, f]
+    for f in range(kernel_input.law_numbers.shape[1]):
+        m[at.LAW + f * WIDTH + lane] = kernel_input.law_numbers[i, f]
     step_time = record.step * record.tick
     m[at.TICK + lane], m[at.STEP + lane], m[at.STEP_TIME + lane] = record.tick, record.step, step_time
     m[at.PERIOD + lane], m[at.LANDING + lane] = record.period, record.landing
@@ -144,49 +153,57 @@ def _constants(m, shape, asked, lane, i):
     m[at.LIMIT + lane] = min(record.landing, record.end)
     m[at.COARSEST + lane], m[at.FINEST + lane] = record.coarsest, record.finest
     m[at.COARSE_TICKS + lane] = record.step >> record.coarsest
-    m[at.PHASE0 + lane], m[at.OFFSET + lane], m[at.HOME + lane] = record.phase, record.offset, record.home
+    m[at.PHASE0 + lane], m[at.OFFSET + lane], m[at.HOME + lane] = (
+        record.phase,
+        record.offset,
+        record.well_sign,
+    )
     m[at.REST_CONTACT + lane], m[at.REST_CENTER + lane] = record.rest_contact, record.rest_center
     m[at.TIP_SPEED + lane] = record.tip_speed
     m[at.DECIDE_REACH + lane], m[at.DECIDE_ENERGY + lane] = record.decide_reach, record.decide_energy
-    m[at.DECIDE_CROSSINGS + lane], m[at.MAX_STEPS + lane] = record.decide_crossings, asked.max_steps
+    m[at.DECIDE_CROSSINGS + lane], m[at.MAX_STEPS + lane] = record.decide_crossings, kernel_input.max_steps
     fastest = drive_rate(drive)
     for j in range(modes_of(shape)):
         mode = at.MODE + j * at.MODE_ROWS
         fastest = max(fastest, m[mode + at.OMEGA_I])
-        m[mode + at.CONTACT + lane] = asked.contact_rows[record.contact_row, j]
-        m[mode + at.Q + lane] = asked.starts[record.start_row, 0, j]
-        m[mode + at.P + lane] = asked.starts[record.start_row, 1, j]
-        m[mode + at.SEEN_WELL + lane] = record.home * m[mode + at.WELL]
+        m[mode + at.CONTACT + lane] = kernel_input.contact_rows[record.contact_row, j]
+        m[mode + at.Q + lane] = kernel_input.starts[record.start_row, 0, j]
+        m[mode + at.P + lane] = kernel_input.starts[record.start_row, 1, j]
+        m[mode + at.SEEN_WELL + lane] = record.well_sign * m[mode + at.WELL]
     finest_look = TWO_PI / (PIECES * fastest)
     m[at.FINEST_LOOK + lane], m[at.PIECES + lane] = finest_look, max(4, math.ceil(step_time / finest_look))
 
 
 @compiled
-def seat(m, n, shape, world, asked, lane, i, book):
+def seat(m, n, shape, world, kernel_input, lane, i, accumulators):
     """Put run *i* into a lane; its status."""
-    record, bit = asked.runs[i], 1 << lane
+    record, bit = kernel_input.runs[i], 1 << lane
     n[at.RUNS + lane] = i
-    _constants(m, shape, asked, lane, i)
+    _constants(m, shape, kernel_input, lane, i)
     _prepare_all(m, shape, world, lane, record.finest + 2)
     m[at.KEY + lane], m[at.LOOK_KEY + lane], m[at.LOOK_PIECES + lane] = -99.0, -1.0, 0.0
     m[at.T + lane] = m[at.WITHIN + lane] = 0.0
     energy = stand(m, shape, world, lane)
-    seen = Seen(
+    seen = ContactKinematics(
         m[at.W + lane], m[at.WV + lane], m[at.D + lane], m[at.DV + lane], m[at.C + lane], m[at.CV + lane]
     )
-    law = numbers_of(asked.law, asked.law_numbers, i)
+    law = numbers_of(kernel_input.law, kernel_input.law_numbers, i)
     since = record.contact_time
     touching = since >= 0.0
     if not math.isfinite(since):
         pressed = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
         touching = pressed and not is_impulsive(law)
-    book.touching, book.onset = int(touching), 0
+    accumulators.touching, accumulators.onset = int(touching), 0
     if math.isfinite(since) and since > 0.0:
-        book.onset = -int(since / record.tick + 0.5)
-    open_book(book, seen.c, seen, law, energy + contact_energy(law, seen.d))
-    m[at.ONSET + lane], m[at.SIDE + lane], m[at.DEEPEST + lane] = book.onset, book.side, book.deepest
-    m[at.MIN_W + lane], m[at.MAX_W + lane] = book.min_displacement, book.max_displacement
-    m[at.MIN_C + lane], m[at.MAX_C + lane] = book.min_center, book.max_center
+        accumulators.onset = -int(since / record.tick + 0.5)
+    begin_statistics(accumulators, seen.c, seen, law, energy + contact_energy(law, seen.d))
+    m[at.ONSET + lane], m[at.SIDE + lane], m[at.DEEPEST + lane] = (
+        accumulators.onset,
+        accumulators.side,
+        accumulators.deepest,
+    )
+    m[at.MIN_W + lane], m[at.MAX_W + lane] = accumulators.min_displacement, accumulators.max_displacement
+    m[at.MIN_C + lane], m[at.MAX_C + lane] = accumulators.min_center, accumulators.max_center
     for row in range(at.PEAK_WV, at.DEEPEST, WIDTH):
         m[row + lane] = 0.0
     for row in (at.SAFE_GAP, at.SAFE_CENTER, at.WEIGHED, at.BEAT, at.STEPS, at.LATE):
@@ -196,6 +213,6 @@ def seat(m, n, shape, world, asked, lane, i, book):
     n[at.LIVE] |= bit
     if touching:
         n[at.TOUCHING] |= bit
-    if is_quiet(energy, world.gamma, world.stretch):
+    if is_low_energy(energy, world.gamma, world.stretch):
         n[at.QUIET] |= bit
     return _RUNNING if record.end > 0 else _OK

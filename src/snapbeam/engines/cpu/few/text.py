@@ -12,7 +12,7 @@ from typing import Any
 from snapbeam.engines.cpu.few import places as at
 from snapbeam.engines.scalar.composition import TURNS
 from snapbeam.engines.scalar.contact import contact_force
-from snapbeam.engines.scalar.lanes import WIDTH, fma, load, move, splat, spread_at, store, vabs
+from snapbeam.engines.scalar.lanes import WIDTH, fma, load, move, splat, broadcast_load, store, vabs
 from snapbeam.engines.scalar.masks import both, less, pick, vmax
 from snapbeam.engines.scalar.physics import (
     mode_energy,
@@ -22,14 +22,14 @@ from snapbeam.engines.scalar.physics import (
     tension_factors,
     turned,
 )
-from snapbeam.engines.scalar.signals import bulge
+from snapbeam.engines.scalar.signals import hermite_overshoot_bound
 
 __all__ = ["TEXTS", "Modes", "made"]
 
 _KNOWN = {
-    "__name__": __name__, "both": both, "bulge": bulge, "contact_force": contact_force, "fma": fma, "less": less,
+    "__name__": __name__, "both": both, "hermite_overshoot_bound": hermite_overshoot_bound, "contact_force": contact_force, "fma": fma, "less": less,
     "load": load, "move": move, "mode_energy": mode_energy, "pick": pick, "shaker_motion": shaker_motion,
-    "sincos": sincos, "splat": splat, "spread_at": spread_at, "store": store,
+    "sincos": sincos, "splat": splat, "broadcast_load": broadcast_load, "store": store,
     "tension_acceleration": tension_acceleration, "tension_factors": tension_factors, "turned": turned, "vabs": vabs,
     "vmax": vmax,
 }  # fmt: skip
@@ -64,7 +64,7 @@ class Modes:
         )
 
     def number(self, i: int, which: int) -> str:
-        return f"spread_at(m, {self.place(i, which)})"
+        return f"broadcast_load(m, {self.place(i, which)})"
 
     def total(self, term: Callable[[int], tuple[str, str]]) -> str:
         """The sum over modes of products: a chain down each of the eight columns, then halves, quarters and pairs."""
@@ -93,7 +93,7 @@ class Modes:
         sums: list[str | None] = [None] * ways
         for j in block:
             way = (j - block.start) % ways
-            element = f"spread_at(m, {at.COUPLING + i * at.MOST + j})"
+            element = f"broadcast_load(m, {at.COUPLING + i * at.MOST + j})"
             before = sums[way]
             sums[way] = f"({element} * q{j})" if before is None else f"fma({element}, q{j}, {before})"
         if ways == 4:
@@ -142,7 +142,7 @@ def _take(modes: Modes) -> list[str]:
         ]
         body += [f"k{i} = {modes.row(i, at.K)}"]
     body += [f"for stage in range({modes.flows + 1}):"]
-    stage = ["weight = spread_at(m, stages.kick + stage) * length", "if any_touching:"]
+    stage = ["weight = broadcast_load(m, stages.kick + stage) * length", "if any_touching:"]
     stage += [f"    sine = load(m, {at.TURN} + {WIDTH} * stage)"]
     stage += [f"    cosine = load(m, {at.TURN + TURNS * WIDTH} + {WIDTH} * stage)"]
     stage += ["    sine, cosine = sine0 * cosine + cosine0 * sine, cosine0 * cosine - sine0 * sine"]
@@ -226,7 +226,7 @@ def _energies(modes: Modes) -> list[str]:
 
 
 def _glide(modes: Modes) -> list[str]:
-    """A free step in short pieces, as the other layout's :func:`~snapbeam.engines.cpu.settling.look.look_inside`.
+    """A free step in short pieces, as the other layout's :func:`~snapbeam.engines.cpu.settling.look.sample_inside_step`.
 
     Row i of a look is the penetration, its rate, the displacement of the centre and its rate; only lanes of *which*
     that have so many pieces are written.  Returns, for each lane, the greatest value that the penetration may have
@@ -284,7 +284,7 @@ def _glide(modes: Modes) -> list[str]:
     step += [f"    store(m, row + {2 * WIDTH}, pick(written, c, load(m, row + {2 * WIDTH})))"]
     step += [f"    store(m, row + {3 * WIDTH}, pick(written, cv, load(m, row + {3 * WIDTH})))"]
     step += ["if i > 0:"]
-    step += ["    reach = vmax(before, d) + bulge(before_rate, dv, piece)"]
+    step += ["    reach = vmax(before, d) + hermite_overshoot_bound(before_rate, dv, piece)"]
     step += ["    greatest = pick(written, vmax(greatest, reach), greatest)"]
     step += ["before, before_rate, begun = d, dv, done"]
     step += [

@@ -6,36 +6,42 @@ from typing import Any
 
 from numba.extending import overload
 
-from snapbeam.engines.cpu.settling.elastic import settle
-from snapbeam.engines.cpu.settling.newton import settle_newton
+from snapbeam.engines.cpu.settling.elastic import accept_step
+from snapbeam.engines.cpu.settling.newton import accept_step_restitution
 from snapbeam.engines.scalar.compile import INLINE_HERE
 
-__all__ = ["after_step"]
+__all__ = ["accept_any_step"]
 
 
-def after_step(
+def accept_any_step(
     memory: Any,
     blocks: Any,
-    place: Any,
+    workspace: Any,
     run: Any,
     now: Any,
     step: Any,
     done: Any,
-    room: Any,
-    book: Any,
-    asked: Any,
+    scratch: Any,
+    accumulators: Any,
+    kernel_input: Any,
     outputs: Any,
 ) -> Any:
     """Where a run stands after a step, and the step that was taken; *outputs* are what is recorded, or None."""
     raise TypeError("after_step runs in compiled code only")
 
 
-@overload(after_step, jit_options=INLINE_HERE)
-def _after_step(memory, blocks, place, run, now, step, done, room, book, asked, outputs):
-    law = asked.types[asked.fields.index("law")]
-    chosen = settle_newton if law.instance_class.owner.impulsive else settle
+@overload(accept_any_step, jit_options=INLINE_HERE)
+def _accept_any_step(
+    memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs
+):
+    law = kernel_input.types[kernel_input.fields.index("law")]
+    chosen = accept_step_restitution if law.instance_class.owner.impulsive else accept_step
 
-    def implementation(memory, blocks, place, run, now, step, done, room, book, asked, outputs):
-        return chosen(memory, blocks, place, run, now, step, done, room, book, asked, outputs)
+    def implementation(
+        memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs
+    ):
+        return chosen(
+            memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs
+        )
 
     return implementation

@@ -6,25 +6,25 @@ import math
 
 from snapbeam.core.codes import RunStatus
 from snapbeam.engines.cpu.recording import record_held
-from snapbeam.engines.cpu.settling.elastic import swapped, weighed
-from snapbeam.engines.cpu.settling.hold import PANELS, held_for, hold, hold_force
-from snapbeam.engines.cpu.state import Now, Watch, cut_slot, phase_at
+from snapbeam.engines.cpu.settling.elastic import swap_rows, monitor_energy
+from snapbeam.engines.cpu.settling.hold import PANELS, held_for, hold, constraint_force
+from snapbeam.engines.cpu.state import IntegratorState, StepControl, cut_slot, phase_at
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.cpu.uneven import about_level, at_center
 from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.decisions import (
-    Seen,
+    ContactKinematics,
     contact_level,
-    count_in_step,
-    finish_impact,
+    count_zero_crossings_in_step,
+    close_impact,
     ticks_of,
-    track,
+    accumulate_displacement,
 )
 from snapbeam.engines.scalar.extras import observe as observe_extras
 
 __all__ = ["carry"]
 
-_OK, _RUNNING = int(RunStatus.OK), int(RunStatus.RUNNING)
+_OK, _RUNNING = int(RunStatus.OK), int(RunStatus.INTERRUPTED)
 _BISECTIONS = 60
 
 
@@ -36,7 +36,7 @@ def _release_between(memory, blocks, layout, run, tip, phase, low, high):
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
             break
-        if hold_force(memory, blocks, layout, run, tip, phase + omega * middle) < 0.0:
+        if constraint_force(memory, blocks, layout, run, tip, phase + omega * middle) < 0.0:
             high = middle
         else:
             low = middle
@@ -50,11 +50,11 @@ def _release(memory, blocks, layout, run, tip, phase, length):
     The force is looked at in *PANELS* panels; where it dips between them, its least value is followed.
     """
     piece, omega = length / PANELS, tip.drive.omega
-    before = force = hold_force(memory, blocks, layout, run, tip, phase)
+    before = force = constraint_force(memory, blocks, layout, run, tip, phase)
     if force < 0.0:
         return 0.0
     for i in range(1, PANELS + 1):
-        after = hold_force(memory, blocks, layout, run, tip, phase + omega * (i * piece))
+        after = constraint_force(memory, blocks, layout, run, tip, phase + omega * (i * piece))
         if after < 0.0:
             return _release_between(memory, blocks, layout, run, tip, phase, (i - 1) * piece, i * piece)
         if i > 1 and force < before and force <= after:
@@ -62,24 +62,24 @@ def _release(memory, blocks, layout, run, tip, phase, length):
             bend = before - 2.0 * force + after
             if bend > 0.0:
                 at = (i - 1 + 0.5 * (before - after) / bend) * piece
-                if hold_force(memory, blocks, layout, run, tip, phase + omega * at) < 0.0:
+                if constraint_force(memory, blocks, layout, run, tip, phase + omega * at) < 0.0:
                     return _release_between(memory, blocks, layout, run, tip, phase, (i - 2) * piece, at)
         before, force = force, after
     return -1.0
 
 
 @inlined
-def carry(memory, blocks, place, run, tip, now, step, room, book, asked, outputs):
+def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators, kernel_input, outputs):
     """Where a run stands after a step in which the tip carries the beam, up to the release if there is one.
 
     Returns that and the step.
     """
-    layout, clock, tick = place.layout, run.clock, run.clock.tick
-    rest_contact, rest_center = now.home * run.rest_contact, now.home * run.rest_center
-    t, seen, watch = now.t, now.seen, now.watch
+    layout, clock, tick = workspace.layout, run.clock, run.clock.tick
+    rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
+    t, seen, control = now.t, now.seen, now.control
     # however strongly it is stretched, a beam that is carried moves no faster than the tip
     left = min((now.landed + 1) * clock.landing, clock.end) - t
-    ticks = min(ticks_of(clock, contact_level(clock, (t - book.onset) * tick, 0.0, 0.0)), left)
+    ticks = min(ticks_of(clock, contact_level(clock, (t - accumulators.onset) * tick, 0.0, 0.0)), left)
     ticks = max(1, ticks // 4)
     length = ticks * tick
     release = _release(memory, blocks, layout, run, tip, step.phase, length)
@@ -94,25 +94,25 @@ def carry(memory, blocks, place, run, tip, now, step, room, book, asked, outputs
     there = step.phase + tip.drive.omega * length
     sample = now.sample
     if outputs is not None:
-        sample = record_held(memory, blocks, layout, run, tip, now, step, book, outputs)
-    book.impulse += impulse
-    book.work += work
-    book.gross_work += gross
-    book.dissipated += dissipated
-    book.deepest = max(book.deepest, peak)
+        sample = record_held(memory, blocks, layout, run, tip, now, step, accumulators, outputs)
+    accumulators.impulse += impulse
+    accumulators.work += work
+    accumulators.gross_work += gross
+    accumulators.dissipated += dissipated
+    accumulators.deepest = max(accumulators.deepest, peak)
     _, gq, qr = hold(memory, blocks, layout, tip, there, step.q1, step.p1, step.k1)
     about = observe(memory, layout, tip, there, step.q1, step.p1)
-    seen1 = Seen(about.w + rest_contact, about.wv, 0.0, 0.0, about.c + rest_center, about.cv)
-    track(book, seen, seen1, length)
+    seen1 = ContactKinematics(about.w + rest_contact, about.wv, 0.0, 0.0, about.c + rest_center, about.cv)
+    accumulate_displacement(accumulators, seen, seen1, length)
     # a carried centre moves as the tip does, slowly enough for one cubic
-    count_in_step(
-        book, clock, t, length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1), room.looked,
+    count_zero_crossings_in_step(
+        accumulators, clock, t, length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1), scratch.looked,
         at_center(layout.uneven, rest_center), 0, 0.0,
     )  # fmt: skip
-    observe_extras(asked.extras, book, t * tick, length, seen, seen1, True)
+    observe_extras(kernel_input.extras, accumulators, t * tick, length, seen, seen1, True)
     t += ticks
     status = _RUNNING if t < clock.end else _OK
-    rows, touching = swapped(now.rows), True
+    rows, touching = swap_rows(now.rows), True
     if released:
         touching = False
         after = (t - now.t) * tick - length
@@ -120,18 +120,24 @@ def carry(memory, blocks, place, run, tip, now, step, room, book, asked, outputs
             0, cut_slot(run), after, there, False, step.q1, step.p1, step.k1,
             step.q, step.p, step.k, step.r,
         )  # fmt: skip
-        prepare(memory, layout, place.stages, run.struck.drive, after, rest.at)
-        done = take_step(memory, blocks, layout, place.stages, tip, rest, True)
+        prepare(memory, layout, workspace.stages, run.struck.drive, after, rest.at)
+        done = take_step(memory, blocks, layout, workspace.stages, tip, rest, True)
         gq, qr, rows = done.gq, done.qr, now.rows
-        book.dissipated += done.dissipated
+        accumulators.dissipated += done.dissipated
         if outputs is None:
-            finish_impact(book, None, 0, tip.law, t, tick)
+            close_impact(accumulators, None, 0, tip.law, t, tick)
         else:
-            finish_impact(book, outputs.impacts, outputs.marks[1], tip.law, t, tick)
+            close_impact(accumulators, outputs.impacts, outputs.marks[1], tip.law, t, tick)
         about = observe(memory, layout, tip, phase_at(run, t), rows.q, rows.p)
         d = min(about.d, 0.0)
-        seen1 = Seen(about.w + rest_contact, about.wv, d, about.dv, about.c + rest_center, about.cv)
-    kept = Watch(touching, watch.quiet, t, t, watch.weighed, watch.beat)
+        seen1 = ContactKinematics(
+            about.w + rest_contact, about.wv, d, about.dv, about.c + rest_center, about.cv
+        )
+    kernel_output = StepControl(touching, control.quiet, t, t, control.monitor_energy, control.beat)
     state = rows.q, rows.p, gq, qr
-    kept, status = weighed(memory, layout, run, now, t, state, seen1, kept, released, status, book, asked)
-    return Now(t, now.home, 2.0 * gq + qr, rows, seen1, kept, sample, now.landed, status), step
+    kernel_output, status = monitor_energy(
+        memory, layout, run, now, t, state, seen1, kernel_output, released, status, accumulators, kernel_input
+    )
+    return IntegratorState(
+        t, now.well_sign, 2.0 * gq + qr, rows, seen1, kernel_output, sample, now.landed, status
+    ), step

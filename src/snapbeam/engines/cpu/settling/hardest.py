@@ -11,15 +11,15 @@ from snapbeam.engines.cpu.state import cut_slot
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.scalar.compile import INLINE_HERE, inlined
 from snapbeam.engines.scalar.contact import felt_force
-from snapbeam.engines.scalar.signals import cubic, turning_point, widened
+from snapbeam.engines.scalar.signals import cubic, turning_point, update_extrema
 
-__all__ = ["hardest_point"]
+__all__ = ["locate_peak_force"]
 
 _PARTS = 24
 """Of a step, at whose ends the force is looked at."""
 
 
-def hardest_point(
+def locate_peak_force(
     memory: Any,
     blocks: Any,
     layout: Any,
@@ -30,7 +30,7 @@ def hardest_point(
     step: Any,
     seen1: Any,
     sample: Any,
-    book: Any,
+    accumulators: Any,
     outputs: Any,
 ) -> Any:
     """The greatest penetration of a contact so far, or the greatest force under a law that loses energy.
@@ -50,14 +50,17 @@ def aside(step, run, length, size):
 
 
 @inlined
-def _deepest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, book, outputs):
+def _deepest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs):
     """The greatest penetration of a contact so far, its turning point within the step included.
 
     Returns that and how many samples there are: the turning point is one where the run is recorded.
     """
-    seen, deepest = now.seen, max(book.deepest, seen1.d)
+    seen, deepest = now.seen, max(accumulators.deepest, seen1.d)
     turn = turning_point(seen.d, seen.dv, seen1.d, seen1.dv, step.length) if seen.dv > 0.0 else -1.0
-    if turn > 0.0 and widened(seen.d, deepest, seen.d, seen.dv, seen1.d, seen1.dv, step.length)[1] > deepest:
+    if (
+        turn > 0.0
+        and update_extrema(seen.d, deepest, seen.d, seen.dv, seen1.d, seen1.dv, step.length)[1] > deepest
+    ):
         part, size = turn * step.length, layout.size
         prepare(memory, layout, stages, run.struck.drive, part, cut_slot(run))
         ledger = None if outputs is None else True
@@ -67,16 +70,22 @@ def _deepest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, s
         about = observe(memory, layout, tip, there, run.spare, run.spare + size)
         if outputs is not None:
             when = now.t * run.clock.tick + part
-            sample = record_aside(memory, layout, tip, now, short, here, when, about, sample, book, outputs)
+            sample = record_aside(
+                memory, layout, tip, now, short, here, when, about, sample, accumulators, outputs
+            )
         deepest = max(deepest, about.d)
     return deepest, sample
 
 
 @inlined
-def _greatest_force(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, book, outputs):
+def _greatest_force(
+    memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+):
     """The greatest force of a contact so far: looked for on the cubic through the step, then stepped to."""
     seen, law = now.seen, tip.law
-    greatest = max(book.deepest, max(felt_force(law, seen.d, seen.dv), felt_force(law, seen1.d, seen1.dv)))
+    greatest = max(
+        accumulators.deepest, max(felt_force(law, seen.d, seen.dv), felt_force(law, seen1.d, seen1.dv))
+    )
     c0, c1, c2, c3 = cubic(seen.d, seen.dv, seen1.d, seen1.dv, step.length)
     best, at = greatest, 0.0
     for i in range(1, _PARTS):
@@ -95,17 +104,23 @@ def _greatest_force(memory, blocks, layout, stages, run, tip, now, step, seen1, 
         about = observe(memory, layout, tip, there, run.spare, run.spare + size)
         if outputs is not None:
             when = now.t * run.clock.tick + part
-            sample = record_aside(memory, layout, tip, now, short, here, when, about, sample, book, outputs)
+            sample = record_aside(
+                memory, layout, tip, now, short, here, when, about, sample, accumulators, outputs
+            )
         greatest = max(greatest, felt_force(law, about.d, about.dv))
     return greatest, sample
 
 
-@overload(hardest_point, jit_options=INLINE_HERE)
-def _hardest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, book, outputs):
+@overload(locate_peak_force, jit_options=INLINE_HERE)
+def _hardest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs):
     law = tip.types[tip.fields.index("law")]
-    chosen = _greatest_force if law.instance_class.owner.lossy else _deepest_point
+    chosen = _greatest_force if law.instance_class.owner.rate_dependent else _deepest_point
 
-    def implementation(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, book, outputs):
-        return chosen(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, book, outputs)
+    def implementation(
+        memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+    ):
+        return chosen(
+            memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+        )
 
     return implementation

@@ -7,7 +7,7 @@ from snapbeam.engines.scalar.compile import compiled, inlined
 from snapbeam.engines.scalar.physics import tension_factors
 from snapbeam.engines.scalar.tip import tip_acceleration, tip_motion
 
-__all__ = ["PANELS", "held_for", "hold", "hold_force"]
+__all__ = ["PANELS", "held_for", "hold", "constraint_force"]
 
 PANELS = 8
 """Of a step: the force is integrated over each by Simpson's rule, and looked at for a release."""
@@ -36,7 +36,7 @@ def hold(memory, blocks, layout, tip, phase, q, p, k):
 
 
 @inlined
-def hold_force(memory, blocks, layout, run, tip, phase):
+def constraint_force(memory, blocks, layout, run, tip, phase):
     """The force alone; the mode is put into the spare rows."""
     spare, size = run.spare, layout.size
     force, _, _ = hold(memory, blocks, layout, tip, phase, spare, spare + size, spare + 2 * size)
@@ -54,7 +54,9 @@ def held_for(memory, blocks, layout, run, tip, phase, length):
         if i == 0 or i == 2 * PANELS:
             weight = 1.0
         weight *= length / (6.0 * PANELS)
-        force = hold_force(memory, blocks, layout, run, tip, phase + omega * (i * length / (2 * PANELS)))
+        force = constraint_force(
+            memory, blocks, layout, run, tip, phase + omega * (i * length / (2 * PANELS))
+        )
         speed = memory[p] * c
         impulse += weight * force
         work += weight * force * speed

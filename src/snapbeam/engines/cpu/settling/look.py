@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from snapbeam.engines.cpu.rows import dot, glide, signals
+from snapbeam.engines.cpu.rows import dot, propagate_free, signals
 from snapbeam.engines.scalar.compile import compiled
 from snapbeam.engines.scalar.lanes import WIDTH, lanes_sum, load
 from snapbeam.engines.scalar.physics import sincos
 from snapbeam.engines.scalar.tip import turned_motion
 
-__all__ = ["look_inside"]
+__all__ = ["sample_inside_step"]
 
 
 @compiled
-def look_inside(memory, layout, tip, flow, pieces, piece, step, with_center, room):
+def sample_inside_step(memory, layout, tip, flow, pieces, piece, step, with_center, scratch):
     """Follow a free step in *pieces* short ones, each one exact linear flow, and note what is seen.
 
     The tension's acceleration, known at both ends of the step, is taken as linear in between: exact
     enough for signals whose fastest mode the pieces resolve.  Row i of ``room.looked`` becomes the penetration, its
     rate, and, if *with_center*, the displacement of the centre from rest and its rate.
     """
-    looked, parts = room.looked, room.parts
+    looked, parts = scratch.looked, scratch.parts
     q, p, k, k1 = step.q, step.p, step.k, step.k1
-    glide(memory, layout, layout.contact, flow, pieces, piece, q, p, k, k1, with_center, parts)
+    propagate_free(memory, layout, layout.contact, flow, pieces, piece, q, p, k, k1, with_center, parts)
     size, drive = layout.size, tip.drive
     contact0, contact1 = dot(memory, size, layout.contact, k), dot(memory, size, layout.contact, k1)
     center0, center1 = dot(memory, size, layout.center, k), dot(memory, size, layout.center, k1)

@@ -16,20 +16,24 @@ import math
 from snapbeam.core.codes import RunStatus
 from snapbeam.engines.cpu.recording import record_instants
 from snapbeam.engines.cpu.settling.carried import carry
-from snapbeam.engines.cpu.settling.elastic import cut_to, meets, swapped, weighed
+from snapbeam.engines.cpu.settling.elastic import cut_step, detect_contact_event, swap_rows, monitor_energy
 from snapbeam.engines.cpu.settling.hold import hold
-from snapbeam.engines.cpu.state import Now, Watch, cut_slot, phase_at
+from snapbeam.engines.cpu.state import IntegratorState, StepControl, cut_slot, phase_at
 from snapbeam.engines.cpu.step import Step, observe, prepare, take_step
 from snapbeam.engines.cpu.uneven import about_level, at_center
 from snapbeam.engines.scalar.compile import compiled, inlined
-from snapbeam.engines.scalar.decisions import Seen, count_in_step, track
+from snapbeam.engines.scalar.decisions import (
+    ContactKinematics,
+    count_zero_crossings_in_step,
+    accumulate_displacement,
+)
 from snapbeam.engines.scalar.extras import observe as observe_extras
-from snapbeam.engines.scalar.signals import cubic, first_rise, root
+from snapbeam.engines.scalar.signals import cubic, first_upcrossing, root
 from snapbeam.engines.scalar.tip import seen_from
 
-__all__ = ["settle_newton"]
+__all__ = ["accept_step_restitution"]
 
-_OK, _RUNNING, _NOT_FINITE = int(RunStatus.OK), int(RunStatus.RUNNING), int(RunStatus.NOT_FINITE)
+_OK, _RUNNING, _DIVERGED = int(RunStatus.OK), int(RunStatus.INTERRUPTED), int(RunStatus.DIVERGED)
 _STEP_LIMIT = int(RunStatus.STEP_LIMIT)
 _LOCATIONS = 24
 """Newton steps in which a hit is located, at most."""
@@ -40,31 +44,31 @@ _SOON = 0.05
 
 
 @inlined
-def strike(memory, blocks, place, run, tip, p, seen, when, phase, book, outputs):
+def apply_impact_law(memory, blocks, workspace, run, tip, p, seen, when, phase, accumulators, outputs):
     """Newton's law; *p* is where the mode's velocity stands.  Returns whether the bodies stay together.
 
     They do if the contact presses them together and what is left of the chatter, a geometric series of ever
     shorter flights, is over soon and too low to be seen.
     """
-    layout = place.layout
+    layout = workspace.layout
     c, e = memory[layout.contact], tip.law.coefficient
     speed = seen.wv + seen.dv
     impulse = (1.0 + e) * seen.dv / (c * c)
     memory[p] += c * impulse
-    book.work += impulse * speed
-    book.gross_work += abs(impulse * speed)
+    accumulators.work += impulse * speed
+    accumulators.gross_work += abs(impulse * speed)
     lost = 0.5 * (1.0 - e * e) * seen.dv * seen.dv / (c * c)
-    book.dissipated += lost
-    book.lost += lost
-    book.total_impulse += impulse
+    accumulators.dissipated += lost
+    accumulators.lost += lost
+    accumulators.total_impulse += impulse
     if outputs is not None:
-        at = book.impacts - outputs.marks[1]
+        at = accumulators.impacts - outputs.marks[1]
         if at < outputs.impacts.shape[0]:
             outputs.impacts[at, 0] = when
             outputs.impacts[at, 1] = 0.0
             outputs.impacts[at, 2] = math.nan
             outputs.impacts[at, 3] = impulse
-    book.impacts += 1
+    accumulators.impacts += 1
     spare, size = run.spare, layout.size
     away = e * seen.dv
     force, _, _ = hold(memory, blocks, layout, tip, phase, spare, spare + size, spare + 2 * size)
@@ -86,17 +90,17 @@ def strike(memory, blocks, place, run, tip, p, seen, when, phase, book, outputs)
 
 
 @inlined
-def _stuck(memory, place, run, seen, p, book):
+def _stuck(memory, workspace, run, seen, p, accumulators):
     """What is left of the relative velocity after the last hit of a chatter is lost; begins the book of a contact."""
-    c = memory[place.layout.contact]
+    c = memory[workspace.layout.contact]
     away = run.struck.law.coefficient * seen.dv
-    book.impulse = -away / (c * c)
-    book.work += book.impulse * (seen.wv + seen.dv)
+    accumulators.impulse = -away / (c * c)
+    accumulators.work += accumulators.impulse * (seen.wv + seen.dv)
     lost = 0.5 * away * away / (c * c)
-    book.dissipated += lost
-    book.lost += lost
-    book.deepest = 0.0
-    book.touching = 1
+    accumulators.dissipated += lost
+    accumulators.lost += lost
+    accumulators.deepest = 0.0
+    accumulators.touching = 1
 
 
 @compiled
@@ -150,7 +154,7 @@ def _turns(u0, v0, u1, v1, h):
 @compiled
 def _rise(u0, v0, u1, v1, h):
     """As first_rise, and where the signal falls at both ends and has risen between them."""
-    rise = first_rise(u0, v0, u1, v1, h)
+    rise = first_upcrossing(u0, v0, u1, v1, h)
     if rise >= 0.0 or v0 > 0.0 or v1 > 0.0:
         return rise
     bottom, top = _turns(u0, v0, u1, v1, h)
@@ -187,17 +191,17 @@ def _top(looked, pieces, piece, entry):
 
 
 @inlined
-def _cut_at(memory, blocks, place, run, tip, step, length):
+def _cut_at(memory, blocks, workspace, run, tip, step, length):
     """A step cut to *length*; what it gave, and what is seen there."""
-    cut = cut_to(step, run, 0, length)
-    prepare(memory, place.layout, place.stages, run.struck.drive, cut.length, cut.at)
-    done = take_step(memory, blocks, place.layout, place.stages, tip, cut, True)
+    cut = cut_step(step, run, 0, length)
+    prepare(memory, workspace.layout, workspace.stages, run.struck.drive, cut.length, cut.at)
+    done = take_step(memory, blocks, workspace.layout, workspace.stages, tip, cut, True)
     phase = step.phase + tip.drive.omega * cut.length
-    return cut, done, observe(memory, place.layout, tip, phase, step.q1, step.p1)
+    return cut, done, observe(memory, workspace.layout, tip, phase, step.q1, step.p1)
 
 
 @inlined
-def _located(memory, blocks, place, run, tip, step, entry, top, at_end, still_speed):
+def _located(memory, blocks, workspace, run, tip, step, entry, top, at_end, still_speed):
     """The step cut at the hit itself, by Newton's method on the trajectory; what it gave, and what is seen there.
 
     *top* is where the penetration is greatest if it falls again within the step, *at_end* that at the end of the
@@ -206,11 +210,11 @@ def _located(memory, blocks, place, run, tip, step, entry, top, at_end, still_sp
     """
     before, low, high = math.inf, 0.0, step.length
     if at_end < 0.0 and top < step.length:
-        cut, done, about = _cut_at(memory, blocks, place, run, tip, step, top)
+        cut, done, about = _cut_at(memory, blocks, workspace, run, tip, step, top)
         if about.d <= 0.0:
             return cut, done, about, False
         high, at_end = top, about.d
-    cut, done, about = _cut_at(memory, blocks, place, run, tip, step, entry)
+    cut, done, about = _cut_at(memory, blocks, workspace, run, tip, step, entry)
     for _ in range(_LOCATIONS):
         if about.dv <= still_speed and not (at_end > 0.0 and about.d > 0.0):
             break
@@ -230,14 +234,14 @@ def _located(memory, blocks, place, run, tip, step, entry, top, at_end, still_sp
                 break
             wanted, change = 0.5 * (low + high), math.inf
         before = abs(change)
-        cut, done, about = _cut_at(memory, blocks, place, run, tip, step, wanted)
+        cut, done, about = _cut_at(memory, blocks, workspace, run, tip, step, wanted)
     return cut, done, about, about.dv > still_speed
 
 
 @inlined
-def _moved_on(memory, blocks, place, run, tip, step, q, p, k, after, phase, together):
+def _moved_on(memory, blocks, workspace, run, tip, step, q, p, k, after, phase, together):
     """From a hit or a release to the next tick, into the rows that the step began from; returns g.q and q.Gq."""
-    layout, stages = place.layout, place.stages
+    layout, stages = workspace.layout, workspace.stages
     if together:
         there = phase + tip.drive.omega * after
         _, gq, qr = hold(memory, blocks, layout, tip, there, step.q, step.p, step.k)
@@ -249,50 +253,60 @@ def _moved_on(memory, blocks, place, run, tip, step, q, p, k, after, phase, toge
 
 
 @inlined
-def settle_newton(memory, blocks, place, run, now, step, done, room, book, asked, outputs):
-    """As :func:`snapbeam.engines.cpu.settling.elastic.settle`, of a run whose impacts last no time."""
-    layout, clock, tick = place.layout, run.clock, run.clock.tick
-    tip = seen_from(run.struck, now.home, run.rest_contact)
-    rest_contact, rest_center = now.home * run.rest_contact, now.home * run.rest_center
-    t, seen, watch = now.t, now.seen, now.watch
-    if watch.touching:
-        return carry(memory, blocks, place, run, tip, now, step, room, book, asked, outputs)
+def accept_step_restitution(
+    memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs
+):
+    """As :func:`snapbeam.engines.cpu.settling.elastic.accept_step`, of a run whose impacts last no time."""
+    layout, clock, tick = workspace.layout, run.clock, run.clock.tick
+    tip = seen_from(run.struck, now.well_sign, run.rest_contact)
+    rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
+    t, seen, control = now.t, now.seen, now.control
+    if control.touching:
+        return carry(
+            memory, blocks, workspace, run, tip, now, step, scratch, accumulators, kernel_input, outputs
+        )
     still_speed = _NOISE * (run.tip_speed + abs(seen.wv))
     if seen.d >= 0.0 and seen.dv > still_speed:
         # in touch and closing before any step
         q, p, k = now.rows.q, now.rows.p, now.rows.k
-        together = strike(memory, blocks, place, run, tip, p, seen, t * tick, step.phase, book, outputs)
+        together = apply_impact_law(
+            memory, blocks, workspace, run, tip, p, seen, t * tick, step.phase, accumulators, outputs
+        )
         if together:
-            _stuck(memory, place, run, seen, p, book)
-            book.onset = t
+            _stuck(memory, workspace, run, seen, p, accumulators)
+            accumulators.onset = t
             hold(memory, blocks, layout, tip, step.phase, q, p, k)
-        status = _STEP_LIMIT if book.steps >= clock.max_steps else _RUNNING
+        status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
         away = 0.0 if together else tip.law.coefficient * seen.dv
         wv = seen.wv + seen.dv + away
-        kept = Watch(together, False, t, t, watch.weighed, watch.beat)
-        after = Seen(seen.w, wv, 0.0, -away, seen.c, memory_rate(memory, layout, p))
-        return Now(t, now.home, now.stretch, now.rows, after, kept, now.sample, now.landed, status), step
+        kernel_output = StepControl(together, False, t, t, control.monitor_energy, control.beat)
+        after = ContactKinematics(seen.w, wv, 0.0, -away, seen.c, memory_rate(memory, layout, p))
+        return IntegratorState(
+            t, now.well_sign, now.stretch, now.rows, after, kernel_output, now.sample, now.landed, status
+        ), step
 
     about = observe(memory, layout, tip, step.phase + tip.drive.omega * step.length, step.q1, step.p1)
     if not math.isfinite(about.d + about.dv):
         return (
-            Now(t, now.home, now.stretch, now.rows, seen, watch, now.sample, now.landed, _NOT_FINITE),
+            IntegratorState(
+                t, now.well_sign, now.stretch, now.rows, seen, control, now.sample, now.landed, _DIVERGED
+            ),
             step,
         )
-    met = meets(memory, layout, run, now, tip, step, about, room)
-    entry = met.entry
-    if met.pieces > 0:
-        _mend(room.looked, met.pieces, step.length, about)
-        if t + step.ticks > met.safe_gap:
-            entry = _entry(room.looked, met.pieces, met.piece)
-    if seen.d > -still_speed * run.step_time and met.pieces > 0:
+    contact_event = detect_contact_event(memory, layout, run, now, tip, step, about, scratch)
+    entry = contact_event.entry
+    if contact_event.pieces > 0:
+        _mend(scratch.looked, contact_event.pieces, step.length, about)
+        if t + step.ticks > contact_event.safe_gap:
+            entry = _entry(scratch.looked, contact_event.pieces, contact_event.piece)
+    if seen.d > -still_speed * run.step_time and contact_event.pieces > 0:
         still = still_speed * run.step_time
-        entry = _rises(room.looked, met.pieces, met.piece, still, still_speed)
+        entry = _rises(scratch.looked, contact_event.pieces, contact_event.piece, still, still_speed)
     hit, ticks = False, step.ticks
     if entry >= 0.0:
-        top = _top(room.looked, met.pieces, met.piece, entry)
+        top = _top(scratch.looked, contact_event.pieces, contact_event.piece, entry)
         located, done, about, hit = _located(
-            memory, blocks, place, run, tip, step, entry, top, about.d, still_speed
+            memory, blocks, workspace, run, tip, step, entry, top, about.d, still_speed
         )
         ticks = min(max(1, math.ceil(located.length / tick)), step.ticks)
         if hit:
@@ -301,45 +315,57 @@ def settle_newton(memory, blocks, place, run, now, step, done, room, book, asked
                 step.k1, step.r,
             )  # fmt: skip
         else:
-            step = cut_to(step, run, ticks, ticks * tick)
-            prepare(memory, layout, place.stages, run.struck.drive, step.length, step.at)
-            done = take_step(memory, blocks, layout, place.stages, tip, step, True)
+            step = cut_step(step, run, ticks, ticks * tick)
+            prepare(memory, layout, workspace.stages, run.struck.drive, step.length, step.at)
+            done = take_step(memory, blocks, layout, workspace.stages, tip, step, True)
             about = observe(memory, layout, tip, step.phase + tip.drive.omega * step.length, step.q1, step.p1)
-    seen1 = Seen(about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv)
+    seen1 = ContactKinematics(
+        about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv
+    )
     sample = now.sample
     if outputs is not None:
-        sample = record_instants(memory, blocks, layout, place.stages, run, tip, now, step, book, outputs)
-    book.dissipated += done.dissipated
-    track(book, seen, seen1, step.length)
-    if hit or t + step.ticks > met.safe_center:
-        count_in_step(
-            book, clock, t, step.length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1),
-            room.looked, at_center(layout.uneven, rest_center), met.pieces, met.piece,
+        sample = record_instants(
+            memory, blocks, layout, workspace.stages, run, tip, now, step, accumulators, outputs
+        )
+    accumulators.dissipated += done.dissipated
+    accumulate_displacement(accumulators, seen, seen1, step.length)
+    if hit or t + step.ticks > contact_event.safe_center:
+        count_zero_crossings_in_step(
+            accumulators, clock, t, step.length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1),
+            scratch.looked, at_center(layout.uneven, rest_center), contact_event.pieces, contact_event.piece,
         )  # fmt: skip
-    observe_extras(asked.extras, book, t * tick, step.length, seen, seen1, False)
+    observe_extras(kernel_input.extras, accumulators, t * tick, step.length, seen, seen1, False)
 
     t += step.ticks
     status = _RUNNING if t < clock.end else _OK
-    rows, gq, qr, together = swapped(now.rows), done.gq, done.qr, False
+    rows, gq, qr, together = swap_rows(now.rows), done.gq, done.qr, False
     if hit:
         when, phase = now.t * tick + step.length, step.phase + tip.drive.omega * step.length
-        together = strike(memory, blocks, place, run, tip, step.p1, seen1, when, phase, book, outputs)
+        together = apply_impact_law(
+            memory, blocks, workspace, run, tip, step.p1, seen1, when, phase, accumulators, outputs
+        )
         if together:
-            _stuck(memory, place, run, seen1, step.p1, book)
-            book.onset = t
+            _stuck(memory, workspace, run, seen1, step.p1, accumulators)
+            accumulators.onset = t
         gq, qr = _moved_on(
-            memory, blocks, place, run, tip, step, step.q1, step.p1, step.k1,
+            memory, blocks, workspace, run, tip, step, step.q1, step.p1, step.k1,
             (t - now.t) * tick - step.length, phase, together,
         )  # fmt: skip
         rows = now.rows
         about = observe(memory, layout, tip, phase_at(run, t), rows.q, rows.p)
         d, dv = (0.0, 0.0) if together else (min(about.d, 0.0), about.dv)
-        seen1 = Seen(about.w + rest_contact, about.wv, d, dv, about.c + rest_center, about.cv)
-    safe_gap, safe_center = (t, t) if entry >= 0.0 else (met.safe_gap, met.safe_center)
-    kept = Watch(together, watch.quiet, safe_gap, safe_center, watch.weighed, watch.beat)
+        seen1 = ContactKinematics(about.w + rest_contact, about.wv, d, dv, about.c + rest_center, about.cv)
+    safe_gap, safe_center = (t, t) if entry >= 0.0 else (contact_event.safe_gap, contact_event.safe_center)
+    kernel_output = StepControl(
+        together, control.quiet, safe_gap, safe_center, control.monitor_energy, control.beat
+    )
     state = rows.q, rows.p, gq, qr
-    kept, status = weighed(memory, layout, run, now, t, state, seen1, kept, hit, status, book, asked)
-    return Now(t, now.home, 2.0 * gq + qr, rows, seen1, kept, sample, now.landed, status), step
+    kernel_output, status = monitor_energy(
+        memory, layout, run, now, t, state, seen1, kernel_output, hit, status, accumulators, kernel_input
+    )
+    return IntegratorState(
+        t, now.well_sign, 2.0 * gq + qr, rows, seen1, kernel_output, sample, now.landed, status
+    ), step
 
 
 @inlined

@@ -7,7 +7,7 @@ Striker j has the contact's row c_j, with the sign of its own side, and pushes t
 A force without loss is a kick like that of the tension, p' += sum_j c_j f_j: it stands in memory beside the first
 striker's, is entered before each kick, and is part of the acceleration that a step keeps for the next.
 
-*others* is an :class:`Others` or None, by type: with one striker nothing of this is compiled.
+*others* is an :class:`FurtherContacts` or None, by type: with one striker nothing of this is compiled.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from snapbeam.engines.cpu.dot import dot
 from snapbeam.engines.scalar.compile import called, inlined
-from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, splat, spread_at
+from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, splat, broadcast_load
 from snapbeam.engines.scalar.several import (
     DEPTH,
     FORCE,
@@ -37,20 +37,20 @@ from snapbeam.engines.scalar.several import (
 )
 
 __all__ = [
-    "Others",
+    "FurtherContacts",
     "block",
-    "given_by_others",
-    "gross_of_others",
+    "with_further_contact_work",
+    "with_further_contact_gross_work",
     "penetration_of",
-    "press",
-    "put_others",
-    "stored_by_others",
+    "evaluate_contacts",
+    "mirror_further_contacts",
+    "with_further_contact_energy",
     "struck",
     "struck_along",
 ]
 
 
-class Others(NamedTuple):
+class FurtherContacts(NamedTuple):
     """Where in memory the strikers beside the first one stand."""
 
     rows: int
@@ -91,7 +91,7 @@ def _press(memory, size, others, drive, argument, q, weight, begins):
 
 
 @inlined
-def press(memory, size, others, drive, argument, q, weight, begins):
+def evaluate_contacts(memory, size, others, drive, argument, q, weight, begins):
     """Put the forces at a place and an argument of the drive at hand; add up what a kick of *weight* by them does.
 
     *begins*: with the first kick of a step.
@@ -107,7 +107,7 @@ def struck(memory, size, others, row, k):
     if others is None:
         return k
     for j in range(count_of(others.kinds)):
-        force = spread_at(memory, block(others, j) + FORCE)
+        force = broadcast_load(memory, block(others, j) + FORCE)
         k = fma(force, load(memory, others.rows + j * size + row), k)
     return k
 
@@ -126,17 +126,17 @@ def struck_along(memory, size, others, contact, along):
 
 
 @inlined
-def put_others(memory, others, home):
+def mirror_further_contacts(memory, others, well_sign):
     """Where they are, as seen from the well *home*."""
     if others is None:
         return
     for j in range(count_of(others.kinds)):
         at = block(others, j)
-        memory[at + HERE] = memory[at + OFFSET] + (1.0 - home) * memory[at + REST]
+        memory[at + HERE] = memory[at + OFFSET] + (1.0 - well_sign) * memory[at + REST]
 
 
 @inlined
-def given_by_others(memory, others, work):
+def with_further_contact_work(memory, others, work):
     """Work of the first striker in a step with that of the others."""
     if others is None:
         return work
@@ -146,7 +146,7 @@ def given_by_others(memory, others, work):
 
 
 @inlined
-def gross_of_others(memory, others, gross):
+def with_further_contact_gross_work(memory, others, gross):
     """The same, every part taken as positive."""
     if others is None:
         return gross
@@ -156,7 +156,7 @@ def gross_of_others(memory, others, gross):
 
 
 @inlined
-def stored_by_others(memory, others, energy):
+def with_further_contact_energy(memory, others, energy):
     """An energy with what the other contacts store."""
     if others is None:
         return energy

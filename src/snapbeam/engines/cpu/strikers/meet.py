@@ -9,14 +9,20 @@ from __future__ import annotations
 import math
 
 from snapbeam.engines.cpu.dot import dot
-from snapbeam.engines.cpu.rows import flow_coefficients, glide, speed_bound
-from snapbeam.engines.cpu.step import tapped_step
-from snapbeam.engines.cpu.strikers.force import block, penetration_of, put_others
-from snapbeam.engines.cpu.world.circuit import known_for, tapped_speed
+from snapbeam.engines.cpu.rows import flow_coefficients, propagate_free, speed_bound
+from snapbeam.engines.cpu.step import with_circuit_acceleration
+from snapbeam.engines.cpu.strikers.force import block, penetration_of, mirror_further_contacts
+from snapbeam.engines.cpu.world.circuit import validity_horizon, circuit_speed_bound
 from snapbeam.engines.cpu.world.forced import extra_speed
 from snapbeam.engines.outcomes import OTHER_IMPACTS, OTHER_IMPULSE, OTHER_PEAK, OTHER_WORK
 from snapbeam.engines.scalar.compile import called, inlined
-from snapbeam.engines.scalar.decisions import TRUST, Seen, contact_level, entry_again, safe_for
+from snapbeam.engines.scalar.decisions import (
+    TRUST,
+    ContactKinematics,
+    contact_level,
+    refine_onset,
+    safe_interval,
+)
 from snapbeam.engines.scalar.lanes import WIDTH, lanes_sum, load
 from snapbeam.engines.scalar.several import (
     CUT,
@@ -42,26 +48,26 @@ from snapbeam.engines.scalar.several import (
     force_of,
     motion_of,
 )  # fmt: skip
-from snapbeam.engines.scalar.signals import first_fall, first_rise, widened
+from snapbeam.engines.scalar.signals import first_downcrossing, first_upcrossing, update_extrema
 
 __all__ = [
     "any_touches",
-    "begin_others",
-    "close_others",
-    "count_others",
-    "entry_of_others",
-    "first_edge",
-    "keep_others",
-    "level_of_others",
-    "see_others",
+    "begin_further_contacts",
+    "close_further_contacts",
+    "accumulate_further_contacts",
+    "refine_further_onsets",
+    "first_further_event",
+    "store_further_contacts",
+    "further_contacts_step_level",
+    "observe_further_contacts",
     "trusted",
-    "turn_others",
+    "update_further_contacts",
 ]
 
 
 @called
-def _begin(memory, size, others, drive, asked, i, argument, home, q):
-    put_others(memory, others, home)
+def _begin(memory, size, others, drive, kernel_input, i, argument, well_sign, q):
+    mirror_further_contacts(memory, others, well_sign)
     for j in range(count_of(others.kinds)):
         at = block(others, j)
         depth, velocity = penetration_of(memory, size, others, drive, argument, j, q)
@@ -72,18 +78,18 @@ def _begin(memory, size, others, drive, asked, i, argument, home, q):
 
 
 @inlined
-def begin_others(memory, size, others, drive, asked, i, argument, home, q):
+def begin_further_contacts(memory, size, others, drive, kernel_input, i, argument, well_sign, q):
     """Put the strikers of run *i* in memory; one that presses at the start touches from then on; p follows *q*."""
     if others is None:
         return
     for j in range(count_of(others.kinds)):
         at = block(others, j)
         for number in range(NUMBERS):
-            memory[at + number] = asked.other_numbers[i, j, number]
-        place = asked.other_places[i, j]
+            memory[at + number] = kernel_input.other_numbers[i, j, number]
+        place = kernel_input.other_places[i, j]
         for row in range(size):
-            memory[others.rows + j * size + row] = asked.other_rows[place, row]
-    _begin(memory, size, others, drive, asked, i, argument, home, q)
+            memory[others.rows + j * size + row] = kernel_input.other_rows[place, row]
+    _begin(memory, size, others, drive, kernel_input, i, argument, well_sign, q)
 
 
 @inlined
@@ -105,7 +111,7 @@ def trusted(memory, others, t, until):
 
 
 @inlined
-def level_of_others(memory, others, clock, t, touching, level):
+def further_contacts_step_level(memory, others, clock, t, touching, level):
     """The level of a step, made finer for those that touch, and finer still where more than one contact lasts.
 
     A beam that is pressed from several sides has the stiffness of all contacts, whose rates add as squares: of two
@@ -126,7 +132,7 @@ def level_of_others(memory, others, clock, t, touching, level):
 
 
 @inlined
-def see_others(memory, size, others, drive, argument, q, p):
+def observe_further_contacts(memory, size, others, drive, argument, q, p):
     """Note penetrations and their rates at the end of a step."""
     if others is None:
         return
@@ -138,11 +144,11 @@ def see_others(memory, size, others, drive, argument, q, p):
 
 
 @called
-def _entry(memory, layout, others, drive, flow, pieces, piece, step, j, room):
+def _entry(memory, layout, others, drive, flow, pieces, piece, step, j, scratch):
     """When within a free step the gap of striker j closes, s; -1 if it does not."""
-    size, row, parts = layout.size, others.rows + j * layout.size, room.parts
+    size, row, parts = layout.size, others.rows + j * layout.size, scratch.parts
     sign, here = memory[block(others, j) + SIGN], memory[block(others, j) + HERE]
-    glide(memory, layout, row, flow, pieces, piece, step.q, step.p, step.k, step.k1, False, parts)
+    propagate_free(memory, layout, row, flow, pieces, piece, step.q, step.p, step.k, step.k1, False, parts)
     push0, push1 = dot(memory, size, row, step.k), dot(memory, size, row, step.k1)
     before, rate_before = 0.0, 0.0
     for i in range(pieces + 1):
@@ -157,7 +163,7 @@ def _entry(memory, layout, others, drive, flow, pieces, piece, step, j, room):
         depth = here + motion - w
         closing = velocity - rate - owed * ((1.0 - done) * push0 + done * push1)
         if i > 0:
-            rise = first_rise(before, rate_before, depth, closing, piece)
+            rise = first_upcrossing(before, rate_before, depth, closing, piece)
             if rise >= 0.0:
                 return (i - 1 + rise) * piece
         before, rate_before = depth, closing
@@ -165,7 +171,7 @@ def _entry(memory, layout, others, drive, flow, pieces, piece, step, j, room):
 
 
 @inlined
-def _looked_for(memory, layout, others, slot, run, drive, step, j, room):
+def _looked_for(memory, layout, others, slot, run, drive, step, j, scratch):
     """The same, in pieces as short as the fastest mode asks for."""
     look, pieces = slot, run.step_pieces
     if step.ticks == 2 * run.clock.step:
@@ -174,12 +180,12 @@ def _looked_for(memory, layout, others, slot, run, drive, step, j, room):
         look += 4 * layout.size
         pieces = max(2, math.ceil(step.length / run.finest_look))
         flow_coefficients(memory, layout, step.length / pieces, look)
-    free = tapped_step(memory, layout, run.spare, step)
-    return _entry(memory, layout, others, drive, look, pieces, step.length / pieces, free, j, room)
+    free = with_circuit_acceleration(memory, layout, run.spare, step)
+    return _entry(memory, layout, others, drive, look, pieces, step.length / pieces, free, j, scratch)
 
 
 @called
-def _edge(memory, layout, others, slot, run, t, drive, step, room):
+def _edge(memory, layout, others, slot, run, t, drive, step, scratch):
     """The tick of a step at which the first of the others meets or leaves the beam, and each one's own."""
     size, tick, earliest = layout.size, run.clock.tick, step.ticks
     after = t + step.ticks
@@ -194,29 +200,31 @@ def _edge(memory, layout, others, slot, run, t, drive, step, room):
             if depth1 <= 0.0:
                 cut = step.ticks
                 if depth > 0.0:
-                    cut = max(1, int(first_fall(depth, rate, depth1, rate1, step.length) * step.ticks))
+                    cut = max(
+                        1, int(first_downcrossing(depth, rate, depth1, rate1, step.length) * step.ticks)
+                    )
         else:
             if busy:
                 memory[at + SAFE] = t
             elif after > memory[at + SAFE]:
                 bound, known = (
                     speed_bound(memory, layout, row, step.q, step.p),
-                    known_for(layout.circuit, run.step_time),
+                    validity_horizon(layout.circuit, run.step_time),
                 )
-                bound = tapped_speed(
+                bound = circuit_speed_bound(
                     memory, size, layout.omega, layout.circuit, row, step.q, step.p, bound, TRUST * known
                 )
                 bound += extra_speed(layout.forced, memory, size, drive, row, TRUST * run.step_time)
                 push = dot(memory, size, row, step.k)
-                safe = safe_for(-depth, bound, memory[at + SPEED], push, known)
+                safe = safe_interval(-depth, bound, memory[at + SPEED], push, known)
                 memory[at + SAFE] = t + int(safe / tick)
             entry = -1.0
             if after > memory[at + SAFE]:
                 if step.touching:
                     # what is looked into knows nothing of the first contact's force; the ends of the step do
-                    entry = first_rise(depth, rate, depth1, rate1, step.length) * step.length
+                    entry = first_upcrossing(depth, rate, depth1, rate1, step.length) * step.length
                 else:
-                    entry = _looked_for(memory, layout, others, slot, run, drive, step, j, room)
+                    entry = _looked_for(memory, layout, others, slot, run, drive, step, j, scratch)
             if entry >= 0.0:
                 cut = min(step.ticks, int(entry / tick))
             elif depth1 > 0.0:
@@ -228,18 +236,18 @@ def _edge(memory, layout, others, slot, run, t, drive, step, room):
 
 
 @inlined
-def first_edge(memory, layout, others, slot, run, t, drive, step, room):
+def first_further_event(memory, layout, others, slot, run, t, drive, step, scratch):
     """The tick within a step at which the first of the other strikers meets or leaves the beam; its end if none does.
 
     *slot* is where the flow over a piece of a look stands.
     """
     if others is None:
         return step.ticks
-    return _edge(memory, layout, others, slot, run, t, drive, step, room)
+    return _edge(memory, layout, others, slot, run, t, drive, step, scratch)
 
 
 @inlined
-def entry_of_others(memory, others, clock, edge, cut, whole, least, due):
+def refine_further_onsets(memory, others, clock, edge, cut, whole, least, due):
     """Where a step that was cut at *cut* is to be cut, knowing better how far the gap of one that enters there is.
 
     Nothing new unless it is *due*: the *edge* at which the step was cut first is one of theirs.
@@ -250,13 +258,13 @@ def entry_of_others(memory, others, clock, edge, cut, whole, least, due):
         for j in range(count_of(others.kinds)):
             at = block(others, j)
             if memory[at + TOUCHING] == 0.0 and memory[at + CUT] == edge:
-                seen = Seen(0.0, 0.0, memory[at + DEPTH1], memory[at + RATE1], 0.0, 0.0)
-                return entry_again(clock, cut, whole, seen, least)
+                seen = ContactKinematics(0.0, 0.0, memory[at + DEPTH1], memory[at + RATE1], 0.0, 0.0)
+                return refine_onset(clock, cut, whole, seen, least)
     return cut
 
 
 @inlined
-def keep_others(memory, others):
+def store_further_contacts(memory, others):
     """Keep what the accepted step gave: a look ahead that follows writes over it."""
     if others is None:
         return
@@ -266,40 +274,40 @@ def keep_others(memory, others):
 
 
 @inlined
-def count_others(memory, others, touching, done, book):
+def accumulate_further_contacts(memory, others, touching, done, accumulators):
     """Enter the work of each of the others in the statistics, and of all if the first does not touch."""
     if others is None:
         return
     for j in range(count_of(others.kinds)):
-        book.others[j, OTHER_WORK] += memory[block(others, j) + WORKED]
+        accumulators.others[j, OTHER_WORK] += memory[block(others, j) + WORKED]
     if not touching:
-        book.work += done.work
-        book.gross_work += done.gross
+        accumulators.work += done.work
+        accumulators.gross_work += done.gross
 
 
 @inlined
-def _leave(memory, others, j, book, outputs, t, tick):
+def _leave(memory, others, j, accumulators, outputs, t, tick):
     """Enter a contact that ends at tick *t* in the statistics, unless nothing was pressed."""
     at = block(others, j)
     deepest = memory[at + DEEPEST]
     if deepest > 0.0:
-        onset, pushed = memory[at + ONSET], memory[at + PUSHED]
+        onset, add_static_load = memory[at + ONSET], memory[at + PUSHED]
         duration, force = (t - onset) * tick, force_of(others.kinds, memory, at + LAW, j, deepest)
-        _write_impact(outputs, book, onset * tick, duration, force, pushed, j)
-        book.impacts += 1
-        book.contact_time += duration
-        book.others[j, OTHER_IMPACTS] += 1.0
-        book.others[j, OTHER_PEAK] = max(book.others[j, OTHER_PEAK], force)
-    book.total_impulse += memory[at + PUSHED]
-    book.others[j, OTHER_IMPULSE] += memory[at + PUSHED]
+        _write_impact(outputs, accumulators, onset * tick, duration, force, add_static_load, j)
+        accumulators.impacts += 1
+        accumulators.contact_time += duration
+        accumulators.others[j, OTHER_IMPACTS] += 1.0
+        accumulators.others[j, OTHER_PEAK] = max(accumulators.others[j, OTHER_PEAK], force)
+    accumulators.total_impulse += memory[at + PUSHED]
+    accumulators.others[j, OTHER_IMPULSE] += memory[at + PUSHED]
     memory[at + TOUCHING], memory[at + DEEPEST], memory[at + PUSHED] = 0.0, 0.0, 0.0
 
 
 @inlined
-def _write_impact(outputs, book, onset, duration, force, impulse, j):
+def _write_impact(outputs, accumulators, onset, duration, force, impulse, j):
     if outputs is None:
         return
-    at = book.impacts - outputs.marks[1]
+    at = accumulators.impacts - outputs.marks[1]
     if at < outputs.impacts.shape[0]:
         outputs.impacts[at, 0], outputs.impacts[at, 1] = onset, duration
         outputs.impacts[at, 2], outputs.impacts[at, 3] = force, impulse
@@ -307,7 +315,7 @@ def _write_impact(outputs, book, onset, duration, force, impulse, j):
 
 
 @called
-def _turn(memory, others, edge, t, length, tick, book, outputs):
+def _turn(memory, others, edge, t, length, tick, accumulators, outputs):
     for j in range(count_of(others.kinds)):
         at = block(others, j)
         depth, rate, depth1, rate1 = (
@@ -315,7 +323,7 @@ def _turn(memory, others, edge, t, length, tick, book, outputs):
         )  # fmt: skip
         touching = memory[at + TOUCHING] != 0.0
         if touching and length > 0.0:
-            memory[at + DEEPEST] = widened(
+            memory[at + DEEPEST] = update_extrema(
                 memory[at + DEPTH], max(memory[at + DEEPEST], depth1), depth, rate, depth1, rate1, length
             )[1]
             memory[at + PUSHED] += memory[at + KEPT]
@@ -324,7 +332,7 @@ def _turn(memory, others, edge, t, length, tick, book, outputs):
         if memory[at + CUT] >= 0.0 and memory[at + CUT] <= edge:
             memory[at + SAFE] = t
             if touching:
-                _leave(memory, others, j, book, outputs, t, tick)
+                _leave(memory, others, j, accumulators, outputs, t, tick)
                 memory[at + DEPTH] = min(memory[at + DEPTH], 0.0)
             else:
                 memory[at + TOUCHING], memory[at + ONSET] = 1.0, t
@@ -332,21 +340,21 @@ def _turn(memory, others, edge, t, length, tick, book, outputs):
 
 
 @inlined
-def turn_others(memory, others, edge, t, length, tick, book, outputs):
+def update_further_contacts(memory, others, edge, t, length, tick, accumulators, outputs):
     """Where they stand at tick *t*, after a step of *length* (s) whose first edge was at tick *edge* of it.
 
     With a length of 0 nothing has moved: those turn whose gap closes as the step begins.
     """
     if others is None:
         return
-    _turn(memory, others, edge, t, length, tick, book, outputs)
+    _turn(memory, others, edge, t, length, tick, accumulators, outputs)
 
 
 @inlined
-def close_others(memory, others, book, outputs, t, tick):
+def close_further_contacts(memory, others, accumulators, outputs, t, tick):
     """Enter the contacts that go on at the end of a run."""
     if others is None:
         return
     for j in range(count_of(others.kinds)):
         if memory[block(others, j) + TOUCHING] != 0.0:
-            _leave(memory, others, j, book, outputs, t, tick)
+            _leave(memory, others, j, accumulators, outputs, t, tick)

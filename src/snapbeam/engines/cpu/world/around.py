@@ -12,7 +12,7 @@ from snapbeam.engines.cpu.world.forced import worked
 from snapbeam.engines.scalar.compile import INLINE_HERE, inlined
 from snapbeam.engines.scalar.lanes import WIDTH, fma, load, store
 
-__all__ = ["around_kick", "count_given"]
+__all__ = ["around_kick", "accumulate_environment_work"]
 
 
 @inlined
@@ -102,10 +102,10 @@ def _around_kick(memory, blocks, layout, tip, step, stage, weight, along, given)
 
 
 @inlined
-def count_given(forced, book, given):
+def accumulate_environment_work(forced, accumulators, given):
     """Enter the work given in a step in the statistics."""
     if forced is None:
         return
-    book.base_work += given.base
-    book.load_work += given.load
-    book.gross_work += given.gross
+    accumulators.base_work += given.base
+    accumulators.load_work += given.load
+    accumulators.gross_work += given.gross

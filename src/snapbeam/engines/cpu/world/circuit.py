@@ -22,19 +22,19 @@ from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, splat, st
 
 __all__ = [
     "Circuit",
-    "Tap",
+    "CircuitIncrement",
     "apply_tap",
-    "calm",
-    "count_circuit",
+    "disable_long_steps",
+    "accumulate_circuit",
     "kick_source",
-    "known_for",
+    "validity_horizon",
     "lean_kick",
-    "no_tap",
-    "passed_by",
+    "no_circuit_increment",
+    "missed_onset",
     "put_rate",
     "tap_of",
-    "tapped_rows",
-    "tapped_speed",
+    "circuit_acceleration_rows",
+    "circuit_speed_bound",
     "without_circuit",
 ]
 
@@ -57,7 +57,7 @@ class Circuit(NamedTuple):
     """Which element of a row is y; None of a circuit without inertia."""
 
 
-class Tap(NamedTuple):
+class CircuitIncrement(NamedTuple):
     """What a kick does to the circuit."""
 
     impulse: float
@@ -79,7 +79,7 @@ def put_rate(memory, circuit, rate):
 
 
 @inlined
-def calm(circuit, quiet):
+def disable_long_steps(circuit, quiet):
     """Whether steps may be longer: never with a circuit, which couples all modes at any energy."""
     if circuit is None:
         return quiet
@@ -102,9 +102,9 @@ def _without_element(memory, own, p, energy):
 
 
 @inlined
-def no_tap():
+def no_circuit_increment():
     """Of a step that has not begun."""
-    return Tap(0.0, 0.0, 0.0, 0.0)
+    return CircuitIncrement(0.0, 0.0, 0.0, 0.0)
 
 
 @inlined
@@ -127,7 +127,7 @@ def _flow(s, y, push, size, rate, weight, energy):
         ds, dy = size * dy, -ds - rate * dy
     w0, w1, w2, w3 = _WEIGHTS
     squares = w0 * y0 * y0 + w1 * y1 * y1 + w2 * y2 * y2 + w3 * y3 * y3
-    return Tap(impulse, end, energy + rate * squares * weight, twice)
+    return CircuitIncrement(impulse, end, energy + rate * squares * weight, twice)
 
 
 @inlined
@@ -149,7 +149,7 @@ def _resistive_flow(s, push, size, rate, weight, energy):
         ds = -lam * ds
     w0, w1, w2, w3 = _WEIGHTS
     squares = w0 * s0 * s0 + w1 * s1 * s1 + w2 * s2 * s2 + w3 * s3 * s3
-    return Tap(-rate * impulse, -rate * end, energy + rate * squares * weight, -rate * twice)
+    return CircuitIncrement(-rate * impulse, -rate * end, energy + rate * squares * weight, -rate * twice)
 
 
 @inlined
@@ -208,7 +208,7 @@ def _state(memory, size, circuit, own, p):
 
 
 @inlined
-def tapped_rows(memory, size, circuit, spare, step):
+def circuit_acceleration_rows(memory, size, circuit, spare, step):
     """Where the accelerations of a free step's ends stand, the circuit's part included: in *spare*, if there is one."""
     if circuit is None:
         return step.k, step.k1
@@ -224,7 +224,7 @@ def tapped_rows(memory, size, circuit, spare, step):
 
 
 @inlined
-def tapped_speed(memory, size, omega, circuit, along, q, p, bound, horizon):
+def circuit_speed_bound(memory, size, omega, circuit, along, q, p, bound, horizon):
     """A speed that c.q cannot exceed within a time, c the row *along*; *bound* is that of the linear flow alone.
 
     The energy of linear modes and circuit together, Y^2/2 = (sum p^2 + omega^2 q^2 + y^2)/2, only falls, so that
@@ -248,7 +248,7 @@ def tapped_speed(memory, size, omega, circuit, along, q, p, bound, horizon):
 
 
 @inlined
-def known_for(circuit, horizon):
+def validity_horizon(circuit, horizon):
     """For how long what is seen of a free flight is relied on: a circuit stiffens the beam, and changes it soon."""
     if circuit is None:
         return horizon
@@ -256,7 +256,7 @@ def known_for(circuit, horizon):
 
 
 @inlined
-def passed_by(circuit, event, depth, depth1):
+def missed_onset(circuit, event, depth, depth1):
     """Whether a free step ended in the contact unseen: the tension changed more than was foreseen."""
     if circuit is None:
         return False
@@ -264,9 +264,11 @@ def passed_by(circuit, event, depth, depth1):
 
 
 @inlined
-def count_circuit(memory, layout, circuit, p, book, tap):
+def accumulate_circuit(memory, layout, circuit, p, accumulators, tap):
     """Enter what a step lost in the circuit in the statistics, and its greatest y."""
     if circuit is None:
         return
-    book.circuit_energy += tap.energy
-    book.peak_circuit = max(book.peak_circuit, abs(_state(memory, layout.size, circuit, circuit.own, p)))
+    accumulators.circuit_energy += tap.energy
+    accumulators.peak_circuit = max(
+        accumulators.peak_circuit, abs(_state(memory, layout.size, circuit, circuit.own, p))
+    )

@@ -13,7 +13,7 @@ from numba.extending import overload
 
 from snapbeam.engines.scalar.compile import INLINE_HERE, inlined
 
-__all__ = ["Jump", "jumps_of", "up_to_edge"]
+__all__ = ["Jump", "jumps_of", "up_to_discontinuity"]
 
 _TWO_PI = 2.0 * math.pi
 _MARGIN = 2
@@ -86,7 +86,7 @@ def _limited(jumps: list[Jump], fields: tuple[str, ...]) -> Any:
     return all_of_them
 
 
-def up_to_edge(drive: Any, phase: float, period: int, t: int, limit: int) -> int:
+def up_to_discontinuity(drive: Any, phase: float, period: int, t: int, limit: int) -> int:
     """The tick at which a step from tick *t* ends at the latest: *limit*, or a border of a jump before it.
 
     Parameters
@@ -102,7 +102,7 @@ def up_to_edge(drive: Any, phase: float, period: int, t: int, limit: int) -> int
     raise TypeError("up_to_edge runs in compiled code only")
 
 
-@overload(up_to_edge, jit_options=INLINE_HERE)
+@overload(up_to_discontinuity, jit_options=INLINE_HERE)
 def _up_to_edge(drive, phase, period, t, limit):
     jumps = jumps_of(drive.instance_class.owner)
     if not jumps:

@@ -4,7 +4,7 @@ In the frame of the ends an acceleration a(t) of the base is the modal accelerat
 load is dP(t) (g + G q), that is dP more of both that the tension pulls with.  Both depend on position and time alone,
 so that kicks stay what they were: a(t) and dP(t) at hand stand in memory, and are entered before each kick.
 
-*forced* is a :class:`Forced` or None, by type: without a base and a load nothing of this is compiled.
+*forced* is a :class:`TimeDependentForces` or None, by type: without a base and a load nothing of this is compiled.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from numba.extending import overload
 
 from snapbeam.engines.scalar.compile import INLINE_HERE, inlined
 from snapbeam.engines.scalar.joined import base_acceleration, load_change
-from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, splat, spread_at
+from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, splat, broadcast_load
 
 __all__ = [
-    "Forced",
-    "Given",
+    "TimeDependentForces",
+    "ExternalWork",
     "changed_load",
     "enter_forces",
     "extra_speed",
-    "no_given",
-    "shaken",
+    "no_external_work",
+    "add_base_acceleration",
     "shaken_along",
     "worked",
 ]
 
 
-class Forced(NamedTuple):
+class TimeDependentForces(NamedTuple):
     """Where in memory the forces stand."""
 
-    shaken: int
+    add_base_acceleration: int
     """What an acceleration of the base does to p, a row of the structure."""
     now: int
     """Acceleration of the base (m/s^2) and change of the axial load (N) at hand."""
@@ -41,7 +41,7 @@ class Forced(NamedTuple):
     """Room for the acceleration of a kick."""
 
 
-class Given(NamedTuple):
+class ExternalWork(NamedTuple):
     """Work on the beam within a step, J, of the base and of the axial load, and the size of its parts."""
 
     base: float
@@ -50,9 +50,9 @@ class Given(NamedTuple):
 
 
 @inlined
-def no_given():
+def no_external_work():
     """Of a step that has not begun."""
-    return Given(0.0, 0.0, 0.0)
+    return ExternalWork(0.0, 0.0, 0.0)
 
 
 def enter_forces(forced: Any, memory: Any, drive: Any, argument: float) -> None:
@@ -82,11 +82,11 @@ def changed_load(memory, forced, along_g, along_r):
 
 
 @inlined
-def shaken(memory, forced, row, k):
+def add_base_acceleration(memory, forced, row, k):
     """An acceleration with what the base adds."""
     if forced is None:
         return k
-    return fma(spread_at(memory, forced.now), load(memory, forced.shaken + row), k)
+    return fma(broadcast_load(memory, forced.now), load(memory, forced.add_base_acceleration + row), k)
 
 
 @inlined
@@ -96,7 +96,7 @@ def shaken_along(memory, size, forced, contact, along):
         return along
     total = splat(0.0)
     for row in range(0, size, WIDTH):
-        total = fma(load(memory, forced.shaken + row), load(memory, contact + row), total)
+        total = fma(load(memory, forced.add_base_acceleration + row), load(memory, contact + row), total)
     return along + memory[forced.now] * lanes_sum(total)
 
 
@@ -113,7 +113,7 @@ def _extra_speed(forced, memory, size, drive, along, horizon):
     def implementation(forced, memory, size, drive, along, horizon):
         total = 0.0
         for row in range(size):
-            total += abs(memory[forced.shaken + row] * memory[along + row])
+            total += abs(memory[forced.add_base_acceleration + row] * memory[along + row])
         return total * drive.base_hardest * horizon
 
     return implementation
@@ -129,7 +129,7 @@ def worked(memory, size, forced, weight, g, r, kick, p, given):
     base, load_work, half = splat(0.0), splat(0.0), 0.5 * weight
     for row in range(0, size, WIDTH):
         middle = fma(half, load(memory, kick + row), load(memory, p + row))
-        base = fma(load(memory, forced.shaken + row), middle, base)
+        base = fma(load(memory, forced.add_base_acceleration + row), middle, base)
         load_work = fma(load(memory, g + row) + load(memory, r + row), middle, load_work)
     of_base, of_load = weight * shaking * lanes_sum(base), weight * change * lanes_sum(load_work)
-    return Given(given.base + of_base, given.load + of_load, given.gross + abs(of_base) + abs(of_load))
+    return ExternalWork(given.base + of_base, given.load + of_load, given.gross + abs(of_base) + abs(of_load))

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.core.validate import InputError, shown
 from snapbeam.lab.camera.photron.fields import Fields, read_fields
 from snapbeam.lab.camera.photron.timing import Timing, read_timing
@@ -48,7 +48,7 @@ class CameraHeader:
     start_frame: int
     camera: str
     comment: str
-    findings: tuple[Finding, ...]
+    diagnostics: tuple[Diagnostic, ...]
 
     @property
     def mraw(self) -> Path:
@@ -109,7 +109,7 @@ def read_header(path: str | Path) -> CameraHeader:
         start_frame=fields.integer("start", -(2**40), 2**40, default=0),
         camera=fields.text("camera", ""),
         comment=fields.text("comment", ""),
-        findings=(*timing.findings, *_curve(fields)),
+        diagnostics=(*timing.diagnostics, *_curve(fields)),
     )
     if stored == 12 and not header.image_suffix and header.width * header.height % 2:
         raise fields.error("width", f"= {header.width}: 12-bit frames hold an even number of pixels")
@@ -154,7 +154,7 @@ def _scale_hint(fields: Fields) -> str:
     return f"its field 'Scale Pixel Size' is {size:g} in a unit that it does not name ({size:g}e-6 if um)"
 
 
-def _curve(fields: Fields) -> tuple[Finding, ...]:
+def _curve(fields: Fields) -> tuple[Diagnostic, ...]:
     gamma, enhance = fields.number("gamma"), fields.number("edge_enhance")
     if (gamma is None or gamma == 1.0) and not enhance:
         return ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 from snapbeam.lab.camera.photron.fields import Fields
 from snapbeam.lab.plausibility.recording import KINDS
 
@@ -26,7 +26,7 @@ class Timing:
     frame_rate: float | None
     question: str
     exposure: float | None
-    findings: tuple[Finding, ...]
+    diagnostics: tuple[Diagnostic, ...]
 
 
 def read_timing(fields: Fields, frames: int) -> Timing:
@@ -58,26 +58,26 @@ def read_timing(fields: Fields, frames: int) -> Timing:
             "another rate; give frame_rate (--frame-rate) in Hz"
         )
         frame_rate = None
-    exposure, findings = _exposure(fields, rate)
-    return Timing(rate, skip, frame_rate, question, exposure, findings)
+    exposure, diagnostics = _exposure(fields, rate)
+    return Timing(rate, skip, frame_rate, question, exposure, diagnostics)
 
 
-def _exposure(fields: Fields, rate: float | None) -> tuple[float | None, tuple[Finding, ...]]:
+def _exposure(fields: Fields, rate: float | None) -> tuple[float | None, tuple[Diagnostic, ...]]:
     stated = fields.positive("shutter")
     longest = math.inf if rate is None else 1.01 / rate
-    findings: list[Finding] = []
+    diagnostics: list[Diagnostic] = []
     exposure = stated if not fields.xml or stated is None else 1.0 / stated
     if exposure is not None and exposure > longest:
         other = 1.0 / exposure
         if other <= longest:
-            findings.append(KINDS["shutter"].found(stated=exposure, exposure_us=1e6 * other))
+            diagnostics.append(KINDS["shutter"].found(stated=exposure, exposure_us=1e6 * other))
             exposure = other
         else:
-            findings.append(KINDS["no_exposure"].found(stated=exposure, frame_us=1e6 / (rate or math.nan)))
+            diagnostics.append(KINDS["no_exposure"].found(stated=exposure, frame_us=1e6 / (rate or math.nan)))
             exposure = None
     nsec = fields.number("shutter_nsec")
     if nsec is not None and nsec > 0.0 and 1e-9 * nsec <= longest:
         if exposure is not None and abs(1e-9 * nsec / exposure - 1.0) > 0.02:
-            findings.append(KINDS["two_exposures"].found(first_us=1e6 * exposure, second_us=1e-3 * nsec))
+            diagnostics.append(KINDS["two_exposures"].found(first_us=1e6 * exposure, second_us=1e-3 * nsec))
         exposure = 1e-9 * nsec
-    return exposure, tuple(findings)
+    return exposure, tuple(diagnostics)

@@ -48,7 +48,7 @@ class ArraySource(FrameSource):
         self.numbers = np.arange(shape[0])
         self._colors = len(shape) == 4
         if self._colors:
-            self.findings += (KINDS["colour"].found(channels=shape[3]),)
+            self.diagnostics += (KINDS["colour"].found(channels=shape[3]),)
         self._full = 0.0
         if dtype.kind == "f":
             self._full = float_range(

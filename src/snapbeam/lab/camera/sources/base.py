@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.findings import Finding
+from snapbeam.core.findings import Diagnostic
 
 __all__ = ["FrameSource", "grey_of", "scaled_floats"]
 
@@ -31,7 +31,7 @@ class FrameSource:
         [Hz], [m], [s], or None where the file does not say.
     frame_rate_question, pixel_size_hint
         What the file says that is not enough, for the refusal.
-    findings, edge_error
+    diagnostics, edge_error
         What makes measurements doubtful, and the standard error [px] that the format adds to every edge.
     metadata
         What else the file says.
@@ -47,7 +47,7 @@ class FrameSource:
         self.exposure: float | None = None
         self.frame_rate_question = ""
         self.pixel_size_hint = ""
-        self.findings: tuple[Finding, ...] = ()
+        self.diagnostics: tuple[Diagnostic, ...] = ()
         self.edge_error = 0.0
         self.metadata: dict[str, Any] = {}
 

@@ -70,9 +70,9 @@ def images_of_header(header: CameraHeader) -> FrameSource:
             f"{header.path}: says {header.frame_count} frames of {header.height} x {header.width} pixels; beside it "
             f"are {len(own)} {header.image_suffix} images of {source.shape[0]} x {source.shape[1]}"
         )
-    found = source.findings
+    found = source.diagnostics
     take_header(source, header)
-    source.findings += found
+    source.diagnostics += found
     if source.max_value > header.max_value and header.effective_side == "lower":
         source.max_value = header.max_value
     return source
@@ -123,14 +123,14 @@ class ImageSource(FrameSource):
             self.max_value = int(np.iinfo(first.dtype).max)
         self.metadata = {"format": "numbered images", "first_number": order[0]}
         if any(one.suffix.lower() in (".jpg", ".jpeg") for one in self._files):
-            self.findings += (KINDS["lossy"].found(error_px=LOSSY_ERROR),)
+            self.diagnostics += (KINDS["lossy"].found(error_px=LOSSY_ERROR),)
             self.edge_error = LOSSY_ERROR
 
     def _load(self, index: int) -> NDArray[Any]:
         image = load_image(self._files[index], grey=False)
         if image.ndim == 3:
-            if not any(one.code == KINDS["colour"].code for one in self.findings):
-                self.findings += (KINDS["colour"].found(channels=image.shape[2]),)
+            if not any(one.code == KINDS["colour"].code for one in self.diagnostics):
+                self.diagnostics += (KINDS["colour"].found(channels=image.shape[2]),)
             image = grey_of(image)
         return image
 

@@ -24,7 +24,7 @@ def take_header(source: FrameSource, header: CameraHeader) -> None:
     source.pixel_size = header.pixel_size
     source.pixel_size_hint = header.scale_hint
     source.exposure = header.timing.exposure
-    source.findings = header.findings
+    source.diagnostics = header.diagnostics
     source.metadata = {
         "format": "Photron mraw"
         if not header.image_suffix
@@ -53,7 +53,7 @@ class PhotronSource(FrameSource):
         if header.raw_colors:
             self._gains, spread = _mosaic(self.read(0, 1, (0, self.shape[0]))[0])
             if self._gains is not None:
-                self.findings += (KINDS["mosaic"].found(spread_percent=100.0 * spread),)
+                self.diagnostics += (KINDS["mosaic"].found(spread_percent=100.0 * spread),)
 
     def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
         frames = read_mraw(self.header, start, stop, rows)

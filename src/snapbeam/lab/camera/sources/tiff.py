@@ -63,14 +63,14 @@ class TiffSource(FrameSource):
             self._dtype = first.dtype
             self._colors = first.ndim == 3
             if self._colors:
-                self.findings += (KINDS["colour"].found(channels=first.shape[2]),)
+                self.diagnostics += (KINDS["colour"].found(channels=first.shape[2]),)
             if str(getattr(first.compression, "name", "NONE")).upper() in (
                 "JPEG",
                 "OJPEG",
                 "JPEG2000",
                 "WEBP",
             ):
-                self.findings += (KINDS["lossy"].found(error_px=LOSSY_ERROR),)
+                self.diagnostics += (KINDS["lossy"].found(error_px=LOSSY_ERROR),)
                 self.edge_error = LOSSY_ERROR
             self._imagej(self._file.imagej_metadata or {}, first)
         except InputError:

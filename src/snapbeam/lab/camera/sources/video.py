@@ -53,7 +53,7 @@ class VideoSource(FrameSource):
                     rate = None if playback is None else float(playback)
                     self.metadata = {"format": f"video ({codec})", "playback_rate": rate}
                 if codec not in LOSSLESS:
-                    self.findings += (KINDS["lossy"].found(error_px=LOSSY_ERROR),)
+                    self.diagnostics += (KINDS["lossy"].found(error_px=LOSSY_ERROR),)
                     self.edge_error = LOSSY_ERROR
                 name = stream.codec_context.pix_fmt or ""
                 self.shape = (stream.codec_context.height, stream.codec_context.width)
@@ -68,7 +68,7 @@ class VideoSource(FrameSource):
         if count == 0 or 0 in self.shape:
             raise InputError(f"{path}: the video holds no frame")
         if name not in ("gray", "gray8") and re.search(r"rgb|bgr|bayer|gbr|pal8", name):
-            self.findings += (KINDS["colour"].found(channels=3),)
+            self.diagnostics += (KINDS["colour"].found(channels=3),)
         deep = re.search(r"(9|10|12|14|16|48)(le|be)", name)
         self._format = "gray16le" if deep else "gray"
         self.max_value = 65535 if deep else 255

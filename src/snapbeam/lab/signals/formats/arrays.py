@@ -37,7 +37,7 @@ def read_numpy(path: Path, _told: Told) -> list[Channel]:
         unit = next((str(value) for value in units if value), None)
         channel: Channel = {"data": data, "name": name, "unit_str": unit}
         if stated is not None:
-            channel["fs"] = positive("sampling_freq", stated, "Hz")
+            channel["fs"] = positive("sampling_frequency", stated, "Hz")
         channels.append(channel)
     return with_time(channels)
 

@@ -178,7 +178,7 @@ def write_csv(path: Path, signal: xr.DataArray, _full_scale: float | None = None
     """Write a signal as a table of time and value, 12 digits each."""
     values, time, rate = check_signal(signal)
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"# sampling_freq: {rate:.12g} Hz\n")
+        file.write(f"# sampling_frequency: {rate:.12g} Hz\n")
         file.write(f"time [s],{signal.name} [{signal.attrs['units']}]\n")
         np.savetxt(file, np.column_stack((time, values)), fmt="%.12g", delimiter=",")
 

@@ -14,7 +14,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from snapbeam.core.findings import Finding, tell
+from snapbeam.core.findings import Diagnostic, tell
 from snapbeam.core.validate import InputError
 
 __all__ = ["TextBlock", "decoded", "read_block", "to_number"]
@@ -184,7 +184,7 @@ def read_block(path: Path, columns: int = 0) -> TextBlock:
         raise InputError(f"{path}: a quoted value runs over the end of a line")
     if not text.endswith("\n") and _is_short(cells):
         words = f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}, as a copy that was broken off does"
-        tell([Finding("signal.cut", words, {"lines": float(len(lines))})])
+        tell([Diagnostic("signal.cut", words, {"lines": float(len(lines))})])
     return TextBlock(
         path=path,
         header=(*comments, *(line for k, line in enumerate(lines[: dialect.first]) if k not in taken)),

@@ -1,1 +1,1 @@
-"""Finding out from a sample of frames what a recording shows, before it is followed."""
+"""Diagnostic out from a sample of frames what a recording shows, before it is followed."""

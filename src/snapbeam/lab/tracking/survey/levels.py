@@ -21,7 +21,7 @@ def otsu(frames: NDArray[np.floating]) -> float:
         import cv2
     except ImportError as error:
         raise InputError(
-            "threshold = None: finding one needs OpenCV (pip install 'snapbeam[lab]'); or give threshold "
+            "threshold = None: diagnostic one needs OpenCV (pip install 'snapbeam[lab]'); or give threshold "
             "(--threshold)"
         ) from error
     low, high = (float(level) for level in np.percentile(frames[:, ::2, ::2], (0.05, 99.95)))

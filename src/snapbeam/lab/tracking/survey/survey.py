@@ -1,4 +1,4 @@
-"""Finding the beam and the shaker in a sample of frames, before following them."""
+"""Diagnostic the beam and the shaker in a sample of frames, before following them."""
 
 from __future__ import annotations
 

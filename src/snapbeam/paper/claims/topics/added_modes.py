@@ -13,7 +13,7 @@ from scipy.stats import spearmanr
 
 import snapbeam as sb
 from snapbeam.model.paper_values import MODES
-from snapbeam.paper.claims.finding import Finding, Quantity, above, below, found, near
+from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.claims.spread import combined, median_of, part, resampled, share
 from snapbeam.paper.claims.topics.locations import grid_step, relative_threshold
 from snapbeam.paper.system import paper_model
@@ -49,7 +49,7 @@ def _over(first: Quantity, second: Quantity) -> Quantity:
     return Quantity(value, value * spread)
 
 
-def two_modes(results: Results) -> Finding:
+def two_modes(results: Results) -> ClaimResult:
     """8a: two modes raise the threshold about x_s = 0.25."""
     maps = _maps(results)
     one, two = _at_place(maps[1]), _at_place(maps[2])
@@ -67,13 +67,13 @@ def _apart(first: xr.Dataset, second: xr.Dataset) -> Quantity:
     return median_of(off, 0.5 * step)
 
 
-def half_the_modes(results: Results) -> Finding:
+def half_the_modes(results: Results) -> ClaimResult:
     """8b: 16 modes give nearly the map of 32."""
     maps = _maps(results)
     last = max(maps)
     first, second = maps[last // 2], maps[last]
     apart = _apart(first, second)
-    a, b = first.response.values, second.response.values
+    a, b = first.response_class.values, second.response_class.values
     base, nudged = (part(results, "sensitivity", name).response.values for name in ("base", "perturbed"))
     changed, floor = share(a != b), share(base != nudged)
     snapped = share(is_interwell(a) != is_interwell(b))
@@ -92,7 +92,7 @@ def _antinode() -> tuple[float, float]:
     return float(x[np.argmax(np.abs(phi[:, 1]))]), float(x[np.argmax(np.abs(dynamic))])
 
 
-def antinode(results: Results) -> Finding:
+def antinode(results: Results) -> ClaimResult:
     """8c: the place is that of the antinode of the second mode."""
     maps = _maps(results)
     x, one = relative_threshold(maps[1])
@@ -112,7 +112,7 @@ def antinode(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def small_changes(results: Results) -> Finding:
+def small_changes(results: Results) -> ClaimResult:
     """8d: beyond two modes each number added changes the threshold little."""
     maps = _maps(results)
     counts = sorted(maps)
@@ -131,7 +131,7 @@ def small_changes(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def energy_of_second_mode(results: Results) -> Finding:
+def energy_of_second_mode(results: Results) -> ClaimResult:
     """8e: the threshold of two modes rises where an impulse gives its energy to the second."""
     maps = _maps(results)
     x, one = relative_threshold(maps[1])
@@ -154,7 +154,7 @@ def energy_of_second_mode(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def second_mode_is_critical(results: Results) -> Finding:
+def second_mode_is_critical(results: Results) -> ClaimResult:
     """8f: how much of the rise from 1 to 32 modes the second alone makes, as a share of its logarithm."""
     maps = _maps(results)
     last = max(maps)
@@ -165,7 +165,7 @@ def second_mode_is_critical(results: Results) -> Finding:
     return found(above(made, 0.5), above(made, 0.25), made=made, last=last)
 
 
-def twice_the_modes(results: Results) -> Finding:
+def twice_the_modes(results: Results) -> ClaimResult:
     """8g: the map over frequency of 32 modes against that of 64."""
     base, double = (part(results, "sensitivity", name) for name in ("base", "double_modes"))
     curves = [interwell_threshold(ds) for ds in (base, double)]
@@ -173,8 +173,8 @@ def twice_the_modes(results: Results) -> Finding:
     off = off[np.isfinite(off)]
     step = float(np.diff(base.velocity_amplitude.values).max()) / float(np.nanmedian(curves[0]))
     apart = median_of(np.abs(off), 0.5 * step)
-    changed = share(base.response.values != double.response.values)
-    floor = share(base.response.values != part(results, "sensitivity", "perturbed").response.values)
+    changed = share(base.response_class.values != double.response.values)
+    floor = share(base.response_class.values != part(results, "sensitivity", "perturbed").response.values)
     return found(
         below(apart, 0.05) & below(changed, floor.value + floor.uncertainty), below(apart, 0.1), apart=apart,
         changed=changed, floor=floor, mean=float(off.mean()), modes=int(base.attrs["modes"]),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam.model.galerkin.modes import BucklingModes
 from snapbeam.model.paper_values import BEAM, MODES
-from snapbeam.paper.claims.finding import Finding, Quantity, above, below, found
+from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found
 from snapbeam.paper.system import paper_model
 
 if TYPE_CHECKING:
@@ -30,18 +30,18 @@ def _quadrature() -> tuple[_Array, _Array]:
     return 0.5 * BEAM.length * (at + 1.0), 0.5 * BEAM.length * weight
 
 
-def apex(results: Results) -> Finding:
+def apex(results: Results) -> ClaimResult:
     """20a: Eq. (2) against the static solution of Eq. (11), its integrals by quadrature."""
     x, weight = _quadrature()
     modes = BucklingModes(BEAM.length, 1)
     stiffness = BEAM.bending_stiffness * float(weight @ modes.curvature(x)[0] ** 2) - BEAM.axial_load
-    alpha = math.sqrt(-stiffness / BEAM.tension_stiffness)
+    alpha = math.sqrt(-stiffness / BEAM.nonlinear_stiffness)
     height = alpha * float(modes.shape(0.5 * BEAM.length)[0])
     off = Quantity(abs(height / BEAM.buckling_level - 1.0), 1e-9)
     return found(below(off.value, 1e-8), off=off, height=1e3 * height)
 
 
-def wavenumbers(results: Results) -> Finding:
+def wavenumbers(results: Results) -> ClaimResult:
     """20b: the wavenumbers of Eq. (7) make the matrix of Eq. (6) singular."""
 
     def smallest(z: float) -> float:
@@ -62,7 +62,7 @@ def wavenumbers(results: Results) -> Finding:
     return found(below(at, 1e-6 * between), at=Quantity(at, 1e-15), between=between)
 
 
-def orthogonality(results: Results) -> Finding:
+def orthogonality(results: Results) -> ClaimResult:
     """20c: Eq. (9), by quadrature."""
     x, weight = _quadrature()
     slope = BucklingModes(BEAM.length, MODES).slope(x)
@@ -70,7 +70,7 @@ def orthogonality(results: Results) -> Finding:
     return found(below(worst, 1e-9), worst=Quantity(worst, 1e-12))
 
 
-def checkerboard(results: Results) -> Finding:
+def checkerboard(results: Results) -> ClaimResult:
     """20d: the mass matrix couples modes of one parity and no others, by quadrature."""
     x, weight = _quadrature()
     shape = BucklingModes(BEAM.length, MODES).shape(x)
@@ -85,7 +85,7 @@ def checkerboard(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def no_buckling_level(results: Results) -> Finding:
+def no_buckling_level(results: Results) -> ClaimResult:
     """18: buckling modes do not depend on the buckling level, the dynamic modes about a well do."""
     x = np.linspace(0.01, 0.99, 99)
     few = 4
@@ -107,12 +107,12 @@ def no_buckling_level(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def dynamic_basis(results: Results) -> Finding:
+def dynamic_basis(results: Results) -> ClaimResult:
     """13: the wells of a basis of dynamic modes, and of the basis of buckling modes."""
     from scipy.optimize import minimize
 
     model = paper_model(results.pick(32, 64))
-    depth, rest = model.barrier_energy - model.well_energy, model.equilibrium
+    depth, rest = model.saddle_energy - model.well_energy, model.well_amplitude
     gaps, errors, counts = [], [], (2, 4, 8, 16)
     for count in counts:
         basis = model.linear_modes[:, :count]

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import snapbeam as sb
 from snapbeam.model.paper_values import BEAM, MODES, STRAIGHT_BEAM
-from snapbeam.paper.claims.finding import Check, Finding, Quantity, above, below, found, near
+from snapbeam.paper.claims.finding import Check, ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.system import paper_model
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def _with_rounding(of: Callable[[sb.Beam], ArrayLike], beam: sb.Beam) -> list[Qu
 
 @cache
 def _freq(beam: sb.Beam) -> _Array:
-    return sb.ReducedModel.from_beam(beam, modes=MODES).natural_freq
+    return sb.ReducedModel.from_beam(beam, modes=MODES).natural_frequencies
 
 
 def _agree(values: list[Quantity], printed: tuple[float, ...], digits: tuple[float, ...]) -> Check:
@@ -55,7 +55,7 @@ def _agree(values: list[Quantity], printed: tuple[float, ...], digits: tuple[flo
     return reduce(and_, checks)
 
 
-def _printed(beam: sb.Beam, printed: tuple[float, ...], digits: tuple[float, ...]) -> Finding:
+def _printed(beam: sb.Beam, printed: tuple[float, ...], digits: tuple[float, ...]) -> ClaimResult:
     """Natural frequencies against printed ones, each given to a last digit."""
     values = _with_rounding(lambda other: _freq(other)[: len(printed)], beam)
     named = dict(zip(("first", "second", "third"), values, strict=False))
@@ -63,23 +63,23 @@ def _printed(beam: sb.Beam, printed: tuple[float, ...], digits: tuple[float, ...
     return found(_agree(values, printed, digits), off=off, **named)
 
 
-def straight_beam(results: Results) -> Finding:
+def straight_beam(results: Results) -> ClaimResult:
     """1a: the frequencies that set the thickness."""
     return _printed(STRAIGHT_BEAM, (80.0, 221.0), (1.0, 1.0))
 
 
-def buckled_beam(results: Results) -> Finding:
+def buckled_beam(results: Results) -> ClaimResult:
     """1b: the frequencies about a well."""
     return _printed(BEAM, (81.8, 159.0, 380.0), (0.1, 1.0, 1.0))
 
 
-def misprint(results: Results) -> Finding:
+def misprint(results: Results) -> ClaimResult:
     """1c: the factor 2 of Eq. (A.2)."""
     import scipy.linalg
 
     def freq(beam: sb.Beam) -> _Array:
         model = sb.ReducedModel.from_beam(beam, modes=MODES)
-        square = model.tension_stiffness * float(model.equilibrium[0] ** 2)
+        square = model.nonlinear_stiffness * float(model.well_amplitude[0] ** 2)
         tangent = model.stiffness + 2.0 * square
         tangent[0] = model.stiffness[0] + 3.0 * square
         return np.asarray(np.sqrt(scipy.linalg.eigvalsh(np.diag(tangent), model.mass)[:3]) / (2.0 * math.pi))
@@ -89,13 +89,13 @@ def misprint(results: Results) -> Finding:
     return found(agrees, second=second, first=first, third=third)
 
 
-def greatest_frequency(results: Results) -> Finding:
+def greatest_frequency(results: Results) -> ClaimResult:
     """1d: the end of the frequency axis in Hz."""
     (value,) = _with_rounding(lambda beam: 4.0 * _freq(beam)[:1], BEAM)
     return found(near(value.value, 325.0, 0.5 + value.uncertainty), greatest=value)
 
 
-def measured_frequency(results: Results) -> Finding:
+def measured_frequency(results: Results) -> ClaimResult:
     """1e: the fitted first frequency against those measured in both wells."""
     mean = 0.5 * (81.3 + 80.5)
     off = Quantity(float(_freq(BEAM)[0]) / mean - 1.0, 0.5 * (81.3 - 80.5) / mean)
@@ -108,13 +108,15 @@ def _crossing() -> float:
 
     def lead(level: float) -> float:
         model = sb.ReducedModel.from_beam(BEAM.replace(buckling_level=level), modes=MODES)
-        first = [float(model.natural_freq[np.flatnonzero(model.parity == parity)[0]]) for parity in (1, -1)]
+        first = [
+            float(model.natural_frequencies[np.flatnonzero(model.parity == parity)[0]]) for parity in (1, -1)
+        ]
         return first[0] - first[1]
 
     return float(brentq(lead, 0.2e-3, 2e-3, xtol=1e-9))
 
 
-def first_is_symmetric(results: Results) -> Finding:
+def first_is_symmetric(results: Results) -> ClaimResult:
     """21a: at the level of the paper the first dynamic mode is the first symmetric one."""
     level = Quantity(1e3 * BEAM.buckling_level, 5e-4)
     parity = int(paper_model(MODES).parity[0])
@@ -123,7 +125,7 @@ def first_is_symmetric(results: Results) -> Finding:
     )
 
 
-def order_changes(results: Results) -> Finding:
+def order_changes(results: Results) -> ClaimResult:
     """21b: at higher levels it is the second."""
     crossing = _crossing()
     beyond = sb.ReducedModel.from_beam(BEAM.replace(buckling_level=1.2 * crossing), modes=MODES)
@@ -132,25 +134,25 @@ def order_changes(results: Results) -> Finding:
     return found(swapped, crossing=Quantity(1e3 * crossing, 1e-3), ratio=ratio)
 
 
-def convergence(results: Results) -> Finding:
+def convergence(results: Results) -> ClaimResult:
     """11: the first ten frequencies with 32 modes."""
 
     def worst(beam: sb.Beam) -> float:
-        return float(np.abs(_freq(beam)[:10] / sb.exact_natural_freq(beam, 10) - 1.0).max())
+        return float(np.abs(_freq(beam)[:10] / sb.exact_natural_frequencies(beam, 10) - 1.0).max())
 
     (error,) = _with_rounding(worst, BEAM)
     stored = results["figA9"]["error"].error.sel(modes=MODES).values
     return found(below(error, 7e-4), error=error, mode=int(np.nanargmax(stored)) + 1)
 
 
-def below_three_kilohertz(results: Results) -> Finding:
+def below_three_kilohertz(results: Results) -> ClaimResult:
     """11b: how many natural frequencies lie below 3 kHz."""
 
     def count(beam: sb.Beam) -> float:
-        return float((sb.exact_natural_freq(beam, 14) < _MOST).sum())
+        return float((sb.exact_natural_frequencies(beam, 14) < _MOST).sum())
 
     (number,) = _with_rounding(count, BEAM)
-    tenth = float(sb.exact_natural_freq(BEAM, 10)[-1])
+    tenth = float(sb.exact_natural_frequencies(BEAM, 10)[-1])
     return found(near(number, 10.0, 0.0), below(number, 10.0), number=number, tenth=tenth)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam.core.codes import ResponseClass
 from snapbeam.model.paper_values import LOCATION
-from snapbeam.paper.claims.finding import Check, Finding, Quantity, above, below, found
+from snapbeam.paper.claims.finding import Check, ClaimResult, Quantity, above, below, found
 from snapbeam.paper.claims.spread import chaos, chaos_of_pairs, share
 from snapbeam.sweeps.analysis import is_interwell
 
@@ -56,15 +56,15 @@ def share_of(
 
 
 def is_kind(kind: ResponseClass) -> Callable[[xr.Dataset], _Mask]:
-    return lambda ds: np.asarray(ds.response.values == kind)
+    return lambda ds: np.asarray(ds.response_class.values == kind)
 
 
 def _interwell(ds: xr.Dataset) -> _Mask:
-    return is_interwell(ds.response.values)
+    return is_interwell(ds.response_class.values)
 
 
 def transient(ds: xr.Dataset) -> _Mask:
-    return is_transient(ds.response.values)
+    return is_transient(ds.response_class.values)
 
 
 def _beyond(cut: float) -> Callable[[xr.Dataset], _Mask]:
@@ -77,7 +77,7 @@ def _beyond(cut: float) -> Callable[[xr.Dataset], _Mask]:
     return where
 
 
-def settled(results: Results) -> Finding:
+def settled(results: Results) -> ClaimResult:
     """4a: many modes, 1000 cycles, high V/Omega: all transient interwell 2."""
     second = is_kind(ResponseClass.TRANSIENT_2)
     shares = [share_of(results, "fig7", 1, second, _beyond(cut)) for cut in _CUTS]
@@ -86,14 +86,14 @@ def settled(results: Results) -> Finding:
     for value in shares[1:]:
         every, most = every & above(value, 0.99), most & above(value, 0.9)
     ds = _map(results, "fig7", 1)
-    rest = ds.response.values[_beyond(1.0)(ds)]
+    rest = ds.response_class.values[_beyond(1.0)(ds)]
     return found(
         every, most, share=shares[0], second=shares[1], third=shares[2], fourth=shares[3],
         continuous=float((rest == ResponseClass.CONTINUOUS).mean()),
     )  # fmt: skip
 
 
-def continuous_one_mode(results: Results) -> Finding:
+def continuous_one_mode(results: Results) -> ClaimResult:
     """4b: many interwell responses of one mode stay continuous."""
     shares = [
         share_of(results, "fig7", which, is_kind(ResponseClass.CONTINUOUS), _interwell) for which in (0, 1)
@@ -102,7 +102,7 @@ def continuous_one_mode(results: Results) -> Finding:
     return found(above(one, 0.25) & above(one, many.value), above(one, 0.1), share=one, many=many)
 
 
-def first_well_disappears(results: Results) -> Finding:
+def first_well_disappears(results: Results) -> ClaimResult:
     """4c: transient interwell 1 of one mode all but disappears from 200 to 1000 cycles."""
     first = is_kind(ResponseClass.TRANSIENT_1)
     before = share_of(results, "fig6", 0, first, _interwell)
@@ -112,7 +112,8 @@ def first_well_disappears(results: Results) -> Finding:
         Quantity(after.value / max(before.value, 1e-12), after.uncertainty / max(before.value, 1e-12)), 0.25
     )
     points = [
-        int((_map(results, name, 0).response == ResponseClass.TRANSIENT_1).sum()) for name in ("fig6", "fig7")
+        int((_map(results, name, 0).response_class == ResponseClass.TRANSIENT_1).sum())
+        for name in ("fig6", "fig7")
     ]
     return found(
         rare & gone & above(before, 0.01), rare, after=after, before=before,
@@ -121,10 +122,10 @@ def first_well_disappears(results: Results) -> Finding:
 
 
 def _changed(first: xr.Dataset, second: xr.Dataset) -> float:
-    return float((first.response.values != second.response.values).mean())
+    return float((first.response_class.values != second.response_class.values).mean())
 
 
-def changes(results: Results) -> Finding:
+def changes(results: Results) -> ClaimResult:
     """4d: how many points change class between 200 and 1000 cycles."""
     values = []
     for which in (0, 1):
@@ -135,19 +136,19 @@ def changes(results: Results) -> Finding:
     return found(above(one, 0.1) & above(many, 0.1), above(one, 0.1) | above(many, 0.1), many=many, one=one)
 
 
-def mostly_transient(results: Results) -> Finding:
+def mostly_transient(results: Results) -> ClaimResult:
     """4e: most snap-throughs of many modes end in a transient response."""
     value = share_of(results, "fig7", 1, transient, _interwell)
     return found(above(value, 0.5), share=value)
 
 
-def every_kind(results: Results) -> Finding:
+def every_kind(results: Results) -> ClaimResult:
     """19: all four classes, by frequency and amplitude and by location."""
     kinds = [kind for kind in ResponseClass if kind is not ResponseClass.UNKNOWN]
     values = [share_of(results, "fig6", 1, is_kind(kind), _everywhere) for kind in kinds]
     least = min(values, key=lambda value: value.value)
     ds = [ds for ds in results["fig8"].values() if int(ds.attrs["modes"]) > 1][-1]
-    response = ds.response.transpose("relative_amplitude", "location").values
+    response = ds.response_class.transpose("relative_amplitude", "location").values
     by_location = max(len(set(row.tolist())) for row in response)
     return found(
         above(least, 0.005) & above(by_location, 2), above(least, 0.0), least=least,
@@ -156,7 +157,7 @@ def every_kind(results: Results) -> Finding:
 
 
 def _everywhere(ds: xr.Dataset) -> _Mask:
-    return np.ones(ds.response.shape, dtype=bool)
+    return np.ones(ds.response_class.shape, dtype=bool)
 
 
 ROWS = {

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from snapbeam.model.paper_values import BEAM, CONTACT, LOCATION
-from snapbeam.paper.claims.finding import Finding, Quantity, above, below, found, near
+from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.claims.spread import part, resampled
 from snapbeam.paper.studies.sensitivity import tip_contact
 from snapbeam.paper.system import paper_model, paper_run
@@ -36,10 +36,10 @@ def _counts(results: Results) -> tuple[int, ...]:
     return tuple(results.pick((4, 8, 16), (16, 32, 64, 128, 256)))
 
 
-def restitution(results: Results) -> Finding:
+def restitution(results: Results) -> ClaimResult:
     """12a: the impulse of the first impact by the law of restitution, (1 + e) M v."""
     counts = _counts(results)
-    speed = _DRIVE[1] * BEAM.buckling_level * 2.0 * math.pi * paper_model(32).reference_freq
+    speed = _DRIVE[1] * BEAM.buckling_level * 2.0 * math.pi * paper_model(32).reference_frequency
     mass = np.array([paper_model(modes).contact_mass(LOCATION) for modes in counts])
     impulse = (1.0 + _RESTITUTION) * mass * speed
     (slope, _), covariance = np.polyfit(np.log(counts), np.log(impulse), 1, cov="unscaled")
@@ -52,12 +52,12 @@ def restitution(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def hertz(results: Results) -> Finding:
+def hertz(results: Results) -> ClaimResult:
     """12b: the impulse over the first half cycle by Hertz's law."""
     counts, (omega, drive) = _counts(results), _DRIVE
-    reference, impulse = paper_model(32).reference_freq, []
+    reference, impulse = paper_model(32).reference_frequency, []
     for modes in counts:
-        run = paper_run(modes, omega, drive, 1, reference_freq=reference, sample_times=[0.0])
+        run = paper_run(modes, omega, drive, 1, reference_frequency=reference, sample_times=[0.0])
         first = run.impacts.onset.values < 0.5 / (omega * reference)
         impulse.append(float(run.impacts.impulse.values[first].sum()))
     changes = np.abs(np.diff(impulse) / np.array(impulse[1:]))
@@ -70,7 +70,7 @@ def hertz(results: Results) -> Finding:
     )
 
 
-def stiffness(results: Results) -> Finding:
+def stiffness(results: Results) -> ClaimResult:
     """16: the contact stiffness from the stated materials."""
     from scipy.optimize import brentq
 
@@ -96,11 +96,11 @@ def _over_runs(results: Results, of: Callable[[NDArray[np.int64]], float]) -> Qu
     return resampled(statistic, len(groups))
 
 
-def impulse_like(results: Results) -> Finding:
+def impulse_like(results: Results) -> ClaimResult:
     """22a: how much of the impulse comes in impacts that are short for the beam and for the drive."""
     runs, table = part(results, "waveforms", "runs"), part(results, "waveforms", "impacts")
     ratio = runs.frequency_ratio.values[table.run.values.astype(int)]
-    length = table.duration.values * float(table.attrs["reference_freq"]) * np.maximum(1.0, ratio)
+    length = table.duration.values * float(table.attrs["reference_frequency"]) * np.maximum(1.0, ratio)
     impulse = table.impulse.values
     carried = _over_runs(
         results, lambda at: float(impulse[at][length[at] < _SHORT].sum() / impulse[at].sum())
@@ -115,7 +115,7 @@ def _penetration(force: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray((force / CONTACT.stiffness) ** (2.0 / 3.0))
 
 
-def shallow(results: Results) -> Finding:
+def shallow(results: Results) -> ClaimResult:
     """22b: penetration against the radius of the tip."""
     depth = _penetration(part(results, "waveforms", "impacts").peak_force.values)
     deep = _over_runs(results, lambda at: float(np.quantile(depth[at], 0.99)) / _TIP_RADIUS)
@@ -125,7 +125,7 @@ def shallow(results: Results) -> Finding:
     )
 
 
-def elastic(results: Results) -> Finding:
+def elastic(results: Results) -> ClaimResult:
     """22c: the greatest contact pressure against the onset of yield of the tip."""
     force = part(results, "waveforms", "impacts").peak_force.values
     # E* from the printed stiffness, k_c = 4/3 E* sqrt(R), which is what the model has

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from snapbeam.core.codes import ResponseClass
-from snapbeam.paper.claims.finding import Finding, Quantity, above, found
+from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, found
 from snapbeam.paper.claims.spread import combined, median_of, part, share
 from snapbeam.paper.studies.disturbances import EXCESS, OFFSET
 from snapbeam.sweeps.analysis import is_interwell
@@ -22,7 +22,7 @@ __all__ = ["ROWS"]
 
 
 def _changed(classes: xr.Dataset, variant: str) -> NDArray[np.bool_]:
-    response = classes.response
+    response = classes.response_class
     return np.asarray(response.sel(variant=variant).values != response.sel(variant="base").values)
 
 
@@ -30,12 +30,12 @@ def _less(first: Quantity, second: Quantity) -> Quantity:
     return Quantity(first.value - second.value, combined(first.uncertainty, second.uncertainty))
 
 
-def startup(results: Results) -> Finding:
+def startup(results: Results) -> ClaimResult:
     """25a: a first cycle that is larger than the rest."""
     classes = part(results, "disturbances", "classes")
     value, floor = (share(_changed(classes, name)) for name in ("startup", "perturbed"))
     excess = _less(value, floor)
-    base, other = (classes.response.sel(variant=name).values for name in ("base", "startup"))
+    base, other = (classes.response_class.sel(variant=name).values for name in ("base", "startup"))
     snapped = share(is_interwell(base) != is_interwell(other))
     return found(
         above(excess, 0.0) & above(value, 0.1), above(value, 0.1), share=value, floor=floor, excess=excess,
@@ -43,30 +43,30 @@ def startup(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def initial_conditions(results: Results) -> Finding:
+def initial_conditions(results: Results) -> ClaimResult:
     """25b: a start slightly off the well."""
     classes = part(results, "disturbances", "classes")
     value = share(_changed(classes, "offset"))
     return found(above(value, 0.1), above(value, 0.02), share=value, offset=OFFSET)
 
 
-def near_transitions(results: Results) -> Finding:
+def near_transitions(results: Results) -> ClaimResult:
     """25c: particularly near transitions between classes, and where the response is not periodic."""
     classes = part(results, "disturbances", "classes")
     changed, border = _changed(classes, "offset"), classes.at_border.values.astype(bool)
     beside, elsewhere = share(changed[border]), share(changed[~border])
     excess = _less(beside, elsewhere)
-    calm = classes.response.sel(variant="base").values == ResponseClass.INTRAWELL
+    calm = classes.response_class.sel(variant="base").values == ResponseClass.INTRAWELL
     return found(
         above(excess, 0.0) & above(beside, 2.0 * elsewhere.value), above(excess, 0.0), excess=excess,
         beside=beside, elsewhere=elsewhere, calm=share(changed[calm]),
     )  # fmt: skip
 
 
-def impacts_need_all_modes(results: Results) -> Finding:
+def impacts_need_all_modes(results: Results) -> ClaimResult:
     """29: the next impact from the whole state and from the first mode alone."""
     table = part(results, "disturbances", "impacts")
-    first = float(table.attrs["reference_freq"])
+    first = float(table.attrs["reference_frequency"])
 
     def change(name: str) -> NDArray[np.float64]:
         return np.abs(table[f"{name}_alone"].values / table[name].values - 1.0)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.paper.claims.finding import Finding, Quantity, above, below, found
+from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found
 from snapbeam.paper.claims.spread import combined, mean_of, part
 from snapbeam.paper.claims.topics.classes import transient
 from snapbeam.paper.claims.topics.locations import along
@@ -32,24 +32,24 @@ def _relative(results: Results, ratio: float) -> tuple[Quantity, Quantity]:
     return end, centre
 
 
-def _efficient(results: Results, ratio: float) -> Finding:
+def _efficient(results: Results, ratio: float) -> ClaimResult:
     end, centre = _relative(results, ratio)
     return found(
         below(end, 0.6) & below(centre, 0.6), below(end, 0.9) & below(centre, 0.9), end=end, centre=centre
     )
 
 
-def efficient_middle(results: Results) -> Finding:
+def efficient_middle(results: Results) -> ClaimResult:
     """33a: near a clamp and at the centre little velocity is needed, Omega = 0.625."""
     return _efficient(results, 0.625)
 
 
-def efficient_fast(results: Results) -> Finding:
+def efficient_fast(results: Results) -> ClaimResult:
     """33b: and Omega = 1.625."""
     return _efficient(results, 1.625)
 
 
-def more_so_when_fast(results: Results) -> Finding:
+def more_so_when_fast(results: Results) -> ClaimResult:
     """33c: particularly at high frequency."""
     slow, fast = (_relative(results, ratio) for ratio in (0.625, 1.625))
     gains = [
@@ -78,7 +78,7 @@ def _means(x: _Array, values: _Array, error: float) -> tuple[Quantity, Quantity]
     return mean_of(values[x <= END], error), mean_of(values[x >= CENTRE], error)
 
 
-def _wide(results: Results, ratio: float) -> Finding:
+def _wide(results: Results, ratio: float) -> ClaimResult:
     ds = _window(results, ratio)
     drives, x = ds.velocity_amplitude.values, ds.location.values
     step = float(drives[1] - drives[0])
@@ -92,17 +92,17 @@ def _wide(results: Results, ratio: float) -> Finding:
     )  # fmt: skip
 
 
-def wide_middle(results: Results) -> Finding:
+def wide_middle(results: Results) -> ClaimResult:
     """15a: amplitudes that give a transient response, near a clamp and near the centre, Omega = 0.625."""
     return _wide(results, 0.625)
 
 
-def wide_fast(results: Results) -> Finding:
+def wide_fast(results: Results) -> ClaimResult:
     """15b: and Omega = 1.625."""
     return _wide(results, 1.625)
 
 
-def _fine(results: Results, ratio: float) -> Finding:
+def _fine(results: Results, ratio: float) -> ClaimResult:
     ds = _window(results, ratio)
     step = float(ds.velocity_amplitude[1] - ds.velocity_amplitude[0])
     low, high = longest_window(ds)
@@ -122,12 +122,12 @@ def _fine(results: Results, ratio: float) -> Finding:
     )
 
 
-def fine_middle(results: Results) -> Finding:
+def fine_middle(results: Results) -> ClaimResult:
     """15c: how finely the amplitude has to be set, as a share of itself, Omega = 0.625."""
     return _fine(results, 0.625)
 
 
-def fine_fast(results: Results) -> Finding:
+def fine_fast(results: Results) -> ClaimResult:
     """15d: and Omega = 1.625."""
     return _fine(results, 1.625)
 

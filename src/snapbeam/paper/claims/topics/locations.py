@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 import snapbeam as sb
-from snapbeam.paper.claims.finding import Finding, Quantity, above, below, found, near
+from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.claims.spread import combined, mean_of, median_of, share
 from snapbeam.sweeps.analysis import interwell_threshold
 
@@ -58,7 +58,7 @@ def along(results: Results, ratio: float, which: int) -> tuple[_Array, _Array, f
     return x, curve, grid_step(ds, float(filled[top])) * float(static[top])
 
 
-def _follows(results: Results, ratio: float, which: int, printed: float, narrow: float) -> Finding:
+def _follows(results: Results, ratio: float, which: int, printed: float, narrow: float) -> ClaimResult:
     """Whether a threshold is a printed multiple of V_QS1 at nearly all locations."""
     ds = _map(results, ratio, which)
     x, curve = relative_threshold(ds)
@@ -73,27 +73,27 @@ def _follows(results: Results, ratio: float, which: int, printed: float, narrow:
     )  # fmt: skip
 
 
-def one_mode_slow(results: Results) -> Finding:
+def one_mode_slow(results: Results) -> ClaimResult:
     """6a."""
     return _follows(results, _SLOW, 0, 1.0, 0.3)
 
 
-def one_mode_middle(results: Results) -> Finding:
+def one_mode_middle(results: Results) -> ClaimResult:
     """6b."""
     return _follows(results, _MIDDLE, 0, 0.2, 0.3)
 
 
-def one_mode_fast(results: Results) -> Finding:
+def one_mode_fast(results: Results) -> ClaimResult:
     """6c."""
     return _follows(results, _FAST, 0, 0.05, 0.3)
 
 
-def many_modes_slow(results: Results) -> Finding:
+def many_modes_slow(results: Results) -> ClaimResult:
     """7a."""
     return _follows(results, _SLOW, 1, 1.0, 0.15)
 
 
-def _peak(results: Results, ratio: float, place: float) -> Finding:
+def _peak(results: Results, ratio: float, place: float) -> ClaimResult:
     """Where the threshold of many modes is highest, and how far that goes."""
     x, curve, step = along(results, ratio, 1)
     top = int(np.argmax(curve))
@@ -108,12 +108,12 @@ def _peak(results: Results, ratio: float, place: float) -> Finding:
     )  # fmt: skip
 
 
-def peak_middle(results: Results) -> Finding:
+def peak_middle(results: Results) -> ClaimResult:
     """7b."""
     return _peak(results, _MIDDLE, 0.4)
 
 
-def peak_fast(results: Results) -> Finding:
+def peak_fast(results: Results) -> ClaimResult:
     """7c."""
     return _peak(results, _FAST, 0.3)
 
@@ -125,7 +125,7 @@ def _over_one_mode(results: Results, ratio: float) -> tuple[_Array, _Array]:
     return x, many / one
 
 
-def higher_everywhere(results: Results) -> Finding:
+def higher_everywhere(results: Results) -> ClaimResult:
     """7d: at Omega = 0.625 more modes raise the threshold at every location."""
     few, many = (_map(results, _MIDDLE, which) for which in (0, 1))
     x, one = relative_threshold(few)
@@ -142,7 +142,7 @@ def higher_everywhere(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def most_beside_centre(results: Results) -> Finding:
+def most_beside_centre(results: Results) -> ClaimResult:
     """7e: and most about x_s = 0.4."""
     x, one, _ = along(results, _MIDDLE, 0)
     _, many, step = along(results, _MIDDLE, 1)
@@ -164,7 +164,7 @@ def most_beside_centre(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def more_apparent(results: Results) -> Finding:
+def more_apparent(results: Results) -> ClaimResult:
     """7f: the rise is greater at Omega = 1.625 than at 0.625."""
     values = []
     for ratio in (_MIDDLE, _FAST):
@@ -182,20 +182,20 @@ def _depth(results: Results, ratio: float) -> Quantity:
     return Quantity(float(curve[-1]) / top, 1.4 * step / top)
 
 
-def notch_at_centre(results: Results) -> Finding:
+def notch_at_centre(results: Results) -> ClaimResult:
     """7g: at Omega = 0.625 there is a notch at the centre."""
     depth = _depth(results, _MIDDLE)
     return found(below(depth, 0.8), below(depth, 0.9), depth=depth)
 
 
-def notch_deepens(results: Results) -> Finding:
+def notch_deepens(results: Results) -> ClaimResult:
     """7h: it deepens from Omega = 0.625 to 1.625."""
     slow, fast = _depth(results, _MIDDLE), _depth(results, _FAST)
     deeper = Quantity(slow.value - fast.value, combined(slow.uncertainty, fast.uncertainty))
     return found(above(deeper, 0.0), deeper=deeper, slow=slow, fast=fast)
 
 
-def below_static(results: Results) -> Finding:
+def below_static(results: Results) -> ClaimResult:
     """7i: at Omega = 0.625 the thresholds of both models are significantly below V_QS1."""
     x, _ = relative_threshold(_map(results, _MIDDLE, 1))
     curves = [relative_threshold(_map(results, _MIDDLE, which))[1] for which in (0, 1)]
@@ -207,7 +207,7 @@ def below_static(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def rises_with_frequency(results: Results) -> Finding:
+def rises_with_frequency(results: Results) -> ClaimResult:
     """7j: from Omega = 0.625 to 1.625 the threshold of many modes rises over much of the beam, that of one falls."""
     shares = []
     for which in (0, 1):

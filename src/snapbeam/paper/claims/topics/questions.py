@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from snapbeam.model.paper_values import CONTACT
-from snapbeam.paper.claims.finding import Check, Finding, Number, Quantity, above, measured
+from snapbeam.paper.claims.finding import Check, ClaimResult, Number, Quantity, above, measured
 from snapbeam.paper.claims.spread import chaos, combined, part, resampled, share
 from snapbeam.paper.claims.topics.classes import transient
 from snapbeam.paper.studies.sensitivity import buckling_mode_damping
@@ -39,7 +39,7 @@ def _compare(
 ) -> tuple[Check, dict[str, Quantity | Number]]:
     """A variant of a map against what a change of 1e-9 does to that map."""
     first, second, floor = (part(results, "sensitivity", name) for name in (base, variant, nudged))
-    a, b, c = (ds.response.values for ds in (first, second, floor))
+    a, b, c = (ds.response_class.values for ds in (first, second, floor))
     changed, alone = share(a != b), share(a != c)
     snapped, snapped_alone = (share(is_interwell(a) != is_interwell(other)) for other in (b, c))
     # the thresholds of two models on one grid of V; the base may have another coordinate by 1e-9
@@ -53,24 +53,24 @@ def _compare(
     }  # fmt: skip
 
 
-def reference_frequency(results: Results) -> Finding:
+def reference_frequency(results: Results) -> ClaimResult:
     """A: which omega_1 normalises one mode."""
     matters, named = _compare(results, "one_mode", "one_mode_reference", "one_mode_perturbed")
     own, other = (
-        float(part(results, "sensitivity", name).attrs["reference_freq"])
+        float(part(results, "sensitivity", name).attrs["reference_frequency"])
         for name in ("one_mode", "one_mode_reference")
     )
     return measured(matters, **named, own=own, other=other, scale=other / own)
 
 
-def contact_stiffness(results: Results) -> Finding:
+def contact_stiffness(results: Results) -> ClaimResult:
     """B: the contact stiffness, against what a common modulus of the stated material gives."""
     matters, named = _compare(results, "base", "soft_contact", "perturbed")
     soft = float(part(results, "sensitivity", "soft_contact").attrs["contact_stiffness"])
     return measured(matters, **named, soft=soft, printed=CONTACT.stiffness)
 
 
-def damping(results: Results) -> Finding:
+def damping(results: Results) -> ClaimResult:
     """C: damping of the linear modes or of the buckling modes."""
     matters, named = _compare(results, "base", "buckling_damping", "perturbed")
     model = paper_model(int(part(results, "sensitivity", "base").attrs["modes"]))
@@ -81,27 +81,29 @@ def damping(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def end_rule(results: Results) -> Finding:
+def end_rule(results: Results) -> ClaimResult:
     """D: transient runs whose end is not final, so that the well they end in depends on the instant."""
     values = []
     for ds in results["fig6"].values():
 
         def unsettled(other: xr.Dataset) -> float:
             inside = transient(other)
-            return float((~other.end_is_final.values.astype(bool))[inside].mean()) if inside.any() else 0.0
+            return (
+                float((~other.final_well_proven.values.astype(bool))[inside].mean()) if inside.any() else 0.0
+            )
 
         moved = chaos(results, unsettled, int(ds.attrs["modes"]))
-        values.append(share((~ds.end_is_final.values.astype(bool))[transient(ds)], moved))
+        values.append(share((~ds.final_well_proven.values.astype(bool))[transient(ds)], moved))
     one, many = values
     return measured(above(many, 0.01) | above(one, 0.01), many=many, one=one)
 
 
-def step(results: Results) -> Finding:
+def step(results: Results) -> ClaimResult:
     """E: half the step of the integrator."""
     matters, named = _compare(results, "base", "half_step", "perturbed")
     base, half = part(results, "sensitivity", "base"), part(results, "sensitivity", "half_step")
-    changed = base.response.values != half.response.values
-    inside = is_interwell(base.response.values)[changed]
+    changed = base.response_class.values != half.response_class.values
+    inside = is_interwell(base.response_class.values)[changed]
     border = compare_maps(base, half).at_border
     return measured(
         matters, **named, border=border, interwell=float(inside.mean()) if changed.any() else float("nan")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.paper.claims.finding import Finding, Quantity, above, below, found, near
+from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.claims.spread import combined
 from snapbeam.paper.claims.topics.thresholds import notch_of
 from snapbeam.paper.recipes.figB10 import maxima
@@ -39,7 +39,7 @@ def _drives(results: Results) -> tuple[float, float]:
     return float(low), float(moderate)
 
 
-def low_drive(results: Results) -> Finding:
+def low_drive(results: Results) -> ClaimResult:
     """9a: one mode, low drive."""
     first, second = _two(results, 0, _LOW)
     close = near(first, 1.8, 0.05 + first.uncertainty) & near(second, 3.6, 0.05 + second.uncertainty)
@@ -56,7 +56,7 @@ def _shift(before: Quantity, after: Quantity) -> Quantity:
     return Quantity(before.value - after.value, combined(before.uncertainty, after.uncertainty))
 
 
-def shifts_left(results: Results) -> Finding:
+def shifts_left(results: Results) -> ClaimResult:
     """9b: one mode, moderate drive."""
     low, moderate = _two(results, 0, _LOW), _two(results, 0, _MODERATE)
     first, second = (_shift(before, after) for before, after in zip(low, moderate, strict=True))
@@ -65,13 +65,13 @@ def shifts_left(results: Results) -> Finding:
     )
 
 
-def another_maximum(results: Results) -> Finding:
+def another_maximum(results: Results) -> ClaimResult:
     """9e: one mode, moderate drive, near Omega = 3.5."""
     _, second = _two(results, 0, _MODERATE)
     return found(near(second, 3.5, 0.05 + second.uncertainty), near(second, 3.5, 0.15), second=second)
 
 
-def lower_with_many(results: Results) -> Finding:
+def lower_with_many(results: Results) -> ClaimResult:
     """9c: many modes have their maxima at lower frequencies."""
     shifts, beyond = [], []
     for level in (_LOW, _MODERATE):
@@ -90,10 +90,10 @@ def lower_with_many(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def one_mode_is_adequate(results: Results) -> Finding:
+def one_mode_is_adequate(results: Results) -> ClaimResult:
     """9d: how far one mode is off with the frequencies of low-amplitude resonances, in Hz."""
     maps = list(results["figB10"].values())
-    own, other = (float(ds.attrs["reference_freq"]) for ds in maps)
+    own, other = (float(ds.attrs["reference_frequency"]) for ds in maps)
     offs = []
     for one, many in zip(_two(results, 0, _LOW), _two(results, 1, _LOW), strict=True):
         value = one.value * own / (many.value * other) - 1.0
@@ -109,11 +109,11 @@ def one_mode_is_adequate(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def softening(results: Results) -> Finding:
+def softening(results: Results) -> ClaimResult:
     """9f: the free vibration of one mode about a well is the slower the larger."""
     model = paper_model(1)
-    kappa, gamma, mass = float(model.stiffness[0]), model.tension_stiffness, float(model.mass[0, 0])
-    rest = abs(float(model.equilibrium[0]))
+    kappa, gamma, mass = float(model.stiffness[0]), model.nonlinear_stiffness, float(model.mass[0, 0])
+    rest = abs(float(model.well_amplitude[0]))
     swing = 0.5
 
     def energy(a: float) -> float:
@@ -130,12 +130,12 @@ def softening(results: Results) -> Finding:
         speed = np.sqrt(np.maximum(2.0 / mass * (energy(inner) - np.array([energy(v) for v in a])), 1e-300))
         return 2.0 * float(np.sum(half * np.sin(angle) / speed)) * math.pi / points
 
-    values = [1.0 / (period(points) * float(model.natural_freq[0])) for points in (400, 800)]
+    values = [1.0 / (period(points) * float(model.natural_frequencies[0])) for points in (400, 800)]
     freq = Quantity(values[1], abs(values[1] - values[0]) + 1e-9)
     return found(below(freq, 0.99), freq=freq, swing=swing)
 
 
-def _linked(results: Results, which: int) -> Finding:
+def _linked(results: Results, which: int) -> ClaimResult:
     """Where the maximum stands just below the threshold, against the notch of Fig. 6."""
     study = list(results["resonance"].values())[which]
     drives, ratios = ridge(study)
@@ -159,12 +159,12 @@ def _linked(results: Results, which: int) -> Finding:
     )  # fmt: skip
 
 
-def notch_is_resonance_one(results: Results) -> Finding:
+def notch_is_resonance_one(results: Results) -> ClaimResult:
     """31a."""
     return _linked(results, 0)
 
 
-def notch_is_resonance_many(results: Results) -> Finding:
+def notch_is_resonance_many(results: Results) -> ClaimResult:
     """31b."""
     return _linked(results, 1)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.paper.claims.finding import Finding, Quantity, above, below, found
+from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found
 from snapbeam.paper.claims.spread import mean_of, part, resampled
 from snapbeam.paper.claims.topics.waveforms import amplitudes
 from snapbeam.paper.system import paper_model, paper_run
@@ -32,7 +32,7 @@ def _ripple(results: Results) -> tuple[_Array, NDArray[np.bool_], _Array]:
     return parts, run.contact_force.values == 0.0, run.cycle.values
 
 
-def ripples(results: Results) -> Finding:
+def ripples(results: Results) -> ClaimResult:
     """10c: high-frequency oscillations of the centre in every cycle."""
     parts, flight, cycle = _ripple(results)
     run = results["fig5"]["run"]
@@ -47,7 +47,7 @@ def ripples(results: Results) -> Finding:
     window = np.hanning(whole.size)
     spectrum = np.abs(np.fft.rfft((whole - whole.mean()) * window))
     strongest = float(np.fft.rfftfreq(whole.size, run.time.values[1])[np.argmax(spectrum)])
-    first = float(run.attrs["reference_freq"])
+    first = float(run.attrs["reference_frequency"])
     high = above(strongest, 2.0 * first)
     return found(
         above(rippled, 0.999) & high, above(rippled, 0.5) & high, rippled=rippled, cycles=heights.size,
@@ -55,7 +55,7 @@ def ripples(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def odd_ripples(results: Results) -> Finding:
+def odd_ripples(results: Results) -> ClaimResult:
     """10d: the ripple of the centre comes from the odd modes."""
     _, along, alpha = amplitudes(results)
     shapes = along["shape"].values
@@ -64,7 +64,7 @@ def odd_ripples(results: Results) -> Finding:
     return found(below(even / odd, 0.01), even=Quantity(even / odd, 1e-7))
 
 
-def few_modes(results: Results) -> Finding:
+def few_modes(results: Results) -> ClaimResult:
     """10e: how much of the ripple the first few modes make."""
     parts, flight, cycle = _ripple(results)
     whole = parts.sum(axis=1)
@@ -82,15 +82,15 @@ def few_modes(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def central_shaker(results: Results) -> Finding:
+def central_shaker(results: Results) -> ClaimResult:
     """14: a shaker at the centre excites no antisymmetric mode."""
     modes, cycles = results.pick(8, 32), results.pick(10, 50)
     alpha = paper_run(modes, 1.21, 0.3, cycles, location=0.5).dataset.modal_amplitude.values
-    even = float(np.abs(alpha[:, 1::2]).max() / abs(paper_model(modes).equilibrium[0]))
+    even = float(np.abs(alpha[:, 1::2]).max() / abs(paper_model(modes).well_amplitude[0]))
     return found(below(even, 0.0), even=Quantity(even, 0.0), cycles=cycles)
 
 
-def all_modes_excited(results: Results) -> Finding:
+def all_modes_excited(results: Results) -> ClaimResult:
     """28: off the centre every mode is excited."""
     peak = part(results, "waveforms", "runs").peak_amplitude.values
     least = resampled(lambda at: float(np.median(peak[at], axis=0).min()), peak.shape[0])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.paper.claims.finding import Finding, Quantity, above, below, found, near
+from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.claims.spread import chaos, combined, median_of, part, share
 from snapbeam.sweeps.analysis import Notch, interwell_threshold, threshold_notch
 
@@ -50,7 +50,7 @@ def _notch(results: Results, which: int) -> tuple[Quantity, Notch, Notch]:
     return Quantity(lowest.position, combined(half, moved)), lowest, wide
 
 
-def _near_printed(results: Results, which: int, printed: float) -> Finding:
+def _near_printed(results: Results, which: int, printed: float) -> ClaimResult:
     position, lowest, wide = _notch(results, which)
     meets = below(wide.low, printed + 0.05) & above(wide.high, printed - 0.05)
     ratio, _, _, step = curves(results)
@@ -61,17 +61,17 @@ def _near_printed(results: Results, which: int, printed: float) -> Finding:
     )  # fmt: skip
 
 
-def notch_of_one_mode(results: Results) -> Finding:
+def notch_of_one_mode(results: Results) -> ClaimResult:
     """2a."""
     return _near_printed(results, 0, 1.4)
 
 
-def notch_of_many_modes(results: Results) -> Finding:
+def notch_of_many_modes(results: Results) -> ClaimResult:
     """2b."""
     return _near_printed(results, 1, 1.2)
 
 
-def notch_shifts(results: Results) -> Finding:
+def notch_shifts(results: Results) -> ClaimResult:
     """2c: it is lower with many modes."""
     one, many = _notch(results, 0)[0], _notch(results, 1)[0]
     shift = Quantity(one.value - many.value, combined(one.uncertainty, many.uncertainty))
@@ -88,12 +88,12 @@ def _small_share(results: Results, variant: str) -> float:
 def _in_hertz(results: Results) -> tuple[_Array, _Array, _Array, float]:
     """The same in Hz and in units of V of many modes: one shaker, its frequency and its speed, for both models."""
     ratio, one, many, step = curves(results)
-    own, other = (float(ds.attrs["reference_freq"]) for ds in results["fig6"].values())
+    own, other = (float(ds.attrs["reference_frequency"]) for ds in results["fig6"].values())
     moved = np.interp(ratio, ratio * own / other, one * own / other, left=np.nan, right=np.nan)
     return ratio, moved, many, step
 
 
-def universally_higher(results: Results) -> Finding:
+def universally_higher(results: Results) -> ClaimResult:
     """3a: whether many modes have the higher threshold everywhere."""
     shares, listed = [], []
     moved = abs(_small_share(results, "") - _small_share(results, "perturbed"))
@@ -123,7 +123,7 @@ def _rise(ratio: _Array, curve: _Array) -> float:
     return high / low
 
 
-def high_frequency(results: Results) -> Finding:
+def high_frequency(results: Results) -> ClaimResult:
     """3b: low with one mode, rising with many."""
     ratio, one, many, _ = curves(results)
 
@@ -147,7 +147,7 @@ def high_frequency(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def crucial(results: Results) -> Finding:
+def crucial(results: Results) -> ClaimResult:
     """3c: how far one mode is off with the threshold."""
     _, one, many, _ = curves(results)
     ratio = (many / one)[np.isfinite(many / one)]
@@ -161,7 +161,7 @@ def _slow(results: Results, which: int) -> tuple[_Array, _Array, float]:
     return ds.frequency_ratio.values, interwell_threshold(ds, "relative_amplitude"), step
 
 
-def _converges(results: Results, which: int) -> Finding:
+def _converges(results: Results, which: int) -> ClaimResult:
     ratio, curve, step = _slow(results, which)
     slowest = Quantity(float(curve[0]), step)
     towards = below(abs(float(curve[0]) - 1.0), abs(float(curve[1]) - 1.0) + 0.5 * step)
@@ -172,17 +172,17 @@ def _converges(results: Results, which: int) -> Finding:
     )  # fmt: skip
 
 
-def slow_one_mode(results: Results) -> Finding:
+def slow_one_mode(results: Results) -> ClaimResult:
     """5a."""
     return _converges(results, 0)
 
 
-def slow_many_modes(results: Results) -> Finding:
+def slow_many_modes(results: Results) -> ClaimResult:
     """5b."""
     return _converges(results, 1)
 
 
-def _far_below(results: Results, which: int) -> Finding:
+def _far_below(results: Results, which: int) -> ClaimResult:
     ratio, curve, step = _slow(results, which)
     fast = curve[ratio >= 1.0]
     most = Quantity(float(np.nanmax(fast)), step)
@@ -191,12 +191,12 @@ def _far_below(results: Results, which: int) -> Finding:
     )
 
 
-def fast_one_mode(results: Results) -> Finding:
+def fast_one_mode(results: Results) -> ClaimResult:
     """5c."""
     return _far_below(results, 0)
 
 
-def fast_many_modes(results: Results) -> Finding:
+def fast_many_modes(results: Results) -> ClaimResult:
     """5d."""
     return _far_below(results, 1)
 
@@ -220,7 +220,7 @@ def _tuning(results: Results, which: int) -> tuple[Quantity, int]:
     return median_of(widths), int(widths.size)
 
 
-def sharper(results: Results) -> Finding:
+def sharper(results: Results) -> ClaimResult:
     """30: how wide the dips of the threshold are, over their frequency."""
     (one, few), (many, more) = (_tuning(results, which) for which in (0, 1))
     less = Quantity(one.value - many.value, combined(one.uncertainty, many.uncertainty))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from snapbeam.core.codes import ResponseClass
-from snapbeam.paper.claims.finding import Finding, Quantity, above, found
+from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, found
 from snapbeam.paper.claims.spread import combined, share
 from snapbeam.paper.claims.topics.classes import is_kind, share_of, transient
 from snapbeam.sweeps.analysis import interwell_threshold, is_interwell
@@ -28,12 +28,12 @@ def _late(results: Results, which: int) -> tuple[xr.Dataset, xr.Dataset]:
     return maps[2 * which], maps[2 * which + 1]
 
 
-def outlasts(results: Results) -> Finding:
+def outlasts(results: Results) -> ClaimResult:
     """32a: points still change class after 1000 cycles."""
     values = []
     for which in (0, 1):
         before, after = _late(results, which)
-        values.append(share(before.response.values != after.response.values))
+        values.append(share(before.response_class.values != after.response_class.values))
     one, many = values
     cycles = [int(ds.attrs["cycles"]) for ds in _late(results, 1)]
     return found(
@@ -42,10 +42,10 @@ def outlasts(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def outlasts_near_threshold(results: Results) -> Finding:
+def outlasts_near_threshold(results: Results) -> ClaimResult:
     """32b: particularly near the threshold, with many modes."""
     before, after = _late(results, 1)
-    changed = before.response.values != after.response.values
+    changed = before.response_class.values != after.response_class.values
     threshold = interwell_threshold(before)[:, None]
     drive = before.velocity_amplitude.values[None, :]
     close = np.abs(drive / threshold - 1.0) <= _NEAR
@@ -57,50 +57,50 @@ def outlasts_near_threshold(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def outlasts_first_well(results: Results) -> Finding:
+def outlasts_first_well(results: Results) -> ClaimResult:
     """32c: and of transient interwell 1."""
     before, after = _late(results, 1)
-    changed = before.response.values != after.response.values
-    first = before.response.values == ResponseClass.TRANSIENT_1
+    changed = before.response_class.values != after.response_class.values
+    first = before.response_class.values == ResponseClass.TRANSIENT_1
     value = share(changed[first])
-    rest = share(changed[is_interwell(before.response.values) & ~first])
+    rest = share(changed[is_interwell(before.response_class.values) & ~first])
     return found(
         above(value, 2.0 * rest.value) & above(value, 0.0), share=value, rest=rest, points=int(first.sum())
     )
 
 
-def ends_in_second_well(results: Results) -> Finding:
+def ends_in_second_well(results: Results) -> ClaimResult:
     """24a: transient responses mostly end about the second well."""
     value = share_of(results, "fig6", 1, is_kind(ResponseClass.TRANSIENT_2), transient)
     late = share_of(results, "fig7", 1, is_kind(ResponseClass.TRANSIENT_2), transient)
     return found(above(value, 0.5) & above(late, 0.5), above(late, 0.5), share=value, late=late)
 
 
-def ends_in_first_well(results: Results) -> Finding:
+def ends_in_first_well(results: Results) -> ClaimResult:
     """24b: some end about the first."""
     value = share_of(results, "fig6", 1, is_kind(ResponseClass.TRANSIENT_1), transient)
     return found(above(value, 0.001), above(value, 0.0), share=value)
 
 
-def snaps_once(results: Results) -> Finding:
+def snaps_once(results: Results) -> ClaimResult:
     """24c: whether transient responses mostly snap through only once."""
     value = share_of(
-        results, "fig6", 1, lambda ds: np.asarray(ds.crossings.values == 1),
-        lambda ds: np.asarray(ds.response.values == ResponseClass.TRANSIENT_2),
+        results, "fig6", 1, lambda ds: np.asarray(ds.zero_crossings.values == 1),
+        lambda ds: np.asarray(ds.response_class.values == ResponseClass.TRANSIENT_2),
     )  # fmt: skip
     ds = list(results["fig6"].values())[1]
-    crossings = ds.crossings.values[ds.response.values == ResponseClass.TRANSIENT_2]
+    crossings = ds.zero_crossings.values[ds.response_class.values == ResponseClass.TRANSIENT_2]
     return found(
         above(value, 0.5), above(value, 0.1), share=value, up_to_three=float((crossings <= 3).mean()),
         middle=float(np.median(crossings)) if crossings.size else float("nan"),
     )  # fmt: skip
 
 
-def decays(results: Results) -> Finding:
+def decays(results: Results) -> ClaimResult:
     """24d: transient interwell 2 has settled, below the barrier, at the end."""
     value = share_of(
-        results, "fig6", 1, lambda ds: np.asarray(ds.end_is_final.values.astype(bool)),
-        lambda ds: np.asarray(ds.response.values == ResponseClass.TRANSIENT_2),
+        results, "fig6", 1, lambda ds: np.asarray(ds.final_well_proven.values.astype(bool)),
+        lambda ds: np.asarray(ds.response_class.values == ResponseClass.TRANSIENT_2),
     )  # fmt: skip
     return found(above(value, 0.9), above(value, 0.5), share=value)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam.core.codes import ResponseClass
 from snapbeam.model.paper_values import BEAM, LOCATION
-from snapbeam.paper.claims.finding import Finding, Quantity, above, below, found
+from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found
 from snapbeam.paper.claims.spread import median_of, part, resampled, share
 from snapbeam.paper.recipe import MissingResults
 from snapbeam.paper.recipes.fig5 import snap_times
@@ -35,7 +35,7 @@ def amplitudes(results: Results) -> tuple[xr.Dataset, xr.Dataset, _Array]:
     return run, along, run.modal_amplitude.values.astype(float) / abs(float(along.attrs["rest_amplitude"]))
 
 
-def snaps_through(results: Results) -> Finding:
+def snaps_through(results: Results) -> ClaimResult:
     """10a: Fig. 5 snaps through."""
     run, _, alpha = amplitudes(results)
     period = float(run.time[-1] / run.cycle[-1])
@@ -62,7 +62,7 @@ def _dominance(results: Results, name: str, low: float, high: float) -> Quantity
     return resampled(lambda at: float(hits[at].sum() / max(total[at].sum(), 1.0)), total.size)
 
 
-def higher_modes_dominate(results: Results) -> Finding:
+def higher_modes_dominate(results: Results) -> ClaimResult:
     """10b: which modes lead while the beam passes the unstable equilibrium."""
     half, fifth, twentieth = (_dominance(results, "higher_exceed", 0.0, cut) for cut in (0.5, 0.2, 0.05))
     _, _, alpha = amplitudes(results)
@@ -74,7 +74,7 @@ def higher_modes_dominate(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def antisymmetric_part(results: Results) -> Finding:
+def antisymmetric_part(results: Results) -> ClaimResult:
     """26a: how large the antisymmetric part is where alpha_1 passes zero."""
     table = part(results, "waveforms", "snap_throughs")
     uneven, run = table.antisymmetric.values, table.run.values.astype(int)
@@ -90,7 +90,7 @@ def antisymmetric_part(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def slow_push(results: Results) -> Finding:
+def slow_push(results: Results) -> ClaimResult:
     """26b: the antisymmetric part along the equilibria of a slow push at the shaker's place.
 
     With the contact held, (K0 + gamma s) alpha = force phi, s the sum of the squares of alpha, which falls from its
@@ -100,9 +100,9 @@ def slow_push(results: Results) -> Finding:
 
     def largest(beam: sb.Beam) -> float:
         model = sb.ReducedModel.from_beam(beam, modes=modes)
-        rest = float(model.equilibrium @ model.equilibrium)
+        rest = float(model.well_amplitude @ model.well_amplitude)
         square = rest * np.linspace(0.001, 0.999, 999)
-        flexible = model.shape_at(LOCATION) / (model.stiffness + model.tension_stiffness * square[:, None])
+        flexible = model.shape_at(LOCATION) / (model.stiffness + model.nonlinear_stiffness * square[:, None])
         alpha = flexible * np.sqrt(square / np.sum(flexible**2, axis=1))[:, None]
         return float(np.sqrt(np.sum(alpha[:, 1::2] ** 2, axis=1).max() / rest))
 
@@ -112,12 +112,12 @@ def slow_push(results: Results) -> Finding:
     return found(above(value, 0.1), above(value, 0.05), largest=value, load=load)
 
 
-def first_mode_away(results: Results) -> Finding:
+def first_mode_away(results: Results) -> ClaimResult:
     """27: away from the unstable equilibrium the first mode soon leads the antisymmetric ones."""
     exceeded = _dominance(results, "antisymmetric_exceed", 0.5, np.inf)
     table = part(results, "waveforms", "snap_throughs")
     run = table.run.values.astype(int)
-    delay = table.delay.values * float(table.attrs["reference_freq"])
+    delay = table.delay.values * float(table.attrs["reference_frequency"])
     # a passage after which it does not come to that before the next is late
     delay = np.where(np.isfinite(delay), delay, np.inf)
     groups = [delay[run == at] for at in np.unique(run)]
@@ -141,7 +141,7 @@ def _repeats(record: _Array) -> bool:
     return after < _PERIODIC * size or after < 0.5 * before
 
 
-def not_periodic(results: Results) -> Finding:
+def not_periodic(results: Results) -> ClaimResult:
     """23a: intrawell responses that do not repeat themselves."""
     record = part(results, "waveforms", "strobed").displacement.values.astype(float)
     periodic = np.array([_repeats(one) for one in record], dtype=bool)
@@ -152,7 +152,7 @@ def not_periodic(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def similar_amplitude(results: Results) -> Finding:
+def similar_amplitude(results: Results) -> ClaimResult:
     """23b: the peaks of those are alike, not equal, and the beam stays about its first well."""
     record = part(results, "waveforms", "strobed").displacement.values.astype(float)
     wild = np.array([one for one in record if not _repeats(one)])
@@ -168,13 +168,13 @@ def similar_amplitude(results: Results) -> Finding:
     )  # fmt: skip
 
 
-def in_order(results: Results) -> Finding:
+def in_order(results: Results) -> ClaimResult:
     """23c: intrawell, one snap-through, several, as the amplitude grows at one frequency."""
     searched = results["fig4"]["searched"]
-    settled = searched.response.values == ResponseClass.TRANSIENT_2
+    settled = searched.response_class.values == ResponseClass.TRANSIENT_2
     hits = []
     for kinds, crossings, second in zip(
-        searched.response.values, searched.crossings.values, settled, strict=True
+        searched.response_class.values, searched.zero_crossings.values, settled, strict=True
     ):
         once, more = np.flatnonzero(second & (crossings == 1)), np.flatnonzero(second & (crossings >= 3))
         ordered = once.size > 0 and more.size > 0 and once[0] < more[-1]
