@@ -12,15 +12,15 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-NEEDS = {"diffrax", "equinox", "heyoka", "holoviews", "jax", "numbalsoda", "panel", "playwright"}
-"""Packages that single benchmarks need; without them that one is left out."""
+NEEDS = {"boost", "diffrax", "equinox", "heyoka", "holoviews", "jax", "numbalsoda", "panel", "playwright"}
+"""Packages that single benchmarks need, and a C++ compiler with Boost; without them that one is left out."""
 _IMPORT = """
 import importlib, sys
 for name in sys.argv[1:]:
     try:
         importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        print(error.name.partition(".")[0])
+    except ImportError as error:
+        print((error.name or name).partition(".")[0])
 """
 
 
