@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
@@ -17,6 +18,12 @@ from snapbeam.runs.schema import trajectory_dataset
 def pytest_addoption(parser):
     parser.addoption("--seed", type=int, default=7, help="of tests that draw at random (slow ones)")
     parser.addoption("--draws", type=int, default=100, help="how many such tests draw")
+
+
+def pytest_configure():
+    """Restore the handler of Ctrl-C, which a background job may ignore, since child processes inherit it."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture
