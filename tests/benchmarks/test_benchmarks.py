@@ -46,6 +46,6 @@ def test_the_gpus_benchmark_runs_in_the_simulator(tmp_path):
         cwd=ROOT, env=dict(os.environ, NUMBA_ENABLE_CUDASIM="1"), capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    found = json.loads((tmp_path / "gpu.json").read_text())
+    found = json.loads((tmp_path / "gpu.json").read_text(encoding="utf-8"))
     assert {"facts", "conformance", "throughput", "scaling", "map"} <= found.keys()
     assert found["conformance"]["first_cycle"][0]["error"] < 1e-6

@@ -22,8 +22,8 @@ import snapbeam as sb
 from snapbeam import paper
 
 DATA = Path(__file__).parent / "data"
-STORED: dict[str, Any] = json.loads((DATA / "frozen_0_1.json").read_text())
-IMPULSES: dict[str, list[str]] = json.loads((DATA / "restitution_0_1.json").read_text())
+STORED: dict[str, Any] = json.loads((DATA / "frozen_0_1.json").read_text(encoding="utf-8"))
+IMPULSES: dict[str, list[str]] = json.loads((DATA / "restitution_0_1.json").read_text(encoding="utf-8"))
 """The first three impulses of each of its runs under Newton's law."""
 CASES = frozen.cases()
 LOOSE = {"gross_work": 0.5, "contact_share": 0.05, "last_crossing": 0.2}

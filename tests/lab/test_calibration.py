@@ -66,7 +66,7 @@ def test_the_papers_numbers(tmp_path):
     assert config.model.beam is not None
     assert config.model.beam.buckling_level == pytest.approx(found.values["buckling_level"], rel=1e-12)
     assert np.all(np.asarray(config.model.damping_ratio) == 0.005) and config.model.modes == 32
-    assert "unequal wells" in path.read_text()
+    assert "unequal wells" in path.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(("kind", "value"), [("rise", 1.2e-6), ("uniform_load", 11e-3)])
@@ -83,7 +83,7 @@ def test_two_wells_and_soft_ends_go_into_the_file(tmp_path, kind, value):
         assert model.beam.ends == beam.ends
         assert abs(getattr(model.imperfection, kind)) == pytest.approx(value, rel=0.2)
         assert any(f"{kind} = " in text for text in found.remarks)
-        assert ("[ends]" in path.read_text()) == (beam is not BEAM)
+        assert ("[ends]" in path.read_text(encoding="utf-8")) == (beam is not BEAM)
     one = dataclasses.replace(PAPER, upper_well_freq=())
     with pytest.raises(InputError, match="needs the first frequency about both wells; the upper one's"):
         calibrate(one, modes=4, imperfection=kind)
@@ -185,7 +185,8 @@ def test_a_file_of_measurements(tmp_path):
     path.write_text(
         "[measured]\nstraight_freq = [80.0, 221.0]\nstraight_freq_se = 0.4\nlower_well_freq = [81.3]\n"
         "[beam]\nlength = 0.161\n[[measured.contact]]\nclosing_speed = 0.1\nduration = 2e-4\n"
-        "peak_force = 2.0\n"
+        "peak_force = 2.0\n",
+        encoding="utf-8",
     )
     found, others = load_measurements(path)
     assert found.straight_freq == (80.0, 221.0) and found.straight_freq_se == (0.4, 0.4)
@@ -203,7 +204,7 @@ def test_a_file_of_measurements(tmp_path):
         ("[beam]\nlength = 0.161\n", r"no section \[measured\]"),
         ("measured = [", "no TOML"),
     ):
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=word) as caught:
             load_measurements(path)
         assert "m.toml" in str(caught.value)
