@@ -83,7 +83,12 @@ def test_coil(modes, inductance) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("modes", "ratio", "velocity", "resistance", "cycles"),
-    [(3, 2.782, 0.333, 9.06e5, 3), (1, 0.4038, 0.473, 3.27e5, 1), (3, 1.3, 0.4, 3e5, 2), (8, 2.0, 0.3, 5e5, 1)],
+    [
+        (3, 2.782, 0.333, 9.06e5, 3),
+        (1, 0.4038, 0.473, 3.27e5, 1),
+        (3, 1.3, 0.4, 3e5, 2),
+        (8, 2.0, 0.3, 5e5, 1),
+    ],
 )
 def test_struck_with_a_nearly_open_circuit(modes, ratio, velocity, resistance, cycles) -> None:
     """The layers stiffen the beam, so that it comes back to the tip sooner than without: no contact is missed."""

@@ -46,6 +46,7 @@ def test_it_is_that_of_the_linear_fit() -> None:
     assert damping[1] < 0.005 < damping[2]
 
 
+@pytest.mark.slow
 def test_what_the_data_do_not_say_stays_as_it_was() -> None:
     """Density and modulus come in as a ratio: their product is as uncertain as before."""
     prior = {"young_modulus": 0.05, "density": 0.05}
@@ -62,6 +63,7 @@ def test_intervals_cover() -> None:
     assert counted.trials == 400 and 0.93 <= counted.all <= 0.97, counted
 
 
+@pytest.mark.slow
 def test_what_follows_is_drawn_from_it() -> None:
     found = sb.posterior(measured_of(paper.BEAM, error=0.02), paper.BEAM, PRIOR, modes=2, draws=400)
     spread = found.spread(of={"velocity_amplitude": sb.Normal(0.02, relative=True)})

@@ -82,11 +82,13 @@ def demand(found, within: float, cover: float) -> None:
     assert (found[:, 2:] > 0.97).mean(axis=0).min() > 0.18
 
 
-@pytest.mark.parametrize(("law", "draws"), [pytest.param(one_well, 100, marks=pytest.mark.slow), (chirp, 50)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("law", "draws"), [(one_well, 100), (chirp, 50)])
 def test_a_hundred_noisy_decays(law, draws):
     demand(scores(law(0.12), draws), 0.97, 0.90)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["hilbert", "log_decrement"])
 def test_noisy_decays_by_cycles(method):
     # over 250 other draws 92 % and more lie within two errors; 60 such draws fall below 85 % once in 50 times
@@ -123,6 +125,7 @@ def test_a_known_buckling_level_narrows_the_frequency():
     assert abs(held.natural_freq - F0) < 2.5 * held.natural_freq_se
 
 
+@pytest.mark.slow
 def test_standard_errors_hold_for_coloured_noise():
     """Noise ten times as strong above 1 kHz leaves the errors of an 80 Hz mode alone."""
     rng, values = np.random.default_rng(5), chirp(0.1)
