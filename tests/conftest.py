@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 
@@ -24,6 +25,25 @@ def pytest_configure():
     """Restore the handler of Ctrl-C, which a background job may ignore, since child processes inherit it."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+WITHOUT_KERNELS = ("lab", "model", "config", "core", "docs", "figures")
+"""Folders whose tests compile hardly any kernel; each takes ten seconds."""
+
+
+def pytest_collection_modifyitems(items):
+    """Take in turn a file that needs kernels and one that does not.
+
+    One of two workers (``--dist loadfile --no-loadscope-reorder``) then compiles the common kernels, and the other
+    finds them on disk.
+    """
+    files = {}
+    for item in items:
+        files.setdefault(item.path, []).append(item)
+    without = [path for path in files if path.parent.name in WITHOUT_KERNELS]
+    needing = [path for path in files if path not in without]
+    pairs = itertools.zip_longest(needing, without)
+    items[:] = [item for pair in pairs for path in pair if path is not None for item in files[path]]
 
 
 @pytest.fixture

@@ -16,8 +16,11 @@ DEAR = {
     "ex19_figB10_resonance",
     "ex21_sensitivity",
     "ex22_claims",
+    "ex23_other_worlds",
+    "ex24_dynamics",
+    "ex25_design",
 }
-"""Figures of the paper that take seconds; tests/paper draws the others and tests what they are made of."""
+"""Figures of the paper, which tests/paper draws too, and others that take seconds or compile their own kernels."""
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("ex*.py"))
 
 
