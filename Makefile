@@ -74,7 +74,7 @@ lint: $(VENV)/.installed-test
 	$(BIN)/lint-imports
 
 test: lint
-	$(BIN)/python -m pytest -m "not slow" --durations=15 -n $(WORKERS) --dist loadfile
+	$(BIN)/python -m pytest -m "not slow" --durations=15 -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 test-slow: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -m slow --durations=15

@@ -290,7 +290,7 @@ def main(arguments: list[str] | None = None) -> int:
             for title, rows in results[name].items():
                 if isinstance(rows, list):
                     show(f"{name}: {title}", rows)
-            options.output.write_text(json.dumps(results, indent=2))
+            options.output.write_text(json.dumps(results, indent=2), encoding="utf-8")
     compared = results.get("conformance", {})
     right = all(row["error"] < 1e-6 for row in compared.get("first_cycle", []))
     right &= all(row["within_three"] for row in compared.get("class_shares", []))

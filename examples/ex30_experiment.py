@@ -72,7 +72,7 @@ for well, level in (("lower", 0.3323e-3), ("upper", 0.3289e-3)):
     wells[well] = lab.identify_decay(lab.read_signal(files / f"decay_{well}.csv"))
     mode = wells[well].modes[0]
     print(
-        f"{well} well: {mode.natural_frequencies:.3f} ± {mode.natural_freq_se:.3f} Hz "
+        f"{well} well: {mode.natural_frequencies:.3f} ± {mode.natural_frequencies_se:.3f} Hz "
         f"(truth {model.natural_frequencies[0]:.3f}), damping ratio "
         f"{mode.damping_ratio:.5f} ± {mode.damping_ratio_se:.5f} (truth 0.005)"
     )
@@ -93,7 +93,7 @@ figure = plot_decay(lab.read_signal(files / "decay_upper.csv"), wells["upper"])
 # the wells differ by far more than the errors of their decays, and the symmetric model cannot follow that.
 
 measured = lab.Measurements(
-    straight_frequency=(80.0, 221.0),
+    straight_frequencies=(80.0, 221.0),
     lower_well_frequencies=(round(wells["lower"].natural_frequencies, 2),),
     upper_well_frequencies=(round(wells["upper"].natural_frequencies, 2),),
     damping_ratio=[fit.damping_ratio for fit in wells.values()],

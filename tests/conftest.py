@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import os
+import signal
 
 os.environ.setdefault("MPLBACKEND", "Agg")
 
@@ -17,6 +19,31 @@ from snapbeam.runs.schema import trajectory_dataset
 def pytest_addoption(parser):
     parser.addoption("--seed", type=int, default=7, help="of tests that draw at random (slow ones)")
     parser.addoption("--draws", type=int, default=100, help="how many such tests draw")
+
+
+def pytest_configure():
+    """Restore the handler of Ctrl-C, which a background job may ignore, since child processes inherit it."""
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+WITHOUT_KERNELS = ("lab", "model", "config", "core", "docs", "figures")
+"""Folders whose tests compile hardly any kernel; each takes ten seconds."""
+
+
+def pytest_collection_modifyitems(items):
+    """Take in turn a file that needs kernels and one that does not.
+
+    One of two workers (``--dist loadfile --no-loadscope-reorder``) then compiles the common kernels, and the other
+    finds them on disk.
+    """
+    files = {}
+    for item in items:
+        files.setdefault(item.path, []).append(item)
+    without = [path for path in files if path.parent.name in WITHOUT_KERNELS]
+    needing = [path for path in files if path not in without]
+    pairs = itertools.zip_longest(needing, without)
+    items[:] = [item for pair in pairs for path in pair if path is not None for item in files[path]]
 
 
 @pytest.fixture

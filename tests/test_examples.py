@@ -8,6 +8,19 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import pytest
 
+DEAR = {
+    "ex12_fig4_waveforms",
+    "ex15_fig7_map_1000_cycles",
+    "ex16_fig8_location",
+    "ex17_si5_added_modes",
+    "ex19_figB10_resonance",
+    "ex21_sensitivity",
+    "ex22_claims",
+    "ex23_other_worlds",
+    "ex24_dynamics",
+    "ex25_design",
+}
+"""Figures of the paper, which tests/paper draws too, and others that take seconds or compile their own kernels."""
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("ex*.py"))
 
 
@@ -15,7 +28,13 @@ def test_there_are_examples():
     assert EXAMPLES
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=[path.stem for path in EXAMPLES])
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, marks=pytest.mark.slow if path.stem in DEAR else (), id=path.stem)
+        for path in EXAMPLES
+    ],
+)
 def test_example(path, capsys):
     runpy.run_path(str(path))
     assert plt.get_fignums() or capsys.readouterr().out

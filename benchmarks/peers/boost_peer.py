@@ -31,7 +31,7 @@ _SIGNATURE = types.void(types.double, *3 * (types.CPointer(types.double),))
 def _library() -> ctypes.CDLL:
     compiler = os.environ.get("CXX") or shutil.which("g++") or shutil.which("c++")
     if compiler is None:
-        raise ImportError("no C++ compiler")
+        raise ImportError("no C++ compiler", name="boost")
     text = _SOURCE.read_bytes() + " ".join((compiler, *_OPTIONS)).encode()
     folder = (
         Path(tempfile.gettempdir()) / f"snapbeam-boost-{os.getuid()}-{hashlib.sha256(text).hexdigest()[:12]}"
@@ -44,7 +44,8 @@ def _library() -> ctypes.CDLL:
             [compiler, *_OPTIONS, str(_SOURCE), "-o", str(made)], capture_output=True, text=True
         )
         if done.returncode != 0:
-            raise ImportError((re.findall(r"error: .*", done.stderr) or ["it does not compile"])[0])
+            why = (re.findall(r"error: .*", done.stderr) or ["it does not compile"])[0]
+            raise ImportError(why, name="boost")
         made.replace(built)
     return ctypes.CDLL(str(built))
 

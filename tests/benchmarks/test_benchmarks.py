@@ -12,15 +12,15 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-NEEDS = {"diffrax", "equinox", "heyoka", "holoviews", "jax", "numbalsoda", "panel", "playwright"}
-"""Packages that single benchmarks need; without them that one is left out."""
+NEEDS = {"boost", "diffrax", "equinox", "heyoka", "holoviews", "jax", "numbalsoda", "panel", "playwright"}
+"""Packages that single benchmarks need, and a C++ compiler with Boost; without them that one is left out."""
 _IMPORT = """
 import importlib, sys
 for name in sys.argv[1:]:
     try:
         importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        print(error.name.partition(".")[0])
+    except ImportError as error:
+        print((error.name or name).partition(".")[0])
 """
 
 
@@ -46,6 +46,6 @@ def test_the_gpus_benchmark_runs_in_the_simulator(tmp_path):
         cwd=ROOT, env=dict(os.environ, NUMBA_ENABLE_CUDASIM="1"), capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    found = json.loads((tmp_path / "gpu.json").read_text())
+    found = json.loads((tmp_path / "gpu.json").read_text(encoding="utf-8"))
     assert {"facts", "conformance", "throughput", "scaling", "map"} <= found.keys()
     assert found["conformance"]["first_cycle"][0]["error"] < 1e-6

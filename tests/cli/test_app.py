@@ -93,7 +93,7 @@ def test_text_where_a_number_belongs(cli):
 
 
 def test_unknown_key_of_a_file(cli, tmp_path):
-    (tmp_path / "beam.toml").write_text("[beam]\nlenght = 0.161\n")
+    (tmp_path / "beam.toml").write_text("[beam]\nlenght = 0.161\n", encoding="utf-8")
     result = cli("map", "--config", "beam.toml")
     assert result.exit_code == 2
     assert result.stderr == "error: beam.toml: [beam] lenght: unknown key; did you mean 'length'?\n"
@@ -133,7 +133,8 @@ def test_file_and_options_together(cli, tmp_path):
     (tmp_path / "beam.toml").write_text(
         "[model]\nmodes = 2\n[integration]\ncycles = 4\n"
         "[map]\nfrequency_ratio = [0.5, 1.0]\nvelocity_amplitude = 0.3\n"
-        "[contact]\nstiffness = 1e8\n"
+        "[contact]\nstiffness = 1e8\n",
+        encoding="utf-8",
     )
     result = cli("map", "--config", "beam.toml", "--cycles", "6", "--location", "0.3,0.4")
     assert result.exit_code == 0, result.output

@@ -36,7 +36,8 @@ def test_worlds_in_a_parameter_file(tmp_path) -> None:
     file = tmp_path / "world.toml"
     file.write_text(
         '[contact]\nlaw = "kelvin_voigt"\nspring = 2e6\ndamper = 20.0\n[drive]\nkind = "burst"\n'
-        "frequency_ratio = 1.2\nvelocity_amplitude = 0.2\nlength = 5.0\n[striker]\nmass = 0.02\n"
+        "frequency_ratio = 1.2\nvelocity_amplitude = 0.2\nlength = 5.0\n[striker]\nmass = 0.02\n",
+        encoding="utf-8",
     )
     system = load_config(file).system
     assert system.get("contact.linear_damping") == 20.0

@@ -218,7 +218,7 @@ def test_round_trip(tmp_path):
     )
     path = tmp_path / "beam.toml"
     dump_config(config, path, comment="fitted to a sweep\nof four frequencies")
-    text = path.read_text()
+    text = path.read_text(encoding="utf-8")
     assert text.startswith("# fitted to a sweep\n# of four frequencies\n\n[beam]\n")
     assert "# distance between the clamps, m\nlength = 0.2\n" in text
     assert load_config(path) == config
@@ -332,7 +332,7 @@ def test_files_that_cannot_be_read(tmp_path):
     with pytest.raises(InputError, match="cannot be read, No such file"):
         load_config(tmp_path / "none.toml")
     bad = tmp_path / "bad.toml"
-    bad.write_text("[beam]\nlength = 0.1 m\n")
+    bad.write_text("[beam]\nlength = 0.1 m\n", encoding="utf-8")
     with pytest.raises(InputError, match=r"is no TOML.*line 2"):
         load_config(bad)
     with pytest.raises(InputError, match=r"must end in \.toml"):

@@ -144,7 +144,7 @@ KINDS = {
 """Every law of contact and every drive there is: what is asked of one is asked of all."""
 
 
-SLOW = {"recorded restitution", "kelvin-voigt", "power"}
+SLOW = {"hunt-crossley", "recorded", "recorded restitution", "kelvin-voigt", "power"}
 """Kernels of their own, half a minute to compile, for what the others test one by one."""
 
 

@@ -46,7 +46,10 @@ def solved(modes: int, ratio: float, velocity: float, cycles: int) -> Solution:
     return beam.solve(ratio, velocity, np.linspace(0.0, end, SAMPLES))
 
 
-@pytest.mark.parametrize(("modes", "pair", "cycles", "measured"), CASES + DEAR)
+@pytest.mark.parametrize(
+    ("modes", "pair", "cycles", "measured"),
+    [*CASES, DEAR[0], *(pytest.param(*case, marks=pytest.mark.slow) for case in DEAR[1:])],
+)
 def test_trajectory(modes, pair, cycles, measured) -> None:
     """The displacements at the shaker and at the centre, and every impact, at the default step."""
     truth = solved(modes, *pair, cycles)

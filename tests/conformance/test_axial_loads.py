@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from around_oracle import Surroundings, live
 from oracle import PaperBeam
-from test_moving_base import SLOW, ledger, model
+from test_moving_base import ledger, model
 
 import snapbeam as sb
 from snapbeam.core.validate import InputError
 
 
-@pytest.mark.parametrize("modes", [pytest.param(1, marks=SLOW), 3, pytest.param(8, marks=SLOW)])
+@pytest.mark.slow
+@pytest.mark.parametrize("modes", [1, 3, 8])
 def test_against_an_independent_solution(modes) -> None:
     """With a base beside it: several motions, each by its own clock."""
     beam, cycles = PaperBeam(modes), 3

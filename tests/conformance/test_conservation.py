@@ -31,7 +31,12 @@ def energy_errors(march, model, share: float, cycles: list[int]) -> tuple[list[f
 
 @pytest.mark.parametrize(
     ("modes", "cycles", "share", "bound"),
-    [(1, 100_000, 0.5, 3e-7), (32, 10_000, 0.5, 3e-7), (1, 100_000, 0.1, 3e-7), (32, 10_000, 0.1, 1.5e-5)],
+    [
+        (1, 100_000, 0.5, 3e-7),
+        pytest.param(32, 10_000, 0.5, 3e-7, marks=pytest.mark.slow),
+        pytest.param(1, 100_000, 0.1, 3e-7, marks=pytest.mark.slow),
+        pytest.param(32, 10_000, 0.1, 1.5e-5, marks=pytest.mark.slow),
+    ],
 )
 def test_no_drift_within_a_well(march, model_of, modes, cycles, share, bound) -> None:
     """Measured: at most 7e-8 from the first hundred cycles to the last, without a trend.

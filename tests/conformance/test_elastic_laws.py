@@ -38,14 +38,9 @@ LAWS: dict[str, tuple[sb.ContactLaw, Callable[[float, float], float]]] = {
 CYCLES = {1: 3, 3: 2, 8: 1}
 
 
-@pytest.mark.parametrize(
-    ("name", "modes"),
-    [
-        pytest.param(name, modes, marks=() if (name, modes) == ("layer", 3) else pytest.mark.slow)
-        for name in LAWS
-        for modes in CYCLES
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("modes", CYCLES)
+@pytest.mark.parametrize("name", LAWS)
 def test_against_an_independent_solution(name: str, modes: int) -> None:
     """1e-3 b at level *map*, 1e-7 b at level *reference*, and a ledger that closes to 1e-4 of the gross work."""
     law, force = LAWS[name]

@@ -22,8 +22,8 @@ import snapbeam as sb
 from snapbeam import paper
 
 DATA = Path(__file__).parent / "data"
-STORED: dict[str, Any] = json.loads((DATA / "frozen_0_1.json").read_text())
-IMPULSES: dict[str, list[str]] = json.loads((DATA / "restitution_0_1.json").read_text())
+STORED: dict[str, Any] = json.loads((DATA / "frozen_0_1.json").read_text(encoding="utf-8"))
+IMPULSES: dict[str, list[str]] = json.loads((DATA / "restitution_0_1.json").read_text(encoding="utf-8"))
 """The first three impulses of each of its runs under Newton's law."""
 CASES = frozen.cases()
 LOOSE = {"gross_work": 0.5, "contact_time_fraction": 0.05, "last_zero_crossing": 0.2}
@@ -46,7 +46,12 @@ def run_of(index: int) -> sb.Run:
     return frozen.answer(CASES[index])
 
 
-@pytest.mark.parametrize("index", range(len(CASES)))
+QUICK = {kind: k for k, kind in enumerate([(case["kind"], case["modes"]) for case in CASES])}
+"""The last case of each kind and number of modes; the others are slow."""
+INDICES = [pytest.param(k, marks=() if k in QUICK.values() else pytest.mark.slow) for k in range(len(CASES))]
+
+
+@pytest.mark.parametrize("index", INDICES)
 def test_frozen(index: int) -> None:
     """One run with what version 0.1 gave."""
     case, stored = CASES[index], dict(STORED["runs"][index])
@@ -115,6 +120,7 @@ def test_every_kind_is_there() -> None:
     assert len(CASES) == len(STORED["runs"]) == 300
 
 
+@pytest.mark.slow
 def test_what_was_said_to_be_final_and_is_not() -> None:
     """It was taken back where the striker still strikes, and only there."""
     taken, kernel_output = 0, 0
@@ -125,6 +131,7 @@ def test_what_was_said_to_be_final_and_is_not() -> None:
     assert taken > kernel_output > 0, (taken, kernel_output)
 
 
+@pytest.mark.slow
 def test_runs_of_another_processor_are_compared_closely() -> None:
     """A model whose numbers differ in their last digits: close where the problem is well-conditioned."""
     compared = 0
@@ -139,7 +146,9 @@ def test_runs_of_another_processor_are_compared_closely() -> None:
     assert compared > 30
 
 
-@pytest.mark.parametrize("index", [i for i in range(260, 300) if i % 4 == 0])
+@pytest.mark.parametrize(
+    "index", [pytest.param(i, marks=() if i == 296 else pytest.mark.slow) for i in range(260, 300, 4)]
+)
 def test_newton_against_an_independent_solution(index: int) -> None:
     """DOP853 with events on the equation as the paper writes it: the first impacts, measured to 1e-5 of the impulse."""
     case = CASES[index]

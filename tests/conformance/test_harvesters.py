@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from around_oracle import Surroundings, live, slopes
 from oracle import LENGTH, LEVEL, PaperBeam
-from test_moving_base import SLOW, ledger, model
+from test_moving_base import ledger, model
 
 import snapbeam as sb
 from snapbeam import paper
@@ -74,7 +74,8 @@ def compare(
         assert ledger(run) < 1e-4
 
 
-@pytest.mark.parametrize("modes", [pytest.param(1, marks=SLOW), 3, pytest.param(8, marks=SLOW)])
+@pytest.mark.slow
+@pytest.mark.parametrize("modes", [1, 3, 8])
 def test_piezo(modes) -> None:
     def row(beam):
         return THETA * (slopes(beam, 0.25 * LENGTH) - slopes(beam, 0.0))
@@ -96,13 +97,14 @@ def test_coil(modes, inductance) -> None:
     compare(modes, 4 if modes == 1 else 2, coil, row, inductance, 40.0, -30.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("modes", "ratio", "velocity", "resistance", "cycles"),
     [
         (3, 2.782, 0.333, 9.06e5, 3),
-        pytest.param(1, 0.4038, 0.473, 3.27e5, 1, marks=pytest.mark.slow),
-        pytest.param(3, 1.3, 0.4, 3e5, 2, marks=pytest.mark.slow),
-        pytest.param(8, 2.0, 0.3, 5e5, 1, marks=pytest.mark.slow),
+        (1, 0.4038, 0.473, 3.27e5, 1),
+        (3, 1.3, 0.4, 3e5, 2),
+        (8, 2.0, 0.3, 5e5, 1),
     ],
 )
 def test_struck_with_a_nearly_open_circuit(modes, ratio, velocity, resistance, cycles) -> None:

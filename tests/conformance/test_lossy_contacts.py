@@ -37,7 +37,7 @@ def ledger(run: sb.Run) -> np.ndarray:
 
 
 LAWS = [
-    pytest.param(name, e, marks=[pytest.mark.slow] if e == 0.9 else [])
+    pytest.param(name, e, marks=[pytest.mark.slow] if e == 0.9 or name == "kelvin_voigt" else [])
     for name in ("hunt_crossley", "kelvin_voigt")
     for e in (0.9, 0.5, 0.05)
 ]
@@ -91,7 +91,7 @@ CASES = [
     ("hunt-crossley", 8, 1, 1.3e-6, 5e-10),
     # the onset of its force is a jump, which four impacts of one mode that snaps magnify
     pytest.param("kelvin-voigt", 1, 5, 1.5e-5, 6e-6, marks=pytest.mark.slow),
-    ("kelvin-voigt", 3, 2, 1.4e-6, 1.1e-7),
+    pytest.param("kelvin-voigt", 3, 2, 1.4e-6, 1.1e-7, marks=pytest.mark.slow),
     pytest.param("kelvin-voigt", 8, 1, 4e-8, 1.1e-9, marks=pytest.mark.slow),
 ]
 

@@ -73,6 +73,7 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
         assert run.summary.impacts > 1
 
 
+@pytest.mark.slow
 def test_mirrored_and_going_on() -> None:
     """The mirrored system's mirrored run, and three periods in one go and one by one, bit for bit."""
     motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3)
@@ -119,6 +120,7 @@ def test_small_motions_follow_the_linear_response() -> None:
     assert swing == pytest.approx(strength * omega[0] ** 2 * gain, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_never_decided_by_energy() -> None:
     """A shaken beam may cross at any time: nothing is final, and only a continuous response is certain early."""
     system = sb.System(

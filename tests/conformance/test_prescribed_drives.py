@@ -139,7 +139,7 @@ CASES: dict[str, Callable[[float], Case]] = {
 }
 CYCLES: dict[object, int] = {1: 3, 3: 3, 8: 1} | {("logarithmic sweep", 1): 2, ("shock", 3): 2}
 """As long as conditioning allows: after another cycle these two answer a relative change of 1e-10 by 1e-7 b."""
-NORMAL = {("shock", 3), ("noise", 3)}
+NORMAL = {("shock", 3)}
 
 
 @pytest.mark.parametrize(

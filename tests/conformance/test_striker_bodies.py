@@ -77,9 +77,8 @@ def test_body_on_a_suspension(modes, cycles) -> None:
     assert run.summary.impacts > 1
 
 
-@pytest.mark.parametrize(
-    "modes", [pytest.param(1, marks=pytest.mark.slow), 3, pytest.param(8, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("modes", [1, 3, 8])
 def test_thrown_sphere(modes) -> None:
     """A free mass thrown at the beam from a distance."""
     mass, speed, gap = 2e-3, 0.4, 0.2 * LEVEL
@@ -102,6 +101,7 @@ def test_thrown_sphere(modes) -> None:
     assert run.summary.impulse == pytest.approx(-mass * float(run.final_state.striker_rate), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_sphere_meets_a_free_mass() -> None:
     """Two free bodies: momentum and energy, and all of the exchange of equal masses."""
     for mass in (1e-3, 2e-3, 5e-3):

@@ -80,6 +80,7 @@ def test_burst(modes, at_map, at_reference) -> None:
         assert np.ptp(ledger.values) < 1e-4 * data.attrs["gross_work"]
 
 
+@pytest.mark.slow
 def test_going_on_is_going_on() -> None:
     """Three calls of one period give what one of three gives, to rounding: time is part of the state."""
     drive = sb.Burst(
@@ -98,6 +99,7 @@ def test_going_on_is_going_on() -> None:
     np.testing.assert_array_equal(again.phase, step.phase)
 
 
+@pytest.mark.slow
 def test_one_tone_alone_is_the_sine() -> None:
     model = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
     two = sb.TwoTone(frequency_ratio=1.3, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.0)

@@ -43,11 +43,9 @@ def add_base_acceleration(model: sb.ReducedModel, ratio: float, velocity: float,
     return sb.System(model, paper.CONTACT, sb.Striker(drive=drive, location=LOCATION, **more))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", GIVEN.values(), ids=GIVEN)
-@pytest.mark.parametrize(
-    ("modes", "cycles"),
-    [pytest.param(1, 4, marks=pytest.mark.slow), (3, 2), pytest.param(8, 1, marks=pytest.mark.slow)],
-)
+@pytest.mark.parametrize(("modes", "cycles"), [(1, 4), (3, 2), (8, 1)])
 def test_independent_solution(modes, cycles, given) -> None:
     """The paper's coordinates with the energy's gradient as it is written, DOP853."""
     if modes == 1 and ("skew" in given):
@@ -81,7 +79,9 @@ def test_independent_solution(modes, cycles, given) -> None:
     assert run.summary.zero_crossings > 0 or cycles == 1
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=pytest.mark.slow if seed > 1 else ()) for seed in range(6)]
+)
 def test_no_equilibrium_is_missed(seed) -> None:
     """Every minimum that 200 starts find is there, and every equilibrium is one."""
     rng = np.random.default_rng(seed)
@@ -122,6 +122,7 @@ def test_nothing_is_bit_for_bit_the_perfect_beam() -> None:
     assert system.model.imperfection is None
 
 
+@pytest.mark.slow
 def test_a_small_shape_recedes_to_the_perfect_beam() -> None:
     """The error falls in proportion to the shape: to the perfect beam's own solution."""
     run = sb.simulate(
@@ -144,6 +145,7 @@ def test_a_small_shape_recedes_to_the_perfect_beam() -> None:
     assert errors[2] == pytest.approx(0.01 * errors[0], rel=0.1)
 
 
+@pytest.mark.slow
 def test_mirror_image() -> None:
     """The mirrored system's mirrored run, to the last bit."""
     given = {"rise": 9e-6, "skew": 4e-6, "force": 0.03, "at": 0.3}
@@ -176,6 +178,7 @@ def test_a_run_knows_nothing_of_the_others_of_its_batch() -> None:
         assert together.highest[i] == alone.highest[0]
 
 
+@pytest.mark.slow
 def test_going_on_loses_no_bit() -> None:
     system = add_base_acceleration(model_of(3, rise=1e-5, skew=5e-6), 1.21, 0.25)
     once = sb.advance(system, periods=4)
@@ -184,6 +187,7 @@ def test_going_on_loses_no_bit() -> None:
     np.testing.assert_array_equal(twice.amplitude, once.amplitude)
 
 
+@pytest.mark.slow
 def test_far_well_is_quiet() -> None:
     """At rest in either well nothing moves, and its share of energy at high frequencies is none."""
     model = model_of(4, rise=1.5e-5, skew=3e-6)
@@ -226,14 +230,8 @@ def random_runs(modes: int, count: int, seed: int, cycles: int) -> tuple[int, in
     return decided, wrong, classes
 
 
-@pytest.mark.parametrize(
-    ("modes", "count", "cycles"),
-    [
-        (2, 240, 24),
-        pytest.param(1, 4000, 60, marks=pytest.mark.slow),
-        pytest.param(8, 4000, 60, marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("modes", "count", "cycles"), [(2, 240, 24), (1, 4000, 60), (8, 4000, 60)])
 def test_early_decisions(modes, count, cycles) -> None:
     decided, wrong, classes = random_runs(modes, count, 10 * modes, cycles)
     assert wrong == 0

@@ -176,7 +176,7 @@ WORLDS: dict[str, World] = {
     "power": World(struck(sine(), sb.PowerLaw.from_stiffness(4e11, 2.0)), SINE | PLACE),
     "layer": World(struck(sine(), sb.LayeredHertz(stiffness=4e8, layer_stiffness=1e10)), SINE | PLACE),
     "hunt_crossley": World(
-        struck(sine(), sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)), SINE | PLACE, own_kernel=False
+        struck(sine(), sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)), SINE | PLACE
     ),
     "kelvin_voigt": World(struck(sine(), sb.KelvinVoigt(2e6, 20.0)), SINE | PLACE),
     "a gap": World(struck(sine(), gap=4e-5), SINE | {"striker.gap": (-5e-5, 1e-4)}, own_kernel=False),
@@ -212,7 +212,7 @@ WORLDS: dict[str, World] = {
     "two_tone": World(
         struck(TWO), SINE | {"drive.second_amplitude": (0.0, 0.3), "drive.second_phase": (-3.0, 3.0)}
     ),
-    "recorded": World(record, PLACE, cycles=11, own_kernel=False),
+    "recorded": World(record, PLACE, cycles=11),
     "still": World(struck(sb.FixedStop(), gap=-1e-4), {"striker.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
     "a body": World(
         struck(sine(), mass=0.02, spring=700.0, damper=0.7), SINE | PLACE, own_kernel=False, decides=False
@@ -232,8 +232,8 @@ WORLDS: dict[str, World] = {
         SINE | {"striker_2.gap": (-2e-5, 1e-4), "drive_2.displacement_amplitude": (0.0, 0.2)},
         decides=False,
     ),
-    "unequal wells": World(struck(sine()), SINE | PLACE, imperfection=UNEVEN, fewest=2, own_kernel=False),
-    "a measured shape": World(struck(sine()), SINE | PLACE, imperfection=MEASURED, own_kernel=False),
+    "unequal wells": World(struck(sine()), SINE | PLACE, imperfection=UNEVEN, fewest=2),
+    "a measured shape": World(struck(sine()), SINE | PLACE, imperfection=MEASURED),
     "other ends": World(struck(sine()), SINE | PLACE, beam=SPRUNG, own_kernel=False),
     "a given load": World(
         struck(sine()),

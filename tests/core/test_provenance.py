@@ -86,9 +86,9 @@ def test_unwritable_paths_are_refused(tmp_path):
 def test_a_file_is_whole_or_not_there(tmp_path):
     target = tmp_path / "result.txt"
     with atomic_path(target) as temporary:
-        temporary.write_text("first")
+        temporary.write_text("first", encoding="utf-8")
     with pytest.raises(KeyboardInterrupt), atomic_path(target) as temporary:
-        temporary.write_text("half")
+        temporary.write_text("half", encoding="utf-8")
         raise KeyboardInterrupt
-    assert target.read_text() == "first"
+    assert target.read_text(encoding="utf-8") == "first"
     assert [file.name for file in tmp_path.iterdir()] == ["result.txt"]

@@ -24,8 +24,8 @@ def measured_of(beam, modes: int = 2, error: float = 0.003, draw=None) -> Measur
     noise = [np.zeros(modes), np.zeros(modes)] if draw is None else draw.standard_normal((2, modes))
     values = [f * (1.0 + error * z) for f, z in zip((straight, well), noise, strict=True)]
     return Measurements(
-        straight_frequency=values[0].tolist(), straight_freq_se=(error * straight).tolist(),
-        lower_well_frequencies=values[1].tolist(), lower_well_freq_se=(error * well).tolist(),
+        straight_frequencies=values[0].tolist(), straight_frequencies_se=(error * straight).tolist(),
+        lower_well_frequencies=values[1].tolist(), lower_well_frequencies_se=(error * well).tolist(),
         damping_ratio=[0.005, 0.0052, 0.0048],
         contact=[ContactTest(closing_speed=0.1, duration=5e-4, peak_force=4.0)],
     )  # fmt: skip
@@ -46,6 +46,7 @@ def test_it_is_that_of_the_linear_fit() -> None:
     assert damping[1] < 0.005 < damping[2]
 
 
+@pytest.mark.slow
 def test_what_the_data_do_not_say_stays_as_it_was() -> None:
     """Density and modulus come in as a ratio: their product is as uncertain as before."""
     prior = {"young_modulus": 0.05, "density": 0.05}
@@ -64,6 +65,7 @@ def test_intervals_cover() -> None:
     assert counted.trials == 400 and 0.93 <= counted.all <= 0.97, counted
 
 
+@pytest.mark.slow
 def test_what_follows_is_drawn_from_it() -> None:
     found = sb.estimate_posterior(
         measured_of(paper.BEAM, error=0.02), paper.BEAM, PRIOR, modes=2, samples=400
@@ -107,5 +109,5 @@ def test_refusals() -> None:
         sb.estimate_posterior(measured, paper.BEAM, {"width": 0.1})
     with pytest.raises(InputError, match="prior"):
         sb.estimate_posterior(measured, paper.BEAM, {})
-    with pytest.raises(InputError, match="straight_freq_se"):
-        sb.estimate_posterior(Measurements(straight_frequency=[30.0]), paper.BEAM, PRIOR)
+    with pytest.raises(InputError, match="straight_frequencies_se"):
+        sb.estimate_posterior(Measurements(straight_frequencies=[30.0]), paper.BEAM, PRIOR)

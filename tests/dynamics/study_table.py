@@ -7,6 +7,7 @@ docs/data/lifetimes.md.
 from __future__ import annotations
 
 import math
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,7 @@ EARLIER = (32.0, 46.0, 89.0, 99.0)
 MANY = 0.5
 
 
+@cache
 def stored(name: str) -> dict[str, xr.Dataset]:
     """The datasets of a stored file by name."""
     with xr.open_datatree(DATA / f"{name}.nc", engine="h5netcdf") as tree:
@@ -49,6 +51,7 @@ def against(ds: xr.Dataset, figure: xr.Dataset, cycles: int) -> tuple[float, flo
     return float(share.mean()), float(called.mean()), float((called.sum() - share.sum()) / spread)
 
 
+@cache
 def figures() -> list[tuple[int, str, int, float, float, float]]:
     """Number of modes, figure, cycles, and :func:`against` of each."""
     data, six, seven = stored("lifetimes"), stored("fig6"), stored("fig7")
@@ -60,6 +63,7 @@ def figures() -> list[tuple[int, str, int, float, float, float]]:
     return rows
 
 
+@cache
 def sensitivity() -> dict[str, tuple[float, float]]:
     """kappa, lambda (a cycle), their ratio and alpha, each with a standard error."""
     data = stored("lifetimes")

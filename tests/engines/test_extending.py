@@ -83,9 +83,9 @@ def own(tmp_path_factory):
     """The three files, imported; taken back again afterwards."""
     before = package_hash()
     statistic, law = tmp_path_factory.mktemp("statistic"), tmp_path_factory.mktemp("law")
-    (statistic / "own_function.py").write_text(FUNCTION)
-    (statistic / "own_row.py").write_text(ROW)
-    (law / "own_law.py").write_text(LAW)
+    (statistic / "own_function.py").write_text(FUNCTION, encoding="utf-8")
+    (statistic / "own_row.py").write_text(ROW, encoding="utf-8")
+    (law / "own_law.py").write_text(LAW, encoding="utf-8")
     sys.path[:0] = [str(statistic), str(law)]
     invalidate_caches()
     try:

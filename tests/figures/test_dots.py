@@ -17,7 +17,7 @@ from snapbeam.lab.compare.maps import compare_measured_points
 
 def table(tmp_path, text):
     path = tmp_path / "measured.csv"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     return path
 
 

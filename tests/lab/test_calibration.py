@@ -20,7 +20,7 @@ from snapbeam.model.galerkin.reduction import ReducedModel
 from snapbeam.model.paper_values import BEAM
 
 PAPER = Measurements(
-    straight_frequency=[80.0, 221.0],
+    straight_frequencies=[80.0, 221.0],
     lower_well_frequencies=[81.3],
     upper_well_frequencies=[80.5],
     damping_ratio=[0.005],
@@ -35,7 +35,7 @@ def frequencies(beam: Beam, count: int = 2, modes: int = 12):
 
 def measured(beam: Beam, rng: np.random.Generator | None = None, share: float = 0.003) -> Measurements:
     """Frequencies of a beam, with errors of a *share* of them where there is a generator."""
-    values = {"straight_frequency": frequencies(beam.replace(axial_load=0.0), 3)}
+    values = {"straight_frequencies": frequencies(beam.replace(axial_load=0.0), 3)}
     values |= {"lower_well_frequencies": frequencies(beam), "upper_well_frequencies": frequencies(beam)}
     out = {}
     for name, freq in values.items():
@@ -66,7 +66,7 @@ def test_the_papers_numbers(tmp_path):
     assert config.model.beam is not None
     assert config.model.beam.buckling_level == pytest.approx(found.values["buckling_level"], rel=1e-12)
     assert np.all(np.asarray(config.model.damping_ratio) == 0.005) and config.model.modes == 32
-    assert "unequal wells" in path.read_text()
+    assert "unequal wells" in path.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(("kind", "value"), [("rise", 1.2e-6), ("uniform_load", 11e-3)])
@@ -83,7 +83,7 @@ def test_two_wells_and_soft_ends_go_into_the_file(tmp_path, kind, value):
         assert model.beam.boundary == beam.boundary
         assert abs(getattr(model.imperfection, kind)) == pytest.approx(value, rel=0.2)
         assert any(f"{kind} = " in text for text in found.remarks)
-        assert ("[boundary]" in path.read_text()) == (beam is not BEAM)
+        assert ("[boundary]" in path.read_text(encoding="utf-8")) == (beam is not BEAM)
     one = dataclasses.replace(PAPER, upper_well_frequencies=())
     with pytest.raises(InputError, match="needs the first frequency about both wells; the upper one's"):
         calibrate(one, modes=4, imperfection=kind)
@@ -141,13 +141,15 @@ def test_what_data_cannot_tell_apart_is_said(fit, words):
 
 def test_parameters_that_hardly_part_are_warned_of():
     """Length and thickness act alike but for the pull of b."""
-    data = Measurements(straight_frequency=[80.0], lower_well_frequencies=[81.0, 159.0], straight_freq_se=0.4)
+    data = Measurements(
+        straight_frequencies=[80.0], lower_well_frequencies=[81.0, 159.0], straight_frequencies_se=0.4
+    )
     found = calibrate(data, fit=("thickness", "length", "buckling_level"), modes=12)
     assert found.undetermined or any("hardly" in text or "known to" in text for text in found.warnings)
 
 
 def test_only_a_straight_beam_or_only_wells():
-    straight = calibrate(Measurements(straight_frequency=[80.0, 221.0]), modes=12)
+    straight = calibrate(Measurements(straight_frequencies=[80.0, 221.0]), modes=12)
     assert list(straight.values) == ["thickness"] and straight.well_frequencies is None
     wells = calibrate(Measurements(lower_well_frequencies=[81.0]), modes=12)
     assert list(wells.values) == ["buckling_level"]
@@ -185,25 +187,26 @@ def test_a_file_of_measurements(tmp_path):
     path.write_text(
         "[measured]\nstraight_freq = [80.0, 221.0]\nstraight_freq_se = 0.4\nlower_well_frequencies = [81.3]\n"
         "[beam]\nlength = 0.161\n[[measured.contact]]\nclosing_speed = 0.1\nduration = 2e-4\n"
-        "peak_force = 2.0\n"
+        "peak_force = 2.0\n",
+        encoding="utf-8",
     )
     found, others = load_measurements(path)
-    assert found.straight_frequency == (80.0, 221.0) and found.straight_freq_se == (0.4, 0.4)
+    assert found.straight_frequencies == (80.0, 221.0) and found.straight_frequencies_se == (0.4, 0.4)
     assert others == {"beam": {"length": 0.161}} and found.contact[0].peak_force == 2.0
     for text, word in (
         ("[measured]\nstraigth_freq = [80.0]\n", "straigth_freq: unknown"),
-        ("[measured]\nstraight_freq = ['80 Hz']\n", r"straight_frequency\[0\]"),
+        ("[measured]\nstraight_freq = ['80 Hz']\n", r"straight_frequencies\[0\]"),
         ("[measured]\nstraight_freq = [221.0, 80.0]\n", "must increase"),
         ("[measured]\nstraight_freq = [-80.0]\n", "greater than 0"),
         ("[measured]\nstraight_freq = [nan]\n", "finite"),
-        ("[measured]\nstraight_freq = [80.0]\nstraight_freq_se = [1.0, 2.0]\n", "straight_freq_se"),
+        ("[measured]\nstraight_freq = [80.0]\nstraight_freq_se = [1.0, 2.0]\n", "straight_frequencies_se"),
         ("[measured]\ndamping_ratio = [5.0]\n", "damping_ratio"),
         ("[measured]\ncontact = 3\n", "list of tables"),
         ("[[measured.contact]]\nclosing_speed = 0.1\nduration = 1e-4\n", "two of"),
         ("[beam]\nlength = 0.161\n", r"no section \[measured\]"),
         ("measured = [", "no TOML"),
     ):
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
         with pytest.raises(InputError, match=word) as caught:
             load_measurements(path)
         assert "m.toml" in str(caught.value)
@@ -218,10 +221,13 @@ def test_a_file_of_measurements(tmp_path):
         (lambda: calibrate(PAPER, fit=("thickness", "thickness")), "different"),
         (lambda: calibrate(PAPER, fit="thickness"), "tuple"),
         (lambda: calibrate(PAPER, BEAM.replace(axial_load=0.0)), "straight"),
-        (lambda: calibrate(Measurements(straight_frequency=[80.0]), fit=("buckling_level",)), "about a well"),
+        (
+            lambda: calibrate(Measurements(straight_frequencies=[80.0]), fit=("buckling_level",)),
+            "about a well",
+        ),
         (lambda: calibrate(Measurements(damping_ratio=[0.01]), fit=("thickness",)), "no frequency"),
         (lambda: calibrate(PAPER, modes=1), "for a model of 1 modes"),
-        (lambda: calibrate({"straight_frequency": [80.0]}), "Measurements"),
+        (lambda: calibrate({"straight_frequencies": [80.0]}), "Measurements"),
     ],
 )
 def test_refusals(make, word):

@@ -137,7 +137,9 @@ def test_two_recordings_of_one_name_are_refused(tmp_path):
 def test_a_table_says_which_files_are_which_test(tmp_path):
     touch(tmp_path, "x1.tif", "v7.csv")
     table = tmp_path / "list.csv"
-    table.write_text("test;recording;vibrometer;frequency_hz;location\nfirst;x1.tif;v7.csv;98,5;0,47\n")
+    table.write_text(
+        "test;recording;vibrometer;frequency_hz;location\nfirst;x1.tif;v7.csv;98,5;0,47\n", encoding="utf-8"
+    )
     (test,) = find_tests(tmp_path, table)
     assert (test.name, test.recording.name, test.vibrometer.name) == ("first", "x1.tif", "v7.csv")
     assert (test.frequency, test.location, test.velocity) == (98.5, 0.47, None)
@@ -157,7 +159,7 @@ def test_a_table_says_which_files_are_which_test(tmp_path):
 )
 def test_a_bad_table_is_refused(tmp_path, text, words):
     touch(tmp_path, "x1.tif")
-    (tmp_path / "list.csv").write_text(text)
+    (tmp_path / "list.csv").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=words):
         find_tests(tmp_path, tmp_path / "list.csv")
 

@@ -208,7 +208,7 @@ def test_commands_of_signals(program, tmp_path):
     told = program("vibrometer", path, "--plot", tmp_path / "v.png", "--json", tmp_path / "v.json",
                    "--drive-output", tmp_path / "drive.nc")  # fmt: skip
     assert told.exit_code == 0, told.output
-    report = json.loads((tmp_path / "v.json").read_text())
+    report = json.loads((tmp_path / "v.json").read_text(encoding="utf-8"))
     assert report["accepted"] is True and report["frequency_hz"] == pytest.approx(100.0, abs=0.01)
     assert (tmp_path / "v.png").stat().st_size > 10_000 and (tmp_path / "drive.nc").exists()
 
@@ -216,7 +216,7 @@ def test_commands_of_signals(program, tmp_path):
     path = write_signal(tmp_path / "d.uff", make_signal(decay, "m", 1e4))
     told = program("identify", path, "--method", "all", "--json", tmp_path / "d.json")
     assert told.exit_code == 0, told.output
-    report = json.loads((tmp_path / "d.json").read_text())
+    report = json.loads((tmp_path / "d.json").read_text(encoding="utf-8"))
     for method in ("fit", "hilbert", "log_decrement"):
         assert report[method]["modes"][0]["natural_frequencies"] == pytest.approx(81.0, rel=5e-4)
     assert program("identify", tmp_path / "none.csv").exit_code == 2
@@ -247,7 +247,7 @@ def test_a_drive_takes_amplitude_and_sign_from_the_camera(program, tmp_path, pol
     told = program("vibrometer", path, "--frequency", freq, "--camera", tmp_path / "tracked.nc", "--drive-output",
                    tmp_path / "drive.nc", "--amplitude-from", source, "--json", tmp_path / "v.json")  # fmt: skip
     assert told.exit_code == 0, told.output
-    report = json.loads((tmp_path / "v.json").read_text())["alignment"]
+    report = json.loads((tmp_path / "v.json").read_text(encoding="utf-8"))["alignment"]
     assert report["polarity"] == polarity
     assert abs(report["gain"] - gain) < 5.0 * report["gain_se"] < 0.02
     codes = [one["code"] for one in report["diagnostics"]]
@@ -278,7 +278,7 @@ def test_command_of_calibration(program, tmp_path):
                    "-o", tmp_path / "beam.toml", "--json", tmp_path / "c.json")  # fmt: skip
     assert told.exit_code == 0, told.output
     assert "outside the symmetric model" in told.output
-    values = json.loads((tmp_path / "c.json").read_text())["values"]
+    values = json.loads((tmp_path / "c.json").read_text(encoding="utf-8"))["values"]
     assert values["buckling_level"] == pytest.approx(0.331e-3, abs=0.0005e-3)
     assert program("calibrate").exit_code == 2
     assert program("calibrate", "--straight", "80,x").exit_code == 2
@@ -288,14 +288,15 @@ def test_command_of_comparison(program, tmp_path, synthetic_map, synthetic_run):
     synthetic_map.to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
     synthetic_run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
     (tmp_path / "t.csv").write_text(
-        "frequency_hz,velocity_m_s,location,response\n80,0.002,0.476,intrawell\n100,0.08,0.476,transient 2\n"
+        "frequency_hz,velocity_m_s,location,response\n80,0.002,0.476,intrawell\n100,0.08,0.476,transient 2\n",
+        encoding="utf-8",
     )
     told = program("compare", tmp_path / "t.csv", tmp_path / "map.nc", "--json", tmp_path / "t.json")
     assert told.exit_code == 0, told.output
-    assert json.loads((tmp_path / "t.json").read_text())["used"] == 2
+    assert json.loads((tmp_path / "t.json").read_text(encoding="utf-8"))["used"] == 2
     told = program("compare", tmp_path / "run.nc", tmp_path / "run.nc", "--json", tmp_path / "r.json")
     assert told.exit_code == 0, told.output
-    report = json.loads((tmp_path / "r.json").read_text())
+    report = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))
     assert report["rms_difference_b"] == 0.0
     for option in ("", "--overlay"):
         picture = tmp_path / f"runs{option}.png"

@@ -12,25 +12,28 @@ ENDS = ("right", "flagged", "refused")
 
 
 QUICK = (
-    "dark striker before a dark background, with a white sticker",
-    "a bright bar, such as a clamp, that crosses the picture and never moves",
-    "12 bits in a file of 16, overexposed by 1.8",
-    "each frame the mean of itself and the one before",
     "the beam moves in the first frame",
     "a pixel size twice the true one, beside a gauge",
-    "a striker 40 px off in single frames",
+    "two modes 3 Hz apart, and one asked for",
+    "nothing but hum, with --frequencies 81",
+    "ten percent more amplitude in the camera",
 )
-"""One of each group that is rendered and tracked, at some three seconds each; the group's others are slow."""
+"""Of the groups that take a second and more a case: those of the quick run; the others are slow."""
 
 
-RENDERED = ("Jumps of the striker", "Half the exposure")
-"""Groups beside those of the scenes that are rendered and tracked too."""
+DEAR = (
+    "Jumps of the striker",
+    "Half the exposure",
+    "Free decays",
+    "Vibrometer upside down against the camera",
+)
+"""Groups beside those of the rendered scenes that take as long."""
 
 
 def shown(case):
     """A case as a parameter."""
-    rendered = case.look.__module__.endswith("scenes") or case.group in RENDERED
-    marks = pytest.mark.slow if rendered and case.mistake not in QUICK else ()
+    dear = case.look.__module__.endswith("scenes") or case.group in DEAR
+    marks = pytest.mark.slow if dear and case.mistake not in QUICK else ()
     return pytest.param(case, marks=marks, id=f"{case.group}: {case.mistake}")
 
 

@@ -75,7 +75,7 @@ def test_text_tables_of_instruments(tmp_path, kind, encoding):
 @pytest.mark.parametrize("kind", VOLTS)
 def test_tables_of_oscilloscopes(tmp_path, kind):
     path = tmp_path / "scope.csv"
-    path.write_text(VOLTS[kind])
+    path.write_text(VOLTS[kind], encoding="utf-8")
     signal = read_signal(path)
     same(signal)
     assert signal.attrs["units"] == "V"
@@ -84,13 +84,13 @@ def test_tables_of_oscilloscopes(tmp_path, kind):
 
 def test_a_table_without_a_header_is_read_when_its_columns_are_named(tmp_path):
     path = tmp_path / "bare.csv"
-    path.write_text(rows("{t:.6f},{v:.9f}"))
+    path.write_text(rows("{t:.6f},{v:.9f}"), encoding="utf-8")
     with pytest.raises(InputError, match=r"--columns"):
         read_signal(path)
     same(read_signal(path, columns="time [s],velocity [m/s]"))
     with pytest.raises(InputError, match="names 3"):
         read_signal(path, columns="a,b,c")
-    path.write_text(rows("{v:.9f}", ","))
+    path.write_text(rows("{v:.9f}", ","), encoding="utf-8")
     with pytest.raises(InputError, match="commas part columns or decimals"):
         read_signal(path)
     same(read_signal(path, columns="velocity [m/s]", sampling_frequency=2000.0))
@@ -100,16 +100,20 @@ def test_thousands_are_points_only_before_a_decimal_comma(tmp_path):
     path = tmp_path / "large.csv"
     values = [1234.5 + 100.0 * i for i in range(COUNT)]
     german = [f"{v:,.2f}".replace(",", "x").replace(".", ",").replace("x", ".") for v in values]
-    path.write_text("fs = 1000 Hz\nforce [N]\n" + "\n".join(german))
+    path.write_text("fs = 1000 Hz\nforce [N]\n" + "\n".join(german), encoding="utf-8")
     np.testing.assert_allclose(read_signal(path).values, values)
 
 
 def test_a_header_that_contradicts_itself_is_refused(tmp_path):
     path = tmp_path / "twice.csv"
-    path.write_text("Sample Rate: 2000 Hz\nSample Interval: 1e-3\nvelocity [m/s]\n" + rows("{v:.9f}"))
+    path.write_text(
+        "Sample Rate: 2000 Hz\nSample Interval: 1e-3\nvelocity [m/s]\n" + rows("{v:.9f}"), encoding="utf-8"
+    )
     with pytest.raises(InputError, match="contradicts itself"):
         read_signal(path)
-    path.write_text("Sample Rate: 1000 Hz\ntime [s],velocity [m/s]\n" + rows("{t:.6f},{v:.9f}"))
+    path.write_text(
+        "Sample Rate: 1000 Hz\ntime [s],velocity [m/s]\n" + rows("{t:.6f},{v:.9f}"), encoding="utf-8"
+    )
     with pytest.raises(InputError, match="the header says 1000"):
         read_signal(path)
 
@@ -117,7 +121,7 @@ def test_a_header_that_contradicts_itself_is_refused(tmp_path):
 def test_lines_in_the_middle_are_never_dropped(tmp_path):
     path = tmp_path / "hole.csv"
     lines = TEXTS["points, semicolons"].splitlines()
-    path.write_text("\n".join([*lines[:20], "overload", *lines[20:]]))
+    path.write_text("\n".join([*lines[:20], "overload", *lines[20:]]), encoding="utf-8")
     with pytest.raises(InputError, match="line 21 has 1 value"):
         read_signal(path)
 
@@ -135,11 +139,11 @@ def lvm(decimal="."):
 @pytest.mark.parametrize("decimal", [".", ","])
 def test_labview_text(tmp_path, decimal):
     path = tmp_path / "daq.lvm"
-    path.write_text(lvm(decimal))
+    path.write_text(lvm(decimal), encoding="utf-8")
     assert [entry["name"] for entry in read_channels(path)] == ["Velocity", "Drive"]
     same(read_signal(path, "Velocity"))
     assert read_signal(path, "Drive").attrs["units"] == "V"
-    path.write_text("\n".join(lvm(decimal).splitlines()[:-3]))
+    path.write_text("\n".join(lvm(decimal).splitlines()[:-3]), encoding="utf-8")
     with pytest.raises(InputError, match="promises 40 samples"):
         read_signal(path, "Velocity")
 
@@ -205,7 +209,7 @@ def test_more_units_and_sensitivities_the_other_way_round():
 def test_a_table_that_was_cut_in_its_last_number_says_so(tmp_path, end, cut):
     rows = "".join(f"{i * 1e-4:.6f},{math.sin(0.3 * i):.6f}\n" for i in range(400))
     file = tmp_path / "cut.csv"
-    file.write_text(f"time [s],velocity [mm/s]\n{rows}0.040000,{end}")
+    file.write_text(f"time [s],velocity [mm/s]\n{rows}0.040000,{end}", encoding="utf-8")
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         read_signal(file)

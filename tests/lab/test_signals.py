@@ -71,7 +71,7 @@ TABLES = {
 @pytest.mark.parametrize("text", TABLES)
 def test_dialects_of_csv(tmp_path, text):
     path = tmp_path / "t.csv"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     rate, scale = TABLES[text]
     signal = read_signal(path)
     np.testing.assert_allclose(signal.values, scale * (np.arange(30) % 7 + 0.5), rtol=1e-12)
@@ -104,7 +104,7 @@ BROKEN = {
 def test_broken_tables_name_the_file_and_the_place(tmp_path, case):
     lines, word = BROKEN[case]
     path = tmp_path / "broken.csv"
-    path.write_text("\n".join(lines) + "\n")
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     with pytest.raises(InputError, match=word) as caught:
         read_signal(path, sensitivity="1 m/s/FS" if case == "volts unread" else None)
     assert "broken.csv" in str(caught.value)
@@ -112,7 +112,9 @@ def test_broken_tables_name_the_file_and_the_place(tmp_path, case):
 
 def test_channels_and_contradictions(tmp_path):
     path = tmp_path / "two.csv"
-    path.write_text("time [s],v [V],x [mm]\n" + "".join(f"{i / 1e3},{i % 3},{i}\n" for i in range(40)))
+    path.write_text(
+        "time [s],v [V],x [mm]\n" + "".join(f"{i / 1e3},{i % 3},{i}\n" for i in range(40)), encoding="utf-8"
+    )
     assert [c["name"] for c in read_channels(path)] == ["v", "x"]
     assert read_signal(path, "v", sensitivity="125 mm/s/V").values[1] == pytest.approx(0.125)
     assert read_signal(path, 1).attrs["units"] == "m"

@@ -154,7 +154,11 @@ def test_integration_does_not_drift(snr, share):
 
 @pytest.mark.parametrize(
     ("freq", "over", "polarity", "delay"),
-    [(100.0, 0.3, 1, 0.01234), (300.0, 0.0, -1, -0.0301234), (60.0, 0.3, 1, 0.1)],
+    [
+        pytest.param(100.0, 0.3, 1, 0.01234, marks=pytest.mark.slow),
+        (300.0, 0.0, -1, -0.0301234),
+        pytest.param(60.0, 0.3, 1, 0.1, marks=pytest.mark.slow),
+    ],
 )
 def test_alignment_with_a_camera(freq, over, polarity, delay):
     signal, _ = record(freq=freq, over=over, cycles=60)

@@ -109,7 +109,7 @@ def test_what_is_read_back_runs_alike(tmp_path) -> None:
 )
 def test_files_that_are_no_system(tmp_path, text: str, message: str) -> None:
     path = tmp_path / "system.toml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=message):
         sb.System.load(path)
 

@@ -84,7 +84,7 @@ def test_numbers_of_the_paper():
 def test_written_as_three_files(tmp_path):
     written, files = write_claims(tmp_path, paper.shared_results(), paper.Results())
     assert sorted(file.name for file in files) == ["claims.csv", "claims.json", "claims.md"]
-    record = json.loads((tmp_path / "claims.json").read_text())
+    record = json.loads((tmp_path / "claims.json").read_text(encoding="utf-8"))
     assert record["snapbeam_version"] and record["summary"] == summary(written)
     for entry, row in zip(record["claims"], written, strict=True):
         assert entry["number"] == row.number and entry["verdict"] == row.verdict
@@ -100,7 +100,7 @@ def test_written_as_three_files(tmp_path):
 def test_markdown(tmp_path):
     """Questions apart, cells that are whole, links that lead somewhere, no column that is the same throughout."""
     write_claims(tmp_path, paper.shared_results(), paper.Results())
-    text = (tmp_path / "claims.md").read_text()
+    text = (tmp_path / "claims.md").read_text(encoding="utf-8")
     assert text.startswith(f"**{summary(rows())}**")
     tables = re.split(r"^### ", text, flags=re.MULTILINE)[1:]
     assert [table.splitlines()[0] for table in tables] == [read_topic(topic).title for topic in TOPICS]
@@ -108,7 +108,7 @@ def test_markdown(tmp_path):
     for table in tables:
         lines = [line for line in table.splitlines() if line.startswith("|")]
         assert {line.replace("\\|", "").count("|") for line in lines} == {lines[0].count("|")}
-    page = REPRODUCTION.read_text()
+    page = REPRODUCTION.read_text(encoding="utf-8")
     headings = {
         line.lstrip("# ").lower().replace(" ", "-").replace(".", "")
         for line in page.splitlines()

@@ -71,7 +71,9 @@ def test_recipes_of_one_size_share_a_grid(results):
 
 def test_dots_lie_where_they_were_measured(tmp_path, results):
     table = tmp_path / "dots.csv"
-    table.write_text("frequency_ratio,velocity_amplitude,location,response\n1.625,0.3,0.3,intrawell\n")
+    table.write_text(
+        "frequency_ratio,velocity_amplitude,location,response\n1.625,0.3,0.3,intrawell\n", encoding="utf-8"
+    )
     figure = paper.fig8(results=results, dots=table)
     found = [c for ax in figure.axes for c in ax.collections if isinstance(c, PathCollection)]
     assert len(found) == 2  # both panels at that frequency

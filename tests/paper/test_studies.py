@@ -37,7 +37,7 @@ STUDIES = (
     "disturbances",
     "sensitivity",
     "lifetimes",
-    "two_tips",
+    pytest.param("two_tips", marks=pytest.mark.slow),
     pytest.param("notch", marks=pytest.mark.slow),
     pytest.param("switch", marks=pytest.mark.slow),
     pytest.param("harvesting", marks=pytest.mark.slow),

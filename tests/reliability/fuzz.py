@@ -343,7 +343,7 @@ def main(calls: int, seed: int, report: Path, seconds: float = math.inf) -> None
     lines = [json.dumps(seen | {"seconds": round(time.monotonic() - start)})]
     for name, examples in sorted(wrong.items(), key=lambda item: -len(item[1])):
         lines.append(f"{len(examples):5d}  {name}\n       {examples[0][:200]}")
-    report.write_text("\n".join(lines) + "\n")
+    report.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

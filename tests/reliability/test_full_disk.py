@@ -70,12 +70,12 @@ def test_no_room_anywhere(mounted, monkeypatch):
     disk = mounted("disk", "size=8k")
     monkeypatch.setattr("tempfile.tempdir", str(disk))
     before = disk / "a.nc"
-    before.write_text("a file of before")
+    before.write_text("a file of before", encoding="utf-8")
     with pytest.raises(
         NoRoomError, match=r"needs 0\.8\d+ MB, 0\.00\d+ MB are free: make room and give the same"
     ):
         write_netcdf(random_set(100_000), before)
-    assert os.listdir(disk) == ["a.nc"] and before.read_text() == "a file of before"
+    assert os.listdir(disk) == ["a.nc"] and before.read_text(encoding="utf-8") == "a file of before"
 
 
 def test_blocks_that_do_not_fit(mounted, tmp_path, monkeypatch, tried):
@@ -160,10 +160,10 @@ def test_orphans_of_killed_writers_are_swept(tmp_path, tried):
     with atomic_path(tmp_path / "map.nc") as mine:
         assert os.listdir(tmp_path) == [mine.name]
         with atomic_path(tmp_path / "map.nc") as other:
-            other.write_text("other")
+            other.write_text("other", encoding="utf-8")
         assert mine.exists()
-        mine.write_text("whole")
-    assert os.listdir(tmp_path) == ["map.nc"] and (tmp_path / "map.nc").read_text() == "whole"
+        mine.write_text("whole", encoding="utf-8")
+    assert os.listdir(tmp_path) == ["map.nc"] and (tmp_path / "map.nc").read_text(encoding="utf-8") == "whole"
     tried("writers killed in the middle of a file")
 
 
@@ -171,7 +171,7 @@ def test_every_netcdf_file_is_written_that_way():
     """Nothing in the package hands a path on a disk to the HDF5 library to write to."""
     package = Path(sb.__file__).parent
     for file in package.rglob("*.py"):
-        text = file.read_text()
+        text = file.read_text(encoding="utf-8")
         assert not re.search(
             r"\.to_netcdf\(|h5netcdf\.File\((?!stream)|h5py\.File\((?!stream).*[\"'](w|a)", text
         ), file

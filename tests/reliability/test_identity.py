@@ -109,7 +109,7 @@ def test_parts_that_something_else_computed_are_told(tmp_path, name, value, word
     ledger = store / "ledger.jsonl"
     records = list(Ledger(ledger).records.values())
     changed = Record(**vars(records[0]) | {name: value})
-    ledger.write_text("".join(f"{record.line()}\n" for record in (changed, records[1])))
+    ledger.write_text("".join(f"{record.line()}\n" for record in (changed, records[1])), encoding="utf-8")
     with pytest.warns(UserWarning, match=words):
         found = sb.sweep(system(), axes, how, checkpoint=sb.CheckpointOptions(store))
     assert not found.attrs["reproducible"].startswith("bit for bit")

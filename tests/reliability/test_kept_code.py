@@ -41,7 +41,7 @@ def small(python):
     def run(folder, **environment):
         file = folder / "small.py"
         if not file.exists():
-            file.write_text(SMALL)
+            file.write_text(SMALL, encoding="utf-8")
         path = f"{folder}{os.pathsep}{python.package}"
         done = python("import small", path, timeout=60, **environment)
         assert done.returncode == 0, done.stderr
@@ -55,7 +55,7 @@ def started(folder):
     """The same in this process, in a module made anew."""
     file = folder / "small.py"
     if not file.exists():
-        file.write_text(SMALL.replace("print", "answer = "))
+        file.write_text(SMALL.replace("print", "answer = "), encoding="utf-8")
     spec = importlib.util.spec_from_file_location("small", file)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -100,7 +100,7 @@ def test_damaged_code_is_compiled_again(tmp_path, tried, harm):
 def test_a_full_disk_keeps_no_code(small, mounted, tried):
     """Said once; the answer is the same."""
     disk = mounted("disk", "size=16k")
-    (disk / "small.py").write_text(SMALL)
+    (disk / "small.py").write_text(SMALL, encoding="utf-8")
     (disk / "filler").write_bytes(b"0" * 4096)
     answer, said = small(disk, TMPDIR=str(disk), HOME=str(disk))
     assert answer == "42.0 compiled"
@@ -112,7 +112,7 @@ def test_read_only_package_and_home(small, mounted, read_only, tmp_path, tried):
     """Kept in a private folder of the temporary ones; with none to write to, not at all."""
     disk, other = mounted("disk", "size=64k"), tmp_path / "temporary"
     other.mkdir()
-    (disk / "small.py").write_text(SMALL)
+    (disk / "small.py").write_text(SMALL, encoding="utf-8")
     read_only(disk)
     places = {"HOME": str(disk), "XDG_CACHE_HOME": str(disk)}
     answer, said = small(disk, TMPDIR=str(other), **places)
@@ -172,7 +172,7 @@ print(total(np.arange(4.0)), "loaded" if total.stats.cache_hits else "compiled")
 
 
 def test_code_that_needs_numbas_runtime_is_loaded_in_a_fresh_process(python, tmp_path):
-    (tmp_path / "arrays.py").write_text(ARRAYS)
+    (tmp_path / "arrays.py").write_text(ARRAYS, encoding="utf-8")
     for how in ("compiled", "loaded"):
         done = python("import arrays", f"{tmp_path}{os.pathsep}{python.package}", timeout=120)
         assert done.returncode == 0, done.stderr

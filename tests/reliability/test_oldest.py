@@ -11,7 +11,7 @@ EXTRAS = ["lab", "cluster", "video", "dev"]
 
 
 def test_every_dependency_has_a_lower_bound_that_can_be_installed():
-    project = tomllib.loads(PYPROJECT.read_text())["project"]
+    project = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))["project"]
     count = len(project["dependencies"]) + sum(len(project["optional-dependencies"][each]) for each in EXTRAS)
     assert len(oldest(EXTRAS)) == count
     assert "typer==0.17.5" in oldest([])
@@ -22,11 +22,13 @@ def test_every_dependency_has_a_lower_bound_that_can_be_installed():
 )
 def test_other_bounds_are_refused(tmp_path, text):
     file = tmp_path / "pyproject.toml"
-    file.write_text(f'[project]\ndependencies = ["{text}"]\n')
+    file.write_text(f'[project]\ndependencies = ["{text}"]\n', encoding="utf-8")
     with pytest.raises(ValueError, match="must be name>=version"):
         oldest([], file)
 
 
 def test_the_source_distribution_holds_what_builds_and_tests_it():
-    held = tomllib.loads(PYPROJECT.read_text())["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
+    held = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))["tool"]["hatch"]["build"]["targets"]["sdist"][
+        "include"
+    ]
     assert {"/Makefile", "/src", "/tests", "/constraints.txt"} <= set(held)

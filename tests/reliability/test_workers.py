@@ -168,7 +168,7 @@ def test_a_scheduler_that_is_killed(tmp_path, work, monkeypatch, tried):
         "    print(c.scheduler_address, flush=True)\n    time.sleep(600)\n"
     )
     file = tmp_path / "scheduler.py"
-    file.write_text(script)
+    file.write_text(script, encoding="utf-8")
     process = subprocess.Popen([sys.executable, str(file)], stdout=subprocess.PIPE, text=True)
     try:
         address = process.stdout.readline().strip()

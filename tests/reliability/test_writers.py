@@ -71,7 +71,7 @@ def test_a_refused_writer_touches_nothing(stored, work):
 
 
 def test_a_foreign_folder_is_left_as_it_is(tmp_path, work):
-    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(InputError, match="is not empty and holds no map"):
         MapStore(tmp_path, work)
     assert [file.name for file in tmp_path.iterdir()] == ["notes.txt"]
@@ -95,11 +95,11 @@ def test_hard_links_lead_nowhere(stored, work, tmp_path, tried, name):
 def test_a_name_of_a_holder_that_is_gone_is_not_told(stored, work):
     """After a kill the old name stands in the lock; the next writer's is told as soon as it is there."""
     path, _ = stored
-    (path / "lock").write_text("process 4194304000\n")
+    (path / "lock").write_text("process 4194304000\n", encoding="utf-8")
     with MapStore(path, work):
         with pytest.raises(CheckpointError, match=rf"process {os.getpid()}"):
             MapStore(path, work)
-    assert (path / "lock").read_text() == ""
+    assert (path / "lock").read_text(encoding="utf-8") == ""
 
 
 def test_a_whole_store_is_read_where_nothing_can_be_written(

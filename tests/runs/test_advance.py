@@ -294,6 +294,7 @@ def record(model: sb.ReducedModel) -> sb.Striker:
     )
 
 
+@pytest.mark.slow
 def test_a_record_goes_on_where_it_was_and_ends() -> None:
     model = sb.ReducedModel.from_beam(paper.BEAM, 4)
     system = sb.System(model, paper.CONTACT, record(model))

@@ -100,5 +100,5 @@ def test_an_interrupt_is_heard_within_a_second(name: str) -> None:
         process.kill()
         process.wait()
     assert process.returncode != 0 and "KeyboardInterrupt" in messages
-    # a second to hear it, and what a busy machine takes to end a process
-    assert heard < 3.0
+    # a second to hear it, and the time that a busy machine takes to end a process; each run would take minutes
+    assert heard < 10.0

@@ -115,7 +115,7 @@ def test_refusals(tmp_path) -> None:
         run.save(tmp_path / "none" / "run.nc")
     with pytest.raises(InputError, match=r"none\.nc.*no such file"):
         sb.load(tmp_path / "none.nc")
-    (tmp_path / "text.nc").write_text("no netcdf")
+    (tmp_path / "text.nc").write_text("no netcdf", encoding="utf-8")
     with pytest.raises(InputError, match="is no NetCDF file of results"):
         sb.load(tmp_path / "text.nc")
     run.dataset.to_netcdf(tmp_path / "dataset.nc", engine="h5netcdf")

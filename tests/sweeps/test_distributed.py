@@ -101,7 +101,15 @@ def test_workers_that_are_killed_in_mid_task(tmp_path, small, whole, client):
     columns, tally, _, made = computed(tmp_path / "store", work, stage, client)
     assert columns.content_hash() == whole.content_hash()
     assert tally.computed == 7 and not tally.failed and "failed_tasks" not in made
-    assert sorted(len(file.read_text()) for file in tmp_path.glob("*-*")) == [1, 1, 1, 1, 1, 2, 2]
+    assert sorted(len(file.read_text(encoding="utf-8")) for file in tmp_path.glob("*-*")) == [
+        1,
+        1,
+        1,
+        1,
+        1,
+        2,
+        2,
+    ]
 
 
 def test_a_poisonous_task_is_set_apart(tmp_path, small, whole, client):
@@ -116,7 +124,15 @@ def test_a_poisonous_task_is_set_apart(tmp_path, small, whole, client):
         np.delete(status, np.r_[poisoned]) == RunStatus.OK
     ).all()
     assert (work.values("response_class", columns)[poisoned] == ResponseClass.UNKNOWN).all()
-    assert sorted(len(file.read_text()) for file in tmp_path.glob("*-*")) == [1, 1, 1, 1, 1, 2, 3]
+    assert sorted(len(file.read_text(encoding="utf-8")) for file in tmp_path.glob("*-*")) == [
+        1,
+        1,
+        1,
+        1,
+        1,
+        2,
+        3,
+    ]
     tally = SweepReport()
     result = long_map(**small, store=tmp_path / "store", tally=tally)  # here, and without the poison
     assert tally.resumed == 6 and tally.computed == 1
@@ -170,7 +186,7 @@ prologue = ["module load python"]
 
 def test_slurm(tmp_path):
     file = tmp_path / "slurm.toml"
-    file.write_text(SLURM)
+    file.write_text(SLURM, encoding="utf-8")
     cluster = parse_cluster(str(file))
     assert cluster.kind == "slurm" and cluster.slurm["jobs"] == 4
     jobqueue = pytest.importorskip("dask_jobqueue")
@@ -200,7 +216,7 @@ def test_slurm(tmp_path):
 )
 def test_slurm_files_that_are_wrong(tmp_path, text, message):
     file = tmp_path / "slurm.toml"
-    file.write_text(text)
+    file.write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=message):
         parse_cluster(str(file))
 

@@ -76,17 +76,17 @@ def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     ledger = tmp_path / "store" / "ledger.jsonl"
     deadline = time.monotonic() + 300.0
-    while not ledger.exists() or ledger.read_text().count("\n") < 2:
+    while not ledger.exists() or ledger.read_text(encoding="utf-8").count("\n") < 2:
         assert process.poll() is None and time.monotonic() < deadline, process.stderr.read()
         time.sleep(0.01)
     process.send_signal(signal.SIGKILL)
     process.communicate()
-    done = ledger.read_text().count("\n")
+    done = ledger.read_text(encoding="utf-8").count("\n")
     assert done < 16 and not (tmp_path / "map.nc").exists()
     again = CliRunner().invoke(app, ["map", "--checkpoint", "store", "-o", "map.nc", "--log", "map.log"])
     assert again.exit_code == 0, again.output
     assert f"16 tasks, {done} done before, {16 - done} computed now, 0 damaged, 0 given up" in again.stdout
-    log = (tmp_path / "map.log").read_text().splitlines()
+    log = (tmp_path / "map.log").read_text(encoding="utf-8").splitlines()
     assert log[0].endswith("map of 64 points") and "T" in log[0].split()[0]
     assert any(f"{4 * done} of 64 points are done" in line for line in log)
     assert any("(100.0 %)" in line and "points/s" in line for line in log)

@@ -123,7 +123,7 @@ def test_damage_after_the_check_is_not_read(stored, work):
 def test_descriptions_of_arrays_are_written_again(stored, work, whole):
     path, stage = stored
     for file in sorted(path.glob("runs.zarr/**/zarr.json")):
-        file.write_text("{}")
+        file.write_text("{}", encoding="utf-8")
     with MapStore(path, work) as store:
         assert fill(store, stage) == []
         assert store.reader(stage).read(0, 20).content_hash() == whole.content_hash()
@@ -131,7 +131,7 @@ def test_descriptions_of_arrays_are_written_again(stored, work, whole):
 
 def test_done_is_what_the_ledger_says(stored, work, tmp_path):
     path, stage = stored
-    lines = (path / "ledger.jsonl").read_text().splitlines(keepends=True)
+    lines = (path / "ledger.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)
     assert len(lines) == 4
     altered = lines[1].replace('"task":1', '"task":0', 1)
     for content, pending in (
@@ -141,11 +141,11 @@ def test_done_is_what_the_ledger_says(stored, work, tmp_path):
         ("", [0, 1, 2, 3]),
         ("\x00\xff not a record\n" + "".join(lines), []),
     ):
-        (path / "ledger.jsonl").write_text(content)
+        (path / "ledger.jsonl").write_text(content, encoding="utf-8")
         with MapStore(path, work) as store:
             store.open_stage(stage)
             assert store.pending(stage) == pending and store.damaged == []
-    (path / "ledger.jsonl").write_text("".join(lines[:3]) + lines[3][:40])
+    (path / "ledger.jsonl").write_text("".join(lines[:3]) + lines[3][:40], encoding="utf-8")
     with MapStore(path, work) as store:
         assert store.ledger.torn == 1
         assert fill(store, stage) == [3]
@@ -171,7 +171,7 @@ def test_other_parameters_are_refused_with_the_differences(stored, small):
 
 
 def test_a_folder_that_is_no_store(tmp_path, work):
-    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(InputError, match="is not empty and holds no map"):
         MapStore(tmp_path, work)
     with pytest.raises(InputError, match="must be a folder, not a file"):
@@ -182,12 +182,12 @@ def test_a_folder_that_is_no_store(tmp_path, work):
 
 def test_a_damaged_description_is_told(stored, work):
     path, _ = stored
-    held = json.loads((path / "map.json").read_text())
+    held = json.loads((path / "map.json").read_text(encoding="utf-8"))
     for text in ("", "{", json.dumps(held | {"parameters": held["parameters"] | {"cycles": 4}})):
-        (path / "map.json").write_text(text)
+        (path / "map.json").write_text(text, encoding="utf-8")
         with pytest.raises(CheckpointError, match=r"map\.json is damaged"):
             MapStore(path, work)
-    (path / "map.json").write_text(json.dumps(held | {"format_version": 99}))
+    (path / "map.json").write_text(json.dumps(held | {"format_version": 99}), encoding="utf-8")
     with pytest.raises(InputError, match=r"another format \(99\)"):
         MapStore(path, work)
 
@@ -284,7 +284,7 @@ def test_a_torn_line_of_the_ledger_stays_apart(tmp_path):
     with file.open("ab") as stream:
         stream.write(b"tw")
     append_line(file, "three")
-    assert file.read_text() == "one\ntw\nthree\n"
+    assert file.read_text(encoding="utf-8") == "one\ntw\nthree\n"
 
 
 @pytest.fixture
@@ -347,7 +347,7 @@ def test_another_version_is_told(stored, work, small):
     lines = []
     for record in Ledger(path / "ledger.jsonl").records.values():
         lines.append(Record(**(vars(record) | {"version": "0.0.1", "processor": "i386"})).line())
-    (path / "ledger.jsonl").write_text("\n".join(lines) + "\n")
+    (path / "ledger.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
     with pytest.warns(UserWarning, match=r"begun with snapbeam 0\.0\.1 on a i386 processor"):
         result = long_map(**small, store=path)
     assert "snapbeam 0.0.1, processor i386" in result.attrs["computed_by"]
@@ -370,5 +370,5 @@ def test_nothing_on_the_way_to_a_number_runs_code_of_a_file():
         package / "engines" / "scalar" / "joined.py",
         package / "engines" / "scalar" / "several.py",
     }:
-        hits = [line for line in file.read_text().splitlines() if forbidden.search(line)]
+        hits = [line for line in file.read_text(encoding="utf-8").splitlines() if forbidden.search(line)]
         assert hits == [], file

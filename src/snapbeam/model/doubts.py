@@ -99,7 +99,7 @@ def _of_modes(model: ReducedModel, beam: Beam) -> list[Diagnostic]:
             "omega_1, by which Omega and V are normalised, is its frequency "
             f"({model.natural_frequencies[0]:.5g} Hz), although a striker at the centre cannot excite it; set "
             f"model.reference_frequency = {symmetric:.5g} Hz to normalise by the first symmetric mode",
-            {"buckling_level_over_radius": level, "symmetric_frequency": symmetric},
+            {"buckling_level_over_radius": level, "symmetric_frequencies": symmetric},
         )
     ]
 

@@ -70,7 +70,7 @@ def test_every_file_of_the_engines_and_the_codes_is_in_it(copy) -> None:
 
 def test_a_file_more_is_another_fingerprint(copy) -> None:
     first = mark()
-    (copy / "engines" / "cpu" / "more.py").write_text("")
+    (copy / "engines" / "cpu" / "more.py").write_text("", encoding="utf-8")
     assert mark() != first
 
 
@@ -119,7 +119,7 @@ class Spring(ContactLaw):
 
 def law_of(folder: Path, text: str) -> type:
     """The law in a file of somebody's, read anew."""
-    (folder / "somebodys_law.py").write_text(text)
+    (folder / "somebodys_law.py").write_text(text, encoding="utf-8")
     sys.modules.pop("somebodys_law", None)
     importlib.invalidate_caches()
     shutil.rmtree(folder / "__pycache__", ignore_errors=True)

@@ -47,7 +47,7 @@ def high_arch(**shapes):
         well = ReducedModel.from_beam(beam, 12).natural_frequencies[:2]
         straight = ReducedModel.from_beam(beam.replace(axial_load=0.0), 12).natural_frequencies[:2]
         measured = lab.Measurements(
-            straight_frequency=straight, straight_freq_se=1e-3 * straight, lower_well_frequencies=well[: shapes.pop("count", 2)],
+            straight_frequencies=straight, straight_frequencies_se=1e-3 * straight, lower_well_frequencies=well[: shapes.pop("count", 2)],
             **shapes,
         )  # fmt: skip
         found = lab.calibrate(measured)

@@ -73,7 +73,7 @@ def calibrate(
         config_from_mapping(sections, str(measurements))
         settings = override(settings, sections)
     for name, text in (
-        ("straight_frequency", straight), ("lower_well_frequencies", lower_well), ("upper_well_frequencies", upper_well),
+        ("straight_frequencies", straight), ("lower_well_frequencies", lower_well), ("upper_well_frequencies", upper_well),
         ("damping_ratio", damping),
     ):  # fmt: skip
         if text is not None:

@@ -75,7 +75,7 @@ def identify(
             table.add_row(
                 name if i == 0 else "",
                 str(i + 1),
-                f"{mode.natural_frequencies:.4f} +- {mode.natural_freq_se:.4f}",
+                f"{mode.natural_frequencies:.4f} +- {mode.natural_frequencies_se:.4f}",
                 f"{100 * mode.damping_ratio:.4f} +- {100 * mode.damping_ratio_se:.4f}",
                 f"{mode.amplitude:.4g} {fit.units}",
                 f"{mode.softening * mode.amplitude**2:.4f}" if i == 0 else "",

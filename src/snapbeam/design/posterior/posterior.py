@@ -238,7 +238,7 @@ def _known_by_themselves(measured: Measurements) -> list[tuple[str, Any, Any]]:
 
 def _has_frequencies(measured: Measurements) -> bool:
     return bool(
-        measured.straight_frequency or measured.lower_well_frequencies or measured.upper_well_frequencies
+        measured.straight_frequencies or measured.lower_well_frequencies or measured.upper_well_frequencies
     )
 
 

@@ -72,20 +72,20 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
 
         right = figure.add_subplot(grid[1, 1])
         right.errorbar(
-            scale * fit.backbone_amplitude, fit.backbone_frequency, 2.0 * fit.backbone_freq_se,
+            scale * fit.backbone_amplitude, fit.backbone_frequency, 2.0 * fit.backbone_frequencies_se,
             fmt="o", color=BEAM_COLOR, markersize=3, linewidth=0.7, capsize=1.5, label="parts of the decay",
         )  # fmt: skip
         a = np.linspace(0.0, 1.05 * float(fit.backbone_amplitude.max()), 200)
         law = mode.natural_frequencies * (1.0 - mode.softening * a**2)
         right.plot(scale * a, law, color=SHAKER_COLOR, label=r"$f_0\,(1 - \kappa a^2)$")
         right.errorbar(
-            [0.0], [mode.natural_frequencies], [2.0 * mode.natural_freq_se], fmt="s", color=CENTER_COLOR,
+            [0.0], [mode.natural_frequencies], [2.0 * mode.natural_frequencies_se], fmt="s", color=CENTER_COLOR,
             markeredgecolor=BEAM_COLOR, markersize=4, linewidth=0.9, capsize=2.0, label="zero amplitude",
         )  # fmt: skip
         right.set(xlabel=f"Amplitude ({unit})", ylabel="Frequency (Hz)")
         right.margins(x=0.03)
         right.set_title(
-            f"$f_0$ = {mode.natural_frequencies:.3f} $\\pm$ {mode.natural_freq_se:.3f} Hz", loc="left"
+            f"$f_0$ = {mode.natural_frequencies:.3f} $\\pm$ {mode.natural_frequencies_se:.3f} Hz", loc="left"
         )
         right.legend(loc="best")
         fix_ticks(top, left, right)

@@ -353,7 +353,7 @@ def _data(measured: Measurements, modes: int) -> list[_Datum]:
 def _fitted(measured: Measurements, fit: tuple[str, ...] | None) -> list[str]:
     wells = bool(measured.lower_well_frequencies or measured.upper_well_frequencies)
     if fit is None:
-        return ["thickness"] * bool(measured.straight_frequency) + ["buckling_level"] * wells
+        return ["thickness"] * bool(measured.straight_frequencies) + ["buckling_level"] * wells
     if isinstance(fit, str) or len(set(fit)) < len(fit):
         raise InputError(f"fit = {shown(fit)}: must be a tuple of different names among {', '.join(FITTED)}")
     for name in fit:

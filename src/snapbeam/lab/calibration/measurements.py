@@ -83,11 +83,11 @@ class Measurements:
 
     Parameters
     ----------
-    straight_frequency : sequence of float
+    straight_frequencies : sequence of float
         Natural frequencies without axial load, Hz.
     lower_well_frequencies, upper_well_frequencies : sequence of float
         Natural frequencies about either well, Hz.
-    straight_freq_se, lower_well_freq_se, upper_well_freq_se : float or sequence of float, optional
+    straight_frequencies_se, lower_well_frequencies_se, upper_well_frequencies_se : float or sequence of float, optional
         Their standard errors, Hz.
     lower_well_shape, upper_well_shape : sequence of str, optional
         "symmetric" or "antisymmetric" for each frequency about a well.  Where given, frequencies are matched
@@ -101,12 +101,12 @@ class Measurements:
     contact : sequence of ContactTest
     """
 
-    straight_frequency: Sequence[float] = ()
-    straight_freq_se: float | Sequence[float] | None = None
+    straight_frequencies: Sequence[float] = ()
+    straight_frequencies_se: float | Sequence[float] | None = None
     lower_well_frequencies: Sequence[float] = ()
-    lower_well_freq_se: float | Sequence[float] | None = None
+    lower_well_frequencies_se: float | Sequence[float] | None = None
     upper_well_frequencies: Sequence[float] = ()
-    upper_well_freq_se: float | Sequence[float] | None = None
+    upper_well_frequencies_se: float | Sequence[float] | None = None
     lower_well_shape: Sequence[str] = ()
     upper_well_shape: Sequence[str] = ()
     damping_ratio: Sequence[float] = ()
@@ -117,7 +117,7 @@ class Measurements:
 
     def __post_init__(self) -> None:
         for name in (
-            "straight_frequency",
+            "straight_frequencies",
             "lower_well_frequencies",
             "upper_well_frequencies",
             "damping_ratio",

@@ -136,7 +136,7 @@ def doubts(result: Calibration, measured: Measurements) -> list[Diagnostic]:
             told.append(KINDS["unequal_wells"].found(told=text, first=one, second=two))
     assumed = [
         state
-        for state in ("straight_frequency", "lower_well_frequencies", "upper_well_frequencies")
+        for state in ("straight_frequencies", "lower_well_frequencies", "upper_well_frequencies")
         if getattr(measured, state) and getattr(measured, f"{state}_se") is None
     ]
     if assumed:

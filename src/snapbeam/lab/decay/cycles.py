@@ -122,7 +122,7 @@ def regress(cycles: Cycles, start: float, units: str, method: str, soften: bool 
         raise InputError("signal: the cycles follow no decaying oscillation")
     return ModeEstimate(
         natural_frequencies=natural / (2.0 * math.pi),
-        natural_freq_se=math.sqrt(freq_var) / (2.0 * math.pi),
+        natural_frequencies_se=math.sqrt(freq_var) / (2.0 * math.pi),
         damping_ratio=delta / natural,
         damping_ratio_se=math.sqrt(delta_var) / natural,
         amplitude=amplitude,

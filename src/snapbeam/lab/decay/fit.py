@@ -137,7 +137,7 @@ def fit_decay(
         modes.append(
             ModeEstimate(
                 natural_frequencies=value[f"f{i}"],
-                natural_freq_se=error[f"f{i}"] * stretch,
+                natural_frequencies_se=error[f"f{i}"] * stretch,
                 damping_ratio=value[f"z{i}"],
                 damping_ratio_se=error[f"z{i}"] * stretch,
                 amplitude=amplitude,

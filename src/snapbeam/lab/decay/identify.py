@@ -152,7 +152,7 @@ def identify_decay(
         diagnostics=(*decay.diagnostics, *told, *doubts),
         backbone_amplitude=amplitude,
         backbone_frequency=freq,
-        backbone_freq_se=freq_se,
+        backbone_frequencies_se=freq_se,
         envelope_time=cycles.time,
         envelope=cycles.amplitude,
     )

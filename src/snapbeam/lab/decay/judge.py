@@ -101,13 +101,13 @@ def judged(
     missed = misfit.share * first.damping_ratio
     raised = dataclasses.replace(
         first,
-        natural_freq_se=max(first.natural_freq_se * grown, freq_apart, missed * first.natural_frequencies),
+        natural_frequencies_se=max(first.natural_frequencies_se * grown, freq_apart, missed * first.natural_frequencies),
         damping_ratio_se=max(first.damping_ratio_se * grown, damping_apart, missed),
     )
     others = [
         dataclasses.replace(
             mode,
-            natural_freq_se=mode.natural_freq_se * grown,
+            natural_frequencies_se=mode.natural_frequencies_se * grown,
             damping_ratio_se=mode.damping_ratio_se * grown,
         )
         for mode in result.modes[1:]
@@ -171,7 +171,7 @@ def widened(modes: tuple[ModeEstimate, ...], drift: float, added: float) -> tupl
     return tuple(
         dataclasses.replace(
             mode,
-            natural_freq_se=math.hypot(mode.natural_freq_se, drift * mode.natural_frequencies),
+            natural_frequencies_se=math.hypot(mode.natural_frequencies_se, drift * mode.natural_frequencies),
             damping_ratio_se=math.hypot(
                 mode.damping_ratio_se,
                 added / (2.0 * math.pi * mode.natural_frequencies),

@@ -41,7 +41,7 @@ class ModeEstimate:
     """
 
     natural_frequencies: float
-    natural_freq_se: float
+    natural_frequencies_se: float
     damping_ratio: float
     damping_ratio_se: float
     amplitude: float
@@ -60,7 +60,7 @@ class DecayFit:
     """The modes of a free decay, strongest first, with what is needed to judge and to draw the result.
 
     ``snr`` [dB] is that of the first mode at the start; ``backbone_amplitude`` and ``backbone_frequency`` [Hz],
-    with ``backbone_freq_se``, are the amplitude and frequency of the first mode over successive parts of
+    with ``backbone_frequencies_se``, are the amplitude and frequency of the first mode over successive parts of
     the decay; ``envelope_time``, ``envelope`` its amplitude cycle by cycle; ``residual_whiteness`` the
     noise near the first mode over the noise elsewhere; ``misfit`` what the fit leaves at the first mode over
     what the noise about it explains, 1 if the model says it all.  ``lines`` are sines that do not decay, taken
@@ -80,7 +80,7 @@ class DecayFit:
     diagnostics: tuple[Diagnostic, ...]
     backbone_amplitude: _Array = field(repr=False)
     backbone_frequency: _Array = field(repr=False)
-    backbone_freq_se: _Array = field(repr=False)
+    backbone_frequencies_se: _Array = field(repr=False)
     envelope_time: _Array = field(repr=False)
     envelope: _Array = field(repr=False)
 
@@ -103,7 +103,7 @@ class DecayFit:
         """The figures as plain numbers and words, for a table or a JSON file."""
         names = (
             "natural_frequencies",
-            "natural_freq_se",
+            "natural_frequencies_se",
             "damping_ratio",
             "damping_ratio_se",
             "amplitude",

@@ -62,7 +62,7 @@ def compare_wells(
     for name, well, se in (("lower", lower, lower_se), ("upper", upper, upper_se)):
         if isinstance(well, DecayFit):
             values.append(well.natural_frequencies)
-            errors.append(well.modes[0].natural_freq_se)
+            errors.append(well.modes[0].natural_frequencies_se)
         else:
             values.append(positive(name, well, "Hz"))
             errors.append(math.nan if se is None else nonnegative(f"{name}_se", se, "Hz"))
