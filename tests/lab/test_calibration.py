@@ -185,7 +185,7 @@ def test_contact_stiffness_from_collisions():
 def test_a_file_of_measurements(tmp_path):
     path = tmp_path / "m.toml"
     path.write_text(
-        "[measured]\nstraight_freq = [80.0, 221.0]\nstraight_freq_se = 0.4\nlower_well_frequencies = [81.3]\n"
+        "[measured]\nstraight_frequencies = [80.0, 221.0]\nstraight_frequencies_se = 0.4\nlower_well_frequencies = [81.3]\n"
         "[beam]\nlength = 0.161\n[[measured.contact]]\nclosing_speed = 0.1\nduration = 2e-4\n"
         "peak_force = 2.0\n",
         encoding="utf-8",
@@ -195,11 +195,11 @@ def test_a_file_of_measurements(tmp_path):
     assert others == {"beam": {"length": 0.161}} and found.contact[0].peak_force == 2.0
     for text, word in (
         ("[measured]\nstraigth_freq = [80.0]\n", "straigth_freq: unknown"),
-        ("[measured]\nstraight_freq = ['80 Hz']\n", r"straight_frequencies\[0\]"),
-        ("[measured]\nstraight_freq = [221.0, 80.0]\n", "must increase"),
-        ("[measured]\nstraight_freq = [-80.0]\n", "greater than 0"),
-        ("[measured]\nstraight_freq = [nan]\n", "finite"),
-        ("[measured]\nstraight_freq = [80.0]\nstraight_freq_se = [1.0, 2.0]\n", "straight_frequencies_se"),
+        ("[measured]\nstraight_frequencies = ['80 Hz']\n", r"straight_frequencies\[0\]"),
+        ("[measured]\nstraight_frequencies = [221.0, 80.0]\n", "must increase"),
+        ("[measured]\nstraight_frequencies = [-80.0]\n", "greater than 0"),
+        ("[measured]\nstraight_frequencies = [nan]\n", "finite"),
+        ("[measured]\nstraight_frequencies = [80.0]\nstraight_frequencies_se = [1.0, 2.0]\n", "straight_frequencies_se"),
         ("[measured]\ndamping_ratio = [5.0]\n", "damping_ratio"),
         ("[measured]\ncontact = 3\n", "list of tables"),
         ("[[measured.contact]]\nclosing_speed = 0.1\nduration = 1e-4\n", "two of"),

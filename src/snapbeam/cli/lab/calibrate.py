@@ -81,7 +81,7 @@ def calibrate(
             if shapes and not name.endswith("well_frequencies"):
                 raise InputError(f"{name} = {text!r}: only frequencies about a well carry a shape, s or a")
             if shapes:
-                given[name.replace("_freq", "_shape")] = shapes
+                given[name.replace("_frequencies", "_shape")] = shapes
             given[name] = lab.numbers(name, text)
             given[f"{name}_se"] = frequency_se if "freq" in name else None
     for name, value in (("thickness", measured_thickness), ("buckling_level", measured_buckling_level)):

@@ -35,20 +35,20 @@ class Forward:
     def __post_init__(self) -> None:
         for state in _STATES:
             values, errors = (
-                getattr(self.measured, f"{state}_freq"),
-                getattr(self.measured, f"{state}_freq_se"),
+                getattr(self.measured, f"{state}_frequencies"),
+                getattr(self.measured, f"{state}_frequencies_se"),
             )
             if values and errors is None:
                 raise InputError(
-                    f"{state}_freq_se: is needed; without standard errors nothing can be said of the rest"
+                    f"{state}_frequencies_se: is needed; without standard errors nothing can be said of the rest"
                 )
             if len(values) > self.modes:
-                raise InputError(f"{state}_freq: {len(values)} frequencies for a model of {self.modes} modes")
+                raise InputError(f"{state}_frequencies: {len(values)} frequencies for a model of {self.modes} modes")
         if not self.target.size:
             raise InputError("measured: has no frequency")
 
     def _listed(self, ending: str) -> _Array:
-        parts: list[Any] = [getattr(self.measured, f"{state}_freq{ending}") or () for state in _STATES]
+        parts: list[Any] = [getattr(self.measured, f"{state}_frequencies{ending}") or () for state in _STATES]
         return np.concatenate([np.asarray(part, dtype=np.float64) for part in parts])
 
     @property
@@ -65,7 +65,7 @@ class Forward:
         """Those of a beam, Hz."""
         found = []
         for state in _STATES:
-            count = len(getattr(self.measured, f"{state}_freq"))
+            count = len(getattr(self.measured, f"{state}_frequencies"))
             if not count:
                 continue
             own = beam.replace(axial_load=0.0) if state == "straight" else beam

@@ -333,10 +333,10 @@ class _Datum:
 def _data(measured: Measurements, modes: int) -> list[_Datum]:
     data = []
     for state, word in (("straight", "straight"), ("lower_well", "lower well"), ("upper_well", "upper well")):
-        values = getattr(measured, f"{state}_freq")
-        errors = getattr(measured, f"{state}_freq_se") or [words.ASSUMED * value for value in values]
+        values = getattr(measured, f"{state}_frequencies")
+        errors = getattr(measured, f"{state}_frequencies_se") or [words.ASSUMED * value for value in values]
         if len(values) > modes:
-            raise InputError(f"{state}_freq: {len(values)} frequencies for a model of {modes} modes")
+            raise InputError(f"{state}_frequencies: {len(values)} frequencies for a model of {modes} modes")
         shapes = getattr(measured, f"{state}_shape", ())
         seen = {1: 0, -1: 0}
         for i, (value, error) in enumerate(zip(values, errors, strict=True)):

@@ -142,9 +142,9 @@ class Measurements:
             object.__setattr__(self, f"{name}_shape", tuple(shapes))
             for i, shape in enumerate(shapes):
                 choice(f"{name}_shape[{i}]", shape, ("symmetric", "antisymmetric"))
-            if shapes and len(shapes) != len(getattr(self, f"{name}_freq")):
+            if shapes and len(shapes) != len(getattr(self, f"{name}_frequencies")):
                 raise InputError(
-                    f"{name}_shape: {len(shapes)} word(s), {name}_freq has {len(getattr(self, f'{name}_freq'))}"
+                    f"{name}_shape: {len(shapes)} word(s), {name}_frequencies has {len(getattr(self, f'{name}_frequencies'))}"
                 )
         if any(ratio >= 1.0 for ratio in self.damping_ratio):
             raise InputError(f"damping_ratio = {list(self.damping_ratio)}: must lie in (0, 1)")

@@ -40,7 +40,7 @@ def either_well(beam: Beam, measured: Measurements, modes: int) -> tuple[float, 
 
     goals = []
     for state in ("lower_well", "upper_well"):
-        values, shapes = getattr(measured, f"{state}_freq"), getattr(measured, f"{state}_shape")
+        values, shapes = getattr(measured, f"{state}_frequencies"), getattr(measured, f"{state}_shape")
         fitting = (
             [f for f, shape in zip(values, shapes, strict=True) if shape == "symmetric"] if shapes else values
         )
