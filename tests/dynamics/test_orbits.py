@@ -101,7 +101,7 @@ def test_known_maps() -> None:
 
 def test_coarse_derivatives_are_told(monkeypatch) -> None:
     """At level standard multipliers are off by more than rounding and less than what is said."""
-    from snapbeam.core import diagnostics
+    from snapbeam.core import findings as diagnostics
 
     monkeypatch.setattr(diagnostics, "_told", set())
     system = system_of(1, 1.6, 0.03)
