@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.assemble import make_ensemble
-from snapbeam.engines.cpu import driver as cpu_engine
-from snapbeam.engines.ensemble import Ensemble
-from snapbeam.engines.plan import Plan, choose_base_step
-from snapbeam.runs.samples import joined
+from snapbeam.simulation.dataset import joined
+from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.cpu import driver as cpu_engine
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.step_size import Plan, choose_base_step
 
 __all__ = [
     "CONTACT",

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from snapbeam.figures.style import house_style, new_figure, save_figure
+from snapbeam.plot.style import house_style, new_figure, save_figure
 
 __all__ = ["layouts_chart", "requests_chart", "scaling_chart", "work_precision_chart"]
 

@@ -18,7 +18,7 @@ import snapbeam as sb
 from benchmarks.cases import model_of
 from benchmarks.impacts import ways
 from benchmarks.report import save, table
-from snapbeam.model.paper_values import CONTACT
+from snapbeam.model.default_values import CONTACT
 
 __all__ = ["run"]
 
@@ -72,8 +72,8 @@ def _diagram(share: float) -> Cost:
     """Up and down over the velocity amplitude, 8 modes, 100 periods left out and 32 kept at each value."""
     values = np.linspace(0.01, 0.3, _VALUES)[:: round(1.0 / share)]
     system = _system(8, 1.4, 0.01)
-    sb.bifurcation_diagram(system, "velocity_amplitude", values[:2], periods=(2, 4))
-    seconds, _ = _seconds(lambda: sb.bifurcation_diagram(system, "velocity_amplitude", values))
+    sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", values[:2], periods=(2, 4))
+    seconds, _ = _seconds(lambda: sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", values))
     return Cost(
         f"diagram of {_VALUES} amplitudes, up and down, N = 8", values.size, _VALUES, seconds, 0.0, 60.0
     )
@@ -82,10 +82,12 @@ def _diagram(share: float) -> Cost:
 def _branch(share: float) -> Cost:
     """Orbits of 32 modes and two periods at level "reference", every one with its multipliers."""
     system = _system(32, 3.5, 0.06)
-    orbit = sb.periodic_orbit(system, period=2, transient=2000)
+    orbit = sb.dynamics.periodic_orbit(system, period=2, transient=2000)
     most = round(_ORBITS * share)
     seconds, branch = _seconds(
-        lambda: sb.continuation(orbit, "velocity_amplitude", (0.005, 0.6), max_points=most, max_step=2e-4)
+        lambda: sb.dynamics.continuation(
+            orbit, "velocity_amplitude", (0.005, 0.6), max_points=most, max_step=2e-4
+        )
     )
     return Cost(f"branch of {_ORBITS} orbits, N = 32", len(branch.orbits), _ORBITS, seconds, 0.0, 60.0)
 
@@ -93,10 +95,10 @@ def _branch(share: float) -> Cost:
 def _basins(share: float) -> Cost:
     """States of one mode that tap or rest, or go on for 200 cycles."""
     side = round(_SIDE * share**0.5)
-    found = sb.find_attractors(_system(1, 1.6, 0.03, 0.05), 40, transient=300)
+    found = sb.dynamics.find_attractors(_system(1, 1.6, 0.03, 0.05), 40, transient=300)
     plane = {"amplitude[1]": np.linspace(-1.6, 1.6, side), "velocity[1]": np.linspace(-1.0, 1.0, side)}
-    sb.basins_of_attraction(found, {name: values[:2] for name, values in plane.items()}, periods=2)
-    seconds, _ = _seconds(lambda: sb.basins_of_attraction(found, plane, periods=200))
+    sb.dynamics.basins_of_attraction(found, {name: values[:2] for name, values in plane.items()}, periods=2)
+    seconds, _ = _seconds(lambda: sb.dynamics.basins_of_attraction(found, plane, periods=200))
     return Cost(
         f"basins of {_SIDE} x {_SIDE} states, N = 1, 200 cycles", side**2, _SIDE**2, seconds, 0.0, 120.0
     )
@@ -119,7 +121,9 @@ def _lifetimes(share: float) -> Cost:
             }
         )
         times.append(
-            _seconds(lambda at=point: sb.lifetime_map(system, at, how, initial_conditions=_STARTS))[0]
+            _seconds(lambda at=point: sb.dynamics.lifetime_map(system, at, how, initial_conditions=_STARTS))[
+                0
+            ]
         )
     cpu = np.array([each.cpu for each in times])
     error = float(np.std(cpu, ddof=1)) * count**0.5

@@ -12,10 +12,10 @@ from benchmarks.cases import CONTACT, model_of
 from benchmarks.report import save, table
 from benchmarks.timing import measure
 from snapbeam import paper
-from snapbeam.core.codes import RunStatus
-from snapbeam.engines.assemble import make_ensemble
-from snapbeam.engines.cpu import driver as cpu_engine
-from snapbeam.engines.ensemble import Ensemble
+from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.cpu import driver as cpu_engine
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.util.status_codes import RunStatus
 
 __all__ = ["ensemble_of", "run", "sample"]
 

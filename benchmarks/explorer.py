@@ -23,7 +23,7 @@ import numpy as np
 
 import snapbeam as sb
 from benchmarks.timing import machine
-from snapbeam.config import Config
+from snapbeam.model.parameter_file import Config
 
 __all__ = ["measured", "run"]
 

@@ -25,15 +25,15 @@ import numpy as np
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.codes import ResponseClass
-from snapbeam.engines.answer import statistics_of
-from snapbeam.engines.assemble import make_ensemble
-from snapbeam.engines.cpu import driver as cpu_engine
-from snapbeam.engines.cuda import driver as cuda_engine
-from snapbeam.engines.cuda.driver import Options
-from snapbeam.engines.cuda.layout import device_structure
-from snapbeam.engines.ensemble import Ensemble
-from snapbeam.engines.scalar.composition import COMPOSITIONS
+from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.cpu import driver as cpu_engine
+from snapbeam.solver.cuda import driver as cuda_engine
+from snapbeam.solver.cuda.driver import Options
+from snapbeam.solver.cuda.layout import device_structure
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.splitting import COMPOSITIONS
+from snapbeam.solver.statistics import statistics_of
+from snapbeam.util.status_codes import ResponseClass
 
 CONTACT = sb.HertzContact(stiffness=4e8)
 LOCATION = 1 / 2.1

@@ -11,9 +11,9 @@ from benchmarks.charts import layouts_chart
 from benchmarks.ensemble import ensemble_of, sample
 from benchmarks.report import save, table
 from benchmarks.timing import measure
-from snapbeam.engines.cpu import driver
-from snapbeam.engines.cpu.few.places import MOST
-from snapbeam.engines.ensemble import Ensemble
+from snapbeam.solver.cpu import driver
+from snapbeam.solver.cpu.run_lanes.layout import MOST
+from snapbeam.solver.ensemble import Ensemble
 
 __all__ = ["run"]
 

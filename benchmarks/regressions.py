@@ -12,8 +12,8 @@ import pytest
 
 from benchmarks.cases import Case
 from benchmarks.ensemble import ensemble_of, sample
-from snapbeam.engines.cpu import driver as cpu_engine
-from snapbeam.model.decision import decidable_energy
+from snapbeam.model.early_termination import decidable_energy
+from snapbeam.solver.cpu import driver as cpu_engine
 
 
 @pytest.mark.parametrize("modes", [1, 8, 32, 128])

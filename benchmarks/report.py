@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.timing import machine
-from snapbeam.core.files import atomic_path
+from snapbeam.util.files import atomic_path
 
 __all__ = ["describe", "load", "save", "table"]
 

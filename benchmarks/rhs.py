@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from benchmarks.cases import CONTACT, Case
 from benchmarks.peers.equations import equations_of
-from snapbeam.engines.cpu.memory import pack
-from snapbeam.engines.cpu.rows import dot, tension_rows
-from snapbeam.engines.scalar.physics import sincos, tension_factors
-from snapbeam.engines.structure import structure_of
+from snapbeam.solver.cpu.dot import dot
+from snapbeam.solver.cpu.memory import pack
+from snapbeam.solver.cpu.mode_lanes import tension_rows
+from snapbeam.solver.physics import sincos, tension_factors
+from snapbeam.solver.structure import structure_of
 
 __all__ = ["CompiledSystem", "aligned", "compiled_system"]
 

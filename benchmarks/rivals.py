@@ -20,7 +20,7 @@ from benchmarks.peers import PEERS, Method, methods
 from benchmarks.report import save, table
 from benchmarks.timing import Timing, measure
 from snapbeam import paper
-from snapbeam.engines.cpu import driver as cpu_engine
+from snapbeam.solver.cpu import driver as cpu_engine
 
 __all__ = ["chosen_points", "run"]
 

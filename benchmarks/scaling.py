@@ -17,14 +17,14 @@ from benchmarks.ensemble import ensemble_of, sample
 from benchmarks.report import save, table
 from benchmarks.rhs import aligned
 from benchmarks.timing import measure
-from snapbeam.engines.cpu import driver as cpu_engine
-from snapbeam.engines.cpu.memory import pack
-from snapbeam.engines.cpu.rows import acceleration_rows, tension_rows
-from snapbeam.engines.scalar.composition import COMPOSITIONS
-from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, splat, store
-from snapbeam.engines.scalar.physics import tension_factors
-from snapbeam.engines.structure import structure_of
-from snapbeam.model.galerkin.modes import BucklingModes
+from snapbeam.model.buckling_modes import BucklingModes
+from snapbeam.solver.cpu import driver as cpu_engine
+from snapbeam.solver.cpu.memory import pack
+from snapbeam.solver.cpu.mode_lanes import acceleration_rows, tension_rows
+from snapbeam.solver.physics import tension_factors
+from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, splat, store
+from snapbeam.solver.splitting import COMPOSITIONS
+from snapbeam.solver.structure import structure_of
 
 __all__ = ["run"]
 

@@ -14,13 +14,13 @@ from benchmarks.cases import Case, model_of
 from benchmarks.report import save, table
 from benchmarks.rhs import aligned
 from benchmarks.timing import measure
-from snapbeam.engines.cpu import driver as cpu_engine
-from snapbeam.engines.cpu.memory import pack
-from snapbeam.engines.cpu.rows import tension_rows
-from snapbeam.engines.plan import Plan
-from snapbeam.engines.scalar.composition import COMPOSITIONS, TURNS, Composition
-from snapbeam.engines.structure import structure_of
-from snapbeam.runs.samples import joined
+from snapbeam.simulation.dataset import joined
+from snapbeam.solver.cpu import driver as cpu_engine
+from snapbeam.solver.cpu.memory import pack
+from snapbeam.solver.cpu.mode_lanes import tension_rows
+from snapbeam.solver.splitting import COMPOSITIONS, TURNS, Composition
+from snapbeam.solver.step_size import Plan
+from snapbeam.solver.structure import structure_of
 
 __all__ = ["run"]
 

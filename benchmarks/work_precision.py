@@ -13,7 +13,7 @@ from benchmarks.peers import PEERS, methods
 from benchmarks.report import save, table
 from benchmarks.timing import measure
 from snapbeam import paper
-from snapbeam.engines.cpu import driver as cpu_engine
+from snapbeam.solver.cpu import driver as cpu_engine
 
 __all__ = ["LIMIT", "run"]
 

@@ -12,9 +12,9 @@ import snapbeam as sb
 from benchmarks.report import save, table
 from benchmarks.timing import measure
 from snapbeam import paper
-from snapbeam.engines.assemble import make_ensemble
-from snapbeam.engines.cpu import driver as cpu_engine
-from snapbeam.engines.ensemble import Ensemble
+from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.cpu import driver as cpu_engine
+from snapbeam.solver.ensemble import Ensemble
 
 __all__ = ["WORLDS", "run"]
 

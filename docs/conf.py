@@ -14,7 +14,7 @@ from docutils import nodes
 from sphinx.domains.python._object import PyXrefMixin
 from sphinx.ext.napoleon.docstring import GoogleDocstring
 
-from snapbeam.core.provenance import __version__
+from snapbeam._version import __version__
 
 # Figures of the paper are drawn from full-size data that were computed once.
 DATA = Path(__file__).parent / "data"
@@ -104,7 +104,7 @@ def draw_paper(app: Any) -> None:
     import matplotlib.pyplot as plt
 
     from snapbeam import paper
-    from snapbeam.figures import save_figure
+    from snapbeam.plot.style import save_figure
 
     folder = Path(app.srcdir) / "_paper"
     folder.mkdir(exist_ok=True)

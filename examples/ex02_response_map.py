@@ -11,7 +11,7 @@ import numpy as np
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.figures import plot_response_map
+from snapbeam.plot.map import plot_response_map
 
 system = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=4, damping_ratio=paper.DAMPING_RATIO),

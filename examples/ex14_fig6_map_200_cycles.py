@@ -11,7 +11,7 @@ with damping); just above, it has too little energy left to come back.
 import numpy as np
 
 from snapbeam import paper
-from snapbeam.sweeps.analysis import interwell_threshold, threshold_notch
+from snapbeam.sweeps.threshold import interwell_threshold, threshold_notch
 
 results = paper.shared_results()
 figure = paper.fig6(results=results)

@@ -3,7 +3,7 @@ More and more modes
 ===================
 
 Supplementary video SI5: the map over location at :math:`\Omega` = 1.625 as modes are added. Six of its
-frames; ``snapbeam paper si5`` writes the video.
+frames; ``snapbeam reproduce si5`` writes the video.
 """
 
 from snapbeam import paper

@@ -8,7 +8,7 @@ what :math:`\omega_1` normalises one mode.
 """
 
 from snapbeam import paper
-from snapbeam.sweeps.analysis import compare_maps
+from snapbeam.sweeps.threshold import compare_maps
 
 results = paper.shared_results()
 figure = paper.sensitivity(results=results)

@@ -7,7 +7,8 @@ numbers of a sketch where no data are stored; those of full size are in the page
 """
 
 from snapbeam import paper
-from snapbeam.paper.claims import measure_claims, summary
+from snapbeam.paper.claims import measure_claims
+from snapbeam.paper.claims.table import summary
 
 rows = measure_claims(paper.shared_results(), paper.Results())
 print(summary(rows))

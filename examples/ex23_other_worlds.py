@@ -14,7 +14,8 @@ the system itself.
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.figures import plot_run, plot_system
+from snapbeam.plot.run import plot_run
+from snapbeam.plot.schematic import plot_system
 
 model = sb.ReducedModel.from_beam(paper.BEAM, modes=8)
 level = paper.BEAM.buckling_level
@@ -27,7 +28,9 @@ burst = sb.Burst(
     ramp_down_cycles=1,
     retraction=0.4,
 )
-shaker = sb.Striker(drive=burst, mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7)
+shaker = sb.Striker(
+    drive=burst, mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7
+)
 system = sb.System(model, lossy, shaker)
 plot_system(system)
 
@@ -47,7 +50,11 @@ plot_run(run.dataset)
 # Thrown at the middle of the beam from above, at :math:`0.4\,b\,\omega_1`.
 
 sphere = sb.Striker(
-    drive=sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=0.5 * level, side="above", location=0.5
+    drive=sb.ConstantVelocity(speed=0.4),
+    mass=2e-3,
+    gap=0.5 * level,
+    side="above",
+    location=0.5,
 )
 thrown = sb.System(model, paper.CONTACT, sphere)
 plot_system(thrown)
@@ -66,11 +73,17 @@ plot_run(run.dataset)
 # --------------------------------
 # An initial shape and a side load make the wells unequal; each end may turn on a spring of its own.
 
-soft = paper.BEAM.replace(boundary=sb.BoundaryConditions(left_rotational_stiffness=20.0, right_rotational_stiffness=5.0))
+soft = paper.BEAM.replace(
+    boundary=sb.BoundaryConditions(
+        left_rotational_stiffness=20.0, right_rotational_stiffness=5.0
+    )
+)
 uneven = sb.ReducedModel.from_beam(
     soft,
     modes=8,
-    imperfection=sb.Imperfection(midspan_amplitude=8e-6, point_load=0.02, point_location=0.3),
+    imperfection=sb.Imperfection(
+        midspan_amplitude=8e-6, point_load=0.02, point_location=0.3
+    ),
 )
 print(
     f"first frequency about the lower well {uneven.well_frequencies[0, 0]:.1f} Hz, "
@@ -92,10 +105,18 @@ plot_system(
 motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25)
 stop = sb.Striker(drive=sb.FixedStop(), gap=0.2 * level)
 piezo = sb.PiezoelectricHarvester(
-    moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_start=0.0, patch_end=0.25
+    moment_per_volt=4e-3,
+    capacitance=60e-9,
+    resistance=2e4,
+    patch_start=0.0,
+    patch_end=0.25,
 )
 shaken = sb.System(
-    model, paper.CONTACT, stop, base_excitation=sb.BaseExcitation(motion=motion), harvester=piezo
+    model,
+    paper.CONTACT,
+    stop,
+    base_excitation=sb.BaseExcitation(motion=motion),
+    harvester=piezo,
 )
 plot_system(shaken)
 
@@ -103,8 +124,12 @@ plot_system(shaken)
 # A coil, under a load that changes
 # ---------------------------------
 
-coil = sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)
-load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))
+coil = sb.ElectromagneticHarvester(
+    force_factor=1.5, resistance=30.0, coil_resistance=10.0, location=0.4
+)
+load = sb.AxialLoadModulation(
+    motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0)
+)
 plot_system(
     sb.System(
         model,

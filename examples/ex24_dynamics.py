@@ -18,7 +18,7 @@ import xarray as xr
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.figures.dynamics import plot_basins, plot_diagram, plot_survival
+from snapbeam.plot.dynamics import plot_basins, plot_diagram, plot_survival
 
 two = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=2),
@@ -31,7 +31,9 @@ points = xr.Dataset(
         "velocity_amplitude": ("point", [0.25, 0.55]),
     }
 )
-lifetimes = sb.lifetime_map(two, points, sb.Integration(cycles=300), initial_conditions=120)
+lifetimes = sb.dynamics.lifetime_map(
+    two, points, sb.Integration(cycles=300), initial_conditions=120
+)
 for i in range(2):
     one = lifetimes.isel(point=i)
     print(
@@ -51,22 +53,22 @@ one = sb.System(
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.6, velocity_amplitude=0.05),
 )
-diagram = sb.bifurcation_diagram(
+diagram = sb.dynamics.bifurcation_diagram(
     one, "velocity_amplitude", np.linspace(0.02, 0.3, 113)
 )
 limits = ("velocity_amplitude", (0.02, 0.3))
-orbit = sb.periodic_orbit(one, transient=300)
+orbit = sb.dynamics.periodic_orbit(one, transient=300)
 branches = [
-    sb.continuation(orbit, *limits, max_step=0.06),
-    sb.continuation(orbit, *limits, direction="down"),
+    sb.dynamics.continuation(orbit, *limits, max_step=0.06),
+    sb.dynamics.continuation(orbit, *limits, direction="down"),
 ]
 flip = next(event for event in branches[0].special_points if event.kind == "flip")
-doubled = sb.switch_branch(flip, *limits)
-branches.append(sb.continuation(doubled, "velocity_amplitude", (0.02, 0.17)))
-weak = sb.periodic_orbit(
+doubled = sb.dynamics.switch_branch(flip, *limits)
+branches.append(sb.dynamics.continuation(doubled, "velocity_amplitude", (0.02, 0.17)))
+weak = sb.dynamics.periodic_orbit(
     one.replace(**{"drive.velocity_amplitude": 0.03}), transient=300
 )
-branches.append(sb.continuation(weak, *limits))
+branches.append(sb.dynamics.continuation(weak, *limits))
 for branch in branches:
     for event in branch.special_points:
         print(
@@ -79,13 +81,13 @@ plot_diagram(diagram, branches=[branch.to_dataset() for branch in branches])
 # ------------------------------------
 # States of the mode in the plane of displacement and velocity, from the tip's mid-position on, which stays where it is.
 
-found = sb.find_attractors(one, 100)
+found = sb.dynamics.find_attractors(one, 100)
 plane = {
     "amplitude[1]": np.linspace(-0.98, 2.0, 80),
     "velocity[1]": np.linspace(-1.5, 1.5, 80),
 }
-basins = sb.basins_of_attraction(found, plane)
-entropy = sb.basin_entropy(basins.basin, 5)
+basins = sb.dynamics.basins_of_attraction(found, plane)
+entropy = sb.dynamics.basin_entropy(basins.basin, 5)
 print(
     f"{len(found.attractors)} attractors, "
     f"basin entropy {entropy.basin:.3f} ± {entropy.basin_error:.3f}"

@@ -17,32 +17,32 @@ import numpy as np
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.figures.design import plot_probability, plot_quantiles, plot_tornado
+from snapbeam.plot.uncertainty import plot_probability, plot_quantiles, plot_tornado
 
 system = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=1),
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
 )
-spread = sb.ParameterUncertainty(
+spread = sb.uncertainty.ParameterUncertainty(
     of={
-        "beam.buckling_level": sb.Normal(0.01, relative=True),
-        "contact.stiffness": sb.LogNormal(0.2),
-        "location": sb.Normal(0.005),
-        "velocity_amplitude": sb.Normal(0.02, relative=True),
+        "beam.buckling_level": sb.uncertainty.Normal(0.01, relative=True),
+        "contact.stiffness": sb.uncertainty.LogNormal(0.2),
+        "location": sb.uncertainty.Normal(0.005),
+        "velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True),
     },
     displacement=3.5e-6,
     phase=True,
 )
 short = sb.Integration(cycles=20)
-probability = sb.probability_map(
+probability = sb.uncertainty.probability_map(
     system,
     {
         "frequency_ratio": np.linspace(0.4, 2.4, 17),
         "velocity_amplitude": np.linspace(0.02, 0.24, 17),
     },
     spread,
-    sb.SamplingPlan(half_width=0.12, initial_runs=16, max_runs=60),
+    sb.uncertainty.SamplingPlan(half_width=0.12, initial_runs=16, max_runs=60),
     integration=short,
 )
 print(f"{int(probability.runs.sum())} runs")
@@ -53,13 +53,13 @@ plot_probability(probability)
 # -------------------
 # Where the probability is 0.05, 0.5 and 0.95, with bands of 95 %; a cross where it is seen to fall again.
 
-threshold = sb.quantile_threshold(
+threshold = sb.uncertainty.quantile_threshold(
     system,
     "velocity_amplitude",
     (0.005, 0.3),
     {"frequency_ratio": np.linspace(0.4, 2.4, 9)},
     spread,
-    sb.QuantileSearchSettings(runs=200),
+    sb.uncertainty.QuantileSearchSettings(runs=200),
     integration=short,
 )
 plot_quantiles(threshold)
@@ -69,7 +69,7 @@ plot_quantiles(threshold)
 # ------------------
 # For each parameter one standard score down and up; how much that is in its own unit stands beside it.
 
-sensitivity = sb.sensitivity(
+sensitivity = sb.uncertainty.sensitivity(
     system, "peak_force", spread, samples=16, integration=sb.Integration(cycles=5)
 )
 plot_tornado(sensitivity)

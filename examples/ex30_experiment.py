@@ -17,14 +17,13 @@ import numpy as np
 import snapbeam as sb
 import snapbeam.lab as lab
 from snapbeam import paper
-from snapbeam.figures.lab.calibration import plot_calibration
-from snapbeam.figures.lab.dot_comparison import plot_dot_comparison
-from snapbeam.figures.lab.identification import plot_decay
-from snapbeam.figures.lab.tracking import plot_frame, plot_tracking_quality
-from snapbeam.figures.lab.vibrometer import plot_drive
-from snapbeam.figures.lab.waveform_comparison import plot_waveform_comparison
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
-from snapbeam.lab.compare.dots import MeasuredPoints
+from snapbeam.lab.plot.calibration import plot_calibration
+from snapbeam.lab.plot.comparison import plot_dot_comparison, plot_waveform_comparison
+from snapbeam.lab.plot.fit_decay import plot_decay
+from snapbeam.lab.plot.tracking import plot_frame, plot_tracking_quality
+from snapbeam.lab.plot.vibrometer import plot_drive
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
+from snapbeam.sweeps.measured_points import MeasuredPoints
 
 folder = tempfile.TemporaryDirectory()
 files = Path(folder.name)
@@ -54,7 +53,10 @@ for well, level in (("lower", 0.3323e-3), ("upper", 0.3289e-3)):
     deflected[0] *= 0.9
     free = sb.simulate(
         sb.System(
-            model, initial_state=sb.State(amplitude=deflected, velocity=np.zeros(model.modes))
+            model,
+            initial_state=sb.State(
+                amplitude=deflected, velocity=np.zeros(model.modes)
+            ),
         ),
         sb.Integration(cycles=41),
         sample_times=np.arange(int(0.5 * rate)) / rate,
@@ -307,7 +309,12 @@ dots = MeasuredPoints(
         [
             *speed,
             drive.steady.amplitude
-            / (2.0 * np.pi * calibration.well_frequencies * calibration.beam.buckling_level),
+            / (
+                2.0
+                * np.pi
+                * calibration.well_frequencies
+                * calibration.beam.buckling_level
+            ),
         ]
     ),
     np.full(len(omega) + 1, paper.LOCATION),

@@ -20,7 +20,11 @@ beam = sb.Beam(
 )
 contact = sb.HertzContact.from_materials(5e-3, (210e9, 205e9), (0.3, 0.3))
 model = sb.ReducedModel.from_beam(beam, modes=6, damping_ratio=0.004)
-print(model.natural_frequencies[:3], sb.exact_natural_frequencies(beam, count=3), "Hz")
+print(
+    model.natural_frequencies[:3],
+    sb.model.exact_natural_frequencies(beam, count=3),
+    "Hz",
+)
 print(
     f"b/r = {beam.buckling_level / beam.radius_of_gyration:.2f}; "
     "above 6.2 the first mode would be antisymmetric"
@@ -55,7 +59,10 @@ for thickness, value in zip(found.beam_thickness.values, low.values, strict=True
 
 near = {"velocity_amplitude": np.linspace(0.05, 0.35, 7)}
 sure = sb.sweep(
-    system, near, sb.Integration(cycles=60), replicates=sb.Replicates(5, check_half_step=True)
+    system,
+    near,
+    sb.Integration(cycles=60),
+    replicates=sb.Replicates(5, check_half_step=True),
 )
 print(sure.class_fraction.max("response_class").values)
 

@@ -13,32 +13,34 @@ from matplotlib import pyplot as plt
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.figures.design import plot_designs
+from snapbeam.plot.uncertainty import plot_designs
 
 system = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=paper.DAMPING_RATIO),
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1).striker(),
 )
-spread = sb.ParameterUncertainty(
+spread = sb.uncertainty.ParameterUncertainty(
     of={
-        "velocity_amplitude": sb.Normal(0.02, relative=True),
-        "location": sb.Normal(0.005),
+        "velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True),
+        "location": sb.uncertainty.Normal(0.005),
     },
     displacement=3.5e-6,
     phase=True,
 )
-found = sb.optimize_design(
+found = sb.uncertainty.optimize_design(
     system,
     {
         "location": (0.1, 0.48),
         "frequency_ratio": (0.3, 2.6),
         "velocity_amplitude": (0.01, 0.6),
     },
-    ["speed", sb.Objective(quantity="peak_force", quantile=0.5)],
-    sb.Constraint(quantity="snap", lower=0.95),
+    ["speed", sb.uncertainty.Objective(quantity="peak_force", quantile=0.5)],
+    sb.uncertainty.Constraint(quantity="snap", lower=0.95),
     spread,
-    sb.OptimizerSettings(generations=8, population=12, samples=40, validation_samples=100),
+    sb.uncertainty.OptimizerSettings(
+        generations=8, population=12, samples=40, validation_samples=100
+    ),
     integration=sb.Integration(cycles=10),
 )
 plot_designs(found)

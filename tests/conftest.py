@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from snapbeam.core.codes import ResponseClass
-from snapbeam.runs.schema import trajectory_dataset
+from snapbeam.simulation.dataset import trajectory_dataset
+from snapbeam.util.status_codes import ResponseClass
 
 
 def pytest_addoption(parser):

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 from numpy.typing import NDArray
 
-from snapbeam.engines.cuda.driver import Options
-from snapbeam.engines.ensemble import Ensemble
+from snapbeam.solver.cuda.driver import Options
+from snapbeam.solver.ensemble import Ensemble
 
 __all__ = ["Job", "march_in_simulator"]
 
@@ -47,7 +47,7 @@ def march_in_simulator(
 
 
 def _answer(asked: Path, answered: Path) -> None:
-    from snapbeam.engines.cuda import driver as cuda_engine
+    from snapbeam.solver.cuda import driver as cuda_engine
 
     sys.setswitchinterval(1e-5)
     results = []

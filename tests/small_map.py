@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.sweeps.compute.task import PointWork
-from snapbeam.sweeps.compute.tasks import MemoryKeeper, Stage
 from snapbeam.sweeps.doors import map_setup
+from snapbeam.sweeps.tasks import MemoryKeeper, PointWork, Stage
 
 BEAM = sb.Beam(
     length=0.161, thickness=0.4e-3, width=15e-3, density=7800.0, young_modulus=200e9, buckling_level=0.335e-3

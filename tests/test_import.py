@@ -39,7 +39,7 @@ def test_the_version_loads_next_to_nothing():
 
 def test_a_run_without_files_loads_no_pictures_and_no_tables():
     loaded = loaded_by("simulate", "--modes", "1", "--cycles", "2", "--quiet")
-    assert "snapbeam.engines.cpu.march_one" in loaded
+    assert "snapbeam.solver.cpu.integrate" in loaded
     assert not loaded & {"matplotlib", "pandas", "xarray", "dask", "scipy.stats"}
 
 

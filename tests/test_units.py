@@ -10,9 +10,10 @@ import xarray as xr
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.config import PHYSICAL, parameters
-from snapbeam.engines.outcomes import STATISTICS
-from snapbeam.runs.schema import SCHEMA
+from snapbeam.model.parameter_axes import PHYSICAL
+from snapbeam.model.parameters import parameters
+from snapbeam.simulation.dataset import SCHEMA
+from snapbeam.solver.statistics import STATISTICS
 
 SYMBOLS = {"s", "m", "kg", "N", "Pa", "J", "W", "Hz", "rad", "K", "A", "V", "F", "H", "ohm", "g"}
 PREFIXES = {"", "k", "M", "G", "m", "u", "n"}

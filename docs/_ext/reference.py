@@ -42,8 +42,8 @@ def _table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 def parameter_tables() -> str:
     """Every key of a parameter file, section by section, from the table of parameters."""
-    from snapbeam.config import parameters
-    from snapbeam.config.settings import Config
+    from snapbeam.model.parameter_file import Config
+    from snapbeam.model.parameters import parameters
 
     given = Config().system.parameters
     parts = []
@@ -75,10 +75,9 @@ def _number(value: Any) -> str:
 
 def variable_tables() -> str:
     """Variables of runs, impacts and maps, and what the codes mean."""
-    from snapbeam.core.codes import ResponseClass, RunStatus
-    from snapbeam.engines.outcomes import STATISTICS
-    from snapbeam.runs.samples import IMPACT_COLUMNS
-    from snapbeam.runs.schema import SCHEMA
+    from snapbeam.simulation.dataset import IMPACT_COLUMNS, SCHEMA
+    from snapbeam.solver.statistics import STATISTICS
+    from snapbeam.util.status_codes import ResponseClass, RunStatus
 
     runs = [(f"`{name}`", ", ".join(row.dims), row.units, row.long_name) for name, row in SCHEMA.items()]
     impacts = [(f"`{name}`", unit, words) for name, unit, words in IMPACT_COLUMNS]

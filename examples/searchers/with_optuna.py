@@ -14,8 +14,8 @@ system = sb.System(
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1).striker(),
 )
-spread = sb.ParameterUncertainty(
-    of={"velocity_amplitude": sb.Normal(0.02, relative=True)},
+spread = sb.uncertainty.ParameterUncertainty(
+    of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)},
     displacement=3.5e-6,
     phase=True,
 )
@@ -24,11 +24,11 @@ variables = {
     "frequency_ratio": (0.3, 2.6),
     "velocity_amplitude": (0.01, 0.6),
 }
-problem = sb.design_problem(
+problem = sb.uncertainty.design_problem(
     system,
     variables,
     "speed",
-    sb.Constraint(quantity="snap", lower=0.95),
+    sb.uncertainty.Constraint(quantity="snap", lower=0.95),
     spread,
     samples=40,
     integration=sb.Integration(cycles=10),

@@ -10,7 +10,7 @@ __all__ = ["main"]
 def main() -> None:
     """Run the program; an interrupt while it is still being loaded ends it as one later does."""
     try:
-        from snapbeam.cli import main as run
+        from snapbeam.cli.app import main as run
     except KeyboardInterrupt:
         sys.exit(130)
     run()

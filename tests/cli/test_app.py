@@ -11,8 +11,8 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
-from snapbeam.cli import app
-from snapbeam.core.provenance import __version__
+from snapbeam._version import __version__
+from snapbeam.cli.app import app
 
 MAP = (
     "map",

@@ -1,4 +1,4 @@
-"""``snapbeam draw``, and other worlds from the command line."""
+"""``snapbeam schematic``, and other worlds from the command line."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import pytest
 from typer.testing import CliRunner
 
 from snapbeam.cli.app import app
-from snapbeam.config import config_from_mapping, load_config
-from snapbeam.core.validate import InputError
+from snapbeam.model.parameter_file import config_from_mapping, load_config
+from snapbeam.util.validation import InputError
 
 
 def run(*arguments: object):
@@ -27,7 +27,7 @@ def test_draws_what_was_asked_for(tmp_path) -> None:
 
 
 def test_refused_by_name(tmp_path) -> None:
-    answer = run("draw", "-o", tmp_path / "a.png", "--striker-suspension-stiffness", 700)
+    answer = run("schematic", "-o", tmp_path / "a.png", "--striker-suspension-stiffness", 700)
     assert answer.exit_code != 0
     assert "give its mass" in " ".join(answer.output.split())
 

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 import snapbeam as sb
 from snapbeam.cli.app import _COMMANDS, app
-from snapbeam.config import Config, load_config
+from snapbeam.model.parameter_file import Config, load_config
 
 RUNNER = CliRunner()
 SMALL = ["--modes", "1", "--cycles", "12"]

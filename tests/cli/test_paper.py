@@ -1,11 +1,11 @@
-"""``snapbeam paper``: figures and claims from the command line."""
+"""``snapbeam reproduce``: figures and claims from the command line."""
 
 from __future__ import annotations
 
 import pytest
 from typer.testing import CliRunner
 
-from snapbeam.cli import app
+from snapbeam.cli.app import app
 
 
 @pytest.fixture

@@ -10,14 +10,8 @@ import pytest
 import xarray as xr
 from rich.console import Console
 
-from snapbeam.cli.common.summary import (
-    class_table,
-    deepest_notch,
-    lowest_interwell,
-    map_summary,
-    status_lines,
-)
-from snapbeam.core.codes import ResponseClass, RunStatus
+from snapbeam.cli.summary import class_table, deepest_notch, lowest_interwell, map_summary, status_lines
+from snapbeam.util.status_codes import ResponseClass, RunStatus
 
 
 def text(*renderables):
@@ -80,7 +74,7 @@ def test_what_was_there_before_is_no_part_of_the_rate(monkeypatch) -> None:
 
     from rich.console import Console
 
-    from snapbeam.cli.common import console
+    from snapbeam.cli import console
 
     clock = iter([0.0, 10.0, 50.0])
     monkeypatch.setattr(console.time, "monotonic", lambda: next(clock))

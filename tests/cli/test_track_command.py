@@ -12,9 +12,8 @@ from typer.testing import CliRunner
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "lab"))
 from lab_waveforms import BUCKLING_LEVEL, FRAME_RATE, PIXEL, errors_px, impacts, rms
 
-from snapbeam.cli.lab.track import track
-from snapbeam.lab.synthetic.recording import render_recording
-from snapbeam.lab.synthetic.setup import SyntheticCamera, SyntheticStage
+from snapbeam.lab.cli.track import track
+from snapbeam.lab.synthetic import SyntheticCamera, SyntheticStage, render_recording
 
 app = typer.Typer()
 app.command()(track)

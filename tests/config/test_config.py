@@ -5,21 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.config import (
+from snapbeam.model.default_values import BEAM, CONTACT
+from snapbeam.model.integration import Integration
+from snapbeam.model.parameter_axes import PHYSICAL, from_physical, parse_axis, to_physical
+from snapbeam.model.parameter_file import (
     DEFAULT_AXES,
-    PHYSICAL,
     Config,
     config_from_mapping,
     dump_config,
-    from_physical,
     load_config,
     override,
-    parse_axis,
-    to_physical,
 )
-from snapbeam.core.validate import InputError
-from snapbeam.model.integration import Integration
-from snapbeam.model.paper_values import BEAM, CONTACT
+from snapbeam.util.validation import InputError
 
 
 def test_nothing_given_is_the_paper():

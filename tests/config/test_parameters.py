@@ -10,14 +10,14 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.config import lookup, parameters
-from snapbeam.config.parameters import Parameter, short_names
-from snapbeam.core.validate import InputError
-from snapbeam.model.contact import LAWS
-from snapbeam.model.drive import DRIVES
-from snapbeam.model.galerkin.reduction import MODEL_QUANTITIES
+from snapbeam.model.axial_load import LOADS
+from snapbeam.model.contact.base import LAWS
+from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.harvester import HARVESTERS
+from snapbeam.model.parameters import Parameter, lookup, parameters, short_names
 from snapbeam.model.quantity import RUN, STRUCTURE, quantities
-from snapbeam.model.world import HARVESTERS, LOADS
+from snapbeam.model.reduced_model import MODEL_QUANTITIES
+from snapbeam.util.validation import InputError
 
 TABLE = parameters()
 CLASSES = {
@@ -174,7 +174,7 @@ def test_unknown_names(name, message) -> None:
 
 def test_scopes_are_what_an_ensemble_shares() -> None:
     """Whatever is of scope run may differ inside one ensemble; the engines take it as a column."""
-    from snapbeam.engines.assemble import run_columns
+    from snapbeam.solver.assemble import run_columns
 
     laws = {
         "restitution": sb.Restitution(0.5),

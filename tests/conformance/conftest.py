@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
-from snapbeam.engines.answer import statistics_of
-from snapbeam.engines.assemble import make_ensemble
-from snapbeam.engines.ensemble import Ensemble
-from snapbeam.engines.registry import resolve
 from snapbeam.model.integration import ENGINES
+from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.registry import resolve
+from snapbeam.solver.statistics import statistics_of
+from snapbeam.util.validation import InputError
 
 
 @dataclass(frozen=True)

@@ -88,7 +88,7 @@ def plan_0_1(
     model: sb.ReducedModel, contact: Any, *, step: float | None = None, accuracy: str = "standard"
 ) -> Any:
     """The steps of version 0.1, by the constants that it had for the paper's beam."""
-    from snapbeam.engines.plan import Plan
+    from snapbeam.solver.step_size import Plan
 
     fastest = float(model.omega.max())
     stretch = float(model.well_amplitude @ model.well_amplitude)
@@ -112,7 +112,7 @@ def plan_0_1(
 
 def answer(case: dict[str, Any]) -> sb.Run:
     """The run of a case, with the steps of version 0.1."""
-    with mock.patch("snapbeam.engines.assemble.plan_steps", plan_0_1):
+    with mock.patch("snapbeam.solver.assemble.plan_steps", plan_0_1):
         return answer_with_own_steps(case)
 
 

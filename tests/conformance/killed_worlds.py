@@ -21,9 +21,9 @@ import zarr.storage  # noqa: F401  (loaded before the first fork)
 from worlds import WORLDS
 
 import snapbeam as sb
-from snapbeam.config.parameters import lookup, parameters
-from snapbeam.sweeps.compute.task import PointWork
-from snapbeam.sweeps.stored import CheckpointOptions
+from snapbeam.model.parameters import lookup, parameters
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions
+from snapbeam.sweeps.tasks import PointWork
 
 NOT_SWEPT = {
     "integration.engine": "which engine",

@@ -64,9 +64,9 @@ def integrate(
     system: sb.System, integration: sb.Integration, points: Mapping[str, Any], layout: str
 ) -> tuple[NDArray[Any], dict[str, NDArray[Any]]] | None:
     """Kernel records and statistics of an ensemble in one CPU layout; None if the layout does not support it."""
-    from snapbeam.engines.answer import statistics_of
-    from snapbeam.engines.assemble import make_ensemble
-    from snapbeam.engines.cpu import driver
+    from snapbeam.solver.assemble import make_ensemble
+    from snapbeam.solver.cpu import driver
+    from snapbeam.solver.statistics import statistics_of
 
     ensemble = make_ensemble(system, integration, points)
     before = driver.FEW_MODES, driver.FEWEST_STEPS
@@ -92,14 +92,14 @@ def model_arrays(model: sb.ReducedModel) -> list[NDArray[Any]]:
 
 
 def solver_fingerprint() -> str:
-    from snapbeam.engines.mark import solver_fingerprint
+    from snapbeam.solver.fingerprint import solver_fingerprint
 
     return solver_fingerprint()
 
 
 def command_app() -> Any:
     """The commands as a Typer application."""
-    from snapbeam.cli import app
+    from snapbeam.cli.app import app
 
     return app
 
@@ -392,8 +392,9 @@ def small_system(modes: int = 1, damping_ratio: float = 0.005, **drive: float) -
 
 
 PLANE = {"frequency_ratio": [0.8, 1.4], "velocity_amplitude": [0.06, 0.15, 0.3]}
-SPREAD = sb.ParameterUncertainty(
-    of={"location": sb.Normal(0.01), "contact.stiffness": sb.LogNormal(0.2)}, phase=True
+SPREAD = sb.uncertainty.ParameterUncertainty(
+    of={"location": sb.uncertainty.Normal(0.01), "contact.stiffness": sb.uncertainty.LogNormal(0.2)},
+    phase=True,
 )
 SHORT = sb.Integration(cycles=6, threads=1)
 
@@ -405,21 +406,23 @@ def quiet_system() -> sb.System:
 
 @cache
 def found_attractors() -> Any:
-    return sb.find_attractors(quiet_system(), 12, transient=300, integration=sb.Integration(threads=1))
+    return sb.dynamics.find_attractors(
+        quiet_system(), 12, transient=300, integration=sb.Integration(threads=1)
+    )
 
 
 def basins() -> xr.Dataset:
     grid = {"amplitude[1]": np.linspace(-1.6, 1.6, 6), "velocity[1]": np.linspace(-1.0, 1.0, 5)}
-    return sb.basins_of_attraction(found_attractors(), grid, periods=100)
+    return sb.dynamics.basins_of_attraction(found_attractors(), grid, periods=100)
 
 
 @cache
 def orbit() -> Any:
-    return sb.periodic_orbit(quiet_system(), transient=300)
+    return sb.dynamics.periodic_orbit(quiet_system(), transient=300)
 
 
 def branch() -> xr.Dataset:
-    return sb.continuation(orbit(), "velocity_amplitude", (0.02, 0.04), max_points=12).to_dataset()
+    return sb.dynamics.continuation(orbit(), "velocity_amplitude", (0.02, 0.04), max_points=12).to_dataset()
 
 
 def a_run() -> Any:
@@ -441,29 +444,29 @@ ANALYSES: dict[str, Callable[[], xr.Dataset]] = {
     "threshold": lambda: sb.threshold(
         small_system(), "velocity_amplitude", np.linspace(0.05, 0.4, 8), {"frequency_ratio": [0.8, 1.4]}, SHORT
     ),
-    "lifetimes": lambda: sb.lifetime_map(
+    "lifetimes": lambda: sb.dynamics.lifetime_map(
         small_system(), PLANE, sb.Integration(cycles=60, threads=1), initial_conditions=6, after=[3, 10]
     ),
     "attractors": lambda: found_attractors().to_dataset(),
     "basins": basins,
-    "bifurcation diagram": lambda: sb.bifurcation_diagram(
+    "bifurcation diagram": lambda: sb.dynamics.bifurcation_diagram(
         quiet_system(), "velocity_amplitude", [0.03, 0.05], sb.Integration(threads=1), periods=(20, 4), grazing=True
     ),
-    "Poincare section": lambda: sb.poincare_section(quiet_system(), periods=20, transient=10),
-    "Lyapunov exponents": lambda: sb.lyapunov_spectrum(small_system(3), 3, periods=20, transient=10),
-    "separation exponent": lambda: sb.largest_lyapunov(small_system(3), periods=20, transient=10),
+    "Poincare section": lambda: sb.dynamics.poincare_section(quiet_system(), periods=20, transient=10),
+    "Lyapunov exponents": lambda: sb.dynamics.lyapunov_spectrum(small_system(3), 3, periods=20, transient=10),
+    "separation exponent": lambda: sb.dynamics.largest_lyapunov(small_system(3), periods=20, transient=10),
     "branch": branch,
-    "probability map": lambda: sb.probability_map(small_system(), PLANE, SPREAD, 12, integration=SHORT),
-    "quantile threshold": lambda: sb.quantile_threshold(
-        small_system(), "velocity_amplitude", (0.05, 0.4), uncertainty=SPREAD, options=sb.QuantileSearchSettings(runs=120), integration=SHORT
+    "probability map": lambda: sb.uncertainty.probability_map(small_system(), PLANE, SPREAD, 12, integration=SHORT),
+    "quantile threshold": lambda: sb.uncertainty.quantile_threshold(
+        small_system(), "velocity_amplitude", (0.05, 0.4), uncertainty=SPREAD, options=sb.uncertainty.QuantileSearchSettings(runs=120), integration=SHORT
     ),
-    "sensitivity": lambda: sb.sensitivity(
-        small_system(), "peak_force", sb.ParameterUncertainty(of=SPREAD.of), samples=8, integration=SHORT
+    "sensitivity": lambda: sb.uncertainty.sensitivity(
+        small_system(), "peak_force", sb.uncertainty.ParameterUncertainty(of=SPREAD.of), samples=8, integration=SHORT
     ),
-    "design": lambda: sb.optimize_design(
+    "design": lambda: sb.uncertainty.optimize_design(
         small_system(), {"velocity_amplitude": (0.05, 0.4), "location": (0.3, 0.5)}, "speed",
-        sb.Constraint(quantity="snap", lower=0.8), SPREAD,
-        sb.OptimizerSettings(generations=2, population=6, samples=8, validation_samples=100, candidates=2), integration=SHORT,
+        sb.uncertainty.Constraint(quantity="snap", lower=0.8), SPREAD,
+        sb.uncertainty.OptimizerSettings(generations=2, population=6, samples=8, validation_samples=100, candidates=2), integration=SHORT,
     ),
 }  # fmt: skip
 

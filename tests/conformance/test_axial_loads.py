@@ -11,7 +11,7 @@ from oracle import PaperBeam
 from test_moving_base import ledger, model
 
 import snapbeam as sb
-from snapbeam.core.validate import InputError
+from snapbeam.util.validation import InputError
 
 
 @pytest.mark.slow

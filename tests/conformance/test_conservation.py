@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from snapbeam.core.codes import RunStatus
-from snapbeam.model.decision import RESERVE
+from snapbeam.model.early_termination import RESERVE
 from snapbeam.model.state import State
+from snapbeam.util.status_codes import RunStatus
 
 REGULAR = [(1.4, 0.02), (0.1, 0.05)]
 ELSEWHERE = [(1.21, 0.18), (1.625, 0.3), (3.0, 0.5), (0.5, 0.4)]

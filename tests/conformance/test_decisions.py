@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.core.codes import ResponseClass, RunStatus
+from snapbeam.util.status_codes import ResponseClass, RunStatus
 
 
 def compare(march, model, given, cycles: int) -> tuple[int, set[int]]:

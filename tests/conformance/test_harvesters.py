@@ -12,7 +12,7 @@ from test_moving_base import ledger, model
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
+from snapbeam.util.validation import InputError
 
 THETA, CAPACITANCE = 4e-3, 60e-9
 PIEZO = sb.PiezoelectricHarvester(
@@ -162,7 +162,7 @@ def test_sweep_of_the_load() -> None:
     beam = system.model
     loads = np.geomspace(2e3, 2e6, 7)
     found = sb.sweep(system, {"harvester.resistance": loads}, sb.Integration(cycles=150))
-    from snapbeam.model.world.base import rigid_mass
+    from snapbeam.model.base_excitation import rigid_mass
 
     theta = float((beam.linear_modes.T @ PIEZO.row(beam))[0])
     pull = float((beam.linear_modes.T @ rigid_mass(beam))[0])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from snapbeam import paper
-from snapbeam.model.galerkin.reduction import ReducedModel
+from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
 
 MASS, SPEED = 2.0e-3, 0.05

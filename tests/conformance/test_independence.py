@@ -7,9 +7,9 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.codes import RunStatus
-from snapbeam.model.galerkin.reduction import ReducedModel
+from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
+from snapbeam.util.status_codes import RunStatus
 
 
 def part_of(given: dict, which: np.ndarray) -> dict:
@@ -52,7 +52,7 @@ def test_runs_that_end_at_the_same_step(march, model_of, modes, runs) -> None:
 
 def test_runs_of_different_contact_are_what_they_are_alone(march, model_of) -> None:
     """A stiffness that differs between the runs of one ensemble: the steps suit each run's own."""
-    from snapbeam.engines.assemble import make_ensemble
+    from snapbeam.solver.assemble import make_ensemble
 
     stiffness = np.array([1e7, 4e8, 3e9])
     shaker = sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.25)

@@ -8,8 +8,8 @@ from oracle import LEVEL
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.scalar.tip import tip_motion
-from snapbeam.model.drive import Scale
+from snapbeam.model.drive.base import Scale
+from snapbeam.solver.excitation import tip_motion
 
 SHAKER = sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.15)
 

@@ -12,10 +12,10 @@ from world_oracle import Tip, follow
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
-from snapbeam.engines.registry import resolve
-from snapbeam.engines.scalar.composition import COMPOSITIONS, GENERAL
-from snapbeam.engines.scalar.losses import lossy_kick
+from snapbeam.solver.contact_force import lossy_kick
+from snapbeam.solver.registry import resolve
+from snapbeam.solver.splitting import COMPOSITIONS, GENERAL
+from snapbeam.util.validation import InputError
 
 MASS, SPEED = 2e-3, 0.05
 

@@ -11,8 +11,8 @@ from oracle import LEVEL, LOCATION, PaperBeam
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
-from snapbeam.engines.registry import resolve
+from snapbeam.solver.registry import resolve
+from snapbeam.util.validation import InputError
 
 SLOW = pytest.mark.slow
 
@@ -111,7 +111,7 @@ def test_small_motions_follow_the_linear_response() -> None:
     run = sb.simulate(system, sb.Integration(cycles=400, accuracy="reference"))
     data = run.dataset.isel(time=run.dataset.cycle.values > 395)
     swing = float(np.ptp(data.midspan_displacement.values)) / 2.0
-    from snapbeam.model.world.base import rigid_mass
+    from snapbeam.model.base_excitation import rigid_mass
 
     omega = beam.omega
     rows = (beam.linear_modes.T @ rigid_mass(beam)) * (beam.linear_modes.T @ beam.midspan_shape)

@@ -111,14 +111,14 @@ def test_sections_orbits_and_diagrams_begin_at_the_phase() -> None:
     system = system_of(("base",)).replace(**{"base_excitation.acceleration_amplitude": 0.02})
     exact = sb.Integration(accuracy="reference")
     flow = Stroboscope(system, exact)
-    section = sb.poincare(system, periods=PERIODS, transient=0, integration=exact)
+    section = sb.dynamics.poincare_section(system, periods=PERIODS, transient=0, integration=exact)
     wanted = advanced(system, flow, integration=exact)[:, :2] * flow.scales[:2]
     size = float(np.abs(wanted).max())
     np.testing.assert_allclose(section.modal_amplitude[1:], wanted, rtol=0.0, atol=1e-6 * size)
     turned = (section.drive_phase.values - PHASES["base"] + 1.0) % (2.0 * math.pi)
     np.testing.assert_allclose(turned, 1.0, atol=1e-9)
 
-    orbit = sb.periodic_orbit(system, transient=300)
+    orbit = sb.dynamics.periodic_orbit(system, transient=300)
     back = sb.advance(orbit.system, periods=1, integration=exact)
     np.testing.assert_allclose(back.amplitude, orbit.state.amplitude, rtol=0.0, atol=1e-8 * size)
 
@@ -149,7 +149,7 @@ def test_phases_that_would_be_ignored_are_refused() -> None:
         flow.coordinates(sb.State(amplitude=MODEL.equilibrium, phase=0.3))
     flow.coordinates(sb.State(amplitude=MODEL.equilibrium, phase=1.0 + 6.0 * math.pi))
     with pytest.raises(sb.InputError, match="state phase"):
-        sb.bifurcation_diagram(
+        sb.dynamics.bifurcation_diagram(
             system_of(("striker",)), "velocity_amplitude", [0.1, 0.2], sweeps=(),
-            starts=sb.Starts(count=2, phase=True), periods=(1, 2),
+            starts=sb.dynamics.InitialConditions(count=2, phase=True), periods=(1, 2),
         )  # fmt: skip

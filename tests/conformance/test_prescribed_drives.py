@@ -14,7 +14,7 @@ from world_oracle import Tip, differences, follow, missing
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.cpu.world.edges import Jump, jumps_of
+from snapbeam.solver.cpu.terms.discontinuities import Jump, jumps_of
 
 HERTZ = 4e8
 Motion = Callable[[float], tuple[float, float]]

@@ -15,7 +15,7 @@ from bouncing import Bouncer
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.plan import choose_base_step
+from snapbeam.solver.step_size import choose_base_step
 
 FINER = 16.0
 """Steps of level "reference" over those of the run that is taken for the truth."""

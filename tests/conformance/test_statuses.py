@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.core.codes import ResponseClass, RunStatus
-from snapbeam.core.validate import InputError
 from snapbeam.model.state import State
+from snapbeam.util.status_codes import ResponseClass, RunStatus
+from snapbeam.util.validation import InputError
 
 NOT_GIVEN = (
     "min_displacement",

@@ -11,8 +11,8 @@ from world_oracle import Tip, follow
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
-from snapbeam.engines.registry import resolve
+from snapbeam.solver.registry import resolve
+from snapbeam.util.validation import InputError
 
 HERTZ = 4e8
 

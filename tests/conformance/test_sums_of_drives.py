@@ -12,7 +12,7 @@ from several_oracle import Tip, apply_impact_law
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.scalar.tip import tip_motion
+from snapbeam.solver.excitation import tip_motion
 
 SINE = sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.1, phase=0.4)
 BURST = sb.Burst(frequency_ratio=2.3, velocity_amplitude=0.08, duration_cycles=3.0)

@@ -13,10 +13,10 @@ from world_oracle import Tip, follow
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.codes import RunStatus
-from snapbeam.core.validate import InputError
-from snapbeam.engines.assemble import make_ensemble
-from snapbeam.engines.registry import resolve
+from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.registry import resolve
+from snapbeam.util.status_codes import RunStatus
+from snapbeam.util.validation import InputError
 
 HERTZ = 4e8
 GIVEN = {

@@ -14,11 +14,12 @@ from killed_worlds import NOT_SWEPT
 from worlds import WORLDS, mirror_image
 
 import snapbeam as sb
-from snapbeam.config.parameters import parameters
-from snapbeam.core.codes import RunStatus
-from snapbeam.model.contact import LAWS
-from snapbeam.model.drive import DRIVES
-from snapbeam.model.world import HARVESTERS, LOADS
+from snapbeam.model.axial_load import LOADS
+from snapbeam.model.contact.base import LAWS
+from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.harvester import HARVESTERS
+from snapbeam.model.parameters import parameters
+from snapbeam.util.status_codes import RunStatus
 
 HERE = Path(__file__).parent
 MIRRORED = {

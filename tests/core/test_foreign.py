@@ -12,13 +12,12 @@ from typer.testing import CliRunner
 
 import snapbeam as sb
 from snapbeam.cli.app import app
-from snapbeam.config import Config
-from snapbeam.core.files import check_writable
-from snapbeam.core.foreign import foreign_files_kept, is_ours
-from snapbeam.core.netcdf import write_netcdf
-from snapbeam.core.validate import InputError
-from snapbeam.figures import save_figure
-from snapbeam.figures.animation import write_frames
+from snapbeam.model.parameter_file import Config
+from snapbeam.plot.animation import write_frames
+from snapbeam.plot.style import save_figure
+from snapbeam.util.files import check_writable, foreign_files_kept, is_ours
+from snapbeam.util.netcdf import write_netcdf
+from snapbeam.util.validation import InputError
 
 RUN = ["simulate", "--modes", "1", "--cycles", "3", "--quiet"]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.core.kinds import checked
+from snapbeam.util.validation import checked
 
 if TYPE_CHECKING:
     import xarray as xr

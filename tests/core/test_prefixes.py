@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from snapbeam.core.prefixes import prefixed, scale_of
+from snapbeam.util.si_prefixes import prefixed, scale_of
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,10 @@ from enum import IntEnum
 import numpy as np
 import pytest
 
-from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.provenance import __version__, canonical_json, command_line, made_by, parameter_hash
-from snapbeam.core.validate import InputError
+from snapbeam._version import __version__
+from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.provenance import canonical_json, command_line, made_by, parameter_hash
+from snapbeam.util.validation import InputError
 
 
 def test_no_paths_and_no_host():

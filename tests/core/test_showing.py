@@ -6,7 +6,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.reporting import counting, sharing
+from snapbeam.util.diagnostics import counting, sharing
 
 
 @pytest.fixture(scope="module")

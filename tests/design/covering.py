@@ -14,14 +14,12 @@ from typing import NamedTuple
 import numpy as np
 
 import snapbeam as sb
-from snapbeam.core.files import atomic_path
-from snapbeam.design.posterior.posterior import _population
-from snapbeam.design.probability.allocation import allocate
-from snapbeam.design.quantiles.isotonic import crossing
-from snapbeam.design.quantiles.local import local_crossing
-from snapbeam.design.quantiles.search import search
-from snapbeam.dynamics.lifetimes.survival import fit_lifetime
-from snapbeam.engines.mark import solver_fingerprint
+from snapbeam.dynamics.lifetimes import fit_lifetime
+from snapbeam.solver.fingerprint import solver_fingerprint
+from snapbeam.uncertainty.posterior import _population
+from snapbeam.uncertainty.probability import allocate
+from snapbeam.uncertainty.quantiles import crossing, local_crossing, search
+from snapbeam.util.files import atomic_path
 
 DATA = Path(__file__).parents[2] / "docs" / "data"
 TRIALS = 400
@@ -52,7 +50,7 @@ def proportions(method: str) -> Counted:
         hits = ranks.random(which.size) < truth[which]
         return np.stack([hits] * 4), np.zeros(which.size, dtype=bool)
 
-    allocation = sb.SamplingPlan(half_width=0.05, interval=method)
+    allocation = sb.uncertainty.SamplingPlan(half_width=0.05, interval=method)
     _, low, high = allocate(ask, truth.size, allocation).limits(allocation, 0)
     return Counted(truth.size, {"probability": float(((low <= truth) & (truth <= high)).mean())})
 
@@ -69,7 +67,7 @@ def thresholds() -> Counted:
             chance = 1.0 / (1.0 + np.exp(-(values - MIDDLE) / SCALE))
             return generator.random(values.size) < chance, np.zeros(values.size, dtype=bool)
 
-        runs = search(ask, 1, (0.0, 1.0), sb.QuantileSearchSettings(runs=400, seed=trial))[0]
+        runs = search(ask, 1, (0.0, 1.0), sb.uncertainty.QuantileSearchSettings(runs=400, seed=trial))[0]
         for i, level in enumerate(LEVELS):
             _, low, high = crossing(runs.values, runs.hits, level)
             held[trial, i] = low <= true[i] <= high
@@ -87,10 +85,10 @@ def _indices(given: bool) -> Counted:
     for seed in range(TRIALS):
         if given:
             ranks = np.random.default_rng(seed).random((2000, 3))
-            one = sb.sobol_indices_from_samples(ranks, ishigami(ranks.T), seed=seed)
+            one = sb.uncertainty.sobol_indices_from_samples(ranks, ishigami(ranks.T), seed=seed)
             held.append(np.concatenate([(one.low <= FIRST) & (FIRST <= one.high)]))
             continue
-        both = sb.sobol_indices(ishigami, 3, 16, seed=seed)
+        both = sb.uncertainty.sobol_indices(ishigami, 3, 16, seed=seed)
         parts = ((both.first, FIRST), (both.total, TOTAL))
         held.append(np.concatenate([(each.low <= truth) & (truth <= each.high) for each, truth in parts]))
     names = [f"{kind} {i + 1}" for kind in (("first",) if given else ("first", "total")) for i in range(3)]
@@ -101,8 +99,8 @@ def goals() -> Counted:
     """Mean and quantile of 200 normal numbers."""
     generator, found = np.random.default_rng(5), {}
     for name, goal, truth in (
-        ("mean", sb.Objective(quantity="peak_force"), 0.0),
-        ("quantile 0.9", sb.Objective(quantity="peak_force", quantile=0.9), 1.2815515655446004),
+        ("mean", sb.uncertainty.Objective(quantity="peak_force"), 0.0),
+        ("quantile 0.9", sb.uncertainty.Objective(quantity="peak_force", quantile=0.9), 1.2815515655446004),
     ):
         rows = np.array([goal.estimate(generator.standard_normal(200), 0, 0.95) for _ in range(5 * TRIALS)])
         found[name] = float(((rows[:, 1] <= truth) & (truth <= rows[:, 2])).mean())
@@ -141,7 +139,7 @@ def posterior() -> Counted:
             return np.concatenate([(frequencies(logs) - seen) / error, logs / known])
 
         logs, weights = _population(terms, np.zeros(2), 400, trial)
-        limits = sb.Posterior(("beam.thickness", "beam.buckling_level"), logs, weights).interval()
+        limits = sb.uncertainty.Posterior(("beam.thickness", "beam.buckling_level"), logs, weights).interval()
         held.append(
             [low <= value <= high for (_, low, high), value in zip(limits.values(), truth, strict=True)]
         )

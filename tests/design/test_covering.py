@@ -5,7 +5,7 @@ from __future__ import annotations
 import covering
 import pytest
 
-from snapbeam.engines.mark import solver_fingerprint
+from snapbeam.solver.fingerprint import solver_fingerprint
 
 
 @pytest.mark.parametrize("name", covering.stored())

@@ -8,10 +8,12 @@ from small import small_system
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
+from snapbeam.util.validation import InputError
 
 GAP = 0.1 * paper.BEAM.buckling_level
-SPREAD = sb.ParameterUncertainty(of={"velocity_amplitude": sb.Normal(0.02, relative=True)})
+SPREAD = sb.uncertainty.ParameterUncertainty(
+    of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)}
+)
 HOW = sb.Integration(cycles=3, threads=1)
 
 
@@ -25,7 +27,7 @@ def between_two() -> sb.System:
 def test_a_statistic_of_one() -> None:
     """The effect of the drive on the stop's peak force is the difference of the runs a score up and down."""
     system = between_two()
-    found = sb.sensitivity(system, "peak_force_striker_2", SPREAD, samples=2, integration=HOW)
+    found = sb.uncertainty.sensitivity(system, "peak_force_striker_2", SPREAD, samples=2, integration=HOW)
     speed = system.get("drive.velocity_amplitude")
     ends = [
         sb.simulate(system.replace(**{"drive.velocity_amplitude": speed * share}), HOW).summary
@@ -40,10 +42,10 @@ def test_a_statistic_of_one() -> None:
 def test_a_goal_and_a_limit_of_one() -> None:
     """The estimate is the mean over the draws of that striker's peak force, not of the greater of both."""
     goal, limit = (
-        sb.Objective(quantity="peak_force_striker_2"),
-        sb.Constraint(quantity="impacts_striker_1", lower=1.0, probability=0.5),
+        sb.uncertainty.Objective(quantity="peak_force_striker_2"),
+        sb.uncertainty.Constraint(quantity="impacts_striker_1", lower=1.0, probability=0.5),
     )
-    problem = sb.design_problem(
+    problem = sb.uncertainty.design_problem(
         between_two(), {"velocity_amplitude": (0.1, 0.3)}, goal, limit, SPREAD, integration=HOW, samples=8
     )
     numbers = np.arange(8)
@@ -56,15 +58,15 @@ def test_a_goal_and_a_limit_of_one() -> None:
 
 def test_who_is_not_there_is_refused() -> None:
     with pytest.raises(InputError, match="1 striker;"):
-        sb.sensitivity(small_system(), "peak_force_striker_2", SPREAD, integration=HOW)
+        sb.uncertainty.sensitivity(small_system(), "peak_force_striker_2", SPREAD, integration=HOW)
     with pytest.raises(InputError, match="2 strikers"):
-        sb.optimize_design(
+        sb.uncertainty.optimize_design(
             between_two(), {"velocity_amplitude": (0.1, 0.3)}, "peak_force_striker_3", [], SPREAD
         )
     with pytest.raises(InputError, match="no quantity"):
-        sb.Objective(quantity="peak_force_striker_5")
+        sb.uncertainty.Objective(quantity="peak_force_striker_5")
     with pytest.raises(InputError, match="statistic"):
-        sb.sensitivity(between_two(), "peak_force_striker_0", SPREAD, integration=HOW)
+        sb.uncertainty.sensitivity(between_two(), "peak_force_striker_0", SPREAD, integration=HOW)
 
 
 def test_they_are_told_in_words() -> None:

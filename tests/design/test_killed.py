@@ -16,33 +16,38 @@ import snapbeam as sb
 
 KILLS, CHUNK = 20, 2
 HOW = sb.Integration(cycles=20, threads=1)
-SPREAD = sb.ParameterUncertainty(
-    of={"velocity_amplitude": sb.Normal(0.05, relative=True)}, phase=True, displacement=3e-6
+SPREAD = sb.uncertainty.ParameterUncertainty(
+    of={"velocity_amplitude": sb.uncertainty.Normal(0.05, relative=True)}, phase=True, displacement=3e-6
 )
-WIDE = sb.ParameterUncertainty(
-    of={"location": sb.Normal(0.01), "contact.stiffness": sb.LogNormal(0.2)}, phase=True
+WIDE = sb.uncertainty.ParameterUncertainty(
+    of={"location": sb.uncertainty.Normal(0.01), "contact.stiffness": sb.uncertainty.LogNormal(0.2)},
+    phase=True,
 )
 
 
 def probability(store):
     axes = {"frequency_ratio": [0.8, 1.4], "velocity_amplitude": np.linspace(0.06, 0.3, 6)}
-    runs = sb.SamplingPlan(half_width=0.08, initial_runs=16, max_runs=160)
-    return sb.probability_map(small_system(), axes, SPREAD, runs, integration=HOW, checkpoint=store)
+    runs = sb.uncertainty.SamplingPlan(half_width=0.08, initial_runs=16, max_runs=160)
+    return sb.uncertainty.probability_map(
+        small_system(), axes, SPREAD, runs, integration=HOW, checkpoint=store
+    )
 
 
 def optimum(store):
-    effort = sb.OptimizerSettings(
+    effort = sb.uncertainty.OptimizerSettings(
         generations=6, population=6, samples=16, validation_samples=100, candidates=3
     )
     variables = {"velocity_amplitude": (0.05, 0.4), "location": (0.3, 0.5)}
-    limit = sb.Constraint(quantity="snap", lower=0.8)
-    return sb.optimize_design(
+    limit = sb.uncertainty.Constraint(quantity="snap", lower=0.8)
+    return sb.uncertainty.optimize_design(
         small_system(), variables, "speed", limit, SPREAD, effort, integration=HOW, checkpoint=store
     )
 
 
 def tornado(store):
-    return sb.sensitivity(small_system(), "peak_force", WIDE, samples=80, integration=HOW, checkpoint=store)
+    return sb.uncertainty.sensitivity(
+        small_system(), "peak_force", WIDE, samples=80, integration=HOW, checkpoint=store
+    )
 
 
 def kept(store: Path) -> int:

@@ -7,10 +7,12 @@ import pytest
 from small import small_system
 
 import snapbeam as sb
-from snapbeam.core.validate import InputError
-from snapbeam.design.optimum.evolution import front_of
+from snapbeam.uncertainty.differential_evolution import front_of
+from snapbeam.util.validation import InputError
 
-SPREAD = sb.ParameterUncertainty(of={"velocity_amplitude": sb.Normal(0.02, relative=True)})
+SPREAD = sb.uncertainty.ParameterUncertainty(
+    of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)}
+)
 HOW = sb.Integration(cycles=1, threads=1)
 
 
@@ -34,7 +36,7 @@ def test_better_than_as_many_random_designs() -> None:
     bounds = [(-1.0, 1.5)] * 3
     wins = 0
     for seed in range(20):
-        search = sb.DifferentialEvolution(bounds, 40, seed)
+        search = sb.uncertainty.DifferentialEvolution(bounds, 40, seed)
         for _ in range(50):
             goals, violation = noisy(search.ask())
             search.tell(goals, violation)
@@ -47,7 +49,7 @@ def test_better_than_as_many_random_designs() -> None:
 
 def test_a_front_is_found() -> None:
     """Two bowls: the front is the segment between their bottoms, and it is covered."""
-    search = sb.DifferentialEvolution([(-1.0, 2.0)] * 2, 40, 3)
+    search = sb.uncertainty.DifferentialEvolution([(-1.0, 2.0)] * 2, 40, 3)
     for _ in range(60):
         x = search.ask()
         goals = np.stack([np.sum(x**2, axis=1), np.sum((x - 1.0) ** 2, axis=1)], axis=1)
@@ -61,7 +63,10 @@ def test_a_front_is_found() -> None:
 
 
 def test_asking_again_changes_nothing() -> None:
-    one, two = sb.DifferentialEvolution([(0.0, 1.0)], 8), sb.DifferentialEvolution([(0.0, 1.0)], 8)
+    one, two = (
+        sb.uncertainty.DifferentialEvolution([(0.0, 1.0)], 8),
+        sb.uncertainty.DifferentialEvolution([(0.0, 1.0)], 8),
+    )
     for _ in range(4):
         np.testing.assert_array_equal(one.ask(), one.ask())
         np.testing.assert_array_equal(one.ask(), two.ask())
@@ -78,24 +83,24 @@ def test_the_quasi_static_optimum(tmp_path) -> None:
     It holds on fresh draws, its interval is said, and a second call computes nothing.
     """
     system = small_system(frequency_ratio=0.02, location=0.3)
-    effort = sb.OptimizerSettings(
+    effort = sb.uncertainty.OptimizerSettings(
         generations=8, population=8, samples=40, validation_samples=200, candidates=4
     )
     arguments = (
         system, {"velocity_amplitude": (0.005, 0.03)}, "velocity_amplitude",
-        sb.Constraint(quantity="snap", lower=0.9), SPREAD, effort,
+        sb.uncertainty.Constraint(quantity="snap", lower=0.9), SPREAD, effort,
     )  # fmt: skip
-    ds = sb.optimize_design(*arguments, integration=HOW, checkpoint=tmp_path / "store")
-    expected = float(sb.quasi_static_threshold(0.3, 0.02)) * 1.026
+    ds = sb.uncertainty.optimize_design(*arguments, integration=HOW, checkpoint=tmp_path / "store")
+    expected = float(sb.model.quasi_static_threshold(0.3, 0.02)) * 1.026
     assert float(ds["velocity_amplitude"][0]) == pytest.approx(expected, rel=0.08)
     assert int(ds["holds"][0]) in (1, 2)
     assert float(ds["kept_snap_low"][0]) >= 0.85 and float(ds["kept_snap"][0]) > 0.9
     tally = sb.SweepReport()
-    again = sb.optimize_design(
+    again = sb.uncertainty.optimize_design(
         *arguments, integration=HOW, checkpoint=sb.CheckpointOptions(tmp_path / "store", report=tally)
     )
     assert tally.runs == 0 and again.equals(ds)
-    fresh = sb.design_problem(*arguments[:5], integration=HOW).estimate(
+    fresh = sb.uncertainty.design_problem(*arguments[:5], integration=HOW).estimate(
         [float(ds["velocity_amplitude"][0])], np.arange(5 * 10**9, 5 * 10**9 + 200)
     )
     assert fresh.limits[0, 0] >= 0.87
@@ -106,8 +111,8 @@ def test_an_optimiser_of_ones_own() -> None:
     from scipy.optimize import minimize_scalar
 
     system = small_system(frequency_ratio=0.02, location=0.3)
-    problem = sb.design_problem(
-        system, {"velocity_amplitude": (0.005, 0.03)}, "speed", sb.Constraint(quantity="snap", lower=0.9), SPREAD,
+    problem = sb.uncertainty.design_problem(
+        system, {"velocity_amplitude": (0.005, 0.03)}, "speed", sb.uncertainty.Constraint(quantity="snap", lower=0.9), SPREAD,
         samples=16, integration=HOW,
     )  # fmt: skip
 
@@ -121,24 +126,24 @@ def test_an_optimiser_of_ones_own() -> None:
 
 def test_limits_of_the_design_itself_cost_no_run() -> None:
     system = small_system()
-    problem = sb.design_problem(
+    problem = sb.uncertainty.design_problem(
         system,
         {"velocity_amplitude": (0.05, 0.4)},
         "peak_force",
-        sb.Constraint(quantity="stroke", upper=1e-9),
+        sb.uncertainty.Constraint(quantity="stroke", upper=1e-9),
         SPREAD,
     )
     worth = problem.evaluate([[0.1], [0.3]])
     assert (worth.violation > 1.0).all() and (worth.runs == 0).all() and problem.trials.runs == 0
     scale = system.scale
-    stroke = sb.Objective(quantity="stroke")._quantity.of(
+    stroke = sb.uncertainty.Objective(quantity="stroke")._quantity.of(
         system, {"drive.velocity_amplitude": np.array([0.2])}
     )
     assert float(stroke[0]) == pytest.approx(0.2 * scale.length / 1.21)
     with pytest.raises(InputError, match="no design"):
-        sb.optimize_design(
-            system, {"velocity_amplitude": (0.05, 0.4)}, "speed", sb.Constraint(quantity="stroke", upper=1e-9), SPREAD,
-            sb.OptimizerSettings(generations=2, population=6),
+        sb.uncertainty.optimize_design(
+            system, {"velocity_amplitude": (0.05, 0.4)}, "speed", sb.uncertainty.Constraint(quantity="stroke", upper=1e-9), SPREAD,
+            sb.uncertainty.OptimizerSettings(generations=2, population=6),
         )  # fmt: skip
 
 
@@ -146,8 +151,8 @@ def test_intervals_of_goals_cover() -> None:
     """Mean and quantile of normal numbers: 95 % intervals hold the truth in 93 to 97 % of 2000 trials."""
     generator = np.random.default_rng(5)
     for goal, truth in (
-        (sb.Objective(quantity="peak_force"), 0.0),
-        (sb.Objective(quantity="peak_force", quantile=0.9), 1.2815515655446004),
+        (sb.uncertainty.Objective(quantity="peak_force"), 0.0),
+        (sb.uncertainty.Objective(quantity="peak_force", quantile=0.9), 1.2815515655446004),
     ):
         rows = np.array([goal.estimate(generator.standard_normal(200), 0, 0.95) for _ in range(2000)])
         assert 0.93 <= ((rows[:, 1] <= truth) & (truth <= rows[:, 2])).mean() <= 0.975
@@ -156,23 +161,25 @@ def test_intervals_of_goals_cover() -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: sb.Objective(quantity="peak_farce"), "no quantity"),
-        (lambda: sb.Objective(quantity="snap", quantile=0.5), "quantiles"),
-        (lambda: sb.Constraint(quantity="peak_force"), "at_least or at_most"),
-        (lambda: sb.Constraint(quantity="snap", upper=0.5), "at_least"),
-        (lambda: sb.OptimizerSettings(population=2), "population"),
-        (lambda: sb.optimize_design(small_system(), {}, "speed", [], SPREAD), "variables"),
+        (lambda: sb.uncertainty.Objective(quantity="peak_farce"), "no quantity"),
+        (lambda: sb.uncertainty.Objective(quantity="snap", quantile=0.5), "quantiles"),
+        (lambda: sb.uncertainty.Constraint(quantity="peak_force"), "at_least or at_most"),
+        (lambda: sb.uncertainty.Constraint(quantity="snap", upper=0.5), "at_least"),
+        (lambda: sb.uncertainty.OptimizerSettings(population=2), "population"),
+        (lambda: sb.uncertainty.optimize_design(small_system(), {}, "speed", [], SPREAD), "variables"),
         (
-            lambda: sb.optimize_design(small_system(), {"modes": (1, 2)}, "speed", [], SPREAD),
+            lambda: sb.uncertainty.optimize_design(small_system(), {"modes": (1, 2)}, "speed", [], SPREAD),
             "cannot be chosen",
         ),
         (
-            lambda: sb.optimize_design(small_system(), {"location": (0.5, 0.2)}, "speed", [], SPREAD),
+            lambda: sb.uncertainty.optimize_design(
+                small_system(), {"location": (0.5, 0.2)}, "speed", [], SPREAD
+            ),
             "less than high",
         ),
         (
-            lambda: sb.optimize_design(
-                small_system(), {"location": (0.2, 0.5)}, "speed", [], sb.ParameterUncertainty()
+            lambda: sb.uncertainty.optimize_design(
+                small_system(), {"location": (0.2, 0.5)}, "speed", [], sb.uncertainty.ParameterUncertainty()
             ),
             "nothing differs",
         ),

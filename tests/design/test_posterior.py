@@ -9,10 +9,10 @@ from small import small_system
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
-from snapbeam.figures import MeasuredPoints
-from snapbeam.lab.calibration.calibrate import calibrate
-from snapbeam.lab.calibration.measurements import ContactTest, Measurements
+from snapbeam.lab.calibration import calibrate
+from snapbeam.sweeps.measured_points import MeasuredPoints
+from snapbeam.uncertainty.measurements import ContactTest, Measurements
+from snapbeam.util.validation import InputError
 
 PRIOR = {"thickness": 0.1, "buckling_level": 0.1}
 
@@ -34,7 +34,7 @@ def measured_of(beam, modes: int = 2, error: float = 0.003, draw=None) -> Measur
 def test_it_is_that_of_the_linear_fit() -> None:
     """Small errors: medians and widths agree with those of least squares."""
     measured = measured_of(paper.BEAM)
-    found = sb.estimate_posterior(measured, paper.BEAM, PRIOR, modes=2, samples=400)
+    found = sb.uncertainty.estimate_posterior(measured, paper.BEAM, PRIOR, modes=2, samples=400)
     fit = calibrate(measured, paper.BEAM, modes=2)
     assert found.effective_sample_size > 200.0 and not found.is_doubtful
     for name in PRIOR:
@@ -50,9 +50,9 @@ def test_it_is_that_of_the_linear_fit() -> None:
 def test_what_the_data_do_not_say_stays_as_it_was() -> None:
     """Density and modulus come in as a ratio: their product is as uncertain as before."""
     prior = {"young_modulus": 0.05, "density": 0.05}
-    found = sb.estimate_posterior(measured_of(paper.BEAM), paper.BEAM, prior, modes=2, samples=500).resampled(
-        500
-    )
+    found = sb.uncertainty.estimate_posterior(
+        measured_of(paper.BEAM), paper.BEAM, prior, modes=2, samples=500
+    ).resampled(500)
     ratio = np.log(found.values[:, 0] / found.values[:, 1])
     product = np.log(found.values[:, 0] * found.values[:, 1])
     assert ratio.std() < 0.01 and product.std() == pytest.approx(0.05 * np.sqrt(2.0), rel=0.2)
@@ -67,10 +67,10 @@ def test_intervals_cover() -> None:
 
 @pytest.mark.slow
 def test_what_follows_is_drawn_from_it() -> None:
-    found = sb.estimate_posterior(
+    found = sb.uncertainty.estimate_posterior(
         measured_of(paper.BEAM, error=0.02), paper.BEAM, PRIOR, modes=2, samples=400
     )
-    spread = found.spread(of={"velocity_amplitude": sb.Normal(0.02, relative=True)})
+    spread = found.spread(of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)})
     scores = spread.normals(np.arange(2000))
     for j, name in enumerate(found.parameters):
         values = spread.of[name].at(np.zeros(2000), scores[:, j])
@@ -79,23 +79,25 @@ def test_what_follows_is_drawn_from_it() -> None:
         assert (values < low).mean() == pytest.approx(0.025, abs=0.015)
     held = sb.Integration(cycles=2, threads=1)
     axes = {"velocity_amplitude": [0.02, 0.5]}
-    ds = sb.probability_map(small_system(2), axes, spread, 12, integration=held)
+    ds = sb.uncertainty.probability_map(small_system(2), axes, spread, 12, integration=held)
     assert (ds["runs"] == 12).all() and float(ds["probability"].sel(outcome="snap")[1]) == 1.0
 
 
 def test_classes_weigh_samples() -> None:
     """A dot that snapped speaks for the beam that snaps there."""
     values = np.array([[0.8], [1.25]]) * paper.BEAM.buckling_level
-    found = sb.Posterior(("beam.buckling_level",), values, np.array([0.5, 0.5]))
+    found = sb.uncertainty.Posterior(("beam.buckling_level",), values, np.array([0.5, 0.5]))
     system = small_system(frequency_ratio=0.02, location=0.4)
-    limit = float(sb.quasi_static_threshold(0.4, 0.02))
+    limit = float(sb.model.quasi_static_threshold(0.4, 0.02))
     one = MeasuredPoints(
         np.array([0.02]), np.array([1.02 * limit]), np.array([0.4]), np.array([2], dtype=np.int8)
     )
-    spread = sb.ParameterUncertainty(
-        of={"velocity_amplitude": sb.Normal(0.01, relative=True)}, hold_fixed="ratios"
+    spread = sb.uncertainty.ParameterUncertainty(
+        of={"velocity_amplitude": sb.uncertainty.Normal(0.01, relative=True)}, hold_fixed="ratios"
     )
-    likelihood = sb.class_likelihood(found, system, one, spread, runs=8, integration=sb.Integration(cycles=1))
+    likelihood = sb.uncertainty.class_likelihood(
+        found, system, one, spread, runs=8, integration=sb.Integration(cycles=1)
+    )
     assert likelihood.shape == (2,) and (likelihood < 0.0).all()
     np.testing.assert_allclose(found.updated([0.0, np.log(3.0)]).weights, [0.25, 0.75])
     assert found.updated([0.0, 0.0]).is_doubtful
@@ -106,8 +108,8 @@ def test_classes_weigh_samples() -> None:
 def test_refusals() -> None:
     measured = measured_of(paper.BEAM)
     with pytest.raises(InputError, match="must be one of"):
-        sb.estimate_posterior(measured, paper.BEAM, {"width": 0.1})
+        sb.uncertainty.estimate_posterior(measured, paper.BEAM, {"width": 0.1})
     with pytest.raises(InputError, match="prior"):
-        sb.estimate_posterior(measured, paper.BEAM, {})
+        sb.uncertainty.estimate_posterior(measured, paper.BEAM, {})
     with pytest.raises(InputError, match="straight_frequencies_se"):
-        sb.estimate_posterior(Measurements(straight_frequencies=[30.0]), paper.BEAM, PRIOR)
+        sb.uncertainty.estimate_posterior(Measurements(straight_frequencies=[30.0]), paper.BEAM, PRIOR)

@@ -8,16 +8,15 @@ from scipy import stats
 from small import small_system
 
 import snapbeam as sb
-from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError
-from snapbeam.design.events import OUTCOMES
-from snapbeam.design.probability.allocation import allocate
-from snapbeam.design.probability.dots import class_counts
-from snapbeam.design.proportion import interval_of, wilson
-from snapbeam.figures import MeasuredPoints
+from snapbeam.sweeps.measured_points import MeasuredPoints
+from snapbeam.uncertainty.measured_classes import class_counts
+from snapbeam.uncertainty.monte_carlo import OUTCOMES, interval_of, wilson
+from snapbeam.uncertainty.probability import allocate
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError
 
-SPREAD = sb.ParameterUncertainty(
-    of={"velocity_amplitude": sb.Normal(0.05, relative=True)}, phase=True, displacement=3e-6
+SPREAD = sb.uncertainty.ParameterUncertainty(
+    of={"velocity_amplitude": sb.uncertainty.Normal(0.05, relative=True)}, phase=True, displacement=3e-6
 )
 AXES = {"frequency_ratio": [0.8, 1.4], "velocity_amplitude": np.linspace(0.06, 0.3, 4)}
 HOW = sb.Integration(cycles=20, threads=1)
@@ -47,7 +46,7 @@ def test_wilson_is_scipys() -> None:
 def test_sequential_intervals_cover(method: str) -> None:
     """400 points of probabilities spread over (0, 1): 93 to 97 % of the intervals hold them though runs stop early."""
     truth = (np.arange(400) + 0.5) / 400.0
-    allocation = sb.SamplingPlan(half_width=0.1, interval=method)
+    allocation = sb.uncertainty.SamplingPlan(half_width=0.1, interval=method)
     counts = allocate(coin(truth), 400, allocation)
     _, low, high = counts.limits(allocation, 0)
     assert 0.93 <= ((low <= truth) & (truth <= high)).mean() <= 0.97
@@ -59,7 +58,7 @@ def test_half_the_runs_of_a_uniform_map() -> None:
     """Steep borders, as of a response map: a half width of 0.05 everywhere for at most half the runs; both agree."""
     v, steep = np.linspace(0.0, 1.0, 60), 25.0
     truth = np.concatenate([1.0 / (1.0 + np.exp(-steep * (v - border))) for border in (0.3, 0.55, 0.8)])
-    sequential = sb.SamplingPlan(half_width=0.05)
+    sequential = sb.uncertainty.SamplingPlan(half_width=0.05)
     counts = allocate(coin(truth), truth.size, sequential)
     _, low, high = counts.limits(sequential, 0)
     assert (0.5 * (high - low)).max() <= 0.05
@@ -67,7 +66,7 @@ def test_half_the_runs_of_a_uniform_map() -> None:
     while np.diff(np.ravel(wilson(needed // 2, needed)[1:]))[0] > 0.1:
         needed += 1
     assert counts.runs.sum() <= 0.5 * needed * truth.size
-    uniform = sb.SamplingPlan(half_width=None, initial_runs=needed)
+    uniform = sb.uncertainty.SamplingPlan(half_width=None, initial_runs=needed)
     other = allocate(coin(truth, seed=1), truth.size, uniform)
     _, below, above = other.limits(uniform, 0)
     assert ((below <= high) & (low <= above)).mean() >= 0.97
@@ -75,7 +74,9 @@ def test_half_the_runs_of_a_uniform_map() -> None:
 
 def test_a_total_is_kept_and_told() -> None:
     truth = np.linspace(0.01, 0.99, 50)
-    counts = allocate(coin(truth), 50, sb.SamplingPlan(half_width=0.1, initial_runs=16, total_runs=2000))
+    counts = allocate(
+        coin(truth), 50, sb.uncertainty.SamplingPlan(half_width=0.1, initial_runs=16, total_runs=2000)
+    )
     assert counts.runs.sum() == 2000
     assert counts.open.any() and not counts.open.all()
 
@@ -90,22 +91,24 @@ def test_failed_runs_widen_the_interval() -> None:
 
 def test_map_of_a_beam() -> None:
     """Outcomes add up, threads and resumption change nothing, and a beam driven hard snaps."""
-    runs = sb.SamplingPlan(half_width=0.15, initial_runs=16, max_runs=64)
-    ds = sb.probability_map(small_system(), AXES, SPREAD, runs, integration=HOW)
+    runs = sb.uncertainty.SamplingPlan(half_width=0.15, initial_runs=16, max_runs=64)
+    ds = sb.uncertainty.probability_map(small_system(), AXES, SPREAD, runs, integration=HOW)
     assert ds["probability"].dims == ("frequency_ratio", "velocity_amplitude", "outcome")
     ends = ds["hits"].sel(outcome=["continuous", "first_well", "other_well"]).sum("outcome")
     assert (ends == ds["runs"]).all() and (ds["runs_failed"] == 0).all()
     snap = ds["probability"].sel(outcome="snap")
     assert (snap.isel(velocity_amplitude=-1) == 1.0).all() and (snap.isel(velocity_amplitude=0) < 0.5).all()
     assert ds["reached"].all() and ds.attrs["runs_made"] == int(ds["runs"].sum())
-    two = sb.probability_map(small_system(), AXES, SPREAD, runs, integration=HOW.replace(threads=2))
+    two = sb.uncertainty.probability_map(
+        small_system(), AXES, SPREAD, runs, integration=HOW.replace(threads=2)
+    )
     assert two["hits"].equals(ds["hits"])
 
 
 def test_a_map_is_resumed_after_being_killed(tmp_path) -> None:
     """Killed after every point in turn: nothing is computed twice, and what comes out is what an unbroken map gives."""
-    runs = sb.SamplingPlan(half_width=0.15, initial_runs=16, max_runs=64)
-    whole = sb.probability_map(small_system(), AXES, SPREAD, runs, integration=HOW)
+    runs = sb.uncertainty.SamplingPlan(half_width=0.15, initial_runs=16, max_runs=64)
+    whole = sb.uncertainty.probability_map(small_system(), AXES, SPREAD, runs, integration=HOW)
     store, seen = tmp_path / "map", 0
 
     class Killed(Exception):
@@ -121,7 +124,7 @@ def test_a_map_is_resumed_after_being_killed(tmp_path) -> None:
 
         keeping = sb.CheckpointOptions(store, points_per_task=16, report=tally)
         try:
-            found = sb.probability_map(
+            found = sb.uncertainty.probability_map(
                 small_system(), AXES, SPREAD, runs, integration=HOW, checkpoint=keeping, progress=kill
             )
             break
@@ -130,7 +133,7 @@ def test_a_map_is_resumed_after_being_killed(tmp_path) -> None:
     assert seen >= 3
     assert found["hits"].equals(whole["hits"]) and found["runs"].equals(whole["runs"])
     tally = sb.SweepReport()
-    sb.probability_map(
+    sb.uncertainty.probability_map(
         small_system(),
         AXES,
         SPREAD,
@@ -140,14 +143,14 @@ def test_a_map_is_resumed_after_being_killed(tmp_path) -> None:
     )
     assert tally.runs == 0
     with pytest.raises(InputError):
-        other = sb.ParameterUncertainty(of=SPREAD.of, phase=True, displacement=3e-6, seed=9)
-        sb.probability_map(small_system(), AXES, other, runs, integration=HOW, checkpoint=store)
+        other = sb.uncertainty.ParameterUncertainty(of=SPREAD.of, phase=True, displacement=3e-6, seed=9)
+        sb.uncertainty.probability_map(small_system(), AXES, other, runs, integration=HOW, checkpoint=store)
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"spread": sb.ParameterUncertainty()}, "nothing differs"),
+        ({"spread": sb.uncertainty.ParameterUncertainty()}, "nothing differs"),
         ({"runs": 0}, "first"),
         ({"runs": "many"}, "Allocation"),
         ({"axes": {}}, "at least one parameter"),
@@ -157,12 +160,12 @@ def test_a_map_is_resumed_after_being_killed(tmp_path) -> None:
 def test_refusals(change, words: str) -> None:
     given = {"system": small_system(), "axes": AXES, "spread": SPREAD, "runs": 16} | change
     with pytest.raises(InputError, match=words):
-        sb.probability_map(**given)
+        sb.uncertainty.probability_map(**given)
 
 
 def test_dots_are_judged_by_their_likelihood() -> None:
     """Dots drawn from a map agree with it, dots of one class everywhere do not."""
-    ds = sb.probability_map(small_system(), AXES, SPREAD, 60, integration=HOW)
+    ds = sb.uncertainty.probability_map(small_system(), AXES, SPREAD, 60, integration=HOW)
     counts = class_counts(ds)
     assert (counts.sum(axis=-1) == 60).all()
     generator = np.random.default_rng(2)
@@ -170,12 +173,14 @@ def test_dots_are_judged_by_their_likelihood() -> None:
     share = counts.reshape(-1, 4) / 60.0
     drawn = np.array([generator.choice(4, p=row / row.sum()) for row in share], dtype=np.int8)
     place = np.full(drawn.size, np.nan)
-    good = sb.score_measurements(ds, MeasuredPoints(omega.ravel(), v.ravel(), place, drawn))
+    good = sb.uncertainty.score_measurements(ds, MeasuredPoints(omega.ravel(), v.ravel(), place, drawn))
     assert good.attrs["p_value"] > 0.01
     low, high = good.attrs["log_likelihood_low"], good.attrs["log_likelihood_high"]
     assert low <= good.attrs["log_likelihood"] <= high
     never = np.full(drawn.size, ResponseClass.TRANSIENT_1, dtype=np.int8)
-    bad = sb.score_measurements(ds, MeasuredPoints(omega.ravel(), v.ravel(), place, never))
+    bad = sb.uncertainty.score_measurements(ds, MeasuredPoints(omega.ravel(), v.ravel(), place, never))
     assert bad.attrs["p_value"] < 0.01 and bad.attrs["agree"] < good.attrs["agree"]
     with pytest.raises(InputError, match="outside"):
-        sb.score_measurements(ds, MeasuredPoints(np.array([3.0]), np.array([0.1]), place[:1], never[:1]))
+        sb.uncertainty.score_measurements(
+            ds, MeasuredPoints(np.array([3.0]), np.array([0.1]), place[:1], never[:1])
+        )

@@ -7,10 +7,8 @@ import pytest
 from small import small_system
 
 import snapbeam as sb
-from snapbeam.core.validate import InputError
-from snapbeam.design.quantiles.isotonic import critical, crossing, isotonic, rises, spans
-from snapbeam.design.quantiles.local import local_crossing
-from snapbeam.design.quantiles.search import search
+from snapbeam.uncertainty.quantiles import critical, crossing, isotonic, local_crossing, rises, search, spans
+from snapbeam.util.validation import InputError
 
 LEVELS = np.array([0.05, 0.5, 0.95])
 MIDDLE, SCALE = 0.4, 0.05
@@ -27,7 +25,9 @@ def runs_of(truth, seed: int, runs: int, rounds: int = 4):
     def ask(columns, values, numbers):
         return generator.random(values.size) < truth(values), np.zeros(values.size, dtype=bool)
 
-    return search(ask, 1, (0.0, 1.0), sb.QuantileSearchSettings(runs=runs, rounds=rounds, seed=seed))[0]
+    return search(
+        ask, 1, (0.0, 1.0), sb.uncertainty.QuantileSearchSettings(runs=runs, rounds=rounds, seed=seed)
+    )[0]
 
 
 def test_the_limiting_distribution_is_that_of_single_runs() -> None:
@@ -102,19 +102,21 @@ def test_falling_is_seen_and_told() -> None:
 def test_the_quasi_static_threshold() -> None:
     """One mode at Omega = 0.02: every quantile is V_QS1 within 2 %, less what the beam's inertia takes off it."""
     place = np.array([0.25, 0.4, 0.5])
-    ds = sb.quantile_threshold(
+    ds = sb.uncertainty.quantile_threshold(
         small_system(frequency_ratio=0.02), "velocity_amplitude", (1e-4, 0.03), {"location": place},
-        options=sb.QuantileSearchSettings(runs=120), integration=sb.Integration(cycles=1, threads=1),
+        options=sb.uncertainty.QuantileSearchSettings(runs=120), integration=sb.Integration(cycles=1, threads=1),
     )  # fmt: skip
-    expected = sb.quasi_static_threshold(place, 0.02)
+    expected = sb.model.quasi_static_threshold(place, 0.02)
     np.testing.assert_allclose(ds["threshold"].sel(quantile=0.5), expected, rtol=0.03)
     assert ds["monotone"].all() and (ds["outcome_of_search"] == 0).all()
     assert (ds["threshold_low"] <= ds["threshold"]).all() and (ds["threshold"] <= ds["threshold_high"]).all()
 
 
 def test_tolerances_spread_the_threshold(tmp_path) -> None:
-    spread = sb.ParameterUncertainty(of={"velocity_amplitude": sb.Normal(0.1, relative=True)})
-    how, run = sb.QuantileSearchSettings(runs=120), sb.Integration(cycles=10, threads=1)
+    spread = sb.uncertainty.ParameterUncertainty(
+        of={"velocity_amplitude": sb.uncertainty.Normal(0.1, relative=True)}
+    )
+    how, run = sb.uncertainty.QuantileSearchSettings(runs=120), sb.Integration(cycles=10, threads=1)
     arguments = (
         small_system(),
         "velocity_amplitude",
@@ -123,21 +125,21 @@ def test_tolerances_spread_the_threshold(tmp_path) -> None:
         spread,
         how,
     )
-    ds = sb.quantile_threshold(*arguments, integration=run, checkpoint=tmp_path / "store")
+    ds = sb.uncertainty.quantile_threshold(*arguments, integration=run, checkpoint=tmp_path / "store")
     assert (np.diff(ds["threshold"], axis=-1) > 0.0).all()
-    again = sb.quantile_threshold(
+    again = sb.uncertainty.quantile_threshold(
         *arguments, integration=run.replace(threads=2), checkpoint=tmp_path / "store"
     )
     assert again.equals(ds)
-    sure = sb.quantile_threshold(*arguments[:4], options=how, integration=run)
+    sure = sb.uncertainty.quantile_threshold(*arguments[:4], options=how, integration=run)
     np.testing.assert_allclose(
         ds["threshold"].sel(quantile=0.5), sure["threshold"].sel(quantile=0.5), rtol=0.1
     )
 
 
 def test_out_of_range_is_told() -> None:
-    ds = sb.quantile_threshold(
-        small_system(), "velocity_amplitude", (1e-4, 1e-3), options=sb.QuantileSearchSettings(runs=120),
+    ds = sb.uncertainty.quantile_threshold(
+        small_system(), "velocity_amplitude", (1e-4, 1e-3), options=sb.uncertainty.QuantileSearchSettings(runs=120),
         integration=sb.Integration(cycles=3),
     )  # fmt: skip
     assert (ds["outcome_of_search"] == 1).all() and ds["threshold"].isnull().all()
@@ -158,8 +160,8 @@ def test_out_of_range_is_told() -> None:
 def test_refusals(change, words: str) -> None:
     given = {"system": small_system(), "along": "velocity_amplitude", "between": (0.01, 0.3)} | change
     with pytest.raises(InputError, match=words):
-        sb.quantile_threshold(**given)
+        sb.uncertainty.quantile_threshold(**given)
     with pytest.raises(InputError):
-        sb.QuantileSearchSettings(runs=20)
+        sb.uncertainty.QuantileSearchSettings(runs=20)
     with pytest.raises(InputError):
-        sb.QuantileSearchSettings(probabilities=(0.5, 0.2))
+        sb.uncertainty.QuantileSearchSettings(probabilities=(0.5, 0.2))

@@ -8,7 +8,7 @@ import pytest
 from small import small_system
 
 import snapbeam as sb
-from snapbeam.core.validate import InputError
+from snapbeam.util.validation import InputError
 
 A, B = 7.0, 0.1
 VARIANCE = A**2 / 8.0 + B * np.pi**4 / 5.0 + B**2 * np.pi**8 / 18.0 + 0.5
@@ -25,12 +25,12 @@ def ishigami(ranks):
 def test_ishigami() -> None:
     """0.314, 0.442 and 0, within the intervals of both estimates; at 99 %, since there are nine of them."""
     np.testing.assert_allclose(FIRST, [0.314, 0.442, 0.0], atol=5e-4)
-    found = sb.sobol_indices(ishigami, 3, 128, confidence=0.99)
+    found = sb.uncertainty.sobol_indices(ishigami, 3, 128, confidence=0.99)
     for indices, truth in ((found.first, FIRST), (found.total, TOTAL)):
         assert (indices.low <= truth).all() and (truth <= indices.high).all()
         assert (indices.high - indices.low < 0.2).all()
     ranks = np.random.default_rng(4).random((4000, 3))
-    given = sb.sobol_indices_from_samples(ranks, ishigami(ranks.T), confidence=0.99)
+    given = sb.uncertainty.sobol_indices_from_samples(ranks, ishigami(ranks.T), confidence=0.99)
     assert (given.low <= FIRST).all() and (FIRST <= given.high).all()
     assert (given.high - given.low < 0.2).all()
 
@@ -48,19 +48,19 @@ def test_correlated_inputs_are_no_trouble_for_given_data() -> None:
     """y = x1 with x2 correlated by 0.8: the first has all of the variance, the second 0.64 of it."""
     generator = np.random.default_rng(3)
     x = generator.multivariate_normal([0.0, 0.0], [[1.0, 0.8], [0.8, 1.0]], 6000)
-    found = sb.sobol_indices_from_samples(x, x[:, 0])
+    found = sb.uncertainty.sobol_indices_from_samples(x, x[:, 0])
     np.testing.assert_allclose(found.estimate, [1.0, 0.64], atol=0.05)
 
 
 def test_the_quasi_static_threshold_moves_with_the_location() -> None:
     """At Omega = 0.02 V_QS1 = Omega sin^2(pi x_s): the derivative is known, and damping has no part in it."""
     system = small_system(frequency_ratio=0.02, location=0.3)
-    of = {"location": sb.Normal(0.005), "model.damping_ratio": sb.LogNormal(0.1)}
-    answer = sb.ThresholdQoI(bounds=(0.005, 0.02), values=9, halvings=6)
-    ds = sb.sensitivity(
+    of = {"location": sb.uncertainty.Normal(0.005), "model.damping_ratio": sb.uncertainty.LogNormal(0.1)}
+    answer = sb.uncertainty.ThresholdQoI(bounds=(0.005, 0.02), values=9, halvings=6)
+    ds = sb.uncertainty.sensitivity(
         system,
         answer,
-        sb.ParameterUncertainty(of=of),
+        sb.uncertainty.ParameterUncertainty(of=of),
         samples=2,
         integration=sb.Integration(cycles=1, threads=1),
     )
@@ -73,19 +73,23 @@ def test_the_quasi_static_threshold_moves_with_the_location() -> None:
 def test_refusals() -> None:
     system, spread = (
         small_system(),
-        sb.ParameterUncertainty(of={"location": sb.Normal(0.001), "contact.stiffness": sb.LogNormal(0.1)}),
+        sb.uncertainty.ParameterUncertainty(
+            of={"location": sb.uncertainty.Normal(0.001), "contact.stiffness": sb.uncertainty.LogNormal(0.1)}
+        ),
     )
     with pytest.raises(InputError, match="no parameter"):
-        sb.sensitivity(system, "peak_force", sb.ParameterUncertainty(displacement=1e-6))
+        sb.uncertainty.sensitivity(
+            system, "peak_force", sb.uncertainty.ParameterUncertainty(displacement=1e-6)
+        )
     with pytest.raises(InputError, match="statistic"):
-        sb.sensitivity(system, "peak", spread)
-    tied = sb.ParameterUncertainty(of=spread.of, correlation=[[1.0, 0.5], [0.5, 1.0]])
+        sb.uncertainty.sensitivity(system, "peak", spread)
+    tied = sb.uncertainty.ParameterUncertainty(of=spread.of, correlation=[[1.0, 0.5], [0.5, 1.0]])
     with pytest.raises(InputError, match="given_data"):
-        sb.sensitivity(system, "peak_force", tied, "sobol")
-    far = sb.ThresholdQoI(bounds=(1e-4, 2e-4), values=2, halvings=0)
+        sb.uncertainty.sensitivity(system, "peak_force", tied, "sobol")
+    far = sb.uncertainty.ThresholdQoI(bounds=(1e-4, 2e-4), values=2, halvings=0)
     with pytest.raises(InputError, match="is not there"):
-        sb.sensitivity(system, far, spread, samples=2, integration=sb.Integration(cycles=1))
+        sb.uncertainty.sensitivity(system, far, spread, samples=2, integration=sb.Integration(cycles=1))
     with pytest.raises(InputError, match="at least 200"):
-        sb.sobol_indices_from_samples(np.zeros((10, 2)), np.zeros(10))
+        sb.uncertainty.sobol_indices_from_samples(np.zeros((10, 2)), np.zeros(10))
     with pytest.raises(InputError, match="power of 2"):
-        sb.sobol_indices(ishigami, 3, 100)
+        sb.uncertainty.sobol_indices(ishigami, 3, 100)

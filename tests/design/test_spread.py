@@ -9,19 +9,21 @@ import pytest
 from small import small_system
 
 import snapbeam as sb
-from snapbeam.core.validate import InputError
-from snapbeam.design.spread import spread_from_mapping
-from snapbeam.design.trials import trials_of
+from snapbeam.uncertainty.distributions import spread_from_mapping
+from snapbeam.uncertainty.monte_carlo import trials_of
+from snapbeam.util.validation import InputError
 
 NUMBERS = np.arange(4000)
 
 
 def test_draws_hang_on_their_number_alone() -> None:
-    spread = sb.ParameterUncertainty(
-        of={"contact.stiffness": sb.LogNormal(0.2), "location": sb.Normal(1e-3)}, seed=3
+    spread = sb.uncertainty.ParameterUncertainty(
+        of={"contact.stiffness": sb.uncertainty.LogNormal(0.2), "location": sb.uncertainty.Normal(1e-3)},
+        seed=3,
     )
-    turned = sb.ParameterUncertainty(
-        of={"location": sb.Normal(1e-3), "contact.stiffness": sb.LogNormal(0.2)}, seed=3
+    turned = sb.uncertainty.ParameterUncertainty(
+        of={"location": sb.uncertainty.Normal(1e-3), "contact.stiffness": sb.uncertainty.LogNormal(0.2)},
+        seed=3,
     )
     whole = spread.normals(NUMBERS[:50])
     np.testing.assert_array_equal(spread.normals(np.array([41, 7, 41])), whole[[41, 7, 41]])
@@ -31,15 +33,19 @@ def test_draws_hang_on_their_number_alone() -> None:
 @pytest.mark.parametrize(
     ("each", "mean", "sd"),
     [
-        (sb.Normal(0.02, relative=True), 0.2, 0.004),
-        (sb.Normal(0.01), 0.2, 0.01),
-        (sb.UniformTolerance(0.1, relative=True), 0.2, 0.02 / math.sqrt(3.0)),
-        (sb.LogNormal(0.1), 0.2 * math.exp(0.005), 0.2 * math.exp(0.005) * math.sqrt(math.expm1(0.01))),
-        (sb.UniformRange(0.1, 0.5), 0.3, 0.4 / math.sqrt(12.0)),
+        (sb.uncertainty.Normal(0.02, relative=True), 0.2, 0.004),
+        (sb.uncertainty.Normal(0.01), 0.2, 0.01),
+        (sb.uncertainty.UniformTolerance(0.1, relative=True), 0.2, 0.02 / math.sqrt(3.0)),
+        (
+            sb.uncertainty.LogNormal(0.1),
+            0.2 * math.exp(0.005),
+            0.2 * math.exp(0.005) * math.sqrt(math.expm1(0.01)),
+        ),
+        (sb.uncertainty.UniformRange(0.1, 0.5), 0.3, 0.4 / math.sqrt(12.0)),
     ],
 )
 def test_moments(each, mean: float, sd: float) -> None:
-    spread = sb.ParameterUncertainty(of={"velocity_amplitude": each})
+    spread = sb.uncertainty.ParameterUncertainty(of={"velocity_amplitude": each})
     values = each.at(np.full(NUMBERS.size, 0.2), spread.normals(NUMBERS)[:, 0])
     assert values.mean() == pytest.approx(mean, abs=4.0 * sd / math.sqrt(NUMBERS.size))
     assert values.std() == pytest.approx(sd, rel=0.05)
@@ -47,12 +53,12 @@ def test_moments(each, mean: float, sd: float) -> None:
 
 def test_correlation() -> None:
     of = {
-        "beam.thickness": sb.Normal(1e-6),
-        "beam.buckling_level": sb.Normal(1e-6),
-        "location": sb.Normal(0.01),
+        "beam.thickness": sb.uncertainty.Normal(1e-6),
+        "beam.buckling_level": sb.uncertainty.Normal(1e-6),
+        "location": sb.uncertainty.Normal(0.01),
     }
     matrix = np.array([[1.0, -0.8, 0.0], [-0.8, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    scores = sb.ParameterUncertainty(of=of, correlation=matrix, phase=True).normals(NUMBERS)
+    scores = sb.uncertainty.ParameterUncertainty(of=of, correlation=matrix, phase=True).normals(NUMBERS)
     np.testing.assert_allclose(np.corrcoef(scores.T)[:3, :3], matrix, atol=0.06)
     assert scores.shape == (NUMBERS.size, 4)
 
@@ -60,11 +66,13 @@ def test_correlation() -> None:
 def test_hz_and_metres_per_second_are_held() -> None:
     """A beam buckled further has a higher first frequency: the same shaker strikes it at another ratio."""
     system = small_system()
-    spread = sb.ParameterUncertainty(of={"beam.buckling_level": sb.Normal(0.02, relative=True)})
+    spread = sb.uncertainty.ParameterUncertainty(
+        of={"beam.buckling_level": sb.uncertainty.Normal(0.02, relative=True)}
+    )
     numbers = np.arange(5)
     points = {"drive.frequency_ratio": np.full(5, 1.3)}
     for held in ("physical", "ratios"):
-        trials = trials_of(system, sb.ParameterUncertainty(of=spread.of, hold_fixed=held), None)
+        trials = trials_of(system, sb.uncertainty.ParameterUncertainty(of=spread.of, hold_fixed=held), None)
         found = trials.columns(points, numbers)
         hz, speed = [], []
         for i in range(5):
@@ -89,7 +97,7 @@ def test_a_ringing_start_never_presses_the_tip() -> None:
     """Beside a tip that is drawn back, nothing touches at the start: an overlap would shoot the beam away."""
     system = small_system(velocity_amplitude=0.001)
     trials = trials_of(
-        system, sb.ParameterUncertainty(displacement=5e-6, phase=True), sb.Integration(cycles=2)
+        system, sb.uncertainty.ParameterUncertainty(displacement=5e-6, phase=True), sb.Integration(cycles=2)
     )
     found = trials.statistics({"drive.velocity_amplitude": np.full(200, 0.001)}, np.arange(200))
     assert (found["response_class"] == sb.ResponseClass.INTRAWELL).all()
@@ -99,21 +107,35 @@ def test_a_ringing_start_never_presses_the_tip() -> None:
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: sb.ParameterUncertainty(of={"beam.thicknes": sb.Normal(1.0)}), "thickness"),
-        (lambda: sb.ParameterUncertainty(of={"beam.thickness": 0.01}), "distribution"),
-        (lambda: sb.ParameterUncertainty(of={"model.modes": sb.Normal(1.0)}), "cannot be drawn"),
-        (lambda: sb.ParameterUncertainty(of={"integration.step": sb.Normal(1.0)}), "cannot be drawn"),
-        (lambda: sb.ParameterUncertainty(of={"drive.phase": sb.Normal(1.0)}, phase=True), "one of the two"),
         (
-            lambda: sb.ParameterUncertainty(
-                of={"location": sb.Normal(0.1)}, correlation=[[1.0, 0.2], [0.2, 1.0]]
+            lambda: sb.uncertainty.ParameterUncertainty(of={"beam.thicknes": sb.uncertainty.Normal(1.0)}),
+            "thickness",
+        ),
+        (lambda: sb.uncertainty.ParameterUncertainty(of={"beam.thickness": 0.01}), "distribution"),
+        (
+            lambda: sb.uncertainty.ParameterUncertainty(of={"model.modes": sb.uncertainty.Normal(1.0)}),
+            "cannot be drawn",
+        ),
+        (
+            lambda: sb.uncertainty.ParameterUncertainty(of={"integration.step": sb.uncertainty.Normal(1.0)}),
+            "cannot be drawn",
+        ),
+        (
+            lambda: sb.uncertainty.ParameterUncertainty(
+                of={"drive.phase": sb.uncertainty.Normal(1.0)}, phase=True
+            ),
+            "one of the two",
+        ),
+        (
+            lambda: sb.uncertainty.ParameterUncertainty(
+                of={"location": sb.uncertainty.Normal(0.1)}, correlation=[[1.0, 0.2], [0.2, 1.0]]
             ),
             "shape",
         ),
-        (lambda: sb.ParameterUncertainty(displacement=-1.0), "displacement"),
-        (lambda: sb.ParameterUncertainty(hold_fixed="hz"), "held"),
-        (lambda: sb.Normal(0.0), "standard_deviation"),
-        (lambda: sb.UniformRange(2.0, 1.0), "less than high"),
+        (lambda: sb.uncertainty.ParameterUncertainty(displacement=-1.0), "displacement"),
+        (lambda: sb.uncertainty.ParameterUncertainty(hold_fixed="hz"), "held"),
+        (lambda: sb.uncertainty.Normal(0.0), "standard_deviation"),
+        (lambda: sb.uncertainty.UniformRange(2.0, 1.0), "less than high"),
     ],
 )
 def test_refusals(make, words: str) -> None:
@@ -122,7 +144,9 @@ def test_refusals(make, words: str) -> None:
 
 
 def test_draws_out_of_range_are_refused() -> None:
-    trials = trials_of(small_system(), sb.ParameterUncertainty(of={"location": sb.Normal(0.5)}), None)
+    trials = trials_of(
+        small_system(), sb.uncertainty.ParameterUncertainty(of={"location": sb.uncertainty.Normal(0.5)}), None
+    )
     with pytest.raises(InputError, match="out of range"):
         trials.columns({}, np.arange(100))
 
@@ -136,8 +160,8 @@ def test_files() -> None:
         "seed": 4,
     }
     spread = spread_from_mapping(table)
-    assert spread.of["beam.thickness"] == sb.Normal(0.01, relative=True)
-    assert spread.of["contact.stiffness"] == sb.LogNormal(0.3)
+    assert spread.of["beam.thickness"] == sb.uncertainty.Normal(0.01, relative=True)
+    assert spread.of["contact.stiffness"] == sb.uncertainty.LogNormal(0.3)
     assert spread.parameters[-1] == "drive.phase" and spread.seed == 4
     for bad in (
         {"beam.thickness": {"normal": 1.0, "uniform": 2.0}},

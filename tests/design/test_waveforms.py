@@ -8,8 +8,8 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.config.physical import unit_of
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.model.parameter_axes import unit_of
+from snapbeam.util.validation import InputError, InputTypeError
 
 PRIOR = {"thickness": 0.03, "buckling_level": 0.03, "contact_stiffness": 0.3}
 CYCLES, ERROR = 4, 5e-6
@@ -21,7 +21,7 @@ def nominal_system(modes: int = 1, velocity: float = 0.12) -> sb.System:
     return sb.System(model, paper.CONTACT, shaker)
 
 
-def measured(nominal: sb.System, logs: np.ndarray, draw: np.random.Generator) -> sb.Waveform:
+def measured(nominal: sb.System, logs: np.ndarray, draw: np.random.Generator) -> sb.uncertainty.Waveform:
     """The motion of another beam under the same shaker, with errors."""
     h, b, k = np.exp(logs)
     other = nominal.replace(
@@ -42,11 +42,13 @@ def measured(nominal: sb.System, logs: np.ndarray, draw: np.random.Generator) ->
     seen = run.dataset.displacement_at_striker.values * other.scale.length + ERROR * draw.standard_normal(
         times.size
     )
-    return sb.Waveform(system=nominal, time=times, displacement=seen, standard_error=ERROR)
+    return sb.uncertainty.Waveform(system=nominal, time=times, displacement=seen, standard_error=ERROR)
 
 
-def found(waveform: sb.Waveform, seed: int = 0) -> sb.Posterior:
-    return sb.estimate_posterior(None, paper.BEAM, PRIOR, waveforms=waveform, samples=200, seed=seed)
+def found(waveform: sb.uncertainty.Waveform, seed: int = 0) -> sb.uncertainty.Posterior:
+    return sb.uncertainty.estimate_posterior(
+        None, paper.BEAM, PRIOR, waveforms=waveform, samples=200, seed=seed
+    )
 
 
 def test_the_beam_and_the_contact_are_found() -> None:
@@ -78,22 +80,26 @@ def test_what_is_beyond_the_horizon_does_not_count() -> None:
     times = np.linspace(0.0, 30 * period * (1.0 - 1e-9), 600)
     seen = np.zeros(times.size)
     seen[3] = np.nan
-    near = sb.Waveform(system=nominal, time=times, displacement=seen, standard_error=1e-6)
-    far = sb.Waveform(system=nominal, time=times, displacement=seen, standard_error=1e-6, drive_error=1e-6)
+    near = sb.uncertainty.Waveform(system=nominal, time=times, displacement=seen, standard_error=1e-6)
+    far = sb.uncertainty.Waveform(
+        system=nominal, time=times, displacement=seen, standard_error=1e-6, drive_error=1e-6
+    )
     assert period < near.horizon < far.horizon < 30 * period
     assert not near.used[3] and not near.used[times > near.horizon].any()
     with pytest.raises(InputError, match="nothing of the waveform can be known so well"):
-        _ = sb.Waveform(system=nominal, time=times, displacement=seen, standard_error=1e-13).horizon
+        _ = sb.uncertainty.Waveform(
+            system=nominal, time=times, displacement=seen, standard_error=1e-13
+        ).horizon
 
 
 def test_from_a_tracked_run() -> None:
     nominal = nominal_system()
     run = sb.simulate(nominal, sb.Integration(cycles=2))
     for at in ("contact", "center"):
-        waveform = sb.Waveform.from_dataset(run.dataset, nominal, 1e-6, at=at)
+        waveform = sb.uncertainty.Waveform.from_dataset(run.dataset, nominal, 1e-6, at=at)
         assert np.abs(waveform.misfit({})).max() < 1e-6
     with pytest.raises(InputError, match="has no displacement"):
-        sb.Waveform.from_dataset(run.dataset.drop_vars("displacement"), nominal, 1e-6)
+        sb.uncertainty.Waveform.from_dataset(run.dataset.drop_vars("displacement"), nominal, 1e-6)
 
 
 def test_refusals() -> None:
@@ -107,15 +113,15 @@ def test_refusals() -> None:
         ({"at": "end"}, "at = 'end'"),
     ):
         with pytest.raises(InputError, match=words):
-            sb.Waveform(**{**given, **change})
-    waveform = sb.Waveform(**given)
+            sb.uncertainty.Waveform(**{**given, **change})
+    waveform = sb.uncertainty.Waveform(**given)
     with pytest.raises(InputError, match="measured = None: give measurements, waveforms, or both"):
-        sb.estimate_posterior(None, paper.BEAM, PRIOR)
+        sb.uncertainty.estimate_posterior(None, paper.BEAM, PRIOR)
     with pytest.raises(InputTypeError, match="waveforms = 3"):
-        sb.estimate_posterior(None, paper.BEAM, PRIOR, waveforms=3)
+        sb.uncertainty.estimate_posterior(None, paper.BEAM, PRIOR, waveforms=3)
     with pytest.raises(InputError, match="contact_stiffness must be one of"):
         from test_posterior import measured_of
 
-        sb.estimate_posterior(measured_of(paper.BEAM), paper.BEAM, PRIOR)
+        sb.uncertainty.estimate_posterior(measured_of(paper.BEAM), paper.BEAM, PRIOR)
     with pytest.raises(InputError, match="contact_stiffness is measured by itself"):
-        sb.estimate_posterior(measured_of(paper.BEAM), paper.BEAM, PRIOR, waveforms=waveform)
+        sb.uncertainty.estimate_posterior(measured_of(paper.BEAM), paper.BEAM, PRIOR, waveforms=waveform)

@@ -83,7 +83,7 @@ def test_there_are_commands_in_the_pages():
     assert sum(len(commands(path)) for path in PAGES) > 15
 
 
-@pytest.mark.parametrize("module", ["snapbeam", "snapbeam.lab", "snapbeam.figures", "snapbeam.config"])
+@pytest.mark.parametrize("module", ["snapbeam", "snapbeam.lab", "snapbeam.plot", "snapbeam.config"])
 def test_interface_page_is_complete(module):
     text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
     named = set(re.findall(r"::\s*(?:snapbeam\.)?([\w.]+)$", text, re.MULTILINE))

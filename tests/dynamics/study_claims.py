@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from snapbeam.dynamics.lifetimes.survival import proportion
+from snapbeam.dynamics.lifetimes import proportion
 from snapbeam.paper.claims.finding import Check, ClaimResult, Quantity, above, below, found
 
 __all__ = ["Row", "claims", "table"]

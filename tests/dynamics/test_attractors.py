@@ -15,22 +15,22 @@ import snapbeam as sb
 def test_known_attractors() -> None:
     """Henon's is chaotic, the logistic map's at 3.2 of period 2, at 3.83 of period 3 beside a chaotic saddle."""
     draw = np.random.default_rng(1)
-    chaotic = sb.find_attractors(henon(), draw.uniform(-0.1, 0.1, (12, 2)), transient=200)
+    chaotic = sb.dynamics.find_attractors(henon(), draw.uniform(-0.1, 0.1, (12, 2)), transient=200)
     assert [each.kind for each in chaotic.attractors] == ["chaotic"] and chaotic.undecided == 0.0
     assert chaotic.attractors[0].exponent == pytest.approx(0.419, abs=0.03)
-    two = sb.find_attractors(logistic(3.2), draw.uniform(0.1, 0.9, (20, 1)))
+    two = sb.dynamics.find_attractors(logistic(3.2), draw.uniform(0.1, 0.9, (20, 1)))
     assert [each.period for each in two.attractors] == [2]
-    three = sb.find_attractors(logistic(3.83), draw.uniform(0.1, 0.9, (40, 1)), transient=3)
+    three = sb.dynamics.find_attractors(logistic(3.83), draw.uniform(0.1, 0.9, (40, 1)), transient=3)
     assert [each.kind for each in three.attractors] == ["periodic"] and three.attractors[0].period == 3
     assert three.undecided > 0.0, "after three steps some have not arrived, and none is called chaotic"
 
 
-def shares_of_the_pendulum(found: sb.Attractors, periods: int) -> list[float]:
+def shares_of_the_pendulum(found: sb.dynamics.Attractors, periods: int) -> list[float]:
     plane = {
         "x[1]": math.asin(0.5) + np.linspace(-math.pi, math.pi, 48, endpoint=False),
         "x[2]": np.linspace(-10.0, 10.0, 48),
     }
-    ds = sb.basins_of_attraction(found, plane, periods=periods)
+    ds = sb.dynamics.basins_of_attraction(found, plane, periods=periods)
     return [float((ds["basin"] == label).mean()) for label in (0, 1, -1)]
 
 
@@ -38,7 +38,7 @@ def shares_of_the_pendulum(found: sb.Attractors, periods: int) -> list[float]:
 def test_the_pendulum_of_bstab() -> None:
     """15 % go to the fixed point, 85 % rotate: a fixed point too where the angle is seen whenever it has come round."""
     starts = np.array([[math.asin(0.5), 0.01], [math.asin(0.5), 0.02], [2.0, 3.0], [1.0, 6.0]])
-    found = sb.find_attractors(turning_pendulum(), starts, transient=200)
+    found = sb.dynamics.find_attractors(turning_pendulum(), starts, transient=200)
     assert [each.period for each in found.attractors] == [1, 1]
     rest = int(np.argmin([abs(each.points[0, 1]) for each in found.attractors]))
     shares = shares_of_the_pendulum(found, 60)
@@ -50,7 +50,7 @@ def test_the_pendulum_of_bstab() -> None:
 @pytest.mark.slow
 def test_what_is_no_attractor_of_the_map_is_undecided() -> None:
     """Seen at a fixed interval the rotation never repeats and does not diverge: neither periodic nor chaotic."""
-    found = sb.find_attractors(
+    found = sb.dynamics.find_attractors(
         pendulum(), np.array([[math.asin(0.5), 0.01], [math.asin(0.5), 0.02]]), transient=600
     )
     assert [each.period for each in found.attractors] == [1]
@@ -63,7 +63,7 @@ def test_labels_do_not_depend_on_order() -> None:
     draw = np.random.default_rng(4)
     states = np.column_stack([draw.uniform(-1.5, 4.5, 60), draw.uniform(-0.5, 0.5, 60)])
     order = draw.permutation(60)
-    one, other = (sb.find_attractors(flow, rows, transient=400) for rows in (states, states[order]))
+    one, other = (sb.dynamics.find_attractors(flow, rows, transient=400) for rows in (states, states[order]))
     np.testing.assert_array_equal(one.labels[order], other.labels)
     assert one.undecided == 0.0 and {len(one.attractors), len(other.attractors)} == {2}
     assert one.shares.sum() == pytest.approx(1.0)
@@ -72,7 +72,7 @@ def test_labels_do_not_depend_on_order() -> None:
 def test_a_beam_between_two_wells() -> None:
     """A weak drive: tapping in the struck well, rest in the far one; basins in any number of threads."""
     system = system_of(1, 1.6, 0.03, 0.05)
-    found = sb.find_attractors(system, 40, transient=300)
+    found = sb.dynamics.find_attractors(system, 40, transient=300)
     assert all(each.kind == "periodic" and each.orbit.is_stable for each in found.attractors)
     for each in found.attractors:
         fine = each.verification
@@ -82,7 +82,7 @@ def test_a_beam_between_two_wells() -> None:
     sides = {math.copysign(1.0, each.points[0, 0]) for each in found.attractors}
     assert sides == {-1.0, 1.0} and found.undecided == 0.0
     plane = {"amplitude[1]": np.linspace(-1.6, 1.6, 24), "velocity[1]": np.linspace(-1.0, 1.0, 20)}
-    ds = sb.basins_of_attraction(found, plane, periods=300)
+    ds = sb.dynamics.basins_of_attraction(found, plane, periods=300)
     assert ds["basin"].dims == ("amplitude[1]", "velocity[1]")
     assert ds.attrs["undecided"] < 0.02
     flow = found.flow
@@ -90,9 +90,9 @@ def test_a_beam_between_two_wells() -> None:
         row = np.array([[plane["amplitude[1]"][at[0]], plane["velocity[1]"][at[1]]]])
         end, label = flow.march(row, 2000).states[0], int(ds["basin"][at])
         assert label == -1 or np.abs(found.attractors[label].points - end).max(axis=1).min() < 1e-3
-    alone = sb.find_attractors(system, 40, transient=300, integration=sb.Integration(threads=1))
+    alone = sb.dynamics.find_attractors(system, 40, transient=300, integration=sb.Integration(threads=1))
     np.testing.assert_array_equal(alone.labels, found.labels)
-    again = sb.basins_of_attraction(alone, plane, periods=300)
+    again = sb.dynamics.basins_of_attraction(alone, plane, periods=300)
     np.testing.assert_array_equal(again["basin"], ds["basin"])
     np.testing.assert_array_equal(again["captured_after"], ds["captured_after"])
 
@@ -110,7 +110,7 @@ def test_the_edge_of_a_map_is_its_saddle() -> None:
     def right(flow, states, horizon):
         return flow.march(states, horizon).states[:, 0] > 0.0
 
-    edge = sb.edge_tracking(cubic, [-0.8, 0.6], [0.9, 0.6], outcome=right, horizon=80)
+    edge = sb.dynamics.edge_tracking(cubic, [-0.8, 0.6], [0.9, 0.6], outcome=right, horizon=80)
     np.testing.assert_allclose(edge.states[-1], [0.0, 0.0], atol=1e-4)
     assert edge.orbit is not None and edge.orbit.unstable == 1
     np.testing.assert_allclose(edge.orbit.coordinates, 0.0, atol=1e-8)
@@ -119,7 +119,9 @@ def test_the_edge_of_a_map_is_its_saddle() -> None:
 def test_the_edge_between_snapping_and_not() -> None:
     """One damped mode: the border runs to an unstable orbit near the hilltop."""
     system = system_of(1, 1.6, 0.03, 0.05)
-    edge = sb.edge_tracking(system, np.array([-0.9, 0.0]), np.array([-1.0, 1.3]), periods=25, horizon=60)
+    edge = sb.dynamics.edge_tracking(
+        system, np.array([-0.9, 0.0]), np.array([-1.0, 1.3]), periods=25, horizon=60
+    )
     assert (edge.distance < 1e-3).all()
     assert edge.orbit is not None and edge.orbit.unstable == 1
 
@@ -127,13 +129,13 @@ def test_the_edge_between_snapping_and_not() -> None:
 def test_refusals() -> None:
     system = system_of(1, 1.6, 0.03)
     with pytest.raises(sb.InputError, match="states"):
-        sb.find_attractors(henon(), 20)
+        sb.dynamics.find_attractors(henon(), 20)
     with pytest.raises(sb.InputError, match="found"):
-        sb.basins_of_attraction(system, {})
+        sb.dynamics.basins_of_attraction(system, {})
     with pytest.raises(sb.InputError, match="must be False and True"):
-        sb.edge_tracking(system, np.array([-1.0, 0.0]), np.array([-1.0, 0.001]))
-    found = sb.find_attractors(logistic(3.2), np.array([[0.3]]))
+        sb.dynamics.edge_tracking(system, np.array([-1.0, 0.0]), np.array([-1.0, 0.001]))
+    found = sb.dynamics.find_attractors(logistic(3.2), np.array([[0.3]]))
     with pytest.raises(sb.InputError, match="two coordinates"):
-        sb.basins_of_attraction(found, {"x[1]": [0.1, 0.2]})
+        sb.dynamics.basins_of_attraction(found, {"x[1]": [0.1, 0.2]})
     with pytest.raises(sb.InputError, match="no coordinate"):
-        sb.basins_of_attraction(found, {"x[1]": [0.1, 0.2], "y": [0.1, 0.2]})
+        sb.dynamics.basins_of_attraction(found, {"x[1]": [0.1, 0.2], "y": [0.1, 0.2]})

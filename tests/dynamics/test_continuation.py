@@ -14,14 +14,14 @@ import snapbeam as sb
 
 
 def test_flips_of_the_logistic_map() -> None:
-    orbit = sb.periodic_orbit(logistic(2.5), [0.6])
-    branch = sb.continuation(orbit, "r", (2.2, 3.7))
+    orbit = sb.dynamics.periodic_orbit(logistic(2.5), [0.6])
+    branch = sb.dynamics.continuation(orbit, "r", (2.2, 3.7))
     assert branch.termination_reason == "limit of the parameter"
     flip = next(event for event in branch.special_points if event.kind == "flip")
     assert flip.value == pytest.approx(3.0, abs=1e-7)
-    doubled = sb.switch_branch(flip, "r", (2.2, 3.7))
+    doubled = sb.dynamics.switch_branch(flip, "r", (2.2, 3.7))
     assert doubled.period == 2 and doubled.minimal_period == 2 and doubled.is_stable
-    second = sb.continuation(doubled, "r", (2.2, 3.7))
+    second = sb.dynamics.continuation(doubled, "r", (2.2, 3.7))
     flips = [event.value for event in second.special_points if event.kind == "flip"]
     assert flips[0] == pytest.approx(1.0 + math.sqrt(6.0), abs=1e-7)
     first = next(event for event in second.special_points if event.kind == "flip")
@@ -33,8 +33,8 @@ def test_flips_of_the_logistic_map() -> None:
 
 def test_a_fold_is_passed() -> None:
     """Henon's fixed points meet at a = -(1 - b)^2/4; the branch turns there and goes on along the other."""
-    orbit = sb.periodic_orbit(henon(0.1), [0.8, 0.2])
-    branch = sb.continuation(orbit, "a", (-0.2, 0.3), direction="down")
+    orbit = sb.dynamics.periodic_orbit(henon(0.1), [0.8, 0.2])
+    branch = sb.dynamics.continuation(orbit, "a", (-0.2, 0.3), direction="down")
     fold = next(event for event in branch.special_points if event.kind == "fold")
     assert fold.value == pytest.approx(-0.1225, abs=1e-8)
     assert abs(fold.value + 0.1225) <= fold.error < 1e-8
@@ -55,10 +55,10 @@ def test_an_isola_is_closed_from_a_seed_on_it() -> None:
         2,
         r=2.1,
     )
-    (seed,) = sb.find_attractors(
+    (seed,) = sb.dynamics.find_attractors(
         ring, np.random.default_rng(0).uniform(-0.3, 0.8, (20, 2)), transient=200
     ).attractors
-    branch = sb.continuation(seed.orbit, "r", (0.0, 4.0), max_points=2000)
+    branch = sb.dynamics.continuation(seed.orbit, "r", (0.0, 4.0), max_points=2000)
     assert branch.termination_reason == "closed"
     assert sorted(event.value for event in branch.special_points) == pytest.approx([1.5, 2.5], abs=1e-8)
     assert {event.kind for event in branch.special_points} == {"fold"}
@@ -66,7 +66,7 @@ def test_an_isola_is_closed_from_a_seed_on_it() -> None:
         assert min(abs(event.value - 1.5), abs(event.value - 2.5)) <= event.error < 1e-7
     radius = np.hypot([orbit.coordinates[0] for orbit in branch.orbits], branch.values - 2.0)
     np.testing.assert_allclose(radius, 0.5, atol=1e-8)
-    other = sb.periodic_orbit(ring, [0.1, 0.0], deflate=[seed.orbit], iterations=200)
+    other = sb.dynamics.periodic_orbit(ring, [0.1, 0.0], deflate=[seed.orbit], iterations=200)
     assert other.coordinates[0] == pytest.approx(-seed.orbit.coordinates[0], abs=1e-9) and other.unstable == 1
 
 
@@ -91,12 +91,12 @@ def grazes_at(restitution: float, periods: int, below: float) -> float:
     return float(brentq(scratch, ratios[first], ratios[first - 1], args=(restitution, periods)))
 
 
-def follow_to_grazing(ratio: float, restitution: float, periods: int, longest: float) -> sb.Branch:
+def follow_to_grazing(ratio: float, restitution: float, periods: int, longest: float) -> sb.dynamics.Branch:
     """Every orbit is the exact one, and the branch ends where its flight touches the wall a second time."""
     _, state = exact_orbit(ratio, restitution, periods)
-    orbit = sb.periodic_orbit(oscillator(ratio, restitution), state, periods, phase=math.pi)
+    orbit = sb.dynamics.periodic_orbit(oscillator(ratio, restitution), state, periods, phase=math.pi)
     between = (1.0005 * periods, ratio + 0.01)
-    branch = sb.continuation(orbit, "frequency_ratio", between, direction="down", max_step=longest)
+    branch = sb.dynamics.continuation(orbit, "frequency_ratio", between, direction="down", max_step=longest)
     assert branch.termination_reason == "grazing"
     for each, value in zip(branch.orbits, branch.values, strict=True):
         # at the same velocity the wall's amplitude goes with 1/omega
@@ -129,8 +129,8 @@ def test_orbits_of_twenty_points_are_followed_to_grazing(
 def test_a_branch_of_the_beam() -> None:
     """One mode, from intrawell tapping up: stable first, then a flip; product of multipliers all the way."""
     system = system_of(1, 1.6, 0.03)
-    orbit = sb.periodic_orbit(system, transient=1000)
-    branch = sb.continuation(orbit, "velocity_amplitude", (0.005, 0.2), max_step=0.1)
+    orbit = sb.dynamics.periodic_orbit(system, transient=1000)
+    branch = sb.dynamics.continuation(orbit, "velocity_amplitude", (0.005, 0.2), max_step=0.1)
     model = system.model
     exact = -2.0 * float((model.damping_ratio * model.omega).sum()) / (model.reference_frequency * 1.6)
     for each in branch.orbits:
@@ -138,15 +138,15 @@ def test_a_branch_of_the_beam() -> None:
     flip = next(event for event in branch.special_points if event.kind == "flip")
     nearest = flip.orbit.multipliers[np.argmin(np.abs(flip.orbit.multipliers + 1.0))]
     assert abs(nearest + 1.0) < 1e-6
-    doubled = sb.switch_branch(flip, "velocity_amplitude", (0.005, 0.2))
+    doubled = sb.dynamics.switch_branch(flip, "velocity_amplitude", (0.005, 0.2))
     assert doubled.minimal_period == 2
 
 
 def test_refusals() -> None:
-    orbit = sb.periodic_orbit(logistic(2.5), [0.6])
+    orbit = sb.dynamics.periodic_orbit(logistic(2.5), [0.6])
     with pytest.raises(sb.InputError, match="must hold the orbit's own"):
-        sb.continuation(orbit, "r", (3.0, 4.0))
+        sb.dynamics.continuation(orbit, "r", (3.0, 4.0))
     with pytest.raises(sb.InputError, match="must be increasing"):
-        sb.continuation(orbit, "r", (4.0, 3.0))
+        sb.dynamics.continuation(orbit, "r", (4.0, 3.0))
     with pytest.raises(sb.InputError, match="direction"):
-        sb.continuation(orbit, "r", (2.0, 4.0), direction="sideways")
+        sb.dynamics.continuation(orbit, "r", (2.0, 4.0), direction="sideways")

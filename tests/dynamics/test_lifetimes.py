@@ -8,8 +8,8 @@ import xarray as xr
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.dynamics.lifetimes.lifetime_map import refit
-from snapbeam.model.start import rest_state
+from snapbeam.dynamics.lifetimes import refit
+from snapbeam.model.state import rest_state
 
 MEASURED = {(1.21, 0.25): 32.0, (1.625, 0.3): 46.0, (2.5, 0.55): 89.0, (3.5, 0.6): 99.0}
 """Lifetimes in cycles, N = 32, from some 210 runs each: to 7 %."""
@@ -22,14 +22,14 @@ def system_of(modes: int, ratio: float = 1.625, velocity: float = 0.3) -> sb.Sys
 
 AXES = {"frequency_ratio": [1.2, 1.625], "velocity_amplitude": [0.01, 0.2, 0.3]}
 SHORT = sb.Integration(cycles=120)
-TELL = {"survival": sb.LifetimeSettings(settling_cycles=20.0), "starts": 6}
+TELL = {"survival": sb.dynamics.LifetimeSettings(settling_cycles=20.0), "starts": 6}
 
 
 def test_nothing_depends_on_threads_order_or_the_other_points(tmp_path) -> None:
     system = system_of(2)
-    whole = sb.lifetime_map(system, AXES, SHORT, **TELL)
-    one = sb.lifetime_map(system, AXES, SHORT.replace(threads=1), **TELL)
-    kept = sb.lifetime_map(
+    whole = sb.dynamics.lifetime_map(system, AXES, SHORT, **TELL)
+    one = sb.dynamics.lifetime_map(system, AXES, SHORT.replace(threads=1), **TELL)
+    kept = sb.dynamics.lifetime_map(
         system, AXES, SHORT, checkpoint=sb.CheckpointOptions(tmp_path / "kept", points_per_task=2), **TELL
     )
     for other in (one, kept):
@@ -38,7 +38,7 @@ def test_nothing_depends_on_threads_order_or_the_other_points(tmp_path) -> None:
     points = xr.Dataset(
         {"frequency_ratio": ("point", [1.625, 1.2]), "velocity_amplitude": ("point", [0.3, 0.2])}
     )
-    some = sb.lifetime_map(system, points, SHORT, **TELL)
+    some = sb.dynamics.lifetime_map(system, points, SHORT, **TELL)
     np.testing.assert_array_equal(
         some.last_snap[0], whole.last_snap.sel(frequency_ratio=1.625, velocity_amplitude=0.3)
     )
@@ -49,26 +49,26 @@ def test_nothing_depends_on_threads_order_or_the_other_points(tmp_path) -> None:
 
 def test_a_store_is_resumed_and_refuses_other_starts(tmp_path) -> None:
     system, tally = system_of(1), sb.SweepReport()
-    first = sb.lifetime_map(
+    first = sb.dynamics.lifetime_map(
         system, AXES, SHORT, checkpoint=sb.CheckpointOptions(tmp_path / "s", points_per_task=2), **TELL
     )
-    again = sb.lifetime_map(
+    again = sb.dynamics.lifetime_map(
         system, AXES, SHORT, checkpoint=sb.CheckpointOptions(tmp_path / "s", report=tally), **TELL
     )
     assert tally.computed == 0 and tally.resumed == 3
     assert first.drop_attrs().equals(again.drop_attrs())
     with pytest.raises(sb.InputError, match="starts"):
-        sb.lifetime_map(
+        sb.dynamics.lifetime_map(
             system,
             AXES,
             SHORT,
             checkpoint=tmp_path / "s",
-            **(TELL | {"starts": sb.InitialConditions(count=6, seed=1)}),
+            **(TELL | {"starts": sb.dynamics.InitialConditions(count=6, seed=1)}),
         )
 
 
 def test_counts_add_up() -> None:
-    ds = sb.lifetime_map(system_of(2), AXES, SHORT, **TELL)
+    ds = sb.dynamics.lifetime_map(system_of(2), AXES, SHORT, **TELL)
     settled = (ds.last_snap.notnull() & (ds.runs_snapping < 6)).any()
     assert bool(settled)
     runs = 6 - ds.runs_failed
@@ -79,7 +79,7 @@ def test_counts_add_up() -> None:
     falling = ds.snapping_probability.diff("after")
     assert (falling <= 0.0).all()
     assert (ds.lifetime_low <= ds.lifetime_high).all()
-    wider = refit(ds, sb.LifetimeSettings(settling_cycles=20.0, confidence=0.99))
+    wider = refit(ds, sb.dynamics.LifetimeSettings(settling_cycles=20.0, confidence=0.99))
     known = ds.lifetime.notnull()
     assert (wider.lifetime_low <= ds.lifetime_low).where(known, True).all()
 
@@ -87,11 +87,15 @@ def test_counts_add_up() -> None:
 def test_the_tip_stands_still_in_space() -> None:
     """A start with the phase drawn differs from one without; none presses the beam before the drive moves."""
     system = system_of(2)
-    starts = sb.InitialConditions(count=8, phase=True, displacement=0.0)
+    starts = sb.dynamics.InitialConditions(count=8, phase=True, displacement=0.0)
     phases = [float(starts.state(system, s).phase) for s in range(8)]
     assert len(set(phases)) == 8 and all(np.pi <= phase <= 2.0 * np.pi for phase in phases)
-    ds = sb.lifetime_map(
-        system, None, SHORT, initial_conditions=starts, settings=sb.LifetimeSettings(settling_cycles=20.0)
+    ds = sb.dynamics.lifetime_map(
+        system,
+        None,
+        SHORT,
+        initial_conditions=starts,
+        settings=sb.dynamics.LifetimeSettings(settling_cycles=20.0),
     )
     assert ds.last_snap.dims == ("start",)
     assert len(np.unique(ds.last_snap)) > 1
@@ -99,7 +103,7 @@ def test_the_tip_stands_still_in_space() -> None:
 
 def test_runs_that_snap_on_are_followed_to_the_end() -> None:
     """One mode at a point where many runs go on: none is stopped because it is sure to be called continuous."""
-    ds = sb.lifetime_map(
+    ds = sb.dynamics.lifetime_map(
         system_of(1), None, sb.Integration(cycles=400), initial_conditions=24, after=[200, 350]
     )
     lasting = ds.last_snap.values[ds.last_snap.values > 350.0]
@@ -113,7 +117,9 @@ def test_runs_that_snap_on_are_followed_to_the_end() -> None:
 @pytest.mark.parametrize("point", MEASURED)
 def test_measured_lifetimes_come_again(point) -> None:
     """Measured twice, once with some 210 runs and here with 400: within both errors, and all of them end in well 2."""
-    ds = sb.lifetime_map(system_of(32, *point), None, sb.Integration(cycles=1000), initial_conditions=400)
+    ds = sb.dynamics.lifetime_map(
+        system_of(32, *point), None, sb.Integration(cycles=1000), initial_conditions=400
+    )
     assert int(ds.runs_snapping) == 0
     assert float(ds.end_probability.sel(well="other")) == 1.0
     relative = float(ds.lifetime) / MEASURED[point] - 1.0
@@ -127,7 +133,10 @@ def test_measured_lifetimes_come_again(point) -> None:
     [
         ({"starts": 0}, "starts = 0"),
         ({"starts": 2.5}, "starts = 2.5"),
-        ({"survival": sb.LifetimeSettings(settling_cycles=500.0)}, "must be more than the quiet cycles"),
+        (
+            {"survival": sb.dynamics.LifetimeSettings(settling_cycles=500.0)},
+            "must be more than the quiet cycles",
+        ),
         ({"after": [50, 20]}, "after = [50, 20]"),
         ({"after": [1000]}, "after[0]"),
         ({"axes": {"velocity_amplitde": [0.1, 0.2]}}, "did you mean"),
@@ -135,20 +144,20 @@ def test_measured_lifetimes_come_again(point) -> None:
 )
 def test_refusals(given, words: str) -> None:
     with pytest.raises(sb.InputError) as error:
-        sb.lifetime_map(system_of(1), integration=SHORT, **given)
+        sb.dynamics.lifetime_map(system_of(1), integration=SHORT, **given)
     assert words in str(error.value)
 
 
 def test_a_free_beam_is_refused() -> None:
     with pytest.raises(sb.InputError, match="striker = None"):
-        sb.lifetime_map(sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), paper.CONTACT))
+        sb.dynamics.lifetime_map(sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), paper.CONTACT))
 
 
 def test_no_start_presses_the_tip() -> None:
     """Beside a tip that hardly moves nothing touches at the start: an overlap would shoot the beam away."""
-    ds = sb.lifetime_map(
-        system_of(1, 1.2, 0.0005), {"location": [0.3, 0.5]}, SHORT, initial_conditions=sb.InitialConditions(count=64, displacement=1e-5),
-        settings=sb.LifetimeSettings(settling_cycles=20.0),
+    ds = sb.dynamics.lifetime_map(
+        system_of(1, 1.2, 0.0005), {"location": [0.3, 0.5]}, SHORT, initial_conditions=sb.dynamics.InitialConditions(count=64, displacement=1e-5),
+        settings=sb.dynamics.LifetimeSettings(settling_cycles=20.0),
     )  # fmt: skip
     assert (ds.runs_never == 64).all() and (ds.end_probability.sel(well="first") == 1.0).all()
     system = system_of(4)
@@ -156,9 +165,11 @@ def test_no_start_presses_the_tip() -> None:
         turned = system.replace(**{"striker.side": side})
         for number in range(6):
             place = np.array([0.1, 0.35, 0.5])
-            many = sb.InitialConditions(count=6).state(turned, number, location=place)
+            many = sb.dynamics.InitialConditions(count=6).state(turned, number, location=place)
             rest = rest_state(turned.model, turned.striker)
             moved = np.sum(turned.model.shape_at(place) * (many.amplitude - rest.amplitude), axis=-1)
             assert (away * moved > 0.0).all()
-            one = sb.InitialConditions(count=6).state(turned.replace(**{"striker.location": 0.35}), number)
+            one = sb.dynamics.InitialConditions(count=6).state(
+                turned.replace(**{"striker.location": 0.35}), number
+            )
             np.testing.assert_array_equal(one.amplitude, many.amplitude[1])

@@ -14,18 +14,18 @@ import snapbeam as sb
 
 def test_henon() -> None:
     """0.419, and the sum of both is ln b to rounding."""
-    ds = sb.lyapunov_spectrum(henon(), 2, 20_000, states=[[0.1, 0.1]])
+    ds = sb.dynamics.lyapunov_spectrum(henon(), 2, 20_000, states=[[0.1, 0.1]])
     value, error = (float(ds[name][0, 0]) for name in ("exponent", "exponent_error"))
     assert value == pytest.approx(0.4192, abs=max(3.0 * error, 2e-3))
     assert float(ds["exponent"].sum()) == pytest.approx(math.log(0.3), abs=1e-10)
-    other = sb.largest_lyapunov(henon(), 20_000, states=[[0.1, 0.1]])
+    other = sb.dynamics.largest_lyapunov(henon(), 20_000, states=[[0.1, 0.1]])
     assert float(other["exponent"][0]) == pytest.approx(value, abs=5e-3)
 
 
 @pytest.mark.slow
 def test_lorenz() -> None:
     """0.906, 0 and a sum of -(sigma + 1 + beta)."""
-    ds = sb.lyapunov_spectrum(lorenz(0.25, 25), 3, 1600, states=[[1.0, 1.0, 20.0]])
+    ds = sb.dynamics.lyapunov_spectrum(lorenz(0.25, 25), 3, 1600, states=[[1.0, 1.0, 20.0]])
     values, errors = ds["exponent"].values[0], ds["exponent_error"].values[0]
     assert values[0] == pytest.approx(0.906, abs=max(3.0 * errors[0], 0.02))
     assert values[1] == pytest.approx(0.0, abs=0.02)
@@ -36,7 +36,7 @@ def test_lorenz() -> None:
 def test_the_sum_of_all_exponents_is_that_of_damping(modes: int) -> None:
     """-2 sum zeta omega, whatever the drive does, with impacts on the way: to 1e-8 of it."""
     system = system_of(modes, 1.4, 0.2)
-    ds = sb.lyapunov_spectrum(system, 2 * modes, 20, transient=3)
+    ds = sb.dynamics.lyapunov_spectrum(system, 2 * modes, 20, transient=3)
     exact = -2.0 * float((system.model.damping_ratio * system.model.omega).sum())
     assert float(ds["exponent"].sum()) == pytest.approx(exact, rel=1e-8)
     assert bool(
@@ -46,16 +46,16 @@ def test_the_sum_of_all_exponents_is_that_of_damping(modes: int) -> None:
 
 def test_a_periodic_orbit_has_the_exponents_of_its_multipliers() -> None:
     system = system_of(1, 1.6, 0.03)
-    orbit = sb.periodic_orbit(system, transient=1000)
+    orbit = sb.dynamics.periodic_orbit(system, transient=1000)
     how = sb.Integration(accuracy="reference")
-    ds = sb.lyapunov_spectrum(system, 1, 400, transient=0, states=orbit.state, integration=how)
+    ds = sb.dynamics.lyapunov_spectrum(system, 1, 400, transient=0, states=orbit.state, integration=how)
     expected = math.log(abs(orbit.multipliers[0])) / orbit.flow.period
     assert float(ds["exponent"][0, 0]) == pytest.approx(expected, rel=0.1)
 
 
 def test_transients_are_told_from_what_they_settle_on() -> None:
     """A beam that snaps for a while and then rings down: diverging first, contracting afterwards."""
-    ds = sb.lyapunov_spectrum(system_of(8, 1.625, 0.3), 1, 700, transient=0)
+    ds = sb.dynamics.lyapunov_spectrum(system_of(8, 1.625, 0.3), 1, 700, transient=0)
     last = int(ds["periods_snapping"][0])
     assert 5 < last < 650
     assert float(ds["exponent_snapping"][0, 0]) > 10.0
@@ -66,40 +66,40 @@ def test_transients_are_told_from_what_they_settle_on() -> None:
 def test_two_trajectories_agree_and_serve_where_the_force_jumps() -> None:
     """Intrawell chaos: both estimates within their errors; under restitution only the second."""
     system = system_of(8, 1.4, 0.01)
-    tangent = sb.lyapunov_spectrum(system, 1, 600, transient=300)
-    pair = sb.largest_lyapunov(system, 600, transient=300)
+    tangent = sb.dynamics.lyapunov_spectrum(system, 1, 600, transient=300)
+    pair = sb.dynamics.largest_lyapunov(system, 600, transient=300)
     value, other = float(tangent["exponent"][0, 0]), float(pair["exponent"][0])
     error = math.hypot(float(tangent["exponent_error"][0, 0]), float(pair["exponent_error"][0]))
     assert value > 5.0 * error
     assert other == pytest.approx(value, abs=4.0 * error)
     with pytest.raises(sb.InputError, match="largest_lyapunov"):
-        sb.lyapunov_spectrum(oscillator(1.6, 0.8))
-    bouncing = sb.largest_lyapunov(oscillator(1.7, 0.6), 60, transient=200)
+        sb.dynamics.lyapunov_spectrum(oscillator(1.6, 0.8))
+    bouncing = sb.dynamics.largest_lyapunov(oscillator(1.7, 0.6), 60, transient=200)
     assert float(bouncing["exponent"][0]) * 2.0 * math.pi / 1.7 == pytest.approx(math.log(0.6), abs=0.02)
 
 
 def test_a_map_of_exponents_is_that_of_its_points() -> None:
     axes = {"frequency_ratio": [1.5, 1.6], "velocity_amplitude": [0.02, 0.1, 0.3]}
-    ds = sb.lyapunov_spectrum(system_of(1, 1.6, 0.03), 1, 30, transient=20, axes=axes)
-    one = sb.lyapunov_spectrum(system_of(1, 1.5, 0.3), 1, 30, transient=20)
+    ds = sb.dynamics.lyapunov_spectrum(system_of(1, 1.6, 0.03), 1, 30, transient=20, axes=axes)
+    one = sb.dynamics.lyapunov_spectrum(system_of(1, 1.5, 0.3), 1, 30, transient=20)
     assert ds["exponent"].dims == ("frequency_ratio", "velocity_amplitude", "exponent_number")
     chosen = ds["exponent"].sel(frequency_ratio=1.5, velocity_amplitude=0.3)
     assert float(chosen[0]) == float(one["exponent"][0, 0]), "to the last bit, whatever it is marched with"
     for name in ("exponent_error", "exponent_snapping", "exponent_settled"):
         np.testing.assert_array_equal(ds[name].sel(frequency_ratio=1.5, velocity_amplitude=0.3), one[name][0])
-    alone = sb.lyapunov_spectrum(
+    alone = sb.dynamics.lyapunov_spectrum(
         system_of(1, 1.6, 0.03), 1, 30, transient=20, axes=axes, integration=sb.Integration(threads=1)
     )
     turned = {name: axes[name] for name in reversed(axes)}
-    other = sb.lyapunov_spectrum(system_of(1, 1.6, 0.03), 1, 30, transient=20, axes=turned)
+    other = sb.dynamics.lyapunov_spectrum(system_of(1, 1.6, 0.03), 1, 30, transient=20, axes=turned)
     np.testing.assert_array_equal(alone["exponent"], ds["exponent"])
     np.testing.assert_array_equal(other["exponent"].transpose(*ds["exponent"].dims), ds["exponent"])
 
 
 def test_refusals() -> None:
     with pytest.raises(sb.InputError, match="k = 3"):
-        sb.lyapunov_spectrum(system_of(1, 1.6, 0.03), 3)
+        sb.dynamics.lyapunov_spectrum(system_of(1, 1.6, 0.03), 3)
     with pytest.raises(sb.InputError, match="another structure"):
-        sb.lyapunov_spectrum(system_of(1, 1.6, 0.03), axes={"model.damping_ratio": [0.01, 0.02]})
+        sb.dynamics.lyapunov_spectrum(system_of(1, 1.6, 0.03), axes={"model.damping_ratio": [0.01, 0.02]})
     with pytest.raises(sb.InputError, match="states"):
-        sb.lyapunov_spectrum(henon())
+        sb.dynamics.lyapunov_spectrum(henon())

@@ -15,10 +15,10 @@ def grebogi_basins(points: int):
     """Basins on the window that the map was first looked at in, points x points starts."""
     flow = grebogi()
     states = np.array([[0.1, -0.3], [math.pi - 0.1, 0.3], [0.3, 0.2], [2.0, -0.1]])
-    found = sb.find_attractors(flow, states, transient=400)
+    found = sb.dynamics.find_attractors(flow, states, transient=400)
     assert [each.kind for each in found.attractors] == ["periodic", "periodic"]
     plane = {"x[1]": np.linspace(0.0, 2.0 * math.pi, points), "x[2]": np.linspace(-0.5, 0.5, points)}
-    ds = sb.basins_of_attraction(found, plane, periods=2000)
+    ds = sb.dynamics.basins_of_attraction(found, plane, periods=2000)
     assert ds.attrs["undecided"] == 0.0
     return ds["basin"].values
 
@@ -28,36 +28,36 @@ def test_grebogis_map() -> None:
 
     Other grids of like size give 0.597 to 0.603: half of the interval is no more than two standard errors.
     """
-    entropy = sb.basin_entropy(grebogi_basins(300), 6)
+    entropy = sb.dynamics.basin_entropy(grebogi_basins(300), 6)
     assert entropy.boxes == 2500 and 1600 < entropy.boundary_boxes < 1750
     assert 0.40 <= entropy.basin <= 0.42
     assert 0.60 <= entropy.boundary <= 0.61
     assert 0.002 < entropy.boundary_error < 0.004
-    shifted = sb.basin_entropy(grebogi_basins(302), 6)
+    shifted = sb.dynamics.basin_entropy(grebogi_basins(302), 6)
     assert shifted.boundary == pytest.approx(entropy.boundary, abs=4.0 * entropy.boundary_error)
 
 
 def test_the_exponent_of_grebogis_map() -> None:
     """0.2 (Grebogi et al. 1983), the dimension of the border being 1.8."""
-    found = sb.uncertainty_exponent(grebogi_basins(900))
+    found = sb.dynamics.uncertainty_exponent(grebogi_basins(900))
     assert found.exponent == pytest.approx(0.2, abs=0.02)
-    assert 0.2 <= sb.uncertainty_exponent(grebogi_basins(251)).exponent <= 0.3
+    assert 0.2 <= sb.dynamics.uncertainty_exponent(grebogi_basins(251)).exponent <= 0.3
 
 
 def test_a_smooth_border_has_dimension_one() -> None:
     x, y = np.meshgrid(*[np.linspace(-1.0, 1.0, 601)] * 2)
     disc = (x * x + y * y < 0.4).astype(int)
-    found = sb.uncertainty_exponent(disc, [1, 2, 4, 8])
+    found = sb.dynamics.uncertainty_exponent(disc, [1, 2, 4, 8])
     assert found.exponent == pytest.approx(1.0, abs=0.03)
-    assert not sb.basin_entropy(disc).is_fractal
+    assert not sb.dynamics.basin_entropy(disc).is_fractal
 
 
 def test_random_labels_have_all_the_entropy() -> None:
     labels = np.random.default_rng(0).integers(0, 3, (300, 300))
-    entropy = sb.basin_entropy(labels, 10)
+    entropy = sb.dynamics.basin_entropy(labels, 10)
     assert entropy.boundary == pytest.approx(math.log(3.0), abs=0.02) and entropy.is_fractal
     assert entropy.boxes == entropy.boundary_boxes == 900
-    assert sb.uncertainty_exponent(labels).exponent == pytest.approx(0.0, abs=0.01)
+    assert sb.dynamics.uncertainty_exponent(labels).exponent == pytest.approx(0.0, abs=0.01)
 
 
 def test_a_cantor_border_has_its_dimension() -> None:
@@ -67,41 +67,44 @@ def test_a_cantor_border_has_its_dimension() -> None:
     for level in range(13):
         digit = number // 3 ** (12 - level) % 3
         grid = np.where((digit == 1) & (grid == 0), 1 + level % 2, grid)
-    found = sb.uncertainty_exponent(grid, [3**k for k in range(4, 9)])
+    found = sb.dynamics.uncertainty_exponent(grid, [3**k for k in range(4, 9)])
     assert found.exponent == pytest.approx(1.0 - math.log(2.0) / math.log(3.0), abs=0.05)
 
 
 def test_integrity_of_known_shapes() -> None:
     x, y = np.meshgrid(np.arange(201), np.arange(201), indexing="ij")
     disc = ((x - 100) ** 2 + (y - 100) ** 2 < 60**2).astype(int)
-    found = sb.dynamical_integrity(disc, 1, attractor=(110, 100))
+    found = sb.dynamics.dynamical_integrity(disc, 1, attractor=(110, 100))
     assert found.global_measure == pytest.approx(math.pi * 60**2 / 201**2, rel=5e-3)
     assert found.factor == pytest.approx(60.0, abs=1.0) and found.center == (100, 100)
     assert found.local_measure == pytest.approx(50.0, abs=1.0)
-    stretched = sb.dynamical_integrity(disc, 1, spacing=[0.5, 0.5])
+    stretched = sb.dynamics.dynamical_integrity(disc, 1, spacing=[0.5, 0.5])
     assert stretched.factor == pytest.approx(0.5 * found.factor)
-    rim = sb.dynamical_integrity(np.ones((11, 11), dtype=int), 1)
+    rim = sb.dynamics.dynamical_integrity(np.ones((11, 11), dtype=int), 1)
     assert rim.factor == pytest.approx(6.0), "the rim of the window is a border"
 
 
 def test_classes_of_a_map_are_labels_too() -> None:
     kinds = np.zeros((40, 40), dtype=np.int8)
     kinds[:, 20:] = 3
-    assert sb.basin_entropy(kinds, 5).boundary_boxes == 0
-    assert sb.basin_entropy(kinds, 8).boundary_boxes == 5
+    assert sb.dynamics.basin_entropy(kinds, 5).boundary_boxes == 0
+    assert sb.dynamics.basin_entropy(kinds, 8).boundary_boxes == 5
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: sb.basin_entropy(np.zeros((4, 4))), "must be whole numbers"),
-        (lambda: sb.basin_entropy(np.zeros((4, 4), dtype=int), 5), "box = 5"),
-        (lambda: sb.uncertainty_exponent(np.zeros((40, 40), dtype=int)), "no border is met"),
+        (lambda: sb.dynamics.basin_entropy(np.zeros((4, 4))), "must be whole numbers"),
+        (lambda: sb.dynamics.basin_entropy(np.zeros((4, 4), dtype=int), 5), "box = 5"),
+        (lambda: sb.dynamics.uncertainty_exponent(np.zeros((40, 40), dtype=int)), "no border is met"),
         (
-            lambda: sb.dynamical_integrity(np.zeros((4, 4), dtype=int), 0, attractor=(9, 0)),
+            lambda: sb.dynamics.dynamical_integrity(np.zeros((4, 4), dtype=int), 0, attractor=(9, 0)),
             "attractor = (9, 0)",
         ),
-        (lambda: sb.dynamical_integrity(np.zeros((4, 4), dtype=int), 0, spacing=[0.0, 1.0]), "spacing"),
+        (
+            lambda: sb.dynamics.dynamical_integrity(np.zeros((4, 4), dtype=int), 0, spacing=[0.0, 1.0]),
+            "spacing",
+        ),
     ],
 )
 def test_refusals(call, words: str) -> None:

@@ -48,7 +48,7 @@ EXACT = [
 def test_orbits_with_one_impact_in_n_periods(ratio: float, restitution: float, periods: int) -> None:
     """State and impulse to 1e-8, and det = r^2."""
     speed, state = exact_orbit(ratio, restitution, periods)
-    orbit = sb.periodic_orbit(oscillator(ratio, restitution), state * 1.003, periods, phase=math.pi)
+    orbit = sb.dynamics.periodic_orbit(oscillator(ratio, restitution), state * 1.003, periods, phase=math.pi)
     np.testing.assert_allclose(orbit.coordinates, state, rtol=0.0, atol=1e-8)
     assert orbit.contact_summary.impacts == 1
     assert orbit.contact_summary.least_impulse == pytest.approx((1.0 + restitution) * speed, rel=1e-8)
@@ -61,7 +61,7 @@ def test_orbits_with_one_impact_in_n_periods(ratio: float, restitution: float, p
 def test_products_of_multipliers(modes: int, ratio: float, velocity: float, periods: int) -> None:
     """exp(-2 T sum zeta omega), impacts or none; the orbit closes by the plain march too."""
     system = system_of(modes, ratio, velocity)
-    orbit = sb.periodic_orbit(system, period=periods, transient=2000)
+    orbit = sb.dynamics.periodic_orbit(system, period=periods, transient=2000)
     model = system.model
     exact = (
         -2.0
@@ -79,9 +79,9 @@ def test_products_of_multipliers(modes: int, ratio: float, velocity: float, peri
 
 
 def test_multipliers_come_in_reciprocal_pairs_without_damping() -> None:
-    orbit = sb.periodic_orbit(system_of(1, 1.6, 0.03), transient=1500)
+    orbit = sb.dynamics.periodic_orbit(system_of(1, 1.6, 0.03), transient=1500)
     for damping in (0.002, 0.0005, 0.0):
-        orbit = sb.periodic_orbit(system_of(1, 1.6, 0.03, damping), orbit)
+        orbit = sb.dynamics.periodic_orbit(system_of(1, 1.6, 0.03, damping), orbit)
     values = orbit.multipliers
     assert orbit.contact_summary.impacts == 1
     np.testing.assert_allclose(values[0] * values[1], 1.0, atol=1e-8)
@@ -90,24 +90,26 @@ def test_multipliers_come_in_reciprocal_pairs_without_damping() -> None:
 def test_known_maps() -> None:
     """Fixed points of Henon's map; the second fixed point by leaving out the first."""
     root = math.sqrt(0.49 + 4.0 * 1.4)
-    first = sb.periodic_orbit(henon(), [0.5, 0.2])
+    first = sb.dynamics.periodic_orbit(henon(), [0.5, 0.2])
     np.testing.assert_allclose(first.coordinates[0], (-0.7 + root) / 2.8, rtol=1e-10)
-    second = sb.periodic_orbit(henon(), [0.5, 0.2], deflate=[first], iterations=200)
+    second = sb.dynamics.periodic_orbit(henon(), [0.5, 0.2], deflate=[first], iterations=200)
     np.testing.assert_allclose(second.coordinates[0], (-0.7 - root) / 2.8, rtol=1e-9)
     assert not first.is_stable and first.unstable == 1
-    twice = sb.periodic_orbit(logistic(3.2), [0.5], 4, transient=400)
+    twice = sb.dynamics.periodic_orbit(logistic(3.2), [0.5], 4, transient=400)
     assert twice.minimal_period == 2
 
 
 def test_coarse_derivatives_are_told(monkeypatch) -> None:
     """At level standard multipliers are off by more than rounding and less than what is said."""
-    from snapbeam.core import findings as diagnostics
+    from snapbeam.util import diagnostics
 
     monkeypatch.setattr(diagnostics, "_told", set())
     system = system_of(1, 1.6, 0.03)
     with pytest.warns(sb.DiagnosticWarning, match="--accuracy reference"):
-        coarse = sb.periodic_orbit(system, transient=1500, integration=sb.Integration(accuracy="standard"))
-    fine = sb.periodic_orbit(system, coarse.coordinates)
+        coarse = sb.dynamics.periodic_orbit(
+            system, transient=1500, integration=sb.Integration(accuracy="standard")
+        )
+    fine = sb.dynamics.periodic_orbit(system, coarse.coordinates)
     (told,) = coarse.diagnostics
     apart = np.abs(coarse.multipliers - fine.multipliers).max()
     assert 1e-4 < apart < told.numbers["relative_error"]
@@ -116,12 +118,12 @@ def test_coarse_derivatives_are_told(monkeypatch) -> None:
 
 
 def test_what_does_not_converge_says_why() -> None:
-    with pytest.raises(sb.OrbitNotFoundError, match="try another period"):
-        sb.periodic_orbit(logistic(3.9), [0.3], 7, iterations=2)
+    with pytest.raises(sb.dynamics.OrbitNotFoundError, match="try another period"):
+        sb.dynamics.periodic_orbit(logistic(3.9), [0.3], 7, iterations=2)
     free = sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), paper.CONTACT)
     with pytest.raises(sb.InputError, match="striker = None"):
-        sb.periodic_orbit(free)
+        sb.dynamics.periodic_orbit(free)
     with pytest.raises(sb.InputError, match="guess of 3 numbers"):
-        sb.periodic_orbit(system_of(1, 1.6, 0.03), [0.1, 0.2, 0.3])
+        sb.dynamics.periodic_orbit(system_of(1, 1.6, 0.03), [0.1, 0.2, 0.3])
     with pytest.raises(sb.InputError, match="period = 0"):
-        sb.periodic_orbit(system_of(1, 1.6, 0.03), period=0)
+        sb.dynamics.periodic_orbit(system_of(1, 1.6, 0.03), period=0)

@@ -13,7 +13,7 @@ import snapbeam as sb
 
 def test_a_stroboscopic_section_is_that_of_advance() -> None:
     system = system_of(2, 1.4, 0.02)
-    ds = sb.poincare_section(
+    ds = sb.dynamics.poincare_section(
         system, periods=12, transient=0, integration=sb.Integration(accuracy="reference")
     )
     how = sb.Integration(accuracy="reference")
@@ -27,7 +27,7 @@ def test_a_stroboscopic_section_is_that_of_advance() -> None:
 
 
 def test_an_impact_section_is_on_the_contact() -> None:
-    ds = sb.poincare_section(system_of(1, 1.6, 0.03), "impact", 40, transient=2000)
+    ds = sb.dynamics.poincare_section(system_of(1, 1.6, 0.03), "impact", 40, transient=2000)
     assert ds.sizes["point"] == 40
     tip = ds["displacement"].values
     assert tip.std() < 1e-3 * abs(tip.mean()), "the response is of period 1: every impact is alike"
@@ -35,7 +35,9 @@ def test_an_impact_section_is_on_the_contact() -> None:
 
 
 def test_a_section_at_a_level_is_on_it() -> None:
-    ds = sb.poincare_section(system_of(1, 1.6, 0.3), ("midspan_displacement", 0.0, "up"), 60, transient=0)
+    ds = sb.dynamics.poincare_section(
+        system_of(1, 1.6, 0.3), ("midspan_displacement", 0.0, "up"), 60, transient=0
+    )
     assert ds.sizes["point"] >= 2
     np.testing.assert_allclose(ds["midspan_displacement"].values, 0.0, atol=1e-7)
     assert (ds["midspan_velocity"].values > 0.0).all()
@@ -45,10 +47,10 @@ def test_sweeps_meet_the_branch() -> None:
     """Both sweeps come back after a period, and one of them is on the orbit that is found from rest."""
     system = system_of(1, 1.6, 0.03, 0.02)
     values = np.linspace(0.02, 0.06, 5)
-    ds = sb.bifurcation_diagram(system, "velocity_amplitude", values, periods=(400, 16))
+    ds = sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", values, periods=(400, 16))
     assert ds["midspan_displacement"].dims == ("sweep", "velocity_amplitude", "period")
     assert (ds["least_period"] == 1).all() and not ds["failed"].any()
-    orbit = sb.periodic_orbit(system.replace(**{"drive.velocity_amplitude": 0.04}), transient=300)
+    orbit = sb.dynamics.periodic_orbit(system.replace(**{"drive.velocity_amplitude": 0.04}), transient=300)
     model = orbit.flow.system.model
     center = float(model.midspan_shape @ orbit.state.amplitude) / orbit.flow.system.scale.length
     swept = ds["midspan_displacement"].sel(velocity_amplitude=0.04, method="nearest")
@@ -59,13 +61,13 @@ def test_sweeps_meet_the_branch() -> None:
 def test_sweeps_show_hysteresis_and_starts_what_they_miss() -> None:
     """Snapped through on the way up, the beam stays in the far well on the way down."""
     system = system_of(1, 1.6, 0.03, 0.05)
-    ds = sb.bifurcation_diagram(
+    ds = sb.dynamics.bifurcation_diagram(
         system, "velocity_amplitude", [0.03, 0.4], periods=(150, 16), initial_conditions=2
     )
     assert list(ds["sweep"].values) == ["up", "down", "start 0", "start 1"]
     weak = ds["midspan_displacement"].sel(velocity_amplitude=0.03).isel(period=-1)
     assert float(weak.sel(sweep="up")) < 0.0 and float(weak.sel(sweep="start 0")) < 0.0
-    again = sb.bifurcation_diagram(
+    again = sb.dynamics.bifurcation_diagram(
         system,
         "velocity_amplitude",
         [0.03, 0.4],
@@ -78,7 +80,7 @@ def test_sweeps_show_hysteresis_and_starts_what_they_miss() -> None:
 
 
 def test_approaches_are_told() -> None:
-    ds = sb.bifurcation_diagram(
+    ds = sb.dynamics.bifurcation_diagram(
         system_of(8, 1.4, 0.03),
         "velocity_amplitude",
         [0.03, 0.031],
@@ -91,10 +93,12 @@ def test_approaches_are_told() -> None:
 
 def test_a_parameter_of_the_structure_may_be_swept() -> None:
     system = system_of(1, 1.6, 0.03, 0.05)
-    ds = sb.bifurcation_diagram(
+    ds = sb.dynamics.bifurcation_diagram(
         system, "model.damping_ratio", [0.04, 0.05], sweeps=["down"], periods=(200, 4)
     )
-    plain = sb.bifurcation_diagram(system, "velocity_amplitude", [0.03], sweeps=["up"], periods=(200, 4))
+    plain = sb.dynamics.bifurcation_diagram(
+        system, "velocity_amplitude", [0.03], sweeps=["up"], periods=(200, 4)
+    )
     one = ds["midspan_displacement"].sel(damping_ratio=0.05).values.ravel()
     np.testing.assert_allclose(one, plain["midspan_displacement"].values.ravel(), atol=1e-6)
 
@@ -102,16 +106,22 @@ def test_a_parameter_of_the_structure_may_be_swept() -> None:
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda s: sb.poincare_section(s, "nowhere"), "section"),
+        (lambda s: sb.dynamics.poincare_section(s, "nowhere"), "section"),
         (
-            lambda s: sb.poincare_section(s, ("midspan_displacement", 5.0, "up"), 3, transient=0),
+            lambda s: sb.dynamics.poincare_section(s, ("midspan_displacement", 5.0, "up"), 3, transient=0),
             "is never met",
         ),
-        (lambda s: sb.poincare_section(s, ("contact_force", 0.0, "up")), "section[0]"),
-        (lambda s: sb.bifurcation_diagram(s, "contact.type", [1.0, 2.0]), "contact.type"),
-        (lambda s: sb.bifurcation_diagram(s, "velocity_amplitude", [0.2, 0.1]), "strictly increasing"),
-        (lambda s: sb.bifurcation_diagram(s, "velocity_amplitude", [0.1, 0.2], sweeps=[]), "sweeps"),
-        (lambda s: sb.bifurcation_diagram(s, "velocity_amplitude", [0.1, 0.2], periods=3), "periods = 3"),
+        (lambda s: sb.dynamics.poincare_section(s, ("contact_force", 0.0, "up")), "section[0]"),
+        (lambda s: sb.dynamics.bifurcation_diagram(s, "contact.type", [1.0, 2.0]), "contact.type"),
+        (
+            lambda s: sb.dynamics.bifurcation_diagram(s, "velocity_amplitude", [0.2, 0.1]),
+            "strictly increasing",
+        ),
+        (lambda s: sb.dynamics.bifurcation_diagram(s, "velocity_amplitude", [0.1, 0.2], sweeps=[]), "sweeps"),
+        (
+            lambda s: sb.dynamics.bifurcation_diagram(s, "velocity_amplitude", [0.1, 0.2], periods=3),
+            "periods = 3",
+        ),
     ],
 )
 def test_refusals(call, words: str) -> None:

@@ -36,7 +36,7 @@ LONG = [
 @pytest.mark.parametrize("name", ["both", *LONG])
 def test_exponents_add_up_to_the_damping(name):
     """-2 sum zeta omega, whatever shakes the beam."""
-    found = sb.lyapunov_spectrum(SHAKEN[name], periods=20, transient=5, k=4).exponent.values.ravel()
+    found = sb.dynamics.lyapunov_spectrum(SHAKEN[name], periods=20, transient=5, k=4).exponent.values.ravel()
     expected = -2.0 * DAMPING * float(MODEL.omega.sum())
     assert found.sum() == pytest.approx(expected, rel=1e-8)
 
@@ -46,7 +46,7 @@ def test_an_orbit_is_one_of_the_run_itself(name):
     """From the orbit a recorded run comes back to it, period after period; the multipliers' product is known."""
     system = SHAKEN[name].replace(**{"base_excitation.acceleration_amplitude": 0.02})
     exact = sb.Integration(accuracy="reference")
-    orbit = sb.periodic_orbit(system, integration=exact, transient=300)
+    orbit = sb.dynamics.periodic_orbit(system, integration=exact, transient=300)
     flow = Stroboscope(system, exact)
     lost = math.exp(-2.0 * DAMPING * float(MODEL.omega.sum()) * flow.period)
     assert float(np.prod(orbit.multipliers).real) == pytest.approx(lost, rel=1e-8)
@@ -80,7 +80,7 @@ def test_periods_one_by_one_are_periods_at_once():
 def test_what_does_not_repeat_is_refused(system, words):
     """A section needs a common period."""
     with pytest.raises(sb.InputError, match=words):
-        sb.lyapunov_spectrum(system, periods=20, transient=5)
+        sb.dynamics.lyapunov_spectrum(system, periods=20, transient=5)
     with pytest.raises(sb.InputError, match="phase = 1"):
         Stroboscope(SHAKEN["base"], phase=1.0)
 
@@ -98,6 +98,6 @@ def test_several_strikers_are_refused_by_name():
     """What is possible with them is said."""
     stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
     system = sb.System(MODEL, paper.CONTACT, [STRIKER, stop])
-    for ask in (Stroboscope, sb.lyapunov_spectrum, sb.find_attractors, sb.advance):
+    for ask in (Stroboscope, sb.dynamics.lyapunov_spectrum, sb.dynamics.find_attractors, sb.advance):
         with pytest.raises(sb.InputError, match="of several strikers ask for whole runs"):
             ask(system)

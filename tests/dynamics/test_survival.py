@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.core.validate import InputError
-from snapbeam.dynamics.lifetimes.survival import LifetimeSettings, fit_lifetime, proportion
+from snapbeam.dynamics.lifetimes import LifetimeSettings, fit_lifetime, proportion
+from snapbeam.util.validation import InputError
 
 LIFETIME, DELAY = 50.0, 8.0
 

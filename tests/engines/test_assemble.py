@@ -9,9 +9,9 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
-from snapbeam.engines.assemble import make_ensemble
-from snapbeam.engines.structure import structure_of
+from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.structure import structure_of
+from snapbeam.util.validation import InputError
 
 MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=5)
 SYSTEM = sb.System(MODEL, paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))

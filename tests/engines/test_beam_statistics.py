@@ -9,9 +9,9 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.outcomes import Statistic, register, withdraw
-from snapbeam.model.start import rest_state
-from snapbeam.sweeps.replicas import Replicates, perturbed_start
+from snapbeam.model.state import rest_state
+from snapbeam.solver.statistics import Statistic, register, withdraw
+from snapbeam.sweeps.replicates import Replicates, perturbed_start
 
 MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
 MASS = 0.02

@@ -17,10 +17,10 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.config import lookup, parameters
-from snapbeam.core.validate import InputError
-from snapbeam.engines.outcomes import STATISTICS, unregister
-from snapbeam.model.contact import LAWS
+from snapbeam.model.contact.base import LAWS
+from snapbeam.model.parameters import lookup, parameters
+from snapbeam.solver.statistics import STATISTICS, unregister
+from snapbeam.util.validation import InputError
 
 FUNCTION = '''"""The deepest that the tip ever is, at the end of a step, m."""
 

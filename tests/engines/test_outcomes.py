@@ -9,8 +9,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
-from snapbeam.engines.outcomes import (
+from snapbeam.solver.statistics import (
     ACCUMULATORS,
     STATISTICS,
     Statistic,
@@ -19,6 +18,7 @@ from snapbeam.engines.outcomes import (
     register,
     unregister,
 )
+from snapbeam.util.validation import InputError
 
 MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=8)
 

@@ -9,7 +9,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.plan import choose_base_step
+from snapbeam.solver.step_size import choose_base_step
 
 
 @pytest.mark.parametrize("modes", [1, 2, 5, 16, 32, 48, 64, 128])

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.config import Config
+from snapbeam.model.parameter_file import Config
 
 pytest.importorskip("panel", reason="the explorer's extra is not installed: make explorer-deps")
 

@@ -365,7 +365,7 @@ def test_other_addresses_need_a_flag(folder):
 
 @pytest.mark.slow
 def test_the_same_in_a_notebook(tab, small_map):
-    shown = sb.explore(small_map)
+    shown = sb.explorer.explore(small_map)
     try:
         assert shown.url in shown._repr_html_()
         page = tab(shown.url)

@@ -10,11 +10,7 @@ import snapbeam as sb
 
 pytest.importorskip("panel")
 
-from snapbeam.explorer.maps.layers import chances
-from snapbeam.explorer.maps.plane import Plane
-from snapbeam.explorer.maps.points import compared, integration_of, system_of
-from snapbeam.explorer.maps.scatter import Scatter
-from snapbeam.explorer.maps.source import opened
+from snapbeam.explorer.maps import Plane, Scatter, chances, compared, integration_of, opened, system_of
 
 SHORT = sb.Integration(cycles=4)
 
@@ -93,10 +89,14 @@ def test_one_point_of_an_axis_may_stand_upward(one_mode):
 
 def test_probabilities_and_lifetimes_are_shown_and_told(one_mode, tmp_path):
     axes = {"frequency_ratio": np.linspace(0.8, 1.6, 3), "velocity_amplitude": np.linspace(0.1, 0.3, 2)}
-    spread = sb.ParameterUncertainty(of={"velocity_amplitude": sb.Normal(0.05, relative=True)})
-    allocation = sb.SamplingPlan(half_width=0.4, initial_runs=8, max_runs=8)
-    found = sb.probability_map(one_mode, axes, spread, allocation, integration=SHORT)
-    lived = sb.lifetime_map(one_mode, axes, sb.Integration(cycles=80), initial_conditions=6, after=[10, 30])
+    spread = sb.uncertainty.ParameterUncertainty(
+        of={"velocity_amplitude": sb.uncertainty.Normal(0.05, relative=True)}
+    )
+    allocation = sb.uncertainty.SamplingPlan(half_width=0.4, initial_runs=8, max_runs=8)
+    found = sb.uncertainty.probability_map(one_mode, axes, spread, allocation, integration=SHORT)
+    lived = sb.dynamics.lifetime_map(
+        one_mode, axes, sb.Integration(cycles=80), initial_conditions=6, after=[10, 30]
+    )
     both = xr.merge(
         [found, lived.drop_vars([name for name in lived.data_vars if name in found])], compat="override"
     ).assign_attrs(found.attrs)

@@ -12,8 +12,7 @@ import snapbeam as sb
 
 pytest.importorskip("panel")
 
-from snapbeam.explorer.jobs import Cancelled, Jobs, Token
-from snapbeam.explorer.limits import CYCLES, MODES, SAMPLES, check_run, samples_of
+from snapbeam.explorer.jobs import CYCLES, MODES, SAMPLES, Cancelled, Jobs, Token, check_run, samples_of
 
 ROOM = Path(sb.__file__).parent / "explorer"
 

@@ -194,7 +194,7 @@ def test_pictures_of_a_list_are_taken_away(tab, serve, system, tmp_path):
     drawn = np.asarray(Image.open(files["png"]).convert("RGB")).reshape(-1, 3)
     colors = {tuple(each) for each in np.unique(drawn, axis=0)}
     classes = {sb.ResponseClass(int(kind)) for kind in np.unique(found["response_class"])}
-    from snapbeam.figures import CLASS_COLORS
+    from snapbeam.plot.style import CLASS_COLORS
 
     for kind in classes:
         assert tuple(bytes.fromhex(CLASS_COLORS[kind][1:])) in colors, f"no dot of {kind.label}"

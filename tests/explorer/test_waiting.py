@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("panel")
 
-from snapbeam.explorer.waiting import Compiling, Waiting
+from snapbeam.explorer.jobs import Compiling, Waiting
 
 
 class Clock:

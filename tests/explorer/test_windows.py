@@ -10,7 +10,7 @@ import snapbeam as sb
 pytest.importorskip("panel")
 
 from snapbeam.explorer.jobs import Cancelled, Jobs, Token
-from snapbeam.explorer.maps.windows import compute, planned
+from snapbeam.explorer.maps import compute, planned
 
 NAMES = ("drive.frequency_ratio", "drive.velocity_amplitude")
 
@@ -109,9 +109,8 @@ def test_the_papers_beam_is_mapped_while_one_looks(tab, serve, folder):
 
 def test_what_each_of_two_strikers_does_is_shown_and_kept(one_mode, jobs) -> None:
     """A map to be computed offers it, a window has it with unit and words, after what all of them do together."""
-    from snapbeam.explorer.cards.take import window_dataset
-    from snapbeam.explorer.maps.layers import layers_of
-    from snapbeam.explorer.maps.source import SystemSource
+    from snapbeam.explorer.cards import window_dataset
+    from snapbeam.explorer.maps import SystemSource, layers_of
 
     stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=2e-5)
     two = sb.System(one_mode.model, one_mode.contact, [one_mode.striker, stop])

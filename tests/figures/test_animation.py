@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.core.validate import InputError
-from snapbeam.figures.animation import animate_run, frame_times
+from snapbeam.plot.animation import animate_run, frame_times
+from snapbeam.util.validation import InputError
 
 pytest.importorskip("imageio_ffmpeg")
 

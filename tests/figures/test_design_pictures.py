@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from snapbeam.core.validate import InputError
-from snapbeam.figures.design import plot_designs, plot_probability, plot_quantiles, plot_tornado
+from snapbeam.plot.uncertainty import plot_designs, plot_probability, plot_quantiles, plot_tornado
+from snapbeam.util.validation import InputError
 
 
 @pytest.fixture(autouse=True)

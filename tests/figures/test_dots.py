@@ -7,12 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError
-from snapbeam.figures import read_measured_points
-from snapbeam.figures.lab.dot_comparison import plot_dot_comparison
-from snapbeam.lab.compare.dots import MeasuredPoints
-from snapbeam.lab.compare.maps import compare_measured_points
+from snapbeam.lab.compare_maps import compare_measured_points
+from snapbeam.lab.plot.comparison import plot_dot_comparison
+from snapbeam.sweeps.measured_points import MeasuredPoints, read_measured_points
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError
 
 
 def table(tmp_path, text):

@@ -8,9 +8,9 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
-from snapbeam.core.codes import RunStatus
-from snapbeam.dynamics.lifetimes.lifetime_map import refit
-from snapbeam.figures.dynamics import plot_basins, plot_section, plot_survival
+from snapbeam.dynamics.lifetimes import refit
+from snapbeam.plot.dynamics import plot_basins, plot_section, plot_survival
+from snapbeam.util.status_codes import RunStatus
 
 CYCLES, QUIET = 400, 50.0
 
@@ -39,7 +39,7 @@ def lives(last: np.ndarray, failed: int = 0) -> xr.Dataset:
         {name: (("point", "start"), values, labels) for name, values in columns.items()},
         attrs={"cycles": CYCLES, "quiet": QUIET, "confidence": 0.95},
     )
-    return refit(ds, sb.LifetimeSettings(settling_cycles=QUIET), [100])
+    return refit(ds, sb.dynamics.LifetimeSettings(settling_cycles=QUIET), [100])
 
 
 def curve(ax: plt.Axes) -> tuple[np.ndarray, np.ndarray]:

@@ -9,8 +9,10 @@ import xarray as xr
 from matplotlib.colors import to_rgb
 
 from snapbeam import InputError
-from snapbeam.core.codes import ResponseClass
-from snapbeam.figures import CLASS_COLORS, MeasuredPoints, plot_points, plot_response_map, plot_statistic
+from snapbeam.plot.map import plot_points, plot_response_map, plot_statistic
+from snapbeam.plot.style import CLASS_COLORS
+from snapbeam.sweeps.measured_points import MeasuredPoints
+from snapbeam.util.status_codes import ResponseClass
 
 
 @pytest.fixture

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError
-from snapbeam.figures import CLASS_COLORS, MeasuredPoints, class_handles, plot_response_map, save_figure
+from snapbeam.plot.map import class_handles, plot_response_map
+from snapbeam.plot.style import CLASS_COLORS, save_figure
+from snapbeam.sweeps.measured_points import MeasuredPoints
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError
 
 
 @pytest.fixture(autouse=True)

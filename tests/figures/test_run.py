@@ -8,8 +8,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from snapbeam.core.validate import InputError
-from snapbeam.figures import plot_run, save_figure
+from snapbeam.plot.run import plot_run
+from snapbeam.plot.style import save_figure
+from snapbeam.util.validation import InputError
 
 
 @pytest.fixture(autouse=True)

@@ -7,8 +7,8 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
-from snapbeam.figures import plot_system
+from snapbeam.plot.schematic import plot_system
+from snapbeam.util.validation import InputError
 
 LEVEL = paper.BEAM.buckling_level
 

@@ -9,9 +9,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 import snapbeam as sb
-from snapbeam import figures, paper
-from snapbeam.core.validate import InputError
-from snapbeam.figures.captions import caption
+from snapbeam import paper
+from snapbeam.plot.style import caption
+from snapbeam.util.validation import InputError
 
 
 @pytest.fixture(autouse=True)
@@ -66,12 +66,12 @@ def test_spectrum_of_a_sine():
         {"displacement": ("time", 0.3 * np.sin(2 * np.pi * 3.0 * cycle), attrs)},
         {"time": ("time", cycle * 0.01, {"units": "s"}), "cycle": ("time", cycle, {"units": "1"})},
     )
-    line = figures.plot_spectrum(run, variable="displacement").lines[0]
+    line = plot.plot_spectrum(run, variable="displacement").lines[0]
     at = int(np.argmax(line.get_ydata()))
     assert line.get_xdata()[at] == pytest.approx(3.0, abs=0.03)
     assert line.get_ydata()[at] == pytest.approx(0.3, rel=0.02)
     with pytest.raises(InputError, match="at least 16 samples"):
-        figures.plot_spectrum(run, variable="displacement", window=(0.0, 0.01))
+        plot.plot_spectrum(run, variable="displacement", window=(0.0, 0.01))
 
 
 def test_statistics_of_a_map(synthetic_map):
@@ -80,20 +80,20 @@ def test_statistics_of_a_map(synthetic_map):
         dims=synthetic_map.response.dims, attrs={"units": "N", "long_name": "peak contact force"},
     )  # fmt: skip
     ds = synthetic_map.assign(peak_force=force)
-    ax = figures.plot_statistic(ds, "peak_force")
+    ax = plot.plot_statistic(ds, "peak_force")
     mesh = ax.collections[0]
     assert mesh.norm.vmin == pytest.approx(1e-2) and mesh.norm.vmax == pytest.approx(100.0), (
         "mN, by powers of ten"
     )
     assert "(mN)" in ax.figure.axes[1].get_ylabel()
-    line = figures.plot_statistic(ds.isel(frequency_ratio=3), "peak_force", ax=plt.figure().add_subplot())
+    line = plot.plot_statistic(ds.isel(frequency_ratio=3), "peak_force", ax=plt.figure().add_subplot())
     assert line.lines[0].get_ydata().size == ds.sizes["velocity_amplitude"]
     with pytest.raises(InputError, match="nosuch"):
-        figures.plot_statistic(ds, "nosuch")
+        plot.plot_statistic(ds, "nosuch")
 
 
 def test_a_map_over_one_axis(synthetic_map):
-    ax = figures.plot_response_map(synthetic_map.isel(frequency_ratio=3))
+    ax = plot.plot_response_map(synthetic_map.isel(frequency_ratio=3))
     assert ax.get_xlabel() == "Velocity amplitude $V$" and "Centre displacement" in ax.get_ylabel()
     with pytest.raises(InputError, match="are drawn over two axes"):
-        figures.plot_response_map(synthetic_map.isel(frequency_ratio=3), threshold_line=True)
+        plot.plot_response_map(synthetic_map.isel(frequency_ratio=3), threshold_line=True)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError
-from snapbeam.figures import CLASS_COLORS, new_figure, save_figure
+from snapbeam.plot.style import CLASS_COLORS, new_figure, save_figure
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError
 
 # Machado, Oliveira and Fernandes, IEEE Trans. Vis. Comput. Graph. 15 (2009) 1291, severity 1, on linear RGB.
 VISION = {

@@ -10,9 +10,11 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Rectangle
 
-from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError
-from snapbeam.figures import CLASS_COLORS, plot_response_map, plot_threshold, save_figure
+from snapbeam.plot.map import plot_response_map
+from snapbeam.plot.style import CLASS_COLORS, save_figure
+from snapbeam.plot.threshold import plot_threshold
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError
 
 _KINDS = (
     "band_found",

@@ -11,13 +11,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "lab"))
 from lab_waveforms import BUCKLING_LEVEL, FRAME_RATE, PIXEL, impacts
 
 from snapbeam import InputError
-from snapbeam.figures.lab.tracking import found_edges, plot_frame, plot_tracking_quality
-from snapbeam.figures.lab.tracking_video import annotated_video
-from snapbeam.figures.style import save_figure
-from snapbeam.lab.camera.recording import open_recording
-from snapbeam.lab.synthetic.recording import render_recording
-from snapbeam.lab.synthetic.setup import SyntheticCamera, SyntheticStage
+from snapbeam.lab.camera import open_recording
+from snapbeam.lab.plot.tracking import annotated_video, found_edges, plot_frame, plot_tracking_quality
+from snapbeam.lab.synthetic import SyntheticCamera, SyntheticStage, render_recording
 from snapbeam.lab.tracking.track import track
+from snapbeam.plot.style import save_figure
 
 
 @pytest.fixture(scope="module", params=["below", "right"])

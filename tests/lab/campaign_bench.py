@@ -6,7 +6,7 @@ import numpy as np
 
 import snapbeam as sb
 import snapbeam.lab as lab
-from snapbeam.core.codes import ResponseClass
+from snapbeam.util.status_codes import ResponseClass
 
 LOCATION = 1.0 / 2.1
 BEAM = sb.Beam(

@@ -9,17 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from snapbeam import InputError
-from snapbeam.core.findings import doubtful
-from snapbeam.lab import (
-    Defects,
-    SyntheticCamera,
-    SyntheticStage,
-    diagnostics_of,
-    open_recording,
-    render_recording,
-    track,
-)
-from snapbeam.lab.synthetic.defects import Fixture
+from snapbeam.lab import Defects, SyntheticCamera, SyntheticStage, open_recording, render_recording, track
+from snapbeam.lab.synthetic import Fixture
+from snapbeam.util.diagnostics import diagnostics_of, doubtful
 
 LEVEL = 0.335e-3
 

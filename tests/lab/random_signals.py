@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from snapbeam import InputError
-from snapbeam.core.findings import doubtful
-from snapbeam.lab import diagnostics_of, identify_decay, make_signal, measure_drive, render_vibrometer
+from snapbeam.lab import identify_decay, make_signal, measure_drive, render_vibrometer
+from snapbeam.util.diagnostics import diagnostics_of, doubtful
 
 DRIVE_DEFECTS = (
     "dropout", "hold", "spikes", "clipped", "clipped on one side", "clipped before the noise", "gentle start",

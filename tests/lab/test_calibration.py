@@ -9,15 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from snapbeam.config import load_config
-from snapbeam.core.validate import InputError
-from snapbeam.figures.lab.calibration import plot_calibration
-from snapbeam.lab.calibration.calibrate import ContactTest, Measurements, calibrate, load_measurements
+from snapbeam.lab.calibration import calibrate
+from snapbeam.lab.plot.calibration import plot_calibration
 from snapbeam.model.beam import Beam
-from snapbeam.model.contact import HertzContact
-from snapbeam.model.ends import BoundaryConditions
-from snapbeam.model.galerkin.reduction import ReducedModel
-from snapbeam.model.paper_values import BEAM
+from snapbeam.model.boundary_conditions import BoundaryConditions
+from snapbeam.model.contact.hertz import HertzContact
+from snapbeam.model.default_values import BEAM
+from snapbeam.model.parameter_file import load_config
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.uncertainty.measurements import ContactTest, Measurements, load_measurements
+from snapbeam.util.validation import InputError
 
 PAPER = Measurements(
     straight_frequencies=[80.0, 221.0],
@@ -199,7 +200,10 @@ def test_a_file_of_measurements(tmp_path):
         ("[measured]\nstraight_frequencies = [221.0, 80.0]\n", "must increase"),
         ("[measured]\nstraight_frequencies = [-80.0]\n", "greater than 0"),
         ("[measured]\nstraight_frequencies = [nan]\n", "finite"),
-        ("[measured]\nstraight_frequencies = [80.0]\nstraight_frequencies_se = [1.0, 2.0]\n", "straight_frequencies_se"),
+        (
+            "[measured]\nstraight_frequencies = [80.0]\nstraight_frequencies_se = [1.0, 2.0]\n",
+            "straight_frequencies_se",
+        ),
         ("[measured]\ndamping_ratio = [5.0]\n", "damping_ratio"),
         ("[measured]\ncontact = 3\n", "list of tables"),
         ("[[measured.contact]]\nclosing_speed = 0.1\nduration = 1e-4\n", "two of"),

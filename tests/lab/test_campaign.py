@@ -9,9 +9,7 @@ from typer.testing import CliRunner
 
 from snapbeam import InputError
 from snapbeam.cli.app import app
-from snapbeam.lab.campaign.campaign import COLUMNS, run_campaign
-from snapbeam.lab.campaign.pairing import find_tests
-from snapbeam.lab.campaign.settings import load_settings
+from snapbeam.lab.batch import COLUMNS, find_tests, load_settings, run_campaign
 
 KNOWN = {
     "tracking": {"buckling_level": 0.335e-3, "location": 1.0 / 2.1, "beam_thickness": 0.4e-3},
@@ -30,7 +28,7 @@ REASONS = {
 
 
 def command(*arguments):
-    return CliRunner().invoke(app, ["campaign", *(str(one) for one in arguments)])
+    return CliRunner().invoke(app, ["process-tests", *(str(one) for one in arguments)])
 
 
 def rows(output):

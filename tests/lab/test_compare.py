@@ -10,20 +10,19 @@ import typer
 import xarray as xr
 from typer.testing import CliRunner
 
-from snapbeam.cli.lab.calibrate import calibrate
-from snapbeam.cli.lab.compare import compare
-from snapbeam.cli.lab.identify import identify
-from snapbeam.cli.lab.vibrometer import vibrometer
-from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError
-from snapbeam.figures.lab.dot_comparison import plot_dot_comparison
-from snapbeam.figures.lab.waveform_comparison import plot_waveform_comparison, plot_waveform_overlay
-from snapbeam.lab.compare.dots import MeasuredPoints
-from snapbeam.lab.compare.maps import compare_measured_points
-from snapbeam.lab.compare.waveforms import compare_waveforms
-from snapbeam.lab.signals.files import write_signal
-from snapbeam.lab.signals.signal import make_signal
-from snapbeam.runs.schema import trajectory_dataset
+from snapbeam.lab.cli.calibrate import calibrate
+from snapbeam.lab.cli.compare import compare
+from snapbeam.lab.cli.fit_decay import identify
+from snapbeam.lab.cli.vibrometer import vibrometer
+from snapbeam.lab.compare_maps import compare_measured_points
+from snapbeam.lab.compare_waveforms import compare_waveforms
+from snapbeam.lab.plot.comparison import plot_dot_comparison, plot_waveform_comparison, plot_waveform_overlay
+from snapbeam.lab.signal_files import write_signal
+from snapbeam.lab.signals import make_signal
+from snapbeam.simulation.dataset import trajectory_dataset
+from snapbeam.sweeps.measured_points import MeasuredPoints
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError
 
 
 def dots_of(dataset, count: int = 200, seed: int = 0):
@@ -214,12 +213,12 @@ def test_commands_of_signals(program, tmp_path):
 
     decay = 1e-4 * np.exp(-2.5 * time) * np.cos(2.0 * np.pi * 81.0 * time) + 1e-6 * rng.standard_normal(8000)
     path = write_signal(tmp_path / "d.uff", make_signal(decay, "m", 1e4))
-    told = program("identify", path, "--method", "all", "--json", tmp_path / "d.json")
+    told = program("fit-decay", path, "--method", "all", "--json", tmp_path / "d.json")
     assert told.exit_code == 0, told.output
     report = json.loads((tmp_path / "d.json").read_text(encoding="utf-8"))
     for method in ("fit", "hilbert", "log_decrement"):
         assert report[method]["modes"][0]["natural_frequencies"] == pytest.approx(81.0, rel=5e-4)
-    assert program("identify", tmp_path / "none.csv").exit_code == 2
+    assert program("fit-decay", tmp_path / "none.csv").exit_code == 2
 
 
 @pytest.mark.parametrize(("polarity", "source"), [(1, "vibrometer"), (1, "camera"), (-1, "camera")])

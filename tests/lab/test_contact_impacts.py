@@ -6,7 +6,7 @@ import xarray as xr
 
 from snapbeam import InputError
 from snapbeam.lab import stiffness_from_impacts
-from snapbeam.lab.calibration.measurements import HERTZ_TIME
+from snapbeam.uncertainty.measurements import HERTZ_TIME
 
 STIFFNESS, MASS = 4e8, 0.02
 

@@ -82,7 +82,7 @@ def test_masked_median_agrees_with_numpy():
 
 def test_faint_light_that_lasts_shows_in_the_mean_thickness():
     """1.5 standard deviations, over 56 frames: told, and in the error; never in 200 records of noise alone."""
-    from snapbeam.lab.tracking.measure.series import distortion
+    from snapbeam.lab.tracking.measure import distortion
 
     rng, count = np.random.default_rng(5), 280
     plain = np.zeros(count)
@@ -99,7 +99,7 @@ def test_faint_light_that_lasts_shows_in_the_mean_thickness():
 
 def test_light_over_half_of_the_frames_does_not_hide_behind_the_scatter_that_it_makes():
     """Three standard deviations, over 70 of 150 frames: the scatter of all frames is twice that of the noise."""
-    from snapbeam.lab.tracking.measure.series import distortion
+    from snapbeam.lab.tracking.measure import distortion
 
     thickness = 16.0 + 0.035 * np.random.default_rng(5).standard_normal(150)
     thickness[40:110] += 0.1
@@ -110,7 +110,7 @@ def test_light_over_half_of_the_frames_does_not_hide_behind_the_scatter_that_it_
 
 def test_a_frame_whose_columns_agree_by_chance_is_not_surer_than_the_others():
     """Of 14 columns with a noise of 0.34 px none but outliers is left out, and no error is less than the usual one."""
-    from snapbeam.lab.tracking.measure.series import pooled
+    from snapbeam.lab.tracking.measure import pooled
 
     rng = np.random.default_rng(3)
     x = np.arange(14.0) - 6.5

@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import snapbeam as sb
-from snapbeam.core.codes import ResponseClass, classify
-from snapbeam.core.validate import InputError
-from snapbeam.figures.lab.identification import plot_decay
-from snapbeam.lab.compare.response import measure_response
+from snapbeam.lab.compare_waveforms import measure_response
 from snapbeam.lab.decay.identify import METHODS, identify_decay
-from snapbeam.lab.decay.wells import compare_wells
-from snapbeam.lab.signals.signal import make_signal
-from snapbeam.model.paper_values import BEAM
-from snapbeam.runs.schema import trajectory_dataset
+from snapbeam.lab.decay.model import compare_wells
+from snapbeam.lab.plot.fit_decay import plot_decay
+from snapbeam.lab.signals import make_signal
+from snapbeam.model.default_values import BEAM
+from snapbeam.simulation.dataset import trajectory_dataset
+from snapbeam.util.status_codes import ResponseClass, classify
+from snapbeam.util.validation import InputError
 
 F0, ZETA, RATE = 80.0, 0.005, 5000.0
 B = 0.335e-3

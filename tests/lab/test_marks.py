@@ -7,8 +7,8 @@ from lab_waveforms import BUCKLING_LEVEL, FRAME_RATE, PIXEL, impacts
 
 import snapbeam.lab as lab
 from snapbeam import InputError
-from snapbeam.lab.camera.marks import profile_shift
-from snapbeam.lab.synthetic.defects import Fixture
+from snapbeam.lab.camera import profile_shift
+from snapbeam.lab.synthetic import Fixture
 
 ROWS = np.arange(40.0)
 

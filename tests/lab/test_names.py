@@ -1,9 +1,9 @@
 """The laboratory's public names are where its own list says."""
 
 import pytest
+import snapbeam.core.findings as diagnostics
 
 import snapbeam
-import snapbeam.core.findings as diagnostics
 import snapbeam.lab as lab
 
 

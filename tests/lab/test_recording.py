@@ -10,10 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from snapbeam import InputError
-from snapbeam.lab.camera.photron.header import read_header
-from snapbeam.lab.camera.photron.pixels import pack_12bit, unpack_12bit
-from snapbeam.lab.camera.recording import open_recording
-from snapbeam.lab.camera.write import write_photron, write_video
+from snapbeam.lab.camera import open_recording, write_photron, write_video
+from snapbeam.lab.photron import pack_12bit, read_header, unpack_12bit
 
 REAL = Path(__file__).resolve().parents[3] / "shared" / "data" / "photron"
 SCALES = {"frame_rate": 10_000.0, "pixel_size": 12e-6}

@@ -7,11 +7,9 @@ import pytest
 from lab_waveforms import errors_px, rms
 
 import snapbeam as sb
-from snapbeam.lab.camera.recording import open_recording
-from snapbeam.lab.synthetic.run import render_run
-from snapbeam.lab.synthetic.setup import SyntheticCamera, SyntheticStage
-from snapbeam.lab.tracking.onsets import contact_onsets
-from snapbeam.lab.tracking.track import track
+from snapbeam.lab.camera import open_recording
+from snapbeam.lab.synthetic import SyntheticCamera, SyntheticStage, render_run
+from snapbeam.lab.tracking.track import contact_onsets, track
 
 LOCATION = 1.0 / 2.1
 BEAM = sb.Beam(

@@ -9,10 +9,9 @@ import wave
 import numpy as np
 import pytest
 
-from snapbeam.core.validate import InputError
-from snapbeam.lab.signals.files import read_channels, read_signal
-from snapbeam.lab.signals.signal import check_signal
-from snapbeam.lab.signals.units import parse_sensitivity, si_unit
+from snapbeam.lab.signal_files import read_channels, read_signal
+from snapbeam.lab.signals import check_signal, parse_sensitivity, si_unit
+from snapbeam.util.validation import InputError
 
 COUNT = 40
 TIME = np.arange(COUNT) / 2000.0

@@ -8,10 +8,9 @@ import xarray as xr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from snapbeam.core.validate import InputError
-from snapbeam.lab.signals.files import read_channels, read_signal, write_signal
-from snapbeam.lab.signals.signal import check_signal, even_sampling, make_signal
-from snapbeam.lab.signals.units import parse_sensitivity, si_unit
+from snapbeam.lab.signal_files import read_channels, read_signal, write_signal
+from snapbeam.lab.signals import check_signal, even_sampling, make_signal, parse_sensitivity, si_unit
+from snapbeam.util.validation import InputError
 
 KINDS = ("csv", "wav", "uff", "tdms", "h5", "npz")
 QUICK = settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)

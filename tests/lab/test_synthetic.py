@@ -7,10 +7,8 @@ import pytest
 from lab_waveforms import PIXEL, impacts
 
 from snapbeam import InputError
-from snapbeam.lab.camera.recording import open_recording
-from snapbeam.lab.synthetic.recording import render_recording
-from snapbeam.lab.synthetic.run import render_vibrometer
-from snapbeam.lab.synthetic.setup import SyntheticCamera, SyntheticStage
+from snapbeam.lab.camera import open_recording
+from snapbeam.lab.synthetic import SyntheticCamera, SyntheticStage, render_recording, render_vibrometer
 
 STILL = (np.array([0.0, 0.01]), np.zeros(2), np.full(2, -0.2e-3))
 CAMERA = SyntheticCamera(frame_rate=5000.0, pixel_size=PIXEL, shape=(120, 48))

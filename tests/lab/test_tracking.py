@@ -7,14 +7,11 @@ import pytest
 from lab_waveforms import BUCKLING_LEVEL, FRAME_RATE, PIXEL, errors_px, impacts, rms
 
 from snapbeam import InputError
-from snapbeam.lab.camera.recording import open_recording
-from snapbeam.lab.synthetic.recording import render_recording
-from snapbeam.lab.synthetic.setup import SyntheticCamera, SyntheticStage
-from snapbeam.lab.tracking.flags import FrameFlag
-from snapbeam.lab.tracking.onsets import contact_onsets
-from snapbeam.lab.tracking.quality import tracking_quality, tracking_report
-from snapbeam.lab.tracking.track import track
-from snapbeam.runs.schema import check_trajectory
+from snapbeam.lab.camera import open_recording
+from snapbeam.lab.synthetic import SyntheticCamera, SyntheticStage, render_recording
+from snapbeam.lab.tracking.settings import FrameFlag
+from snapbeam.lab.tracking.track import contact_onsets, track, tracking_quality, tracking_report
+from snapbeam.simulation.dataset import check_trajectory
 
 STICKER = {"shaker_width": 0.8e-3}
 PLAIN_TIP = {"shaker_width": 1.0e-3, "tip_radius": 0.6e-3, "marker_thickness": 0.0}
@@ -187,7 +184,7 @@ def test_the_beam_alone_and_a_picture_of_the_background(tmp_path):
 
 
 def test_frames_without_anything_to_find_are_refused(tmp_path):
-    from snapbeam.lab.camera.write import write_photron
+    from snapbeam.lab.camera import write_photron
 
     rng = np.random.default_rng(0)
     cases = {

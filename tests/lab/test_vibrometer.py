@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.core.validate import InputError
-from snapbeam.lab.drive.align import align
-from snapbeam.lab.drive.displacement import displacement_from_velocity
-from snapbeam.lab.drive.record import recorded_drive
-from snapbeam.lab.drive.vibrometer import measure_drive
-from snapbeam.lab.signals.signal import SignalSamples, make_signal
-from snapbeam.lab.signals.sine_fit import fit_sine, spectral_peak
+from snapbeam.lab.drive_alignment import align, recorded_drive
+from snapbeam.lab.signals import SignalSamples, make_signal
+from snapbeam.lab.sine_fit import fit_sine, spectral_peak
+from snapbeam.lab.vibrometer import displacement_from_velocity, measure_drive
+from snapbeam.util.validation import InputError
 
 V, ONSET, TAU = 0.03, 0.0504, 0.015
 

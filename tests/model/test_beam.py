@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.model.beam import Beam
-from snapbeam.model.paper_values import BEAM
+from snapbeam.model.default_values import BEAM
+from snapbeam.util.validation import InputError, InputTypeError
 
 STEEL = {"length": 0.161, "thickness": 0.4e-3, "width": 15e-3, "density": 7800.0, "young_modulus": 200e9}
 

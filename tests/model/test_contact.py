@@ -9,16 +9,14 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
-from snapbeam.core.validate import InputError, InputTypeError
-from snapbeam.model.contact import (
-    HertzContact,
-    HuntCrossley,
-    KelvinVoigt,
-    LayeredHertz,
-    PowerLaw,
-    Restitution,
-)
+from snapbeam.model.contact.hertz import HertzContact
+from snapbeam.model.contact.hunt_crossley import HuntCrossley
+from snapbeam.model.contact.kelvin_voigt import KelvinVoigt
+from snapbeam.model.contact.layered_hertz import LayeredHertz
 from snapbeam.model.contact.loss import loss_number, restitution_of_loss
+from snapbeam.model.contact.power_law import PowerLaw
+from snapbeam.model.contact.restitution import Restitution
+from snapbeam.util.validation import InputError, InputTypeError
 
 
 def test_from_materials() -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from snapbeam.model.decision import decidable_energy, least_energy_at
-from snapbeam.model.galerkin.reduction import ReducedModel
-from snapbeam.model.paper_values import BEAM
+from snapbeam.model.default_values import BEAM
+from snapbeam.model.early_termination import decidable_energy, least_energy_at
+from snapbeam.model.reduced_model import ReducedModel
 
 
 def brute_force(model: ReducedModel, location: float, displacement: float) -> float:

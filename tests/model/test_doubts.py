@@ -9,7 +9,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core import findings as diagnostics
+from snapbeam.util import diagnostics
 
 SHAKER = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1)
 

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from snapbeam.core.validate import InputError, InputTypeError
-from snapbeam.model.galerkin.modes import BucklingModes
-from snapbeam.model.galerkin.quasi_static import quasi_static_threshold
-from snapbeam.model.paper_values import BEAM, LOCATION
+from snapbeam.model.buckling_modes import BucklingModes
+from snapbeam.model.default_values import BEAM, LOCATION
+from snapbeam.model.quasi_static import quasi_static_threshold
 from snapbeam.model.striker import Shaker
+from snapbeam.util.validation import InputError, InputTypeError
 
 
 def test_shaker() -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.core.validate import InputError
-from snapbeam.model.drive import HORIZON, Scale
+from snapbeam.model.drive.base import HORIZON, Scale
+from snapbeam.util.validation import InputError
 
 SCALE = Scale(0.335e-3, 514.0)
 DRIVES = {

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from snapbeam.core.validate import InputError
-from snapbeam.model.galerkin.frequencies import exact_natural_frequencies
-from snapbeam.model.galerkin.reduction import ReducedModel
-from snapbeam.model.paper_values import BEAM, STRAIGHT_BEAM
+from snapbeam.model.default_values import BEAM, STRAIGHT_BEAM
+from snapbeam.model.natural_frequencies import exact_natural_frequencies
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.util.validation import InputError
 
 UNIT = math.sqrt(BEAM.bending_stiffness / BEAM.mass_per_length) / BEAM.length**2 / (2.0 * math.pi)
 

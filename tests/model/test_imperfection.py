@@ -7,13 +7,12 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.config import config_from_mapping
-from snapbeam.core.validate import InputError
-from snapbeam.model.decision import crossing_energy
-from snapbeam.model.galerkin.modes import BucklingModes
-from snapbeam.model.imperfection.equilibria import equilibria_of
-from snapbeam.model.imperfection.fitted import identify_imperfection
-from snapbeam.model.imperfection.passing import least_energy_through
+from snapbeam.model.buckling_modes import BucklingModes
+from snapbeam.model.early_termination import crossing_energy
+from snapbeam.model.equilibria import equilibria_of, least_energy_through
+from snapbeam.model.imperfection_identification import identify_imperfection
+from snapbeam.model.parameter_file import config_from_mapping
+from snapbeam.util.validation import InputError
 
 LENGTH = paper.BEAM.length
 LEVEL = paper.BEAM.buckling_level
@@ -150,7 +149,7 @@ def test_bound_behind_early_decision(modes) -> None:
             assert bound == pytest.approx(best, abs=1e-6 * depth)
     assert crossing_energy(model) == pytest.approx(model.saddle_energy, abs=1e-6 * depth)
     # without a side force it is that of equal wells
-    from snapbeam.model.decision import least_energy_at
+    from snapbeam.model.early_termination import least_energy_at
 
     plain = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
     none = least_energy_through(

@@ -7,7 +7,7 @@ import dataclasses
 import pytest
 
 import snapbeam as sb
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.util.validation import InputError, InputTypeError
 
 
 def test_what_is_not_given() -> None:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from snapbeam.core.validate import InputError
-from snapbeam.model.galerkin.modes import BucklingModes, wavenumbers
+from snapbeam.model.buckling_modes import BucklingModes, wavenumbers
+from snapbeam.util.validation import InputError
 
 LENGTH = 0.161
 

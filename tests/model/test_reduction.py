@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from snapbeam.core.validate import InputError, InputTypeError
 from snapbeam.model.beam import Beam
-from snapbeam.model.galerkin.modes import BucklingModes
-from snapbeam.model.galerkin.rank_one import rank_one_eigenpairs
-from snapbeam.model.galerkin.reduction import ReducedModel
-from snapbeam.model.paper_values import BEAM, LOCATION, STRAIGHT_BEAM
+from snapbeam.model.buckling_modes import BucklingModes
+from snapbeam.model.default_values import BEAM, LOCATION, STRAIGHT_BEAM
+from snapbeam.model.reduced_model import ReducedModel, rank_one_eigenpairs
+from snapbeam.util.validation import InputError, InputTypeError
 
 # above P_cr2 the second mode forms the saddles
 DEEP_BEAM = BEAM.replace(buckling_level=8.0 * BEAM.radius_of_gyration)

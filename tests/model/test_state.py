@@ -9,8 +9,8 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError, InputTypeError
-from snapbeam.model.start import amplitude_scale, rest_state, started
+from snapbeam.model.state import amplitude_scale, rest_state, started
+from snapbeam.util.validation import InputError, InputTypeError
 
 MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
 BELOW, ABOVE = (

@@ -10,8 +10,8 @@ from scipy.integrate import quad
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
 from snapbeam.model.contact.stress import bending_stress, hertz_stress
+from snapbeam.util.validation import InputError
 
 
 def test_pressure_carries_the_force() -> None:

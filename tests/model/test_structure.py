@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from snapbeam.core.validate import InputError
-from snapbeam.model.galerkin.reduction import ReducedModel
-from snapbeam.model.paper_values import BEAM, LOCATION
+from snapbeam.model.default_values import BEAM, LOCATION
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.util.validation import InputError
 
 TWO = {"mass": np.eye(2), "stiffness": [1.0, 4.0], "contact_shape": [1.0, 1.0]}
 

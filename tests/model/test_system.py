@@ -10,7 +10,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.util.validation import InputError, InputTypeError
 
 MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
 SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
@@ -174,7 +174,7 @@ def test_any_change_is_another_system(name: str) -> None:
 
 
 def test_every_parameter_of_scope_run_can_be_changed() -> None:
-    from snapbeam.config import parameters
+    from snapbeam.model.parameters import parameters
 
     own = {"contact": "hertz", "drive": "sine"}
     names = {
@@ -236,7 +236,7 @@ OF_OTHERS = {
 @pytest.mark.parametrize("kind", OF_OTHERS)
 def test_other_laws_and_drives_too(kind) -> None:
     """Every parameter of theirs makes another system, and every system comes back from its mapping."""
-    from snapbeam.config import parameters
+    from snapbeam.model.parameters import parameters
 
     part, changes = OF_OTHERS[kind]
     if part is None:
@@ -253,8 +253,8 @@ def test_other_laws_and_drives_too(kind) -> None:
 
 
 def test_every_law_and_drive_is_asked() -> None:
-    from snapbeam.model.contact import LAWS
-    from snapbeam.model.drive import DRIVES
+    from snapbeam.model.contact.base import LAWS
+    from snapbeam.model.drive.base import DRIVES
 
     assert {*LAWS, *DRIVES} - {"hertz", "sine"} == set(OF_OTHERS)
 

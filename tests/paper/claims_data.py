@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from snapbeam.core.codes import ResponseClass
 from snapbeam.paper.recipe import Results
+from snapbeam.util.status_codes import ResponseClass
 
 RATIO = np.round(np.linspace(0.1, 4.0, 79), 6)
 DRIVE = np.round(np.linspace(0.01, 0.65, 65), 6)

@@ -7,7 +7,6 @@ import pytest
 import xarray as xr
 from claims_data import DRIVE, RATIO, Given, calm_sensitivity, response_map, two_maps
 
-from snapbeam.core.codes import ResponseClass
 from snapbeam.paper.claims.topics import (
     classes,
     disturbances,
@@ -19,6 +18,7 @@ from snapbeam.paper.claims.topics import (
     waveforms,
 )
 from snapbeam.paper.studies.waveforms import BIN_EDGES
+from snapbeam.util.status_codes import ResponseClass
 
 STEP = DRIVE[1] - DRIVE[0]
 

@@ -13,9 +13,11 @@ from pathlib import Path
 import pytest
 
 from snapbeam import paper
-from snapbeam.core.validate import InputError
-from snapbeam.paper.claims import TOPICS, VERDICTS, Claim, measure_claims, summary, write_claims
+from snapbeam.paper.claims import TOPICS, measure_claims, write_claims
+from snapbeam.paper.claims.finding import VERDICTS
 from snapbeam.paper.claims.prose import read_topic
+from snapbeam.paper.claims.table import Claim, summary
+from snapbeam.util.validation import InputError
 
 REPRODUCTION = Path(__file__).parents[2] / "docs" / "reproduction.md"
 

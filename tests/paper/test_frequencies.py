@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from snapbeam.model.galerkin.frequencies import exact_natural_frequencies
-from snapbeam.model.galerkin.reduction import ReducedModel
-from snapbeam.model.paper_values import BEAM, MODES, STRAIGHT_BEAM
+from snapbeam.model.default_values import BEAM, MODES, STRAIGHT_BEAM
+from snapbeam.model.natural_frequencies import exact_natural_frequencies
+from snapbeam.model.reduced_model import ReducedModel
 
 # Hz, as printed in section 3.2 for N = 32
 PRINTED = [81.8, 159.0, 380.0]

@@ -11,11 +11,11 @@ from matplotlib.colors import to_hex
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.codes import ResponseClass
-from snapbeam.core.validate import InputError
-from snapbeam.figures import CLASS_COLORS
 from snapbeam.paper.recipes import fig4, fig5, fig8, figB10
 from snapbeam.paper.store import load_results
+from snapbeam.plot.style import CLASS_COLORS
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError
 
 
 @pytest.fixture
@@ -84,7 +84,7 @@ def test_dots_lie_where_they_were_measured(tmp_path, results):
 def test_location_maps_reach_twice_the_static_threshold(results):
     for ds in results["fig8"].values():
         ratio = float(ds.frequency_ratio)
-        static = sb.quasi_static_threshold(ds.location.values, ratio)
+        static = sb.model.quasi_static_threshold(ds.location.values, ratio)
         np.testing.assert_allclose(ds.velocity_amplitude.isel(relative_amplitude=-1).values, 2.0 * static)
     assert {float(ds.frequency_ratio) for ds in results["fig8"].values()} == set(fig8.FREQUENCY_RATIOS)
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from snapbeam import paper
-from snapbeam.core.codes import ResponseClass
-from snapbeam.engines.mark import solver_fingerprint
 from snapbeam.paper.store import load_results
+from snapbeam.solver.fingerprint import solver_fingerprint
+from snapbeam.util.status_codes import ResponseClass
 
 DATA = Path(__file__).parents[2] / "docs" / "data"
 

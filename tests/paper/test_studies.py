@@ -12,7 +12,6 @@ import xarray as xr
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.codes import ResponseClass
 from snapbeam.paper.store import load_results
 from snapbeam.paper.studies import disturbances, notch, switch
 from snapbeam.paper.studies.harvesting import power_above
@@ -20,6 +19,7 @@ from snapbeam.paper.studies.resonance import ridge
 from snapbeam.paper.studies.sensitivity import buckling_mode_damping
 from snapbeam.paper.studies.waveforms import passages
 from snapbeam.paper.studies.windows import longest_window
+from snapbeam.util.status_codes import ResponseClass
 
 
 @pytest.fixture(scope="module")

@@ -35,8 +35,8 @@ import xarray as xr
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.files import NoRoomError
-from snapbeam.core.validate import InputError
+from snapbeam.util.files import NoRoomError
+from snapbeam.util.validation import InputError
 
 LONGEST = 10.0
 """Seconds that a call may take."""
@@ -213,7 +213,7 @@ def _judged(longest: float, function: Any, fixed: Sequence[Any], named: Mapping[
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             result = function(*fixed, **named)
-    except (InputError, sb.CheckpointError, sb.OrbitNotFoundError, NoRoomError):
+    except (InputError, sb.CheckpointError, sb.dynamics.OrbitNotFoundError, NoRoomError):
         return ""
     except _TooLong as error:
         return f"over {longest:g} s, {_trouble(error)}"
@@ -233,7 +233,7 @@ def commands() -> dict[str, list[Any]]:
     """Every command of the program, with its parameters."""
     import typer
 
-    from snapbeam.cli import app
+    from snapbeam.cli.app import app
 
     found: dict[str, list[Any]] = {}
     for name, each in typer.main.get_command(app).commands.items():
@@ -279,7 +279,7 @@ def judged_command(words: list[str]) -> str:
     """Run a command line here: "" if it ends with a status and words; what is wrong otherwise."""
     from typer.testing import CliRunner
 
-    from snapbeam.cli import app
+    from snapbeam.cli.app import app
 
     ended: list[Any] = []
     said = judged(lambda: ended.append(CliRunner().invoke(app, words)))

@@ -20,10 +20,9 @@ import numpy as np
 import zarr.storage  # noqa: F401  (loaded before the first fork, so that a child starts at once)
 
 import snapbeam as sb
-from snapbeam.sweeps.compute.task import PointWork
-from snapbeam.sweeps.compute.tasks import MemoryKeeper, Stage
+from snapbeam.sweeps.checkpoint.store import MapStore
 from snapbeam.sweeps.doors import long_map, map_setup
-from snapbeam.sweeps.keep.store import MapStore
+from snapbeam.sweeps.tasks import MemoryKeeper, PointWork, Stage
 
 WRITERS = 3
 BEAM = sb.Beam(

@@ -13,10 +13,9 @@ from typer.testing import CliRunner
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.cli import app
-from snapbeam.core.netcdf import read_netcdf
-from snapbeam.lab.signals.formats.header import header_values
-from snapbeam.lab.signals.formats.tables import split_unit
+from snapbeam.cli.app import app
+from snapbeam.lab.signal_formats import header_values, split_unit
+from snapbeam.util.netcdf import read_netcdf
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +84,7 @@ def test_files_that_point_elsewhere_are_refused(tmp_path):
     with h5py.File(tmp_path / "stack.h5", "w") as file:
         file.create_dataset("frames", (4, 64, 64), "u1", external=[(str(secret), 0, 4 * 64 * 64)])
     with pytest.raises(sb.InputError, match="in another file"):
-        from snapbeam.lab.camera.recording import open_recording
+        from snapbeam.lab.camera import open_recording
 
         open_recording(tmp_path / "stack.h5", frame_rate=1e4, pixel_size=1e-5)
 

@@ -14,8 +14,8 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
-from snapbeam.core.files import NoRoomError, atomic_path
-from snapbeam.core.netcdf import netcdf_file, write_netcdf
+from snapbeam.util.files import NoRoomError, atomic_path
+from snapbeam.util.netcdf import netcdf_file, write_netcdf
 
 RUN = "import sys; from snapbeam.cli import main; main()"
 
@@ -138,7 +138,7 @@ def test_commands_on_a_full_disk(mounted, tmp_path, tried, place):
 
 
 def test_a_full_disk_for_the_log_ends_no_map(tmp_path, mounted, capsys):
-    from snapbeam.cli.common.long import LongReport
+    from snapbeam.cli.parameter_options import LongReport
 
     disk = mounted("disk", "size=8k")
     (disk / "filler").write_bytes(b"0" * 8192)
@@ -151,7 +151,7 @@ def test_a_full_disk_for_the_log_ends_no_map(tmp_path, mounted, capsys):
 def test_orphans_of_killed_writers_are_swept(tmp_path, tried):
     """What a killed process left is removed by the next write; what a living one writes is not."""
     script = (
-        "import os, signal, sys; from snapbeam.core.files import atomic_path\n"
+        "import os, signal, sys; from snapbeam.util.files import atomic_path\n"
         "with atomic_path(sys.argv[1]) as temporary:\n"
         "    temporary.write_text('half'); os.kill(os.getpid(), signal.SIGKILL)"
     )

@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import snapbeam as sb
-from snapbeam.core import validate
-from snapbeam.core.validate import InputError
+from snapbeam.util import validation as validate
+from snapbeam.util.validation import InputError
 
 CALLS = 2000
 _MOST_LOOSE = 0.001

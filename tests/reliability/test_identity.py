@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.core.provenance import arithmetic_hash, code_hash
-from snapbeam.core.validate import InputError
-from snapbeam.model.contact import LAWS
-from snapbeam.sweeps.compute.maker import differences, this_maker
-from snapbeam.sweeps.keep.ledger import Ledger, Record
+from snapbeam.model.contact.base import LAWS
+from snapbeam.sweeps.checkpoint.records import Ledger, Record
+from snapbeam.sweeps.tasks import differences, this_maker
+from snapbeam.util.provenance import arithmetic_hash, code_hash
+from snapbeam.util.validation import InputError
 
 AXES = {"drive.velocity_amplitude": np.array([0.2, 0.4])}
 MATRICES = {
@@ -115,7 +115,7 @@ def test_parts_that_something_else_computed_are_told(tmp_path, name, value, word
     assert not found.attrs["reproducible"].startswith("bit for bit")
 
 
-ROUNDING = "from snapbeam.core.provenance import arithmetic_hash as a; print(a())"
+ROUNDING = "from snapbeam.util.provenance import arithmetic_hash as a; print(a())"
 
 
 def test_another_kernel_of_linear_algebra_is_another_rounding(python, tried):

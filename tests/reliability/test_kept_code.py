@@ -8,7 +8,7 @@ import random
 
 import pytest
 
-from snapbeam.engines.scalar.kept_code import private_folder
+from snapbeam.solver.compilation import private_folder
 
 RUN = """
 import snapbeam as sb

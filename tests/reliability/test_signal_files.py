@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from snapbeam.core.validate import InputError
-from snapbeam.lab.signals.files import read_signal
+from snapbeam.lab.signal_files import read_signal
+from snapbeam.util.validation import InputError
 
 
 @pytest.mark.parametrize("kind", ["external", "virtual"])

@@ -9,8 +9,8 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError, InputTypeError, finite, finite_array, integer
-from snapbeam.model.galerkin.rank_one import rank_one_eigenpairs
+from snapbeam.model.reduced_model import rank_one_eigenpairs
+from snapbeam.util.validation import InputError, InputTypeError, finite, finite_array, integer
 
 MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=2)
 

@@ -14,9 +14,9 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
-from snapbeam.engines.clock import most_steps, seconds_of
+from snapbeam.solver.step_size import most_steps, seconds_of
 from snapbeam.sweeps.points import points_of
+from snapbeam.util.validation import InputError
 
 MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=2)
 

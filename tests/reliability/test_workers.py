@@ -13,13 +13,12 @@ from pathlib import Path
 
 import pytest
 
-from snapbeam.sweeps.compute import workers
-from snapbeam.sweeps.compute.cluster import open_client, parse_cluster
-from snapbeam.sweeps.compute.tasks import Stage
-from snapbeam.sweeps.compute.workers import ClusterWorkers
-from snapbeam.sweeps.errors import CheckpointError
-from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.stored import CheckpointOptions, StoreKeeper, SweepReport
+from snapbeam.sweeps import distributed as workers
+from snapbeam.sweeps.checkpoint.records import CheckpointError
+from snapbeam.sweeps.checkpoint.store import MapStore
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, StoreKeeper, SweepReport
+from snapbeam.sweeps.distributed import ClusterWorkers, open_client, parse_cluster
+from snapbeam.sweeps.tasks import Stage
 
 CHUNK = 3
 DRIVER = Path(__file__).with_name("worker_driver.py")
@@ -104,8 +103,8 @@ def test_a_worker_that_never_delivers(tmp_path, work, client, monkeypatch):
 
 
 def test_workers_with_other_code_are_refused(tmp_path, work, client, monkeypatch):
-    monkeypatch.setattr("snapbeam.core.provenance.code_hash", lambda: "0123456789abcdef")
-    monkeypatch.setattr("snapbeam.sweeps.compute.maker.code_hash", lambda: "0123456789abcdef")
+    monkeypatch.setattr("snapbeam.util.provenance.code_hash", lambda: "0123456789abcdef")
+    monkeypatch.setattr("snapbeam.sweeps.tasks.code_hash", lambda: "0123456789abcdef")
     with pytest.raises(CheckpointError, match=r"a worker runs snapbeam .* install the same in both places"):
         within(120, computed, tmp_path / "store", work, client)
 

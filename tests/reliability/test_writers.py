@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from snapbeam.core.validate import InputError
-from snapbeam.sweeps.compute.tasks import Stage
-from snapbeam.sweeps.errors import CheckpointError
-from snapbeam.sweeps.keep.store import MapStore
+from snapbeam.sweeps.checkpoint.records import CheckpointError
+from snapbeam.sweeps.checkpoint.store import MapStore
+from snapbeam.sweeps.tasks import Stage
+from snapbeam.util.validation import InputError
 
 DRIVER = Path(__file__).with_name("race_driver.py")
 CHUNK = 6

@@ -18,13 +18,11 @@ from pathlib import Path
 import numpy as np
 
 import snapbeam as sb
-from snapbeam.sweeps.compute.cluster import open_client, parse_cluster
-from snapbeam.sweeps.compute.task import PointWork
-from snapbeam.sweeps.compute.tasks import MemoryKeeper, Stage
-from snapbeam.sweeps.compute.workers import ClusterWorkers
+from snapbeam.sweeps.checkpoint.store import MapStore
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, StoreKeeper, SweepReport
+from snapbeam.sweeps.distributed import ClusterWorkers, open_client, parse_cluster
 from snapbeam.sweeps.doors import map_setup
-from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.stored import CheckpointOptions, StoreKeeper, SweepReport
+from snapbeam.sweeps.tasks import MemoryKeeper, PointWork, Stage
 
 CHUNK = 4
 LONGEST = 180.0

@@ -10,8 +10,8 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError, InputTypeError
-from snapbeam.engines.plan import choose_base_step
+from snapbeam.solver.step_size import choose_base_step
+from snapbeam.util.validation import InputError, InputTypeError
 
 REGULAR = {1: (1.6, 0.03), 8: (1.4, 0.03), 32: (3.5, 0.06)}
 """Omega and V of well-conditioned motions with impacts, by the number of modes."""

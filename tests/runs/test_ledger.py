@@ -9,10 +9,10 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.findings import DiagnosticWarning
-from snapbeam.engines.answer import statistics_of
-from snapbeam.engines.assemble import make_ensemble
-from snapbeam.engines.cpu.driver import run_ensemble
+from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.cpu.driver import run_ensemble
+from snapbeam.solver.statistics import statistics_of
+from snapbeam.util.diagnostics import DiagnosticWarning
 
 VIOLENT = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, 1),

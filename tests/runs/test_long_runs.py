@@ -12,7 +12,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.cpu import driver
+from snapbeam.solver.cpu import driver
 
 SYSTEM = sb.System(
     sb.ReducedModel.from_beam(paper.BEAM, modes=2),

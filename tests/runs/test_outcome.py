@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.core.codes import ResponseClass, RunStatus, classify
-from snapbeam.engines.outcomes import STATISTICS
-from snapbeam.runs.outcome import RunSummary
+from snapbeam.simulation.summary import RunSummary
+from snapbeam.solver.statistics import STATISTICS
+from snapbeam.util.status_codes import ResponseClass, RunStatus, classify
 
 INTRAWELL, FIRST, SECOND, CONTINUOUS = (
     ResponseClass.INTRAWELL,

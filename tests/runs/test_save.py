@@ -11,7 +11,7 @@ import xarray as xr
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
+from snapbeam.util.validation import InputError
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "conformance"))
 import frozen

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.core.validate import InputError
-from snapbeam.runs.schema import SCHEMA, check_trajectory, trajectory_dataset
+from snapbeam.simulation.dataset import SCHEMA, check_trajectory, trajectory_dataset
+from snapbeam.util.validation import InputError
 
 TIME = np.linspace(0.0, 1.0, 5)
 

@@ -11,9 +11,9 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.codes import ResponseClass, RunStatus
-from snapbeam.model.decision import decidable_energy
-from snapbeam.runs.schema import check_trajectory
+from snapbeam.model.early_termination import decidable_energy
+from snapbeam.simulation.dataset import check_trajectory
+from snapbeam.util.status_codes import ResponseClass, RunStatus
 
 REGULAR = [(1.4, 0.02), (0.1, 0.05)]
 ELSEWHERE = [(1.21, 0.18), (1.625, 0.3), (3.0, 0.5), (0.5, 0.4)]

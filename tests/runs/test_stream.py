@@ -10,7 +10,7 @@ import pytest
 from test_save import CASES
 
 import snapbeam as sb
-from snapbeam.core.validate import InputError, InputTypeError
+from snapbeam.util.validation import InputError, InputTypeError
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -22,8 +22,8 @@ def test_is_what_save_writes(name: str, tmp_path) -> None:
 
 
 def test_in_many_pieces(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr("snapbeam.runs.stream._CHUNK", 1000)
-    monkeypatch.setattr("snapbeam.runs.stream._KEPT_BACK", 300)
+    monkeypatch.setattr("snapbeam.simulation.stream._CHUNK", 1000)
+    monkeypatch.setattr("snapbeam.simulation.stream._KEPT_BACK", 300)
     system, integration = CASES["plain"][0], sb.Integration(cycles=60)
     outcome = sb.simulate_to_file(system, integration, path=tmp_path / "run.nc")
     same(sb.load(tmp_path / "run.nc"), sb.simulate(system, integration), outcome)

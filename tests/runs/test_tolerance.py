@@ -10,11 +10,11 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.assemble import make_ensemble, plans_of
-from snapbeam.engines.cpu import driver as cpu_engine
-from snapbeam.engines.scalar.tip import tip_motion
-from snapbeam.runs.samples import joined
-from snapbeam.runs.tolerance import PERTURBATION, _perturbed
+from snapbeam.simulation.dataset import joined
+from snapbeam.simulation.tolerance import PERTURBATION, _perturbed
+from snapbeam.solver.assemble import make_ensemble, plans_of
+from snapbeam.solver.cpu import driver as cpu_engine
+from snapbeam.solver.excitation import tip_motion
 
 CONTACT = sb.HertzContact(stiffness=4e8)
 CYCLES = 4
@@ -84,8 +84,8 @@ def test_chaos_shortens_the_horizon() -> None:
 
 def test_a_request_beyond_reach_is_said(monkeypatch) -> None:
     """What the finest steps do not meet is a warning and a shorter horizon, not a claim."""
-    monkeypatch.setattr("snapbeam.runs.tolerance._FINE", (("standard", 1.0),))
-    monkeypatch.setattr("snapbeam.runs.tolerance._ROUGH", (("map", 4.0), ("map", 2.0)))
+    monkeypatch.setattr("snapbeam.simulation.tolerance._FINE", (("standard", 1.0),))
+    monkeypatch.setattr("snapbeam.simulation.tolerance._ROUGH", (("map", 4.0), ("map", 2.0)))
     model, shaker = model_of(8), shaker_at(0.7, 0.4)
     with pytest.warns(RuntimeWarning, match="met only up to"):
         run = sb.simulate(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.core.codes import ResponseClass, RunStatus
-from snapbeam.core.validate import InputError
-from snapbeam.sweeps.analysis import compare_maps, interwell_threshold, threshold_notch
+from snapbeam.sweeps.threshold import compare_maps, interwell_threshold, threshold_notch
+from snapbeam.util.status_codes import ResponseClass, RunStatus
+from snapbeam.util.validation import InputError
 
 
 def test_threshold_of_a_known_map(synthetic_map):

@@ -12,16 +12,14 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.core.codes import ResponseClass, RunStatus
-from snapbeam.core.validate import InputError
-from snapbeam.sweeps.compute.cluster import open_client, parse_cluster, slurm_arguments
-from snapbeam.sweeps.compute.task import PointWork
-from snapbeam.sweeps.compute.tasks import Stage
-from snapbeam.sweeps.compute.workers import ATTEMPTS, ClusterWorkers
+from snapbeam.sweeps.checkpoint.records import CheckpointError
+from snapbeam.sweeps.checkpoint.store import MapStore
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, StoreKeeper, SweepReport
+from snapbeam.sweeps.distributed import ATTEMPTS, ClusterWorkers, open_client, parse_cluster, slurm_arguments
 from snapbeam.sweeps.doors import long_map, map_setup
-from snapbeam.sweeps.errors import CheckpointError
-from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.stored import CheckpointOptions, StoreKeeper, SweepReport
+from snapbeam.sweeps.tasks import PointWork, Stage
+from snapbeam.util.status_codes import ResponseClass, RunStatus
+from snapbeam.util.validation import InputError
 
 CHUNK = 3  # twenty points: seven tasks
 

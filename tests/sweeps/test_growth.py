@@ -10,11 +10,11 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import snapbeam as sb
-from snapbeam.cli import app
-from snapbeam.sweeps.compute.task import PointWork
+from snapbeam.cli.app import app
+from snapbeam.sweeps.checkpoint.store import layers_of
+from snapbeam.sweeps.checkpointed_sweep import SweepReport
 from snapbeam.sweeps.doors import long_map, map_setup
-from snapbeam.sweeps.keep.growth import layers_of
-from snapbeam.sweeps.stored import SweepReport
+from snapbeam.sweeps.tasks import PointWork
 
 LONGER = {
     "frequency_ratio": np.sort(np.append(np.linspace(0.4, 2.0, 5), [0.2, 1.0])),  # one before, one between

@@ -11,7 +11,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.outcomes import STATISTICS
+from snapbeam.solver.statistics import STATISTICS
 
 RATIO, VELOCITY, LOCATION = [0.8, 1.21, 1.6], [0.05, 0.18, 0.3, 0.5], [0.35, 0.5]
 

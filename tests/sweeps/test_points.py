@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 import xarray as xr
 
-from snapbeam.core.validate import InputError
 from snapbeam.sweeps.points import Grid, PointList, points_of
+from snapbeam.util.validation import InputError
 
 MIXED = {
     "frequency_ratio": [0.8, 1.2, 1.6],

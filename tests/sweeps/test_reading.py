@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.config import Config, lookup
+from snapbeam.model.parameter_file import Config
+from snapbeam.model.parameters import lookup
 
 pytest.importorskip("zarr")
 

@@ -7,14 +7,14 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
-from snapbeam.config import lookup
-from snapbeam.core.codes import RunStatus
-from snapbeam.core.validate import InputError
-from snapbeam.sweeps.compute.task import ResultTable
+from snapbeam.model.parameters import lookup
+from snapbeam.sweeps.checkpointed_sweep import SweepReport
 from snapbeam.sweeps.doors import long_map
 from snapbeam.sweeps.points import Grid
 from snapbeam.sweeps.refine import refine, refined_grid
-from snapbeam.sweeps.stored import SweepReport
+from snapbeam.sweeps.tasks import ResultTable
+from snapbeam.util.status_codes import RunStatus
+from snapbeam.util.validation import InputError
 
 
 class DrawnWork:

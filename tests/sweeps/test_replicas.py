@@ -7,10 +7,10 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
-from snapbeam.core.validate import InputError
-from snapbeam.model.paper_values import BEAM, CONTACT
+from snapbeam.model.default_values import BEAM, CONTACT
 from snapbeam.sweeps.doors import long_map
-from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicates, perturbed_start
+from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates, perturbed_start
+from snapbeam.util.validation import InputError
 
 
 def test_measuring_error_is_that_of_a_pixel():

@@ -16,14 +16,13 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import snapbeam as sb
-from snapbeam.cli import app
-from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION
-from snapbeam.sweeps.compute.task import PointWork
-from snapbeam.sweeps.compute.tasks import Stage, chunk_size
+from snapbeam.cli.app import app
+from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION
+from snapbeam.sweeps.checkpoint.store import MapStore
+from snapbeam.sweeps.checkpointed_sweep import SweepReport
 from snapbeam.sweeps.doors import long_map, map_setup
-from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.replicas import Replicates
-from snapbeam.sweeps.stored import SweepReport
+from snapbeam.sweeps.replicates import Replicates
+from snapbeam.sweeps.tasks import PointWork, Stage, chunk_size
 
 HERE = Path(__file__).parent
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="kills and forks are POSIX here")

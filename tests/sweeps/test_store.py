@@ -17,17 +17,16 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import snapbeam
-from snapbeam.cli import app
-from snapbeam.core.validate import InputError
-from snapbeam.sweeps.compute.task import PointWork
-from snapbeam.sweeps.compute.tasks import Stage
+from snapbeam.cli.app import app
+from snapbeam.sweeps.checkpoint import records as durable
+from snapbeam.sweeps.checkpoint import records as ledger
+from snapbeam.sweeps.checkpoint import store as tables
+from snapbeam.sweeps.checkpoint.records import CheckpointError, Ledger, Record, StoreLock, append_line
+from snapbeam.sweeps.checkpoint.store import MapStore
+from snapbeam.sweeps.checkpointed_sweep import SweepReport
 from snapbeam.sweeps.doors import long_map, map_setup
-from snapbeam.sweeps.errors import CheckpointError
-from snapbeam.sweeps.keep import durable, ledger, tables
-from snapbeam.sweeps.keep.durable import StoreLock, append_line
-from snapbeam.sweeps.keep.ledger import Ledger, Record
-from snapbeam.sweeps.keep.store import MapStore
-from snapbeam.sweeps.stored import SweepReport
+from snapbeam.sweeps.tasks import PointWork, Stage
+from snapbeam.util.validation import InputError
 
 CHUNK = 6  # twenty points: four tasks, the last one short
 

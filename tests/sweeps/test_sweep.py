@@ -12,9 +12,10 @@ import xarray as xr
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError, InputTypeError
-from snapbeam.engines.outcomes import STATISTICS
-from snapbeam.figures import plot_response_map, save_figure
+from snapbeam.plot.map import plot_response_map
+from snapbeam.plot.style import save_figure
+from snapbeam.solver.statistics import STATISTICS
+from snapbeam.util.validation import InputError, InputTypeError
 
 ASKED = sb.Integration(cycles=3)
 AXES = {

@@ -11,9 +11,9 @@ from threshold_grids import AMPLITUDE, SYSTEM, stand_in, thresholds_of
 from typer.testing import CliRunner
 
 import snapbeam as sb
-from snapbeam.cli import app
-from snapbeam.core.validate import InputError
-from snapbeam.model.paper_values import BEAM
+from snapbeam.cli.app import app
+from snapbeam.model.default_values import BEAM
+from snapbeam.util.validation import InputError
 
 RUNNER = CliRunner()
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 import snapbeam as sb
-from snapbeam.core.codes import ResponseClass, RunStatus
-from snapbeam.model.paper_values import BEAM, CONTACT
+from snapbeam.model.default_values import BEAM, CONTACT
 from snapbeam.sweeps.setup import SweepSetup
+from snapbeam.util.status_codes import ResponseClass, RunStatus
 
 SYSTEM = sb.System(
     sb.ReducedModel.from_beam(BEAM, modes=1, damping_ratio=0.005),

@@ -1,4 +1,4 @@
-"""The command line ``snapbeam``: the door for people."""
+"""The command line."""
 
 from snapbeam.cli.app import app, main
 

@@ -9,62 +9,78 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from snapbeam.parts import PARTS, installed_parts
+
 __all__ = ["app", "main"]
 
-# Where each command stands; it is loaded when it is asked for, since what one needs another does without.
+
+# Module and function of each command; a command is loaded when it is used.
 _COMMANDS = {
-    "map": "map.compute_map",
-    "threshold": "threshold.threshold",
-    "probability": "design.probability.probability",
-    "design": "design.optimum.design",
-    "simulate": "simulate.simulate",
-    "dynamics": "dynamics.dynamics",
-    "frequencies": "frequencies.frequencies",
-    "wells": "wells.wells",
-    "plot": "plot.plot",
-    "explore": "explore.explore",
-    "draw": "draw.draw",
-    "paper": "paper.paper",
-    "track": "lab.track.track",
-    "vibrometer": "lab.vibrometer.vibrometer",
-    "identify": "lab.identify.identify",
-    "calibrate": "lab.calibrate.calibrate",
-    "compare": "lab.compare.compare",
-    "campaign": "lab.campaign.campaign",
-    "info": "info.info",
+    "simulate": "snapbeam.cli.simulate:simulate",
+    "map": "snapbeam.cli.map:compute_map",
+    "threshold": "snapbeam.cli.threshold:threshold",
+    "dynamics": "snapbeam.cli.dynamics:dynamics",
+    "probability": "snapbeam.cli.uncertainty:probability",
+    "design": "snapbeam.cli.uncertainty:design",
+    "frequencies": "snapbeam.cli.frequencies:frequencies",
+    "equilibria": "snapbeam.cli.equilibria:equilibria",
+    "plot": "snapbeam.cli.plot:plot",
+    "schematic": "snapbeam.cli.schematic:schematic",
+    "info": "snapbeam.cli.info:info",
 }
 
 
 class _Commands(MutableMapping[str, Any]):
-    """Commands by name, each loaded when it is looked at."""
+    """Commands by name: those of the core, then those of the optional parts; each is loaded when it is used."""
 
     def __init__(self) -> None:
-        self._places: dict[str, Any] = dict(_COMMANDS)
+        self._core: dict[str, Any] = dict(_COMMANDS)
+        self._parts: dict[str, tuple[str, str]] | None = None
+
+    def _of_parts(self) -> dict[str, tuple[str, str]]:
+        if self._parts is None:
+            self._parts = {
+                command: (place, part)
+                for part in installed_parts()
+                for command, place in import_module(f"snapbeam.{part}.cli").COMMANDS.items()
+            }
+        return self._parts
 
     def __getitem__(self, name: str) -> Any:
-        if isinstance(self._places[name], str):
-            self._places[name] = _loaded(name, self._places[name])
-        return self._places[name]
+        found = self._core.get(name)
+        part = ""
+        if found is None:
+            found, part = self._of_parts()[name]
+        if isinstance(found, str):
+            found = self._core[name] = _load_command(name, found, part)
+        return found
 
     def __setitem__(self, name: str, command: Any) -> None:
-        self._places[name] = command
+        self._core[name] = command
 
     def __delitem__(self, name: str) -> None:
-        del self._places[name]
+        del self._core[name]
 
     def __contains__(self, name: object) -> bool:
-        return name in self._places
+        return name in self._core or name in self._of_parts()
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._places)
+        return iter(dict.fromkeys((*_COMMANDS, *self._of_parts())))
 
     def __len__(self) -> int:
-        return len(self._places)
+        return len(list(iter(self)))
 
 
-def _loaded(name: str, place: str) -> Any:
-    module, _, attribute = place.rpartition(".")
-    found = getattr(import_module(f"snapbeam.cli.{module}"), attribute)
+def _load_command(name: str, place: str, part: str) -> Any:
+    module, _, attribute = place.partition(":")
+    try:
+        found = getattr(import_module(module), attribute)
+    except ModuleNotFoundError as error:
+        if not PARTS.get(part):
+            raise
+        raise typer.BadParameter(
+            f'snapbeam {name} needs {error.name}; install it with: pip install ".[{PARTS[part]}]"'
+        ) from error
     if isinstance(found, typer.Typer):
         command: Any = typer.main.get_group(found)
     else:
@@ -87,7 +103,7 @@ class _Program(TyperGroup):
 app = typer.Typer(
     name="snapbeam",
     cls=_Program,
-    help="Impact dynamics of bistable buckled beams: what a shaker that hits a buckled beam makes it do.",
+    help="Impact dynamics of buckled, bistable beams.",
     epilog="Every parameter left out takes the value of Rouleau et al., J. Sound Vib. (2024), 118291.",
     no_args_is_help=True,
     rich_markup_mode="markdown",
@@ -98,7 +114,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from snapbeam.core.version import __version__
+        from snapbeam._version import __version__
 
         typer.echo(f"snapbeam {__version__}")
         raise typer.Exit

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from snapbeam.cli.common import options as opt
-from snapbeam.cli.common.console import answer, door, duration, file_line, out, progress
-from snapbeam.cli.common.parameter_options import (
+from snapbeam.cli import parameter_options as opt
+from snapbeam.cli.console import answer, door, duration, file_line, out, progress
+from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
     DRIVE,
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["dynamics"]
+
 
 dynamics = typer.Typer(
     help="What holds beyond a class: lifetimes, attractors, basins, exponents, orbits and their branches.",
@@ -50,8 +51,8 @@ Values = Annotated[
 
 
 def _checked(output: Path, plot: Path | None) -> None:
-    from snapbeam.cli.common.results import check_pictures
-    from snapbeam.core.files import check_writable
+    from snapbeam.cli.console import check_pictures
+    from snapbeam.util.files import check_writable
 
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
@@ -59,7 +60,7 @@ def _checked(output: Path, plot: Path | None) -> None:
 
 def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, picture: str, lines: list[str]) -> None:
     """Write the results, draw them, and say what they are."""
-    from snapbeam.cli.common.results import draw_dynamics, write_map
+    from snapbeam.cli.console import draw_dynamics, write_map
 
     files = [write_map(dataset, output)]
     if plot is not None:
@@ -100,9 +101,8 @@ def lifetimes(
     Example: snapbeam dynamics lifetimes --modes 8 --frequency-ratio 1.625 --velocity-amplitude 0.2:0.5:16
     --starts 100 -o lifetimes.nc --plot lifetimes.png
     """
-    from snapbeam.dynamics.lifetimes.lifetime_map import lifetime_map
-    from snapbeam.dynamics.lifetimes.survival import LifetimeSettings
-    from snapbeam.dynamics.starts import InitialConditions
+    from snapbeam.dynamics.flow import InitialConditions
+    from snapbeam.dynamics.lifetimes import LifetimeSettings, lifetime_map
 
     settings = configured(given)
     _checked(output, plot)
@@ -155,8 +155,8 @@ def diagram(
 
     Example: snapbeam dynamics diagram --modes 8 --frequency-ratio 1.4 --values 0.01:0.3:400 --plot diagram.png
     """
-    from snapbeam.config import parse_axis
     from snapbeam.dynamics.bifurcation import bifurcation_diagram
+    from snapbeam.model.parameter_axes import parse_axis
 
     settings = configured(given)
     _checked(output, plot)
@@ -264,9 +264,9 @@ def branch(
 
     Example: snapbeam dynamics branch --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --between 0.005:0.3
     """
-    from snapbeam.cli.common.options import parse_window
-    from snapbeam.dynamics.orbits.continuation import continuation
-    from snapbeam.dynamics.orbits.orbit import OrbitNotFoundError, periodic_orbit
+    from snapbeam.cli.parameter_options import parse_window
+    from snapbeam.dynamics.branches import continuation
+    from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, periodic_orbit
 
     settings = configured(given)
     _checked(output, plot)
@@ -280,7 +280,7 @@ def branch(
             integration=how,
         )  # fmt: skip
     except OrbitNotFoundError as error:
-        from snapbeam.core.validate import InputError
+        from snapbeam.util.validation import InputError
 
         raise InputError(f"no orbit of period {1 if period is None else period}: {error}") from None
     found = continuation(orbit, along, limits, direction=direction, max_points=500 if most is None else most)
@@ -316,10 +316,10 @@ def basins(
 
     Example: snapbeam dynamics basins --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --plot basins.png
     """
-    from snapbeam.config import parse_axis
     from snapbeam.dynamics.attractors import find_attractors
+    from snapbeam.dynamics.basins import basin_entropy
     from snapbeam.dynamics.basins import basins_of_attraction as basins_of
-    from snapbeam.dynamics.measures import basin_entropy
+    from snapbeam.model.parameter_axes import parse_axis
 
     settings = configured(given)
     _checked(output, plot)
@@ -373,7 +373,7 @@ def edge(
     Example: snapbeam dynamics edge --modes 1 --damping-ratio 0.05 --frequency-ratio 1.6 --velocity-amplitude 0.03
     --plot edge.png
     """
-    from snapbeam.dynamics.edge import edge_tracking, kicked
+    from snapbeam.dynamics.edge_states import edge_tracking, kicked
     from snapbeam.dynamics.flow import Stroboscope
 
     settings = configured(given)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from snapbeam.cli.common import options as opt
-from snapbeam.cli.common.console import answer, door, out
-from snapbeam.cli.common.parameter_options import BEAM, ENDS, MODEL, configured, with_parameters
+from snapbeam.cli import parameter_options as opt
+from snapbeam.cli.console import answer, door, out
+from snapbeam.cli.parameter_options import BEAM, ENDS, MODEL, configured, with_parameters
 
 __all__ = ["frequencies"]
 
@@ -24,9 +24,9 @@ def frequencies(
     """
     from rich.table import Table
 
-    from snapbeam.core.prefixes import prefixed
-    from snapbeam.core.validate import integer
-    from snapbeam.model.galerkin.frequencies import exact_natural_frequencies
+    from snapbeam.model.natural_frequencies import exact_natural_frequencies
+    from snapbeam.util.si_prefixes import prefixed
+    from snapbeam.util.validation import integer
 
     count = integer("count", count, 1, 200)
     model = configured(given).model

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from snapbeam.cli.common.console import answer, door, out
+from snapbeam.cli.console import answer, door, out
 
 __all__ = ["info"]
 
@@ -17,8 +17,8 @@ def info(
     file: Annotated[Path, typer.Argument(help="NetCDF file written by snapbeam.", metavar="FILE")],
 ) -> None:
     """Say what a map or a run holds and what made it: parameters, version, command, time."""
-    from snapbeam.cli.common.results import open_result
-    from snapbeam.cli.common.summary import class_table, parameter_table, status_lines
+    from snapbeam.cli.console import open_result
+    from snapbeam.cli.summary import class_table, parameter_table, status_lines
 
     dataset = open_result(file)
     answer(

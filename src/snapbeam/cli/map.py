@@ -8,10 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
-from snapbeam.cli.common import long
-from snapbeam.cli.common import options as opt
-from snapbeam.cli.common.console import FAILED, answer, door, out
-from snapbeam.cli.common.parameter_options import (
+from snapbeam.cli import parameter_options as long
+from snapbeam.cli import parameter_options as opt
+from snapbeam.cli.console import FAILED, answer, door, out
+from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
     DRIVE,
@@ -23,6 +23,7 @@ from snapbeam.cli.common.parameter_options import (
 )
 
 __all__ = ["compute_map"]
+
 
 _AXES = (
     "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
@@ -55,9 +56,9 @@ def compute_map(
     Example: snapbeam map --modes 32 --cycles 200 --frequency-ratio 0.1:4:64 --velocity-amplitude
     0.01:0.65:40 --location 1/2.1 -o map.nc --plot map.png
     """
-    from snapbeam.cli.common.results import check_pictures, draw_map, read_overlay
-    from snapbeam.cli.common.summary import map_facts, map_summary
-    from snapbeam.core.files import check_writable
+    from snapbeam.cli.console import check_pictures, draw_map, read_overlay
+    from snapbeam.cli.summary import map_facts, map_summary
+    from snapbeam.util.files import check_writable
 
     settings = long.resumed(given, keeping, configured(given, _axes_of))
     axes = _axes_of(settings, given)
@@ -72,8 +73,8 @@ def compute_map(
         dots, system.model.reference_frequency, None if beam is None else beam.buckling_level
     )
 
+    from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, SweepReport, compute_sweep
     from snapbeam.sweeps.setup import sweep_setup
-    from snapbeam.sweeps.stored import CheckpointOptions, SweepReport, compute_sweep
 
     setup = sweep_setup(system, axes, settings.integration.replace(threads=threads))
     asked = long.sweep_options(keeping)
@@ -97,7 +98,7 @@ def compute_map(
         raise typer.Exit(FAILED if tally.failed else 0)
     elapsed = time.monotonic() - start
     if not long.is_long(keeping):
-        from snapbeam.cli.common.results import write_map
+        from snapbeam.cli.console import write_map
 
         write_map(dataset, output)
     files = [output]
@@ -116,7 +117,8 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
     Where nothing but the paper's own axes and the number of modes is named, the frequency ratio and the velocity
     amplitude have their default axes unless they have a value.
     """
-    from snapbeam.config import DEFAULT_AXES, PHYSICAL
+    from snapbeam.model.parameter_axes import PHYSICAL
+    from snapbeam.model.parameter_file import DEFAULT_AXES
 
     named: dict[str, Any] = settings.axes()
     order = ("model.modes", "drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
@@ -139,14 +141,14 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
 
 
 def _default(name: str, text: str) -> dict[str, Any]:
-    from snapbeam.config import parse_axis
+    from snapbeam.model.parameter_axes import parse_axis
 
     return {name: parse_axis(name, text)}
 
 
 def _check_two_axes(path: Path, axes: dict[str, Any]) -> None:
-    from snapbeam.config import lookup
-    from snapbeam.core.validate import InputError
+    from snapbeam.model.parameters import lookup
+    from snapbeam.util.validation import InputError
 
     many = [lookup(name).short for name, values in axes.items() if len(values) > 1]
     if len(many) != 2:

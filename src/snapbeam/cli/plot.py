@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from snapbeam.cli.common import options as opt
-from snapbeam.cli.common.console import answer, door, file_line, out
+from snapbeam.cli import parameter_options as opt
+from snapbeam.cli.console import answer, door, file_line, out
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["plot"]
+
 
 _SLICE = "One point of an axis, the nearest there is"
 
@@ -40,7 +41,7 @@ def plot(
     window: opt.Window = None,
 ) -> None:
     """Draw a map or a run again: other format, measured dots, one slice of a map of three axes."""
-    from snapbeam.cli.common.results import (
+    from snapbeam.cli.console import (
         check_pictures,
         draw_map,
         draw_run,
@@ -71,9 +72,9 @@ def plot(
 
 def _sliced(dataset: xr.Dataset, wanted: dict[str, float | None], at: list[str]) -> xr.Dataset:
     """The map at the points that were named, the nearest there are."""
-    from snapbeam.cli.common.parameter_options import parse_number
-    from snapbeam.config import lookup
-    from snapbeam.core.validate import InputError
+    from snapbeam.cli.parameter_options import parse_number
+    from snapbeam.model.parameters import lookup
+    from snapbeam.util.validation import InputError
 
     chosen = {name: value for name, value in wanted.items() if value is not None}
     for text in at:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from snapbeam.cli.common import options as opt
-from snapbeam.cli.common.console import FAILED, answer, compiling_told, door, duration, errors, file_line, out
-from snapbeam.cli.common.parameter_options import (
+from snapbeam.cli import parameter_options as opt
+from snapbeam.cli.console import FAILED, answer, compiling_told, door, duration, errors, file_line, out
+from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
     DRIVE,
@@ -76,15 +76,15 @@ def simulate(
     Example: snapbeam simulate --frequency-ratio 1.21 --velocity-amplitude 0.18 -o run.nc --plot run.png
     --window 0:20
     """
-    from snapbeam.cli.common.results import check_pictures, draw_run
-    from snapbeam.core.files import check_writable
+    from snapbeam.cli.console import check_pictures, draw_run
+    from snapbeam.util.files import check_writable
 
     settings = configured(given)
     if output is not None:
         check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
     if animate is not None:
-        from snapbeam.figures.animation import ANIMATION_SUFFIXES
+        from snapbeam.plot.animation import ANIMATION_SUFFIXES
 
         check_writable(animate, "animate", ANIMATION_SUFFIXES)
     part = opt.parse_window(window)
@@ -143,8 +143,8 @@ def _even(system: Any, integration: Any, samples: int | None) -> Any:
         return None
     import numpy as np
 
-    from snapbeam.core.validate import integer
-    from snapbeam.runs.request import cycle_of
+    from snapbeam.simulation.request import cycle_of
+    from snapbeam.util.validation import integer
 
     integer("samples", samples, 1, 100_000)
     drive = system.leads[1]
@@ -183,7 +183,7 @@ class _share_done:
 
 
 def _recorded(path: Path) -> xr.Dataset:
-    from snapbeam.core.netcdf import read_netcdf
+    from snapbeam.util.netcdf import read_netcdf
 
     return read_netcdf(path, "drive")
 
@@ -192,14 +192,14 @@ def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | Non
     import matplotlib
 
     matplotlib.use("Agg")
-    from snapbeam.figures.animation import animate_run
+    from snapbeam.plot.animation import animate_run
 
     return animate_run(dataset, path, window)
 
 
 def _told(answer: Any, elapsed: float) -> str:
-    from snapbeam.core.codes import RunStatus
-    from snapbeam.core.prefixes import prefixed
+    from snapbeam.util.si_prefixes import prefixed
+    from snapbeam.util.status_codes import RunStatus
 
     kind, status = answer.response_class, answer.status
     if status not in (RunStatus.OK, RunStatus.EARLY_STOP):

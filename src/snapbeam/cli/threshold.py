@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 import typer
 
-from snapbeam.cli.common import options as opt
-from snapbeam.cli.common.console import answer, door, duration, file_line, out, progress
-from snapbeam.cli.common.parameter_options import (
+from snapbeam.cli import parameter_options as opt
+from snapbeam.cli.console import answer, door, duration, file_line, out, progress
+from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
     DRIVE,
@@ -21,14 +21,15 @@ from snapbeam.cli.common.parameter_options import (
     configured,
     with_parameters,
 )
-from snapbeam.cli.common.summary import coordinate_text, status_lines
+from snapbeam.cli.summary import coordinate_text, status_lines
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from snapbeam.config import Config
+    from snapbeam.model.parameter_file import Config
 
 __all__ = ["threshold"]
+
 
 _AXES = (
     "drive.frequency_ratio", "drive.frequency_hz", "drive.velocity_amplitude", "drive.velocity_m_s",
@@ -61,9 +62,9 @@ def threshold(
     Example: snapbeam threshold --modes 1,32 --frequency-ratio 0.1:4:64 --velocity-amplitude 0.005:0.64:128
     -o threshold.nc --plot threshold.png
     """
-    from snapbeam.cli.common.results import check_pictures, draw_threshold, write_map
-    from snapbeam.config import lookup
-    from snapbeam.core.files import check_writable
+    from snapbeam.cli.console import check_pictures, draw_threshold, write_map
+    from snapbeam.model.parameters import lookup
+    from snapbeam.util.files import check_writable
 
     settings = configured(given, lambda config, _: _axes_of(config, along))
     check_writable(output, "output", (".nc",))
@@ -100,8 +101,9 @@ def threshold(
 
 def _axes_of(settings: Config, along: str) -> dict[str, Any]:
     """The axes of a search, those of the structure first, and the values to choose from."""
-    from snapbeam.config import lookup, parse_axis
-    from snapbeam.core.validate import InputError
+    from snapbeam.model.parameter_axes import parse_axis
+    from snapbeam.model.parameters import lookup
+    from snapbeam.util.validation import InputError
 
     axes: dict[str, Any] = settings.axes()
     name = lookup(along).name

@@ -1,1 +1,6 @@
-"""Questions put to many runs: how long, how likely, which attractors, how rough their borders, how orbits go on."""
+"""Nonlinear dynamics: attractors, basins, periodic orbits, continuation, exponents, sections, lifetimes."""
+
+import lazy_loader
+
+# The stub __init__.pyi lists the public names; each is loaded when it is first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.config.parameters import lookup
-from snapbeam.core.kinds import checked
-from snapbeam.core.validate import InputError, InputTypeError, axis, choice, flag, integer, shown
-from snapbeam.dynamics.flow import Stroboscope
-from snapbeam.dynamics.orbits.passage import passage_of
-from snapbeam.dynamics.starts import InitialConditions, starts_of
+from snapbeam.dynamics.flow import InitialConditions, Stroboscope, starts_of
+from snapbeam.dynamics.periodic_orbits import passage_of
 from snapbeam.model.integration import Integration
-from snapbeam.model.start import rest_state
+from snapbeam.model.parameters import lookup
+from snapbeam.model.state import rest_state
 from snapbeam.model.system import System
+from snapbeam.util.validation import InputError, InputTypeError, axis, checked, choice, flag, integer, shown
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["bifurcation_diagram", "least_period"]
+
 
 _Array = NDArray[np.float64]
 SWEEPS = ("up", "down")

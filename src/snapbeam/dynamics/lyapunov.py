@@ -9,19 +9,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.config.parameters import lookup
-from snapbeam.core.kinds import checked
-from snapbeam.core.validate import InputError, InputTypeError, finite_array, integer, positive, shown
 from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of
 from snapbeam.model.integration import Integration
+from snapbeam.model.parameters import lookup
 from snapbeam.model.state import State
 from snapbeam.model.system import System
 from snapbeam.sweeps.points import Points, points_of
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    checked,
+    finite_array,
+    integer,
+    positive,
+    shown,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["lyapunov_spectrum", "largest_lyapunov"]
+__all__ = ["largest_lyapunov", "lyapunov_spectrum"]
+
 
 _Array = NDArray[np.float64]
 _BLOCKS = 20

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.kinds import checked
-from snapbeam.core.validate import InputError, InputTypeError, choice, finite, integer, shown
 from snapbeam.dynamics.flow import Stroboscope
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.runs.simulate import simulate
+from snapbeam.simulation.simulate import simulate
+from snapbeam.util.validation import InputError, InputTypeError, checked, choice, finite, integer, shown
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["poincare_section"]
+
 
 _Array = NDArray[np.float64]
 SECTIONS = ("stroboscopic", "impact")

@@ -1,8 +1,9 @@
-"""The explorer: a map in the browser; click on a point, see its run, watch the beam.
+"""The explorer: a response map in the browser; a click on a point computes its run.
 
-It computes through the public interface alone, and draws with Bokeh what the figures draw with Matplotlib.
+It computes through the public interface and draws with Bokeh.
 """
 
-from snapbeam.explorer.start import Explorer, explore, serve
+import lazy_loader
 
-__all__ = ["Explorer", "explore", "serve"]
+# The stub __init__.pyi lists the public names; each is loaded when it is first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -12,10 +12,11 @@ from typing import Any
 from urllib.parse import urlencode
 
 from snapbeam import InputError
-from snapbeam.config import lookup
-from snapbeam.explorer.limits import ADDRESS
+from snapbeam.explorer.jobs import ADDRESS
+from snapbeam.model.parameters import lookup
 
 __all__ = ["Address", "number"]
+
 
 _KEYS = ("x", "y", "show", "at", "view", "set", "theme", "tab")
 _MOST = 64

@@ -7,6 +7,7 @@ progress; a window's next batch waits while a run, which a person waits for, is 
 from __future__ import annotations
 
 import logging
+import tempfile
 import threading
 import time
 import traceback
@@ -14,11 +15,40 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from snapbeam import InputError, CheckpointError
+import numpy as np
+from bokeh.models import ColumnDataSource, CustomJS
 
-__all__ = ["Cancelled", "Jobs", "Token"]
+import snapbeam as sb
+from snapbeam import CheckpointError, InputError, Integration, Run, RunStatus, System
+
+__all__ = [
+    "ADDRESS",
+    "BODY",
+    "CYCLES",
+    "MODES",
+    "NEIGHBOUR",
+    "RUN_SECONDS",
+    "SAMPLES",
+    "SESSIONS",
+    "UPLOAD",
+    "WINDOW_POINTS",
+    "Cancelled",
+    "Compiling",
+    "Downloads",
+    "Jobs",
+    "Token",
+    "Waiting",
+    "check_run",
+    "conditioned",
+    "drawing",
+    "file_bytes",
+    "samples_of",
+    "too_large",
+]
+
 
 _LOG = logging.getLogger("snapbeam.explorer")
 
@@ -159,3 +189,229 @@ def _guarded(work: Callable[[Token], Any], done: Callable[[Any, str], None], tok
         words = f"this failed, which it should not: {type(error).__name__}: {error}"
     if not token.cancelled:
         done(result, words)
+
+
+# ----------------------------------------------------------------------------------------------------
+# How far a run can be trusted: what becomes of a neighbour that differs by 1e-9.
+
+
+NEIGHBOUR = 1e-9
+"""Relative change of the striker's amplitude."""
+_APART = 0.1
+"""Displacement over b from which two runs count as apart."""
+_MOST_CYCLES = 2000
+
+
+def conditioned(run: Run, token: Token) -> str:
+    """Words for it, computed of a neighbour of *run*."""
+    system, integration = run.system, run.integration
+    striker = system.striker
+    if (
+        striker is None
+        or not striker.drive.harmonic
+        or run.summary.status not in (RunStatus.OK, RunStatus.EARLY_STOP)
+    ):
+        return ""
+    cycles = integration.cycles_or_default
+    if cycles > _MOST_CYCLES:
+        return ""
+    token.check()
+    found = sb.perturbation_growth(system, integration, accuracy="standard", perturbation=NEIGHBOUR)
+    token.check()
+    apart = np.flatnonzero(found["separation"].values > _APART)
+    amplitude = system.parameters["drive.velocity_amplitude"]
+    neighbour = system.replace(**{"drive.velocity_amplitude": amplitude * (1.0 + NEIGHBOUR)})
+    other: Any = sb.simulate(neighbour, integration, sample_times=[0.0], progress=token.check).summary
+    same = other.response_class is run.summary.response_class and other.final_well == run.summary.final_well
+    ends = "ends in the same class and well" if same else f"ends elsewhere: {other.response_class.label}"
+    if not apart.size:
+        near = f"a neighbour {NEIGHBOUR:.0e} away in V stays within {_APART:g} b"
+        return f"well conditioned: {near} for all {cycles} cycles"
+    cycle = float(found["cycle"][apart[0]])
+    return f"separates after {cycle:.3g} cycles: a neighbour {NEIGHBOUR:.0e} away in V {ends}"
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a page says while one waits: for how long so far, and that the engine is being compiled.
+
+
+_FIRST = 700
+"""Milliseconds after which a wait is worth a word."""
+_AGAIN = 1000
+
+
+class Compiling(logging.Handler):
+    """Hears in the package's log that code is being compiled.
+
+    Attributes
+    ----------
+    words : str
+        What was said of it; empty if nothing is compiled.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(logging.INFO)
+        self.words = ""
+        self._log = logging.getLogger("snapbeam")
+        self._before = self._log.level
+        self._log.addHandler(self)
+        if self._log.getEffectiveLevel() > logging.INFO:
+            self._log.setLevel(logging.INFO)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Hear one line."""
+        text = record.getMessage()
+        if text.startswith("compiling"):
+            self.words = text
+
+    def over(self) -> None:
+        """Something was computed: what it needed is compiled."""
+        self.words = ""
+
+    def close(self) -> None:
+        """Hear no more."""
+        self._log.removeHandler(self)
+        self._log.setLevel(self._before)
+        super().close()
+
+
+class Waiting:
+    """The waits of one page.
+
+    Parameters
+    ----------
+    heard : Compiling
+    later : callable
+        ``later(work, milliseconds)``: do something on the page's own thread a little later.
+    """
+
+    def __init__(self, heard: Compiling, later: Callable[[Callable[[], None], int], object]) -> None:
+        self._heard, self._later = heard, later
+        self._asked: dict[int, object] = {}
+
+    def begin(self, which: int, tell: Callable[[float, str], None]) -> object:
+        """Call ``tell(seconds, words)`` every second until *which* ends, or begins anew; returns what stands for it."""
+        begun, mark = time.monotonic(), object()
+        self._asked[which] = mark
+
+        def look() -> None:
+            if self._asked.get(which) is mark:
+                tell(time.monotonic() - begun, self._heard.words)
+                self._later(look, _AGAIN)
+
+        self._later(look, _FIRST)
+        return mark
+
+    def waits(self, which: int, mark: object) -> bool:
+        """Whether the wait that :meth:`begin` gave *mark* for goes on."""
+        return self._asked.get(which) is mark
+
+    def end(self, which: int, computed: bool = True) -> None:
+        """There is something to see, or, if nothing was *computed*, no more to wait for."""
+        if self._asked.pop(which, None) is not None and computed:
+            self._heard.over()
+
+
+# ----------------------------------------------------------------------------------------------------
+# What one page may ask of the machine that it runs on; beyond it a request is refused with words.
+
+
+SESSIONS = 24
+"""Open pages."""
+MODES = 256
+CYCLES = 20_000
+SAMPLES = 120_000
+"""Regular samples of a recorded run."""
+SAMPLE_BYTES = 160 * 2**20
+"""Bytes that those samples take."""
+RUN_SECONDS = 60.0
+"""A run that takes longer is given up."""
+WINDOW_POINTS = 60_000
+"""Points of one window that is computed."""
+WINDOW_SECONDS = 1800.0
+UPLOAD = 2 * 2**20
+"""Bytes of a file given to the page."""
+ADDRESS = 4096
+"""Characters of what stands behind the page's address."""
+BODY = 8 * 2**20
+"""Bytes of one message from a page."""
+
+_FEWEST = 200
+"""Regular samples of a cycle of the excitation, or of the first mode, that a run is recorded with by itself."""
+
+
+def too_large(name: str, size: int) -> str:
+    """Words for a file that is too large for a page to give."""
+    return f"{name[:80]}: has {size / 2**20:.1f} MiB; a page takes at most {UPLOAD // 2**20} MiB"
+
+
+def check_run(system: System, integration: Integration) -> None:
+    """Refuse a run that one page may not ask for.
+
+    Raises
+    ------
+    InputError
+        For too many modes or cycles.
+    """
+    if system.model.modes > MODES:
+        raise InputError(f"model.modes = {system.model.modes}: a page may ask for at most {MODES}")
+    if integration.cycles_or_default > CYCLES:
+        raise InputError(
+            f"integration.cycles = {integration.cycles_or_default}: a page may ask for at most {CYCLES}"
+        )
+
+
+def samples_of(system: System, integration: Integration) -> int | None:
+    """Samples to record a run with; None if it may have all that it is recorded with by itself."""
+    striker = system.striker
+    if striker is None or not striker.drive.harmonic:
+        return None
+    ratio = float(striker.drive.frequency_ratio)  # type: ignore[attr-defined]
+    wanted = integration.cycles_or_default * max(1.0, 1.0 / ratio) * _FEWEST
+    row = 8 * (4 * system.model.modes + 20)
+    most = min(SAMPLES, SAMPLE_BYTES // row)
+    return None if wanted <= most else most
+
+
+# ----------------------------------------------------------------------------------------------------
+# Files that a page gives: made beside the page, handed to the browser, never written where a page says.
+
+
+drawing = threading.RLock()
+"""Held while Matplotlib draws, which one thread at a time may do."""
+_SAVE = """
+const bytes = source.data.bytes;
+if (!bytes.length) { return; }
+const link = document.createElement('a');
+link.href = URL.createObjectURL(new Blob([Uint8Array.from(bytes)], {type: source.tags[1]}));
+link.download = source.tags[0];
+document.body.appendChild(link);
+link.click();
+link.remove();
+setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+"""
+_KINDS = {
+    ".png": "image/png", ".pdf": "application/pdf", ".svg": "image/svg+xml", ".mp4": "video/mp4",
+    ".gif": "image/gif", ".nc": "application/x-netcdf", ".toml": "application/toml", ".py": "text/x-python",
+}  # fmt: skip
+
+
+class Downloads:
+    """The way of files to the browser."""
+
+    def __init__(self) -> None:
+        self.source = ColumnDataSource({"bytes": np.zeros(0, dtype=np.uint8)}, tags=["", ""], name="download")
+        self.source.js_on_change("data", CustomJS(args={"source": self.source}, code=_SAVE))
+
+    def give(self, name: str, content: bytes) -> None:
+        """Hand a file to the browser; on the page's own thread."""
+        self.source.tags = [name, _KINDS.get(Path(name).suffix, "application/octet-stream")]
+        self.source.data = {"bytes": np.frombuffer(content, dtype=np.uint8).copy()}
+
+
+def file_bytes(suffix: str, write: Callable[[Path], object]) -> bytes:
+    """What ``write(path)`` writes to a file of its own, which is gone afterwards."""
+    with tempfile.TemporaryDirectory(prefix="snapbeam-") as folder:
+        path = Path(folder) / f"file{suffix}"
+        write(path)
+        return path.read_bytes()

@@ -6,28 +6,92 @@ import contextlib
 import html
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import panel as pn
 from bokeh.models import ColumnDataSource
+from numpy.typing import NDArray
 
-from snapbeam import InputError, Integration, Run, System
+import snapbeam as sb
+from snapbeam import InputError, Integration, Run, RunStatus, System
 from snapbeam.explorer.address import Address, number
-from snapbeam.explorer.answers import Answer, answer
-from snapbeam.explorer.cards.map import MapCard
-from snapbeam.explorer.cards.system import SystemCard, changed_parameters
-from snapbeam.explorer.cards.take import TakeCard
-from snapbeam.explorer.downloads import Downloads
-from snapbeam.explorer.frame import framed
-from snapbeam.explorer.jobs import Token
-from snapbeam.explorer.limits import RUN_SECONDS, check_run, too_large
-from snapbeam.explorer.look import Look, look_of
-from snapbeam.explorer.maps.points import Point
+from snapbeam.explorer.cards import MapCard, SystemCard, TakeCard, changed_parameters
+from snapbeam.explorer.jobs import RUN_SECONDS, Downloads, Token, Waiting, check_run, samples_of, too_large
+from snapbeam.explorer.maps import Point, compared
+from snapbeam.explorer.maps import chances as chances_of
+from snapbeam.explorer.run_view import RunView
 from snapbeam.explorer.shared import Shared
-from snapbeam.explorer.views.run import RunView
-from snapbeam.explorer.waiting import Waiting
+from snapbeam.explorer.style import Look, framed, look_of
 
-__all__ = ["Page"]
+__all__ = ["Answer", "Page", "answer"]
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a page computes of a point, beside the page: a first look at the run, the run, and how it compares.
+
+
+_QUICK = 4000
+"""Samples of a run that is shown at once; all others follow."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """A run of a point, and what is said below it."""
+
+    run: Run
+    words: str
+    """How it compares with what the map holds."""
+    same: bool
+    chances: str
+    """Probabilities and lifetime of the point, where the map holds them."""
+
+
+def answer(
+    card: MapCard, point: Point, base: Any, how: Any, token: Token, look: Callable[[Run], None]
+) -> Answer:
+    """Compute a point of a card's map; *look* is given the run at a few instants before it is recorded whole."""
+    system, integration = point.system(base, how.replace(engine="auto", threads=None))
+    check_run(system, integration)
+    quick = _quick(system, integration, token)
+    if quick is not None:
+        look(quick)
+    count = samples_of(system, integration)
+    times = None if count is None else _even_times(system, integration, count)
+    run = sb.simulate(system, integration, sample_times=times, progress=token.check)
+    chances, source = "", card.shared.source
+    try:
+        held = card.expected(point)
+        chances = chances_of(source.layers, held)
+        same, words = compared(held, run.summary, str(source.attrs.get("engine", "cpu")))
+    except InputError as error:  # the run stands, although its map cannot be read any more
+        same, words = False, str(error)
+    if times is not None:
+        words += f"; recorded at {times.size} instants, the most that a page may ask for"
+    return Answer(run, words, same, chances)
+
+
+def _quick(system: Any, integration: Any, token: Token) -> Run | None:
+    """The run at a few instants, all that its pictures need made; None where those instants cannot be known."""
+    if system.striker is None or not system.striker.drive.harmonic or integration.early_termination:
+        return None
+    times = _even_times(system, integration, _QUICK)
+    run = sb.simulate(system, integration, sample_times=times, progress=token.check)
+    if run.outcome.status is not RunStatus.OK:
+        return None
+    _ = run.dataset  # made here and not on the page's thread, which others wait for
+    return run
+
+
+def _even_times(system: Any, integration: Any, count: int) -> NDArray[np.float64]:
+    """Instants evenly over a run with a sinusoidal drive."""
+    frequency = system.striker.drive.frequency_ratio * system.model.reference_frequency
+    return np.linspace(0.0, integration.cycles_or_default / frequency, count)
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 _GROWTH = 1500
 """Milliseconds between two looks at a store that may be growing."""
@@ -164,7 +228,7 @@ class Page:
 
     def _make_fields(self) -> None:
         names = self.card.plane.parameters
-        from snapbeam.config import lookup
+        from snapbeam.model.parameters import lookup
 
         self.fields = {
             name: pn.widgets.TextInput(name=lookup(name).short.replace("_", " "), value="", width=150)
@@ -278,7 +342,7 @@ class Page:
         self._condition(which, point, run, token)
 
     def _condition(self, which: int, point: Point, run: Run, token: Token) -> None:
-        from snapbeam.explorer.conditioning import conditioned
+        from snapbeam.explorer.jobs import conditioned
 
         def done(words: str | None, error: str) -> None:
             def tell() -> None:
@@ -335,7 +399,7 @@ class Page:
                 self.fields[name].value = repr(value) if isinstance(value, float) else str(value)
 
     def _ask_typed(self) -> None:
-        from snapbeam.config import lookup
+        from snapbeam.model.parameters import lookup
 
         values: dict[str, Any] = {}
         try:

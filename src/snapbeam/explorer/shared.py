@@ -9,13 +9,11 @@ from typing import Any
 
 import snapbeam as sb
 from snapbeam import InputError, Integration, System
-from snapbeam.explorer.jobs import Jobs, Token
-from snapbeam.explorer.maps.points import integration_of, system_of
-from snapbeam.explorer.maps.source import Source
-from snapbeam.explorer.maps.windows import Window
-from snapbeam.explorer.waiting import Compiling
+from snapbeam.explorer.jobs import Compiling, Jobs, Token
+from snapbeam.explorer.maps import Source, Window, integration_of, system_of
 
 __all__ = ["Shared"]
+
 
 _WINDOWS = 48
 """Windows that are kept; of more the one that was looked at longest ago is dropped."""

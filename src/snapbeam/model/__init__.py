@@ -1,1 +1,6 @@
-"""What the physicist writes down (beam, contact, shaker) and its reduction to N modes."""
+"""The beam, its contacts, strikers, excitations and harvesters, and the Galerkin reduction."""
+
+import lazy_loader
+
+# The stub __init__.pyi lists the public names; each is loaded when it is first used.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

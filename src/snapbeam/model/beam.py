@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from snapbeam.core.validate import InputError, InputTypeError, finite, shown
-from snapbeam.model.ends.ends import CLAMPED, BoundaryConditions
-from snapbeam.model.ends.of_beam import Modes, modes_between
-from snapbeam.model.galerkin.modes import wavenumbers
+from snapbeam.model.boundary_conditions import CLAMPED, BoundaryConditions, Modes, modes_between
+from snapbeam.model.buckling_modes import wavenumbers
 from snapbeam.model.quantity import quantities, quantity
+from snapbeam.util.validation import InputError, InputTypeError, finite, shown
 
 __all__ = ["Beam"]
 

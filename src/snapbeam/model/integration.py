@@ -6,10 +6,11 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.core.validate import InputError
 from snapbeam.model.quantity import check_fields, quantities, quantity
+from snapbeam.util.validation import InputError
 
 __all__ = ["ACCURACIES", "CYCLES", "ENGINES", "Integration"]
+
 
 ACCURACIES = ("standard", "reference")
 ENGINES = ("auto", "cpu", "cuda")

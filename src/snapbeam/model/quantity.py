@@ -1,6 +1,6 @@
 """A parameter as a field of a value: its unit, limits, words and scope stand where the value is defined.
 
-The table of parameters (:mod:`snapbeam.config.parameters`) is gathered from these fields; checks, files,
+The table of parameters (:mod:`snapbeam.model.parameters`) is gathered from these fields; checks, files,
 the command line, axes of sweeps and labels of pictures read it there.
 """
 
@@ -8,12 +8,25 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import secrets
+from collections import namedtuple
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.core.validate import choice, finite, flag, integer, nonnegative, positive, within
+from snapbeam.util.validation import choice, finite, flag, integer, nonnegative, positive, within
 
-__all__ = ["RUN", "STRUCTURE", "ParameterField", "check_fields", "quantities", "quantity"]
+__all__ = [
+    "RUN",
+    "STRUCTURE",
+    "ParameterField",
+    "check_fields",
+    "numbers_type",
+    "own_name",
+    "quantities",
+    "quantity",
+]
+
 
 RUN = "run"
 """Scope of what may differ between the runs of one ensemble."""
@@ -34,7 +47,7 @@ class ParameterField:
     kind : type
         float, int, bool, str, or object for anything that checks itself.
     low, high, closed
-        The interval that its numbers must lie in; *closed* as in :func:`snapbeam.core.validate.within`.
+        The interval that its numbers must lie in; *closed* as in :func:`snapbeam.util.validation.within`.
     choices : tuple of str
         The words allowed, of text.
     scope : {"run", "structure"}
@@ -99,3 +112,29 @@ def check_fields(value: Any) -> None:
     """Check every quantity of a frozen dataclass, and keep it as a plain number, in its ``__post_init__``."""
     for name, item in quantities(type(value)).items():
         object.__setattr__(value, name, item.check(name, getattr(value, name)))
+
+
+# ----------------------------------------------------------------------------------------------------
+# The numbers of a law or a drive, as kernels see them.
+
+
+_named_tuple: Any = namedtuple
+
+
+def own_name(kind: type) -> str:
+    """A name that no other class has, in this process or in one whose machine code may be loaded into it.
+
+    Compiled functions are linked by names that those of their arguments' types are part of.  Two laws whose numbers
+    were called alike would share code, whichever was loaded first.
+    """
+    return f"{kind.__qualname__}.{secrets.token_hex(8)}"
+
+
+def numbers_type(kind: Any, fields: Iterable[str]) -> Any:
+    """The named tuple of a class's numbers, made once; an attribute of the class, ``Numbers``."""
+    if "Numbers" not in vars(kind):
+        made: Any = _named_tuple("Numbers", tuple(fields))
+        made.__module__, made.__qualname__ = kind.__module__, f"{kind.__qualname__}.Numbers"
+        made.__name__, made.owner = own_name(kind), kind
+        kind.Numbers = made
+    return kind.Numbers

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -9,10 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.codes import RunStatus
-from snapbeam.core.validate import InputError, finite_array, mapping, shown
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.model.striker import Striker
+from snapbeam.util.status_codes import RunStatus
+from snapbeam.util.validation import InputError, finite_array, integer, mapping, shown
 
-__all__ = ["ModalState", "State"]
+__all__ = ["START_NAME", "ModalState", "State", "amplitude_scale", "rest_state", "started"]
+
 
 _Array = NDArray[np.float64]
 _REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
@@ -126,7 +130,7 @@ class State:
             raise InputError(f"state[{index!r}]: this is one state, not a batch")
         passed, tangent = self.statistics, self.tangent
         if passed is not None:
-            statistics = {
+            passed = {
                 name: values[index] for name, values in passed.items() if np.shape(values) == self.batch
             }
         if tangent is not None:
@@ -220,3 +224,60 @@ def _maybe(name: str, value: ArrayLike, batch: tuple[int, ...]) -> _Array:
     if array.dtype.kind not in "iuf" or np.isinf(array).any():
         raise InputError(f"{name} = {shown(value)}: must be finite numbers, or NaN for none")
     return _spread(name, array.astype(np.float64), batch)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Where runs begin: at rest in a well, or anywhere, named in numbers that people use.
+
+
+START_NAME = re.compile(r"(amplitude|velocity)\[([1-9][0-9]{0,3})\]")
+"""Names of the parameters of a start, after ``start.``: ``amplitude[1]``, ``velocity[3]``."""
+
+
+def amplitude_scale(model: ReducedModel) -> float:
+    """What amplitudes of a start are counted in, m^0.5: the first amplitude in a well, or, of a structure
+    with one well, what moves the centre by the length scale."""
+    well = float(np.sqrt(model.well_amplitude @ model.well_amplitude))
+    if well > 0.0:
+        return well
+    return float(model.length_scale or 1.0) / float(np.abs(model.midspan_shape).max())
+
+
+def rest_state(model: ReducedModel, striker: Striker | None = None) -> State:
+    """At rest in the well that the striker pushes away from, and touched by it."""
+    if striker is not None and striker.side == "above":
+        return State(amplitude=-model.mirrored.equilibrium)
+    return State(amplitude=model.well_amplitude)
+
+
+def started(
+    model: ReducedModel, striker: Striker | None, start: State | None, values: Mapping[str, Any]
+) -> State:
+    """A start with some of its numbers changed.
+
+    ``amplitude[i]`` is the amplitude of buckling mode i over that of the well (-1 for i = 1: the lower well),
+    ``velocity[i]`` its velocity over the same times omega_1, ``striker_position`` the mid-position of the tip
+    in space, m, ``phase`` that of the drive, rad.  Arrays of one length make a batch.
+    """
+    state = rest_state(model, striker) if start is None else start
+    columns = {name: finite_array(f"start.{name}", value) for name, value in values.items()}
+    batch = np.broadcast_shapes(state.batch, *(column.shape for column in columns.values()))
+    amplitude = np.array(np.broadcast_to(state.amplitude, (*batch, model.modes)))
+    velocity = np.array(np.broadcast_to(state.velocity, (*batch, model.modes)))
+    parts: dict[str, Any] = {"phase": state.phase, "striker_position": state.striker_position}
+    scale = amplitude_scale(model)
+    for name, column in columns.items():
+        found = START_NAME.fullmatch(name)
+        if found is None and name not in parts:
+            raise InputError(
+                f"start.{name}: no parameter of a start; must be amplitude[i], velocity[i], phase or striker_position"
+            )
+        if found is None:
+            parts[name] = column
+            continue
+        mode = integer(f"start.{name}: mode", int(found[2]), 1, model.modes) - 1
+        if found[1] == "amplitude":
+            amplitude[..., mode] = column * scale
+        else:
+            velocity[..., mode] = column * scale * 2.0 * np.pi * model.reference_frequency
+    return State(amplitude=amplitude, velocity=velocity, **parts)

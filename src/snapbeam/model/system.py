@@ -13,23 +13,82 @@ from typing import Any
 
 import numpy as np
 
-from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.findings import Diagnostic
-from snapbeam.core.provenance import canonical_json
-from snapbeam.core.validate import InputError, InputTypeError, file_path, instance, shown
-from snapbeam.model.contact import ContactLaw
-from snapbeam.model.doubts import doubts_of
-from snapbeam.model.drive import Drive, Scale, FixedStop
-from snapbeam.model.galerkin.reduction import ReducedModel
-from snapbeam.model.mapping import parts_from_mapping, parts_to_mapping
-from snapbeam.model.replacing import replaced
+from snapbeam.model.axial_load import AxialLoadModulation
+from snapbeam.model.base_excitation import BaseExcitation, rigid_mass
+from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.diagnostics import doubts_of
+from snapbeam.model.drive.base import Drive, Scale
+from snapbeam.model.drive.fixed_stop import FixedStop
+from snapbeam.model.drive.recorded_motion import RecordedMotion
+from snapbeam.model.harvester import Harvester
+from snapbeam.model.mapping import parts_from_mapping, parts_to_mapping, replaced
+from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
-from snapbeam.model.striker import Shaker, Striker
-from snapbeam.model.striker.another import ContactPair, check_others, parted
-from snapbeam.model.world import AxialLoadModulation, BaseExcitation, Harvester
-from snapbeam.model.world.check import check_world
+from snapbeam.model.striker import ContactPair, Shaker, Striker, check_others, parted
+from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.provenance import canonical_json
+from snapbeam.util.validation import InputError, InputTypeError, file_path, instance, shown
 
-__all__ = ["System"]
+__all__ = ["System", "check_world"]
+
+
+# ----------------------------------------------------------------------------------------------------
+# What surrounds a beam, held against the rest of a system: mixtures that are refused, with the way out.
+
+
+_A = {
+    "base": "a Base(motion=AccelerationSine(...))",
+    "axial": "an AxialLoadModulation(motion=HarmonicLoad(...))",
+    "harvester": "a Piezo(...) or a Coil(...)",
+}
+
+
+def check_world(system: Any) -> None:
+    """Refuse surroundings that are none, or that do not go with the rest of a :class:`~snapbeam.System`."""
+    base, load, harvester = system.base_excitation, system.axial_load, system.harvester
+    for name, part, kind in (
+        ("base", base, BaseExcitation),
+        ("axial", load, AxialLoadModulation),
+        ("harvester", harvester, Harvester),
+    ):
+        if part is not None and not isinstance(part, kind):
+            raise InputTypeError(f"{name} = {shown(part)}: must be {_A[name]}")
+    if base is not None:
+        rigid_mass(system.model)
+    if harvester is not None:
+        harvester.row(system.model)
+    if base is None and load is None and harvester is None:
+        return
+    words = "a harvester" if harvester is not None else "a changing axial load"
+    words = "a moving base" if base is not None else words
+    contact, striker = system.contact, system.striker
+    if contact is not None and contact.impulsive:
+        raise InputError(
+            f"contact = {contact!r} with {words}: the carried phase of Newton's law knows the tip's force alone; use a "
+            "HertzContact, or a HuntCrossley with the same restitution"
+        )
+    if contact is not None and contact.rate_dependent and harvester is not None:
+        raise InputError(
+            f"contact = {shown(contact)} with a harvester: two things that depend on the velocity at once; use a "
+            "HertzContact or a PowerLaw, and let damping_ratio stand for the loss"
+        )
+    if (
+        striker is not None
+        and isinstance(striker.drive, RecordedMotion)
+        and (base is not None or load is not None)
+    ):
+        raise InputError(
+            f"drive = 'recorded' with {words}: a record has a clock of its own; drive the striker by a formula, or let "
+            "it stand still"
+        )
+    if load is not None and system.model.beam is None:
+        raise InputError(
+            "axial: changes the axial load of a beam; a structure given by matrices has its load in its stiffness"
+        )
+
+
+# ----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,7 +345,7 @@ class System:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        from snapbeam.core.showing import html_table
+        from snapbeam.util.display import html_table
 
         rows = [(section, text.strip()) for section, _, text in map(_parted, self.describe().splitlines())]
         return html_table(f"System, hash {self.hash[:12]}", rows)

@@ -10,7 +10,9 @@ A recipe computes its data by the public interface alone and draws them:
 documentation shows. :func:`snapbeam.paper.claims.measure_claims` measures what the paper says.
 """
 
-from snapbeam.model.paper_values import (
+from __future__ import annotations
+
+from snapbeam.model.default_values import (
     BEAM,
     CONTACT,
     CYCLES,
@@ -58,6 +60,7 @@ __all__ = [
     "waveforms",
     "windows",
 ]
+
 
 fig2 = Recipe("fig2", "the beam and the shaker, with their symbols")
 fig3 = Recipe("fig3", "a waveform, a shallow penetration closer, and the contact force")

@@ -10,13 +10,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from snapbeam.core.validate import InputError, choice
+from snapbeam.util.validation import InputError, choice
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
 __all__ = ["DATA_VARIABLE", "SIZES", "MissingResults", "Recipe", "Results", "shared_results"]
+
 
 SIZES = ("quick", "full")
 DATA_VARIABLE = "SNAPBEAM_PAPER_DATA"
@@ -153,7 +154,7 @@ class Recipe:
             Results to share with other recipes; *size* and *data* are theirs then.
         **options
             What the recipe takes beside: ``dots`` (fig6, fig7, fig8: a CSV table of measured responses, see
-            :func:`snapbeam.figures.read_measured_points`), ``measured`` (fig4: three files of measured runs).
+            :func:`snapbeam.sweeps.measured_points.read_measured_points`), ``measured`` (fig4: three files of measured runs).
         """
         return self._draw(Results(size, read=data) if results is None else results, options)
 
@@ -176,7 +177,7 @@ class Recipe:
         """
         from matplotlib.pyplot import close
 
-        from snapbeam.figures.style import save_figure
+        from snapbeam.plot.style import save_figure
 
         target = Path(folder)
         if not target.is_dir():

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.core.files import check_writable
-from snapbeam.core.netcdf import write_netcdf
-from snapbeam.core.validate import InputError
-from snapbeam.engines.mark import solver_fingerprint
+from snapbeam.solver.fingerprint import solver_fingerprint
+from snapbeam.util.files import check_writable
+from snapbeam.util.netcdf import write_netcdf
+from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import snapbeam as sb
-from snapbeam.model.paper_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION
+from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,6 +27,7 @@ __all__ = [
     "relative_map",
     "shapes_along",
 ]
+
 
 _Array = NDArray[np.float64]
 
@@ -85,7 +86,7 @@ def relative_map(
     model = paper_model(modes)
     columns, made = [], []
     for at, x in enumerate(locations):
-        static = float(sb.quasi_static_threshold(x, frequency_ratio))
+        static = float(sb.model.quasi_static_threshold(x, frequency_ratio))
         ds = sb.response_map(
             model,
             CONTACT,
@@ -125,7 +126,8 @@ def legend_handles(kinds: ArrayLike) -> list[Artist]:
     """Legend entries of the response classes, the unknown one only if *kinds* holds it."""
     from matplotlib.patches import Patch
 
-    from snapbeam.figures import CLASS_COLORS, class_handles
+    from snapbeam.plot.map import class_handles
+    from snapbeam.plot.style import CLASS_COLORS
 
     handles: list[Artist] = list(class_handles())
     unknown = sb.ResponseClass.UNKNOWN

@@ -1,1 +1,1 @@
-"""Many runs: sweeps over any parameters as labelled datasets, kept, spread and refined, and thresholds."""
+"""sweeps"""

@@ -10,8 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from snapbeam.core.reporting import counting
-from snapbeam.core.validate import (
+from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.integration import Integration
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.model.striker import Shaker
+from snapbeam.model.system import System
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, Note, SweepReport, compute_sweep
+from snapbeam.sweeps.points import Grid, PointList, points_of
+from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates
+from snapbeam.sweeps.setup import SweepSetup, sweep_setup
+from snapbeam.sweeps.threshold import threshold
+from snapbeam.util.diagnostics import counting
+from snapbeam.util.validation import (
     InputError,
     InputTypeError,
     finite_array,
@@ -21,21 +31,12 @@ from snapbeam.core.validate import (
     shown,
     within,
 )
-from snapbeam.model.contact import ContactLaw
-from snapbeam.model.galerkin.reduction import ReducedModel
-from snapbeam.model.integration import Integration
-from snapbeam.model.striker import Shaker
-from snapbeam.model.system import System
-from snapbeam.sweeps.points import Grid, PointList, points_of
-from snapbeam.sweeps.replicas import MEASURING_ERROR, Replicates
-from snapbeam.sweeps.setup import SweepSetup, sweep_setup
-from snapbeam.sweeps.stored import CheckpointOptions, Note, SweepReport, compute_sweep
-from snapbeam.sweeps.threshold import threshold
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["long_map", "map_setup", "response_map", "threshold_curve"]
+
 
 _AXES = {
     "frequency_ratio": ("drive.frequency_ratio", 0.0, np.inf, "neither"),
@@ -187,7 +188,7 @@ def long_map(
     store, cluster, refine_levels, output, progress
         As in :func:`snapbeam.sweep`.
     verify, chunk, note, tally, config
-        As in :class:`snapbeam.Keeping`.
+        As in :class:`snapbeam.CheckpointOptions`.
     replicas, perturbation_rms, replicate_seed, check_half_step
         As in :class:`snapbeam.Replicates`.
 

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam.core.codes import ResponseClass
-from snapbeam.core.netcdf import netcdf_file
-from snapbeam.runs.save import code_flags
-from snapbeam.sweeps.compute.task import CLASSES, PointWork
-from snapbeam.sweeps.compute.tasks import Rows
+from snapbeam.simulation.save import code_flags
 from snapbeam.sweeps.points import PointList, Points
+from snapbeam.sweeps.tasks import CLASSES, PointWork, Rows
+from snapbeam.util.netcdf import netcdf_file
+from snapbeam.util.status_codes import ResponseClass
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["class_coordinate", "to_dataset", "to_netcdf"]
+
 
 _CLASS_DIM = "response_class"
 _BLOCK = 65536

@@ -11,15 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.config.parameters import Parameter, lookup, parameters, short_names
-from snapbeam.config.physical import PHYSICAL, physical_name
-from snapbeam.core.provenance import array_hash
-from snapbeam.core.validate import InputError, InputTypeError, axis, finite_array, shown
+from snapbeam.model.parameter_axes import PHYSICAL, physical_name
+from snapbeam.model.parameters import Parameter, lookup, parameters, short_names
+from snapbeam.util.provenance import array_hash
+from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, shown
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["Columns", "Grid", "PointList", "Points", "points_of"]
+
 
 Columns = dict[str, NDArray[Any]]
 """Values of some points by dotted name, arrays of shape (points,)."""
@@ -254,7 +255,9 @@ def _is_label(name: str) -> bool:
     physical = physical_name(name)
     if physical is not None:
         ratio = lookup(PHYSICAL[physical].parameter).short
-        raise InputError(f"{name}: give {ratio}, which snapbeam.config.from_physical makes of it")
+        raise InputError(
+            f"{name}: give {ratio}, which snapbeam.model.parameter_axes.from_physical makes of it"
+        )
     table = parameters()
     known = [*table, *short_names(), *(full.partition(".")[2] for full in table)]
     if name in known:

@@ -12,14 +12,14 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.codes import ResponseClass, RunStatus
-from snapbeam.core.validate import InputError
-from snapbeam.sweeps.compute.task import ResultTable
-from snapbeam.sweeps.compute.tasks import Keeper, Rows, Stage
 from snapbeam.sweeps.points import Grid
 from snapbeam.sweeps.setup import Progress
+from snapbeam.sweeps.tasks import Keeper, ResultTable, Rows, Stage
+from snapbeam.util.status_codes import ResponseClass, RunStatus
+from snapbeam.util.validation import InputError
 
 __all__ = ["MAX_LEVELS", "RefinedRows", "refine", "refined_grid"]
+
 
 MAX_LEVELS = 10
 _BLOCK = 65536

@@ -6,13 +6,13 @@ import os
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from snapbeam.core.reporting import counting
-from snapbeam.core.validate import integer
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
-from snapbeam.sweeps.replicas import Replicates
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, compute_sweep
+from snapbeam.sweeps.replicates import Replicates
 from snapbeam.sweeps.setup import sweep_setup
-from snapbeam.sweeps.stored import CheckpointOptions, compute_sweep
+from snapbeam.util.diagnostics import counting
+from snapbeam.util.validation import integer
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,7 +43,7 @@ def sweep(
         What is studied; what is not swept is as it says.
     axes : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
         A mapping from parameters to values makes a grid, with a dimension for each: names as in
-        :func:`snapbeam.config.parameters`, dotted (``"beam.thickness"``) or as datasets have them
+        :func:`snapbeam.model.parameters`, dotted (``"beam.thickness"``) or as datasets have them
         (``"frequency_ratio"``), with strictly increasing values.  A dataset with one-dimensional variables, or a
         data frame, makes a list of points along the dimension ``point``.
     integration : Integration, optional

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.engines.cpu.driver import _CHUNK_STEPS, _chunks
+from snapbeam.solver.cpu.driver import _CHUNK_STEPS, _chunks
 
 
 @pytest.mark.parametrize("runs", [1, 2, 3, 7, 40, 1000, 20_000])

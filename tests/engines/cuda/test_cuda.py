@@ -10,19 +10,19 @@ import pytest
 from cuda_simulator import Job, march_in_simulator
 
 import snapbeam as sb
-from snapbeam.core.codes import RunStatus
-from snapbeam.core.validate import InputError
-from snapbeam.engines import registry as engines
-from snapbeam.engines.assemble import make_ensemble
-from snapbeam.engines.cpu import driver as cpu_engine
-from snapbeam.engines.ensemble import Ensemble
-from snapbeam.model import paper_values as paper
+from snapbeam.model import default_values as paper
+from snapbeam.solver import registry as engines
+from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.cpu import driver as cpu_engine
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.util.status_codes import RunStatus
+from snapbeam.util.validation import InputError
 
 pytest.importorskip("numba_cuda", reason="the CUDA engine needs numba-cuda")
 
-from snapbeam.engines.cuda import driver as cuda_engine
-from snapbeam.engines.cuda.driver import Options
-from snapbeam.engines.cuda.layout import device_structure, launch_bounds
+from snapbeam.solver.cuda import driver as cuda_engine
+from snapbeam.solver.cuda.driver import Options
+from snapbeam.solver.cuda.layout import device_structure, launch_bounds
 
 CONTACT = sb.HertzContact(stiffness=4e8)
 
@@ -165,7 +165,7 @@ def test_the_kernel_compiles_for_a_device(monkeypatch, order, threads, columns):
     """To PTX, without a device: no array of a thread may end up in memory, and no sine in a library."""
     from numba import cuda, float64
 
-    from snapbeam.engines.cuda.march import integrate_kernel, signature
+    from snapbeam.solver.cuda.integrate import integrate_kernel, signature
 
     def nothing(x):
         x[0] = 0.0

@@ -10,7 +10,7 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.engines.scalar.composition import COMPOSITIONS, COUPLED, TURNS, slot_length
+from snapbeam.solver.splitting import COMPOSITIONS, COUPLED, TURNS, slot_length
 
 
 @pytest.mark.parametrize("order", [4, 6])

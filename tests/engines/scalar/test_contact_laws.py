@@ -13,14 +13,14 @@ from numba import njit
 from scipy.integrate import quad
 
 import snapbeam as sb
-from snapbeam.engines.scalar.contact import (
+from snapbeam.model.contact.base import LAWS
+from snapbeam.solver.contact_force import (
     contact_energy,
     contact_force,
     contact_slope,
     is_impulsive,
     peak_force,
 )
-from snapbeam.model.contact import LAWS
 
 check = settings(max_examples=50, deadline=None, derandomize=True)
 

@@ -11,10 +11,12 @@ from pathlib import Path
 import pytest
 
 import snapbeam
-from snapbeam.engines.scalar import fingerprint as marking
-from snapbeam.engines.scalar.fingerprint import fingerprint
-from snapbeam.model.contact import HertzContact, Restitution
-from snapbeam.model.drive import RecordedMotion, Sine
+from snapbeam.model.contact.hertz import HertzContact
+from snapbeam.model.contact.restitution import Restitution
+from snapbeam.model.drive.recorded_motion import RecordedMotion
+from snapbeam.model.drive.sine import Sine
+from snapbeam.solver import compilation as marking
+from snapbeam.solver.compilation import fingerprint
 
 PACKAGE = Path(snapbeam.__file__).parent
 
@@ -165,8 +167,8 @@ def test_the_names_that_a_law_gives_are_part_of_it(tmp_path, monkeypatch) -> Non
 
 def test_a_statistic_of_somebody_is_never_kept() -> None:
     """It stands for functions from anywhere; two of them must not share a kernel."""
-    from snapbeam.engines.outcomes import Statistic, register, unregister
-    from snapbeam.engines.scalar.extras import extras_of_table
+    from snapbeam.solver.registered_statistics import extras_of_table
+    from snapbeam.solver.statistics import Statistic, register, unregister
 
     assert fingerprint((HertzContact, Sine, type(extras_of_table()).owner)) is not None
     register(Statistic("own", "float64", "s", "time marched", lambda r, h: h, update=lambda held, step: held))
@@ -179,7 +181,7 @@ def test_a_statistic_of_somebody_is_never_kept() -> None:
 def test_a_law_typed_at_a_prompt_is_never_kept() -> None:
     """Its source cannot be read, so nothing tells two of them apart."""
     code = LAW.format(factor="1.0", more="") + (
-        "\nfrom snapbeam.engines.scalar.fingerprint import fingerprint\n"
+        "\nfrom snapbeam.solver.compilation import fingerprint\n"
         "from snapbeam.model.drive import Sine\nprint(fingerprint((Spring, Sine)))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -6,10 +6,10 @@ import json
 import subprocess
 import sys
 
-from snapbeam.engines.outcomes import Statistic, register, unregister
-from snapbeam.engines.scalar.extras import extras_of_table
-from snapbeam.model.contact import LAWS, ContactLaw
-from snapbeam.model.drive import DRIVES
+from snapbeam.model.contact.base import LAWS, ContactLaw
+from snapbeam.model.drive.base import DRIVES
+from snapbeam.solver.registered_statistics import extras_of_table
+from snapbeam.solver.statistics import Statistic, register, unregister
 
 PROGRAM = """
 import json, sys
@@ -60,7 +60,7 @@ def test_types_of_numbers_are_named_apart() -> None:
 
         return Somebodys
 
-    from snapbeam.model.numbers import numbers_type
+    from snapbeam.model.quantity import numbers_type
 
     kinds += [numbers_type(law(), ("stiffness",)) for _ in range(2)]
     assert len({kind.__name__ for kind in kinds}) == len(kinds)

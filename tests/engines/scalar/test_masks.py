@@ -5,20 +5,23 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from snapbeam.engines.scalar.compile import compiled
-from snapbeam.engines.scalar.decisions import Clock, contact_level
-from snapbeam.engines.scalar.lanes import load, splat, store, vtrunc
-from snapbeam.engines.scalar.masks import (
+from snapbeam.solver.compilation import compiled
+from snapbeam.solver.events import Clock, contact_level
+from snapbeam.solver.simd import (
     bits,
     both,
     halvings,
     less,
+    load,
     lowest,
     mask_of,
     pick,
     power_of_two,
+    splat,
+    store,
     vmax,
     vmin,
+    vtrunc,
 )
 
 

@@ -11,19 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from snapbeam.engines.scalar.lanes import WIDTH, fma, lanes_sum, load, select_less, store, vabs, vfloor
-from snapbeam.engines.scalar.physics import (
-    sincos_cosm1,
+from snapbeam.solver.physics import (
     decay_less_one,
     mode_energy,
     rotation,
     shaker_motion,
     sincos,
+    sincos_cosm1,
     tension_acceleration,
     tension_energy,
     tension_factors,
     turned,
 )
+from snapbeam.solver.simd import WIDTH, fma, lanes_sum, load, select_less, store, vabs, vfloor
 
 
 @njit

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from snapbeam.engines.scalar.signals import (
+from snapbeam.solver.interpolation import (
     count_zero_crossings,
     cubic,
     first_downcrossing,

@@ -10,17 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from snapbeam import InputError
-from snapbeam.core.findings import Diagnostic
-from snapbeam.lab.plausibility import (
-    alignment,
-    calibration,
-    comparison,
-    decay,
-    recording,
-    tracking,
-    vibrometer,
-)
-from snapbeam.lab.plausibility.kinds import Kind
+from snapbeam.lab import diagnostics as alignment
+from snapbeam.lab import diagnostics as calibration
+from snapbeam.lab import diagnostics as comparison
+from snapbeam.lab import diagnostics as decay
+from snapbeam.lab import diagnostics as recording
+from snapbeam.lab import diagnostics as vibrometer
+from snapbeam.lab.diagnostics import Kind
+from snapbeam.lab.tracking import diagnostics as tracking
+from snapbeam.util.diagnostics import Diagnostic
 
 KINDS: Mapping[str, Kind] = {
     kind.code: kind

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import snapbeam.lab as lab
-from snapbeam.runs.schema import trajectory_dataset
+from snapbeam.simulation.dataset import trajectory_dataset
 
 from .case import Case, Outcome, off
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from snapbeam.lab.camera.photron.pixels import pack_12bit
+from snapbeam.lab.photron import pack_12bit
 
 _VIEWER = """
 #Photron Fastcam Viewer Version Information (Resave):

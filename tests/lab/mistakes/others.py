@@ -7,7 +7,7 @@ from lab_waveforms import BUCKLING_LEVEL, FRAME_RATE, PIXEL, impacts
 
 import snapbeam.lab as lab
 from snapbeam import Beam, ReducedModel
-from snapbeam.lab.tracking.flags import FrameFlag
+from snapbeam.lab.tracking.settings import FrameFlag
 
 from .case import Case, Outcome, off
 from .headers import with_pixels
@@ -103,7 +103,7 @@ def half_the_exposure(folder):
 
 
 def _seen(tracked):
-    from snapbeam.lab.drive.seen import shaker_signal
+    from snapbeam.lab.vibrometer import shaker_signal
 
     return shaker_signal(tracked)
 

@@ -8,16 +8,9 @@ import numpy as np
 from lab_waveforms import BUCKLING_LEVEL, FRAME_RATE, PIXEL, impacts
 from random_scenes import write
 
-from snapbeam.lab import (
-    Defects,
-    SyntheticCamera,
-    SyntheticStage,
-    diagnostics_of,
-    open_recording,
-    render_recording,
-    track,
-)
-from snapbeam.lab.synthetic.defects import Fixture
+from snapbeam.lab import Defects, SyntheticCamera, SyntheticStage, open_recording, render_recording, track
+from snapbeam.lab.synthetic import Fixture
+from snapbeam.util.diagnostics import diagnostics_of
 
 from .case import Case, Outcome, off
 

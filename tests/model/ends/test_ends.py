@@ -9,9 +9,8 @@ import pytest
 
 import snapbeam as sb
 from snapbeam import paper
-from snapbeam.core.validate import InputError
-from snapbeam.model.ends.modes import SpringModes
-from snapbeam.model.galerkin.modes import BucklingModes
+from snapbeam.model.buckling_modes import BucklingModes, SpringModes
+from snapbeam.util.validation import InputError
 
 BEAM = paper.BEAM
 LENGTH = BEAM.length
@@ -97,7 +96,7 @@ def test_pinned_beam_in_closed_form() -> None:
     np.testing.assert_allclose(
         sb.ReducedModel.from_beam(straight, modes=8).natural_frequencies, expected, rtol=1e-11
     )
-    np.testing.assert_allclose(sb.exact_natural_frequencies(straight, 8), expected, rtol=1e-11)
+    np.testing.assert_allclose(sb.model.exact_natural_frequencies(straight, 8), expected, rtol=1e-11)
     # w = b sin(pi x/L): the i-th frequency by i^2 (i^2 - 1), the first by b^2/(2 r^2)
     square = (index**2 * (index**2 - 1)).astype(float)
     square[0] = 0.5 * (BEAM.buckling_level / BEAM.radius_of_gyration) ** 2
@@ -105,7 +104,7 @@ def test_pinned_beam_in_closed_form() -> None:
     np.testing.assert_allclose(
         sb.ReducedModel.from_beam(pinned, modes=8).natural_frequencies, expected, rtol=1e-11
     )
-    np.testing.assert_allclose(sb.exact_natural_frequencies(pinned, 8), expected, rtol=1e-10)
+    np.testing.assert_allclose(sb.model.exact_natural_frequencies(pinned, 8), expected, rtol=1e-10)
     model = sb.ReducedModel.from_beam(pinned, modes=8)
     assert float(model.midspan_shape @ model.well_amplitude) == pytest.approx(-BEAM.buckling_level, rel=1e-14)
     np.testing.assert_allclose(model.mass, np.diag(model.mass.diagonal()), atol=1e-14 * model.mass.max())
@@ -136,13 +135,15 @@ def test_static_snap_of_a_pinned_beam() -> None:
 def test_frequencies_against_finite_elements(left, right) -> None:
     """100 Hermite elements with the springs and the rank-one term of the buckled shape."""
     beam = beam_with(left, right)
-    exact = sb.exact_natural_frequencies(beam, 6)
+    exact = sb.model.exact_natural_frequencies(beam, 6)
     np.testing.assert_allclose(finite_elements(beam, left, right, 6), exact, rtol=2e-5)
     reduced = sb.ReducedModel.from_beam(beam, modes=64).natural_frequencies[:6]
     assert (reduced >= exact * (1.0 - 1e-9)).all()
     np.testing.assert_allclose(reduced, exact, rtol=2e-4)
     np.testing.assert_allclose(
-        sb.exact_natural_frequencies(beam_with(1e9, 1e9), 6), sb.exact_natural_frequencies(BEAM, 6), rtol=1e-8
+        sb.model.exact_natural_frequencies(beam_with(1e9, 1e9), 6),
+        sb.model.exact_natural_frequencies(BEAM, 6),
+        rtol=1e-8,
     )
 
 
@@ -196,7 +197,7 @@ def test_supports_that_give_way() -> None:
     stiff = sb.ReducedModel.from_beam(BEAM, modes=8)
     assert model.natural_frequencies[0] < stiff.natural_frequencies[0]
     np.testing.assert_allclose(
-        sb.exact_natural_frequencies(soft, 4)[:2], model.natural_frequencies[:2], rtol=1e-2
+        sb.model.exact_natural_frequencies(soft, 4)[:2], model.natural_frequencies[:2], rtol=1e-2
     )
     nearly = BEAM.replace(boundary=sb.BoundaryConditions(axial_support_stiffness=1e12 * rigid))
     np.testing.assert_allclose(
@@ -207,15 +208,19 @@ def test_supports_that_give_way() -> None:
 def test_quasi_static_threshold_follows_the_first_mode() -> None:
     pinned = beam_with(0.0, 0.0)
     x = np.array([0.2, 0.5, 0.8])
-    np.testing.assert_allclose(sb.quasi_static_threshold(x, 2.0, pinned), 2.0 * np.sin(np.pi * x), rtol=1e-13)
-    np.testing.assert_array_equal(sb.quasi_static_threshold(x, 2.0, BEAM), sb.quasi_static_threshold(x, 2.0))
+    np.testing.assert_allclose(
+        sb.model.quasi_static_threshold(x, 2.0, pinned), 2.0 * np.sin(np.pi * x), rtol=1e-13
+    )
+    np.testing.assert_array_equal(
+        sb.model.quasi_static_threshold(x, 2.0, BEAM), sb.model.quasi_static_threshold(x, 2.0)
+    )
 
 
 def test_slow_striker_snaps_a_pinned_beam_at_the_closed_form() -> None:
     """One mode, Omega = 0.02: the run's threshold is Eq. (21) with the pinned mode, as it is between clamps."""
     model = sb.ReducedModel.from_beam(beam_with(0.0, 0.0), modes=1, damping_ratio=0.05)
     location = 0.3
-    level = float(sb.quasi_static_threshold(location, 0.02, model.beam))
+    level = float(sb.model.quasi_static_threshold(location, 0.02, model.beam))
 
     def crosses(share: float) -> bool:
         drive = sb.Sine(frequency_ratio=0.02, velocity_amplitude=share * level)

@@ -1,1 +1,1 @@
-"""Natural frequencies and damping from free decays."""
+"""decay"""

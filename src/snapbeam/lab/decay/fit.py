@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
-from snapbeam.core.validate import InputError
-from snapbeam.lab.decay.laws import DampingLaw, envelope
-from snapbeam.lab.decay.model import ModeEstimate, law_priors
-from snapbeam.lab.signals.signal import SignalSamples
-from snapbeam.lab.signals.sine_fit import white_variance
+from snapbeam.lab.decay.model import DampingLaw, ModeEstimate, envelope, law_priors
+from snapbeam.lab.signals import SignalSamples
+from snapbeam.lab.sine_fit import white_variance
+from snapbeam.util.validation import InputError
 
 __all__ = ["FitResult", "explain", "fit_decay"]
+
 
 _SLOW = 4  # degree of the polynomial that is fitted beside the modes
 

@@ -13,24 +13,28 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import InputError, choice, integer, positive
-from snapbeam.lab.decay.centres import find_centres, unexplained
-from snapbeam.lab.decay.cycles import Cycles, backbone, noise_level, regress
 from snapbeam.lab.decay.fit import FitResult, explain
-from snapbeam.lab.decay.judge import findings_about, judged, misfit_of, sampled_findings, widened
-from snapbeam.lab.decay.model import DecayFit, ModeEstimate
-from snapbeam.lab.decay.noise_fall import noise_fall, undone
+from snapbeam.lab.decay.joint_fit import fit_modes, mode_by_cycles
+from snapbeam.lab.decay.model import Cycles, DecayFit, ModeEstimate, backbone, noise_level, regress
 from snapbeam.lab.decay.poles import without_poles
-from snapbeam.lab.decay.together import fit_modes, mode_by_cycles
-from snapbeam.lab.decay.window import prepared
-from snapbeam.lab.plausibility.decay import KINDS
-from snapbeam.lab.signals.signal import SignalSamples, check_signal
-from snapbeam.lab.signals.sine_fit import white_variance
+from snapbeam.lab.decay.residual_diagnostics import (
+    findings_about,
+    judged,
+    misfit_of,
+    sampled_findings,
+    widened,
+)
+from snapbeam.lab.decay.window import find_centres, noise_fall, prepared, undone, unexplained
+from snapbeam.lab.diagnostics import KINDS_DECAY
+from snapbeam.lab.signals import SignalSamples, check_signal
+from snapbeam.lab.sine_fit import white_variance
+from snapbeam.util.validation import InputError, choice, integer, positive
 
 if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["METHODS", "identify_decay"]
+
 
 _Array = NDArray[np.float64]
 METHODS = ("fit", "hilbert", "log_decrement")
@@ -129,7 +133,7 @@ def identify_decay(
     if falls is not None:
         added = 100.0 * falls.rate / (2.0 * math.pi * wanted[0].natural_frequencies)
         doubts.append(
-            KINDS["window"].found(factor=falls.factor, constant=1.0 / falls.rate, added_percent=added)
+            KINDS_DECAY["window"].found(factor=falls.factor, constant=1.0 / falls.rate, added_percent=added)
         )
     wanted = widened(wanted, decay.drift, falls.rate if falls is not None else 0.0)
     free = [mode.natural_frequencies for mode in wanted]

@@ -4,20 +4,245 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import median_filter, uniform_filter1d
 
-from snapbeam.core.findings import Diagnostic
-from snapbeam.core.validate import InputError, finite
-from snapbeam.lab.decay.cycles import hilbert_cycles, noise_level, regress
-from snapbeam.lab.decay.drift import Line, find_drift, find_lines, without_lines
-from snapbeam.lab.decay.release import find_ceiling, find_jump, find_release
-from snapbeam.lab.decay.wandering import frequency_drift, steadied
-from snapbeam.lab.plausibility.decay import KINDS
-from snapbeam.lab.signals.signal import SignalSamples
+from snapbeam.lab.decay.model import Cycles, hilbert_cycles, noise_level, regress
+from snapbeam.lab.decay.poles import (
+    Line,
+    Pole,
+    Stabilisation,
+    find_drift,
+    find_lines,
+    find_poles,
+    without_lines,
+)
+from snapbeam.lab.diagnostics import KINDS_DECAY
+from snapbeam.lab.signals import SignalSamples
+from snapbeam.lab.sine_fit import stuck_runs
+from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.validation import InputError, finite
 
-__all__ = ["Decay", "dominant", "prepared"]
+__all__ = [
+    "CLOSE",
+    "ENERGY",
+    "Ceiling",
+    "Centres",
+    "Decay",
+    "Jump",
+    "NoiseFall",
+    "dominant",
+    "find_ceiling",
+    "find_centres",
+    "find_jump",
+    "find_release",
+    "frequency_drift",
+    "noise_fall",
+    "prepared",
+    "steadied",
+    "undone",
+    "unexplained",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Which part of a record is a free decay: from the release on, below the ceiling, until something disturbs it.
+
+
+_RISE = 0.3  # share of the greatest swing below which nothing is released yet
+_PLATEAU = 0.012  # share by which maxima under a ceiling may fall
+
+
+class Ceiling(NamedTuple):
+    """Tops cut off up to the sample *until*."""
+
+    until: int
+
+
+class Jump(NamedTuple):
+    """A cycle at which a decay jumps: its time [s], and by what share of the amplitude."""
+
+    time: float
+    share: float
+
+
+def find_release(samples: SignalSamples, frequency: float) -> int:
+    """First sample of the free decay: where its swing, seen over a period, is the greatest.
+
+    0 where the record begins with it.  The swing is that of the rate of change, so that the deflection before
+    a release, a constant, is none.
+    """
+    width = max(3, round(samples.sampling_frequency / frequency))
+    if samples.values.size < 6 * width:
+        return 0
+    smooth = uniform_filter1d(samples.values, max(1, width // 8))
+    rate = np.diff(smooth)
+    # a release is a jump too, and must not outweigh the swing behind it
+    loud = np.sort(np.abs(rate))[-max(rate.size // 4, 1) :]
+    rate = np.clip(rate, -2.0 * float(np.median(loud)), 2.0 * float(np.median(loud)))
+    total = np.concatenate([[0.0], np.cumsum(rate**2)])
+    swing = np.sqrt((total[width:] - total[:-width]) / width)  # over a period from each sample on
+    top = int(np.argmax(swing))
+    if top < width // 2 or float(swing[: max(width // 4, 1)].max()) > 0.5 * swing[top]:
+        return 0
+    low = np.flatnonzero(swing[:top] < _RISE * swing[top])
+    if not low.size:
+        return 0
+    rising = np.flatnonzero(swing[low[-1] : top + 1] >= 0.9 * swing[top])
+    begin = int(low[-1] + rising[0])
+    # the window may reach over the release: begin where the swing of the next eighth of a period is there too
+    short = max(width // 4, 3)
+    local = np.sqrt(uniform_filter1d(rate**2, short))
+    inside = np.flatnonzero(local[begin : begin + width] > 0.35 * swing[top])
+    return begin + (int(inside[0]) if inside.size else 0) + short
+
+
+def find_ceiling(samples: SignalSamples, frequency: float) -> Ceiling | None:
+    """Whether the first cycles of a decay are cut off, and until where.
+
+    Either the record hits its greatest or least value in runs of equal samples, or the maxima of at least four
+    cycles stay level, and flat, where the later ones fall.
+    """
+    values = samples.values
+    width = max(4, round(samples.sampling_frequency / frequency))
+    until = 0
+    for extreme in (values.max(), values.min()):
+        runs = [run for run in stuck_runs(values, 3) if values[run.first] == extreme]
+        if len(runs) >= 2 and np.ptp(values) > 0.0:
+            until = max(until, runs[-1].last)
+    if until:
+        return Ceiling(min(until + width // 4, values.size))
+    for sign in (1.0, -1.0):
+        until = max(until, _plateau(sign * (values - np.median(values)), width))
+    return Ceiling(min(until + width // 4, values.size)) if until else None
+
+
+def _plateau(values: _Array, width: int) -> int:
+    """End of the cycles whose tops are level and flat; 0 if they are not."""
+    count = values.size // width
+    if count < 8:
+        return 0
+    cycles = values[: count * width].reshape(count, width)
+    ordered = np.sort(cycles, axis=1)
+    tops = ordered[:, -max(width // 12, 1) :].mean(1)  # the mean of the uppermost twelfth
+    flat = (cycles > tops[:, None] - 0.04 * tops[0]).mean(1)
+    level = np.abs(tops / tops[0] - 1.0) < _PLATEAU
+    last = int(np.argmin(level)) if not level.all() else count
+    if last < 4 or last > count - 2:
+        return 0
+    later = tops[last : last + 6]
+    falls = later.size >= 2 and later[-1] < tops[0] * (1.0 - 2.0 * _PLATEAU)
+    wide = float(np.median(flat[:last])) > 0.16  # 0.12 of a sine's cycle, smeared by the mean
+    return last * width if falls and wide else 0
+
+
+def find_jump(cycles: Cycles) -> Jump | None:
+    """The cycle at which amplitude or phase of a mode jumps; None if neither does.
+
+    Straight lines through the logarithm of the amplitude and through the phase of six cycles on either side
+    must differ there by more than eight standard errors and by more than eight percent (or 0.08 rad), and more
+    than anywhere else; slow changes, as of two modes that beat, bend both sides alike.
+    """
+    n, span = cycles.time.size, 6
+    if n < 2 * span + 2:
+        return None
+    log_a = np.log(cycles.amplitude)
+    # cycles begin at whole samples, so they are not quite evenly spaced: their phase is told against time
+    phase = cycles.phase - np.polyval(np.polyfit(cycles.time, cycles.phase, 1), cycles.time)
+    x = np.arange(span, dtype=np.float64)
+    steps = np.zeros((2, n))
+    errors = np.full(n, math.inf)
+    for k in range(span, n - span - 1):
+        for row, series in enumerate((log_a, phase)):
+            left = np.polyfit(x - span, series[k - span : k], 1)
+            right = (
+                np.polyfit(x + 2.0, series[k + 2 : k + 2 + span][: x.size], 1) if k + 2 + span <= n else None
+            )
+            if right is None:
+                continue
+            steps[row, k] = np.polyval(right, 0.5) - np.polyval(left, 0.5)
+        relative = cycles.noise / float(np.min(cycles.amplitude[k - span : k + span]))
+        errors[k] = relative * math.sqrt(2.0 * (1.0 / span + 12.0 * (0.5 * span + 1.0) ** 2 / span**3))
+    size = np.hypot(steps[0], steps[1])
+    # what a smooth curve does to the same lines
+    usual = 1.4826 * float(np.median(size[size > 0.0])) if (size > 0.0).any() else 0.0
+    at = int(np.argmax(size))
+    if size[at] < max(8.0 * errors[at], 0.08, 6.0 * usual):
+        return None
+    return Jump(float(cycles.time[at]), float(size[at]))
+
+
+# ----------------------------------------------------------------------------------------------------
+# A natural frequency that changes with time, as with temperature, told from one that changes with amplitude.
+
+
+_CERTAIN = 7.0  # standard errors
+_EXPLAINED = 2.0  # times the noise that a drift may leave
+_MATTERS = 1e-4  # of the frequency, over the record
+_SECOND = 2.0  # times the square of the softening that its next order may be, to a standard deviation
+
+
+def frequency_drift(cycles: Cycles, frequency: float) -> float:
+    """By what share a frequency changes over a decay with time alone; 0 if by no more than its error.
+
+    The phase of the cycles is a line, the integrals of a^2 and a^4 (softening, a the amplitude of the cycles as it is;
+    the second is held to the size that goes with the first) and, where the frequency drifts at a steady rate, t^2: a
+    drift goes on where little amplitude is left.
+
+    Parameters
+    ----------
+    cycles
+        The first mode, cycle by cycle.
+    frequency
+        Of the mode [Hz].
+    """
+    t = cycles.time - cycles.time[0]
+    if t.size < 24:
+        return 0.0
+    square = (cycles.amplitude / cycles.amplitude.max()) ** 2
+    x = t / t[-1]
+    first, second = (cumulative_trapezoid(square**power, x, initial=0.0) for power in (1, 2))
+    weight = cycles.amplitude / max(cycles.noise, 1e-9 * float(cycles.amplitude.max()))
+    turns = 2.0 * math.pi * frequency * float(t[-1])
+    basis = np.column_stack([np.ones_like(x), x, first, second, x * x]) * weight[:, None]
+    scale = np.linalg.norm(basis, axis=0)
+    softens = 0.0
+    for _ in range(2):  # q s^2, q of some 0.7, is known only after s is
+        held = np.zeros(5)
+        held[3] = 1.0 / max(_SECOND * softens**2 * turns, 1e-6)
+        rows = np.vstack([basis, np.diag(held)[3:4]]) / scale
+        aims = np.append(cycles.phase * weight, 0.0)
+        found = np.linalg.lstsq(rows, aims, rcond=1e-12)[0] / scale
+        softens = float(found[2]) / turns
+    left = (cycles.phase - np.column_stack([np.ones_like(x), x, first, second, x * x]) @ found) * weight
+    inverse = np.linalg.pinv(rows.T @ rows, rcond=1e-12)
+    unit = math.sqrt(float(left @ left) / max(t.size - 5, 1))
+    if unit > _EXPLAINED:  # two modes that beat, a jump: no drift is all that is the matter
+        return 0.0
+    error = max(unit, 1.0) * math.sqrt(float(inverse[-1, -1])) / float(scale[-1])
+    share = 2.0 * float(found[-1]) / turns
+    return share if abs(found[-1]) > _CERTAIN * error and abs(share) > _MATTERS else 0.0
+
+
+def steadied(samples: SignalSamples, share: float) -> SignalSamples:
+    """A record whose frequency drifts by *share* from its first sample to its last, on a clock that drifts alike.
+
+    The clock runs as t + share t^2/(2 T), T the length; the frequency is that of the first sample then.
+    """
+    t = samples.time - samples.time[0]
+    clock = t + 0.5 * share * t * t / t[-1]
+    even = np.arange(int(clock[-1] * samples.sampling_frequency + 1e-9) + 1) / samples.sampling_frequency
+    values = CubicSpline(clock, samples.values)(even)
+    return SignalSamples(values, samples.time[0] + even, samples.sampling_frequency)
+
+
+# ----------------------------------------------------------------------------------------------------
+
 
 _Array = NDArray[np.float64]
 _LEAST_CYCLES = 8.0
@@ -88,7 +313,7 @@ def prepared(samples: SignalSamples, start: float | None, stop: float | None) ->
         first = find_release(part, frequency)
         if first:
             part = _sliced(part, first, None)
-            diagnostics.append(KINDS["release"].found(start=float(part.time[0])))
+            diagnostics.append(KINDS_DECAY["release"].found(start=float(part.time[0])))
             frequency = dominant(part)
     _enough(part, frequency)
     part, told = _below_ceiling(part, frequency)
@@ -99,7 +324,9 @@ def prepared(samples: SignalSamples, start: float | None, stop: float | None) ->
     largest = max(float(np.percentile(np.abs(clean.values - np.median(clean.values)), 99)), 1e-300)
     for line in lines:
         diagnostics.append(
-            KINDS["hum"].found(frequency=line.frequency, amplitude_percent=100.0 * line.amplitude / largest)
+            KINDS_DECAY["hum"].found(
+                frequency=line.frequency, amplitude_percent=100.0 * line.amplitude / largest
+            )
         )
     frequency = dominant(clean)
     rate = _decay_rate(clean, frequency)
@@ -107,13 +334,13 @@ def prepared(samples: SignalSamples, start: float | None, stop: float | None) ->
     if degree:
         clean = SignalSamples(clean.values - drift, clean.time, clean.sampling_frequency)
         diagnostics.append(
-            KINDS["drift"].found(drift_percent=100.0 * float(np.ptp(drift)) / largest, degree=degree)
+            KINDS_DECAY["drift"].found(drift_percent=100.0 * float(np.ptp(drift)) / largest, degree=degree)
         )
         frequency = dominant(clean)
     clean, told = _undisturbed(clean, frequency)
     clean, share = _steady(clean, frequency)
     if share:
-        told.append(KINDS["frequency_drift"].found(share_percent=100.0 * share))
+        told.append(KINDS_DECAY["frequency_drift"].found(share_percent=100.0 * share))
     return Decay(clean, tuple(lines), (*diagnostics, *told), share)
 
 
@@ -146,9 +373,9 @@ def _below_ceiling(samples: SignalSamples, frequency: float) -> tuple[SignalSamp
         return samples, []
     left = frequency * (samples.values.size - ceiling.until) / samples.sampling_frequency
     if left < 1.5 * _LEAST_CYCLES:
-        return samples, [KINDS["clipped_throughout"].found()]
+        return samples, [KINDS_DECAY["clipped_throughout"].found()]
     rest = _sliced(samples, ceiling.until, None)
-    return rest, [KINDS["clipped"].found(until=float(rest.time[0]))]
+    return rest, [KINDS_DECAY["clipped"].found(until=float(rest.time[0]))]
 
 
 def _decay_rate(samples: SignalSamples, frequency: float) -> float:
@@ -189,9 +416,178 @@ def _undisturbed(samples: SignalSamples, frequency: float) -> tuple[SignalSample
     least = 1.5 * _LEAST_CYCLES * samples.sampling_frequency / frequency
     if max(before, after) < least:
         return samples, [
-            KINDS["disturbed"].found(told="about", at=jump.time, jump_percent=100.0 * jump.share)
+            KINDS_DECAY["disturbed"].found(told="about", at=jump.time, jump_percent=100.0 * jump.share)
         ]
     early = before >= least and before >= 0.4 * after
     kept = _sliced(samples, 0, before) if early else _sliced(samples, at + margin, None)
     side = "before" if early else "after"
-    return kept, [KINDS["disturbed"].found(told=side, at=jump.time, jump_percent=100.0 * jump.share)]
+    return kept, [KINDS_DECAY["disturbed"].found(told=side, at=jump.time, jump_percent=100.0 * jump.share)]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Which modes of a decay are to be identified, and which others are in it.
+
+
+ENERGY = 40.0  # of a pole over the noise, from which it is a mode
+CLOSE = 0.25  # share within which modes are fitted together
+_ASKED = 0.1  # share by which a mode may be off the frequency asked for
+
+
+class Centres(NamedTuple):
+    """Modes to identify: frequencies [Hz]; the poles they are, and those near and far that are not asked for.
+
+    Poles are empty where one mode was asked for and none had to be sought.
+    """
+
+    wanted: list[float]
+    own: list[Pole]
+    near: list[Pole]
+    far: list[Pole]
+    diagram: Stabilisation | None
+    told: list[Diagnostic]
+
+
+def find_centres(decay: Decay, count: int, asked: list[float] | None) -> Centres:
+    """The modes wanted, and the others that the record holds."""
+    samples = decay.samples
+    span = samples.values.size / samples.sampling_frequency
+    sigma = noise_level(samples)
+    if asked is None and count == 1:
+        center = dominant(samples)
+        if center * span < 8.0:
+            raise InputError(
+                f"signal spans {center * span:.1f} cycles of {center:g} Hz: must span at least 8"
+            )
+        _stands_out(samples, center, sigma)
+        return Centres([center], [], [], [], None, [])
+    poles, diagram = find_poles(samples, sigma)
+    modes = [pole for pole in poles if _is_mode(pole, span)]
+    told: list[Diagnostic] = []
+    wanted: list[float] = []
+    own: list[Pole] = []
+    if asked is None:
+        if len(modes) < count:
+            names = ", ".join(f"{pole.frequency:.4g} Hz" for pole in modes) or "none"
+            raise InputError(f"signal: no further mode stands out of the noise (found: {names})")
+        own = modes[:count]
+        wanted = [pole.frequency for pole in own]
+    for frequency in asked or ():
+        near = [pole for pole in modes if abs(pole.frequency / frequency - 1.0) < _ASKED]
+        if near:
+            own.append(max(near, key=lambda pole: pole.energy))
+            wanted.append(own[-1].frequency)
+            continue
+        hum = [line for line in decay.lines if abs(line.frequency / frequency - 1.0) < 2.5 * _ASKED]
+        if hum:
+            raise InputError(
+                "signal: "
+                + KINDS_DECAY["hum_asked"].found(asked=frequency, frequency=hum[0].frequency).message
+            )
+        center = dominant(samples, 0.8 * frequency, 1.2 * frequency)
+        _stands_out(samples, center, sigma)
+        wanted.append(center)
+        told.append(KINDS_DECAY["off_asked"].found(asked=frequency, found=center))
+    others = [pole for pole in modes if pole not in own]
+    close = [pole for pole in others if any(abs(pole.frequency / f - 1.0) < CLOSE for f in wanted)]
+    near = [pole for pole in close if pole.energy > 0.003 * max(one.energy for one in own or close)]
+    far = [pole for pole in others if pole not in close]
+    return Centres(wanted, own, near, far, diagram, told)
+
+
+def unexplained(residual: NDArray[np.float64], sampling_frequency: float) -> bool:
+    """Whether what a fit leaves still holds an oscillation that noise would not make."""
+    n = residual.size
+    window = np.cos(0.5 * math.pi * np.arange(n) / n) ** 2
+    power = np.abs(np.fft.rfft(residual * window)) ** 2
+    freq = np.fft.rfftfreq(n, 1.0 / sampling_frequency)
+    power[freq * n < 6.0 * sampling_frequency] = 0.0
+    # noise may be of any colour: each line against its surroundings
+    width = max(min(power.size // 8, 101), 9) | 1
+    around = median_filter(power, width, mode="nearest") / math.log(2.0)
+    return bool((power > 25.0 * np.maximum(around, 1e-300)).any())
+
+
+def _is_mode(pole: Pole, span: float) -> bool:
+    """Whether a pole is a mode: above the noise, decaying, and seen for eight cycles."""
+    return pole.energy > ENERGY and pole.damping_ratio > -1e-3 and pole.frequency * span >= 8.0
+
+
+def _stands_out(samples: SignalSamples, frequency: float, sigma: float) -> None:
+    """Refuse a peak of the spectrum that noise alone could make."""
+    n = samples.values.size
+    span = n / samples.sampling_frequency
+    window = np.cos(0.5 * math.pi * np.arange(n) / n) ** 2
+    values = samples.values - float((samples.values * window).sum() / window.sum())
+    spectrum = np.abs(np.fft.rfft(values * window, 4 * n)) ** 2
+    freq = np.fft.rfftfreq(4 * n, 1.0 / samples.sampling_frequency)
+    floor = sigma**2 * float(np.sum(window**2))
+    if spectrum[np.abs(freq - frequency) <= 1.0 / span].max() < 20.0 * floor:
+        raise InputError("signal: no further mode stands out of the noise (found: none)")
+
+
+# ----------------------------------------------------------------------------------------------------
+# Noise that falls with the decay: what an exponential window leaves behind.
+#
+# Analysers multiply records of hammer tests by exp(-t/T) to make them end in nothing.  What is left is the free decay
+# of a mode that is damped more, by 1/(T omega_0): no number of the decay itself tells.  But the noise of the sensor,
+# which does not decay, was multiplied too.
+
+
+_PARTS = 8
+_LEAST = 64  # lines of the spectrum of a part
+_QUANTILE = 0.25  # of these lines that hold noise alone, however many modes there are
+_CERTAIN_NOISE_FALL = 5.0  # standard errors
+_FALL = 0.2  # of the logarithm of the noise over the record
+
+
+class NoiseFall(NamedTuple):
+    """The noise falls as exp(-``rate`` t) [1/s], by a ``factor`` over the record."""
+
+    rate: float
+    factor: float
+
+
+def noise_fall(rest: SignalSamples, frequency: float) -> NoiseFall | None:
+    """At which rate the noise of a record falls; None if it does not, or not as an exponential does.
+
+    The level of the noise in each eighth of the record is that of the lower quartile of its spectrum, which modes
+    left in it do not reach; a straight line must describe its logarithm, and fall by more than five standard errors.
+
+    Parameters
+    ----------
+    rest
+        What a fit leaves of a decay.
+    frequency
+        Of the first mode [Hz]; noise is sought above one and a half times it.
+    """
+    size = rest.values.size // _PARTS
+    freq = np.fft.rfftfreq(size, 1.0 / rest.sampling_frequency)
+    inside = freq > 1.5 * frequency
+    count = int(np.count_nonzero(inside))
+    if count < _LEAST:
+        return None
+    parts = rest.values[: size * _PARTS].reshape(_PARTS, size)
+    power = np.abs(np.fft.rfft(parts * np.hanning(size), axis=1))[:, inside] ** 2
+    level = np.quantile(power, _QUANTILE, axis=1)
+    floor = (1e-9 * float(np.abs(rest.values).max())) ** 2
+    if not level.min() > floor * size:
+        return None
+    y = 0.5 * np.log(level)
+    t = (np.arange(_PARTS) + 0.5) * size / rest.sampling_frequency
+    # a quantile q of the exponential distribution that a periodogram has, with lines that share a window of Hann
+    spread = -math.sqrt(_QUANTILE / (1.0 - _QUANTILE)) / math.log(1.0 - _QUANTILE)
+    error = 0.5 * spread * math.sqrt(1.5 / count)
+    slope, base = np.polyfit(t, y, 1)
+    off = float(np.sqrt(np.mean((y - base - slope * t) ** 2)))
+    fall = -float(slope) * rest.values.size / rest.sampling_frequency
+    certain = -float(slope) > _CERTAIN_NOISE_FALL * max(error, off) / math.sqrt(
+        float(((t - t.mean()) ** 2).sum())
+    )
+    straight = off < max(2.5 * error, 0.08 * fall)
+    return NoiseFall(-float(slope), math.exp(fall)) if certain and straight and fall > _FALL else None
+
+
+def undone(samples: SignalSamples, constant: float) -> SignalSamples:
+    """A record before it was multiplied by an exponential window of *constant* [s] from its first sample on."""
+    values: NDArray[np.float64] = samples.values * np.exp((samples.time - samples.time[0]) / constant)
+    return SignalSamples(values, samples.time, samples.sampling_frequency)

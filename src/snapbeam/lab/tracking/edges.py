@@ -29,6 +29,7 @@ __all__ = [
     "width_calibration",
 ]
 
+
 Floats = NDArray[np.floating]
 MIN_WIDTH = 0.05
 _ROOT_2PI = math.sqrt(2.0 * math.pi)

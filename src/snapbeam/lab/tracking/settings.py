@@ -6,12 +6,14 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntFlag
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.validate import (
+from snapbeam.lab.tracking.edges import Floats
+from snapbeam.util.validation import (
     InputError,
     InputTypeError,
     choice,
@@ -23,9 +25,83 @@ from snapbeam.core.validate import (
     shown,
     within,
 )
-from snapbeam.lab.tracking.geometry import SIDES, Orientation
 
-__all__ = ["TrackingSettings"]
+__all__ = [
+    "HALF",
+    "HOT",
+    "SIDES",
+    "BeamView",
+    "EdgeShape",
+    "Fields",
+    "FrameFlag",
+    "NoiseShape",
+    "Orientation",
+    "Scene",
+    "ShakerView",
+    "Sticker",
+    "TipOutline",
+    "TrackingSettings",
+    "gather",
+    "spread_columns",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Rows and columns: the turn that brings the shaker below the beam, and windows of pixels about an edge.
+#
+# All tracking is done in one orientation: the beam crosses the picture from left to right, the shaker stands
+# below it and rows count downwards.
+
+
+SIDES = ("below", "above", "left", "right")
+HALF = 6  # half height of the fit windows, pixels
+HOT = 0.25  # share of saturated pixels, beyond the usual, from which an edge is not trusted
+
+
+@dataclass(frozen=True)
+class Orientation:
+    """The side of the beam on which the shaker stands, and the turn that brings it below."""
+
+    side: str
+    shape: tuple[int, int]
+
+    @property
+    def sign(self) -> float:
+        """+1 where the shaker pushes in the positive direction (up or right), -1 where against it."""
+        return 1.0 if self.side in ("below", "left") else -1.0
+
+    def turn(self, frames: NDArray) -> NDArray:
+        """Frames (n, height, width) with the shaker below."""
+        if self.side in ("left", "right"):
+            frames = frames.transpose(0, 2, 1)
+        return frames[:, ::-1] if self.side in ("above", "left") else frames
+
+    def back(self, rows: Floats, columns: Floats) -> tuple[Floats, Floats]:
+        """(rows, columns) of the picture as recorded, from those of the turned one."""
+        if self.side == "below":
+            return rows, columns
+        if self.side == "above":
+            return self.shape[0] - 1.0 - rows, columns
+        return columns, (self.shape[1] - 1.0 - rows if self.side == "left" else rows)
+
+
+def gather(
+    frames: NDArray[np.floating], rows: NDArray, columns: NDArray[np.intp], half: int
+) -> tuple[Floats, NDArray[np.bool_]]:
+    """Windows of 2 half + 1 rows about *rows* (n, columns), and which of them lie inside the frame."""
+    centre = np.where(np.isfinite(rows), np.rint(rows), -1e6).astype(np.int64)
+    inside = (centre >= half) & (centre < frames.shape[1] - half)
+    index = np.clip(centre, half, frames.shape[1] - 1 - half)[..., None] + np.arange(-half, half + 1)
+    picked = frames[np.arange(frames.shape[0])[:, None, None], index, columns[None, :, None]]
+    return picked.astype(np.float64), inside
+
+
+def spread_columns(low: int, high: int, count: int) -> NDArray[np.intp]:
+    """Up to *count* different columns from *low* to *high*, both included, evenly spread."""
+    return np.unique(np.rint(np.linspace(low, high, min(count, max(high - low + 1, 1)))).astype(np.intp))
+
+
+# ----------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -191,3 +267,266 @@ def _mark(number: int, value: Any) -> tuple[int, ...]:
             f"fixed_marks[{number}] = {value!r}: must be (first row, last row + 1, first column, last column + 1)"
         )
     return tuple(integer(f"fixed_marks[{number}][{i}]", one, 0) for i, one in enumerate(value))
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a recording shows, in turned pixels: the beam, the shaker, its sticker and its tip.
+#
+# A scene is built whole by the survey and never changes.
+
+
+_OUTLINE = 3.0  # widths of the edge, of its misfit, by which a tip in the beam's light may lie off
+_UNEVEN = 0.02  # px
+_MADE_UP = 0.15  # px; rows made between two of one field have a correlation of 2/3
+
+
+@dataclass(frozen=True)
+class BeamView:
+    """The beam and the light on it.
+
+    Attributes
+    ----------
+    threshold, bright
+        Grey level that parts objects from the background, and which side of it objects are on.
+    contrast, noise
+        Step of grey levels at the beam's edge, and standard deviation of a pixel.
+    saturated, hot_share
+        Grey level at which pixels are saturated (infinite if none is), and the usual share of such pixels
+        about the edges.
+    edge_width, width_table
+        Blur of the edges [px], and the table that turns fitted widths into true ones.
+    thickness, thickness_error
+        Rows from the far to the near edge, and the standard error.
+    columns, contact_column
+        Where the edge is fitted, and the column it is wanted at.
+    groups, merged
+        Columns that see the beam alone; if there are none, the columns about the contact, and ``merged`` says
+        that the shaker may grow out of the beam there.
+    fixtures
+        (first row, one past the last) of bars that cross the picture and never move.
+    """
+
+    threshold: float
+    bright: bool
+    contrast: float
+    noise: float
+    saturated: float
+    hot_share: float
+    edge_width: float
+    width_table: tuple[Floats, Floats]
+    thickness: float
+    thickness_error: float
+    columns: NDArray[np.intp]
+    contact_column: float
+    groups: tuple[NDArray[np.intp], ...]
+    merged: bool
+    fixtures: tuple[tuple[int, int], ...]
+
+    @property
+    def sign(self) -> float:
+        """+1 for objects brighter than the background, -1 for darker ones."""
+        return 1.0 if self.bright else -1.0
+
+
+@dataclass(frozen=True)
+class Sticker:
+    """A mark on the shaker: a band between two steps of opposite sign.
+
+    ``thickness`` [px]; ``sign`` and ``contrast`` of its upper step; ``template`` is its profile, in which the
+    upper edge stands at ``head``.
+    """
+
+    columns: NDArray[np.intp]
+    thickness: float
+    sign: float
+    contrast: float
+    template: Floats
+    head: int
+
+
+@dataclass(frozen=True)
+class TipOutline:
+    """Rows of the tip at ``columns``, counted from the shaker's reference, and the beam's contrast there."""
+
+    columns: NDArray[np.intp]
+    profile: Floats
+    light: Floats
+
+
+@dataclass(frozen=True)
+class ShakerView:
+    """The shaker: the ``rod`` of columns it covers, and what of it is followed.
+
+    The reference row is the middle of the sticker, or without one the tip itself; ``tip_offset`` is the row
+    of the tip at the contact counted from it and ``tip_error`` its standard error; ``tip_source`` says in
+    words where that is known from; ``isolated`` that the sticker was all that could be seen of the shaker.
+    """
+
+    rod: tuple[int, int]
+    sticker: Sticker | None
+    outline: TipOutline
+    tip_offset: float
+    tip_error: float
+    tip_source: str
+    isolated: bool
+
+    @property
+    def mark(self) -> str:
+        """What is followed: "sticker" or "tip"."""
+        return "tip" if self.sticker is None else "sticker"
+
+    @property
+    def lowest(self) -> float:
+        """Rows from the reference to the lowest pixel needed."""
+        if self.sticker is not None:
+            return self.sticker.thickness / 2.0
+        return float(self.outline.profile.max()) if self.outline.profile.size else 0.0
+
+
+@dataclass(frozen=True)
+class EdgeShape:
+    """The mean shape of the beam's edge over the sample, against what a linear camera would show.
+
+    Attributes
+    ----------
+    misfit
+        Root mean square of what the blurred step leaves of the mean edge, share of the contrast.
+    gamma, gamma_se
+        Exponent of grey level over light that makes the edge symmetric, and its standard error; NaN if the
+        sample was too small to tell.
+    shift
+        Rows by which the fitted edge lies outside the one that is symmetric in light.
+    clipped
+        Share of saturated pixels in the middle of the beam.
+    """
+
+    misfit: float
+    gamma: float
+    gamma_se: float
+    shift: float
+    clipped: float
+
+
+@dataclass(frozen=True)
+class NoiseShape:
+    """Correlation of a pixel's noise ``in_time`` with that of the next frame, ``along`` the beam with that of the next
+    pixel, and ``across`` it; 0 where it is a sensor's own, or too little to tell."""
+
+    in_time: float
+    along: float
+    across: float
+
+    @property
+    def lag(self) -> float:
+        """Frames by which what was averaged over time lags behind."""
+        return self.in_time / (1.0 - self.in_time)
+
+    @property
+    def factor(self) -> float:
+        """By how much errors are larger than neighbouring columns seem to say, as their noise is alike."""
+        return math.sqrt((1.0 + self.along) / (1.0 - self.along))
+
+    @property
+    def made_up(self) -> float:
+        """Standard error [px] of an edge in rows that were made of their neighbours, 0.1 px at two rows of one."""
+        return _MADE_UP * self.across
+
+
+@dataclass(frozen=True)
+class Fields:
+    """Odd and even rows of a picture that lie ``apart`` by a share of the step from frame to frame, and the ``shift``
+    [px] of every other frame; 0 where there is none."""
+
+    apart: float
+    shift: float
+
+    @property
+    def lag(self) -> float:
+        """Frames by which a position may be of another instant than its frame's: fields are half a frame apart."""
+        return 0.5 if self.apart > 0.0 else 0.0
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that the survey found: the beam, the shaker if one is followed, the shape of the edges and of the noise.
+
+    ``striker_in_view`` says that a shaker was seen that is not followed.
+    """
+
+    beam: BeamView
+    shaker: ShakerView | None
+    shape: EdgeShape
+    noise: NoiseShape
+    striker_in_view: bool
+
+    @property
+    def placed_error(self) -> float:
+        """Standard error [px] of where the tip stands against the beam, the same in all frames.
+
+        Never less than a fiftieth of a pixel: the tip is round and uneven.  A tip that is followed by its own
+        outline is seen against the beam through the same lens: what the blurred step leaves of an edge is left
+        there several times over.
+        """
+        if self.shaker is None:
+            return 0.0
+        lens = _UNEVEN
+        if self.shaker.sticker is None and math.isfinite(self.shape.misfit):
+            lens = max(_OUTLINE * self.shape.misfit * self.beam.edge_width, _UNEVEN)
+        return math.hypot(self.shaker.tip_error, self.beam.thickness_error, lens)
+
+
+# ----------------------------------------------------------------------------------------------------
+# What can be wrong with a frame, as codes with advice.
+
+
+class FrameFlag(IntFlag):
+    """Reasons why a frame gave no measurement, or one to be careful with; several may hold at once.
+
+    A position that could not be measured is NaN and its frame carries the reason.  ``BLUR`` alone leaves the
+    position in place: it is the mean over a long exposure.
+    """
+
+    OK = 0
+    GAP = 1
+    BLUR = 2
+    DROPPED = 4
+    GLARE = 8
+    MERGED = 16
+    LOW_CONTRAST = 32
+    OUT_OF_REGION = 64
+    JUMP = 128
+    DISTORTED = 256
+
+    @property
+    def advice(self) -> str:
+        """What happened and what to do about it, for each reason in turn."""
+        return "; ".join(text for flag, text in _ADVICE.items() if flag in self) or "measured"
+
+
+_ADVICE = {
+    FrameFlag.GAP: (
+        "an edge was not found; look at the frame (--picture, --frame), narrow region (--region) or set "
+        "threshold (--threshold)"
+    ),
+    FrameFlag.BLUR: (
+        "the edges are much wider than usual; shorten the exposure or refocus (blur_limit, --blur-limit, "
+        "moves the limit)"
+    ),
+    FrameFlag.DROPPED: "the camera lost the frame: it is absent, blank or a repeat of the one before",
+    FrameFlag.GLARE: (
+        "light saturates the edge; turn the lamp or choose other columns (contact_column, --contact-column)"
+    ),
+    FrameFlag.MERGED: "beam and shaker touch and the shaker shows no edge of its own; put a sticker on it",
+    FrameFlag.LOW_CONTRAST: (
+        "the edge is too faint; add light or set objects (--objects) and threshold (--threshold)"
+    ),
+    FrameFlag.OUT_OF_REGION: "the object left the region; make region (--region) taller",
+    FrameFlag.JUMP: (
+        "the position leaves its neighbours for a frame or few and comes back: something else was taken for "
+        "the object; look at the frame (--picture, --frame)"
+    ),
+    FrameFlag.DISTORTED: (
+        "the beam looks thicker or thinner than usual, or its edge is no step: light or another object lies "
+        "on it; look at the frame (--picture, --frame)"
+    ),
+}

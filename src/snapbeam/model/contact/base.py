@@ -7,10 +7,10 @@ import math
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from snapbeam.model.numbers import numbers_type
-from snapbeam.model.quantity import check_fields
+from snapbeam.model.quantity import check_fields, numbers_type
 
 __all__ = ["LAWS", "ContactLaw", "LawProperties", "hertzian_time"]
+
 
 LAWS: dict[str, type[ContactLaw]] = {}
 """Every law by the name it has in parameter files."""

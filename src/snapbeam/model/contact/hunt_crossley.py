@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.core.validate import positive
 from snapbeam.model.contact.base import ContactLaw, LawProperties
 from snapbeam.model.contact.hertz import HertzContact
 from snapbeam.model.contact.loss import loss_number, preset_loss, restitution_of_loss
 from snapbeam.model.quantity import RUN, quantity
+from snapbeam.util.validation import positive
 
 __all__ = ["HuntCrossley"]
 

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.core.validate import positive, within
 from snapbeam.model.contact.base import ContactLaw, LawProperties
 from snapbeam.model.quantity import RUN, quantity
+from snapbeam.util.validation import positive, within
 
 __all__ = ["KelvinVoigt"]
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from snapbeam.core.validate import choice, positive, within
+from snapbeam.util.validation import choice, positive, within
 
 __all__ = ["PRESETS", "Preset", "loss_number", "preset_loss", "restitution_of_loss"]
 

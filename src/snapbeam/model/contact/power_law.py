@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from snapbeam.core.kinds import checked
-from snapbeam.core.validate import positive, within
 from snapbeam.model.contact.base import ContactLaw, hertzian_time
 from snapbeam.model.quantity import RUN, quantity
+from snapbeam.util.validation import checked, positive, within
 
 __all__ = ["PowerLaw"]
+
 
 _MICROMETRE = 1e-6
 

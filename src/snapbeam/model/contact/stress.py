@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.core.findings import Diagnostic
-from snapbeam.core.kinds import checked
-from snapbeam.core.validate import (
+from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.validation import (
     InputError,
     InputTypeError,
+    checked,
     finite_array,
     integer,
     nonnegative,
@@ -23,6 +23,7 @@ from snapbeam.core.validate import (
 )
 
 __all__ = ["HertzStress", "bending_stress", "hertz_stress"]
+
 
 _Array = NDArray[np.float64]
 _YIELD = 1.60

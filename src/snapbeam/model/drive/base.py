@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.named import NamedTable
-from snapbeam.model.numbers import numbers_type
-from snapbeam.model.quantity import check_fields
+from snapbeam.model.quantity import check_fields, numbers_type
+from snapbeam.util.validation import NamedTable
 
-__all__ = ["DRIVES", "Drive", "Scale"]
+__all__ = ["DRIVES", "HORIZON", "Drive", "Scale", "Timed"]
+
 
 _Array = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ class Drive:
     """The drive whose kernels march it, where that is another one."""
     number_names: ClassVar[tuple[str, ...]] = ("omega",)
     parts: ClassVar[tuple[tuple[str, type[Drive]], ...]] = ()
-    """What moves, by name, of several motions that are marched as one: :mod:`snapbeam.model.drive.joined`."""
+    """What moves, by name, of several motions that are marched as one: :mod:`snapbeam.model.drive.combined`."""
     terms: ClassVar[tuple[type[Drive], ...]] = ()
     """The kinds that it is a sum of."""
     amplitudes: ClassVar[tuple[str, ...]] = ("amplitude",)
@@ -75,7 +76,7 @@ class Drive:
         check_fields(self)
 
     def __add__(self, other: Drive) -> Drive:
-        """One over the other, a :class:`~snapbeam.Sum`."""
+        """One over the other, a :class:`~snapbeam.SumDrive`."""
         from snapbeam.model.drive.sum import SumDrive
 
         return SumDrive.of(self, other)
@@ -119,3 +120,32 @@ class Drive:
     def samples(self) -> _Array:
         """What kernels look up, as one row; empty for a formula."""
         return np.empty(0)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Drives that do not repeat: their motion is a formula of the time since they began.
+
+
+HORIZON = 1 << 24
+"""Cycles in which the argument of such a drive makes its one turn: more than a run may last."""
+
+
+class Timed(Drive):
+    """A drive whose motion depends on the time since it began; its displacement begins at zero, without a jump.
+
+    Kernels get the argument omega t, where omega is so small that it never turns round; ``fastest`` bounds the angular
+    frequency of what happens, rad/s.  A subclass brings :meth:`cycle`, :meth:`shape_numbers`, :meth:`bounds`, and
+    ``motion`` and ``acceleration``.
+    """
+
+    repeats = False
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """The numbers beside ``omega``."""
+        raise NotImplementedError
+
+    def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """The rate of the argument, and what the subclass needs."""
+        return {"omega": 2.0 * math.pi / (HORIZON * self.cycle(columns, scale))} | self.shape_numbers(
+            columns, scale
+        )

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.model.drive.base import Scale
-from snapbeam.model.drive.timed import Timed
+from snapbeam.model.drive.base import Scale, Timed
 from snapbeam.model.quantity import RUN, STRUCTURE, quantity
 
 __all__ = ["Chirp"]
+
 
 _Array = NDArray[np.float64]
 

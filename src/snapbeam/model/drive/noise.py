@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError
-from snapbeam.model.drive.base import Scale
-from snapbeam.model.drive.timed import Timed
+from snapbeam.model.drive.base import Scale, Timed
 from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
+from snapbeam.util.validation import InputError
 
 __all__ = ["BandLimitedNoise"]
+
 
 _Array = NDArray[np.float64]
 LINES = 32

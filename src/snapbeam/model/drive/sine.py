@@ -14,6 +14,7 @@ from snapbeam.model.quantity import RUN, quantity
 
 __all__ = ["Sine"]
 
+
 _Array = NDArray[np.float64]
 
 

@@ -10,11 +10,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError, InputTypeError, shown
-from snapbeam.model.drive.base import DRIVES, Drive, Scale
-from snapbeam.model.drive.timed import Timed
+from snapbeam.model.drive.base import DRIVES, Drive, Scale, Timed
+from snapbeam.util.validation import InputError, InputTypeError, shown
 
 __all__ = ["MOST_TERMS", "SumDrive"]
+
 
 _Array = NDArray[np.float64]
 _SEPARATOR = "__"

@@ -11,16 +11,17 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from snapbeam.core.validate import InputError
 from snapbeam.paper.claims.finding import VERDICTS, ClaimResult
 from snapbeam.paper.claims.prose import fill, read_topic
 from snapbeam.paper.claims.table import Claim, summary, write_table
 from snapbeam.paper.recipe import MissingResults
+from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["TOPICS", "VERDICTS", "Claim", "measure_claims", "measurements", "summary", "write_claims"]
+
 
 TOPICS = (
     "beam",

@@ -21,6 +21,7 @@ __all__ = [
     "near",
 ]
 
+
 VERDICTS = ("holds", "in part", "fails", "open")
 
 Number = float | int | tuple[float, ...] | tuple[tuple[float, ...], ...]

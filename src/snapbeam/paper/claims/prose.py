@@ -18,6 +18,7 @@ from snapbeam.paper.claims.finding import ClaimResult, Number, Quantity
 
 __all__ = ["Entry", "Topic", "fill", "read_topic"]
 
+
 _PLACEHOLDER = re.compile(r"<([a-z][a-z0-9_]*)(\.u)?(?::([^<>]+)|\?([^<>|]*)\|([^<>|]*))?>")
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["chaos", "chaos_of_pairs", "combined", "mean_of", "median_of", "part", "resampled", "share"]
 
+
 _LEVEL = 1.96
 """Standard deviations of a half width: 95 %."""
 _DRAWS = 400

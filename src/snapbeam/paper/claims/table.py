@@ -12,12 +12,13 @@ from dataclasses import asdict, dataclass, field
 from itertools import groupby
 from pathlib import Path
 
-from snapbeam.core.files import atomic_path, check_writable
-from snapbeam.core.provenance import made_by
-from snapbeam.core.validate import choice
 from snapbeam.paper.claims.finding import VERDICTS, Quantity
+from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.provenance import made_by
+from snapbeam.util.validation import choice
 
 __all__ = ["BEGINS", "Claim", "summary", "write_table"]
+
 
 BEGINS = {"claims.md": "**Of ", "claims.csv": "number,topic,says,paper,", "claims.json": ""}
 """The files of the table, and what the text of each begins with."""

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.patches import FancyArrowPatch, Polygon, Rectangle
 
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
-from snapbeam.model.paper_values import BEAM, LOCATION
+from snapbeam.model.default_values import BEAM, LOCATION
 from snapbeam.paper.system import paper_model, shapes_along
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, house_style, new_figure
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.figures.panels import panel_letters
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
 from snapbeam.paper.system import TOLERANCE, paper_run
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,6 +16,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["compute", "draw"]
+
 
 FREQUENCY_RATIO, VELOCITY_AMPLITUDE = 1.21, 0.10
 """An intrawell run near the one of Fig. 5; the paper does not say which it shows."""

@@ -18,13 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.core.netcdf import read_netcdf
-from snapbeam.core.validate import InputError
-from snapbeam.figures.panels import panel_letters
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.paper_values import BEAM, CYCLES, LOCATION
+from snapbeam.model.default_values import BEAM, CYCLES, LOCATION
 from snapbeam.paper.system import TOLERANCE, class_map, paper_model, paper_run
-from snapbeam.runs.schema import check_trajectory
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.simulation.dataset import check_trajectory
+from snapbeam.util.netcdf import read_netcdf
+from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["KINDS", "OPTIONS", "compute", "draw", "read_measured"]
+
 
 _Array = NDArray[np.float64]
 
@@ -137,9 +137,8 @@ def _scatter(modes: int, omega: float, drive: float, cycles: int) -> float:
 
 def _recorded(run: xr.Dataset) -> xr.Dataset:
     """What a camera would have recorded of a run, tracked."""
-    from snapbeam.lab.camera.recording import open_recording
-    from snapbeam.lab.synthetic.run import render_run
-    from snapbeam.lab.synthetic.setup import SyntheticCamera
+    from snapbeam.lab.camera import open_recording
+    from snapbeam.lab.synthetic import SyntheticCamera, render_run
     from snapbeam.lab.tracking.track import track
 
     camera = SyntheticCamera(frame_rate=_FRAME_RATE, shape=(288, 96))

@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.validate import InputError
-from snapbeam.figures.panels import panel_letters
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.paper_values import MODES
+from snapbeam.model.default_values import MODES
 from snapbeam.paper.system import TOLERANCE, paper_model, paper_run, shapes_along
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["FREQUENCY_RATIO", "VELOCITY_AMPLITUDE", "compute", "draw", "snap_times"]
+
 
 _Array = NDArray[np.float64]
 

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.figures.panels import figure_legend, panel_letters
-from snapbeam.figures.response_map import plot_response_map
-from snapbeam.figures.style import house_style, new_figure
-from snapbeam.lab.compare.dots import MeasuredPoints
-from snapbeam.model.paper_values import BEAM, CYCLES
+from snapbeam.model.default_values import BEAM, CYCLES
 from snapbeam.paper.system import class_map, legend_handles, paper_model
+from snapbeam.plot.map import plot_response_map
+from snapbeam.plot.style import figure_legend, house_style, new_figure, panel_letters
+from snapbeam.sweeps.measured_points import MeasuredPoints
 
 if TYPE_CHECKING:
     import os
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["OPTIONS", "compute", "draw", "frequency_maps", "measured_dots"]
+
 
 OPTIONS = ("dots",)
 
@@ -46,7 +46,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 
 def measured_dots(dots: str | os.PathLike[str] | None, ds: xr.Dataset) -> MeasuredPoints | None:
     """The measured responses of a CSV table, normalised as the map is."""
-    from snapbeam.lab.compare.dots import read_measured_points
+    from snapbeam.sweeps.measured_points import read_measured_points
 
     if dots is None:
         return None

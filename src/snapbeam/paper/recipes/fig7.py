@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.figures.panels import figure_legend, panel_letters
-from snapbeam.figures.response_map import plot_response_map
-from snapbeam.figures.style import house_style, new_figure
-from snapbeam.model.paper_values import LONG_CYCLES
+from snapbeam.model.default_values import LONG_CYCLES
 from snapbeam.paper.recipes.fig6 import frequency_maps, measured_dots
 from snapbeam.paper.system import legend_handles
+from snapbeam.plot.map import plot_response_map
+from snapbeam.plot.style import figure_legend, house_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import os
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["OPTIONS", "compute", "draw"]
+
 
 OPTIONS = ("dots",)
 

@@ -8,12 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.figures.panels import cell_edges, class_cells, figure_legend, panel_letters
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.lab.compare.dots import MeasuredPoints
-from snapbeam.model.paper_values import CYCLES, LOCATION
+from snapbeam.model.default_values import CYCLES, LOCATION
 from snapbeam.paper.recipes.fig6 import measured_dots
 from snapbeam.paper.system import legend_handles, paper_model, relative_map, shapes_along
+from snapbeam.plot.style import (
+    BEAM_COLOR,
+    SHAKER_COLOR,
+    cell_edges,
+    class_cells,
+    figure_legend,
+    fix_ticks,
+    house_style,
+    new_figure,
+    panel_letters,
+)
+from snapbeam.sweeps.measured_points import MeasuredPoints
 
 if TYPE_CHECKING:
     import os
@@ -26,6 +35,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["FREQUENCY_RATIOS", "OPTIONS", "compute", "draw", "draw_relative_map"]
+
 
 _Array = NDArray[np.float64]
 
@@ -65,11 +75,11 @@ def draw_relative_map(ax: Axes, ds: xr.Dataset) -> list[Artist]:
     relative = cell_edges(ds.relative_amplitude.values, 0.0)
     relative[-1] = min(relative[-1], 2.0)
     static = np.zeros_like(edges)
-    static[edges > 0.0] = sb.quasi_static_threshold(edges[edges > 0.0], ratio)
+    static[edges > 0.0] = sb.model.quasi_static_threshold(edges[edges > 0.0], ratio)
     class_cells(ax, np.broadcast_to(edges, (relative.size, edges.size)), np.outer(relative, static),
                 ds.response_class.transpose("relative_amplitude", "location").values)  # fmt: skip
     x = np.linspace(0.002, 0.5, 250)
-    curve = sb.quasi_static_threshold(x, ratio)
+    curve = sb.model.quasi_static_threshold(x, ratio)
     lines: list[tuple[float, tuple[float, ...], str]] = [(1.0, (4, 2), r"$V_\mathrm{QS1}$")]
     if ratio in _SHARES:
         lines.append((_SHARES[ratio], (4, 1.5, 1, 1.5), "0.2 or 0.05 $V_\\mathrm{QS1}$"))
@@ -132,7 +142,7 @@ def _starts(ax: Axes) -> None:
 
 
 def _lay_dots(ax: Axes, dots: MeasuredPoints | None, ratio: float) -> None:
-    from snapbeam.figures.style import CLASS_COLORS
+    from snapbeam.plot.style import CLASS_COLORS
 
     if dots is None:
         return

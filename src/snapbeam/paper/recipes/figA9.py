@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import snapbeam as sb
-from snapbeam.core.provenance import made_by
-from snapbeam.figures.style import fix_ticks, house_style, new_figure
-from snapbeam.model.paper_values import BEAM, MODES
+from snapbeam.model.default_values import BEAM, MODES
 from snapbeam.paper.system import paper_model
+from snapbeam.plot.style import fix_ticks, house_style, new_figure
+from snapbeam.util.provenance import made_by
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["compute", "draw"]
 
+
 _COUNT = 10
 
 
@@ -28,7 +29,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     import xarray as xr
 
     modes = np.arange(1, results.pick(32, 64) + 1)
-    exact = sb.exact_natural_frequencies(BEAM, _COUNT)
+    exact = sb.model.exact_natural_frequencies(BEAM, _COUNT)
     error = np.full((modes.size, _COUNT), np.nan)
     for row, count in zip(error, modes, strict=True):
         freq = paper_model(int(count)).natural_frequencies[:_COUNT]

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.figures.panels import panel_letters
-from snapbeam.figures.style import fix_ticks, house_style, new_figure
-from snapbeam.model.paper_values import CONTACT, LOCATION, LONG_CYCLES
+from snapbeam.model.default_values import CONTACT, LOCATION, LONG_CYCLES
 from snapbeam.paper.system import paper_model
+from snapbeam.plot.style import fix_ticks, house_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["LEVELS", "compute", "draw", "maxima"]
+
 
 LEVELS = (0.005, 0.02)
 """Low and moderate drive; the paper does not give its own.  Neither snaps through."""

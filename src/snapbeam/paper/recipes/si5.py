@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from snapbeam.figures.panels import figure_legend, panel_letters
-from snapbeam.figures.style import house_style, new_figure
-from snapbeam.model.paper_values import CYCLES
+from snapbeam.model.default_values import CYCLES
 from snapbeam.paper.recipes.fig8 import draw_relative_map, relative_amplitudes
 from snapbeam.paper.system import legend_handles, relative_map
+from snapbeam.plot.style import figure_legend, house_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["FREQUENCY_RATIO", "compute", "draw", "write_video"]
+
 
 FREQUENCY_RATIO = 1.625
 _SHOWN = (1, 2, 4, 8, 16, 32)
@@ -67,7 +67,7 @@ def draw(results: Results) -> Figure:
 
 def write_video(results: Results, folder: Path) -> list[Path]:
     """The animation, one second and a half a map, as MP4 and GIF."""
-    from snapbeam.figures.animation import write_frames
+    from snapbeam.plot.animation import write_frames
 
     def frames() -> Any:
         for ds in results["si5"].values():

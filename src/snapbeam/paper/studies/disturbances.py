@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.core.provenance import made_by
-from snapbeam.figures.panels import panel_letters
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.paper_values import CONTACT, CYCLES, LOCATION
+from snapbeam.model.default_values import CONTACT, CYCLES, LOCATION
 from snapbeam.paper.system import paper_model
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.util.provenance import made_by
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["EXCESS", "OFFSET", "VARIANTS", "compute", "draw"]
+
 
 _Array = NDArray[np.float64]
 

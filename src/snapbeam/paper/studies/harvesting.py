@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.core.codes import ResponseClass
-from snapbeam.figures.panels import panel_letters
-from snapbeam.figures.style import fix_ticks, house_style, new_figure
-from snapbeam.model.paper_values import BEAM, CONTACT
+from snapbeam.model.default_values import BEAM, CONTACT
+from snapbeam.plot.style import fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.util.status_codes import ResponseClass
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["PIEZO", "SPLIT", "compute", "draw", "power_above"]
+
 
 _Array = NDArray[np.float64]
 
@@ -85,7 +85,7 @@ def draw(results: Results) -> Figure:
     from cmcrameri import cm
     from matplotlib.colors import LogNorm
 
-    from snapbeam.figures import CLASS_COLORS
+    from snapbeam.plot.style import CLASS_COLORS
 
     ds = results["harvesting"]["power"]
     power, share = 1e6 * ds.power.values, 100.0 * ds.share_above.values

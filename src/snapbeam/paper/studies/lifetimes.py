@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import snapbeam as sb
-from snapbeam.figures.dynamics import plot_lifetimes, plot_survival
-from snapbeam.figures.panels import panel_letters
-from snapbeam.figures.style import house_style, new_figure
-from snapbeam.model.paper_values import CONTACT, LONG_CYCLES
+from snapbeam.model.default_values import CONTACT, LONG_CYCLES
 from snapbeam.paper.system import paper_model
+from snapbeam.plot.dynamics import plot_lifetimes, plot_survival
+from snapbeam.plot.style import house_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["ENDLESS", "LONGEST", "POINTS", "compute", "draw"]
+
 
 POINTS = {"frequency_ratio": (1.21, 1.625, 2.5, 3.5), "velocity_amplitude": (0.25, 0.3, 0.55, 0.6)}
 """Where 32 modes have many starts."""
@@ -51,33 +51,33 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 
     found = {}
     cycles = results.pick(120, LONG_CYCLES)
-    survival = sb.LifetimeSettings(settling_cycles=results.pick(20.0, 50.0))
+    survival = sb.dynamics.LifetimeSettings(settling_cycles=results.pick(20.0, 50.0))
     axes = {
         "frequency_ratio": results.pick(np.linspace(0.5, 4.0, 3), np.linspace(0.25, 4.0, 16)),
         "velocity_amplitude": results.pick(np.linspace(0.1, 0.65, 3), np.linspace(0.1, 0.64, 10)),
     }
     for modes in results.pick((1, 2), (1, 2, 4, 8, 32)):
-        found[f"modes_{modes}"] = sb.lifetime_map(
+        found[f"modes_{modes}"] = sb.dynamics.lifetime_map(
             _system(modes, *ENDLESS), axes, sb.Integration(cycles=cycles), initial_conditions=results.pick(3, 8),
             settings=survival, after=results.pick(None, (200, 500, 950)),
             progress=results.progress(f"lifetimes, N = {modes}"),
         )  # fmt: skip
     most = results.pick(2, 32)
     points = xr.Dataset({name: ("point", np.array(values)) for name, values in POINTS.items()})
-    found["points"] = sb.lifetime_map(
+    found["points"] = sb.dynamics.lifetime_map(
         _system(most, *ENDLESS), points, sb.Integration(cycles=cycles), initial_conditions=results.pick(8, 250),
         settings=survival, progress=results.progress("lifetimes at four points"),
     )  # fmt: skip
     for accuracy in ("standard", "reference"):
         long = sb.Integration(cycles=results.pick(200, 10_000), accuracy=accuracy)
-        found[f"long_{accuracy}"] = sb.lifetime_map(
+        found[f"long_{accuracy}"] = sb.dynamics.lifetime_map(
             _system(1, *ENDLESS), None, long, initial_conditions=results.pick(4, 24), settings=survival
         )
     found["exponents"] = _exponents(results, most)
     found["sensitivity"] = _sensitivity(results, most)
     for accuracy in ("standard", "reference"):
         long = sb.Integration(cycles=results.pick(120, 10_000), accuracy=accuracy)
-        found[f"long_many_{accuracy}"] = sb.lifetime_map(
+        found[f"long_many_{accuracy}"] = sb.dynamics.lifetime_map(
             _system(most, *LONGEST), None, long, initial_conditions=results.pick(2, 8), settings=survival,
             progress=results.progress(f"longest of {most} modes, {accuracy}"),
         )  # fmt: skip
@@ -87,13 +87,13 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
 def _exponents(results: Results, modes: int) -> xr.Dataset:
     """The largest exponent while it snaps, of several runs."""
     system = _system(modes, *ENDLESS)
-    starts = sb.InitialConditions(count=results.pick(2, 16))
+    starts = sb.dynamics.InitialConditions(count=results.pick(2, 16))
     states = [starts.state(system, number) for number in range(starts.count)]
     batch = sb.State(
         amplitude=np.array([state.amplitude for state in states]),
         velocity=np.array([state.velocity for state in states]),
     )
-    return sb.lyapunov_spectrum(system, 1, results.pick(20, 200), transient=0, states=batch)
+    return sb.dynamics.lyapunov_spectrum(system, 1, results.pick(20, 200), transient=0, states=batch)
 
 
 def _sensitivity(results: Results, modes: int) -> xr.Dataset:

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import snapbeam as sb
-from snapbeam.figures.style import fix_ticks, house_style, new_figure
-from snapbeam.model.paper_values import CYCLES, LOCATION
+from snapbeam.model.default_values import CYCLES, LOCATION
 from snapbeam.paper.system import class_map, paper_model
-from snapbeam.sweeps.analysis import interwell_threshold
+from snapbeam.plot.style import fix_ticks, house_style, new_figure
+from snapbeam.sweeps.threshold import interwell_threshold
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,7 +32,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     for modes in (1, results.pick(4, 32)):
         columns = []
         for ratio in ratios:
-            static = float(sb.quasi_static_threshold(LOCATION, ratio))
+            static = float(sb.model.quasi_static_threshold(LOCATION, ratio))
             # slow runs take long: those far from where the threshold can be are left out
             low, high = (0.8, 1.1) if ratio < 0.1 else (0.3, 1.1) if ratio < 0.5 else (0.0, 0.6)
             inside = relative[(relative >= low) & (relative <= high + 1e-9)]

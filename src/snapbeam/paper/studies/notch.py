@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.figures.panels import panel_letters
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.paper_values import BEAM, CONTACT, LOCATION
+from snapbeam.model.default_values import BEAM, CONTACT, LOCATION
 from snapbeam.paper.studies.sensitivity import tip_contact
-from snapbeam.sweeps.analysis import Notch
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.sweeps.threshold import Notch
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["BASE", "MEASURED", "VARIANTS", "WINDOW", "compute", "draw", "moved", "notches"]
+
 
 _Array = NDArray[np.float64]
 

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.figures.panels import panel_letters
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.paper_values import CONTACT, LOCATION
+from snapbeam.model.default_values import CONTACT, LOCATION
 from snapbeam.paper.system import paper_model
-from snapbeam.sweeps.analysis import interwell_threshold, is_interwell
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.sweeps.threshold import interwell_threshold, is_interwell
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +24,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["WINDOW", "compute", "draw", "ridge"]
+
 
 _Array = NDArray[np.float64]
 

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.figures.panels import figure_legend, panel_letters
-from snapbeam.figures.response_map import plot_response_map
-from snapbeam.figures.style import house_style, new_figure
-from snapbeam.model.paper_values import CYCLES, DAMPING_RATIO, LONG_CYCLES
+from snapbeam.model.default_values import CYCLES, DAMPING_RATIO, LONG_CYCLES
 from snapbeam.paper.system import class_map, legend_handles, paper_model
+from snapbeam.plot.map import plot_response_map
+from snapbeam.plot.style import figure_legend, house_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["VARIANTS", "buckling_mode_damping", "compute", "draw", "tip_contact"]
+
 
 _Array = NDArray[np.float64]
 

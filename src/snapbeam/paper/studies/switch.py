@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.figures.panels import panel_letters
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.paper_values import BEAM, CONTACT, LOCATION
+from snapbeam.model.default_values import BEAM, CONTACT, LOCATION
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["OMEGA", "cheapest", "compute", "draw", "fold_load"]
+
 
 _Array = NDArray[np.float64]
 

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.figures.panels import figure_legend, panel_letters
-from snapbeam.figures.response_map import plot_response_map
-from snapbeam.figures.style import house_style, new_figure
-from snapbeam.model.paper_values import LONG_CYCLES
+from snapbeam.model.default_values import LONG_CYCLES
 from snapbeam.paper.system import class_map, legend_handles, paper_model
+from snapbeam.plot.map import plot_response_map
+from snapbeam.plot.style import figure_legend, house_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -17,10 +17,9 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.figures.panels import panel_letters
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
-from snapbeam.model.paper_values import BEAM
+from snapbeam.model.default_values import BEAM
 from snapbeam.paper.system import shapes_along
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["LEVEL", "Pushed", "beam_of", "compute", "draw", "push", "second_level"]
+
 
 _Array = NDArray[np.float64]
 

@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.core.provenance import made_by
-from snapbeam.figures.panels import panel_letters
-from snapbeam.figures.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure
 from snapbeam.paper.system import paper_model, paper_run
+from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
+from snapbeam.util.provenance import made_by
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["BIN_EDGES", "compute", "draw", "passages"]
+
 
 _Array = NDArray[np.float64]
 

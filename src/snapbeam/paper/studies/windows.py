@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.figures.panels import class_cells, figure_legend, panel_letters
-from snapbeam.figures.style import fix_ticks, house_style, new_figure
-from snapbeam.model.paper_values import CONTACT, CYCLES
+from snapbeam.model.default_values import CONTACT, CYCLES
 from snapbeam.paper.system import KEPT, legend_handles, paper_model
+from snapbeam.plot.style import class_cells, figure_legend, fix_ticks, house_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["CENTRE", "END", "FREQUENCY_RATIOS", "compute", "draw", "longest_window"]
+
 
 _Array = NDArray[np.float64]
 

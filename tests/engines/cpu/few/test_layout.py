@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.core.codes import RunStatus
-from snapbeam.engines.answer import statistics_of
-from snapbeam.engines.assemble import make_ensemble
-from snapbeam.engines.cpu import driver
-from snapbeam.engines.cpu.few.memory import suits
-from snapbeam.engines.cpu.memory import pack
-from snapbeam.engines.outcomes import Statistic, register, unregister
-from snapbeam.model.paper_values import BEAM, CONTACT
+from snapbeam.model.default_values import BEAM, CONTACT
+from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.cpu import driver
+from snapbeam.solver.cpu.memory import pack
+from snapbeam.solver.cpu.run_lanes.memory import suits
+from snapbeam.solver.statistics import Statistic, register, statistics_of, unregister
+from snapbeam.util.status_codes import RunStatus
 
 
 def ensemble(modes, runs=40, cycles=12, seed=0, contact=CONTACT, drive=None, striker=None, **how):

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam.core.codes import RunStatus
-from snapbeam.engines.assemble import make_ensemble
-from snapbeam.engines.cpu import driver
-from snapbeam.model.paper_values import BEAM, CONTACT
+from snapbeam.model.default_values import BEAM, CONTACT
+from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.cpu import driver
+from snapbeam.util.status_codes import RunStatus
 
 MOST_BYTES = 700
 """Of a run, at most: its numbers, its book, and what is held while the runs are put in order."""

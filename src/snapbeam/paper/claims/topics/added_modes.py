@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
 import snapbeam as sb
-from snapbeam.model.paper_values import MODES
+from snapbeam.model.default_values import MODES
 from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.claims.spread import combined, median_of, part, resampled, share
 from snapbeam.paper.claims.topics.locations import grid_step, relative_threshold
 from snapbeam.paper.system import paper_model
-from snapbeam.sweeps.analysis import interwell_threshold, is_interwell
+from snapbeam.sweeps.threshold import interwell_threshold, is_interwell
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["ROWS"]
+
 
 _Array = NDArray[np.float64]
 _PLACE = (0.2, 0.32)
@@ -97,7 +98,7 @@ def antinode(results: Results) -> ClaimResult:
     maps = _maps(results)
     x, one = relative_threshold(maps[1])
     _, two = relative_threshold(maps[2])
-    static = sb.quasi_static_threshold(x, 1.625)
+    static = sb.model.quasi_static_threshold(x, 1.625)
     rise = (two - one) * static
     rise = np.where(np.isfinite(rise), rise, -np.inf)
     top = int(np.argmax(rise))

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.model.galerkin.modes import BucklingModes
-from snapbeam.model.paper_values import BEAM, MODES
+from snapbeam.model.buckling_modes import BucklingModes
+from snapbeam.model.default_values import BEAM, MODES
 from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found
 from snapbeam.paper.system import paper_model
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["ROWS"]
+
 
 _Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import snapbeam as sb
-from snapbeam.model.paper_values import BEAM, MODES, STRAIGHT_BEAM
+from snapbeam.model.default_values import BEAM, MODES, STRAIGHT_BEAM
 from snapbeam.paper.claims.finding import Check, ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.system import paper_model
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["ROWS"]
+
 
 _Array = NDArray[np.float64]
 _MOST = 3000.0
@@ -138,7 +139,7 @@ def convergence(results: Results) -> ClaimResult:
     """11: the first ten frequencies with 32 modes."""
 
     def worst(beam: sb.Beam) -> float:
-        return float(np.abs(_freq(beam)[:10] / sb.exact_natural_frequencies(beam, 10) - 1.0).max())
+        return float(np.abs(_freq(beam)[:10] / sb.model.exact_natural_frequencies(beam, 10) - 1.0).max())
 
     (error,) = _with_rounding(worst, BEAM)
     stored = results["figA9"]["error"].error.sel(modes=MODES).values
@@ -149,10 +150,10 @@ def below_three_kilohertz(results: Results) -> ClaimResult:
     """11b: how many natural frequencies lie below 3 kHz."""
 
     def count(beam: sb.Beam) -> float:
-        return float((sb.exact_natural_frequencies(beam, 14) < _MOST).sum())
+        return float((sb.model.exact_natural_frequencies(beam, 14) < _MOST).sum())
 
     (number,) = _with_rounding(count, BEAM)
-    tenth = float(sb.exact_natural_frequencies(BEAM, 10)[-1])
+    tenth = float(sb.model.exact_natural_frequencies(BEAM, 10)[-1])
     return found(near(number, 10.0, 0.0), below(number, 10.0), number=number, tenth=tenth)
 
 

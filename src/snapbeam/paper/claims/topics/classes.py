@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.core.codes import ResponseClass
-from snapbeam.model.paper_values import LOCATION
+from snapbeam.model.default_values import LOCATION
 from snapbeam.paper.claims.finding import Check, ClaimResult, Quantity, above, below, found
 from snapbeam.paper.claims.spread import chaos, chaos_of_pairs, share
-from snapbeam.sweeps.analysis import is_interwell
+from snapbeam.sweeps.threshold import is_interwell
+from snapbeam.util.status_codes import ResponseClass
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["ROWS", "is_kind", "share_of", "transient"]
+
 
 _Mask = NDArray[np.bool_]
 _CUTS = (1.0, 2.0, 3.0, 4.0)
@@ -69,7 +70,7 @@ def transient(ds: xr.Dataset) -> _Mask:
 
 def _beyond(cut: float) -> Callable[[xr.Dataset], _Mask]:
     """Points with V above *cut* times the threshold of a slow shaker, the dashed line of Fig. 7."""
-    static = cut * float(sb.quasi_static_threshold(LOCATION, 1.0))
+    static = cut * float(sb.model.quasi_static_threshold(LOCATION, 1.0))
 
     def where(ds: xr.Dataset) -> _Mask:
         return np.asarray(ds.velocity_amplitude.values[None, :] > static * ds.frequency_ratio.values[:, None])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.model.paper_values import BEAM, CONTACT, LOCATION
+from snapbeam.model.default_values import BEAM, CONTACT, LOCATION
 from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.claims.spread import part, resampled
 from snapbeam.paper.studies.sensitivity import tip_contact
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["ROWS"]
+
 
 _RESTITUTION = 0.7  # any value above 0 gives the same trend
 _DRIVE = (1.21, 0.18)

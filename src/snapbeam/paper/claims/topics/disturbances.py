@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.core.codes import ResponseClass
 from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, found
 from snapbeam.paper.claims.spread import combined, median_of, part, share
 from snapbeam.paper.studies.disturbances import EXCESS, OFFSET
-from snapbeam.sweeps.analysis import is_interwell
+from snapbeam.sweeps.threshold import is_interwell
+from snapbeam.util.status_codes import ResponseClass
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ROWS"]
 
+
 _Array = NDArray[np.float64]
 _END, _CENTRE = 0.1, 0.48
 

@@ -11,7 +11,7 @@ from scipy.ndimage import median_filter
 import snapbeam as sb
 from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.claims.spread import combined, mean_of, median_of, share
-from snapbeam.sweeps.analysis import interwell_threshold
+from snapbeam.sweeps.threshold import interwell_threshold
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["ROWS", "along", "grid_step", "relative_threshold"]
+
 
 _Array = NDArray[np.float64]
 _NEAR_END = 0.05
@@ -51,7 +52,7 @@ def along(results: Results, ratio: float, which: int) -> tuple[_Array, _Array, f
     """Locations, the threshold V there, a median over five of them, and the step of V where it is highest."""
     ds = _map(results, ratio, which)
     x, relative = relative_threshold(ds)
-    static = sb.quasi_static_threshold(x, ratio)
+    static = sb.model.quasi_static_threshold(x, ratio)
     filled = np.where(np.isfinite(relative), relative, np.nanmax(relative))
     curve = np.asarray(median_filter(filled * static, size=min(5, filled.size), mode="nearest"))
     top = int(np.argmax(curve))

@@ -13,12 +13,13 @@ from snapbeam.paper.claims.topics.thresholds import notch_of
 from snapbeam.paper.recipes.figB10 import maxima
 from snapbeam.paper.studies.resonance import ridge
 from snapbeam.paper.system import paper_model
-from snapbeam.sweeps.analysis import interwell_threshold
+from snapbeam.sweeps.threshold import interwell_threshold
 
 if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["ROWS"]
+
 
 _BANDS = ((0.5, 2.3), (2.3, 4.1))
 """Omega between which the first and the second maximum are looked for."""

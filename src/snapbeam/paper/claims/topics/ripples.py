@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ROWS"]
 
+
 _Array = NDArray[np.float64]
 _VISIBLE = 0.005
 """Root mean square of a ripple, b, from which it is counted: 1.7 um, or the width of a line in Fig. 5."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found, near
 from snapbeam.paper.claims.spread import chaos, combined, median_of, part, share
-from snapbeam.sweeps.analysis import Notch, interwell_threshold, threshold_notch
+from snapbeam.sweeps.threshold import Notch, interwell_threshold, threshold_notch
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["NOTCH_WINDOW", "ROWS", "curves", "notch_of"]
+
 
 _Array = NDArray[np.float64]
 NOTCH_WINDOW = (0.8, 2.2)

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from snapbeam.core.codes import ResponseClass
 from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, found
 from snapbeam.paper.claims.spread import combined, share
 from snapbeam.paper.claims.topics.classes import is_kind, share_of, transient
-from snapbeam.sweeps.analysis import interwell_threshold, is_interwell
+from snapbeam.sweeps.threshold import interwell_threshold, is_interwell
+from snapbeam.util.status_codes import ResponseClass
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["ROWS"]
+
 
 _NEAR = 0.15
 """Amplitudes within this share of the threshold are near it."""

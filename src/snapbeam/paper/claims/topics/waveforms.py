@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.core.codes import ResponseClass
-from snapbeam.model.paper_values import BEAM, LOCATION
+from snapbeam.model.default_values import BEAM, LOCATION
 from snapbeam.paper.claims.finding import ClaimResult, Quantity, above, below, found
 from snapbeam.paper.claims.spread import median_of, part, resampled, share
 from snapbeam.paper.recipe import MissingResults
 from snapbeam.paper.recipes.fig5 import snap_times
 from snapbeam.paper.system import TOLERANCE
+from snapbeam.util.status_codes import ResponseClass
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from snapbeam.paper.recipe import Results
 
 __all__ = ["ROWS", "amplitudes"]
+
 
 _Array = NDArray[np.float64]
 _PERIODIC = 0.1

@@ -1,1 +1,0 @@
-"""What commands share: options, the console, what they read and how they tell what they found."""

@@ -1,1 +1,0 @@
-"""Commands of the laboratory, a file a verb."""

@@ -1,0 +1,806 @@
+"""Options of commands that set parameters: made from the one table, with its words, units and names."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+from rich.markup import escape
+
+from snapbeam.cli.console import answer, duration, notes, out, pace, progress
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from snapbeam.model.parameter_file import Config
+    from snapbeam.sweeps.checkpointed_sweep import SweepReport
+
+__all__ = [
+    "BEAM",
+    "CONTACT",
+    "DRIVE",
+    "ENDS",
+    "IMPERFECTION",
+    "MODEL",
+    "RUN",
+    "STRIKER",
+    "LongReport",
+    "config_of_file",
+    "configured",
+    "count_option",
+    "is_long",
+    "kept_config",
+    "number_option",
+    "parse_window",
+    "point_text",
+    "report",
+    "resumed",
+    "sweep_options",
+    "tally_lines",
+    "with_keeping",
+    "with_parameters",
+]
+
+
+BEAM = ("beam.length", "beam.thickness", "beam.width", "beam.density", "beam.young_modulus", "beam.buckling_level",
+        "beam.axial_load")  # fmt: skip
+ENDS = (
+    "boundary.left_rotational_stiffness",
+    "boundary.right_rotational_stiffness",
+    "boundary.axial_support_stiffness",
+)
+IMPERFECTION = ("imperfection.midspan_amplitude", "imperfection.antisymmetric_amplitude", "imperfection.point_load", "imperfection.point_location",
+                "imperfection.uniform_load", "imperfection.gravity")  # fmt: skip
+MODEL = ("model.modes", "model.damping_ratio", "model.reference_frequency")
+CONTACT = ("contact.stiffness", "contact.radius", "contact.young_modulus", "contact.poisson_ratio",
+           "contact.coefficient", "contact.damping_factor", "contact.restitution", "contact.speed")  # fmt: skip
+STRIKER = ("striker.location", "striker.location_m", "striker.side", "striker.gap", "striker.mass", "striker.suspension_stiffness",
+           "striker.suspension_damping")  # fmt: skip
+DRIVE = (
+    "drive.frequency_ratio",
+    "drive.frequency_hz",
+    "drive.velocity_amplitude",
+    "drive.velocity_m_s",
+    "drive.phase",
+)
+RUN = (
+    "integration.cycles",
+    "integration.step",
+    "integration.accuracy",
+    "integration.engine",
+    "integration.early_termination",
+    "integration.max_steps",
+)
+
+_PANELS = {
+    "beam": "Beam (default: the paper's)",
+    "ends": "Ends (default: clamped)",
+    "imperfection": "Imperfection (default: none)",
+    "model": "Reduced model and contact",
+    "contact": "Reduced model and contact",
+    "striker": "Striker and drive",
+    "drive": "Striker and drive",
+    "run": "Integration",
+}
+# Option where it is not the parameter's own name, and words that the table does not have.
+_OPTIONS = {
+    "contact.stiffness": "--contact-stiffness",
+    "contact.radius": "--contact-radius",
+    "contact.young_modulus": "--contact-young-modulus",
+    "contact.poisson_ratio": "--contact-poisson-ratio",
+    "contact.coefficient": "--newton-restitution",
+    "contact.damping_factor": "--contact-damping-factor",
+    "contact.restitution": "--hunt-crossley-restitution",
+    "contact.speed": "--hunt-crossley-speed",
+    "drive.phase": "--drive-phase",
+    "boundary.left_rotational_stiffness": "--left-rotational-stiffness",
+    "boundary.right_rotational_stiffness": "--right-rotational-stiffness",
+    "boundary.axial_support_stiffness": "--axial-support-stiffness",
+    "drive.velocity_m_s": "--velocity-m-s",
+    "striker.location_m": "--location-m",
+    "striker.mass": "--striker-mass",
+    "striker.suspension_stiffness": "--striker-suspension-stiffness",
+    "striker.suspension_damping": "--striker-suspension-damping",
+}
+_WORDS = {
+    "contact.radius": "radius of the sphere, with the two next ones in place of a stiffness, m",
+    "contact.young_modulus": "Young's moduli of sphere and beam, Pa: E1,E2",
+    "contact.poisson_ratio": "Poisson ratios of sphere and beam: nu1,nu2",
+    "contact.coefficient": "coefficient of restitution, for one mode, in place of Hertz's law",
+    "contact.damping_factor": "loss chi of the contact, s/m: Hunt and Crossley's law",
+    "contact.restitution": "share of its speed that a free mass keeps, with the next one in place of a loss",
+    "contact.speed": "speed at which it keeps that share, m/s",
+    "beam.axial_load": "axial load, N, compression positive; instead of --buckling-level",
+    "model.reference_frequency": "frequency that Omega and V are normalised by, Hz; the model's first by default",
+    "model.damping_ratio": "damping ratio of every linear mode, or one for each: zeta1,zeta2,...",
+    "integration.step": "step in free flight, s; follows from the model by default",
+    "integration.accuracy": "accuracy level: standard, or reference, far finer, to check with",
+    "integration.engine": "what integrates; auto takes the fastest there is",
+    "integration.early_termination": "end a run once its response class is certain; its other statistics then stop there",
+}
+_PAIRS = ("contact.young_modulus", "contact.poisson_ratio")
+_LISTS = ("model.damping_ratio",)
+"""One number, or one for each linear mode."""
+
+
+def with_parameters(
+    *names: str, axes: tuple[str, ...] = ()
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Give a command options for parameters, and for a parameter file and anything else by name.
+
+    The command gets a parameter ``given``, a mapping of what was given: values by dotted name, and the file.
+
+    Parameters
+    ----------
+    *names : str
+        Parameters, by dotted name.
+    axes : tuple of str
+        Those of them that may be a number, numbers a,b,c or start:stop:count.
+    """
+
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        own = {
+            name: parameter
+            for name, parameter in inspect.signature(function, eval_str=True).parameters.items()
+            if name != "given"
+        }
+        added = {_identifier(name): (name, _option(name, name in axes)) for name in names}
+
+        def command(**arguments: Any) -> Any:
+            given = {full: arguments.pop(key) for key, (full, _) in added.items()}
+            given |= {
+                key: arguments.pop(key)
+                for key in ("config", "set_", "axis", "from_", "point", "print_config")
+                if key in arguments
+            }
+            return function(given=given, **arguments)
+
+        general = _general(bool(axes))
+        command.__name__, command.__doc__ = function.__name__, function.__doc__
+        command.__module__ = function.__module__
+        parameters = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own.values()]
+        parameters += [
+            inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+            for key, (default, kind) in general.items()
+        ]
+        parameters += [
+            inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
+            for key, (_, kind) in added.items()
+        ]
+        command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        return command
+
+    return decorate
+
+
+def _identifier(name: str) -> str:
+    return name.replace(".", "__")
+
+
+def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
+    config = typer.Option(
+        "--config", "-c", help="TOML file of parameters; options given here override it.", metavar="FILE"
+    )
+    anything = typer.Option(
+        "--set", help="Any parameter by its dotted name, such as contact.stiffness=2e8; again for another one.",
+        metavar="NAME=VALUE",
+    )  # fmt: skip
+    source = typer.Option(
+        "--from", help="File of a map or a run whose parameters are taken; options given here override them.",
+        metavar="FILE",
+    )  # fmt: skip
+    point = typer.Option(
+        help="Point of the map of --from, the nearest there is: name=value,name=value.",
+        metavar="NAME=VALUE,...",
+    )
+    shown = typer.Option(
+        "--print-config", help="Print every parameter as a parameter file, what was not given too, and stop."
+    )
+    found: dict[str, tuple[Any, Any]] = {
+        "config": (None, Annotated[Path | None, config]),
+        "from_": (None, Annotated[Path | None, source]),
+        "point": (None, Annotated[str | None, point]),
+        "set_": (None, Annotated[list[str] | None, anything]),
+        "print_config": (False, Annotated[bool, shown]),
+    }
+    if with_axes:
+        axis = typer.Option(
+            "--sweep",
+            help="Sweep any parameter: beam.thickness=3e-4:5e-4:20, model.modes=1,8; again for another axis. Without "
+            "one, the map is over frequency ratio and velocity amplitude.",
+            metavar="NAME=VALUES",
+            rich_help_panel="Axes",
+        )
+        found["axis"] = (None, Annotated[list[str] | None, axis])
+    return found
+
+
+def _option(name: str, is_axis: bool) -> Any:
+    """The type of an option, with its words."""
+    from snapbeam.model.parameter_axes import PHYSICAL
+    from snapbeam.model.parameters import parameters
+
+    section, _, field = name.partition(".")
+    row, physical = parameters().get(name), PHYSICAL.get(name)
+    flag = _OPTIONS.get(name, f"--{field.replace('_', '-')}")
+    unit, words, symbol = "", _WORDS.get(name, ""), ""
+    if row is not None:
+        unit = "" if row.quantity.unit == "1" else row.quantity.unit
+        words = words or row.quantity.long_name + (f", {unit}" if unit else "")
+        symbol = row.quantity.symbol
+    elif physical is not None:
+        words = f"{physical.words}, {physical.unit}, in place of a ratio"
+    text = f"{words[:1].upper()}{words[1:]}{_symbol(symbol)}."
+    options: dict[str, Any] = {"help": text, "rich_help_panel": "Axes" if is_axis else _PANELS[section]}
+    if row is not None and row.quantity.kind is bool:
+        return Annotated[bool | None, typer.Option(f"{flag}/--no-{flag[2:]}", **options)]
+    if is_axis:
+        return Annotated[str | None, typer.Option(flag, metavar="VALUES", **options)]
+    if name in _PAIRS:
+        return Annotated[str | None, typer.Option(flag, metavar="A,B", **options)]
+    if name in _LISTS:
+        return Annotated[str | None, typer.Option(flag, metavar="NUMBER|A,B,...", **options)]
+    if row is not None and row.quantity.kind is str:
+        return Annotated[str | None, typer.Option(flag, metavar="|".join(row.quantity.choices), **options)]
+    if row is not None and row.quantity.kind is int:
+        return Annotated[int | None, typer.Option(flag, parser=parse_count, metavar="COUNT", **options)]
+    return Annotated[float | None, typer.Option(flag, parser=parse_number, metavar="NUMBER", **options)]
+
+
+_UPRIGHT = re.compile(r"\\mathrm\{([^}]*)\}")
+
+
+def _symbol(symbol: str) -> str:
+    """A symbol of a formula as a terminal shows it: ``x_\\mathrm{s}`` is x_s."""
+    plain = _UPRIGHT.sub(r"\1", symbol).replace("\\", "").replace("{", "").replace("}", "")
+    return f" ({plain})" if plain else ""
+
+
+def parse_number(text: str) -> float:
+    """A number, or a fraction."""
+    numerator, slash, denominator = text.partition("/")
+    try:
+        return float(numerator) / float(denominator) if slash else float(text)
+    except (ValueError, ZeroDivisionError):
+        raise typer.BadParameter(f"{text!r} is not a number") from None
+
+
+def parse_count(text: str) -> int:
+    """A whole number."""
+    try:
+        return int(text)
+    except ValueError:
+        raise typer.BadParameter(f"{text!r} is not a whole number") from None
+
+
+def configured(
+    given: Mapping[str, Any], axes_of: Callable[[Config, Mapping[str, Any]], dict[str, Any]] | None = None
+) -> Config:
+    """The parameters of the ``--config`` file overridden by what was given on the command line.
+
+    *axes_of* says what the axes of a command are, those that it has by itself among them, for ``--print-config``.
+    """
+    from snapbeam.model.parameter_file import Config, load_config, override, same_axis
+    from snapbeam.model.parameters import lookup
+    from snapbeam.util.validation import InputError
+
+    config = load_config(given["config"]) if given.get("config") is not None else Config()
+    if given.get("from_") is not None:
+        pass  # import-removed
+
+        if given.get("config") is not None:
+            raise InputError("from, config: give one of the two")
+        config = config_of_file(given["from_"], given.get("point"))
+    sections: dict[str, dict[str, Any]] = {}
+    axes: dict[str, Any] = {}
+    for name, value in given.items():
+        section, dot, field = name.partition(".")
+        if not dot or value is None:
+            continue
+        if isinstance(value, str) and _is_axis(name, value):
+            axes[name] = value
+        else:
+            sections.setdefault(section, {})[field] = _value(name, value)
+    for text in given.get("set_") or ():
+        name, value = _assignment(text, "set")
+        full = name if "." in name and name.partition(".")[2] in ("type", "type") else lookup(name).name
+        section, _, field = full.partition(".")
+        sections.setdefault(section, {})[field] = _value(full, value)
+    for text in given.get("axis") or ():
+        name, value = _assignment(text, "axis")
+        if name in axes:
+            raise InputError(f"axis {name}: is given twice")
+        axes[name] = value
+    single = {f"{section}.{field}" for section, values in sections.items() for field in values}
+    for name in axes:
+        for same in sorted(same_axis(name) & single):
+            raise InputError(f"{same}: is given as a single value and as an axis")
+    if axes:
+        sections["axes"] = sections.get("axes", {}) | axes
+    config = override(config, sections)
+    if given.get("print_config"):
+        from snapbeam.model.parameter_file import config_text
+
+        printed = config.whole(None if axes_of is None else axes_of(config, given))
+        out().print(config_text(printed), markup=False, end="")
+        answer(**printed.to_mapping())
+        raise typer.Exit
+    if config.defaulted:
+        whole = config.whole().to_mapping()
+        values = ", ".join(
+            f"{name} = {_shown(whole, name)}" for name in config.defaulted if name.partition(".")[0] in whole
+        )
+        notes().print(f"[bold yellow]note:[/] taken from the paper's beam: {escape(values)}")
+    return config
+
+
+def _shown(sections: Mapping[str, Mapping[str, Any]], name: str) -> str:
+    """A value with its unit."""
+    from snapbeam.model.parameters import lookup
+
+    section, _, field = name.partition(".")
+    value, unit = sections[section][field], lookup(name).quantity.unit
+    return f"{value:.6g}{'' if unit == '1' else ' ' + unit}"
+
+
+def _is_axis(name: str, value: str) -> bool:
+    """Whether the text of an option that may be an axis is one, and not a number."""
+    from snapbeam.model.parameter_axes import PHYSICAL
+    from snapbeam.model.parameters import parameters
+
+    row = parameters().get(name)
+    numeric = name in PHYSICAL or (row is not None and row.quantity.kind in (float, int))
+    return numeric and name not in (*_PAIRS, *_LISTS) and (":" in value or "," in value)
+
+
+def _assignment(text: str, option: str) -> tuple[str, str]:
+    from snapbeam.util.validation import InputError
+
+    name, equals, value = text.partition("=")
+    if not equals or not name.strip() or not value.strip():
+        raise InputError(f"{option} = {text!r}: must be name=value, such as contact.stiffness=2e8")
+    return name.strip(), value.strip()
+
+
+def _value(name: str, value: Any) -> Any:
+    """The text of an option as what its parameter holds."""
+    from snapbeam.model.parameter_axes import PHYSICAL
+    from snapbeam.model.parameters import row_of
+    from snapbeam.util.validation import InputError
+
+    if not isinstance(value, str):
+        return value
+    row = row_of(name)
+    kind = float if row is None else row.quantity.kind
+    try:
+        if name in _PAIRS or (name in _LISTS and "," in value):
+            return [float(part) for part in value.split(",")]
+        if kind is bool:
+            return {"true": True, "false": False}[value.lower()]
+        if kind is int:
+            return int(value)
+        if kind is float and (row is not None or name in PHYSICAL or name.startswith("start.")):
+            return parse_number(value)
+    except (ValueError, KeyError, typer.BadParameter):
+        words = {bool: "true or false", int: "a whole number"}.get(kind, "a number")
+        raise InputError(f"{name} = {value!r}: must be {words}") from None
+    return value
+
+
+# ----------------------------------------------------------------------------------------------------
+# The options that several commands share beside parameters.
+
+
+_OUTPUT = "Output"
+
+
+def number_option(about: str, panel: str) -> Any:
+    """An option that takes a number."""
+    return typer.Option(help=about, rich_help_panel=panel, parser=parse_number, metavar="NUMBER")
+
+
+def count_option(about: str, panel: str) -> Any:
+    """An option that takes a whole number."""
+    return typer.Option(help=about, rich_help_panel=panel, parser=parse_count, metavar="COUNT")
+
+
+Threads = Annotated[int | None, count_option("Processor cores to use; all by default.", "Integration")]
+Plot = Annotated[
+    Path | None,
+    typer.Option(
+        "--plot", help="Picture to write: .png, .pdf or .svg.", rich_help_panel=_OUTPUT, metavar="FILE"
+    ),
+]
+Dots = Annotated[
+    Path | None,
+    typer.Option(
+        help="CSV of measured responses to lay over the picture: columns frequency_ratio or frequency_hz, "
+        "velocity_amplitude or velocity_m_s, location (optional), response.",
+        rich_help_panel=_OUTPUT,
+        metavar="FILE",
+    ),
+]
+ThresholdLine = Annotated[
+    bool,
+    typer.Option(
+        "--quasi-static-line", help="Draw the quasi-static threshold V_QS1 (Eq. 21).", rich_help_panel=_OUTPUT
+    ),
+]
+Window = Annotated[
+    str | None,
+    typer.Option(help="Cycles to draw, first:last.", rich_help_panel=_OUTPUT, metavar="FIRST:LAST"),
+]
+
+
+def parse_window(text: str | None) -> tuple[float, float] | None:
+    """Return ``first:last`` as two numbers."""
+    from snapbeam.util.validation import InputError, finite
+
+    if text is None:
+        return None
+    try:
+        first, last = (finite("window", float(part)) for part in text.split(":"))
+    except ValueError:
+        raise InputError(f"window = {text!r}: must be first:last, in cycles, such as 0:10") from None
+    if not first < last:
+        raise InputError(f"window = {text!r}: first must be less than last")
+    return first, last
+
+
+# ----------------------------------------------------------------------------------------------------
+# What ``snapbeam map`` needs for maps that take long: their options, their log and their summary.
+
+
+_LONG = "Long maps"
+
+StoreOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--checkpoint",
+        help="Folder to keep the map in while it is computed; one that exists is resumed, and grows with longer axes.",
+        rich_help_panel=_LONG,
+        metavar="DIR",
+    ),
+]
+Verify = Annotated[
+    bool,
+    typer.Option(
+        "--check-checkpoint",
+        help="Check the store and compute again only what is damaged.",
+        rich_help_panel=_LONG,
+    ),
+]
+ClusterOption = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        help="Who computes: local:N, tcp://host:port, or slurm.toml; needs --checkpoint.",
+        rich_help_panel=_LONG,
+        metavar="WHERE",
+    ),
+]
+Refine = Annotated[
+    int | None,
+    count_option("Times to halve the spacing of the axes where neighbours differ in class.", _LONG),
+]
+Replicates = Annotated[
+    int | None, count_option("Repeats of each run with a slightly different start.", _LONG)
+]
+ReplicaSize = Annotated[
+    float | None,
+    number_option("Rms change of the centre's start, m (3.5e-6, a camera's pixel).", _LONG),
+]
+HalveStep = Annotated[
+    bool,
+    typer.Option(
+        "--check-half-step", help="One repeat more with the time step halved.", rich_help_panel=_LONG
+    ),
+]
+Chunk = Annotated[int | None, count_option("Points of a task; follows from the map by default.", _LONG)]
+Log = Annotated[
+    Path | None,
+    typer.Option("--log", help="Text file to append the progress to.", rich_help_panel=_LONG, metavar="FILE"),
+]
+
+_KEPT = {"refine": int, "replicas": int, "perturbation_rms": float, "check_half_step": bool}
+_OPTIONS_LONG: dict[str, tuple[Any, Any]] = {
+    "store": (None, StoreOption),
+    "verify": (False, Verify),
+    "cluster": (None, ClusterOption),
+    "refine": (None, Refine),
+    "replicas": (None, Replicates),
+    "perturbation_rms": (None, ReplicaSize),
+    "check_half_step": (False, HalveStep),
+    "chunk": (None, Chunk),
+    "log": (None, Log),
+}
+
+
+def with_keeping(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Give a command the options of sweeps that take long; it gets them as a mapping ``keeping``."""
+    own = {
+        name: parameter
+        for name, parameter in inspect.signature(function, eval_str=True).parameters.items()
+        if name != "keeping"
+    }
+
+    def command(**arguments: Any) -> Any:
+        keeping = {name: arguments.pop(name) for name in _OPTIONS_LONG}
+        return function(keeping=keeping, **arguments)
+
+    added = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+        for name, (default, kind) in _OPTIONS_LONG.items()
+    ]
+    kept = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY) for parameter in own.values()]
+    command.__name__, command.__doc__, command.__module__ = (
+        function.__name__,
+        function.__doc__,
+        function.__module__,
+    )
+    command.__signature__ = inspect.Signature(kept + added)  # type: ignore[attr-defined]
+    return command
+
+
+def is_long(keeping: Mapping[str, Any]) -> bool:
+    """Whether anything but a log was asked for."""
+    return any(value not in (None, False) for name, value in keeping.items() if name != "log")
+
+
+def sweep_options(keeping: Mapping[str, Any]) -> dict[str, Any]:
+    """What a sweep is asked for beside its store."""
+    from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates
+    from snapbeam.util.validation import integer
+
+    repeats = None
+    count = 0 if keeping["replicas"] is None else integer("replicas", keeping["replicas"], 0, 10_000)
+    if count or keeping["check_half_step"]:
+        size = MEASURING_ERROR if keeping["perturbation_rms"] is None else keeping["perturbation_rms"]
+        repeats = Replicates(count, size, bool(keeping["check_half_step"]))
+    return {"cluster": keeping["cluster"], "refine_levels": keeping["refine"] or 0, "replicas": repeats}
+
+
+def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config) -> Config:
+    """The parameters of the store that is named, with those that are given laid over them.
+
+    So a store is resumed by its name alone, and what is given beside it is compared with what the store holds, not with
+    the paper's beam.  Options that the store keeps are put into *keeping* where they were left out.
+    """
+    from snapbeam.model.parameter_file import config_from_mapping, override
+    from snapbeam.sweeps.checkpoint.store import read_stored_config
+    from snapbeam.util.validation import InputError
+
+    if keeping["store"] is None:
+        return settings
+    kept = read_stored_config(keeping["store"])
+    if kept is None:
+        return settings
+    options = kept.get("options", {})
+    if not isinstance(kept.get("parameters"), dict) or not isinstance(options, dict):
+        raise InputError(f"store = {str(keeping['store'])!r}: keeps no parameters that can be read")
+    for name, kind in _KEPT.items():
+        if not keeping[name] and isinstance(options.get(name), kind):
+            keeping[name] = options[name]
+    own = config_from_mapping(kept["parameters"], source=f"{keeping['store'].name}/map.json")
+    return override(own, settings.to_mapping())
+
+
+def kept_config(settings: Config, keeping: Mapping[str, Any]) -> dict[str, Any]:
+    """What a store keeps so that it can be resumed by its name alone."""
+    import numpy as np
+
+    options = {name: keeping[name] for name in _KEPT if keeping[name]}
+    plain = {
+        section: {
+            name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()
+        }
+        for section, values in settings.to_mapping().items()
+    }
+    return {"parameters": plain, "options": options}
+
+
+class LongReport:
+    """Progress for a person: a bar on a terminal, lines elsewhere, and lines with the time in a log file."""
+
+    _INTERVAL = 30.0
+
+    def __init__(self, bar: Any, log: Path | None) -> None:
+        self._bar = bar
+        self._log = log
+        self._start = self._last = time.monotonic()
+        self._found = 0
+        self._before: int | None = None
+        self._quiet = True
+
+    def note(self, text: str) -> None:
+        """Say something once."""
+        notes().print(text, markup=False)
+        self.log(text)
+
+    def progress(self, done: int, total: int) -> None:
+        """Say how far the present stage is."""
+        now = time.monotonic()
+        if self._before is None or done < self._before:
+            self._start, self._found = now, done
+        finished = done >= total and done != self._before
+        self._before = done
+        self._bar(done, total)
+        if finished or self._quiet or now - self._last >= self._INTERVAL:
+            self._last, self._quiet = now, False
+            share = 100.0 * done / max(total, 1)
+            text = f"{done} of {total} points ({share:.1f} %)"
+            if done > self._found:
+                text += f", {pace(done, total, now - self._start, found=self._found)}"
+            self.log(text)
+
+    def log(self, text: str) -> None:
+        """Append a line with the time to the log file, if there is one."""
+        if self._log is None:
+            return
+        from snapbeam.util.provenance import created_now
+
+        try:
+            with self._log.open("a", encoding="utf-8") as stream:
+                stream.write(f"{created_now()}  {text}\n")
+        except OSError as error:  # no reason to give up what is computed
+            where, self._log = self._log, None
+            self.note(f"log {str(where)!r}: cannot be written any more, {error.strerror or error}")
+
+
+@contextmanager
+def report(total: int, log: Path | None, store: Path | None) -> Iterator[LongReport]:
+    """Give a report of a map of *total* points; refuse, before any work, a log that cannot be written."""
+    from snapbeam.util.files import check_writable
+
+    if log is not None:
+        check_writable(log, "log", appended=True)
+    with progress(total) as bar:
+        said = LongReport(bar, log)
+        said.log(f"map of {total} points")
+        try:
+            yield said
+        except KeyboardInterrupt:
+            said.note(
+                "stopped; nothing is kept: with --checkpoint FOLDER it could go on from here another time"
+                if store is None
+                else "stopped; what the store holds is kept, and the same command goes on from there"
+            )
+            raise
+
+
+def tally_lines(tally: SweepReport, store: Path | None, elapsed: float) -> list[str]:
+    """Return what happened, in words."""
+    lines = []
+    if store is not None:
+        lines.append(f"{tally.runs} runs computed in {duration(elapsed)}")
+        lines.append(
+            f"Store {store}: {tally.tasks} tasks, {tally.resumed} done before, {tally.computed} computed now, "
+            f"{len(tally.damaged)} damaged, {len(tally.failed)} given up"
+        )
+    if tally.missing:
+        lines.append(f"{tally.missing} tasks were never computed; without --check-checkpoint they will be")
+    lines += [f"given up: {stage} task {task} {reason}" for stage, task, reason in tally.failed]
+    return lines
+
+
+# ----------------------------------------------------------------------------------------------------
+# The parameters that a result was computed from, read back from its file.
+
+
+def config_of_file(path: Path, point: str | None) -> Config:
+    """The parameters of a file, at one point of it if it is a map.
+
+    Parameters
+    ----------
+    path : path
+        NetCDF file of a map, a threshold or a run.
+    point : str, optional
+        ``name=value,name=value``: the point nearest to these coordinates, its values exact.
+    """
+    from snapbeam.cli.console import open_result
+    from snapbeam.model.parameter_file import config_from_mapping
+    from snapbeam.util.validation import InputError, parsed_json
+
+    dataset = open_result(path)
+    text = dataset.attrs.get("system")
+    if not isinstance(text, str):
+        raise InputError(f"from = {str(path)!r}: does not hold the parameters it was computed from")
+    sections: dict[str, dict[str, Any]] = parsed_json(text, f"from = {str(path)!r}")
+    if any(isinstance(value, dict) for values in sections.values() for value in values.values()):
+        raise InputError(f"from = {str(path)!r}: was driven by a record, which is too long to be kept in it")
+    if "mass" in sections.get("model", {}):
+        raise InputError(f"from = {str(path)!r}: is of a structure given by matrices; use it from Python")
+    run = {
+        name: value
+        for name, value in parsed_json(
+            dataset.attrs.get("integration", "{}"), f"from = {str(path)!r}"
+        ).items()
+        if value is not None and name != "engine"
+    }
+    start = sections.pop("start", None)
+    if start is not None:
+        raise InputError(f"from = {str(path)!r}: begins in a state of its own; use it from Python")
+    sections["run"] = run
+    for name, value in _at_point(dataset, point, path).items():
+        section, _, field = name.partition(".")
+        sections.setdefault(section, {})[field] = value
+    return config_from_mapping(sections, path.name)
+
+
+def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, Any]:
+    """Values of the parameters at the nearest point, by dotted name."""
+    from snapbeam.model.parameters import lookup
+    from snapbeam.util.validation import InputError
+
+    axes = {name: dataset[name] for name in map(str, dataset.dims) if "parameter" in dataset[name].attrs}
+    if point is None:
+        return {}
+    if "point" in dataset.dims:
+        return _of_list(dataset, point, path)
+    found: dict[str, Any] = {}
+    for part in point.split(","):
+        name, equals, value = part.partition("=")
+        short = lookup(name.strip()).short
+        if not equals or short not in axes:
+            raise InputError(f"point = {point!r}: must name axes of {path.name}: {', '.join(axes)}")
+        values = axes[short].values
+        if values.dtype.kind in "OU":
+            chosen: Any = value.strip()
+        else:
+            try:
+                chosen = values[int(np.argmin(np.abs(values - float(value))))].item()
+            except ValueError:
+                raise InputError(f"point = {point!r}: {value!r} is not a number") from None
+        found[str(axes[short].attrs["parameter"])] = chosen
+    missing = [name for name in axes if axes[name].attrs["parameter"] not in found and axes[name].size > 1]
+    if missing:
+        raise InputError(f"point = {point!r}: says nothing of {', '.join(missing)}")
+    for name in axes:
+        if axes[name].size == 1:
+            found.setdefault(str(axes[name].attrs["parameter"]), axes[name].values[0].item())
+    return found
+
+
+def _of_list(dataset: xr.Dataset, point: str, path: Path) -> dict[str, Any]:
+    """Values of all parameters of the point of a list that is nearest to what is given, by dotted name."""
+    from snapbeam.model.parameters import lookup
+    from snapbeam.util.validation import InputError
+
+    columns = {
+        str(name): item.values
+        for name, item in dataset.coords.items()
+        if item.dims == ("point",) and "parameter" in item.attrs
+    }
+    away = np.zeros(dataset.sizes["point"])
+    for part in point.split(","):
+        name, equals, value = part.partition("=")
+        short = lookup(name.strip()).short
+        if not equals or short not in columns:
+            raise InputError(f"point = {point!r}: must name parameters of {path.name}: {', '.join(columns)}")
+        values = columns[short]
+        if values.dtype.kind in "OU":
+            away = np.where(values == value.strip(), away, np.inf)
+            continue
+        try:
+            away = away + ((values - float(value)) / (float(np.ptp(values)) or 1.0)) ** 2
+        except ValueError:
+            raise InputError(f"point = {point!r}: {value!r} is not a number") from None
+    if not np.isfinite(away).any():
+        raise InputError(f"point = {point!r}: {path.name} has no such point")
+    at = int(np.argmin(away))
+    return {str(dataset[name].attrs["parameter"]): values[at].item() for name, values in columns.items()}
+
+
+def point_text(coordinates: dict[str, Any]) -> str:
+    """Coordinates as ``--point`` takes them, to the last digit."""
+    return ",".join(
+        f"{name}={value!r}" if isinstance(value, float) else f"{name}={value}"
+        for name, value in coordinates.items()
+    )

@@ -1,5 +1,0 @@
-"""The version, alone: who only asks for it loads nothing else."""
-
-__all__ = ["__version__"]
-
-__version__ = "0.1.0"

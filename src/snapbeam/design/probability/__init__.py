@@ -1,1 +1,0 @@
-"""Probability maps: how likely each outcome is, with intervals, for no more runs than that takes."""

@@ -1,1 +1,0 @@
-"""Quantile thresholds: where the probability of snapping passes given values."""

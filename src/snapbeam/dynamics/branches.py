@@ -1,0 +1,560 @@
+"""Branches of periodic orbits: pseudo-arclength continuation in any parameter, and what happens on the way.
+
+With the return map P^m(x; lambda), a branch solves P^m(x; lambda) = x; each orbit is predicted along the tangent of the
+branch and corrected on the plane across it (Keller, in Applications of Bifurcation Theory, 1977).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.dynamics.flow import Flow, Stroboscope
+from snapbeam.dynamics.periodic_orbits import (
+    Corrector,
+    Family,
+    OrbitNotFoundError,
+    PeriodicOrbit,
+    Return,
+    Spot,
+)
+from snapbeam.util.diagnostics import tell, to_json
+from snapbeam.util.validation import InputError, checked, choice, integer, positive, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["EVENTS", "Branch", "SpecialPoint", "between", "continuation", "grazing_end", "switch_branch"]
+
+
+# ----------------------------------------------------------------------------------------------------
+# A branch of periodic orbits, and the events on it, labelled.
+
+
+EVENTS = ("fold", "flip", "Neimark-Sacker", "branch point", "grazing")
+
+
+@dataclass(frozen=True, eq=False)
+class SpecialPoint:
+    """Something that happens on a branch."""
+
+    kind: str
+    """One of :data:`EVENTS`."""
+    orbit: PeriodicOrbit
+    value: float
+    """Of the parameter."""
+    index: int
+    """Number of the orbit of the branch that it comes after."""
+    error: float = math.nan
+    """By how much the value may be off at these steps; NaN: not known."""
+
+    def __repr__(self) -> str:
+        off = "" if math.isnan(self.error) else f" ± {self.error:.1g}"
+        return f"<{self.kind} at {self.value:.8g}{off}>"
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Orbits that follow each other along a parameter."""
+
+    name: str
+    """The parameter."""
+    orbits: list[PeriodicOrbit]
+    special_points: list[SpecialPoint]
+    termination_reason: str
+    """Why it ends."""
+    impacts: list[int]
+    """Of each orbit within its period."""
+    tangents: list[NDArray[np.float64]]
+
+    def __repr__(self) -> str:
+        low, high = self.values.min(), self.values.max()
+        text = f"{len(self.orbits)} orbits of period {self.orbits[0].period}, {self.name} from {low:.6g} to {high:.6g}"
+        return f"<Branch: {text}, {len(self.special_points)} events, end: {self.termination_reason}>"
+
+    @cached_property
+    def values(self) -> NDArray[np.float64]:
+        """Of the parameter along the branch."""
+        return np.array([orbit.flow.value(self.name) for orbit in self.orbits])
+
+    @cached_property
+    def is_stable(self) -> NDArray[np.bool_]:
+        """Of each orbit."""
+        return np.array([orbit.is_stable for orbit in self.orbits])
+
+    def to_dataset(self) -> xr.Dataset:
+        """The branch labelled: over ``orbit`` the parameter, the state, the multipliers, stability, impacts and
+        the centre's displacement, that at every ``return`` too; over ``event`` what happens where."""
+        import xarray as xr
+
+        from snapbeam.model.parameters import lookup
+
+        first = self.orbits[0]
+        names = getattr(first.flow, "names", tuple(f"x[{i + 1}]" for i in range(first.coordinates.size)))
+        values = np.array([orbit.multipliers for orbit in self.orbits])
+        short, unit, words = self.name, "1", self.name
+        if isinstance(first.flow, Stroboscope):
+            row = lookup(self.name)
+            short, unit, words = row.short, row.quantity.unit, row.quantity.long_name
+        states = np.array([orbit.coordinates for orbit in self.orbits])
+        steps = np.linalg.norm(np.diff(states, axis=0), axis=1)
+        dataset = xr.Dataset(
+            {
+                "state": (
+                    ("orbit", "coordinate"),
+                    states,
+                    _labels("state of the orbit at the phase it is seen at"),
+                ),
+                "multiplier_real": (("orbit", "multiplier"), values.real, _labels("Floquet multiplier")),
+                "multiplier_imag": (("orbit", "multiplier"), values.imag, _labels("its imaginary part")),
+                "stable": (
+                    "orbit",
+                    self.is_stable,
+                    _labels("whether every multiplier is inside the unit circle"),
+                ),
+                "impacts": (
+                    "orbit",
+                    np.array(self.impacts, dtype=np.int32),
+                    _labels("impacts within the period"),
+                ),
+                "arclength": (
+                    "orbit",
+                    np.append(0.0, np.cumsum(steps)),
+                    _labels("length of the branch in states"),
+                ),
+                "residual": ("orbit", [orbit.residual for orbit in self.orbits], _labels("of the return")),
+                "event_kind": (
+                    "event",
+                    [event.kind for event in self.special_points],
+                    {"long_name": "what happens"},
+                ),
+                "event_after": (
+                    "event",
+                    [event.index for event in self.special_points],
+                    _labels("orbit before it"),
+                ),
+                "event_value": (
+                    "event",
+                    [event.value for event in self.special_points],
+                    {"units": unit, "long_name": words},
+                ),
+                "event_error": (
+                    "event",
+                    np.array([event.error for event in self.special_points], dtype=np.float64),
+                    {"units": unit, "long_name": f"by how much it may be off at these steps: {words}"},
+                ),
+                "event_state": (
+                    ("event", "coordinate"),
+                    np.array([event.orbit.coordinates for event in self.special_points]).reshape(
+                        -1, states.shape[1]
+                    ),
+                    _labels("state of the orbit there"),
+                ),
+            },
+            {
+                "coordinate": list(names),
+                short: ("orbit", self.values, {"units": unit, "long_name": words, "parameter": self.name}),
+            },
+            {
+                "title": "branch of periodic orbits",
+                "along": short,
+                "period": first.period,
+                "termination_reason": self.termination_reason,
+                "diagnostics": to_json(first.diagnostics),
+            },
+        )
+        if isinstance(first.flow, Stroboscope):
+            centers = np.array([_centers(orbit) for orbit in self.orbits])
+            dataset["midspan_displacement"] = (
+                "orbit",
+                centers[:, 0],
+                _labels("centre displacement there, over b"),
+            )
+            dataset["center_returns"] = (
+                ("orbit", "return"),
+                centers,
+                _labels("centre displacement once a period of the drive, over b"),
+            )
+        return dataset
+
+
+def _centers(orbit: PeriodicOrbit) -> NDArray[np.float64]:
+    """Centre displacement over b, once a period of the drive."""
+    flow = orbit.flow
+    assert isinstance(flow, Stroboscope)
+    states = orbit.coordinates[np.newaxis]
+    if orbit.period > 1:
+        later = flow.march(states, orbit.period - 1, every=True).every
+        assert later is not None
+        states = np.concatenate([states, later[0]])
+    amplitudes = states[:, : flow.modes] * flow.scales[: flow.modes]
+    return np.asarray(amplitudes @ flow.system.model.midspan_shape / flow.system.scale.length)
+
+
+def _labels(words: str) -> dict[str, str]:
+    return {"units": "1", "long_name": words}
+
+
+# ----------------------------------------------------------------------------------------------------
+# What happens on a branch of periodic orbits, located between the orbits that it is found between, with an error.
+#
+# The error of a value holds what is left of the bracket, what the residual of the orbit moves, and what the error of the
+# return map's derivative moves; that of the steps themselves, which other steps show, it does not hold.
+
+
+_LOCATED = 1e-9
+"""Of a multiplier at an event."""
+_HALVINGS = 20
+_TOUCHES = 5e-3
+"""Clearance, over the length scale, below which a branch that goes no further ends by grazing."""
+_FINE, _ROUNDING = 1e-5, 1e-13
+"""Relative error of tangents at level "reference", and of what is known exactly."""
+_ACROSS = 10.0
+"""How much faster multipliers may change across a branch than along it: an orbit that closes badly is off across."""
+
+
+def _counts(came: Return) -> tuple[int, int, int]:
+    """Real multipliers above 1, real ones below -1, and others outside the unit circle."""
+    values = np.linalg.eigvals(came.jacobian)
+    real = np.abs(values.imag) < 1e-12 * np.maximum(np.abs(values), 1e-300)
+    out = np.abs(values) > 1.0
+    return (
+        int((real & (values.real > 1.0)).sum()), int((real & (values.real < -1.0)).sum()), int((out & ~real).sum())
+    )  # fmt: skip
+
+
+def between(corrector: Corrector, one: Spot, other: Spot, at: int) -> list[SpecialPoint]:
+    """What happens between two orbits of a branch, located."""
+    found = []
+    up, flip, pair = (b - a for a, b in zip(_counts(one.came), _counts(other.came), strict=True))
+    if one.tangent[-1] * other.tangent[-1] < 0.0:
+        found.append(_located(corrector, one, other, "fold", at))
+    elif up % 2:
+        found.append(_located(corrector, one, other, "branch point", at))
+    if flip % 2:
+        found.append(_located(corrector, one, other, "flip", at))
+    if pair and not (up or flip):
+        found.append(_located(corrector, one, other, "Neimark-Sacker", at))
+    if one.came.impacts != other.came.impacts:
+        found.append(_grazing(corrector, one, other, at))
+    return [event for event in found if event is not None]
+
+
+def _test(spot: Spot, kind: str) -> float:
+    """What vanishes at an event."""
+    if kind == "fold":
+        return float(spot.tangent[-1])
+    values = np.linalg.eigvals(spot.came.jacobian)
+    if kind == "Neimark-Sacker":
+        pairs = np.abs(values[np.abs(values.imag) > 1e-12])
+        return float(pairs[np.argmin(np.abs(pairs - 1.0))] - 1.0) if pairs.size else np.nan
+    sign = -1.0 if kind == "flip" else 1.0
+    size = values.size
+    # the determinant changes its sign with one real multiplier, whatever the others do
+    logs = np.linalg.slogdet(spot.came.jacobian - sign * np.eye(size))
+    near = values[np.argmin(np.abs(values - sign))]
+    return float(logs[0].real * abs(near - sign))
+
+
+def _between_at(corrector: Corrector, one: Spot, other: Spot, part: float) -> Spot:
+    along = other.y - one.y
+    row = along / np.linalg.norm(along)
+    nearer = one if part < 0.5 else other
+    return corrector.correct(one.y + part * along, row, one.tangent, (nearer.came, nearer.slope))
+
+
+def _located(corrector: Corrector, one: Spot, other: Spot, kind: str, at: int) -> SpecialPoint | None:
+    """An event between two orbits, by the Illinois form of false position."""
+    low, high, f_low, f_high = 0.0, 1.0, _test(one, kind), _test(other, kind)
+    if not f_low * f_high < 0.0:
+        return None
+    best, side = one if abs(f_low) < abs(f_high) else other, 0
+    part, off = (0.0 if best is one else 1.0), 1.0
+    for _ in range(_HALVINGS):
+        steep = (f_high - f_low) / (high - low)
+        tried = low - f_low / steep
+        try:
+            spot = _between_at(corrector, one, other, tried)
+        except OrbitNotFoundError:
+            off = high - low
+            break
+        value = _test(spot, kind)
+        best, part = spot, tried
+        off = min(2.0 * abs(value / steep), high - low)
+        if not abs(value) > _LOCATED or high - low < 1e-9:
+            break
+        if value * f_high > 0.0:
+            high, f_high = tried, value
+            f_low *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            low, f_low = tried, value
+            f_high *= 0.5 if side == -1 else 1.0
+            side = -1
+    orbit = corrector.orbit(best)
+    # a derivative that is off moves the place at which a multiplier seems to pass, and so does an orbit off its own
+    off += _ACROSS * _unsettled(corrector, best) / float(np.linalg.norm(other.y - one.y))
+    off += _derivative_error(corrector.family.flow, orbit) * abs(
+        1.0 / (_test(other, kind) - _test(one, kind))
+    )
+    found = float(best.y[-1]) * corrector.span
+    error = _moved(corrector, (one, best, other), part, off) + corrector.span * _unsettled(corrector, best)
+    return SpecialPoint(kind, orbit, found, at, error)
+
+
+def _derivative_error(flow: Flow, orbit: PeriodicOrbit) -> float:
+    """Relative error of the return map's derivative."""
+    if not isinstance(flow, Stroboscope):
+        return _ROUNDING
+    return max([_FINE, *(float(told.numbers["relative_error"]) for told in orbit.diagnostics)])
+
+
+def _moved(corrector: Corrector, spots: tuple[Spot, Spot, Spot], part: float, off: float) -> float:
+    """How far the parameter moves if the place between the first and the last orbit is off by *off*.
+
+    It is read off the parabola through the three, since at a fold the parameter moves with the square alone.
+    """
+    first, middle, last = (float(spot.y[-1]) for spot in spots)
+    if not 1e-6 < part < 1.0 - 1e-6:
+        return abs(last - first) * corrector.span * off
+    rise, fall = (middle - first) / part, (last - middle) / (1.0 - part)
+    bend = fall - rise
+    slope = rise + bend * part
+    return (abs(slope) * off + abs(bend) * off**2) * corrector.span
+
+
+def _unsettled(corrector: Corrector, spot: Spot) -> float:
+    """How far an orbit may be off, as a state and over the range of the parameter, since it closes no better."""
+    table = corrector.bordered(spot.came, spot.slope, spot.tangent)
+    residual = max(float(np.linalg.norm(spot.came.x - spot.y[:-1])), _ROUNDING)
+    least = float(np.linalg.svd(table, compute_uv=False)[-1])
+    return residual / least if least > 0.0 else float("nan")
+
+
+def _grazing(corrector: Corrector, one: Spot, other: Spot, at: int) -> SpecialPoint:
+    """Where the number of impacts changes between two orbits, by halving."""
+    sides = [one, other]
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        part = 0.5 * (low + high)
+        try:
+            spot = _between_at(corrector, one, other, part)
+        except OrbitNotFoundError:
+            break
+        if spot.came.impacts == one.came.impacts:
+            low, sides[0] = part, spot
+        else:
+            high, sides[1] = part, spot
+    width = abs(float(sides[1].y[-1] - sides[0].y[-1])) * corrector.span
+    found = float(sides[1].y[-1]) * corrector.span
+    error = width + corrector.span * _unsettled(corrector, sides[1])
+    return SpecialPoint("grazing", corrector.orbit(sides[1]), found, at, error)
+
+
+def grazing_end(corrector: Corrector, spots: list[Spot]) -> SpecialPoint | None:
+    """The grazing that a branch ends at, if its last orbit passes the tip without room to spare.
+
+    The room left, over how fast it went along the branch, is by how much the place is off.
+    """
+    last = spots[-1]
+    if not isinstance(corrector.family.flow, Stroboscope):
+        return None
+    orbit = corrector.orbit(last)
+    scratch = orbit.contact_summary.clearance
+    if not scratch < _TOUCHES:
+        return None
+    error, found = float("nan"), float(last.y[-1]) * corrector.span
+    for before in reversed(spots[:-1]):
+        way = abs(float(before.y[-1]) * corrector.span - found)
+        fell = corrector.orbit(before).contact_summary.clearance - scratch
+        if fell > max(scratch, _ROUNDING):
+            error = 2.0 * scratch * way / fell + corrector.span * _unsettled(corrector, last)
+            break
+    return SpecialPoint("grazing", orbit, found, len(spots) - 1, error)
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_Array = NDArray[np.float64]
+_TOLERANCE = 1e-10
+_EASY, _HARD = 4, 9
+"""Iterations up to which the step grows, and from which on it shrinks."""
+
+
+@checked
+def continuation(
+    orbit: PeriodicOrbit,
+    name: str,
+    bounds: tuple[float, float],
+    *,
+    direction: str = "up",
+    max_points: int = 500,
+    step: float = 0.01,
+    max_step: float = 0.02,
+    tolerance: float = _TOLERANCE,
+) -> Branch:
+    """Follow a periodic orbit, stable or not, along one parameter.
+
+    Folds, period doublings (flips), Neimark-Sacker bifurcations, branch points and grazing are located between the
+    orbits that they are found between.  The branch ends at a limit of the parameter, when it closes, at *max_points* orbits,
+    or where no orbit is found, as under a law of restitution where it grazes; ``branch.end`` says which.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        Of :func:`periodic_orbit`, or of a branch.
+    name : str
+        Parameter, by dotted name or the name in datasets.
+    bounds : pair of float
+        Least and greatest value.
+    direction : {"up", "down"}
+        Which way the parameter goes at first.
+    max_points : int
+        Orbits at most.
+    step, max_step : float
+        First and greatest distance between orbits, in units of the well's amplitude for the state and of the range
+        for the parameter.
+    tolerance : float
+        As of :func:`periodic_orbit`.
+
+    Returns
+    -------
+    Branch
+
+    Raises
+    ------
+    InputError
+        For bad input.
+    """
+    low, high = _limits(bounds)
+    begun = orbit.flow.value(name)
+    if not low <= begun <= high:
+        raise InputError(f"between = ({low:g}, {high:g}): must hold the orbit's own {name} = {begun:g}")
+    choice("direction", direction, ("up", "down"))
+    count = integer("max_points", max_points, 2, 10**6)
+    length, max_step = positive("step", step), positive("max_step", max_step)
+    tell(orbit.diagnostics)
+    corrector = Corrector(
+        Family(orbit.flow, name), orbit.period, high - low, positive("tolerance", tolerance)
+    )
+    y = np.append(orbit.coordinates, begun / corrector.span)
+    came, slope = corrector.derivatives(y)
+    sign = np.zeros(y.size)
+    sign[-1] = 1.0 if direction == "up" else -1.0
+    first = Spot(y, corrector.tangent(came, slope, sign), came, slope, orbit.iterations)
+    return _follow(corrector, first, (low, high), count, min(length, max_step), max_step)
+
+
+def _limits(between: tuple[float, float]) -> tuple[float, float]:
+    try:
+        low, high = (float(value) for value in between)
+    except (TypeError, ValueError):
+        raise InputError(f"between = {shown(between)}: must be a least and a greatest number") from None
+    if not low < high:
+        raise InputError(f"between = ({low:g}, {high:g}): must be increasing")
+    return low, high
+
+
+def _follow(
+    corrector: Corrector, first: Spot, limits: tuple[float, float], most: int, length: float, longest: float
+) -> Branch:
+    spots, events = [first], list[SpecialPoint]()
+    end = f"{most} orbits"
+    shortest = 1e-7 * longest
+    limit = tuple(value / corrector.span for value in limits)
+    while len(spots) < most:
+        last = spots[-1]
+        guess = last.y + length * last.tangent
+        over = next((value for value in limit if (guess[-1] - value) * (last.y[-1] - value) < 0.0), None)
+        row = last.tangent
+        if over is not None:
+            # the last orbit stands at the limit itself
+            guess = last.y + (over - last.y[-1]) / last.tangent[-1] * last.tangent
+            guess[-1], row = over, np.append(np.zeros(guess.size - 1), 1.0)
+        try:
+            spot = corrector.correct(guess, row, last.tangent, (last.came, last.slope))
+            turned = float(spot.tangent @ last.tangent)
+            if np.linalg.norm(spot.y - last.y) > 3.0 * length or turned < 0.5:
+                raise OrbitNotFoundError("the next orbit is too far away, or on another branch")
+            if over is None and not limit[0] <= spot.y[-1] <= limit[1]:
+                raise OrbitNotFoundError("the corrected orbit is beyond the limit")
+            if not corrector.family.flow.smooth and spot.came.impacts != last.came.impacts:
+                raise OrbitNotFoundError("another number of impacts: it grazes")
+        except OrbitNotFoundError as error:
+            length *= 0.5
+            if length < shortest:
+                end = f"no further orbit: {error}"
+                grazing = grazing_end(corrector, spots)
+                if grazing is not None:
+                    events.append(grazing)
+                    end = "grazing"
+                break
+            continue
+        events += between(corrector, last, spot, len(spots) - 1)
+        spots.append(spot)
+        if over is not None:
+            end = "limit of the parameter"
+            break
+        if (
+            len(spots) > 8
+            and np.linalg.norm(spot.y - first.y) < 0.75 * length
+            and spot.tangent @ first.tangent > 0.9
+        ):
+            end = "closed"
+            break
+        if spot.iterations <= _EASY and turned > 0.95:
+            length = min(1.4 * length, longest)
+        elif spot.iterations >= _HARD or turned < 0.8:
+            length *= 0.6
+    orbits = [corrector.orbit(spot) for spot in spots]
+    assert corrector.family.name is not None
+    impacts = [spot.came.impacts for spot in spots]
+    return Branch(corrector.family.name, orbits, events, end, impacts, [spot.tangent for spot in spots])
+
+
+def switch_branch(
+    special_point: SpecialPoint, name: str, bounds: tuple[float, float], *, size: float = 0.01
+) -> PeriodicOrbit:
+    """An orbit of the branch that is born at a flip or a branch point, *size* away from it.
+
+    At a flip it has twice the period.  It is sought on the plane at that distance along the critical eigenvector.
+
+    Parameters
+    ----------
+    special_point : Event
+    name, between
+        As of :func:`continuation`.
+    size : float
+        Distance, in units of the well's amplitude.
+
+    Returns
+    -------
+    Orbit
+        From which :func:`continuation` goes on.
+
+    Raises
+    ------
+    InputError
+        For an event at which no other branch is born.
+    OrbitNotFoundError
+        If there is none at that distance; try another.
+    """
+    if not isinstance(special_point, SpecialPoint) or special_point.kind not in ("flip", "branch point"):
+        raise InputError(f"event = {shown(special_point)}: must be a flip or a branch point")
+    low, high = _limits(bounds)
+    orbit, span = special_point.orbit, high - low
+    doubled = special_point.kind == "flip"
+    values, vectors = np.linalg.eig(orbit.jacobian)
+    vector = vectors[:, np.argmin(np.abs(values - (-1.0 if doubled else 1.0)))].real
+    row = np.append(vector / np.linalg.norm(vector), 0.0)
+    flow: Flow = orbit.flow
+    corrector = Corrector(Family(flow, name), orbit.period * (2 if doubled else 1), span, _TOLERANCE)
+    guess = np.append(orbit.coordinates, special_point.value / span) + positive("size", size) * row
+    spot = corrector.correct(guess, row, row)
+    return corrector.orbit(spot)

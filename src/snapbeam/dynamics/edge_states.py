@@ -1,0 +1,227 @@
+"""Edge states: the state on the border between snapping and not, held there by bisection with the state carried on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.dynamics.bifurcation import least_period
+from snapbeam.dynamics.flow import Flow, Stroboscope, flow_of
+from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, shoot
+from snapbeam.model.integration import Integration
+from snapbeam.model.state import State
+from snapbeam.model.system import System
+from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, integer, positive
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["EdgeState", "edge_tracking", "kicked"]
+
+
+_Array = NDArray[np.float64]
+_PIECES = 16
+"""States between the two that are tried at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeState:
+    """A motion on the border between two outcomes."""
+
+    flow: Flow
+    states: _Array
+    """Once a period, shape (periods, d)."""
+    distance: _Array
+    """Between the two states that hold it, at each."""
+    orbit: PeriodicOrbit | None
+    """The unstable orbit that it comes to, if it comes to one."""
+
+    def to_dataset(self) -> xr.Dataset:
+        """The motion, labelled."""
+        import xarray as xr
+
+        names = getattr(self.flow, "names", tuple(f"x[{i + 1}]" for i in range(self.flow.dimension)))
+        labels = {"units": "1", "long_name": "state on the border once a period"}
+        settled = np.empty((0, self.flow.dimension)) if self.orbit is None else self.orbit.points
+        values = np.empty(0, dtype=complex) if self.orbit is None else self.orbit.multipliers
+        return xr.Dataset(
+            {
+                "state": (("period", "coordinate"), self.states, labels),
+                "bisect_threshold": (
+                    "period",
+                    self.distance,
+                    {"units": "1", "long_name": "distance of the two that hold it"},
+                ),
+                "orbit_state": (
+                    ("orbit_period", "coordinate"),
+                    settled,
+                    {"units": "1", "long_name": "unstable orbit that it settles on, once a period"},
+                ),
+                "multiplier_real": (
+                    "multiplier",
+                    values.real,
+                    {"units": "1", "long_name": "its multipliers"},
+                ),
+                "multiplier_imag": ("multiplier", values.imag, {"units": "1", "long_name": "imaginary part"}),
+            },
+            {"coordinate": list(names)},
+            {"title": "edge state", "period": 0 if self.orbit is None else self.orbit.period},
+        )
+
+    def __repr__(self) -> str:
+        end = "on no orbit" if self.orbit is None else f"on {self.orbit!r}".replace("<", "").replace(">", "")
+        return f"<EdgeState over {len(self.states)} periods, {end}>"
+
+
+@checked
+def edge_tracking(
+    system: System | Flow,
+    u1: State | ArrayLike,
+    u2: State | ArrayLike,
+    *,
+    periods: int = 60,
+    horizon: int = 40,
+    bisect_threshold: float = 1e-9,
+    diverge_threshold: float = 1e-5,
+    outcome: Callable[[Flow, _Array, int], NDArray[np.bool_]] | None = None,
+    integration: Integration | None = None,
+) -> EdgeState:
+    """Follow the border between snapping and not (Skufca, Yorke and Eckhardt, Phys. Rev. Lett. 96 (2006) 174101).
+
+    Of the states between a quiet one and one that snaps, two are found that are *bisect_threshold* apart and differ in their
+    outcome; both are marched on until they are *diverge_threshold*, and the search is taken up again between them.
+
+    Parameters
+    ----------
+    system : System, or a Flow
+    u1, u2 : State or array_like of shape (d,)
+        A state from which the beam does not leave its well within *horizon* periods, and one from which it does.
+    periods : int
+        To follow the border for.
+    horizon : int
+        Periods after which the outcome is told.
+    bisect_threshold, diverge_threshold : float
+        In units of the well's amplitude.
+    outcome : callable, optional
+        ``outcome(flow, states, horizon) -> bool array``, in place of snapping.
+    integration : Integration, optional
+
+    Returns
+    -------
+    EdgeState
+        With the unstable periodic orbit that it settles on, if it does.
+
+    Raises
+    ------
+    InputError
+        For bad input, such as two states of the same outcome.
+    """
+    flow = flow_of(system, integration, "reference")
+    total, ahead = integer("periods", periods, 2, 10**6), integer("horizon", horizon, 1, 10**6)
+    near, far = (
+        positive("bisect_threshold", bisect_threshold),
+        positive("diverge_threshold", diverge_threshold),
+    )
+    if not near < far:
+        raise InputError(f"distance = {near:g}: must be less than diverge_threshold = {far:g}")
+    decide = _snaps if outcome is None else outcome
+    low, high = _row(flow, u1, "u1"), _row(flow, u2, "u2")
+    told = decide(flow, np.stack([low, high]), ahead)
+    if bool(told[0]) or not bool(told[1]):
+        raise InputError(
+            f"quiet, snapping: the outcomes within {ahead} periods are {bool(told[0])} and {bool(told[1])}; must be "
+            "False and True"
+        )
+    low, high = _bisect(flow, low, high, near, ahead, decide)
+    states, distances = [], []
+    for _ in range(total):
+        both = flow.march(np.stack([low, high]), 1).states
+        low, high = both[0], both[1]
+        size = float(np.abs(high - low).max())
+        if not np.isfinite(size):
+            raise InputError("a run failed on the border; use accuracy = 'reference'")
+        states.append(0.5 * (low + high))
+        distances.append(size)
+        if size > far:
+            low, high = _bisect(flow, low, high, near, ahead, decide)
+    path = np.array(states)
+    return EdgeState(flow, path, np.array(distances), _settled(flow, path))
+
+
+def kicked(flow: Stroboscope, size: float | None, horizon: int) -> tuple[_Array, _Array]:
+    """The start of a system, and the same with a velocity of the first mode that makes it snap.
+
+    *size* is that velocity over omega_1 times the well's amplitude; without one it is doubled until the beam snaps.
+    """
+    quiet = flow.coordinates()[0]
+    towards = -np.sign(quiet[0]) or 1.0
+    sizes = [0.1 * 2.0**k for k in range(8)] if size is None else [positive("kick", size)]
+    rows = np.repeat(quiet[None], len(sizes) + 1, axis=0)
+    rows[1:, flow.modes] += towards * np.array(sizes)
+    told = _snaps(flow, rows, integer("horizon", horizon, 1, 10**6))
+    if told[0]:
+        raise InputError(f"the start: it snaps within {horizon} periods by itself; take a weaker drive")
+    if not told.any():
+        raise InputError(
+            f"kick (--initial-velocity) = {sizes[-1]:g}: does not snap within {horizon} periods; take a harder one"
+        )
+    return quiet, rows[int(np.argmax(told))]
+
+
+def _row(flow: Flow, state: State | ArrayLike, name: str) -> _Array:
+    if isinstance(state, State):
+        if not isinstance(flow, Stroboscope):
+            raise InputTypeError(f"{name}: must be an array of {flow.dimension} numbers")
+        return flow.coordinates(state)[0]
+    row = finite_array(name, state)
+    if row.shape != (flow.dimension,):
+        raise InputError(f"{name} of shape {row.shape}: must be {flow.dimension} finite numbers")
+    return row
+
+
+def _snaps(flow: Flow, states: _Array, horizon: int) -> NDArray[np.bool_]:
+    marched = flow.march(states, horizon)
+    if "zero_crossings" not in marched.statistics:
+        raise InputError("outcome: is needed for a flow that is no System")
+    crossed = np.asarray(marched.statistics["zero_crossings"] > 0)
+    if isinstance(flow, Stroboscope):
+        # on the border's way some have crossed before they are looked at again
+        shape, first = flow.system.model.midspan_shape, flow.coordinates()[0]
+        side = states[:, : flow.modes] @ shape * float(first[: flow.modes] @ shape)
+        crossed |= side < 0.0
+    return crossed
+
+
+def _bisect(
+    flow: Flow,
+    low: _Array,
+    high: _Array,
+    near: float,
+    horizon: int,
+    decide: Callable[[Flow, _Array, int], NDArray[np.bool_]],
+) -> tuple[_Array, _Array]:
+    """Two states on a line, *near* each other, the first quiet, the second not."""
+    while float(np.abs(high - low).max()) > near:
+        parts = np.arange(1, _PIECES) / _PIECES
+        rows = low + parts[:, None] * (high - low)
+        told = np.concatenate([[False], decide(flow, rows, horizon), [True]])
+        at = int(np.argmax(told))
+        rows = np.concatenate([low[None], rows, high[None]])
+        low, high = rows[at - 1], rows[at]
+    return low, high
+
+
+def _settled(flow: Flow, path: _Array) -> PeriodicOrbit | None:
+    """The unstable orbit that the last periods repeat."""
+    tail = path[-max(4, len(path) // 3) :]
+    period = int(least_period(tail[None], 1e-3)[0])
+    if period == 0:
+        return None
+    try:
+        return shoot(flow, tail[-1], period, 1e-10, 40)
+    except OrbitNotFoundError:
+        return None

@@ -1,0 +1,585 @@
+"""How long snapping lasts, and how it ends: many starts at every point of a sweep."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+from snapbeam.dynamics.flow import InitialConditions, held_in_space, starts_of
+from snapbeam.model.integration import Integration
+from snapbeam.model.system import System
+from snapbeam.simulation.save import code_flags
+from snapbeam.solver.assemble import cycles_of, make_ensemble, run_columns
+from snapbeam.solver.registry import resolve
+from snapbeam.solver.statistics import statistics_of
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, compute_table
+from snapbeam.sweeps.points import Columns, PointList
+from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
+from snapbeam.sweeps.tasks import PointWork, ResultTable
+from snapbeam.util.status_codes import RunStatus
+from snapbeam.util.validation import InputError, InputTypeError, checked, integer, nonnegative, shown, within
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "LifetimeFit",
+    "LifetimeSettings",
+    "LifetimeWork",
+    "fit_lifetime",
+    "lifetime_map",
+    "proportion",
+    "refit",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# How long something lasts that ends at random: censored maximum likelihood with intervals, and whether it fits.
+#
+# After a delay t0 a transient that forgets its past ends at a constant rate kappa = 1/tau: the share that lasts longer
+# than t is exp(-(t - t0)/tau).  The rate is estimated from d ends in a total time at risk E by kappa = d/E (Lawless,
+# Statistical Models and Methods for Lifetime Data, 2nd ed., 2003, section 4.1).
+
+
+_Array = NDArray[np.float64]
+_JEFFREYS = 0.5
+_REFUSED = 0.01
+"""Goodness below which a later delay is tried."""
+_FEWEST, _TRIALS = 8, 40
+"""Ends that are left at least, beside half of them; delays that are tried at most, about."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LifetimeSettings:
+    """How lifetimes are read from runs.
+
+    Parameters
+    ----------
+    delay : float, optional
+        Cycles t0 from which on ends are counted; by default the first end from which on the exponential is not
+        refused at 1 %, at most half of them left out.  That end says when ends begin and is none of those that say
+        how often they are.
+    settling_cycles : float
+        Cycles without a crossing after which snapping is taken to have ended, greater than 0.  A run that crossed
+        within the last of them is still snapping: its lifetime is only known to be longer.
+    confidence : float
+        Of the intervals, in (0, 1).
+    """
+
+    delay: float | None = None
+    settling_cycles: float = 50.0
+    confidence: float = 0.95
+
+    def __post_init__(self) -> None:
+        if self.delay is not None:
+            nonnegative("delay", self.delay, "cycles")
+        if not nonnegative("settling_cycles", self.settling_cycles, "cycles") > 0.0:
+            raise InputError(f"quiet = {shown(self.settling_cycles)}: must be greater than 0 cycles")
+        within("confidence", self.confidence, 0.0, 1.0)
+
+
+class LifetimeFit(NamedTuple):
+    """An exponential law of lifetimes; arrays of the shape of the batch."""
+
+    lifetime: _Array
+    """tau; NaN where no end says it."""
+    low: _Array
+    high: _Array
+    """Interval of tau; infinite where the ends do not bound it."""
+    delay: _Array
+    """t0; NaN where nothing ended."""
+    ended: NDArray[np.int64]
+    """Ends that count."""
+    lasting: NDArray[np.int64]
+    """Runs that outlived the observation."""
+    goodness: _Array
+    """Probability of so great a distance from the exponential if it holds (Kolmogorov and Smirnov); NaN for fewer
+    than three ends."""
+
+
+def fit_lifetime(
+    time: ArrayLike, ended: ArrayLike, delay: float | None = None, confidence: float = 0.95
+) -> LifetimeFit:
+    """Fit exp(-(t - t0)/tau) to times of which some are only known to be longer.
+
+    Without a given delay, t0 is the first end from which on the exponential is not refused at 1 % (at most half of
+    the ends are left out; if it is refused still, t0 is the first end and ``goodness`` says so).  Since the
+    exponential forgets, what lasts longer is, counted from t0, a sample without a delay, and the interval is that of
+    complete data where every run ended, with 2 d kappa E distributed as chi squared.  With censored times the rate
+    has the posterior of Jeffreys' prior, gamma(d + 1/2, E), whose intervals cover as they say to a percent or so.
+
+    Parameters
+    ----------
+    time : array_like of shape (..., runs)
+        Lifetimes, or for how long a run was seen to last; NaN: no run.
+    ended : array_like of bool of the same shape
+        Whether it ended then.
+    delay : float, optional
+        t0; times before it are left out.
+    confidence : float
+
+    Returns
+    -------
+    LifetimeFit
+    """
+    times, ends = np.broadcast_arrays(np.asarray(time, dtype=np.float64), np.asarray(ended, dtype=bool))
+    if times.ndim == 0:
+        raise InputError("time: must have at least one dimension, of runs")
+    if (times < 0.0).any() or np.isinf(times).any():
+        raise InputError("time: must be at least 0 and finite, or NaN where there is no run")
+    share = within("confidence", confidence, 0.0, 1.0)
+    batch = times.shape[:-1]
+    times, ends = times.reshape(-1, times.shape[-1]), ends.reshape(-1, times.shape[-1])
+    rows = [_fit_one(t[~np.isnan(t)], e[~np.isnan(t)], delay) for t, e in zip(times, ends, strict=True)]
+    begun, count, lasting, exposure, distance, used = (np.array(column) for column in zip(*rows, strict=True))
+    shape = np.where(lasting == 0, count, count + _JEFFREYS)
+    tail = 0.5 * (1.0 - share)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        tau = np.where(count > 0, exposure / count, np.nan)
+        high = np.where(count > 0, exposure / stats.gamma.ppf(tail, np.maximum(shape, 1e-9)), np.inf)
+        low = exposure / stats.gamma.ppf(1.0 - tail, np.maximum(shape, 1e-9))
+    unknown = exposure <= 0.0
+    low = np.where(unknown, 0.0, low)
+    high = np.where(unknown, np.inf, high)
+    tau = np.where(unknown, np.nan, tau)
+    goodness = np.where(used >= 2, stats.kstwo.sf(distance, np.maximum(used, 1)), np.nan)
+    return LifetimeFit(
+        tau.reshape(batch), low.reshape(batch), high.reshape(batch), begun.reshape(batch),
+        count.astype(np.int64).reshape(batch), lasting.astype(np.int64).reshape(batch), goodness.reshape(batch),
+    )  # fmt: skip
+
+
+def _fit_one(times: _Array, ends: NDArray[np.bool_], delay: float | None) -> tuple[float, ...]:
+    """Delay, ends, lasting, time at risk, distance from the exponential and the ends that it was measured with."""
+    if delay is not None:
+        kept = times >= delay
+        return (delay, *_from(times[kept] - delay, ends[kept]))
+    if not ends.any():
+        return np.nan, 0, times.size, float(times.sum()), np.nan, 0
+    moments = np.sort(times[ends])
+    most = moments.size - max(_FEWEST, moments.size // 2)
+    found: tuple[float, ...] = ()
+    for dropped in range(0, max(most, 0) + 1, max(1, moments.size // _TRIALS)):
+        begun = float(moments[dropped])
+        kept = times >= begun
+        first = int(np.flatnonzero(ends & (times == begun))[0])
+        kept[first] = False
+        tried = (begun, *_from(times[kept] - begun, ends[kept]))
+        found = found or tried
+        if not tried[5] >= 2 or stats.kstwo.sf(tried[4], tried[5]) >= _REFUSED:
+            return tried
+    return found
+
+
+def _from(times: _Array, ends: NDArray[np.bool_]) -> tuple[float, ...]:
+    """As :func:`_fit_one`, of times that are counted from the delay."""
+    order = np.argsort(times, kind="stable")
+    times, ends = times[order], ends[order]
+    exposure, count = float(times.sum()), int(ends.sum())
+    # the ends in the time that all runs together were at risk come as those of a Poisson process
+    at_risk = np.arange(times.size, 0, -1)
+    spent = np.cumsum(at_risk * np.diff(times, prepend=0.0))
+    marks = spent[ends] / exposure if exposure > 0.0 else np.empty(0)
+    lasting = int(times.size - count)
+    if lasting == 0:
+        marks = marks[:-1]
+    distance = np.nan
+    if marks.size >= 2:
+        steps = np.arange(marks.size + 1) / marks.size
+        distance = max(float((steps[1:] - marks).max()), float((marks - steps[:-1]).max()))
+    return count, lasting, exposure, distance, marks.size
+
+
+def proportion(hits: ArrayLike, runs: ArrayLike, confidence: float = 0.95) -> tuple[_Array, _Array, _Array]:
+    """A probability from counts, with Jeffreys' interval (Brown, Cai and DasGupta, Stat. Sci. 16 (2001) 101).
+
+    Returns
+    -------
+    share, low, high : arrays
+        NaN, 0 and 1 where there are no runs.
+    """
+    good, total = np.broadcast_arrays(np.asarray(hits, dtype=np.float64), np.asarray(runs, dtype=np.float64))
+    if (good < 0).any() or (good > total).any():
+        raise InputError("hits: must be between 0 and the number of runs")
+    tail = 0.5 * (1.0 - within("confidence", confidence, 0.0, 1.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(total > 0, good / total, np.nan)
+    low = np.where(good > 0, stats.beta.ppf(tail, good + 0.5, total - good + 0.5), 0.0)
+    high = np.where(good < total, stats.beta.ppf(1.0 - tail, good + 0.5, total - good + 0.5), 1.0)
+    return share, low, high
+
+
+def checked_cycles(name: str, values: ArrayLike, most: float) -> NDArray[np.int64]:
+    """Whole numbers of cycles in increasing order, at most *most*."""
+    found = [
+        integer(f"{name}[{i}]", value, 0, int(most)) for i, value in enumerate(np.atleast_1d(values).tolist())
+    ]
+    if not found or (np.diff(found) <= 0).any():
+        raise InputError(f"{name} = {found}: must be increasing whole numbers of cycles")
+    return np.array(found, dtype=np.int64)
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a sweep keeps of many starts at every point: when each snapped last, and where it ended.
+
+
+_PER_START = ("status", "zero_crossings", "late_crossings", "well", "final")
+"""Whole numbers kept of each run: how it ended, crossings in all and in the last quarter, +1 for the well opposite to
+the first one and -1 for that, and whether that end is proved."""
+
+
+@dataclass(frozen=True, eq=False)
+class LifetimeWork(PointWork):
+    """The points of a sweep, each run from many starts."""
+
+    starts: InitialConditions = field(default_factory=InitialConditions)
+
+    @cached_property
+    def integers(self) -> tuple[str, ...]:
+        """Names of the columns of whole numbers."""
+        return tuple(f"{name}_{s}" for name in _PER_START for s in range(self.starts.count))
+
+    @cached_property
+    def numbers(self) -> tuple[str, ...]:
+        """Names of the columns of real numbers."""
+        return tuple(f"last_snap_{s}" for s in range(self.starts.count))
+
+    @property
+    def runs_per_point(self) -> int:
+        """Runs that a point takes."""
+        return self.starts.count
+
+    @cached_property
+    def parameters(self) -> dict[str, Any]:
+        """Everything the numbers depend on, plain."""
+        kept = list(_PER_START)
+        return self.setup.identity() | {"lifetimes": kept, "starts": self.starts.describe()}
+
+    def compute(
+        self, points: Columns, threads: int | None = None, progress: Progress | None = None
+    ) -> ResultTable:
+        """Integrate every run of *points*."""
+        size, count = next(iter(points.values())).size, self.starts.count
+        integers = np.zeros((len(_PER_START), count, size), dtype=np.int32)
+        numbers = np.full((count, size), np.nan)
+        cycle = self._cycles(points)
+        side = -1 if self.setup.system.striker is None or self.setup.system.striker.side == "below" else 1
+        for s in range(count):
+
+            def report(done: int, s: int = s) -> None:
+                if progress is not None:
+                    progress((s * size + done) // count, size)
+
+            found = self._march(points, s, threads, report)
+            integers[0, s], integers[1, s] = found["status"], found["zero_crossings"]
+            integers[2, s] = found["zero_crossings_last_quarter"]
+            integers[3, s] = np.where(found["final_well"] == side, -1, 1)
+            integers[4, s] = found["final_well_proven"]
+            numbers[s] = found["last_zero_crossing"] / cycle
+        return ResultTable(integers.reshape(-1, size).T.copy(), numbers.T.copy())
+
+    def _march(
+        self, points: Columns, number: int, threads: int | None, report: Callable[[int], object]
+    ) -> dict[str, NDArray[Any]]:
+        """Every point from one start.
+
+        A run ends early where it provably snaps no more, and never because it is sure to be called continuous: how
+        long it goes on is what is asked.
+        """
+        setup, found, done = self.setup, dict[str, NDArray[Any]](), 0
+        size = next(iter(points.values())).size
+        for system, integration, which, own in setup.groups(points):
+            begun = self.starts.state(
+                system, number, setup.start_of(system, own), own.get("striker.location")
+            )
+            columns = {name: values for name, values in own.items() if not name.startswith("start.")}
+            ensemble = make_ensemble(system, integration, columns, start=begun)
+            ensemble.runs["decide_crossings"] = -1
+            engine = resolve(
+                integration.engine, modes=system.model.modes, law=ensemble.law, drive=ensemble.drive
+            )[1]
+
+            def inside(finished: int, _: int, before: int = done) -> object:
+                return report(before + finished)
+
+            accumulators_of_runs = engine.run_ensemble(ensemble, threads, inside)
+            for name, values in statistics_of(ensemble, accumulators_of_runs).items():
+                found.setdefault(name, np.zeros(size, dtype=values.dtype))[which] = values
+            done += which.size
+        return found
+
+    def _cycles(self, points: Columns) -> NDArray[np.float64]:
+        """Seconds of a cycle of each point."""
+        cycle = np.empty(next(iter(points.values())).size)
+        for system, _, which, own in self.setup.groups(points):
+            columns = {name: values for name, values in own.items() if not name.startswith("start.")}
+            cycle[which] = cycles_of(system, run_columns(system, columns))
+        return cycle
+
+    def unfinished(self, size: int, status: RunStatus = RunStatus.NOT_RUN) -> ResultTable:
+        """Rows of points that were not computed."""
+        integers = np.zeros((size, len(self.integers)), dtype=np.int32)
+        integers[:, : self.starts.count] = status
+        return ResultTable(integers, np.full((size, len(self.numbers)), np.nan))
+
+    def columns(self, table: ResultTable) -> dict[str, NDArray[Any]]:
+        """What was kept by name, arrays of shape (points, starts)."""
+        count = self.starts.count
+        found: dict[str, NDArray[Any]] = {
+            name: table.integers[:, i * count : (i + 1) * count] for i, name in enumerate(_PER_START)
+        }
+        return found | {"last_snap": table.numbers}
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+TITLE = "lifetimes of the snapping of a struck bistable beam"
+CYCLES = 1000
+"""Cycles of a run unless others are asked for."""
+WELLS = ("first", "other")
+START, WELL, AFTER = "start", "well", "after"
+_REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
+
+
+@checked
+def lifetime_map(
+    system: System,
+    axes: Mapping[str, Any] | xr.Dataset | Any = None,
+    integration: Integration | None = None,
+    *,
+    initial_conditions: InitialConditions | int = 32,
+    settings: LifetimeSettings | None = None,
+    after: ArrayLike | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
+    cluster: str | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> xr.Dataset:
+    """How long snapping lasts and how likely each end is, over any parameters.
+
+    A class after n cycles is one sample of what may be a chaotic transient.  Here every point is run from many
+    starts, with the tip's mid-position fixed in space; a run snaps until its centre crosses zero for the last time,
+    and the share that still snaps, exp(-(t - delay)/lifetime), is fitted to the runs that ended and to those that
+    did not (:func:`~snapbeam.dynamics.lifetimes.fit_lifetime`).
+
+    Parameters
+    ----------
+    system : System
+    axes : optional
+        As of :func:`snapbeam.sweep`; one point, the system as it stands, by default.
+    integration : Integration, optional
+        1000 cycles by default.  Runs end early once they provably snap no more, whatever it says.
+    initial_conditions : Starts or int
+        Starts of each point, the same for all of them.
+    settings : Survival, optional
+        Delay, quiet cycles and confidence.
+    after : array_like of int, optional
+        Cycles n for the probability that a run still snaps then; an eighth, a quarter and a half of the cycles, and
+        all of them less the quiet ones, by default.
+    store, cluster, progress
+        As of :func:`snapbeam.sweep`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over the axes, in cycles: ``lifetime`` with ``lifetime_low`` and ``lifetime_high``, ``delay``,
+        ``goodness`` (the probability of so great a distance from an exponential), ``runs_ended``, ``runs_snapping``,
+        ``runs_never`` (never crossed) and ``runs_failed``; ``end_probability`` over ``well`` and
+        ``snapping_probability`` over ``after``, each with ``_low`` and ``_high``; and for every ``start``:
+        ``last_snap``, ``well`` the run ended about, ``final_well_proven`` and ``status``.
+
+    Raises
+    ------
+    InputError
+        For bad input, and for a store that holds something else.
+    CheckpointError
+        If the store is in use, cannot be written or is damaged beyond repair.
+
+    Examples
+    --------
+    >>> ds = sb.dynamics.lifetime_map(system, {"velocity_amplitude": np.linspace(0.1, 0.6, 20)}, starts=100)  # doctest: +SKIP
+    """
+    if not isinstance(system, System):
+        raise InputTypeError(f"system = {shown(system)}: must be a System")
+    if system.striker is None or system.has_environment:
+        raise InputError(
+            "base, axial, harvester: starts differ by the phase of a striker, and what else moves has a phase to it; "
+            "march a batch of states by sb.advance(system, every=True) and count"
+            if system.has_environment
+            else "striker = None: a beam that nothing strikes does not go on snapping"
+        )
+    integration = Integration() if integration is None else integration
+    if not isinstance(integration, Integration):
+        raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
+    settings = LifetimeSettings() if settings is None else settings
+    if not isinstance(settings, LifetimeSettings):
+        raise InputTypeError(f"survival = {shown(settings)}: must be a Survival")
+    cycles = CYCLES if integration.cycles is None else integration.cycles
+    kernel_input = _after(after, cycles, settings)
+    integration = integration.replace(cycles=cycles, early_termination=True)
+    setup = _setup(held_in_space(system), axes, integration)
+    work = LifetimeWork(setup, None, starts_of(initial_conditions))
+    keeping = checkpoint if isinstance(checkpoint, CheckpointOptions) else CheckpointOptions(checkpoint)
+    table, made = compute_table(work, keeping, cluster=cluster, progress=progress)
+    dataset = _runs(work, table, made)
+    return _single(setup, refit(dataset, settings, kernel_input))
+
+
+def _after(after: ArrayLike | None, cycles: int, survival: LifetimeSettings) -> NDArray[np.int64]:
+    observed = cycles - survival.settling_cycles
+    if observed <= 0.0:
+        raise InputError(
+            f"cycles = {cycles} with quiet = {survival.settling_cycles:g}: must be more than the quiet cycles"
+        )
+    if after is None:
+        after = sorted(
+            {int(part) for part in (cycles / 8, cycles / 4, cycles / 2, observed) if part <= observed}
+        )
+    return checked_cycles("after", after, observed)
+
+
+def _setup(system: System, axes: Any, integration: Integration) -> SweepSetup:
+    if axes is None:
+        assert system.striker is not None
+        axes = PointList({"striker.location": np.array([system.striker.location])})
+    return sweep_setup(system, axes, integration)
+
+
+def _single(setup: SweepSetup, dataset: xr.Dataset) -> xr.Dataset:
+    one = isinstance(setup.points, PointList) and tuple(setup.points.columns) == ("striker.location",)
+    return dataset.isel(point=0) if one and setup.points.size == 1 else dataset
+
+
+def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Dataset:
+    """What was kept of every run, labelled."""
+    import xarray as xr
+
+    setup, points = work.setup, work.setup.points
+    more = made | {f"starts_{name}": _plain(value) for name, value in work.starts.describe().items()}
+    attrs = setup.attributes(TITLE, more)
+    dataset = xr.Dataset(coords=setup.coordinates(), attrs=attrs)
+    dims = (*points.dims, START)
+    kept = work.columns(table)
+    failed = ~np.isin(kept["status"], _REACHED)
+    columns: dict[str, tuple[Any, str, str, dict[str, Any]]] = {
+        "last_snap": (kept["last_snap"], "1", "cycle of the last crossing; NaN: never, or not known", {}),
+        "snaps": (kept["zero_crossings"], "1", "crossings of the centre", {}),
+        "late_snaps": (kept["late_crossings"], "1", "crossings in the last quarter of the run", {}),
+        "end_well": (
+            np.where(failed, 0, kept["well"]), "1", "well that the run ended about",
+            {"flag_values": np.array([-1, 0, 1], dtype=np.int8), "flag_meanings": "first unknown other"},
+        ),
+        "final_well_proven": (kept["final"] != 0, "1", "whether the run provably ends there", {}),
+        "status": (kept["status"], "1", "status of the run", code_flags(RunStatus)),
+    }  # fmt: skip
+    kinds = {"last_snap": "float64", "snaps": "int32", "late_snaps": "int32", "final_well_proven": "bool"}
+    for name, (values, unit, words, labels) in columns.items():
+        if name == "last_snap":
+            values = np.where(failed, np.nan, values)
+        array = points.arranged(np.asarray(values).astype(kinds.get(name, "int8")))
+        dataset[name] = (dims, array, {"units": unit, "long_name": words} | labels)
+    return dataset
+
+
+def _plain(value: Any) -> Any:
+    return int(value) if isinstance(value, bool) else value
+
+
+def refit(
+    dataset: xr.Dataset, survival: LifetimeSettings | None = None, after: ArrayLike | None = None
+) -> xr.Dataset:
+    """The lifetimes and probabilities of a lifetime map again, with another delay, quiet time or confidence.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`lifetime_map`.
+    settings : Survival, optional
+    after : array_like of int, optional
+        As of :func:`lifetime_map`; those of the dataset by default.
+
+    Returns
+    -------
+    xarray.Dataset
+    """
+    if "last_snap" not in dataset or START not in dataset["last_snap"].dims:
+        raise InputError("dataset: holds no lifetimes of starts")
+    survival = LifetimeSettings() if survival is None else survival
+    cycles = float(dataset.attrs["cycles"])
+    if after is None:
+        after = dataset[AFTER].values if AFTER in dataset.coords else None
+    kernel_input = _after(after, int(cycles), survival)
+    result = dataset.drop_dims([name for name in (AFTER, WELL) if name in dataset.dims])
+    runs = result.transpose(..., START)
+    dims = runs["last_snap"].dims[:-1]
+    last, status = runs["last_snap"].values, runs["status"].values
+    good = np.isin(status, _REACHED)
+    snapped = good & np.isfinite(last)
+    # what ended early provably snaps no more
+    settled = runs["final_well_proven"].values.astype(bool) | (status == int(RunStatus.EARLY_STOP))
+    observed = cycles - survival.settling_cycles
+    lasting = snapped & ~settled & (last > observed)
+    time = np.where(snapped, np.where(lasting, np.minimum(last, observed), last), np.nan)
+    fit = fit_lifetime(time, snapped & ~lasting, survival.delay, survival.confidence)
+    words: dict[str, tuple[Any, str]] = {
+        "lifetime": (fit.lifetime, "lifetime of snapping, in cycles"),
+        "lifetime_low": (fit.low, "lower limit of the lifetime"),
+        "lifetime_high": (fit.high, "upper limit of the lifetime"),
+        "delay": (fit.delay, "delay before runs end, in cycles"),
+        "goodness": (fit.goodness, "probability of so great a distance from an exponential"),
+        "runs_ended": (fit.ended, "runs that say how often snapping ends"),
+        "runs_snapping": (lasting.sum(axis=-1), "runs that still snapped at the end"),
+        "runs_never": ((good & ~snapped).sum(axis=-1), "runs that never snapped"),
+        "runs_failed": ((~good).sum(axis=-1), "runs that failed"),
+    }
+    for name, (values, text) in words.items():
+        result[name] = (dims, values, {"units": "1", "long_name": text})
+    _probabilities(result, dims, good, time, lasting, runs["end_well"].values, kernel_input, survival)
+    result.attrs |= {"quiet": survival.settling_cycles, "confidence": survival.confidence}
+    return result
+
+
+def _probabilities(
+    result: xr.Dataset,
+    dims: tuple[Any, ...],
+    good: NDArray[np.bool_],
+    time: NDArray[np.float64],
+    lasting: NDArray[np.bool_],
+    well: NDArray[np.int8],
+    kernel_input: NDArray[np.int64],
+    survival: LifetimeSettings,
+) -> None:
+    """Enter the probability of each end, and of snapping on after some cycles."""
+    total = good.sum(axis=-1)
+    ended = good & ~lasting
+    hits = np.stack([(ended & (well == side)).sum(axis=-1) for side in (-1, 1)], axis=-1)
+    result[WELL] = ((WELL,), list(WELLS), {"long_name": "well that a run ends about"})
+    _enter(result, "end_probability", (*dims, WELL), hits, total, "probability of ending in a well", survival)
+    on = np.stack([(good & (time > cycle)).sum(axis=-1) + (lasting & (time == cycle)).sum(axis=-1)
+                   for cycle in kernel_input], axis=-1)  # fmt: skip
+    result[AFTER] = ((AFTER,), kernel_input, {"units": "1", "long_name": "cycles"})
+    words = "probability of snapping on after so many cycles"
+    _enter(result, "snapping_probability", (*dims, AFTER), on, total, words, survival)
+
+
+def _enter(
+    result: xr.Dataset,
+    name: str,
+    dims: tuple[Any, ...],
+    hits: NDArray[np.int64],
+    total: NDArray[np.int64],
+    words: str,
+    survival: LifetimeSettings,
+) -> None:
+    parts = proportion(hits, np.broadcast_to(total[..., None], hits.shape), survival.confidence)
+    for ending, values, text in zip(
+        ("", "_low", "_high"), parts, ("", "lower limit: ", "upper limit: "), strict=True
+    ):
+        result[f"{name}{ending}"] = (dims, values, {"units": "1", "long_name": f"{text}{words}"})

@@ -1,1 +1,0 @@
-"""Periodic orbits, stable or not: shooting, multipliers, branches along a parameter."""

@@ -1,0 +1,659 @@
+"""Periodic orbits: found by shooting, stable or not, with their Floquet multipliers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of
+from snapbeam.model.integration import Integration
+from snapbeam.model.parameters import lookup
+from snapbeam.model.state import State
+from snapbeam.model.system import System
+from snapbeam.simulation.simulate import simulate
+from snapbeam.solver.cpu.driver import usable_cores
+from snapbeam.util.diagnostics import Diagnostic, tell, to_json
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    checked,
+    finite_array,
+    integer,
+    positive,
+    shown,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "Corrector",
+    "Family",
+    "OrbitNotFoundError",
+    "Passage",
+    "PeriodicOrbit",
+    "Return",
+    "Shot",
+    "Spot",
+    "jacobian",
+    "newton",
+    "passage_of",
+    "periodic_orbit",
+    "shoot",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Newton shooting: states that a flow brings back, and the derivative of the flow there.
+
+
+_STENCIL = ((1, 3.0 / 4.0), (2, -3.0 / 20.0), (3, 1.0 / 60.0))
+_STEP = 2e-4
+"""Of the differences of order six that stand for the tangent flow where the force jumps."""
+_SHRINKINGS = 7
+"""Times that it is quartered where states beside each other meet the tip unequally often."""
+_SPLIT = 16
+"""Tangents from which on they are shared among threads."""
+_LONGEST = 0.25
+"""Longest step of Newton's method, in units of the well's amplitude."""
+_SLOW = 0.25
+"""Factor by which a step must lessen the residual, or else the derivative is taken anew."""
+
+
+class OrbitNotFoundError(RuntimeError):
+    """No orbit was found: the message says why, and what to try."""
+
+
+class Shot(NamedTuple):
+    """What Newton's method came to."""
+
+    x: _Array
+    jacobian: _Array
+    """Of the return map there, or near it."""
+    residual: float
+    iterations: int
+    exact: bool
+    """Whether the derivative was taken at *x* itself."""
+
+
+class Family:
+    """A flow over one parameter, at any value of it.
+
+    Parameters
+    ----------
+    flow : Flow
+    name : str, optional
+        Parameter that may be changed; without one the flow stays as it is.
+    """
+
+    def __init__(self, flow: Flow, name: str | None = None) -> None:
+        self.flow = flow
+        self.name = name
+        self._beside = name is not None and (not isinstance(flow, Stroboscope) or lookup(name).is_run)
+
+    def march(
+        self, x: _Array, periods: int, value: float | None = None, tangents: _Array | None = None
+    ) -> Marched:
+        """Take states of shape (runs, d) some periods on, at one value of the parameter."""
+        if value is None or self.name is None:
+            return self.flow.march(x, periods, tangents=tangents)
+        if self._beside:
+            points = {self.name: np.full(len(x), value)}
+            return self.flow.march(x, periods, tangents=tangents, points=points)
+        return self.at(value).march(x, periods, tangents=tangents)
+
+    def at(self, value: float) -> Flow:
+        """The flow at a value of the parameter."""
+        assert self.name is not None
+        return self.flow.neighbour(self.name, value)
+
+    def slope(self, x: _Array, periods: int, value: float, step: float) -> _Array:
+        """Derivative by the parameter of where the flow brings one state, shape (d,)."""
+        if not self._beside or self.name is None:
+            above, below = (
+                self.march(x[None], periods, value + sign * step).states[0] for sign in (1.0, -1.0)
+            )
+        else:
+            points = {self.name: np.array([value + step, value - step])}
+            above, below = self.flow.march(np.repeat(x[None], 2, axis=0), periods, points=points).states
+        change: _Array = (above - below) / (2.0 * step)
+        return change
+
+
+class Return(NamedTuple):
+    """Where the flow brings one state, and the derivative of that by the state."""
+
+    x: _Array
+    jacobian: _Array
+    """Shape (d, d)."""
+    impacts: int
+    """On the way; -1 where it is not told."""
+
+
+def jacobian(family: Family, x: _Array, periods: int, value: float | None = None) -> Return:
+    """One state some periods on, with the derivative of where it comes to."""
+    size = x.size
+    if not family.flow.smooth:
+        return _by_differences(family, x, periods, value)
+    shares = min(usable_cores(), max(1, size // _SPLIT))
+    shares = next(count for count in range(shares, 0, -1) if size % count == 0)
+    tangents = np.eye(size).reshape(shares, size // shares, size)
+    marched = family.march(np.repeat(x[None], shares, axis=0), periods, value, tangents)
+    assert marched.tangents is not None
+    return Return(marched.states[0], marched.tangents.reshape(size, size).T, _impacts(marched))
+
+
+def _by_differences(family: Family, x: _Array, periods: int, value: float | None) -> Return:
+    """As :func:`jacobian`, from states beside it that meet the tip as often as it does."""
+    size, step = x.size, _STEP
+    weights = np.array([weight for _, weight in _STENCIL])
+    for _ in range(_SHRINKINGS):
+        moves = np.concatenate([sign * k * step * np.eye(size) for k, _ in _STENCIL for sign in (1.0, -1.0)])
+        marched = family.march(np.concatenate([x[None], x + moves]), periods, value)
+        contact_event = marched.statistics.get("impacts")
+        if contact_event is None or (contact_event == contact_event[0]).all():
+            break
+        step *= 0.25
+    table = marched.states[1:].reshape(len(_STENCIL), 2, size, size)
+    slopes = np.einsum("k,kij->ij", weights, table[:, 0] - table[:, 1]) / step
+    return Return(marched.states[0], slopes.T, _impacts(marched))
+
+
+def _impacts(marched: Marched) -> int:
+    return int(marched.statistics["impacts"][0]) if "impacts" in marched.statistics else -1
+
+
+def newton(
+    residual: Callable[[_Array], _Array],
+    derivative: Callable[[_Array], tuple[_Array, _Array]],
+    x: _Array,
+    tolerance: float,
+    iterations: int,
+    first: _Array | None = None,
+    deflate: tuple[_Array, ...] = (),
+) -> Shot:
+    """A root of *residual* by Newton's method, its derivative kept by Broyden's updates as long as steps gain by it.
+
+    Parameters
+    ----------
+    residual, derivative : callable
+        r(x), and r(x) with its derivative.
+    first : array, optional
+        A derivative to begin with.
+    deflate : tuple of arrays
+        Roots to stay away from (Farrell, Birkisson and Funke, SIAM J. Sci. Comput. 37 (2015) A2026).
+
+    Raises
+    ------
+    OrbitNotFoundError
+    """
+    fresh = first is None
+    if first is None:
+        r, slope = derivative(x)
+    else:
+        r, slope = residual(x), first
+    size = float(np.abs(r).max())
+    for count in range(iterations):
+        if not np.isfinite(size):
+            raise OrbitNotFoundError(
+                "a run failed on the way; begin nearer to the orbit, or with accuracy = 'reference'"
+            )
+        if size <= tolerance and not (deflate and _near(x, deflate)):
+            return Shot(x, slope, size, count, fresh)
+        try:
+            step: NDArray[Any] = np.linalg.solve(slope, -r)
+        except np.linalg.LinAlgError:
+            raise OrbitNotFoundError(
+                "the derivative is singular, as it is at a fold; change the parameter a little"
+            ) from None
+        step = _deflated(x, step, deflate)
+        reach = float(np.abs(step).max())
+        if reach > _LONGEST:
+            step *= _LONGEST / reach
+        found = residual(x + step)
+        new = float(np.abs(found).max())
+        if not new < size * (_SLOW if not fresh else 1.0) and new > tolerance:
+            if not fresh:
+                # the kept derivative no longer serves
+                r, slope = derivative(x)
+                size, fresh = float(np.abs(r).max()), True
+                continue
+            for _ in range(6):
+                if deflate or new < size:
+                    break
+                step *= 0.5
+                found = residual(x + step)
+                new = float(np.abs(found).max())
+            else:
+                raise OrbitNotFoundError(
+                    f"Newton's method stands still at a residual of {size:.2g}, in units of the well's amplitude; "
+                    "begin nearer to the orbit (transient=..., another period), or with accuracy = 'reference'"
+                )
+        slope = slope + np.outer(found - r - slope @ step, step) / float(step @ step)
+        x, r, size, fresh = x + step, found, new, False
+    raise OrbitNotFoundError(
+        f"no convergence in {iterations} iterations, the residual is {size:.2g} in units of the well's amplitude; "
+        "begin nearer to the orbit (transient=...), try another period, or more iterations"
+    )
+
+
+def _near(x: _Array, known: tuple[_Array, ...]) -> bool:
+    return any(float(np.abs(x - other).max()) < 1e-6 for other in known)
+
+
+def _deflated(x: _Array, step: _Array, known: tuple[_Array, ...]) -> _Array:
+    """Newton's step of the residual times a product of (1 + 1/|x - root|^2)."""
+    along = 0.0
+    for other in known:
+        away = x - other
+        square = float(away @ away)
+        if square == 0.0:
+            raise OrbitNotFoundError("the guess is an orbit that is to be left out; begin elsewhere")
+        along += -2.0 * float(away @ step) / (square * (square + 1.0))
+    if along == 1.0:
+        return step
+    return step / (1.0 - along)
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a run does within its periods: impacts, how near it passes the tip without touching, how far it goes.
+
+
+_SAMPLES = 400
+"""A period."""
+
+
+class Passage(NamedTuple):
+    """Some periods of a run."""
+
+    impacts: int
+    clearance: float
+    """Least gap, over the length scale b, at which the beam turns back from the tip without touching; NaN: never."""
+    least_penetration: float
+    """Greatest penetration of the lightest impact, over b; NaN: none."""
+    least_impulse: float
+    """Of an impact, N s; NaN: none."""
+    peak_displacement: float
+    """Greatest distance of the contact point from the straight beam, over b."""
+    crossings: int
+
+
+def passage_of(flow: Stroboscope, coordinates: _Array, periods: int) -> Passage:
+    """Follow one state for some periods and look at every approach."""
+    system = flow.starting(flow.state(coordinates))
+    integration = flow.integration.replace(cycles=periods, early_termination=False)
+    run = simulate(
+        system, integration, sample_times=np.linspace(0.0, periods * flow.period, _SAMPLES * periods + 1)
+    )
+    data = run.dataset
+    time = data["time"].values
+    depth = data["penetration_normalised"].values
+    held, spacing = np.zeros(time.size, dtype=bool), 1.000001 * (time[1] - time[0])
+    onset, duration = run.impacts["onset"].values, run.impacts["duration"].values
+    for begun, lasted in zip(onset, duration, strict=True):
+        held |= (time >= begun - spacing) & (time <= begun + lasted + spacing)
+    lightest = least = np.nan
+    deepest = []
+    for begun, lasted in zip(onset, duration, strict=True):
+        inside = depth[(time >= begun) & (time <= begun + lasted)]
+        deepest.append(float(inside.max(initial=0.0)))
+    if onset.size:
+        lightest = min(deepest)
+        least = float(run.impacts["impulse"].values.min())
+    return Passage(
+        int(onset.size), _turn_back(time, depth, held), lightest, least,
+        float(np.abs(data["displacement_at_striker"].values).max()),
+        int(run.summary.zero_crossings),
+    )  # fmt: skip
+
+
+def _turn_back(time: _Array, depth: _Array, held: NDArray[np.bool_]) -> float:
+    """Least gap at a turning point of the gap apart from contact, by the parabola through three samples."""
+    best = np.nan
+    inner = np.arange(1, time.size - 1)
+    free = ~(held[inner - 1] | held[inner] | held[inner + 1])
+    turns = inner[free & (depth[inner] >= depth[inner - 1]) & (depth[inner] > depth[inner + 1])]
+    for i in turns:
+        before, here, after = depth[i - 1], depth[i], depth[i + 1]
+        bend = before - 2.0 * here + after
+        top = here if bend == 0.0 else here - (after - before) ** 2 / (8.0 * bend)
+        best = np.nanmin([best, max(-top, 0.0)])
+    return float(best)
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_Array = NDArray[np.float64]
+_Complex = NDArray[np.complex128]
+_SAME = 1e-7
+"""Distance, over the well's amplitude, below which an orbit closes after fewer periods already."""
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicOrbit:
+    """A state that comes back after some periods of the drive."""
+
+    flow: Flow
+    coordinates: _Array
+    """The state in the coordinates of the flow, shape (d,)."""
+    period: int
+    """Periods of the drive, m."""
+    jacobian: _Array
+    """Derivative of the return map, in those coordinates, shape (d, d)."""
+    residual: float
+    """Greatest coordinate of the state that came back less the one that set out."""
+    iterations: int
+
+    @cached_property
+    def multipliers(self) -> _Complex:
+        """Floquet multipliers, largest first, shape (d,)."""
+        values = np.linalg.eigvals(self.jacobian).astype(np.complex128)
+        order = np.lexsort((-values.imag, -np.round(np.abs(values), 12)))
+        return values[order]
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether every multiplier is inside the unit circle."""
+        return bool(np.abs(self.multipliers[0]) < 1.0)
+
+    @property
+    def unstable(self) -> int:
+        """Multipliers outside the unit circle."""
+        return int((np.abs(self.multipliers) > 1.0).sum())
+
+    @cached_property
+    def log_determinant(self) -> float:
+        """Logarithm of the product of the multipliers' sizes."""
+        return float(np.linalg.slogdet(self.jacobian)[1])
+
+    @cached_property
+    def points(self) -> _Array:
+        """The orbit once a period of the drive, shape (m, d)."""
+        marched = self.flow.march(self.coordinates[None], self.period, every=True)
+        assert marched.every is not None
+        return np.concatenate([self.coordinates[None], marched.every[0, :-1]])
+
+    @cached_property
+    def minimal_period(self) -> int:
+        """The fewest periods of the drive after which it closes already."""
+        for divisor in range(1, self.period):
+            if self.period % divisor == 0:
+                apart = np.abs(self.points[divisor] - self.points[0]).max()
+                if apart < _SAME:
+                    return divisor
+        return self.period
+
+    @property
+    def state(self) -> State:
+        """The state that comes back, for :func:`snapbeam.advance` and as a system's start."""
+        return self._stroboscope.state(self.coordinates)
+
+    @property
+    def system(self) -> System:
+        """The system, starting on the orbit."""
+        return self._stroboscope.starting(self.state)
+
+    @cached_property
+    def contact_summary(self) -> Passage:
+        """What it does on its way: impacts, how near it passes the tip, how far it goes."""
+        return passage_of(self._stroboscope, self.coordinates, self.period)
+
+    @property
+    def diagnostics(self) -> tuple[Diagnostic, ...]:
+        """What is doubtful about the multipliers."""
+        return getattr(self.flow, "diagnostics", ())
+
+    @property
+    def _stroboscope(self) -> Stroboscope:
+        if not isinstance(self.flow, Stroboscope):
+            raise InputTypeError("orbit: is of a flow that is no System")
+        return self.flow
+
+    def to_dataset(self) -> xr.Dataset:
+        """The orbit once a period, and its multipliers, labelled."""
+        import xarray as xr
+
+        names = getattr(self.flow, "names", tuple(f"x[{i + 1}]" for i in range(self.coordinates.size)))
+        values = self.multipliers
+        return xr.Dataset(
+            {
+                "state": (
+                    ("period", "coordinate"),
+                    self.points,
+                    {"units": "1", "long_name": "state once a period"},
+                ),
+                "multiplier_real": (
+                    "multiplier",
+                    values.real,
+                    {"units": "1", "long_name": "Floquet multiplier"},
+                ),
+                "multiplier_imag": (
+                    "multiplier",
+                    values.imag,
+                    {"units": "1", "long_name": "its imaginary part"},
+                ),
+            },
+            {"coordinate": list(names)},
+            {
+                "period": self.period,
+                "residual": self.residual,
+                "stable": int(self.is_stable),
+                "diagnostics": to_json(self.diagnostics),
+            },
+        )
+
+    def __repr__(self) -> str:
+        kind = "stable" if self.is_stable else f"unstable ({self.unstable})"
+        size = abs(self.multipliers[0])
+        return f"<Orbit of period {self.period}: {kind}, largest multiplier {size:.6g}>"
+
+
+@checked
+def periodic_orbit(
+    system: System | Flow,
+    guess: State | ArrayLike | PeriodicOrbit | None = None,
+    period: int = 1,
+    integration: Integration | None = None,
+    *,
+    phase: float | None = None,
+    transient: int = 0,
+    tolerance: float = 1e-11,
+    iterations: int = 40,
+    deflate: Sequence[PeriodicOrbit] = (),
+) -> PeriodicOrbit:
+    """The periodic orbit near a state, stable or not, by Newton shooting with the tangent flow.
+
+    The tip's mid-position is fixed in space, where it is at the system's start.  Solves P^m(x) = x for the map P over
+    one period of the drive.
+
+    Parameters
+    ----------
+    system : System, or a Flow
+    guess : State, array_like of shape (d,) or Orbit, optional
+        A state near the orbit, at the phase; the system's start by default.
+    period : int
+        Periods of the drive after which it closes, m.
+    integration : Integration, optional
+        ``accuracy="reference"`` by default: a derivative is no better than the steps it is taken of.  At level
+        ``"standard"`` it is off by up to 2 %, which is warned of.
+    phase : float, optional
+        Of the drive at which the orbit is seen, rad; where no contact begins, ends or lasts no time.
+    transient : int
+        Periods to march from the guess first, which brings it to what attracts it.
+    tolerance : float
+        Greatest coordinate that may remain, in units of the well's amplitude and of omega_1 times it.
+    iterations : int
+    deflate : sequence of Orbit
+        Orbits that are known and are not to be found again.
+
+    Returns
+    -------
+    Orbit
+
+    Raises
+    ------
+    InputError
+        For bad input.
+    OrbitNotFoundError
+        If none is found: the message says why, and what to try.
+    """
+    flow = flow_of(system, integration, "reference")
+    if isinstance(flow, Stroboscope):
+        if flow.system.primary_excitation is None:
+            raise InputError("striker = None: a beam that nothing moves has no orbit but rest")
+        if phase is not None:
+            flow = Stroboscope(flow.system, flow.integration, phase)
+    elif phase is not None:
+        raise InputError(f"phase = {shown(phase)}: is for a System")
+    periods = integer("period", period, 1, 10_000)
+    allowed = positive("tolerance", tolerance)
+    x = _guess_of(flow, guess)
+    before = integer("transient", transient, 0, 10**7)
+    if before:
+        x = flow.march(x[None], before).states[0]
+        if not np.isfinite(x).all():
+            raise OrbitNotFoundError("the run from the guess failed; see its status with sb.advance")
+    tell(getattr(flow, "diagnostics", ()))
+    if not all(isinstance(orbit, PeriodicOrbit) for orbit in deflate):
+        raise InputTypeError(f"deflate = {shown(deflate)}: must be orbits, as periodic_orbit gives")
+    known = tuple(point for orbit in deflate for point in orbit.points)
+    return shoot(flow, x, periods, allowed, integer("iterations", iterations, 1, 10_000), deflate=known)
+
+
+def _guess_of(flow: Flow, guess: State | ArrayLike | PeriodicOrbit | None) -> _Array:
+    if isinstance(guess, PeriodicOrbit):
+        return np.array(guess.coordinates)
+    if guess is None or isinstance(guess, State):
+        if not isinstance(flow, Stroboscope):
+            raise InputTypeError(f"guess = {shown(guess)}: must be an array of {flow.dimension} numbers")
+        if isinstance(guess, State) and guess.batch:
+            raise InputError(f"guess: a batch of shape {guess.batch}: must be one state")
+        return flow.coordinates(guess)[0]
+    array = finite_array("guess", guess, 1)
+    if array.size != flow.dimension:
+        raise InputError(f"guess of {array.size} numbers: must have {flow.dimension}")
+    return array
+
+
+def shoot(
+    flow: Flow,
+    x: _Array,
+    period: int,
+    tolerance: float,
+    iterations: int,
+    first: _Array | None = None,
+    deflate: tuple[_Array, ...] = (),
+) -> PeriodicOrbit:
+    """Newton's method for P^m(x) = x; *first* is a derivative of P^m to begin with."""
+    one, family = np.eye(x.size), Family(flow)
+
+    def residual(at: _Array) -> _Array:
+        return family.march(at[None], period).states[0] - at
+
+    def derivative(at: _Array) -> tuple[_Array, _Array]:
+        came = jacobian(family, at, period)
+        return came.x - at, came.jacobian - one
+
+    shot = newton(
+        residual, derivative, x, tolerance, iterations, None if first is None else first - one, deflate
+    )
+    came = jacobian(family, shot.x, period)
+    return PeriodicOrbit(
+        flow, shot.x, period, came.jacobian, float(np.abs(came.x - shot.x).max()), shot.iterations
+    )
+
+
+# ----------------------------------------------------------------------------------------------------
+# Orbits on planes across a branch: the prediction along its tangent is corrected there (Keller 1977).
+
+
+_ITERATIONS = 14
+_DIFFERENCE = 2e-6
+"""Of the difference by the parameter, over its range."""
+
+
+class Spot(NamedTuple):
+    """One orbit of a branch."""
+
+    y: _Array
+    """State, and the parameter over its range."""
+    tangent: _Array
+    came: Return
+    slope: _Array
+    """Derivative of the return map by the parameter over its range."""
+    iterations: int
+
+
+@dataclass(frozen=True, eq=False)
+class Corrector:
+    """Finds orbits on planes across a branch."""
+
+    family: Family
+    period: int
+    span: float
+    tolerance: float
+
+    def bordered(self, came: Return, slope: _Array, row: _Array) -> _Array:
+        """Derivative of the equations of an orbit and a plane."""
+        size = slope.size
+        table = np.empty((size + 1, size + 1))
+        table[:size, :size] = came.jacobian - np.eye(size)
+        table[:size, size] = slope
+        table[size] = row
+        return table
+
+    def derivatives(self, y: _Array) -> tuple[Return, _Array]:
+        """The return map and its derivatives at a state and a value."""
+        value = float(y[-1]) * self.span
+        came = jacobian(self.family, y[:-1], self.period, value)
+        step = _DIFFERENCE * self.span
+        return came, self.family.slope(y[:-1], self.period, value, step) * self.span
+
+    def correct(
+        self, guess: _Array, row: _Array, before: _Array, known: tuple[Return, _Array] | None = None
+    ) -> Spot:
+        """The orbit on the plane through *guess* across *row*; its tangent goes on as *before* does.
+
+        Raises
+        ------
+        OrbitNotFoundError
+        """
+
+        def residual(y: _Array) -> _Array:
+            value = float(y[-1]) * self.span
+            there = self.family.march(y[None, :-1], self.period, value).states[0]
+            return np.append(there - y[:-1], row @ (y - guess))
+
+        def derivative(y: _Array) -> tuple[_Array, _Array]:
+            came, slope = self.derivatives(y)
+            return np.append(came.x - y[:-1], row @ (y - guess)), self.bordered(came, slope, row)
+
+        first = None if known is None else self.bordered(*known, row)
+        shot = newton(residual, derivative, guess, self.tolerance, _ITERATIONS, first)
+        came, slope = self.derivatives(shot.x)
+        if not np.isfinite(came.jacobian).all() or not np.isfinite(slope).all():
+            raise OrbitNotFoundError("a run beside the orbit failed")
+        return Spot(shot.x, self.tangent(came, slope, before), came, slope, shot.iterations)
+
+    def tangent(self, came: Return, slope: _Array, before: _Array) -> _Array:
+        """Of the branch, of length one, towards where *before* points."""
+        wanted = np.zeros(slope.size + 1)
+        wanted[-1] = 1.0
+        try:
+            found = np.linalg.solve(self.bordered(came, slope, before), wanted)
+        except np.linalg.LinAlgError:
+            return before
+        return found / np.linalg.norm(found)
+
+    def orbit(self, spot: Spot) -> PeriodicOrbit:
+        """As an orbit of the flow at its value."""
+        came, x = spot.came, spot.y[:-1]
+        residual = float(np.abs(came.x - x).max())
+        flow = self.family.at(float(spot.y[-1]) * self.span)
+        return PeriodicOrbit(flow, x, self.period, came.jacobian, residual, spot.iterations)

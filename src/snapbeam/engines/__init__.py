@@ -1,1 +1,0 @@
-"""Time: the engines by name, what they are asked for and what they answer."""

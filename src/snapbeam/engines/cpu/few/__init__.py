@@ -1,1 +1,0 @@
-"""Eight runs in a register, one mode a variable: the layout for few modes."""

@@ -1,1 +1,0 @@
-"""The CUDA engine: a block of threads a trajectory."""

@@ -1,1 +1,0 @@
-"""What every engine compiles: the physics, signals, decisions and compositions, as functions of numbers."""

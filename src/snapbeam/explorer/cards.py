@@ -1,0 +1,1170 @@
+"""The card of the map: which cut is shown, what the pointer is over, which windows are computed."""
+
+from __future__ import annotations
+
+import html
+import tempfile
+import time
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import panel as pn
+from numpy.typing import NDArray
+
+from snapbeam import InputError, Integration, ResponseClass, System, write_netcdf
+from snapbeam.explorer.address import Address, number
+from snapbeam.explorer.jobs import (
+    CYCLES,
+    MODES,
+    UPLOAD,
+    WINDOW_SECONDS,
+    Downloads,
+    Token,
+    Waiting,
+    drawing,
+    file_bytes,
+    too_large,
+)
+from snapbeam.explorer.map_view import MapView
+from snapbeam.explorer.maps import (
+    Plane,
+    Point,
+    Scatter,
+    Window,
+    compute,
+    integration_mapping,
+    map_command,
+    plain,
+    planned,
+    python_lines,
+    run_command,
+    system_toml,
+)
+from snapbeam.explorer.shared import Shared
+from snapbeam.explorer.style import Look, styled
+from snapbeam.model.parameter_file import Config, config_from_mapping
+from snapbeam.model.parameters import Parameter, lookup, parameters
+from snapbeam.plot.style import CLASS_COLORS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from snapbeam import Run
+    from snapbeam.explorer.page import Page
+
+__all__ = ["MapCard", "SystemCard", "TakeCard", "WindowControl", "changed_parameters", "window_dataset"]
+
+
+# ----------------------------------------------------------------------------------------------------
+# When a part of the map is computed anew, and what is told of it meanwhile.
+
+
+_REST = 350
+"""Milliseconds that a view must rest before it is computed."""
+_PUSH = 0.2
+"""Seconds between two pictures of a window that fills."""
+_COARSE = 9.0
+"""Pixels of a cell above which a view is worth computing anew."""
+
+
+class WindowControl:
+    """The window that is being computed for a page, if any."""
+
+    def __init__(self, card: MapCard) -> None:
+        self.card = card
+        self._token: Token | None = None
+        self._moved, self._pushed = 0, 0.0
+        self._awake = False
+        self._waiting = Waiting(card.shared.compiling, card.later)
+
+    def wake(self) -> None:
+        """The page stands in a browser: from now on what is seen is worth computing."""
+        self._awake = True
+        self.view_moved()
+
+    def view_moved(self) -> None:
+        """Another part is seen; it is looked at once it rests."""
+        if not self._awake:
+            return
+        self._moved += 1
+        now = self._moved
+        self.card.later(lambda: self._rested() if now == self._moved else None, _REST)
+
+    def _rested(self) -> None:
+        if self.card.source.skeleton.data_vars and not (self.card.plane.x.even and self.card.plane.y.even):
+            self.card.redraw()
+        self.card.moved()
+        if self.card.auto.value and self._worth_computing():
+            self.compute_view()
+
+    def _worth_computing(self) -> bool:
+        if self.card.system is None or not self.card.plane.can_zoom or self.card.source.is_list:
+            return False
+        if not self.card.source.skeleton.data_vars or self.card.changed:
+            return True
+        left, right, low, high = self.card.view.view
+        wide, tall = self.card.view.pixels
+        inside = [
+            max(int(((axis.edges[:-1] < b) & (axis.edges[1:] > a)).sum()), 1)
+            for axis, a, b in ((self.card.plane.x, left, right), (self.card.plane.y, low, high))
+        ]
+        return not self.card.view.is_whole and max(wide / inside[0], tall / inside[1]) > _COARSE
+
+    def compute_view(self, force: bool = False) -> None:
+        """Compute what is seen, from coarse to fine, in place of what was being computed."""
+        if self.card.system is None or not self.card.plane.can_zoom:
+            self.card.tell("a window needs two axes of numbers, and a system" if force else "")
+            return
+        bounds = self._bounds()
+        if bounds is None:
+            return
+        key = (self.card.plane_key, bounds)
+        self.cancel("")
+        self.card.own.add(key)
+        try:
+            system, integration = Point(self.card.plane.fixed_values()).system(
+                self.card.system, self.card.integration
+            )
+        except InputError as error:
+            self.card.tell(str(error))
+            return
+        log = (self.card.plane.x.log, self.card.plane.y.log)
+        made = planned(
+            system, integration, self.card.plane.names, bounds, log, self.card.view.pixels, key=key
+        )
+        window = self.card.shared.window(made)
+        if window.finished:  # by this page before, or by another
+            self.card.show_windows()
+            return
+        self._token = token = Token(WINDOW_SECONDS)
+        self.card.stop.visible = True
+        self.card.tell("computing what is seen")
+        self._waiting.begin(0, self._still)
+        self.card.shared.jobs.window(
+            lambda _: compute(window, self.card.shared.jobs, token, lambda w: self._grew(w, token)),
+            lambda _, words: self.card.post(lambda: self._ended(window, token, words)),
+            token,
+        )
+
+    def _bounds(self) -> tuple[float, float, float, float] | None:
+        """What is seen, within what the axes may be."""
+        left, right, low, high = self.card.view.view
+        found: list[float] = []
+        for (a, b), name, axis in (
+            ((left, right), self.card.plane.names[0], self.card.plane.x),
+            ((low, high), self.card.plane.names[1], self.card.plane.y),
+        ):
+            item = lookup(name).quantity
+            least = max(a, item.low) if np.isfinite(item.low) else a
+            most = min(b, item.high) if np.isfinite(item.high) else b
+            if axis.log:
+                least = max(least, 1e-3 * float(axis.at[0]))
+            if not least < most:
+                return None
+            found += [least, most]
+        return found[0], found[1], found[2], found[3]
+
+    def _grew(self, window: Window, token: Token) -> None:
+        now = time.monotonic()
+        if now - self._pushed > _PUSH and not token.cancelled:
+            self._pushed = now
+            self.card.post(lambda: self._draw_growing(window, token))
+
+    def _still(self, seconds: float, why: str) -> None:
+        if self._token is not None:
+            self.card.tell(f"computing what is seen, {seconds:.0f} s" + (f"; {why}" if why else ""))
+
+    def _draw_growing(self, window: Window, token: Token) -> None:
+        if token is not self._token:
+            return
+        self._waiting.end(0)
+        self.card.show_windows()
+        left = (window.size - window.done) * window.seconds
+        finest = int(window.stride[window.stride > 0].min()) if (window.stride > 0).any() else 27
+        self.card.tell(
+            f"window: {window.done} of {window.size} points, {left:.0f} s to the finest; blocks of {finest} cells now"
+        )
+
+    def _ended(self, window: Window, token: Token, words: str) -> None:
+        if token is self._token:
+            self._waiting.end(0)
+            self.card.stop.visible = False
+            self._token = None
+            self.card.show_windows()
+            self.card.tell(words or f"window: all {window.size} points computed")
+
+    def cancel(self, words: str) -> None:
+        """Compute no window any more."""
+        if self._token is not None:
+            self._token.cancel()
+            self._token = None
+            self._waiting.end(0, computed=False)
+            self.card.stop.visible = False
+        if words:
+            self.card.tell(f"{words}; what was computed is kept")
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_HEIGHT = 345
+"""Pixels of the figure."""
+
+
+class MapCard:
+    """The map and its controls.
+
+    Parameters
+    ----------
+    look : Look
+    shared : Shared
+    address : Address
+    post, later : callable
+        ``post(work)`` does something on the page's own thread, ``later(work, milliseconds)`` does it later.
+    """
+
+    def __init__(
+        self,
+        look: Look,
+        shared: Shared,
+        address: Address,
+        post: Callable[[Callable[[], None]], None],
+        later: Callable[[Callable[[], None], int], Any],
+    ) -> None:
+        self.look, self.shared, self.post, self.later = look, shared, post, later
+        self.source = shared.source
+        self.system, self.integration = shared.system, shared.integration
+        self.changed = False
+        self.dots: Any = None
+        self.marks: list[tuple[dict[str, Any], str]] = []
+        self.asked: Callable[[Point], None] = lambda _: None
+        self.moved: Callable[[], None] = lambda: None
+        self.own: set[Any] = set()
+        """Keys of the windows that this page has asked for: those of other tabs are not laid over its map."""
+        self._drawn: list[tuple[Window, NDArray[np.int8]]] = []
+        self._picked: tuple[float, float] | None = None
+        self._words = list(address.words)
+        self._make_controls(address)
+        self.control = WindowControl(self)
+        self.holder = pn.Column(sizing_mode="stretch_width", margin=0)
+        self.plane: Any  # a cut through a grid, or a list of points, which have one interface
+        self.view: MapView
+        self.rebuild(address.view)
+
+    # ------------------------------------------------------------------ controls
+
+    def _make_controls(self, address: Address) -> None:
+        source = self.source
+        dims, names = source.dims, source.variables()
+        x = address.x if address.x in dims else dims[0]
+        upward = [name for name in ("velocity_amplitude", "location") if name in dims and name != x]
+        y = (
+            address.y
+            if address.y in dims and address.y != x
+            else next(iter([*upward, *(n for n in dims if n != x)]))
+        )
+        if (address.x and address.x not in dims) or (address.y and address.y not in dims):
+            self._words.append(f"address: this map's axes are {', '.join(dims)}")
+        show = address.show if address.show in names else names[0]
+        if address.show and address.show not in names:
+            self._words.append(f"address: this map has no {address.show}")
+        options = {name.replace("_", " "): name for name in dims}
+        self.x = pn.widgets.Select(name="Across", options=options, value=x, width=170)
+        self.y = pn.widgets.Select(name="Upward", options=options, value=y, width=170)
+        self.show = pn.widgets.Select(
+            name="Shown", options={name.replace("_", " "): name for name in names}, value=show, width=170
+        )  # fmt: skip
+        grid = [name for name in dims if not source.is_list and source.skeleton[name].size > 1]
+        self.sliders = {name: self._slider(name, address) for name in grid}
+        self.auto = pn.widgets.Checkbox(name="compute what is seen", value=True, align="center")
+        self.stop = pn.widgets.Button(
+            name="Stop", button_type="warning", width=70, visible=False, align="center"
+        )
+        self.again = pn.widgets.Button(name="Compute view", button_type="default", width=110, align="center")
+        self.layers = pn.widgets.CheckButtonGroup(
+            options={"threshold": "threshold", "V_QS1": "quasi", "measured": "dots", "windows": "windows"},
+            value=["windows"], button_type="default",
+        )  # fmt: skip
+        self.hover = pn.pane.HTML(
+            "&nbsp;", sizing_mode="stretch_width", css_classes=["hover"], margin=(0, 0, 0, 4)
+        )
+        self.state = pn.pane.HTML(
+            "", sizing_mode="stretch_width", css_classes=["map-state"], margin=(0, 0, 0, 4)
+        )
+        self.key = pn.pane.HTML("", sizing_mode="stretch_width", margin=(0, 0, 0, 4))
+        for widget in (self.x, self.y):
+            widget.param.watch(self._axes_changed, "value")
+        self.show.param.watch(lambda _: self.post(self.redraw), "value")
+        self.layers.param.watch(lambda _: self.post(self.redraw), "value")
+        self.stop.on_click(lambda _: self.post(lambda: self.control.cancel("stopped")))
+        self.again.on_click(lambda _: self.post(lambda: self.control.compute_view(force=True)))
+        for slider in self.sliders.values():
+            slider.param.watch(lambda _: self.post(self._cut_changed), "value")
+        self.auto.visible = self.again.visible = not source.is_list
+        self.slider_box = pn.FlexBox(margin=0)
+
+    def _slider(self, name: str, address: Address) -> Any:
+        points = self.source.coordinate(name)
+        labels = {
+            f"{value:.6g}" if isinstance(value, float) else str(value): at
+            for at, value in enumerate(points.tolist())
+        }
+        if len(labels) < points.size:
+            labels = {repr(value): at for at, value in enumerate(points.tolist())}
+        words, unit = self.source.label(name)
+        title = f"{words} ({unit})" if unit != "1" else words
+        wanted = address.at.get(str(self.source.skeleton[name].attrs.get("parameter", name)))
+        value = (
+            int(np.argmin(np.abs(points - wanted)))
+            if isinstance(wanted, float) and points.dtype.kind == "f"
+            else 0
+        )
+        return pn.widgets.DiscreteSlider(name=title, options=labels, value=value, width=240)
+
+    def _axes_changed(self, event: Any) -> None:
+        if self.x.value == self.y.value:  # the two change places
+            other = self.y if event.obj is self.x else self.x
+            other.value = event.old
+            return
+        self.post(lambda: self.rebuild(None))
+
+    def _cut_changed(self) -> None:
+        self.plane = replace(self.plane, fixed=self._fixed())
+        self.redraw()
+        self.control.view_moved()
+
+    def _fixed(self) -> dict[str, int]:
+        return {
+            name: int(slider.value)
+            for name, slider in self.sliders.items()
+            if name not in (self.x.value, self.y.value)
+        }
+
+    # ------------------------------------------------------------------ the cut
+
+    def rebuild(self, view: tuple[float, ...] | None) -> None:
+        """Make the figure anew, of other axes."""
+        self.control.cancel("")
+        self.plane = (
+            Scatter.of(self.source, self.x.value, self.y.value)
+            if self.source.is_list
+            else Plane.of(self.source, self.x.value, self.y.value, self._fixed())
+        )
+        self.view = MapView(self.look, self.plane.x, self.plane.y, _HEIGHT)
+        if (
+            view is not None
+            and len(view) == 4
+            and not ((self.plane.x.log and view[0] <= 0) or (self.plane.y.log and view[2] <= 0))
+        ):
+            self.view.view = (view[0], view[1], view[2], view[3])
+        self.view.on_tap(self._tapped)
+        self.view.on_hover(self._hovered)
+        self.view.on_view(self.control.view_moved)
+        for edge in ("inner_width", "inner_height"):
+            self.view.plot.on_change(edge, lambda attr, old, new: self.control.view_moved())
+        self.slider_box.objects = [
+            slider for name, slider in self.sliders.items() if name not in (self.x.value, self.y.value)
+        ]  # fmt: skip
+        self.holder.objects = [pn.pane.Bokeh(self.view.plot, sizing_mode="stretch_width", margin=0)]
+        self.redraw()
+        self.control.view_moved()
+
+    @property
+    def layout(self) -> Any:
+        """The card."""
+        return pn.Column(
+            pn.FlexBox(self.x, self.y, self.show, margin=0), self.slider_box, self.holder, self.key, self.hover,
+            pn.FlexBox(self.auto, self.again, self.stop, self.layers, align_items="center", margin=0), self.state,
+            sizing_mode="stretch_width", css_classes=["card"],
+        )  # fmt: skip
+
+    @property
+    def plane_key(self) -> Any:
+        """What two windows must share to be drawn over one another."""
+        assert self.system is not None
+        fixed = tuple(sorted(self.plane.fixed_values().items()))
+        return self.system.hash, self.integration, self.plane.names, fixed
+
+    def windows(self) -> list[Window]:
+        """The windows over this cut that this page has asked for, the widest first."""
+        if self.system is None or self.source.is_list:
+            return []
+        return self.shared.windows(self.plane_key, self.own)
+
+    # ------------------------------------------------------------------ drawing
+
+    def redraw(self) -> None:
+        """Show everything anew."""
+        name, layers = self.show.value, self.layers.value
+        words: list[str] = []
+        try:
+            values = self.plane.values(name)
+        except InputError as error:
+            values = None
+            words.append(str(error))
+        limits = self._limits(name, values)
+        label, unit = self.source.label(name)
+        title = f"{label}{'' if unit == '1' else f' ({unit})'}"
+        title = "" if name == "response_class" else title
+        if self.source.is_list and values is not None:
+            self.view.show_list(self.plane.x.at, self.plane.y.at, name, values, limits, title)
+        else:
+            self.view.show(name, values, limits, title)
+        self.view.fade(self.changed)
+        self.show_windows()
+        words.append(
+            self.view.show_quasi_static("quasi" in layers, self.source.scalars() | self._fixed_short())
+        )
+        if "threshold" in layers and self.source.is_list:
+            words.append("the threshold is that of the columns of a grid; these are points")
+        wanted = "threshold" in layers and values is not None and not self.source.is_list
+        kinds = self.plane.values("response_class") if wanted else None
+        self.view.show_threshold(kinds)
+        self._draw_dots("dots" in layers, words)
+        self._draw_marks()
+        self._legend(values if name == "response_class" else None)
+        if any(words):
+            self._words = [each for each in words if each]
+        self.tell()
+        self.moved()
+
+    def show_windows(self) -> None:
+        """Draw the windows over the map."""
+        shown = self.windows() if "windows" in self.layers.value or not self.source.skeleton.data_vars else []
+        if shown and self.show.value != "response_class" and not self.source.skeleton.data_vars:
+            known = [w.values[self.show.value][w.stride > 0] for w in shown if self.show.value in w.values]
+            self.view.limits = _span(np.concatenate(known)) if known else (0.0, 1.0)
+            self.view.mapper.update(
+                low=self.view.limits[0], high=max(self.view.limits[1], self.view.limits[0] + 1e-300)
+            )
+        self._drawn = self.view.show_windows(shown, self.show.value)
+
+    def _limits(self, name: str, values: NDArray[Any] | None) -> tuple[float, float]:
+        return (0.0, 1.0) if values is None or name == "response_class" else _span(values)
+
+    def _fixed_short(self) -> dict[str, Any]:
+        from snapbeam.model.parameters import lookup
+
+        return {lookup(name).short: value for name, value in self.plane.fixed_values().items()}
+
+    def _draw_dots(self, wanted: bool, words: list[str]) -> None:
+        dots = self.dots
+        empty = np.zeros(0)
+        if not wanted or dots is None:
+            self.view.show_dots(empty, empty, empty)
+            if wanted:
+                words.append("no measured points yet: give a table of them under Take away")
+            return
+        names = (self.plane.x.name, self.plane.y.name)
+        if not all(hasattr(dots, name) for name in names):
+            words.append("measured points lie over frequency ratio, velocity amplitude and location")
+            return
+        keep = ~np.isnan(getattr(dots, names[0])) & ~np.isnan(getattr(dots, names[1]))
+        x, y = (getattr(dots, name)[keep] for name in names)
+        self.view.show_dots(x, y, dots.response_class[keep])
+
+    def _draw_marks(self) -> None:
+        places = [(self.plane.place(values), text) for values, text in self.marks]
+        self.view.show_marks([(*place, text) for place, text in places if place is not None])
+
+    def _legend(self, kinds: NDArray[Any] | None) -> None:
+        items = []
+        for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
+            share = (
+                ""
+                if kinds is None or not kinds.size
+                else f" {100.0 * float(np.mean(kinds == int(kind))):.1f} %"
+            )
+            if kind is ResponseClass.UNKNOWN and (kinds is None or not (kinds == int(kind)).any()):
+                continue
+            items.append(
+                f'<span class="swatch" style="background:{CLASS_COLORS[kind]}"></span>{kind.label}{share}'
+            )
+        self.key.object = (
+            f'<div class="key">{" &nbsp; ".join(items)}</div>' if self.show.value == "response_class" else ""
+        )
+
+    def say(self, words: str) -> None:
+        """Add a line to what is wrong."""
+        self._words.append(words)
+        self.tell()
+
+    def tell(self, words: str = "") -> None:
+        """Say how far windows are, and what is wrong."""
+        lines = [words] if words else []
+        if self.shared.why_not:
+            lines.append(f"runs cannot be computed: {self.shared.why_not}")
+        lines += self._words
+        self.state.object = "<br>".join(html.escape(line) for line in lines)
+
+    # ------------------------------------------------------------------ points
+
+    def _tapped(self, x: float, y: float) -> None:
+        self._picked = (x, y)
+        self.asked(self.point(x, y))
+
+    def point(self, x: float, y: float) -> Point:
+        """The point that is shown at a place: that of the finest window drawn over it, or the map's."""
+        for window, stride in reversed(self._drawn):
+            at = window.computed_at(x, y, stride) if window.covers(x, y) else None
+            if at is not None:
+                values = dict(
+                    zip(window.names, (window.x[at[1]].item(), window.y[at[0]].item()), strict=True)
+                )
+                held = {name: found[at].item() for name, found in window.values.items()}
+                return Point(values | self.plane.fixed_values(), held)
+        return self.plane.at(*self.plane.index(x, y))
+
+    def expected(self, point: Point) -> dict[str, Any]:
+        """What the map holds of a point; empty if it is none of the map's, or the system has changed."""
+        if point.expected or self.changed or not self.source.skeleton.data_vars:
+            return point.expected
+        place = self.plane.find(point.values)
+        return {} if place is None else self.source.point(self.plane.indexers(*place))
+
+    def step(self, values: dict[str, Any], across: int, upward: int) -> Point | None:
+        """The neighbour of a point, *across* and *upward* points on."""
+        place = self.plane.place(values)
+        if place is None:
+            return None
+        for window, drawn in reversed(self._drawn):
+            at = window.computed_at(place[0], place[1], drawn) if window.covers(*place) else None
+            if at is not None:
+                stride = max(int(drawn[at]), 1)
+                column = int(np.clip(at[1] + across * stride, 0, window.x.size - 1))
+                row = int(np.clip(at[0] + upward * stride, 0, window.y.size - 1))
+                return self.point(float(window.x[column]), float(window.y[row]))
+        beside = self.plane.beside(place, across, upward)
+        if self.source.is_list:
+            return self.plane.at(*beside)
+        return self.point(float(self.plane.x.at[beside[1]]), float(self.plane.y.at[beside[0]]))
+
+    def _hovered(self, x: float, y: float) -> None:
+        point = self.point(x, y)
+        name = self.show.value
+        held = point.expected
+        if not held and not self.changed:
+            place = self.plane.index(x, y)
+            held = {}
+            for each in {"response_class", "zero_crossings", "peak_force", name} & set(
+                self.source.variables()
+            ):
+                try:
+                    values = self.plane.values(each)
+                except InputError:
+                    values = None
+                if values is not None:
+                    held[each] = values[place].item()
+        parts = [html.escape(point.words())]
+        if "response_class" in held:
+            parts.append(f"<b>{ResponseClass(int(held['response'])).label}</b>")
+        for each in dict.fromkeys((name, "zero_crossings", "peak_force")):
+            if each in held and each != "response_class":
+                unit = self.source.label(each)[1]
+                parts.append(f"{each.replace('_', ' ')} {held[each]:.5g}{'' if unit == '1' else f' {unit}'}")
+        self.hover.object = " &nbsp;·&nbsp; ".join(parts)
+
+    def use(self, system: System, integration: Integration, changed: bool) -> None:
+        """Compute points and windows of another system from now on."""
+        self.control.cancel("")
+        self.system, self.integration, self.changed = system, integration, changed
+        self.redraw()
+
+
+def _span(values: NDArray[Any]) -> tuple[float, float]:
+    good = values[np.isfinite(values)] if values.dtype.kind == "f" else values
+    return (float(good.min()), float(good.max())) if good.size else (0.0, 1.0)
+
+
+# ----------------------------------------------------------------------------------------------------
+# The card of the system: every parameter with its unit and its limits, what follows from them, files in and out.
+
+
+_SECTIONS = {
+    "beam": "Beam", "model": "Reduced model", "contact": "Contact", "striker": "Striker", "drive": "Drive",
+    "run": "Integration",
+}  # fmt: skip
+_RUN = ("integration.cycles", "integration.accuracy", "integration.step", "integration.early_termination")
+_PRESETS: dict[str, dict[str, dict[str, Any]]] = {
+    "the paper's beam": {},
+    "the paper's, one mode": {"model": {"modes": 1}},
+    "the paper's, 8 modes": {"model": {"modes": 8}},
+    "the paper's, 1000 cycles": {"run": {"cycles": 1000}},
+    "Newton's impact, one mode": {"model": {"modes": 1}, "contact": {"coefficient": 0.6}},
+    "twice the buckling level": {"beam": {"buckling_level": 0.67e-3}},
+    "struck a quarter along": {"striker": {"location": 0.25}},
+}
+
+
+class SystemCard:
+    """Fields of a system.
+
+    Parameters
+    ----------
+    system, integration : System, Integration
+        What the fields hold at first.
+    post : callable
+        ``post(work)``: do something on the page's own thread.
+    downloads : Downloads
+    look : Look
+    """
+
+    def __init__(
+        self,
+        system: System,
+        integration: Integration,
+        post: Callable[[Callable[[], None]], None],
+        downloads: Downloads,
+        look: Look,
+    ) -> None:
+        self.look = look
+        self.first = (system, integration)
+        self.system, self.integration = system, integration
+        self.post, self.downloads = post, downloads
+        self.used: Callable[[System, Integration], None] = lambda *_: None
+        self.fields: dict[str, Any] = {}
+        self.words = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["system-words"])
+        self.facts = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["system-facts"])
+        self.box = pn.Column(sizing_mode="stretch_width", margin=0)
+        apply = pn.widgets.Button(name="Use this system", button_type="primary", width=130)
+        apply.on_click(lambda _: post(self.apply))
+        back = pn.widgets.Button(name="Back to the map's", width=130)
+        back.on_click(lambda _: post(lambda: self.take(*self.first)))
+        save = pn.widgets.Button(name="Save as TOML", width=110)
+        save.on_click(lambda _: post(self._save))
+        self.preset = pn.widgets.Select(name="Preset", options=["", *_PRESETS], width=210)
+        self.preset.param.watch(lambda event: post(lambda: self._chosen(event.new)), "value")
+        self.law = pn.widgets.Select(name="Law of contact", options=_kinds("contact"), width=160)
+        self.law.param.watch(lambda _: post(self._law_changed), "value")
+        self.file = pn.widgets.FileInput(accept=".toml", multiple=False, width=220)
+        self.file.param.watch(lambda event: post(lambda: self._given(event.new)), "value")
+        self._buttons = pn.FlexBox(apply, back, save, margin=0)
+        self._fill()
+
+    @property
+    def layout(self) -> Any:
+        """The card."""
+        return pn.Column(
+            pn.FlexBox(self.preset, pn.Column("Open a TOML file", self.file, margin=0), margin=0),
+            self._buttons, self.words, self.facts, self.box,
+            sizing_mode="stretch_width", css_classes=["card", "system"],
+        )  # fmt: skip
+
+    # ------------------------------------------------------------------ fields
+
+    def _rows(self) -> list[Parameter]:
+        held = self.system.parameters
+        drive = str(held.get("drive.type", "sine"))
+        rows = []
+        for row in parameters().values():
+            kinds = {"contact": self.law.value, "drive": drive}
+            of_kind = not row.kinds or kinds.get(row.section) in row.kinds
+            plain_kind = row.quantity.kind in (float, int, str, bool)
+            if (
+                of_kind
+                and plain_kind
+                and (row.section != "run" or row.name in _RUN)
+                and row.section in _SECTIONS
+            ):
+                rows.append(row)
+        return rows
+
+    def _fill(self) -> None:
+        """Make the fields of the system that is held."""
+        law = str(self.system.parameters.get("contact.type", "hertz"))
+        if self.law.value != law and law in self.law.options:
+            self.law.value = law
+        self._make_fields()
+        self._show_facts()
+
+    def _make_fields(self) -> None:
+        held = dict(self.system.parameters)
+        held |= {f"run.{name}": value for name, value in integration_mapping(self.integration).items()}
+        if self.integration.cycles is None:
+            held["integration.cycles"] = self.integration.cycles_or_default
+        self.fields = {}
+        parts: list[Any] = []
+        for section, title in _SECTIONS.items():
+            own = [row for row in self._rows() if row.section == section]
+            fields = [self._field(row, held.get(row.name)) for row in own]
+            if section == "contact":
+                fields = [self.law, *fields]
+            if fields:
+                parts += [pn.pane.HTML(f"<h2>{title}</h2>", margin=0), pn.FlexBox(*fields, margin=0)]
+        for part in parts:
+            styled(part, self.look)
+        self.box.objects = parts
+
+    def _field(self, row: Parameter, value: Any) -> Any:
+        unit = "" if row.quantity.unit == "1" else f" ({row.quantity.unit})"
+        name = f"{row.name.partition('.')[2].replace('_', ' ')}{unit}"
+        words = f"{row.quantity.long_name}; allowed: {row.limits or 'any'}"
+        common: dict[str, Any] = {"name": name, "width": 160, "description": words}
+        if row.quantity.choices:
+            field = pn.widgets.Select(options=list(row.quantity.choices), value=value, **common)
+        elif row.quantity.kind is bool:
+            field = pn.widgets.Select(options={"no": False, "yes": True}, value=bool(value), **common)
+        else:
+            field = pn.widgets.TextInput(value=_text(value), placeholder=row.limits, **common)
+        self.fields[row.name] = field
+        return field
+
+    def sections(self) -> dict[str, dict[str, Any]]:
+        """What stands in the fields.
+
+        Raises
+        ------
+        InputError
+            For what is no number, and for values out of range.
+        """
+        found: dict[str, dict[str, Any]] = {}
+        for name, field in self.fields.items():
+            row = parameters()[name]
+            section, _, key = name.partition(".")
+            value: Any = field.value
+            if isinstance(value, str) and not row.quantity.choices:
+                if not value.strip():
+                    continue
+                value = number(name, value)
+                if row.quantity.kind is int and value == int(value):
+                    value = int(value)
+            found.setdefault(section, {})[key] = row.quantity.check(name, value)
+        found.setdefault("contact", {})["type"] = self.law.value
+        if found.get("model", {}).get("modes", 1) > MODES:
+            raise InputError(f"model.modes: a page may ask for at most {MODES}")
+        if found.get("run", {}).get("cycles", 1) > CYCLES:
+            raise InputError(f"integration.cycles: a page may ask for at most {CYCLES}")
+        return found
+
+    # ------------------------------------------------------------------ doing
+
+    def apply(self) -> None:
+        """Use what stands in the fields from now on; refused with words, and nothing changes."""
+        try:
+            sections = self.sections()
+            run = {name: value for name, value in sections.pop("run", {}).items() if value is not None}
+            kept = self.system.to_mapping()
+            sections.setdefault("drive", {})["type"] = kept.get("drive", {}).get("type", "sine")
+            if sections["drive"]["type"] != "sine" or "start" in kept or "mass" in kept.get("model", {}):
+                raise InputError(
+                    "a system with a record, a start of its own or matrices is changed from Python"
+                )
+            system = System.from_mapping(sections)
+            self.take(system, Integration(**run))
+        except InputError as error:
+            self.refuse(str(error))
+
+    def take(self, system: System, integration: Integration) -> None:
+        """Use a system from now on."""
+        self.system, self.integration = system, integration
+        self.words.object = ""
+        self._fill()
+        self.used(system, integration)
+
+    def _law_changed(self) -> None:
+        if str(self.system.parameters.get("contact.type")) != self.law.value:
+            self._make_fields()
+
+    def _chosen(self, name: str) -> None:
+        if name:
+            config = config_from_mapping(_PRESETS[name])
+            self.take(config.system, config.integration)
+
+    def _given(self, content: bytes | None) -> None:
+        if not content:
+            return
+        try:
+            if len(content) > UPLOAD:
+                raise InputError(too_large("the file", len(content)))
+            try:
+                sections = tomllib.loads(content.decode("utf-8"))
+            except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError, ValueError) as error:
+                raise InputError(f"the file is no TOML: {error}") from None
+            config: Config = config_from_mapping(sections, "the file")
+            self.take(config.system, config.integration)
+        except InputError as error:
+            self.refuse(str(error))
+
+    def refuse(self, words: str) -> None:
+        """Say what cannot be done."""
+        self.words.object = f'<p class="bad" role="alert">{html.escape(words)}</p>'
+
+    def _save(self) -> None:
+        try:
+            text = system_toml(self.system, self.integration)
+        except InputError as error:
+            self.refuse(str(error))
+            return
+        self.downloads.give("system.toml", text.encode())
+
+    def _show_facts(self) -> None:
+        model = self.system.model
+        facts = [
+            ("f₁", f"{model.reference_frequency:.6g} Hz"),
+            (
+                "natural frequencies",
+                ", ".join(f"{value:.4g}" for value in model.natural_frequencies[:4]) + " Hz",
+            ),
+            ("barrier", f"{1e6 * (model.saddle_energy - model.well_energy):.4g} µJ"),
+        ]
+        beam = model.beam
+        if beam is not None:
+            facts += [
+                ("b/r", f"{beam.buckling_level / beam.radius_of_gyration:.4g}"),
+                ("P/P_cr", f"{beam.axial_load / beam.critical_load:.5g}"),
+            ]
+        cells = "".join(f"<td><span class=faint>{name}</span> <b>{value}</b></td>" for name, value in facts)
+        found = [each.message for each in self.system.diagnostics()]
+        doubts = "".join(f'<p class="bad">{html.escape(each)}</p>' for each in found)
+        self.facts.object = f'<table class="facts"><tr>{cells}</tr></table>{doubts}'
+
+
+def _kinds(section: str) -> list[str]:
+    return sorted({kind for row in parameters().values() if row.section == section for kind in row.kinds})
+
+
+def changed_parameters(
+    before: tuple[System, Integration], after: tuple[System, Integration]
+) -> dict[str, Any]:
+    """What differs between two systems and how they are integrated: new values by dotted name."""
+    found: dict[str, Any] = {}
+    old, new = plain(before[0].to_mapping()), plain(after[0].to_mapping())
+    for section, values in new.items():
+        for name, value in values.items():
+            before_it: Any = old.get(section, {}).get(name)
+            if not np.array_equal(before_it, value):
+                found[f"{section}.{name}"] = value
+    one, other = (integration_mapping(each[1]) for each in (before, after))
+    for name, value in other.items():
+        cycles = name == "cycles" and before[1].cycles_or_default == after[1].cycles_or_default
+        if one[name] != value and name not in ("engine",) and not cycles:
+            found[f"run.{name}"] = value
+    return found
+
+
+def _text(value: Any) -> str:
+    """A value as a field holds it: a number as short as it can be and be the same when it is read."""
+    if isinstance(value, float):
+        short = f"{value:.6g}"
+        return short if float(short) == value else repr(value)
+    return "" if value is None else str(value)
+
+
+# ----------------------------------------------------------------------------------------------------
+# The card of what can be taken away: pictures, data, the command, the lines of Python, a link.
+
+
+_EXPORT_SECONDS = 300.0
+_LONGEST = 20.0
+"""Cycles of an animation, if more are seen."""
+
+
+class TakeCard:
+    """Buttons, and text to copy.
+
+    Parameters
+    ----------
+    page : Page
+        Whose views are taken away.
+    """
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.words = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["take-words"])
+        self.text = pn.pane.HTML("", sizing_mode="stretch_width", css_classes=["take-text"])
+        self.kind = pn.widgets.RadioButtonGroup(options=["png", "pdf", "svg"], value="png")
+        self.slow = pn.widgets.FloatInput(
+            name="slow motion at the hardest impact (s)", value=4.0, start=0.0, end=30.0, width=260
+        )
+        self.length = pn.widgets.FloatInput(
+            name="length of the animation (s)", value=8.0, start=1.0, end=60.0, width=210
+        )
+        self.dots = pn.widgets.FileInput(accept=".csv", multiple=False, width=220)
+        self.dots.param.watch(lambda event: page.post(lambda: self._dots(event.new)), "value")
+        buttons = {
+            "Map": lambda: self._picture("map"), "Run": lambda: self._picture("run"),
+            "MP4": lambda: self._animation(".mp4"), "GIF": lambda: self._animation(".gif"),
+            "Run as NetCDF": self._run_data, "Map as NetCDF": self._map_data, "Window as NetCDF": self._window_data,
+        }  # fmt: skip
+        self.buttons = {name: pn.widgets.Button(name=name, width=145) for name in buttons}
+        for name, work in buttons.items():
+            self.buttons[name].on_click(_posted(page, work))
+        self.link = pn.widgets.Button(name="Copy the link", width=145)
+        self.link.js_on_click(
+            args={"holder": self.page.bar}, code="navigator.clipboard.writeText(window.location.href);"
+        )
+
+    @property
+    def layout(self) -> Any:
+        """The card."""
+        make = self.buttons
+        return pn.Column(
+            pn.pane.HTML("<h2>Pictures in the style of the journal</h2>", margin=0),
+            pn.FlexBox(make["Map"], make["Run"], self.kind, margin=0, align_items="center"),
+            pn.pane.HTML("<h2>The beam moving, of the cycles that are seen</h2>", margin=0),
+            pn.FlexBox(make["MP4"], make["GIF"], self.length, self.slow, margin=0, align_items="center"),
+            pn.pane.HTML("<h2>Data</h2>", margin=0),
+            pn.FlexBox(make["Run as NetCDF"], make["Map as NetCDF"], make["Window as NetCDF"], self.link, margin=0),
+            pn.pane.HTML("<h2>Measured points to lay over the map (CSV)</h2>", margin=0), self.dots,
+            self.words, self.text, sizing_mode="stretch_width", css_classes=["card", "take"],
+        )  # fmt: skip
+
+    # ------------------------------------------------------------------ text
+
+    def refresh(self) -> None:
+        """Write the command and the lines of what is shown."""
+        page = self.page
+        run, point = page.runs[page.which].run, page.points[page.which]
+        parts = []
+        if run is not None and point is not None:
+            file = page.shared.file.name if page.shared.file is not None else ""
+            on_map = bool(file) and not page.card.changed and page.card.plane.find(point.values) is not None
+            skeleton = page.shared.source.skeleton
+            over = {
+                name: value
+                for name, value in point.values.items()
+                if page.card.source.is_list or lookup(name).short in skeleton.dims
+            }
+            command = run_command(over if on_map else point.values, file, on_map)
+            beside = "" if on_map else " (with the system saved as system.toml beside it)"
+            parts.append(
+                f'<h2>The command that makes this run{beside}</h2><pre class="command">{html.escape(command)}</pre>'
+            )
+            text = python_lines(run.system, run.integration)
+            parts.append(f'<h2>The same in Python</h2><pre class="python">{html.escape(text)}</pre>')
+        window = self._window()
+        if window is not None:
+            axes = {
+                name: (float(values[0]), float(values[-1]), int(values.size))
+                for name, values in zip(window.names, (window.x, window.y), strict=True)
+            }
+            if not any(window.log):
+                parts.append(
+                    "<h2>The command that makes the finest window</h2>"
+                    f'<pre class="map-command">{html.escape(map_command(axes, {}))}</pre>'
+                )
+        self.text.object = "".join(parts) or '<p class="note">Click on a point of the map first.</p>'
+
+    def _window(self) -> Any:
+        windows = self.page.card.windows()
+        return windows[-1] if windows else None
+
+    def refuse(self, words: str) -> None:
+        """Say what cannot be done."""
+        self.words.object = f'<p class="bad" role="alert">{html.escape(words)}</p>'
+
+    # ------------------------------------------------------------------ files
+
+    def _make(self, name: str, suffix: str, write: Callable[[Any, Token], object]) -> None:
+        """Make a file beside the page and hand it to the browser."""
+        page = self.page
+        self.words.object = f'<p class="busy">making {html.escape(name)}{suffix}</p>'
+        token = Token(_EXPORT_SECONDS)
+
+        def done(content: bytes | None, error: str) -> None:
+            def tell() -> None:
+                if content is None:
+                    self.words.object = f'<p class="bad">{html.escape(error)}</p>'
+                else:
+                    self.words.object = (
+                        f'<p class="note">{html.escape(name)}{suffix}, {len(content) / 1e3:.0f} kB</p>'
+                    )
+                    page.downloads.give(f"{name}{suffix}", content)
+
+            page.post(tell)
+
+        page.shared.jobs.export(lambda t: file_bytes(suffix, lambda path: write(path, t)), done, token)
+
+    def _run(self) -> Run | None:
+        run = self.page.runs[self.page.which].run
+        if run is None:
+            self.words.object = '<p class="bad">there is no run: click on a point of the map first</p>'
+        return run
+
+    def _picture(self, of: str) -> None:
+        suffix = f".{self.kind.value}"
+        if of == "run":
+            run = self._run()
+            if run is not None:
+                window = self.page.runs[self.page.which].window
+                self._make("run", suffix, lambda path, _: _draw_run(run, window, path))
+            return
+        try:
+            cut = self._cut()
+        except InputError as error:
+            self.refuse(str(error))
+            return
+        quasi = "quasi" in self.page.card.layers.value
+        dots = self.page.card.dots if "dots" in self.page.card.layers.value else None
+        name = self.page.card.show.value
+        label = name if name != "response_class" else "map"
+        if self.page.card.source.is_list:
+            plane = self.page.card.plane
+            along = str(plane.x.name), str(plane.y.name)
+            self._make(label, suffix, lambda path, _: _draw_points(cut, name, along, quasi, dots, path))
+            return
+        self._make(label, suffix, lambda path, _: _draw_map(cut, name, quasi, dots, path))
+
+    def _cut(self) -> xr.Dataset:
+        """The map over the two axes that are shown; of a system without a map, its finest window."""
+        card = self.page.card
+        source = card.source
+        if not source.skeleton.data_vars or card.changed:
+            window = self._window()
+            if window is None or not window.values:
+                raise InputError("there is no map yet")
+            return window_dataset(window)
+        cut = source.skeleton.drop_vars(list(source.skeleton.data_vars)).isel(card.plane.fixed)
+        for name in dict.fromkeys(("response_class", card.show.value)):
+            values = source.values(name)
+            if values is not None:
+                cut[name] = values.isel(card.plane.fixed)
+        return cut
+
+    def _animation(self, suffix: str) -> None:
+        run = self._run()
+        if run is None:
+            return
+        first, last = self.page.runs[self.page.which].window
+        window = (first, min(last, first + _LONGEST))
+        length, slow = float(self.length.value), float(self.slow.value)
+
+        def write(path: Any, token: Token) -> None:
+            from snapbeam.plot.animation import animate_run
+
+            with drawing:
+                animate_run(
+                    run.dataset,
+                    path,
+                    window,
+                    duration=length,
+                    slow_motion=slow,
+                    progress=lambda done, total: token.check(),
+                )
+
+        self._make("run", suffix, write)
+
+    def _run_data(self) -> None:
+        run = self._run()
+        if run is not None:
+            self._make("run", ".nc", lambda path, _: run.save(path))
+
+    def _map_data(self) -> None:
+        source = self.page.card.source
+        if not source.skeleton.data_vars:
+            self.words.object = '<p class="bad">there is no map: take the window</p>'
+            return
+
+        def write(path: Any, _: Token) -> None:
+            write_netcdf(source.whole(), path)
+
+        self._make("map", ".nc", write)
+
+    def _window_data(self) -> None:
+        window = self._window()
+        if window is None or not window.values:
+            self.words.object = '<p class="bad">no window was computed</p>'
+            return
+        dataset = window_dataset(window)
+        self._make("window", ".nc", lambda path, _: write_netcdf(dataset, path))
+
+    def _dots(self, content: bytes | None) -> None:
+        from snapbeam.sweeps.measured_points import read_measured_points
+
+        if not content:
+            return
+        attrs = self.page.card.source.attrs
+        try:
+            if len(content) > UPLOAD:
+                raise InputError(too_large("the table", len(content)))
+            with tempfile.TemporaryDirectory(prefix="snapbeam-") as folder:
+                path = Path(folder) / "dots.csv"
+                path.write_bytes(content)
+                level = attrs.get("beam_buckling_level")
+                dots = read_measured_points(
+                    path, reference_frequency=attrs.get("reference_frequency"), buckling_level=level
+                )
+        except (InputError, UnicodeDecodeError) as error:
+            self.refuse(str(error))
+            return
+        self.page.card.dots = dots
+        self.words.object = f'<p class="note">{len(dots)} measured points</p>'
+        self.page.card.layers.value = [*{*self.page.card.layers.value, "dots"}]
+        self.page.card.redraw()
+
+
+def _posted(page: Page, work: Callable[[], None]) -> Callable[[Any], None]:
+    return lambda _: page.post(work)
+
+
+def _draw_run(run: Run, window: tuple[float, float], path: Any) -> None:
+    from snapbeam.plot.run import plot_run
+    from snapbeam.plot.style import save_figure
+
+    with drawing:
+        _save(save_figure, plot_run(run.dataset, window), path)
+
+
+def _draw_map(cut: xr.Dataset, name: str, quasi: bool, dots: Any, path: Any) -> None:
+    from snapbeam.plot.map import plot_response_map, plot_statistic
+    from snapbeam.plot.style import save_figure
+
+    with drawing:
+        if name == "response_class":
+            ax = plot_response_map(cut, threshold_line=quasi, dots=dots)
+        else:
+            ax = plot_statistic(cut, name)
+        _save(save_figure, ax, path)
+
+
+def _draw_points(
+    cut: xr.Dataset, name: str, along: tuple[str, str], quasi: bool, dots: Any, path: Any
+) -> None:
+    from snapbeam.plot.map import plot_points
+    from snapbeam.plot.style import save_figure
+
+    with drawing:
+        ax = plot_points(cut, name, across=along[0], upward=along[1], dots=dots, threshold_line=quasi)
+        _save(save_figure, ax, path)
+
+
+def _save(save_figure: Any, drawn: Any, path: Any) -> None:
+    import matplotlib.pyplot as plt
+
+    figure = drawn.get_figure(root=True) if hasattr(drawn, "get_figure") else drawn
+    try:
+        save_figure(figure, path)
+    finally:
+        plt.close(figure)
+
+
+def window_dataset(window: Any) -> xr.Dataset:
+    """A window as a labelled map; cells that no run was made of are unknown, with ``computed`` = 0."""
+    import numpy as np
+
+    from snapbeam import STATISTICS
+    from snapbeam.explorer.maps import axes_dataset
+
+    dataset = axes_dataset(
+        window.system, {window.names[1]: window.y, window.names[0]: window.x}, window.integration
+    )
+    dims = tuple(lookup(name).short for name in (window.names[1], window.names[0]))
+    own = window.own()
+    for name, values in window.values.items():
+        row = STATISTICS[name]
+        held = values.astype(np.float64) if values.dtype.kind == "f" else values.copy()
+        held[~own] = np.nan if held.dtype.kind == "f" else -1 if name == "response_class" else 0
+        if name == "status":
+            held[~own] = 5
+        dataset[name] = (dims, held, {"units": row.unit, "long_name": row.long_name})
+    dataset["computed"] = (
+        dims,
+        own.astype(np.int8),
+        {"units": "1", "long_name": "whether the point was run"},
+    )
+    dataset.attrs["title"] = "window of a map of the response of a struck bistable beam"
+    return dataset

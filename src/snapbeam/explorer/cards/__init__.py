@@ -1,1 +1,0 @@
-"""The cards of the page: what can be set, asked for and taken away."""

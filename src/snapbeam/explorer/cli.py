@@ -1,0 +1,81 @@
+"""``snapbeam explore``: a map in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snapbeam.cli.console import answer_now, door, out
+
+__all__ = ["explore"]
+
+
+COMMANDS = {"explore": "snapbeam.explorer.cli:explore"}
+"""Module and function of each command, by name."""
+
+
+@door
+def explore(
+    file: Annotated[
+        Path | None,
+        typer.Argument(help="NetCDF file or store of a map; the paper's beam if left out.", metavar="[MAP]"),
+    ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            "--config", help="TOML file of the system to begin with, where no map is given.", metavar="FILE"
+        ),
+    ] = None,
+    port: Annotated[int, typer.Option(help="Port; a free one by default.", min=0, max=65535)] = 0,
+    address: Annotated[str, typer.Option(help="Address to serve on.")] = "127.0.0.1",
+    allow_remote: Annotated[
+        bool,
+        typer.Option(
+            "--allow-remote", help="Allow an address that others can reach; a token is needed then."
+        ),
+    ] = False,
+    token: Annotated[
+        str | None,
+        typer.Option(help="Token that pages must bring; made up, with --allow-remote, if not given."),
+    ] = None,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")
+    ] = True,
+) -> None:
+    """Open a map in the browser: click on a point, see its run, watch the beam.
+
+    Example: snapbeam explore map.nc
+    """
+    from snapbeam.util.validation import InputError
+
+    if file is not None and config is not None:
+        raise InputError(f"config = {str(config)!r}: a map holds its own system; give one of the two")
+    if token is not None and len(token) < 16:
+        raise InputError("token: must have at least 16 characters")
+    system = integration = None
+    if config is not None:
+        from snapbeam.model.parameter_file import load_config
+
+        settings = load_config(config)
+        system, integration = settings.system, settings.integration
+
+    def ready(url: str) -> None:
+        answer_now(url=url)
+        out().print(f"Explorer at {url}", markup=False)
+        out().print("Press Ctrl+C to stop it.", markup=False)
+        if browser:
+            import webbrowser
+
+            webbrowser.open(url)
+
+    from snapbeam.explorer.server import serve
+
+    try:
+        serve(
+            file, address=address, port=port, allow_remote=allow_remote, token=token, system=system,
+            integration=integration, ready=ready,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        out().print("stopped")

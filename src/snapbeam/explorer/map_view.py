@@ -1,0 +1,300 @@
+"""The map: any two axes, any variable, and on it the windows that were computed, the points and the layers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from bokeh.models import (
+    BoxAnnotation,
+    ColorBar,
+    ColumnDataSource,
+    CustomJS,
+    FixedTicker,
+    LinearColorMapper,
+    Range1d,
+)
+from numpy.typing import NDArray
+
+from snapbeam import ResponseClass
+from snapbeam.explorer.maps import Axis, Window, picture
+from snapbeam.explorer.style import Look, colors_of, columns, figure, inner_size, sequential
+from snapbeam.model import quasi_static_threshold
+from snapbeam.plot.style import CLASS_COLORS
+
+__all__ = ["MapView"]
+
+
+View = tuple[float, float, float, float]
+_THROTTLE = 50
+"""Milliseconds between two looks at where the pointer is."""
+_HOVER = """
+const now = Date.now();
+if (now - (probe.tags[0] || 0) < %d) { return; }
+probe.tags = [now];
+probe.data = {x: [cb_obj.x], y: [cb_obj.y]};
+"""
+_QUASI_STATIC = {"frequency_ratio", "velocity_amplitude", "location"}
+
+
+class MapView:
+    """A figure of a map; it holds no numbers but those it shows.
+
+    Parameters
+    ----------
+    look : Look
+    x, y : Axis
+        The axes shown.
+    height : int
+        Pixels.
+    """
+
+    def __init__(self, look: Look, x: Axis, y: Axis, height: int = 400) -> None:
+        self.look, self.x, self.y = look, x, y
+        self.limits = (0.0, 1.0)
+        self.plot = figure(
+            look, name="map", height=height,
+            x_axis_type="log" if x.log else "linear", y_axis_type="log" if y.log else "linear",
+            x_range=Range1d(*x.span, bounds=None), y_range=Range1d(*y.span, bounds=None),
+            x_axis_label=x.label, y_axis_label=y.label, title="", tools="pan,box_zoom,wheel_zoom,reset",
+            active_scroll="wheel_zoom", active_drag="box_zoom",
+        )  # fmt: skip
+        self.plot.grid.visible = False
+        for axis, bokeh_axis in ((x, self.plot.xaxis), (y, self.plot.yaxis)):
+            if axis.words is not None:
+                bokeh_axis.ticker = FixedTicker(ticks=axis.at.tolist())
+                bokeh_axis.major_label_overrides = dict(zip(axis.at.tolist(), axis.words, strict=True))
+        self.base = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []}, name="map-base")
+        self.whole = self.plot.image_rgba("image", "x", "y", "dw", "dh", source=self.base)
+        self.tiles = ColumnDataSource({"image": [], "x": [], "y": [], "dw": [], "dh": []}, name="map-windows")
+        self.plot.image_rgba("image", "x", "y", "dw", "dh", source=self.tiles)
+        self.frames = columns(left=[], right=[], bottom=[], top=[])
+        self.plot.quad(
+            "left",
+            "right",
+            "bottom",
+            "top",
+            source=self.frames,
+            fill_color=None,
+            line_color="#ffffff",
+            line_width=1.0,
+            line_dash="dotted",
+        )
+        self.curve = columns(x=[], y=[])
+        for color, width in (("#ffffff", 3.0), ("#000000", 1.4)):
+            dash = "solid" if color == "#ffffff" else "dashed"
+            self.plot.line("x", "y", source=self.curve, line_color=color, line_width=width, line_dash=dash)
+        self.threshold = columns(x=[], y=[])
+        for color, width in (("#ffffff", 3.6), ("#000000", 1.8)):
+            self.plot.line("x", "y", source=self.threshold, line_color=color, line_width=width)
+        self.dots = ColumnDataSource({"x": [], "y": [], "color": []})
+        self.plot.scatter(
+            "x", "y", color="color", source=self.dots, size=8, line_color="#ffffff", line_width=1.2
+        )
+        self.list = ColumnDataSource({"x": [], "y": [], "color": []}, name="map-list")
+        self.plot.scatter(
+            "x", "y", color="color", source=self.list, size=9, line_color=look.text, line_width=0.5
+        )
+        self.mark = ColumnDataSource({"x": [], "y": [], "text": []}, name="map-mark")
+        for size, color, width in ((17, "#000000", 3.6), (17, "#ffffff", 1.6)):
+            self.plot.scatter(
+                "x",
+                "y",
+                source=self.mark,
+                size=size,
+                marker="circle_cross",
+                fill_color=None,
+                line_color=color,
+                line_width=width,
+            )
+        self.plot.text(
+            "x",
+            "y",
+            "text",
+            source=self.mark,
+            x_offset=10,
+            y_offset=-6,
+            text_color="#ffffff",
+            text_outline_color="#000000",
+            text_font_style="bold",
+            text_font_size="14px",
+        )
+        self.box = BoxAnnotation(fill_alpha=0.0, line_color=look.accent, line_width=2, visible=False)
+        self.plot.add_layout(self.box)
+        self.mapper = LinearColorMapper(
+            palette=[f"#{r:02x}{g:02x}{b:02x}" for r, g, b, _ in sequential()], low=0.0, high=1.0
+        )
+        self.bar = ColorBar(
+            color_mapper=self.mapper, visible=False, width=10, padding=4, label_standoff=5,
+            background_fill_color=look.card, major_label_text_color=look.text, bar_line_color=look.faint,
+        )  # fmt: skip
+        self.plot.add_layout(self.bar, "right")
+        self.probe = ColumnDataSource({"x": [], "y": []}, name="map-probe", tags=[0])
+        self.plot.js_on_event("mousemove", CustomJS(args={"probe": self.probe}, code=_HOVER % _THROTTLE))
+
+    # ------------------------------------------------------------------ what was asked for
+
+    def on_tap(self, tell: Callable[[float, float], None]) -> None:
+        """Say where the map was clicked."""
+        self.plot.on_event("tap", lambda event: tell(float(event.x), float(event.y)))
+
+    def on_hover(self, tell: Callable[[float, float], None]) -> None:
+        """Say where the pointer is."""
+
+        def moved(_: str, __: Any, data: dict[str, Any]) -> None:
+            if len(data["x"]) and data["x"][0] is not None:
+                tell(float(data["x"][0]), float(data["y"][0]))
+
+        self.probe.on_change("data", moved)
+
+    def on_view(self, tell: Callable[[], None]) -> None:
+        """Say that another part is seen."""
+        self.plot.on_event("rangesupdate", lambda _: tell())
+
+    @property
+    def view(self) -> View:
+        """Left, right, low and high border of what is seen."""
+        across, upward = self.plot.x_range, self.plot.y_range
+        return float(across.start), float(across.end), float(upward.start), float(upward.end)
+
+    @view.setter
+    def view(self, view: View) -> None:
+        self.plot.x_range.update(start=view[0], end=view[1])
+        self.plot.y_range.update(start=view[2], end=view[3])
+
+    @property
+    def pixels(self) -> tuple[int, int]:
+        """Size of what is seen."""
+        return inner_size(self.plot, (560, 340))
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all of the map is seen."""
+        left, right, low, high = self.view
+        return bool(
+            left <= self.x.span[0]
+            and right >= self.x.span[1]
+            and low <= self.y.span[0]
+            and high >= self.y.span[1]
+        )
+
+    # ------------------------------------------------------------------ what is shown
+
+    def show(self, name: str, values: NDArray[Any] | None, limits: tuple[float, float], title: str) -> None:
+        """Show a variable, an array of shape (y, x)."""
+        self.limits = limits
+        is_class = name == "response_class"
+        self.bar.update(visible=not is_class, title=None)
+        if not is_class:
+            self.mapper.update(low=limits[0], high=limits[1] if limits[1] > limits[0] else limits[0] + 1.0)
+        self.plot.title.text = title
+        seen = None if values is None else picture(values, self.x, self.y, self.view, self.pixels)
+        if seen is None:
+            self.base.data = {"image": [], "x": [], "y": [], "dw": [], "dh": []}
+            return
+        self.base.data = {
+            "image": [colors_of(name, seen.values, limits)],
+            "x": [seen.x], "y": [seen.y], "dw": [seen.width], "dh": [seen.height],
+        }  # fmt: skip
+
+    def fade(self, old: bool) -> None:
+        """Show the map pale, if it is of another system than what is computed."""
+        self.whole.glyph.global_alpha = 0.3 if old else 1.0
+
+    def show_windows(self, windows: list[Window], name: str) -> list[tuple[Window, NDArray[np.int8]]]:
+        """Lay windows over the map, the finest uppermost; returns them with their strides as they are drawn."""
+        data: dict[str, list[Any]] = {"image": [], "x": [], "y": [], "dw": [], "dh": []}
+        borders: dict[str, list[float]] = {"left": [], "right": [], "bottom": [], "top": []}
+        drawn = []
+        for window in windows:
+            if name not in window.values:
+                continue
+            with window.writing:
+                stride = window.stride.copy()
+                image = colors_of(name, window.values[name], self.limits).copy()
+            drawn.append((window, stride))
+            image[stride == 0] = 0
+            left, right, low, high = window.bounds
+            for key, value in zip(data, (image, left, low, right - left, high - low), strict=True):
+                data[key].append(value)
+            for key, side in zip(borders, (left, right, low, high), strict=True):
+                borders[key].append(side)
+        self.tiles.data = data
+        self.frames.data = borders
+        return drawn
+
+    def show_list(
+        self,
+        x: NDArray[Any],
+        y: NDArray[Any],
+        name: str,
+        values: NDArray[Any],
+        limits: tuple[float, float],
+        title: str,
+    ) -> None:
+        """Show a list of points as dots in the colours of a variable; those without a number are clear."""
+        self.limits = limits
+        self.plot.title.text = title
+        packed = colors_of(name, values[None, :], limits)[0].view(np.uint8).reshape(-1, 4)
+        self.bar.update(visible=name != "response_class")
+        self.mapper.update(low=limits[0], high=limits[1] if limits[1] > limits[0] else limits[0] + 1.0)
+        self.list.data = {
+            "x": x,
+            "y": y,
+            "color": [f"#{r:02x}{g:02x}{b:02x}{a:02x}" for r, g, b, a in packed],
+        }
+
+    def show_marks(self, marks: list[tuple[float, float, str]]) -> None:
+        """Mark the points whose runs are shown."""
+        self.mark.data = {
+            "x": [each[0] for each in marks], "y": [each[1] for each in marks], "text": [each[2] for each in marks],
+        }  # fmt: skip
+
+    def show_quasi_static(self, visible: bool, fixed: dict[str, Any]) -> str:
+        """Draw V_QS1 of one mode (Eq. 21); says why it cannot be drawn, if it cannot."""
+        self.curve.data = {"x": [], "y": []}
+        if not visible:
+            return ""
+        names = (self.x.name, self.y.name)
+        if set(names) - _QUASI_STATIC:
+            return "V_QS1 is drawn over frequency ratio, location and velocity amplitude"
+        needed = _QUASI_STATIC - set(names)
+        if any(name not in fixed for name in needed):
+            return f"V_QS1 needs {', '.join(sorted(needed))}"
+        first, last = self.x.span
+        across = np.linspace(first, last, 402)[1:-1]
+        if "velocity_amplitude" in names:
+            other = names[1 - names.index("velocity_amplitude")]
+            along = across if names[1] == "velocity_amplitude" else np.linspace(*self.y.span, 402)[1:-1]
+            location, ratio = (
+                (along, fixed["frequency_ratio"]) if other == "location" else (fixed["location"], along)
+            )
+            height = np.asarray(quasi_static_threshold(location, ratio)) * np.ones_like(along)
+            xy = (along, height) if names[1] == "velocity_amplitude" else (height, along)
+        else:
+            location = across if names[0] == "location" else np.linspace(*self.y.span, 402)[1:-1]
+            ratio = fixed["velocity_amplitude"] / np.asarray(quasi_static_threshold(location, 1.0))
+            xy = (ratio, location) if names[0] == "frequency_ratio" else (location, ratio)
+        inside = (xy[0] <= self.x.span[1]) & (xy[1] <= self.y.span[1])
+        self.curve.data = {"x": xy[0][inside], "y": xy[1][inside]}
+        return ""
+
+    def show_threshold(self, values: NDArray[Any] | None) -> None:
+        """Draw the lowest interwell cell of each column, as steps; *values* are classes of shape (y, x)."""
+        self.threshold.data = {"x": [], "y": []}
+        if values is None:
+            return
+        above = values >= int(ResponseClass.TRANSIENT_1)
+        first = np.where(above.any(axis=0), above.argmax(axis=0), -1)
+        x, y = [], []
+        for column, row in enumerate(first):
+            level = np.nan if row < 0 else float(self.y.edges[row])
+            x += [float(self.x.edges[column]), float(self.x.edges[column + 1])]
+            y += [level, level]
+        self.threshold.data = {"x": np.array(x), "y": np.array(y)}
+
+    def show_dots(self, x: NDArray[Any], y: NDArray[Any], kinds: NDArray[Any]) -> None:
+        """Lay measured points over the map."""
+        colors = [CLASS_COLORS[ResponseClass(int(kind))] for kind in kinds]
+        self.dots.data = {"x": x, "y": y, "color": colors}

@@ -1,0 +1,1404 @@
+"""What is explored: a map in memory, a map in a file, or a system of which there is no map yet."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import pprint
+import shlex
+import threading
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import snapbeam as sb
+from snapbeam import (
+    STATISTICS,
+    InputError,
+    InputTypeError,
+    Integration,
+    ResponseClass,
+    RunSummary,
+    System,
+    sweep,
+)
+from snapbeam.explorer.jobs import WINDOW_POINTS, Jobs, Token
+from snapbeam.model.parameter_file import config_from_mapping, config_text
+from snapbeam.model.parameters import lookup
+from snapbeam.plot.axes import edges_of, is_geometric, positions
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "POINT",
+    "Axis",
+    "DatasetSource",
+    "FileSource",
+    "Layer",
+    "Picture",
+    "Plane",
+    "Point",
+    "Scatter",
+    "Source",
+    "StoreSource",
+    "SystemSource",
+    "Window",
+    "chances",
+    "compared",
+    "compute",
+    "integration_of",
+    "layers_of",
+    "map_command",
+    "opened",
+    "parameter_dims",
+    "parameter_name",
+    "picture",
+    "plain",
+    "plain_symbol",
+    "planned",
+    "python_lines",
+    "run_command",
+    "system_of",
+    "system_toml",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a dataset can show over its parameters: its variables, and each entry of those that have one dimension more.
+
+
+POINT = "point"
+"""Dimension of a list of points."""
+_ENTRIES = 12
+"""Entries of one more dimension that are shown one by one: outcomes, wells, classes, numbers of cycles."""
+_HIDDEN = ("status",)
+_OF_0_1 = ("frequency_ratio", "velocity_amplitude", "location")
+"""Axes of maps of version 0.1, which do not say what parameter they are."""
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One number a point: a variable, or one entry of it.
+
+    Attributes
+    ----------
+    variable : str
+    where : dict of str to int
+        Which entry of its further dimension.
+    words, unit : str
+    shown : bool
+        Whether it is offered; limits of intervals and statuses are told with their point alone.
+    """
+
+    variable: str
+    where: dict[str, int]
+    words: str
+    unit: str
+    shown: bool
+
+
+def parameter_name(skeleton: xr.Dataset, name: str) -> str | None:
+    """The dotted name of what a coordinate is of; None if it is no parameter."""
+    if name not in skeleton.coords:
+        return None
+    said = skeleton[name].attrs.get("parameter", name if name in _OF_0_1 else "")
+    try:
+        return lookup(str(said)).name
+    except InputError:
+        return None
+
+
+def parameter_dims(skeleton: xr.Dataset) -> list[str]:
+    """The dimensions that are swept; one of them is ``point`` for a list."""
+    names = [str(name) for name in skeleton.dims]
+    if "response_class" in skeleton:
+        names = [str(name) for name in skeleton["response_class"].dims]
+    return [name for name in names if name == POINT or parameter_name(skeleton, name) is not None]
+
+
+def layers_of(skeleton: xr.Dataset) -> dict[str, Layer]:
+    """All that is known of a point, by name, the class first."""
+    over = set(parameter_dims(skeleton))
+    found: dict[str, Layer] = {}
+    names = set(map(str, skeleton.data_vars))
+    for name, item in skeleton.data_vars.items():
+        if item.dtype.kind not in "biuf" or not over <= set(item.dims):
+            continue
+        further = [str(each) for each in item.dims if each not in over]
+        words, unit = str(item.attrs.get("long_name", name)), str(item.attrs.get("units", "1"))
+        limit = str(name).endswith(("_low", "_high")) and str(name).rpartition("_")[0] in names
+        if not further:
+            found[str(name)] = Layer(str(name), {}, words, unit, shown=not limit and str(name) not in _HIDDEN)
+        elif len(further) == 1 and further[0] in skeleton.coords and item.sizes[further[0]] <= _ENTRIES:
+            for at, entry in enumerate(skeleton[further[0]].values.tolist()):
+                label = _entry(further[0], entry)
+                found[f"{name}_{label.replace(' ', '_')}"] = Layer(
+                    str(name), {further[0]: at}, f"{words}: {label}", unit, shown=not limit
+                )
+    order = list(STATISTICS)
+
+    def place(name: str) -> tuple[bool, int, str]:
+        # those of one of several strikers after those of all
+        whole = name.partition("_striker_")[0] if name in STATISTICS else name
+        return (
+            name != "response_class",
+            order.index(whole) if whole in order else -1,
+            name if whole != name else "",
+        )
+
+    return dict(sorted(found.items(), key=lambda each: place(each[0])))
+
+
+def _entry(dimension: str, value: Any) -> str:
+    if dimension == "response_class":
+        return ResponseClass(int(value)).label
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def chances(layers: dict[str, Layer], held: dict[str, Any]) -> str:
+    """Lifetimes and probabilities of a point in words, each with its interval; empty if there are none."""
+    parts = []
+    for name, layer in layers.items():
+        low, high = (
+            _partner(layers, layer, f"{layer.variable}_{ending}", held) for ending in ("low", "high")
+        )
+        if name not in held or low is None or high is None:
+            continue
+        value = held[name]
+        if isinstance(value, float) and np.isnan(value) and np.isnan(low):
+            continue
+        parts.append(f"{layer.words} {_number(value)} ({_number(low)} to {_number(high)})")
+    shares = {name: layer for name, layer in layers.items() if layer.variable == "class_fraction"}
+    some = [
+        f"{layer.words.rpartition(': ')[2]} {100.0 * held[name]:.0f} %"
+        for name, layer in shares.items()
+        if held.get(name, 0.0) > 0.0
+    ]
+    if some:
+        parts.append(f"of its replicas: {', '.join(some)}")
+    return "; ".join(parts)
+
+
+def _partner(layers: dict[str, Layer], layer: Layer, variable: str, held: dict[str, Any]) -> Any:
+    for name, each in layers.items():
+        if each.variable == variable and each.where == layer.where:
+            return held.get(name)
+    return None
+
+
+def _number(value: Any) -> str:
+    return "∞" if value == np.inf else f"{value:.3g}" if isinstance(value, float) else str(value)
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+class Source:
+    """A map: its coordinates and attributes, and its variables when they are asked for.
+
+    Attributes
+    ----------
+    name : str
+        What to call it.
+    skeleton : xarray.Dataset
+        Coordinates, attributes, and variables that need not be loaded.
+    version : int
+        Grows when the numbers change.
+    """
+
+    name = ""
+    skeleton: xr.Dataset
+    version = 0
+    growing = False
+
+    @property
+    def attrs(self) -> dict[str, Any]:
+        """What the map says of itself."""
+        return dict(self.skeleton.attrs)
+
+    @property
+    def layers(self) -> dict[str, Layer]:
+        """All that is known of a point, by name."""
+        found: dict[str, Layer] = self._of_skeleton("layers", layers_of)
+        return found
+
+    def _of_skeleton(self, what: str, make: Callable[[xr.Dataset], Any]) -> Any:
+        """Something that follows from the skeleton, kept until that is another one."""
+        kept: dict[str, tuple[Any, Any]] = self.__dict__.setdefault("_kept", {})
+        if what not in kept or kept[what][0] is not self.skeleton:
+            kept[what] = (self.skeleton, make(self.skeleton))
+        return kept[what][1]
+
+    @property
+    def dims(self) -> list[str]:
+        """What may stand along an axis: dimensions of more than one point; of a list what differs among its points.
+
+        A map needs two: of one axis, or of one point, what else is known of it stands along the other, as a strip.
+        """
+        found: list[str] = self._of_skeleton("dims", _axes_of)
+        return found
+
+    @property
+    def is_list(self) -> bool:
+        """Whether it is a list of points, not a grid."""
+        return POINT in parameter_dims(self.skeleton)
+
+    def coordinate(self, name: str) -> NDArray[Any]:
+        """The points of an axis."""
+        return np.atleast_1d(np.asarray(self.skeleton[name].values))
+
+    def scalars(self) -> dict[str, Any]:
+        """Dimensions of one point, and coordinates that hold throughout, by name."""
+        found = {
+            str(name): item.values.item() for name, item in self.skeleton.coords.items() if item.size == 1
+        }
+        return found
+
+    def variables(self) -> list[str]:
+        """What can be shown, the class first."""
+        return [name for name, layer in self.layers.items() if layer.shown]
+
+    def numbers(self) -> list[str]:
+        """All that the map holds of a point."""
+        return list(self.layers)
+
+    def label(self, name: str) -> tuple[str, str]:
+        """What a variable or an axis is, in words, and its unit."""
+        if name in self.layers:
+            return self.layers[name].words, self.layers[name].unit
+        if name in self.skeleton.variables:
+            attrs = self.skeleton[name].attrs
+            return str(attrs.get("long_name", name)), str(attrs.get("units", "1"))
+        row = STATISTICS.get(name)
+        return (name, "1") if row is None else (row.long_name, row.unit)
+
+    def values(self, name: str) -> xr.DataArray | None:
+        """A number over the parameters, in memory; None if there are no numbers yet.
+
+        Raises
+        ------
+        InputError
+            If they cannot be read.
+        """
+        layer = self.layers.get(name)
+        return None if layer is None else self.variable(layer.variable).isel(layer.where)
+
+    def variable(self, name: str) -> xr.DataArray:
+        """A variable as the dataset has it, in memory."""
+        return self.skeleton[name]
+
+    def point(self, where: Mapping[str, int]) -> dict[str, Any]:
+        """All that the map holds of one point, by name."""
+        return self._numbers_of(self.skeleton, where)
+
+    def _numbers_of(self, dataset: xr.Dataset, where: Mapping[str, int]) -> dict[str, Any]:
+        inside = {name: at for name, at in where.items() if name in dataset.dims}
+        names = dict.fromkeys(layer.variable for layer in self.layers.values())
+        part = dataset[list(names)].isel(inside).load()
+        return {
+            name: (
+                part[layer.variable].isel(layer.where) if layer.where else part[layer.variable]
+            ).values.item()
+            for name, layer in self.layers.items()
+        }
+
+    def whole(self) -> xr.Dataset:
+        """All of the map, in memory."""
+        return self.skeleton
+
+    def refresh(self) -> bool:
+        """Look whether there is more; True if there is."""
+        return False
+
+
+class DatasetSource(Source):
+    """A map in memory."""
+
+    def __init__(self, dataset: xr.Dataset, name: str = "map") -> None:
+        if not parameter_dims(dataset) or not layers_of(dataset):
+            known = ", ".join(map(str, dataset.data_vars)) or "none"
+            raise InputError(f"{name}: is no map; it has no variable over swept parameters among {known}")
+        self.skeleton = dataset
+        self.name = name
+
+
+class SystemSource(Source):
+    """Axes over a system, without numbers."""
+
+    def __init__(self, system: System, axes: Mapping[str, Any], integration: Integration, name: str) -> None:
+        self.skeleton = axes_dataset(system, axes, integration)
+        self.name = name
+        self.strikers = 1 + len(system.further_contacts)
+
+    def variables(self) -> list[str]:
+        """All that a sweep gives."""
+        names = [name for name in STATISTICS if name != "status"]
+        if self.strikers == 1:
+            return names
+        each = [f"{name}_striker_{number}" for number in range(1, self.strikers + 1) for name in names]
+        return names + [name for name in each if name in STATISTICS]
+
+
+_SMALL = 2**25
+"""Bytes of a map up to which all of it is held, once a point of it has been asked for."""
+
+
+class FileSource(DatasetSource):
+    """A map in a NetCDF file, of which a variable is read when it is first shown."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lock = threading.Lock()
+        self._all: xr.Dataset | None = None
+        self._held: dict[str, xr.DataArray] = {}
+        with self._open() as dataset:
+            self._stamp = self._stamped()
+            super().__init__(dataset.drop_vars([]), path.name)
+            coords = dataset.coords.to_dataset().load()
+            self.skeleton = coords.assign({
+                name: (item.dims, _unread(item), item.attrs) for name, item in dataset.data_vars.items()
+            }).assign_attrs(dataset.attrs)  # fmt: skip
+
+    def _stamped(self) -> tuple[int, int]:
+        found = self._path.stat()
+        return found.st_mtime_ns, found.st_size
+
+    def _open(self) -> xr.Dataset:
+        if not self._path.is_file():
+            raise InputError(f"{self._path.name}: there is no such file any more")
+        import xarray as xr
+
+        try:
+            return xr.open_dataset(self._path, engine="h5netcdf")
+        except Exception as error:  # of damaged bytes the libraries make errors of every kind
+            raise InputError(f"{self._path.name}: is no NetCDF file of results, or is damaged") from error
+
+    def variable(self, name: str) -> xr.DataArray:
+        """A variable, read from the file the first time."""
+        with self._lock:
+            if name not in self._held:
+                with self._open() as dataset:
+                    if self._stamped() != self._stamp:
+                        raise InputError(f"{self.name}: the file was changed; load the page again")
+                    try:
+                        self._held[name] = dataset[name].load()
+                    except (OSError, ValueError, RuntimeError) as error:
+                        raise InputError(f"{self.name}: {name} cannot be read ({error})") from error
+            return self._held[name]
+
+    def point(self, where: Mapping[str, int]) -> dict[str, Any]:
+        """All that the file holds of one point; of a large file only that is read, each time."""
+        if self.skeleton.nbytes <= _SMALL:
+            if self._all is None:
+                self._all = self.whole()
+            elif not self._path.is_file():
+                raise InputError(f"{self._path.name}: there is no such file any more")
+            elif self._stamped() != self._stamp:
+                raise InputError(f"{self.name}: the file was changed; load the page again")
+            return self._numbers_of(self._all, where)
+        with self._lock, self._open() as dataset:
+            if self._stamped() != self._stamp:
+                raise InputError(f"{self.name}: the file was changed; load the page again")
+            try:
+                return self._numbers_of(dataset, where)
+            except (OSError, ValueError, RuntimeError) as error:
+                raise InputError(f"{self.name}: cannot be read ({error})") from error
+
+    def whole(self) -> xr.Dataset:
+        """All of the map, read now."""
+        with self._lock, self._open() as dataset:
+            if self._stamped() != self._stamp:
+                raise InputError(f"{self.name}: the file was changed; load the page again")
+            try:
+                return dataset.load()
+            except (OSError, ValueError, RuntimeError) as error:
+                raise InputError(f"{self.name}: cannot be read ({error})") from error
+
+
+def _axes_of(skeleton: xr.Dataset) -> list[str]:
+    dims = parameter_dims(skeleton)
+    if POINT in dims:
+        over = [str(name) for name, item in skeleton.coords.items() if item.dims == (POINT,)]
+        known = [
+            name
+            for name in over
+            if parameter_name(skeleton, name) is not None and skeleton[name].dtype.kind in "iuf"
+        ]
+        found = [name for name in known if np.unique(skeleton[name].values).size > 1]
+        spare = [name for name in known if name not in found]
+    else:
+        found = [name for name in dims if skeleton.sizes[name] > 1]
+        spare = [name for name in dims if name not in found]
+    spare += [
+        str(name)
+        for name, item in skeleton.coords.items()
+        if item.ndim == 0 and parameter_name(skeleton, str(name)) is not None and item.dtype.kind in "iuf"
+    ]
+    return [*found, *spare[: max(2 - len(found), 0)]]
+
+
+def _unread(item: xr.DataArray) -> NDArray[Any]:
+    """Stands for numbers that are not read: of the right shape and kind, and of no size in memory."""
+    return np.broadcast_to(np.zeros((), item.dtype), item.shape)
+
+
+def axes_dataset(system: System, axes: Mapping[str, Any], integration: Integration) -> xr.Dataset:
+    """Coordinates and attributes of a sweep that is not computed."""
+    import json
+
+    import xarray as xr
+
+    from snapbeam.model.parameters import lookup
+
+    coords: dict[str, Any] = {}
+    for name, values in axes.items():
+        row = lookup(name)
+        labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
+        coords[row.short] = ((row.short,), np.asarray(values), labels)
+    for name in ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location"):
+        row = lookup(name)
+        if row.short not in coords and name in system.parameters:
+            labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
+            coords[row.short] = ((), system.parameters[name], labels)
+    attrs = {
+        "modes": system.model.modes,
+        "cycles": integration.cycles_or_default,
+        "reference_frequency": system.model.reference_frequency,
+        "system": json.dumps(_plain(system.to_mapping())),
+        "integration": json.dumps(integration_mapping(integration)),
+        "snapbeam_version": "",
+    }
+    return xr.Dataset(coords=coords, attrs=attrs)
+
+
+def integration_mapping(integration: Integration) -> dict[str, Any]:
+    """An integration as plain values, without what does not change a number."""
+    import dataclasses
+
+    found = dataclasses.asdict(integration)
+    return {name: value for name, value in found.items() if name != "threads"}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items() if item is not None}
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    return value
+
+
+def opened(what: Any, *, system: System | None = None, integration: Integration | None = None) -> Source:
+    """The source that was named.
+
+    Parameters
+    ----------
+    what : path, xarray.Dataset, System or None
+        A NetCDF file or a store; a map; a system; nothing, for the paper's beam or *system*.
+    system, integration : optional
+        What a map is computed of, where there is none.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no map.
+    """
+    import xarray as xr
+
+    if what is None or isinstance(what, System):
+        from snapbeam.model.parameter_axes import parse_axis
+        from snapbeam.model.parameter_file import DEFAULT_AXES, Config
+
+        chosen = what or system or Config().system
+        axes = {name: parse_axis(name, text) for name, text in DEFAULT_AXES.items()}
+        name = "the paper's beam" if what is None and system is None else "a system"
+        return SystemSource(chosen, axes, integration or Integration(), name)
+    if isinstance(what, xr.Dataset):
+        return DatasetSource(what)
+    if isinstance(what, (str, Path)):
+        path = Path(what)
+        try:
+            folder = path.is_dir()
+        except (OSError, ValueError) as error:  # a name that no file can have
+            raise InputError(f"file: is no path ({error})") from None
+        if folder:
+            pass  # import-removed
+
+            return StoreSource(path)
+        if not path.exists():
+            raise InputError(f"map = {str(path)!r}: there is no such file or store")
+        return FileSource(path)
+    raise InputTypeError(
+        f"map is a {type(what).__name__}: must be a map, a file, a store, a System, or nothing"
+    )
+
+
+# ----------------------------------------------------------------------------------------------------
+# One point of a map: the system and the integration that it was computed with, to the last bit.
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point that is asked for.
+
+    Attributes
+    ----------
+    values : dict
+        Exact values by dotted name, of what the map sweeps.
+    expected : dict
+        What the map holds of it, by name of the statistic; empty if nothing.
+    """
+
+    values: dict[str, Any]
+    expected: dict[str, Any] = field(default_factory=dict)
+
+    def system(self, base: System, integration: Integration) -> tuple[System, Integration]:
+        """What is run at this point."""
+        of_run = {name[4:]: value for name, value in self.values.items() if name.startswith("run.")}
+        of_system = {name: value for name, value in self.values.items() if not name.startswith("run.")}
+        return base.replace(**of_system), integration.replace(**of_run) if of_run else integration
+
+    def words(self) -> str:
+        """The point for a person, in few digits."""
+        return ", ".join(
+            f"{lookup(name).short.replace('_', ' ')} {_brief(value)}" for name, value in self.values.items()
+        )
+
+
+def _brief(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def system_of(attrs: Mapping[str, Any], name: str) -> System:
+    """The system that a map says it was computed of.
+
+    Raises
+    ------
+    InputError
+        If it does not say it, or it was driven by a record, which is too long to be kept in a file.
+    """
+    text = attrs.get("system")
+    if not isinstance(text, str):
+        raise InputError(f"{name}: does not hold the system that it was computed of")
+    sections = _parsed(text, name)
+    if any(isinstance(value, dict) for values in sections.values() for value in values.values()):
+        raise InputError(f"{name}: was driven by a record, which is too long to be kept in it")
+    arrays = {
+        section: {key: np.array(value) if isinstance(value, list) else value for key, value in values.items()}
+        for section, values in sections.items()
+    }
+    return System.from_mapping(arrays)
+
+
+def _parsed(text: str, name: str) -> dict[str, Any]:
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{name}: its description is damaged ({error})") from None
+    if not isinstance(found, dict):
+        raise InputError(f"{name}: its description is damaged")
+    return found
+
+
+def integration_of(attrs: Mapping[str, Any]) -> Integration:
+    """How a map says that it was integrated; one run is always the processor's work."""
+    found = _parsed(str(attrs.get("integration", "{}")), "integration")
+    known = {item: value for item, value in found.items() if value is not None and item != "engine"}
+    return Integration(**known)
+
+
+def parameter_of(skeleton: xr.Dataset, name: str) -> str:
+    """The dotted name of an axis."""
+    attrs = skeleton[name].attrs if name in skeleton.coords else {}
+    return lookup(str(attrs.get("parameter", name))).name
+
+
+def compared(expected: Mapping[str, Any], outcome: RunSummary, engine: str) -> tuple[bool, str]:
+    """Whether a run is what a map holds of it, bit for bit, and words for it."""
+    expected = {name: value for name, value in expected.items() if name in outcome}
+    if not expected:
+        return True, ""
+    differing = []
+    for name, value in expected.items():
+        found = outcome[name]
+        found = int(found) if name in ("response_class", "status") else found
+        same = found == value or (_is_nan(found) and _is_nan(value))
+        if not same and name not in ("steps",):
+            differing.append(name)
+    if not differing:
+        return True, f"bit for bit what the map holds ({len(expected)} numbers)"
+    if "response_class" in differing:
+        return False, "another class than the map's" + _why(expected, engine)
+    return True, f"the map's class; differs in {', '.join(differing[:4])}" + _why(expected, engine)
+
+
+def _why(expected: Mapping[str, Any], engine: str) -> str:
+    if int(expected.get("status", 0)) == 6:
+        return ": the map inferred it from its neighbours"
+    if engine == "cuda":
+        return ": the map was computed by another engine"
+    return ": the map was computed by another version, on another processor, or of a system that has changed"
+
+
+def _is_nan(value: Any) -> bool:
+    return isinstance(value, float) and math.isnan(value)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Cells of a map as the pixels of a picture, for the part that is seen.
+
+
+_Array = NDArray[np.float64]
+_MOST = 1_000_000
+"""Cells that are sent as they are."""
+_EVEN = 1e-6
+_SIGNS = {
+    r"\Omega": "Ω",
+    r"\omega": "ω",
+    r"\zeta": "ζ",
+    r"\rho": "ρ",
+    r"\phi": "φ",
+    r"\varphi": "φ",
+    r"\tau": "τ",
+}
+
+
+def plain_symbol(text: str) -> str:
+    """A symbol as a browser shows it without mathematics."""
+    for sign, letter in _SIGNS.items():
+        text = text.replace(sign, letter)
+    return (
+        text.replace(r"\mathrm", "")
+        .replace("_s", "ₛ")
+        .replace("_{s}", "ₛ")
+        .replace("{", "")
+        .replace("}", "")
+        .replace("\\", "")
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One axis of a map: its points, where they are drawn, and the borders of their cells."""
+
+    name: str
+    label: str
+    points: NDArray[Any]
+    at: _Array
+    edges: _Array
+    words: list[str] | None = None
+    log: bool = False
+
+    @classmethod
+    def of(cls, source: Source, name: str) -> Axis:
+        """The axis of a map."""
+        skeleton = source.skeleton
+        if not skeleton[name].dims:
+            skeleton = skeleton.drop_vars(name).assign_coords({
+                name: (name, source.coordinate(name), skeleton[name].attrs)
+            })  # fmt: skip
+        at, words = positions(skeleton, name)
+        label = cls.words_of(source, name)
+        edges = (
+            edges_of(skeleton, name) if at.size > 1 else at[0] + np.array([-0.5, 0.5]) * max(abs(at[0]), 1.0)
+        )
+        log = words is None and is_geometric(at)
+        return cls(name, label, source.coordinate(name), at, edges, words, log)
+
+    @classmethod
+    def scattered(cls, source: Source, name: str, size: int) -> Axis:
+        """One parameter of a list of points, in the order of the list."""
+        at = np.broadcast_to(source.coordinate(name).astype(np.float64), (size,))
+        low, high = float(at.min()), float(at.max())
+        room = 0.04 * (high - low) or 0.5 * max(abs(low), 1.0)
+        edges = np.array([low - room, high + room])
+        return cls(name, cls.words_of(source, name), source.coordinate(name), at, edges)
+
+    @staticmethod
+    def words_of(source: Source, name: str) -> str:
+        """What stands along it: words, symbol and unit."""
+        from snapbeam.model.parameters import lookup
+
+        attrs = source.skeleton[name].attrs
+        text, unit = source.label(name)
+        text = text.replace("omega_1", "ω₁")
+        symbol = ""
+        if "parameter" in attrs or name in ("frequency_ratio", "velocity_amplitude", "location"):
+            symbol = plain_symbol(lookup(str(attrs.get("parameter", name))).quantity.symbol)
+        return " ".join(part for part in (text, symbol, "" if unit == "1" else f"({unit})") if part)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Outermost borders."""
+        return float(self.edges[0]), float(self.edges[-1])
+
+    def nearest(self, value: float) -> int:
+        """The number of the point in whose cell a place lies; the nearest one outside."""
+        return int(np.clip(np.searchsorted(self.edges, value, side="right") - 1, 0, self.at.size - 1))
+
+    def spread(self, low: float, high: float, pixels: int) -> _Array:
+        """Centres of even pixels from *low* to *high*."""
+        share = (np.arange(pixels) + 0.5) / pixels
+        if self.log:
+            return np.exp(np.log(low) + share * np.log(high / low))
+        return low + share * (high - low)
+
+    @property
+    def even(self) -> bool:
+        """Whether its cells are equally wide on the screen."""
+        edges = np.log(self.edges) if self.log and self.edges[0] > 0.0 else self.edges
+        widths = np.diff(edges)
+        return bool(np.allclose(widths, widths[0], rtol=_EVEN))
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """An array of cells and where it lies."""
+
+    values: NDArray[Any]
+    x: float
+    y: float
+    width: float
+    height: float
+
+
+def _cut(axis: Axis, view: tuple[float, float], pixels: int) -> tuple[NDArray[np.int64], float, float]:
+    """Which cells to show, and from where to where: the cells in view, or pixels, if they are fewer."""
+    low, high = max(min(view), axis.edges[0]), min(max(view), axis.edges[-1])
+    if not low < high:
+        return np.zeros(0, dtype=np.int64), 0.0, 0.0
+    first, last = axis.nearest(low), axis.nearest(np.nextafter(high, low))
+    if axis.even and last - first < max(pixels, 2) * 2:
+        return np.arange(first, last + 1), float(axis.edges[first]), float(axis.edges[last + 1])
+    where = axis.spread(low, high, pixels)
+    index = np.clip(np.searchsorted(axis.edges, where, side="right") - 1, 0, axis.at.size - 1)
+    return index, float(low), float(high)
+
+
+def picture(
+    values: NDArray[Any], x: Axis, y: Axis, view: tuple[float, float, float, float], pixels: tuple[int, int]
+) -> Picture | None:
+    """The part of *values*, of shape (y, x), that a view (x0, x1, y0, y1) of so many pixels shows.
+
+    Cells that lie evenly are sent as they are, so that their borders are exact at any zoom; uneven ones, and more of
+    them than there are pixels, are read off at the centre of each pixel.
+    """
+    if values.size <= _MOST and x.even and y.even:
+        return Picture(values, x.span[0], y.span[0], x.span[1] - x.span[0], y.span[1] - y.span[0])
+    across, left, right = _cut(x, view[:2], pixels[0])
+    upward, low, high = _cut(y, view[2:], pixels[1])
+    if not across.size or not upward.size:
+        return None
+    return Picture(values[np.ix_(upward, across)], left, low, right - left, high - low)
+
+
+# ----------------------------------------------------------------------------------------------------
+# The two axes that are shown, and where the others stand: from places on the screen to points of the map.
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """A cut through a map.
+
+    Attributes
+    ----------
+    x, y : Axis
+        Across and upward.
+    fixed : dict of str to int
+        Which point of each other axis.
+    """
+
+    source: Source
+    x: Axis
+    y: Axis
+    fixed: dict[str, int]
+
+    @classmethod
+    def of(cls, source: Source, x: str, y: str, fixed: dict[str, int]) -> Plane:
+        """The cut through a map along two axes.
+
+        Raises
+        ------
+        InputError
+            If it has no such axes.
+        """
+        for name in (x, y):
+            if name not in source.dims:
+                raise InputError(f"{name}: is no axis of this map, whose axes are {', '.join(source.dims)}")
+        if x == y:
+            raise InputError(f"{x}: stands along both axes")
+        others = {name: fixed.get(name, 0) for name in source.dims if name not in (x, y)}
+        return cls(source, Axis.of(source, x), Axis.of(source, y), others)
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Dotted names of the two axes."""
+        return parameter_of(self.source.skeleton, self.x.name), parameter_of(
+            self.source.skeleton, self.y.name
+        )
+
+    def values(self, name: str) -> NDArray[Any] | None:
+        """A variable on the cut, of shape (y, x)."""
+        found = self.source.values(name)
+        if found is None:
+            return None
+        cut = found.isel({name: at for name, at in self.fixed.items() if name in found.dims})
+        for name in (self.y.name, self.x.name):
+            if name not in cut.dims:  # known of the whole map: a strip
+                cut = cut.drop_vars(name, errors="ignore").expand_dims(name)
+        one = {name: 0 for name in cut.dims if name not in (self.x.name, self.y.name)}
+        return np.asarray(cut.isel(one).transpose(self.y.name, self.x.name).values)
+
+    def index(self, x: float, y: float) -> tuple[int, int]:
+        """Row and column of the point whose cell holds a place."""
+        return self.y.nearest(y), self.x.nearest(x)
+
+    def fixed_values(self) -> dict[str, Any]:
+        """The values of the other axes, by dotted name, and of axes of one point."""
+        found = {
+            parameter_of(self.source.skeleton, name): _plain_plane(self.source.coordinate(name)[at])
+            for name, at in self.fixed.items()
+        }
+        for name in map(str, self.source.skeleton.dims):
+            if (
+                self.source.skeleton.sizes[name] == 1
+                and name not in (self.x.name, self.y.name)
+                and parameter_name(self.source.skeleton, name) is not None
+            ):
+                found[parameter_of(self.source.skeleton, name)] = _plain_plane(
+                    self.source.coordinate(name)[0]
+                )
+        return found
+
+    def at(self, row: int, column: int) -> Point:
+        """The point of the map in a cell, without what the map holds of it."""
+        across, upward = self.names
+        values = {across: _plain_plane(self.x.points[column]), upward: _plain_plane(self.y.points[row])}
+        return Point(values | self.fixed_values())
+
+    def indexers(self, row: int, column: int) -> dict[str, int]:
+        """Where a cell lies in the arrays of the map."""
+        return {self.x.name: column, self.y.name: row, **self.fixed}
+
+    def beside(self, place: tuple[float, float], across: int, upward: int) -> tuple[int, int]:
+        """Row and column of the point *across* and *upward* points from that at a place; the last one at an edge."""
+        row, column = self.index(*place)
+        return (
+            int(np.clip(row + upward, 0, self.y.at.size - 1)),
+            int(np.clip(column + across, 0, self.x.at.size - 1)),
+        )
+
+    @property
+    def parameters(self) -> list[str]:
+        """Dotted names of all that a point is given by."""
+        return list(dict.fromkeys([*self.names, *self.fixed_values()]))
+
+    def find(self, values: dict[str, Any]) -> tuple[int, int] | None:
+        """Row and column of a point given by its exact values; None if it is not one of the map's."""
+        place = []
+        for axis, name in ((self.y, self.names[1]), (self.x, self.names[0])):
+            at = np.flatnonzero(axis.points == values.get(name))
+            if at.size != 1:
+                return None
+            place.append(int(at[0]))
+        same = all(values.get(name, value) == value for name, value in self.fixed_values().items())
+        return (place[0], place[1]) if same else None
+
+    def place(self, values: dict[str, Any]) -> tuple[float, float] | None:
+        """Where a point is drawn; None if it is of another cut."""
+        found = []
+        for axis, name in ((self.x, self.names[0]), (self.y, self.names[1])):
+            value = values.get(name)
+            if value is None:
+                return None
+            if axis.words is not None:
+                at = np.flatnonzero(axis.points == value)
+                if not at.size:
+                    return None
+                found.append(float(axis.at[at[0]]))
+            else:
+                found.append(float(value))
+        return found[0], found[1]
+
+    @property
+    def can_zoom(self) -> bool:
+        """Whether both axes are of numbers between which there are others."""
+        return all(lookup(name).quantity.kind is float for name in self.names)
+
+
+def _plain_plane(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+# ----------------------------------------------------------------------------------------------------
+# A list of points over two of its parameters: each point stands where its own values are.
+
+
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """A list of points seen along two of its parameters; it has the interface of a cut through a grid.
+
+    Attributes
+    ----------
+    x, y : Axis
+        Across and upward; their ``at`` are the places of the points, in the order of the list.
+    """
+
+    source: Source
+    x: Axis
+    y: Axis
+    fixed: dict[str, int]
+
+    @classmethod
+    def of(cls, source: Source, x: str, y: str) -> Scatter:
+        """A list of points along two parameters.
+
+        Raises
+        ------
+        InputError
+            If its points have no such parameters.
+        """
+        for name in (x, y):
+            if name not in source.dims:
+                raise InputError(
+                    f"{name}: is no parameter of these points, which are {', '.join(source.dims)}"
+                )
+        if x == y:
+            raise InputError(f"{x}: stands along both axes")
+        size = source.skeleton.sizes[POINT]
+        return cls(source, Axis.scattered(source, x, size), Axis.scattered(source, y, size), {})
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """Dotted names of the two axes."""
+        skeleton = self.source.skeleton
+        return parameter_of(skeleton, self.x.name), parameter_of(skeleton, self.y.name)
+
+    @property
+    def parameters(self) -> list[str]:
+        """Dotted names of all that a point is given by."""
+        return list(self.at(0).values)
+
+    def values(self, name: str) -> NDArray[Any] | None:
+        """A number of each point, of shape (points,)."""
+        found = self.source.values(name)
+        return None if found is None else np.asarray(found.values)
+
+    def index(self, x: float, y: float) -> tuple[int]:
+        """The point nearest to a place, distances in shares of the axes."""
+        distance = self._away(x, y)
+        return (int(np.argmin(distance[0] ** 2 + distance[1] ** 2)),)
+
+    def _away(self, x: float, y: float) -> NDArray[np.float64]:
+        """Distances of the points across and upward from a place, in shares of the axes; shape (2, points)."""
+        sides = []
+        for axis, value in ((self.x, x), (self.y, y)):
+            low, high = axis.span
+            sides.append((axis.at - value) / (high - low))
+        return np.array(sides)
+
+    def fixed_values(self) -> dict[str, Any]:
+        """Nothing is the same for all points by itself."""
+        return {}
+
+    def at(self, number: int) -> Point:
+        """A point of the list, without what the map holds of it."""
+        values = {}
+        for name, item in self.source.skeleton.coords.items():
+            full = parameter_name(self.source.skeleton, str(name))
+            if item.dims == (POINT,) and "parameter" in item.attrs and full is not None:
+                values[full] = item.values[number].item()
+        return Point(values)
+
+    def indexers(self, number: int) -> dict[str, int]:
+        """Where a point lies in the arrays of the map."""
+        return {POINT: number}
+
+    def find(self, values: dict[str, Any]) -> tuple[int] | None:
+        """The point of exactly these values; None if the list has none."""
+        same = np.ones(self.x.at.size, dtype=bool)
+        for name in self.at(0).values:
+            same &= self.source.skeleton[self._short(name)].values == values.get(name)
+        found = np.flatnonzero(same)
+        return (int(found[0]),) if found.size else None
+
+    def _short(self, full: str) -> str:
+        skeleton = self.source.skeleton
+        return next(str(name) for name in skeleton.coords if parameter_name(skeleton, str(name)) == full)
+
+    def place(self, values: dict[str, Any]) -> tuple[float, float] | None:
+        """Where a point is drawn; None if it does not say."""
+        found = [values.get(name) for name in self.names]
+        if any(value is None for value in found):
+            number = self.find(values)
+            return None if number is None else (float(self.x.at[number[0]]), float(self.y.at[number[0]]))
+        return float(found[0]), float(found[1])  # type: ignore[arg-type]
+
+    def beside(self, place: tuple[float, float], across: int, upward: int) -> tuple[int]:
+        """The nearest point within 45 degrees of a direction; the one at the place itself if there is none."""
+        away = self._away(*place)
+        along = across * away[0] + upward * away[1]
+        aside = np.abs(upward * away[0] - across * away[1])
+        ahead = (along > 0.0) & (aside <= along)
+        if not ahead.any():
+            return self.index(*place)
+        distance = np.where(ahead, away[0] ** 2 + away[1] ** 2, np.inf)
+        return (int(np.argmin(distance)),)
+
+    @property
+    def can_zoom(self) -> bool:
+        """Between the points of a list there is nothing to compute."""
+        return False
+
+
+# ----------------------------------------------------------------------------------------------------
+# A store of a map, also one that is still growing.
+
+
+class StoreSource(DatasetSource):
+    """A store, read without disturbing who writes it; points that are not done are unknown."""
+
+    growing = True
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._stamp = self._stamped()
+        super().__init__(sb.read_checkpoint(path), path.name)
+        self._read = time.monotonic()
+
+    def _stamped(self) -> tuple[int, int]:
+        try:
+            found = (self._path / "ledger.jsonl").stat()
+        except OSError:
+            return 0, 0
+        return found.st_mtime_ns, found.st_size
+
+    def refresh(self) -> bool:
+        """Read it again if more is done."""
+        if not self._path.is_dir():
+            raise sb.InputError(f"{self._path.name}: there is no such store any more")
+        stamp = self._stamped()
+        if stamp == self._stamp:
+            return False
+        self._stamp = stamp
+        self.skeleton = sb.read_checkpoint(self._path)
+        self.version += 1
+        return True
+
+
+# ----------------------------------------------------------------------------------------------------
+# Parts of a map computed anew, from coarse to fine, while the page lives on.
+
+
+_STRIDES = (27, 9, 3, 1)
+"""Cells from one point to the next, level by level; the point of a block is the centre of its middle cell."""
+_BATCH_SECONDS = 0.3
+_FIRST = 8
+"""Points of the first batch, of which the pace is learnt."""
+_MOST_WINDOWS = 512
+
+
+@dataclass(eq=False)
+class Window:
+    """A part of a plane of parameters, on a regular grid of cells.
+
+    Attributes
+    ----------
+    system, integration : System, Integration
+        What is computed; the two axes are set at each point.
+    names : pair of str
+        Dotted names of the axes across and upward.
+    x, y : array of shape (nx,) and (ny,)
+        The values at which runs are made, the centres of cells.
+    bounds : 4 floats
+        Left, right, low and high borders.
+    log : pair of bool
+    stride : array of int8, shape (ny, nx)
+        Cells of the block whose point stands for the cell; 0 where nothing is known.
+    values : dict of arrays of shape (ny, nx)
+        Statistics by name.
+    """
+
+    system: System
+    integration: Integration
+    names: tuple[str, str]
+    x: NDArray[Any]
+    y: NDArray[Any]
+    bounds: tuple[float, float, float, float]
+    log: tuple[bool, bool] = (False, False)
+    key: Any = None
+    values: dict[str, NDArray[Any]] = field(default_factory=dict)
+    stride: NDArray[np.int8] = field(init=False)
+    done: int = 0
+    seconds: float = 0.0
+    version: int = 0
+    finished: bool = False
+    lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+    """Held by who computes it."""
+    writing: threading.Lock = field(default_factory=threading.Lock, repr=False)
+    """Held while values and strides do not agree."""
+
+    def __post_init__(self) -> None:
+        self.stride = np.zeros((self.y.size, self.x.size), dtype=np.int8)
+
+    @property
+    def size(self) -> int:
+        """Cells."""
+        return int(self.x.size * self.y.size)
+
+    def cell(self, x: float, y: float) -> tuple[int, int]:
+        """Row and column of the cell at a place."""
+        place = []
+        for value, (low, high), log, size in (
+            (y, self.bounds[2:], self.log[1], self.y.size),
+            (x, self.bounds[:2], self.log[0], self.x.size),
+        ):
+            share = np.log(value / low) / np.log(high / low) if log else (value - low) / (high - low)
+            place.append(int(np.clip(share * size, 0, size - 1)))
+        return place[0], place[1]
+
+    def computed_at(
+        self, x: float, y: float, stride_of: NDArray[np.int8] | None = None
+    ) -> tuple[int, int] | None:
+        """Row and column of the point that stands for a place; None if there is none.
+
+        *stride_of* is what ``stride`` was when the window was drawn: cells that have been computed since are not yet
+        seen by who clicks on them.
+        """
+        row, column = self.cell(x, y)
+        stride = int((self.stride if stride_of is None else stride_of)[row, column])
+        if stride == 0:
+            return None
+        return _middle(row, stride), _middle(column, stride)
+
+    def own(self) -> NDArray[np.bool_]:
+        """Which cells hold a run of their own, not that of the block they lie in; shape (ny, nx)."""
+        rows, columns = np.indices(self.stride.shape)
+        stride = np.maximum(self.stride.astype(np.int64), 1)
+        middle = [at // stride * stride + stride // 2 for at in (rows, columns)]
+        found: NDArray[np.bool_] = (self.stride > 0) & (middle[0] == rows) & (middle[1] == columns)
+        return found
+
+    def covers(self, x: float, y: float) -> bool:
+        """Whether a place lies in it."""
+        left, right, low, high = self.bounds
+        return left <= x <= right and low <= y <= high
+
+
+def _middle(at: int, stride: int) -> int:
+    return at // stride * stride + stride // 2
+
+
+def _spread(low: float, high: float, cells: int, log: bool) -> _Array:
+    share = (np.arange(cells) + 0.5) / cells
+    return np.exp(np.log(low) + share * np.log(high / low)) if log else low + share * (high - low)
+
+
+def planned(
+    system: System,
+    integration: Integration,
+    names: tuple[str, str],
+    bounds: tuple[float, float, float, float],
+    log: tuple[bool, bool],
+    pixels: tuple[int, int],
+    cell: int = 3,
+    key: Any = None,
+) -> Window:
+    """A window whose finest cells are *cell* pixels wide, wider if there would be too many."""
+    width = max(cell, 1)
+    while (pixels[0] // width + 27) * (pixels[1] // width + 27) > WINDOW_POINTS:
+        width += 1
+    # whole blocks of the coarsest level, so that the middle of every block is that of a finer one
+    nx, ny = (max(round(size / width / _STRIDES[0]), 1) * _STRIDES[0] for size in pixels)
+    x, y = _spread(*bounds[:2], nx, log[0]), _spread(*bounds[2:], ny, log[1])
+    return Window(system, integration, names, x, y, bounds, log, key)
+
+
+def _blocks(size: int, stride: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First cells of the blocks along an axis, and the cells of their points."""
+    first = np.arange(0, size, stride)
+    return first, first + stride // 2
+
+
+def compute(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], None]) -> Window:
+    """Fill a window; *tell* is called after every batch.
+
+    Raises
+    ------
+    Cancelled
+        If it is not wanted any more.
+    InputError
+        For a point that no system has.
+    """
+    while not window.lock.acquire(timeout=0.1):  # another page has asked for it, and computes it
+        token.check()
+    try:
+        return _filled(window, jobs, token, tell)
+    finally:
+        window.lock.release()
+
+
+def _filled(window: Window, jobs: Jobs, token: Token, tell: Callable[[Window], None]) -> Window:
+    pace = None
+    structural = [not _is_run(name) for name in window.names]
+    for stride in _STRIDES:
+        (row0, rows), (column0, columns) = _blocks(window.y.size, stride), _blocks(window.x.size, stride)
+        todo = [
+            (int(a), int(b), int(i), int(j))
+            for a, i in zip(row0, rows, strict=True)
+            for b, j in zip(column0, columns, strict=True)
+            if not 0 < int(window.stride[a, b]) <= stride
+        ]
+        order = _structure_order(todo, structural)
+        at = 0
+        while at < len(order):
+            batch = _FIRST if pace is None else int(np.clip(_BATCH_SECONDS / pace, 1, _MOST_WINDOWS))
+            part = order[at : at + batch]
+            fresh = [item for item in part if not _known(window, item[2], item[3])]
+            found: dict[str, NDArray[Any]] = {}
+            if fresh:
+                with jobs.turn(token):
+                    begun = time.monotonic()
+                    found = _run(window, fresh, token)
+                spent = (time.monotonic() - begun) / len(fresh)
+                first = pace is None
+                pace = spent if first or pace is None else 0.5 * (pace + spent)
+                window.seconds = pace
+            with window.writing:
+                for name, values in found.items():
+                    held = window.values.setdefault(name, np.zeros(window.stride.shape, dtype=values.dtype))
+                    held[[item[2] for item in fresh], [item[3] for item in fresh]] = values
+                for a, b, i, j in part:
+                    block = (slice(a, a + stride), slice(b, b + stride))
+                    for values in window.values.values():
+                        values[block] = values[i, j]
+                    window.stride[block] = stride
+            at += batch
+            window.done += len(fresh)
+            window.version += 1
+            tell(window)
+    window.finished = True
+    window.version += 1
+    return window
+
+
+def _known(window: Window, row: int, column: int) -> bool:
+    """Whether the run of this very cell has been made: it is the point of a coarser block."""
+    stride = int(window.stride[row, column])
+    return bool(stride and _middle(row, stride) == row and _middle(column, stride) == column)
+
+
+def _structure_order(
+    todo: list[tuple[int, int, int, int]], structural: list[bool]
+) -> list[tuple[int, int, int, int]]:
+    """Points of one structure after the other; without structures, scattered over the window."""
+    if structural[0]:
+        return sorted(todo, key=lambda item: item[3])
+    if structural[1]:
+        return sorted(todo, key=lambda item: item[2])
+    return [todo[i] for i in sorted(range(len(todo)), key=lambda i: i * 0.6180339887498949 % 1.0)]
+
+
+def _is_run(name: str) -> bool:
+    from snapbeam.model.parameters import lookup
+
+    return lookup(name).is_run
+
+
+def _run(window: Window, points: list[tuple[int, int, int, int]], token: Token) -> dict[str, NDArray[Any]]:
+    """Statistics of some cells, by name."""
+    import xarray as xr
+
+    rows = np.array([item[2] for item in points])
+    columns = np.array([item[3] for item in points])
+    table = xr.Dataset({
+        window.names[0]: ("point", window.x[columns]),
+        window.names[1]: ("point", window.y[rows]),
+    })  # fmt: skip
+    spare = max(1, (os.cpu_count() or 2) - 1)  # a run that is clicked on needs a core
+    found = sweep(window.system, table, window.integration.replace(threads=spare), progress=token.check)
+    return {str(name): item.values for name, item in found.data_vars.items() if item.dims == ("point",)}
+
+
+# ----------------------------------------------------------------------------------------------------
+# The command and the lines of Python that make exactly what is shown, to the last digit.
+
+
+_CONFIG = "system.toml"
+
+
+def plain(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    """A system's sections as plain values, without what follows from others."""
+    return {
+        section: {
+            name: value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+            for name, value in values.items()
+            if value is not None
+        }
+        for section, values in sections.items()
+    }
+
+
+def _run_section(integration: Integration) -> dict[str, Any]:
+    default = integration_mapping(Integration())
+    return {
+        name: value
+        for name, value in integration_mapping(integration).items()
+        if value is not None and value != default[name] and name != "engine"
+    }
+
+
+def system_toml(system: System, integration: Integration, comment: str = "") -> str:
+    """A parameter file of a system, which ``--config`` reads back equal."""
+    sections = plain(system.to_mapping())
+    run = _run_section(integration)
+    return config_text(config_from_mapping(sections | ({"run": run} if run else {})), comment)
+
+
+def _value(value: Any) -> str:
+    return repr(value) if isinstance(value, (int, float)) else str(value)
+
+
+def run_command(values: Mapping[str, Any], file: str, on_map: bool) -> str:
+    """The command that computes a point: of a file's map, or of a parameter file kept beside it."""
+    if file and on_map:
+        point = ",".join(f"{lookup(name).short}={_value(value)}" for name, value in values.items())
+        source = ["--from", file, "--point", point]
+    else:
+        source = ["--config", _CONFIG]
+        for name, value in values.items():
+            source += ["--set", f"{name}={_value(value)}"]
+    return shlex.join(["snapbeam", "simulate", *source, "-o", "run.nc", "--plot", "run.png"])
+
+
+def map_command(axes: Mapping[str, tuple[float, float, int]], fixed: Mapping[str, Any]) -> str:
+    """The command that computes a window on even axes, of a parameter file kept beside it."""
+    parts = ["snapbeam", "map", "--config", _CONFIG]
+    for name, value in fixed.items():
+        parts += ["--set", f"{name}={_value(value)}"]
+    for name, (first, last, count) in axes.items():
+        parts += ["--sweep", f"{name}={first!r}:{last!r}:{count}"]
+    return shlex.join([*parts, "-o", "window.nc", "--plot", "window.png"])
+
+
+def python_lines(system: System, integration: Integration) -> str:
+    """Lines of Python that compute a run of a system, with nothing beside them."""
+    run = _run_section(integration)
+    arguments = ", ".join(f"{name}={value!r}" for name, value in run.items())
+    sections = plain(system.to_mapping())
+    if "start" in sections:
+        sections["start"] = {name: np.asarray(value).tolist() for name, value in sections["start"].items()}
+    text = pprint.pformat(sections, width=100, sort_dicts=False)
+    return (
+        "import snapbeam as sb\n\n"
+        f"system = sb.System.from_mapping({text})\n"
+        f"run = sb.simulate(system, sb.Integration({arguments}))\n"
+        "print(run.outcome)\n"
+        'run.save("run.nc")\n'
+    )

@@ -1,1 +1,0 @@
-"""What is explored: maps from files, stores and nothing, cut, drawn and computed anew."""

@@ -1,0 +1,994 @@
+"""One run: what it is in a line, and its views."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import panel as pn
+from bokeh.models import (
+    ColumnDataSource,
+    CustomJS,
+    DataTable,
+    Label,
+    NumberFormatter,
+    Range1d,
+    Select,
+    Slider,
+    Span,
+    TableColumn,
+    Toggle,
+)
+from bokeh.transform import linear_cmap
+from numpy.typing import NDArray
+
+from snapbeam import STATISTICS, ResponseClass, RunStatus
+from snapbeam.explorer.style import (
+    Cursor,
+    Look,
+    blend,
+    class_chip,
+    columns,
+    figure,
+    fit,
+    inner_size,
+    legend,
+    sheet,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from snapbeam import ReducedModel, Run
+
+__all__ = [
+    "BeamView",
+    "Energy",
+    "Impacts",
+    "Modal",
+    "Numbers",
+    "Part",
+    "Phase",
+    "RunView",
+    "Spectrum",
+    "Waveform",
+    "across",
+    "amplitude_spectrum",
+    "envelope",
+    "round_trip",
+    "within",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# What every view of a run is: built when it is first looked at, filled when there is a run to show.
+
+
+_ROUNDED = 1e-9
+
+
+class Part:
+    """One view of a run.
+
+    Attributes
+    ----------
+    title : str
+        Of its tab.
+    place : panel.Column
+        Where it stands; empty until :meth:`build`.
+    """
+
+    title = ""
+
+    def __init__(self, look: Look, cursor: Cursor) -> None:
+        self.look, self.cursor = look, cursor
+        self.place = pn.Column(sizing_mode="stretch_width", margin=0)
+        self.built = False
+
+    def activate(self) -> None:
+        """Build it, the first time."""
+        if not self.built:
+            self.built = True
+            parts = self.build()
+            for part in parts:  # before they are on the page, not after
+                if hasattr(part, "select"):
+                    styled(part, self.look)
+            self.place.objects = parts
+
+    def build(self) -> list[Any]:
+        """What stands in it."""
+        raise NotImplementedError
+
+    def show(self, run: Run, low: float, high: float) -> None:
+        """Show a run from *low* to *high*, in cycles or seconds."""
+        raise NotImplementedError
+
+    def named(self, name: str) -> str:
+        """The name of something in this view, another one in each of two runs."""
+        return f"{name}{self.cursor.suffix}"
+
+    def wrap(self, plot: Any) -> Any:
+        """A figure in the page."""
+        return pn.pane.Bokeh(plot, sizing_mode="stretch_width", margin=(0, 0, 4, 0))
+
+
+def across(run: Run) -> tuple[NDArray[np.float64], str]:
+    """What pictures over time have along them, and its label."""
+    if "cycle" in run.dataset.variables:
+        return run.dataset["cycle"].values, "cycles of excitation τ"
+    return run.dataset["time"].values, "time (s)"
+
+
+def within(x: NDArray[np.float64], low: float, high: float) -> slice:
+    """The samples from *low* to *high*, at least two; one that rounding has put beyond an end is in."""
+    low, high = low - _ROUNDED * abs(low), high + _ROUNDED * abs(high)
+    first, last = int(np.searchsorted(x, low)), int(np.searchsorted(x, high, side="right"))
+    if last - first < 2:
+        first, last = max(first - 1, 0), min(first + 2, x.size)
+    return slice(first, last)
+
+
+# ----------------------------------------------------------------------------------------------------
+# The beam moving beside the striker, drawn in the browser from the modal amplitudes.
+
+
+_POSITIONS = 121
+_CONTROLS = """
+.bk-btn, .bk-input { background: var(--sb-card); color: var(--sb-text); border-color: var(--sb-faint); }
+.bk-btn.bk-active, .bk-btn:hover { background: var(--sb-grid); color: var(--sb-text); }
+.bk-btn.bk-active { box-shadow: inset 0 -3px 0 var(--sb-accent); }
+.bk-slider-title, .bk-slider-value { color: var(--sb-text); }
+.noUi-target { background: var(--sb-grid); }
+"""
+_FRAMES = 6000
+_MODES = 32
+_DRAW = """
+const F = frames.data, n = F.t.length;
+if (n < 2) { return; }
+const S = shapes.data, P = S.x.length, m = meta.data;
+let a = 0, b = n - 1;
+const u = Math.min(Math.max(t, F.t[0]), F.t[b]);
+while (b - a > 1) { const c = (a + b) >> 1; if (F.t[c] <= u) { a = c; } else { b = c; } }
+const s = (u - F.t[a]) / (F.t[b] - F.t[a]);
+const w = new Float64Array(P), M = m.modes[0], h = m.half[0];
+for (let i = 0; i < M; i++) {
+  const q = (1 - s) * amplitudes.data.q[a * M + i] + s * amplitudes.data.q[b * M + i];
+  for (let j = 0; j < P; j++) { w[j] += q * modes.data.phi[i * P + j]; }
+}
+const top = new Float64Array(P), low = new Float64Array(P);
+for (let j = 0; j < P; j++) { top[j] = w[j] + h; low[j] = w[j] - h; }
+beam.data = {x: S.x, top: top, low: low};
+const tip = ((1 - s) * F.striker[a] + s * F.striker[b]) , f = F.force[a];
+const side = m.side[0], far = -side * m.reach[0], e = tip - side * h, r = m.tip[0];
+striker.data = {x: [[m.at[0] - r, m.at[0] - r, m.at[0], m.at[0] + r, m.at[0] + r]],
+                y: [[far, e - side * m.taper[0], e, e - side * m.taper[0], far]],
+                color: [f > 0 ? m.hot[0] : m.cold[0]]};
+words.text = "τ = " + u.toFixed(3) + (f > 0 ? "   in contact, " + f.toPrecision(3) + " N" : "");
+"""
+_PLAY = """
+const on = toggle.active;
+toggle.label = on ? "❚❚ Pause" : "► Play";
+if (!on) { return; }
+let last = performance.now();
+const step = (now) => {
+  if (!toggle.active) { return; }
+  const F = frames.data, n = F.t.length;
+  if (n > 1) {
+    let t = place.data.t[0], a = 0, b = n - 1;
+    if (!(t >= F.t[0] && t < F.t[b])) { t = F.t[0]; }
+    while (b - a > 1) { const c = (a + b) >> 1; if (F.t[c] <= t) { a = c; } else { b = c; } }
+    const slow = (linger.active && F.force[a] > 0) ? 0.04 : 1.0;
+    t += Math.pow(10, speed.value) * slow * Math.min(now - last, 100) / 1000;
+    last = now;
+    place.data = {t: [t]};
+    scrub.value = Math.min(Math.max((t - F.t[0]) / (F.t[n - 1] - F.t[0]), 0), 1);
+  }
+  window.requestAnimationFrame(step);
+};
+window.requestAnimationFrame(step);
+"""
+_SCRUB = """
+const F = frames.data;
+if (!toggle.active && F.t.length > 1) {
+  place.data = {t: [F.t[0] + cb_obj.value * (F.t[F.t.length - 1] - F.t[0])]};
+}
+"""
+
+
+@lru_cache(maxsize=8)
+def _shapes(model: ReducedModel, positions: int) -> NDArray[np.float64]:
+    """Buckling modes along the beam, of shape (modes, positions)."""
+    along = np.linspace(0.0, 1.0, positions)
+    found = np.zeros((model.modes, positions))
+    for at, x in enumerate(along[1:-1], 1):
+        found[:, at] = model.shape_at(float(x))
+    return found
+
+
+class BeamView(Part):
+    """Played slowly or fast, scrubbed, slowed at impacts, in true proportions or exaggerated."""
+
+    title = "Beam"
+
+    def build(self) -> list[Any]:
+        look = self.look
+        self.run: Run | None = None
+        self.fresh = True
+        self.count = 0
+        empty: list[float] = []
+        self.frames = ColumnDataSource(
+            {"t": empty, "striker": empty, "force": empty}, name=self.named("frames")
+        )
+        self.amplitudes = ColumnDataSource({"q": empty})
+        self.modes, self.shapes = ColumnDataSource({"phi": empty}), ColumnDataSource({"x": empty})
+        self.meta = ColumnDataSource({"modes": [0]})
+        beam = ColumnDataSource(
+            {"x": empty, "top": empty, "low": empty}, syncable=False, name=self.named("beam")
+        )
+        striker = ColumnDataSource({"x": empty, "y": empty, "color": empty}, syncable=False)
+        self.plot = figure(
+            look, name=self.named("beam-plot"), height=330, title=" ",
+            x_axis_label="position (mm)", y_axis_label="displacement (mm)",
+            x_range=Range1d(0.0, 1.0), y_range=Range1d(-1.0, 1.0), tools="pan,wheel_zoom,reset",
+        )  # fmt: skip
+        self.plot.patches("x", "y", source=striker, fill_color="color", line_color=None)
+        self.plot.varea("x", "low", "top", source=beam, fill_color=look.beam)
+        for edge in ("top", "low"):
+            self.plot.line("x", edge, source=beam, line_color=look.beam, line_width=1.5)
+        words = Label(
+            x=10,
+            y=8,
+            x_units="screen",
+            y_units="screen",
+            text="",
+            text_color=look.text,
+            text_font_size="12px",
+            syncable=False,
+        )
+        self.plot.add_layout(words)
+        self.cursor.follow(
+            _DRAW, self.meta, frames=self.frames, shapes=self.shapes, amplitudes=self.amplitudes, modes=self.modes,
+            meta=self.meta, beam=beam, striker=striker, words=words,
+        )  # fmt: skip
+        sheets = [sheet(look), _CONTROLS]
+        toggle = Toggle(label="► Play", name=self.named("play"), width=90, stylesheets=sheets)
+        speed = Slider(
+            title="speed (log₁₀ cycles/s)",
+            start=-2.0,
+            end=1.5,
+            value=-0.3,
+            step=0.1,
+            width=210,
+            stylesheets=sheets,
+        )
+        linger = Toggle(label="slow at impacts", active=True, width=120, stylesheets=sheets)
+        scrub = Slider(
+            title="",
+            show_value=False,
+            start=0.0,
+            end=1.0,
+            value=0.0,
+            step=0.0005,
+            sizing_mode="stretch_width",
+            name=self.named("scrub"),
+            syncable=False,
+            stylesheets=sheets,
+        )
+        shared = {"toggle": toggle, "frames": self.frames, "place": self.cursor.place}
+        toggle.js_on_change(
+            "active", CustomJS(args=shared | {"speed": speed, "linger": linger, "scrub": scrub}, code=_PLAY)
+        )
+        scrub.js_on_change("value", CustomJS(args=shared, code=_SCRUB))
+        self.scale = Select(
+            title="",
+            options=["exaggerated to fit", "true proportions", "10 times", "100 times"],
+            value="exaggerated to fit",
+            stylesheets=sheets,
+            width=160,
+        )
+        self.scale.on_change("value", lambda attr, old, new: self._rescale())
+        self.plot.on_change("inner_width", lambda attr, old, new: self._rescale())
+        controls = pn.Row(*(pn.pane.Bokeh(item) for item in (toggle, linger, speed, self.scale)), margin=0)
+        return [
+            self.wrap(self.plot),
+            pn.pane.Bokeh(scrub, sizing_mode="stretch_width", margin=(0, 10)),
+            controls,
+        ]
+
+    def show(self, run: Run, low: float, high: float) -> None:
+        self.run = run
+        dataset, model = run.dataset, run.system.model
+        if "modal_amplitude" not in dataset or model.beam is None:
+            self.plot.title.text = "A structure given by matrices has no shape to draw"
+            return
+        x, _ = across(run)
+        inside = within(x, low, high)
+        step = max(1, -(-(inside.stop - inside.start) // _FRAMES))
+        part = slice(inside.start, inside.stop, step)
+        kept = min(model.modes, _MODES)
+        scale = 1e3 * float(dataset.attrs["length_scale"])
+        force = (
+            dataset["contact_force"].values[part] if "contact_force" in dataset else np.zeros(x[part].size)
+        )
+        along = np.linspace(0.0, 1e3 * model.beam.length, _POSITIONS)
+        self.modes.data = {"phi": (1e3 * _shapes(model, _POSITIONS)[:kept]).astype(np.float32).ravel()}
+        self.shapes.data = {"x": along}
+        self.amplitudes.data = {
+            "q": dataset["modal_amplitude"].values[part, :kept].astype(np.float32).ravel()
+        }
+        shown = (
+            dataset["striker_displacement"].values[part]
+            if "striker_displacement" in dataset
+            else np.full(x[part].size, -1e3)
+        )
+        self.frames.data = {
+            "t": x[part],
+            "striker": (scale * shown).astype(np.float64),
+            "force": np.nan_to_num(force),
+        }
+        self.reach = 1.35 * scale * max(1.0, float(np.nanmax(np.abs(dataset["midspan_displacement"].values))))
+        if (
+            self.fresh
+        ):  # the browser draws when it is told of a change, which what comes with the figure is not
+            self.fresh = False
+            self.cursor.later(self._rescale, 300)
+        self.plot.x_range.update(start=-0.02 * along[-1], end=1.02 * along[-1])
+        self._rescale()
+
+    def _rescale(self) -> None:
+        if self.run is None or self.run.system.model.beam is None:
+            return
+        run, beam = self.run, self.run.system.model.beam
+        length = 1e3 * beam.length
+        width, height = inner_size(self.plot, (560, 270))
+        fit = 0.5 * 1.04 * length * height / width
+        half = {"true proportions": fit, "10 times": fit / 10.0, "100 times": fit / 100.0}.get(
+            self.scale.value, self.reach
+        )
+        self.plot.y_range.update(start=-half, end=half)
+        self.plot.title.text = f"Displacements {fit / half:.3g} times as large as lengths"
+        self.count += 1
+        striker = run.system.striker
+        location = 0.5 if striker is None else striker.location
+        side = 1 if striker is None or striker.side == "below" else -1
+        self.meta.data = {
+            "modes": [min(run.system.model.modes, _MODES)], "half": [0.5e3 * beam.thickness], "at": [location * length],
+            "side": [side], "reach": [1e3 * half], "tip": [0.008 * length], "taper": [0.05 * half],
+            "hot": [self.look.second], "cold": [self.look.striker], "count": [self.count],
+        }  # fmt: skip
+
+
+# ----------------------------------------------------------------------------------------------------
+# Long series for a screen: the least and the greatest of each pixel's samples, so that no peak is lost.
+
+
+_Array = NDArray[np.float64]
+
+
+def envelope(x: _Array, y: _Array, low: float, high: float, pixels: int = 1000) -> tuple[_Array, _Array]:
+    """The samples from *low* to *high*, and one beyond on either side; of many, two a pixel.
+
+    Parameters
+    ----------
+    x, y : array of shape (samples,)
+        *x* ascending.
+    """
+    first = max(int(np.searchsorted(x, low)) - 1, 0)
+    last = min(int(np.searchsorted(x, high, side="right")) + 1, x.size)
+    x, y = x[first:last], y[first:last]
+    if x.size <= 3 * pixels:
+        return x, y
+    borders = np.unique(np.searchsorted(x, np.linspace(x[0], x[-1], pixels + 1)[:-1]))
+    lengths = np.diff(np.append(borders, x.size))
+    group = np.repeat(np.arange(borders.size), lengths)
+    order = np.lexsort((y, group))
+    least, greatest = order[borders], order[borders + lengths - 1]
+    kept = np.unique(np.concatenate((least, greatest, [0, x.size - 1])))
+    return x[kept], y[kept]
+
+
+def round_trip(value: float) -> str:
+    """A number as text that gives the same number again."""
+    return repr(float(value))
+
+
+# ----------------------------------------------------------------------------------------------------
+# The energy ledger: what the striker put in, where it is, what was lost.
+
+
+_CURVES = {
+    "striker_work": "work of the striker",
+    "energy_dissipated": "dissipated",
+    "energy_beam": "in the beam, above its well",
+    "energy_contact": "in the contact",
+}
+
+
+class Energy(Part):
+    """Work, what became of it, and whether the books balance."""
+
+    title = "Energy"
+
+    def build(self) -> list[Any]:
+        look = self.look
+        colors = (look.striker, look.faint, look.center, look.second)
+        self.sources = {name: columns(x=[], y=[]) for name in _CURVES}
+        self.sources["striker_work"].name = self.named("energy")
+        self.plot = figure(
+            look, height=360, x_range=self.cursor.range, y_axis_label="energy (µJ)", y_range=(0.0, 1.0),
+            tools="xpan,xbox_zoom,xwheel_zoom,reset", active_drag="xbox_zoom", active_scroll="xwheel_zoom",
+        )  # fmt: skip
+        for (name, label), color in zip(_CURVES.items(), colors, strict=True):
+            self.plot.line(
+                "x", "y", source=self.sources[name], color=color, line_width=1.4, legend_label=label
+            )
+        legend(self.plot, look)
+        self.cursor.attach(self.plot)
+        self.words = pn.pane.HTML("", sizing_mode="stretch_width")
+        return [self.wrap(self.plot), self.words]
+
+    def show(self, run: Run, low: float, high: float) -> None:
+        dataset = run.dataset
+        x, label = across(run)
+        self.plot.xaxis.axis_label = label
+        shown = []
+        for name, source in self.sources.items():
+            if name in dataset:
+                inside = envelope(x, dataset[name].values, low, high)
+                source.data = {"x": inside[0], "y": (1e6 * inside[1]).astype(np.float32)}
+                shown.append(1e6 * inside[1])
+        fit(self.plot, *shown)
+        if all(name in dataset for name in _CURVES):
+            begun = float(dataset["energy_beam"][0] + dataset["energy_contact"][0])
+            parts = {name: float(dataset[name][-1]) for name in _CURVES}
+            left = (
+                parts["striker_work"] + begun - sum(parts[name] for name in _CURVES if name != "striker_work")
+            )
+            scale = max(abs(parts["striker_work"]), parts["energy_dissipated"], 1e-300)
+            barrier = run.system.model.saddle_energy - run.system.model.well_energy
+            self.words.object = (
+                f'<p class="note">At the end the books balance to {left:.2g} J, {abs(left) / scale:.1g} of the work. '
+                f"The barrier between the wells is {1e6 * barrier:.4g} µJ.</p>"
+            )
+
+
+# ----------------------------------------------------------------------------------------------------
+# The table of impacts, and the statistics of the run.
+
+
+_MOST = 20_000
+_TABLE = """
+.slick-viewport, .grid-canvas, .slick-pane { background: var(--sb-card); }
+.slick-header-column, .slick-header-columns { background: var(--sb-card) !important; color: var(--sb-text); }
+.slick-row, .slick-cell { background: var(--sb-card) !important; color: var(--sb-text); border-color: var(--sb-grid); }
+.slick-row.odd, .slick-row.odd .slick-cell { background: var(--sb-page) !important; }
+.slick-row .slick-cell.selected { background: var(--sb-grid) !important; }
+"""
+
+
+class Impacts(Part):
+    """A row an impact; a click on one shows it closer."""
+
+    title = "Impacts"
+
+    def __init__(self, look: Look, cursor: Cursor, closer: Callable[[float, float], None]) -> None:
+        super().__init__(look, cursor)
+        self.closer = closer
+
+    def build(self) -> list[Any]:
+        names = {
+            "cycle": ("onset (cycles)", "0.0000"), "time": ("onset (ms)", "0.000"),
+            "duration": ("duration (µs)", "0.0"), "peak": ("peak force (N)", "0.000"),
+            "impulse": ("impulse (mN s)", "0.0000"),
+        }  # fmt: skip
+        self.source = ColumnDataSource({name: [] for name in names}, name=self.named("impacts"))
+        shown = [
+            TableColumn(field=name, title=title, formatter=NumberFormatter(format=digits))
+            for name, (title, digits) in names.items()
+        ]
+        table = DataTable(
+            source=self.source,
+            columns=shown,
+            sizing_mode="stretch_width",
+            height=400,
+            index_position=None,
+            stylesheets=[sheet(self.look), _TABLE],
+        )
+        self.source.selected.on_change("indices", self._chosen)
+        self.words = pn.pane.HTML("", sizing_mode="stretch_width")
+        return [self.words, pn.pane.Bokeh(table, sizing_mode="stretch_width")]
+
+    def show(self, run: Run, low: float, high: float) -> None:
+        found = run.impacts.isel(impact=slice(0, _MOST))
+        time = found["onset"].values
+        cycle = (
+            np.interp(time, run.dataset["time"].values, run.dataset["cycle"].values)
+            if "cycle" in run.dataset.variables
+            else time
+        )
+        self.source.data = {
+            "cycle": cycle, "time": 1e3 * time, "duration": 1e6 * found["duration"].values,
+            "peak": found["peak_force"].values, "impulse": 1e3 * found["impulse"].values,
+        }  # fmt: skip
+        count = run.impacts.sizes["impact"]
+        more = f"; the first {_MOST} are listed" if count > _MOST else ""
+        self.words.object = f'<p class="note">{count} impacts{more}. Click on one to see it closer.</p>'
+
+    def _chosen(self, _: str, __: Any, rows: list[int]) -> None:
+        if rows:
+            at = rows[0]
+            self.closer(float(self.source.data["cycle"][at]), float(self.source.data["duration"][at]) * 1e-6)
+
+
+class Numbers(Part):
+    """Every statistic with its unit and its meaning."""
+
+    title = "Numbers"
+
+    def build(self) -> list[Any]:
+        self.table = pn.pane.HTML("", sizing_mode="stretch_width")
+        return [self.table]
+
+    def show(self, run: Run, low: float, high: float) -> None:
+        rows = []
+        for name, value in run.summary.items():
+            row = STATISTICS.get(name)
+            shown = getattr(value, "label", None) or getattr(value, "name", None) or value
+            text = f"{shown:.8g}" if isinstance(shown, float) else str(shown)
+            text = "–" if isinstance(shown, float) and np.isnan(shown) else text
+            unit = "" if row is None or row.unit == "1" else row.unit
+            words = "" if row is None else row.long_name
+            cells = (
+                html.escape(words),
+                html.escape(text),
+                html.escape(unit),
+                f"<code>{html.escape(name)}</code>",
+            )
+            kinds = ("", ' class="num"', ' class="unit"', "")
+            row_text = "".join(f"<td{kind}>{cell}</td>" for kind, cell in zip(kinds, cells, strict=True))
+            rows.append(f"<tr>{row_text}</tr>")
+        self.table.object = f'<table class="numbers">{"".join(rows)}</table>'
+
+
+# ----------------------------------------------------------------------------------------------------
+# Modal amplitudes over time, and how large each mode becomes.
+
+
+_SHOWN = 6
+# From Okabe and Ito, told apart by the colour-blind; the first is that of the text.
+_COLORS = ("", "#E69F00", "#56B4E9", "#009E73", "#D55E00", "#CC79A7")
+
+
+class Modal(Part):
+    """What each buckling mode does."""
+
+    title = "Modes"
+
+    def build(self) -> list[Any]:
+        look = self.look
+        plot = figure(
+            look, height=260, x_range=self.cursor.range, y_axis_label="αᵢ over α₁ of the well", y_range=(-1.5, 1.5),
+            tools="xpan,xbox_zoom,xwheel_zoom,reset", active_drag="xbox_zoom", active_scroll="xwheel_zoom",
+        )  # fmt: skip
+        self.lines = [columns(x=[], y=[]) for _ in range(_SHOWN)]
+        for at, source in enumerate(self.lines):
+            color = _COLORS[at] or look.text
+            plot.line("x", "y", source=source, color=color, line_width=1.2, legend_label=f"mode {at + 1}")
+        legend(plot, look)
+        self.cursor.attach(plot)
+        self.bars = columns(mode=[], rms=[], top=[])
+        self.bars.name = self.named("modal")
+        low = figure(
+            look, height=170, y_axis_type="log", x_axis_label="buckling mode i", y_axis_label="rms αᵢ / α₁",
+            tools="reset", x_range=(0.4, 32.6), y_range=(1e-8, 1.0),
+        )  # fmt: skip
+        low.segment("mode", 1e-16, "mode", "rms", source=self.bars, color=look.center, line_width=2)
+        low.scatter("mode", "rms", source=self.bars, color=look.center, size=6)
+        self.low, self.plot = low, plot
+        return [self.wrap(plot), self.wrap(low)]
+
+    def show(self, run: Run, low: float, high: float) -> None:
+        if "modal_amplitude" not in run.dataset:
+            return
+        x, label = across(run)
+        self.plot.xaxis.axis_label = label
+        well = float(np.abs(run.system.model.wells[..., 0]).max()) or 1.0
+        alpha = run.dataset["modal_amplitude"].values / well
+        shown = []
+        for at, source in enumerate(self.lines):
+            if at < alpha.shape[1]:
+                inside = envelope(x, np.ascontiguousarray(alpha[:, at]), low, high, 700)
+                source.data = {"x": inside[0], "y": inside[1].astype(np.float32)}
+                shown.append(inside[1])
+            else:
+                source.data = {"x": [], "y": []}
+        fit(self.plot, *shown)
+        part = alpha[within(x, low, high)]
+        rms = np.sqrt(np.mean((part - part.mean(axis=0)) ** 2, axis=0))
+        self.bars.data = {"mode": np.arange(1, rms.size + 1), "rms": np.maximum(rms, 1e-16), "top": rms}
+        most = float(rms.max(initial=1e-12)) or 1e-12
+        self.low.y_range.update(start=max(1e-8 * most, 1e-16), end=3.0 * most)
+        self.low.x_range.update(start=0.4, end=rms.size + 0.6)
+        self.low.title.text = f"About the mean, cycles {low:.4g} to {high:.4g}"
+
+
+# ----------------------------------------------------------------------------------------------------
+# The phase portrait and the stroboscopic section.
+
+
+_MOST_PHASE = 16_000
+_FOLLOW = """
+const c = source.data.t;
+let a = 0, b = c.length - 1;
+if (b < 1 || t < c[0] || t > c[b]) { dot.data = {w: [], v: []}; return; }
+while (b - a > 1) { const m = (a + b) >> 1; if (c[m] <= t) { a = m; } else { b = m; } }
+dot.data = {w: [source.data.w[a]], v: [source.data.v[a]]};
+"""
+
+
+class Phase(Part):
+    """Displacement against velocity, all of it and once a cycle."""
+
+    title = "Phase"
+
+    def build(self) -> list[Any]:
+        look = self.look
+        self.run: Run | None = None
+        self.span = (0.0, 1.0)
+        self.where = pn.widgets.RadioButtonGroup(
+            name="Of", options={"centre": "center_", "at the striker": ""}, value="center_", button_type="default"
+        )  # fmt: skip
+        self.phase = pn.widgets.FloatSlider(
+            name="Section at the phase (cycles)", start=0.0, end=1.0, step=0.01, value=0.0, width=240
+        )
+        self.line, self.dots = columns(t=[], w=[], v=[]), columns(t=[], w=[], v=[])
+        self.dots.name = self.named("section")
+        dot = ColumnDataSource({"w": [], "v": []}, syncable=False)
+        plots = [
+            figure(look, height=370, tools="pan,box_zoom,wheel_zoom,reset", x_range=(-1.6, 1.6), y_range=(-1.6, 1.6),
+                   title=title, x_axis_label="displacement w (b)", y_axis_label="velocity (b ω₁)", min_border_left=50)
+            for title in ("Phase portrait", "Stroboscopic section")
+        ]  # fmt: skip
+        plots[0].line("w", "v", source=self.line, color=look.center, line_width=0.8)
+        plots[0].scatter("w", "v", source=dot, size=9, color=look.accent)
+        palette = blend(look.accent, look.striker)
+        colors = linear_cmap("t", palette, 0.0, 1.0)
+        self.mapper = colors.transform
+        plots[1].scatter("w", "v", source=self.dots, size=5, color=colors)
+        plots[1].x_range, plots[1].y_range = plots[0].x_range, plots[0].y_range
+        self.section = plots[1]
+        self.cursor.follow(_FOLLOW, source=self.line, dot=dot)
+        self.where.param.watch(lambda _: self.cursor.later(self._draw, 1), "value")
+        self.phase.param.watch(lambda _: self.cursor.later(self._draw, 1), "value_throttled")
+        return [
+            pn.Row(self.where, self.phase, margin=0),
+            pn.Row(*(self.wrap(plot) for plot in plots), sizing_mode="stretch_width"),
+        ]
+
+    def show(self, run: Run, low: float, high: float) -> None:
+        self.run, self.span = run, (low, high)
+        self._draw()
+
+    def _draw(self) -> None:
+        if self.run is None:
+            return
+        dataset, before = self.run.dataset, self.where.value
+        x, _ = across(self.run)
+        inside = within(x, *self.span)
+        step = max(1, -(-(inside.stop - inside.start) // _MOST_PHASE))
+        w, v = (
+            dataset[f"{before}{name}"].values for name in ("displacement_at_striker", "velocity_at_striker")
+        )
+        part = slice(inside.start, inside.stop, step)
+        for axis_range, values in ((self.section.x_range, w[inside]), (self.section.y_range, v[inside])):
+            good = values[np.isfinite(values)]
+            room = 0.06 * float(np.ptp(good)) or 0.1
+            axis_range.update(start=float(good.min()) - room, end=float(good.max()) + room)
+        self.line.data = {"t": x[part], "w": w[part], "v": v[part]}
+        if "cycle" not in dataset.variables:
+            self.dots.data = {"t": [], "w": [], "v": []}
+            return
+        at = np.arange(np.ceil(max(self.span[0], x[0])), min(self.span[1], x[-1]) + 1e-9) + self.phase.value
+        at = at[at <= x[-1] + 1e-9]
+        self.mapper.update(low=self.span[0], high=max(self.span[1], self.span[0] + 1.0))
+        self.section.title.text = f"Section, {at.size} cycles, blue to red"
+        self.dots.data = {"t": at, "w": np.interp(at, x, w), "v": np.interp(at, x, v)}
+
+
+# ----------------------------------------------------------------------------------------------------
+# The amplitude spectrum of what is seen of a run.
+
+
+_MOST_SPECTRUM = 2**16
+
+
+def amplitude_spectrum(time: _Array, values: _Array) -> tuple[_Array, _Array]:
+    """Frequencies, Hz, and amplitudes of a series whose samples need not be even, under a Hann window.
+
+    A sine of amplitude a whose frequency is one of those returned has a peak of height a.
+    """
+    steps = np.diff(time)
+    count = int(min(max(round((time[-1] - time[0]) / np.median(steps)) + 1, 8), _MOST_SPECTRUM))
+    even = np.linspace(time[0], time[-1], count)
+    series = np.interp(even, time, values)
+    window = np.hanning(count)
+    amplitudes = 2.0 * np.abs(np.fft.rfft((series - series.mean()) * window)) / window.sum()
+    return np.fft.rfftfreq(count, even[1] - even[0]), amplitudes
+
+
+class Spectrum(Part):
+    """Which frequencies the beam moves at."""
+
+    title = "Spectrum"
+
+    def build(self) -> list[Any]:
+        look = self.look
+        self.sources = {
+            name: columns(x=[], y=[]) for name in ("midspan_displacement", "displacement_at_striker")
+        }
+        self.sources["midspan_displacement"].name = self.named("spectrum")
+        plot = figure(
+            look, height=420, title=" ", y_axis_type="log", y_axis_label="amplitude (b)",
+            x_axis_label="frequency over f₁", x_range=(0.0, 12.0), y_range=(1e-7, 1.0),
+            tools="pan,box_zoom,wheel_zoom,reset", active_drag="box_zoom",
+        )  # fmt: skip
+        for (name, source), color, label in zip(
+            self.sources.items(),
+            (look.center, look.beam),
+            ("beam, centre", "beam, at the striker"),
+            strict=True,
+        ):
+            plot.line("x", "y", source=source, color=color, legend_label=label, name=name)
+        legend(plot, look)
+        self.drive = Span(dimension="height", line_color=look.striker, line_dash="dashed", line_width=1.2)
+        self.first = Span(dimension="height", line_color=look.faint, line_dash="dotted", location=1.0)
+        plot.add_layout(self.drive)
+        plot.add_layout(self.first)
+        self.plot = plot
+        return [self.wrap(plot)]
+
+    def show(self, run: Run, low: float, high: float) -> None:
+        x, _ = across(run)
+        inside = within(x, low, high)
+        time, first = run.dataset["time"].values[inside], run.system.model.reference_frequency
+        striker = run.system.striker
+        ratio = getattr(striker.drive, "frequency_ratio", None) if striker is not None else None
+        self.drive.location = ratio
+        self.plot.title.text = f"Cycles {low:.4g} to {high:.4g}, Hann window; dashed: the drive, dotted: f₁"
+        most = 1e-12
+        for name, source in self.sources.items():
+            frequency, amplitude = amplitude_spectrum(time, run.dataset[name].values[inside])
+            kept = (frequency > 0.0) & (frequency <= 40.0 * first)
+            source.data = {"x": frequency[kept] / first, "y": np.maximum(amplitude[kept], 1e-12)}
+            most = max(most, float(amplitude[kept].max(initial=0.0)))
+        self.plot.y_range.update(start=1e-7 * most, end=3.0 * most)
+        self.plot.x_range.update(start=0.0, end=max(12.0, 4.0 * (ratio or 1.0)))
+
+
+# ----------------------------------------------------------------------------------------------------
+# Displacements of beam and striker, and the force between them.
+
+
+_CURVES_WAVEFORM = ("midspan_displacement", "displacement_at_striker", "striker_displacement")
+
+
+class Waveform(Part):
+    """Who is where, and how hard they push."""
+
+    title = "Waveform"
+
+    def build(self) -> list[Any]:
+        look = self.look
+        self.sources = {name: columns(x=[], y=[]) for name in (*_CURVES_WAVEFORM, "contact_force")}
+        self.sources["midspan_displacement"].name = self.named("waveform")
+        common: dict[str, Any] = {
+            "x_range": self.cursor.range, "tools": "xpan,xbox_zoom,xwheel_zoom,reset",
+            "active_drag": "xbox_zoom", "active_scroll": "xwheel_zoom", "output_backend": "canvas",
+        }  # fmt: skip
+        top = figure(
+            look,
+            name=self.named("waveform-plot"),
+            height=265,
+            y_axis_label="displacement w (b)",
+            y_range=(-1.5, 1.5),
+            **common,
+        )
+        words = ("beam, centre", "beam, at the striker", "striker")
+        colors, widths = (look.center, look.beam, look.striker), (2.0, 1.0, 1.3)
+        for name, label, color, width in zip(_CURVES_WAVEFORM, words, colors, widths, strict=True):
+            top.line("x", "y", source=self.sources[name], color=color, line_width=width, legend_label=label)
+        legend(top, look)
+        low = figure(
+            look,
+            height=165,
+            y_axis_label="contact force f (N)",
+            y_range=(0.0, 1.0),
+            x_axis_label="cycles of excitation τ",
+            **common,
+        )
+        low.line("x", "y", source=self.sources["contact_force"], color=look.beam, line_width=1.2)
+        for plot in (top, low):
+            self.cursor.attach(plot)
+        self.low, self.top = low, top
+        return [self.wrap(top), self.wrap(low)]
+
+    def show(self, run: Run, low: float, high: float) -> None:
+        x, label = across(run)
+        self.low.xaxis.axis_label = label
+        shown = []
+        for name, source in self.sources.items():
+            if name in run.dataset:
+                y = np.asarray(run.dataset[name].values, dtype=np.float64)
+                inside = envelope(x, y, low, high)
+                source.data = {"x": inside[0].astype(np.float64), "y": inside[1].astype(np.float32)}
+                if name == "contact_force":
+                    fit(self.low, np.append(inside[1], 0.0))
+                else:
+                    shown.append(inside[1])
+            else:
+                source.data = {"x": [], "y": []}
+        fit(self.top, *shown)
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_PAUSE = 60
+"""Milliseconds between two views that are built while nobody looks at them."""
+_SETTLE = 60
+"""Milliseconds that a range must rest before the samples in it are sent."""
+
+
+class RunView:
+    """The card of one run.
+
+    Parameters
+    ----------
+    look : Look
+    name : str
+        ``"A"`` or ``"B"``.
+    post, later : callable
+        ``post(work)``: do something on the page's own thread; ``later(work, milliseconds)``: a little later.
+    """
+
+    def __init__(
+        self,
+        look: Look,
+        name: str,
+        post: Callable[[Callable[[], None]], None],
+        later: Callable[[Callable[[], None], int], Any],
+    ) -> None:
+        self.look, self.name, self.later = look, name, later
+        self.run: Run | None = None
+        self.cursor = Cursor(look, "" if name == "A" else f"-{name}", later)
+        self.parts = [
+            Waveform(look, self.cursor), Phase(look, self.cursor), Spectrum(look, self.cursor),
+            Modal(look, self.cursor), Energy(look, self.cursor), Impacts(look, self.cursor, self._closer),
+            BeamView(look, self.cursor), Numbers(look, self.cursor),
+        ]  # fmt: skip
+        self.head = pn.pane.HTML(
+            "", sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-head"]
+        )
+        self.note = pn.pane.HTML(
+            "", sizing_mode="stretch_width", margin=(0, 0, 2, 0), css_classes=["run-note"]
+        )
+        self.tabs = pn.Tabs(
+            *((part.title, part.place) for part in self.parts), dynamic=True, sizing_mode="stretch_width", margin=0
+        )  # fmt: skip
+        self.tabs.param.watch(lambda _: post(self._activated), "active")
+        self._moved = 0
+        self._quiet = False
+        for edge in ("start", "end"):
+            self.cursor.range.on_change(edge, lambda attr, old, new: self._range_moved())
+        self.layout = pn.Column(
+            self.head, self.note, self.tabs, sizing_mode="stretch_width", css_classes=["card", "run"]
+        )
+        self.notes: dict[str, str] = {}
+
+    @property
+    def active(self) -> Any:
+        """The view that is seen."""
+        return self.parts[self.tabs.active]
+
+    # ------------------------------------------------------------------ what is shown
+
+    def begin(self, words: str) -> None:
+        """Say what is computed, over the run before."""
+        self._write_notes()
+        self._head('<span class="busy">computing</span>', words)
+
+    def wait(self, words: str, seconds: float, why: str) -> None:
+        """Say for how long it has been computed, and what takes the time if that is known."""
+        below = f'<span class="faint">{html.escape(why)}</span>' if why else ""
+        self._head(f'<span class="busy">computing, {seconds:.0f} s</span>', words, below)
+
+    def fail(self, words: str) -> None:
+        """Say why there is no run."""
+        self.notes = {}
+        self._write_notes()
+        self._head('<span class="bad">no run</span>', words)
+
+    def _head(self, kind: str, words: str, below: str = "") -> None:
+        line = f"<br>{below}" if below else ""
+        self.head.object = (
+            f'<span class="point">{html.escape(self.name)}</span> {kind} {html.escape(words)}{line}'
+        )
+
+    def show(self, run: Run, words: str, fresh: bool) -> None:
+        """Show a run; *fresh* if it is not the one before with more samples."""
+        self.run = run
+        self._write_notes()
+        answer = run.summary
+        if answer.status in (RunStatus.OK, RunStatus.EARLY_STOP):
+            well = "upper" if answer.final_well > 0 else "lower"
+            final = ", for good" if answer.final_well_proven else ""
+            counts = (
+                f"{answer.zero_crossings} crossings, {answer.impacts} impacts, ends in the {well} well{final}"
+            )
+            self._head(class_chip(answer.response_class), words, f'<span class="faint">{counts}</span>')
+        else:
+            why = f'<span class="bad">{answer.status.name}: {html.escape(answer.status.advice)}</span>'
+            self._head(class_chip(ResponseClass.UNKNOWN), words, why)
+        if fresh:
+            x, _ = across(run)
+            self._quiet = True
+            self.cursor.range.update(
+                start=float(x[0]), end=float(x[-1]), reset_start=float(x[0]), reset_end=float(x[-1])
+            )
+            self._quiet = False
+        self._draw()
+
+    def say(self, about: str, words: str, bad: bool = False) -> None:
+        """Put a line under the class, one for each thing that it is about."""
+        kind = "bad" if bad else "faint"
+        self.notes[about] = f'<span class="{kind}">{html.escape(words)}</span>' if words else ""
+        self._write_notes()
+
+    def _write_notes(self) -> None:
+        self.note.object = "<br>".join(text for text in self.notes.values() if text)
+
+    def _draw(self) -> None:
+        self.active.activate()
+        if self.run is not None:
+            start, end = float(self.cursor.range.start), float(self.cursor.range.end)
+            self.active.show(self.run, min(start, end), max(start, end))
+
+    def stand(self) -> None:
+        """Build the view that is seen."""
+        self.active.activate()
+
+    def complete(self) -> None:
+        """Build the views that are not seen, one after the other, so that what is asked for meanwhile need not wait."""
+        waiting = [part for part in self.parts if not part.built]
+        if waiting:
+            waiting[0].activate()
+            self.later(self.complete, _PAUSE)
+
+    def _activated(self) -> None:
+        self.active.activate()
+        self.later(self._draw, _SETTLE)  # once the browser has what it is to be drawn in
+
+    def _range_moved(self) -> None:
+        if self._quiet:
+            return
+        self._moved += 1
+        now = self._moved
+        self.later(lambda: self._draw() if now == self._moved else None, _SETTLE)
+
+    def _closer(self, place: float, seconds: float) -> None:
+        """Show the waveform about one impact."""
+        if self.run is None:
+            return
+        x, time = across(self.run)[0], self.run.dataset["time"].values
+        cycles = seconds * (x[-1] - x[0]) / (time[-1] - time[0])
+        self.cursor.range.update(start=place - 1.0 * cycles, end=place + 2.0 * cycles)
+        self.tabs.active = 0
+
+    @property
+    def window(self) -> tuple[float, float]:
+        """The part that is seen, in cycles."""
+        return float(np.min([self.cursor.range.start, self.cursor.range.end])), float(
+            np.max([self.cursor.range.start, self.cursor.range.end])
+        )

@@ -1,0 +1,436 @@
+"""Colours, light and dark, and what all pictures of the page share."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import panel as pn
+from bokeh.core.property.descriptors import UnsetValueError
+from bokeh.events import ConnectionLost, DocumentReady
+from bokeh.models import ColumnDataSource, CustomJS, Range1d, Span
+from bokeh.plotting import figure as bokeh_figure
+from numpy.typing import NDArray
+
+from snapbeam import ResponseClass
+from snapbeam.explorer.jobs import UPLOAD
+from snapbeam.plot.style import CLASS_COLORS
+
+if TYPE_CHECKING:
+    from snapbeam.explorer.page import Page
+    from snapbeam.explorer.run_view import RunView
+
+__all__ = [
+    "DARK",
+    "LIGHT",
+    "Cursor",
+    "Look",
+    "blend",
+    "class_chip",
+    "colors_of",
+    "columns",
+    "figure",
+    "fit",
+    "focused",
+    "framed",
+    "inner_size",
+    "legend",
+    "look_of",
+    "sequential",
+    "sheet",
+    "styled",
+]
+
+
+@dataclass(frozen=True)
+class Look:
+    """One of the two looks of the page."""
+
+    name: str
+    page: str
+    card: str
+    text: str
+    faint: str
+    grid: str
+    beam: str
+    center: str
+    striker: str
+    accent: str
+    second: str
+
+
+LIGHT = Look(
+    "default",
+    "#f3f4f6",
+    "#ffffff",
+    "#1b1f24",
+    "#59636e",
+    "#e4e7eb",
+    "#000000",
+    "#2a87c8",
+    "#b03a27",
+    "#1f6feb",
+    "#8250df",
+)
+DARK = Look(
+    "dark",
+    "#0f1318",
+    "#181d24",
+    "#e6e9ed",
+    "#9aa4af",
+    "#2c333c",
+    "#f2f4f6",
+    "#70bbf0",
+    "#f08a75",
+    "#6cb0ff",
+    "#c297ff",
+)
+
+
+def look_of(theme: str) -> Look:
+    """The look of a theme of Panel's."""
+    return DARK if theme == "dark" else LIGHT
+
+
+@cache
+def sheet(look: Look) -> str:
+    """The page's style sheet."""
+    text = (Path(__file__).parent / "page.css").read_text(encoding="utf-8")
+    names = {
+        name: getattr(look, name) for name in ("page", "card", "text", "faint", "grid", "accent", "striker")
+    }
+    variables = "".join(f"--sb-{name}: {value};" for name, value in names.items())
+    return (
+        f":root, :host {{ {variables} color-scheme: {'dark' if look.name == 'dark' else 'light'}; }}\n{text}"
+    )
+
+
+def focused(look: Look) -> str:
+    """How what has the keyboard's focus is told, where the page's sheet does not reach."""
+    return f":focus-visible {{ outline: 2px solid {look.accent} !important; outline-offset: -2px; }}"
+
+
+def styled(item: Any, look: Look) -> None:
+    """Give a part of the page, and all that is in it, the page's style sheet."""
+    style = sheet(look)
+    for each in item.select():
+        if style not in each.stylesheets:
+            each.stylesheets = [*each.stylesheets, style]
+
+
+def figure(look: Look, **options: Any) -> Any:
+    """An empty Bokeh figure in the house's look."""
+    settings: dict[str, Any] = {
+        "sizing_mode": "stretch_width",
+        "toolbar_location": "right",
+        "tools": "pan,box_zoom,wheel_zoom,reset",
+        "border_fill_color": look.card,
+        "background_fill_color": look.card,
+        "outline_line_color": look.faint,
+        "min_border_left": 58,
+        "min_border_right": 6,
+        "min_border_top": 6,
+        "lod_threshold": None,
+    }
+    plot = bokeh_figure(**(settings | options))
+    for axis in plot.axis:
+        axis.axis_label_text_color = axis.major_label_text_color = look.text
+        axis.axis_label_text_font_style = "normal"
+        axis.axis_label_text_font_size = "12px"
+        axis.major_label_text_font_size = "11px"
+        axis.axis_line_color = axis.major_tick_line_color = look.faint
+        axis.minor_tick_line_color = None
+    plot.grid.grid_line_color = look.grid
+    plot.stylesheets = plot.toolbar.stylesheets = [focused(look)]
+    plot.toolbar.logo = None
+    plot.toolbar.autohide = False
+    plot.title.text_color = look.text
+    plot.title.text_font_size = "12px"
+    plot.title.text_font_style = "normal"
+    return plot
+
+
+def fit(plot: Any, *curves: NDArray[Any]) -> None:
+    """Let a figure show all of some curves."""
+    known = [curve[np.isfinite(curve)] for curve in curves]
+    known = [curve for curve in known if curve.size]
+    if known:
+        low, high = min(float(each.min()) for each in known), max(float(each.max()) for each in known)
+        room = 0.06 * (high - low) or 0.5
+        plot.y_range.update(start=low - room, end=high + room)
+
+
+def legend(plot: Any, look: Look) -> None:
+    """Put the legend of a figure above it."""
+    for item in list(plot.legend):
+        plot.center.remove(item)
+        plot.add_layout(item, "above")
+        item.location = "top_left"
+        item.orientation = "horizontal"
+        item.background_fill_color = look.card
+        item.background_fill_alpha = 0.75
+        item.label_text_color = look.text
+        item.label_text_font_size = "11px"
+        item.border_line_color = None
+        item.padding, item.spacing, item.margin = 3, 8, 4
+        item.glyph_height = item.label_height = 14
+        item.click_policy = "hide"
+
+
+def inner_size(plot: Any, otherwise: tuple[int, int]) -> tuple[int, int]:
+    """Pixels of what a figure shows; *otherwise* until the browser has said it."""
+    found = []
+    for name, value in zip(("inner_width", "inner_height"), otherwise, strict=True):
+        try:
+            found.append(int(getattr(plot, name) or value))
+        except UnsetValueError:
+            found.append(value)
+    return found[0], found[1]
+
+
+def blend(first: str, last: str, steps: int = 64) -> list[str]:
+    """Colours from one to another."""
+    ends = [np.array([int(color[i : i + 2], 16) for i in (1, 3, 5)]) for color in (first, last)]
+    mixed = [
+        np.round(ends[0] + share * (ends[1] - ends[0])).astype(int) for share in np.linspace(0.0, 1.0, steps)
+    ]
+    return [f"#{r:02x}{g:02x}{b:02x}" for r, g, b in mixed]
+
+
+def columns(**values: Any) -> ColumnDataSource:
+    """A source of columns, empty ones unless given."""
+    return ColumnDataSource({name: np.asarray(value) for name, value in values.items()})
+
+
+@cache
+def sequential() -> NDArray[np.uint8]:
+    """The 256 colours of numbers, of shape (256, 4)."""
+    from cmcrameri import cm
+
+    colors: NDArray[np.uint8] = np.round(255.0 * cm.batlow(np.linspace(0.0, 1.0, 256))).astype(np.uint8)
+    return colors
+
+
+@cache
+def _class_table() -> NDArray[np.uint8]:
+    """Colours by class + 1, of shape (5, 4)."""
+    order = sorted(CLASS_COLORS)
+    return np.array(
+        [[int(CLASS_COLORS[kind][i : i + 2], 16) for i in (1, 3, 5)] + [255] for kind in order],
+        dtype=np.uint8,
+    )
+
+
+def colors_of(name: str, values: NDArray[Any], limits: tuple[float, float]) -> NDArray[np.uint32]:
+    """Numbers as colours, packed; what is not finite is left clear."""
+    if name == "response_class":
+        table = _class_table()
+        bytes_ = table[np.clip(values.astype(np.int64) + 1, 0, len(table) - 1)]
+    else:
+        numbers = values.astype(np.float64)
+        low, high = limits
+        share = (numbers - low) / (high - low if high > low else 1.0)
+        good = np.isfinite(share)
+        bytes_ = sequential()[np.clip(np.where(good, share, 0.0) * 255.0, 0, 255).astype(np.int64)].copy()
+        bytes_[~good, 3] = 0
+    return np.ascontiguousarray(bytes_).view(np.uint32).reshape(values.shape)
+
+
+def class_chip(kind: ResponseClass) -> str:
+    """The name of a class on its colour."""
+    ink = "#111" if kind in (ResponseClass.TRANSIENT_2, ResponseClass.CONTINUOUS) else "#fff"
+    return f'<span class="chip" style="background:{CLASS_COLORS[kind]};color:{ink}">{kind.label}</span>'
+
+
+# ----------------------------------------------------------------------------------------------------
+# One cursor for all pictures of a run; it lives in the browser alone.
+
+
+class Cursor:
+    """Where the pointer is along a run, in cycles (or seconds), and the part of the run that is seen.
+
+    Pictures over time share the range; each has a line at the cursor, and whatever else follows it listens to
+    ``place``.
+    """
+
+    def __init__(self, look: Look, suffix: str, later: Callable[[Callable[[], None], int], Any]) -> None:
+        self.look, self.suffix, self.later = look, suffix, later
+        self.range = Range1d(0.0, 1.0)
+        self.place = ColumnDataSource({"t": [0.0]}, syncable=False)
+
+    def attach(self, plot: Any) -> None:
+        """Give a picture over time the cursor."""
+        line = Span(
+            dimension="height",
+            line_color=self.look.accent,
+            line_width=1.2,
+            line_alpha=0.9,
+            syncable=False,
+            location=None,
+        )
+        plot.add_layout(line)
+        move = CustomJS(args={"place": self.place}, code="place.data = {t: [cb_obj.x]};")
+        plot.js_on_event("mousemove", move)
+        follow = CustomJS(args={"line": line, "place": self.place}, code="line.location = place.data.t[0];")
+        self.place.js_on_change("data", follow)
+
+    def follow(self, code: str, *also: Any, **arguments: Any) -> None:
+        """Run *code* in the browser whenever the cursor moves, or the data of one of *also* change.
+
+        In the code ``t`` is where the cursor is.
+        """
+        script = CustomJS(args={"place": self.place} | arguments, code=f"const t = place.data.t[0];\n{code}")
+        for source in (self.place, *also):
+            source.js_on_change("data", script)
+
+
+# ----------------------------------------------------------------------------------------------------
+# How a page is laid out, and the few scripts that it runs in the browser.
+
+
+_FIRST = "Click on the map, use the arrow keys, or type numbers, to see the run of a point."
+_GONE = """
+if (!document.getElementById('gone')) {
+  const note = document.createElement('div');
+  note.id = 'gone'; note.setAttribute('role', 'alert');
+  note.textContent = 'The server of this page has stopped or cannot be reached. What is shown stays; '
+    + 'nothing new can be computed. Start snapbeam explore again, then load the page anew.';
+  document.body.appendChild(note);
+}
+"""
+_ADDRESS = """
+const search = bar.data.search[0];
+const kept = new URLSearchParams(window.location.search).get('token');
+const full = (kept ? 'token=' + encodeURIComponent(kept) + (search ? '&' : '') : '') + search;
+window.history.replaceState(null, '', window.location.pathname + (full ? '?' + full : ''));
+"""
+_KEYS = """
+document.documentElement.lang = 'en';
+document.addEventListener('keydown', (event) => {
+  if (!event.key.startsWith('Arrow') || event.ctrlKey || event.metaKey || event.altKey) { return; }
+  const path = event.composedPath();
+  const owns = (e) => ['INPUT', 'SELECT', 'TEXTAREA'].includes(e.tagName)
+    || ['slider', 'tab', 'grid'].includes(e.getAttribute('role'))
+    || e.classList.contains('bk-tab') || e.classList.contains('slick-viewport') || e.classList.contains('noUi-handle');
+  const typing = path.some((e) => e instanceof Element && owns(e));
+  if (typing) { return; }
+  event.preventDefault();
+  keys.data = {key: [event.key], count: [keys.data.count[0] + 1]};
+});
+"""
+_TABS = """
+document.addEventListener('keydown', (event) => {
+  const tab = event.composedPath()[0];
+  if (!(tab instanceof Element) || !tab.classList.contains('bk-tab')) { return; }
+  if (event.key === 'Enter' || event.key === ' ') { event.preventDefault(); tab.click(); }
+  const next = {ArrowLeft: tab.previousElementSibling, ArrowRight: tab.nextElementSibling}[event.key];
+  if (next && next.classList.contains('bk-tab')) { event.preventDefault(); next.focus(); next.click(); }
+});
+"""
+_FOCUS = """
+const framed = (event, style) => {
+  const plot = event.composedPath().find((e) => e instanceof HTMLElement && e.classList.contains('bk-events'));
+  if (plot) { plot.style.outline = style; plot.style.outlineOffset = '-2px'; }
+};
+document.addEventListener('keyup', (event) => {
+  if (event.key !== 'Tab') { return; }
+  framed(event, '2px solid ' + getComputedStyle(document.documentElement).getPropertyValue('--sb-accent'));
+});
+document.addEventListener('pointerdown', (event) => framed(event, 'none'), true);
+document.addEventListener('keydown', (event) => { if (event.key === 'Tab') { framed(event, 'none'); } }, true);
+"""
+"""Plots lie where no sheet of the page reaches; one that was clicked needs no frame."""
+_TOO_LARGE = """
+document.addEventListener('input', (event) => {
+  const field = event.composedPath()[0];
+  if (!(field instanceof HTMLInputElement) || field.type !== 'file') { return; }
+  const large = [...field.files].find((file) => file.size > %d);
+  if (!large) { return; }
+  field.value = '';
+  refused.data = {name: [large.name], bytes: [large.size], count: [refused.data.count[0] + 1]};
+}, true);
+"""
+_THEME = """
+const search = new URLSearchParams(window.location.search);
+if (search.get('theme') === 'dark') { search.delete('theme'); } else { search.set('theme', 'dark'); }
+window.location.search = search.toString();
+"""
+
+
+def framed(page: Page) -> Any:
+    """All of a page."""
+    look, shared = page.look, page.shared
+    pn.config.raw_css = [sheet(look)]
+    name = html.escape(shared.source.name)
+    title = pn.pane.HTML(
+        f'<h1>snapbeam <span class="faint">{name}</span></h1>', margin=0, sizing_mode="stretch_width"
+    )
+    dark = pn.widgets.Button(name="Dark" if look.name == "default" else "Light", width=70, align="center")
+    dark.js_on_click(code=_THEME)
+    top = pn.Row(
+        title, page.target, page.compare, dark, sizing_mode="stretch_width", css_classes=["top"], margin=0
+    )
+    map_tab = pn.Column(page.card.layout, page.typed, sizing_mode="stretch_width", margin=0)
+    map_tab.insert(0, page.old)
+    others = page_tabs(page)
+    left = pn.Tabs(
+        ("Map", map_tab),
+        *((title, pn.Column(sizing_mode="stretch_width", margin=0)) for title in others),
+        sizing_mode="stretch_width",
+        css_classes=["left"],
+    )
+
+    def turned() -> None:
+        """Fill a tab when it is first looked at."""
+        at = left.active
+        if at > 0 and not left[at].objects:
+            made = list(others.values())[at - 1]()
+            styled(made, look)
+            left[at].objects = [made]
+
+    left.param.watch(lambda _: page.post(turned), "active")
+    runs = pn.FlexBox(page.runs[0].layout, margin=0, css_classes=["right"])
+    page.runs[0].head.object = f'<span class="faint">{_FIRST}</span>'
+    body = pn.FlexBox(
+        left,
+        runs,
+        margin=0,
+        sizing_mode="stretch_width",
+        flex_wrap="wrap",
+        css_classes=["body"],
+    )
+    whole = pn.Column(top, body, sizing_mode="stretch_width", margin=0, css_classes=["whole"])
+    styled(whole, look)
+
+    def add_run(view: RunView) -> None:
+        styled(view.layout, look)
+        runs.append(view.layout)
+
+    page.add_run = add_run
+    doc = page.doc
+    page.bar.js_on_change("data", CustomJS(args={"bar": page.bar}, code=_ADDRESS))
+    if doc is not None:
+        doc.js_on_event(DocumentReady, CustomJS(args={"keys": page.keys}, code=_KEYS))
+        doc.js_on_event(DocumentReady, CustomJS(code=_TABS))
+        doc.js_on_event(DocumentReady, CustomJS(code=_FOCUS))
+        large = CustomJS(args={"refused": page.refused}, code=_TOO_LARGE % UPLOAD)
+        doc.js_on_event(DocumentReady, large)
+        doc.js_on_event(ConnectionLost, CustomJS(code=_GONE))
+        doc.add_root(page.bar)
+        doc.add_root(page.keys)
+        doc.add_root(page.refused)
+        doc.add_root(page.downloads.source)
+    return whole
+
+
+def page_tabs(page: Page) -> dict[str, Callable[[], Any]]:
+    """The tabs beside the map, by title: what makes them."""
+    found: dict[str, Callable[[], Any]] = {}
+    if page.shared.system is not None:
+        found["System"] = lambda: page.system_card().layout
+    return found | {"Take away": lambda: page.take_card().layout}

@@ -1,0 +1,579 @@
+"""A whole campaign: every test of a folder measured, kept, and written to one table."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import hashlib
+import json
+import math
+import os
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from snapbeam._version import __version__
+from snapbeam.lab.camera import open_recording
+from snapbeam.lab.compare_waveforms import LEAST_CYCLES, measure_response
+from snapbeam.lab.drive_alignment import Alignment, align
+from snapbeam.lab.image_sources import IMAGE_SUFFIXES, RECORDING_SUFFIXES
+from snapbeam.lab.signal_files import read_signal
+from snapbeam.lab.signal_formats import READERS, decoded
+from snapbeam.lab.tracking.settings import TrackingSettings
+from snapbeam.lab.tracking.track import track
+from snapbeam.lab.vibrometer import DriveMeasurement, measure_drive, shaker_signal
+from snapbeam.util.diagnostics import Diagnostic, Severity, diagnostics_of
+from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.netcdf import write_netcdf
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError, integer, positive, shown, within
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "COLUMNS",
+    "CampaignSettings",
+    "Test",
+    "TestResult",
+    "find_tests",
+    "kept_result",
+    "load_settings",
+    "run_campaign",
+    "run_test",
+    "write_table",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Which files of a folder are one test: paired by their names, or by a table.
+
+
+_HEADERS = (".cih", ".cihx")
+_SIGNALS = tuple(suffix for suffix in READERS if suffix not in (".h5", ".hdf5", ".npy", ".nc"))
+_WORDS = (
+    r"[-_ ]?(?<![a-z])(vibrometer|vibro|vib|velocity|vel|laser|ldv|drive|shaker|camera|cam|recording|rec|video)"
+    r"(?![a-z])"
+)
+_COLUMNS = ("test", "recording", "vibrometer", "frequency_hz", "velocity_m_s", "location", "comment")
+
+
+@dataclass(frozen=True)
+class Test:
+    """One test: its name, its files, and what was set, where a table says so.
+
+    ``frequency`` [Hz], ``velocity`` [m/s] amplitude, ``location`` x_s/L.
+    """
+
+    __test__ = False  # no test of pytest's
+
+    name: str
+    recording: Path
+    vibrometer: Path | None = None
+    frequency: float | None = None
+    velocity: float | None = None
+    location: float | None = None
+
+
+def find_tests(folder: Path, table: Path | None = None, besides: Path | None = None) -> list[Test]:
+    """The tests of a folder, in the order of their names or of the table.
+
+    A recording and a vibrometer file are one test if their names are the same but for the ending and words
+    such as "vib", "velocity_at_striker" or "camera".  A folder of numbered images is a recording.
+
+    Parameters
+    ----------
+    folder
+        Where the files are.
+    table
+        A text table with the columns test, recording, and, as far as known, vibrometer, frequency_hz,
+        velocity_m_s, location and comment.
+    besides
+        A folder that is none of the recordings, such as that of the results.
+
+    Raises
+    ------
+    InputError
+        If there is no recording, a file of the table is missing, or names do not pair uniquely.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: must be a folder of recordings")
+    if table is not None:
+        return _from_table(folder, table)
+    recordings: dict[str, Path] = {}
+    signals: dict[str, Path] = {}
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith(".") or (besides is not None and path.resolve() == besides.resolve()):
+            continue
+        if path.is_dir():
+            if any(one.suffix.lower() in IMAGE_SUFFIXES for one in path.iterdir()):
+                _put(recordings, path, path.name)
+            continue
+        suffix = path.suffix.lower()
+        if suffix == ".mraw" and any(path.with_suffix(one).exists() for one in _HEADERS):
+            continue
+        if suffix in RECORDING_SUFFIXES:
+            _put(recordings, path, path.stem)
+        elif suffix in _SIGNALS and path.name not in ("tests.csv", "campaign.csv"):
+            _put(signals, path, path.stem)
+    if not recordings:
+        raise InputError(
+            f"{folder}: holds no recording ({', '.join(RECORDING_SUFFIXES)}, or a folder of images)"
+        )
+    return [Test(name, path, signals.get(name)) for name, path in recordings.items()]
+
+
+def _put(known: dict[str, Path], path: Path, stem: str) -> None:
+    name = re.sub(_WORDS, "", stem, flags=re.IGNORECASE).strip("-_ ") or stem
+    if name in known:
+        raise InputError(
+            f"{path.name} and {known[name].name}: both would be of test {name!r}; rename one, or give a table (--table)"
+        )
+    known[name] = path
+
+
+def _from_table(folder: Path, table: Path) -> list[Test]:
+    try:
+        text = decoded(table)
+    except OSError as error:
+        raise InputError(f"table (--table) = {str(table)!r}: cannot be read, {error.strerror}") from error
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    if not lines:
+        raise InputError(f"{table.name}: is empty; its first line must name the columns")
+    mark = next((one for one in (";", "\t") if one in lines[0]), ",")
+    rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=mark)]
+    header = [name.lower() for name in rows[0]]
+    for name in header:
+        if name not in _COLUMNS:
+            raise InputError(f"{table.name}: unknown column {name!r}; must be among {', '.join(_COLUMNS)}")
+    for name in ("test", "recording"):
+        if name not in header:
+            raise InputError(f"{table.name}: must have a column {name!r}")
+    tests = []
+    for number, cells in enumerate(rows[1:], start=2):
+        row = dict(zip(header, cells, strict=False))
+        where = f"{table.name}, row {number}"
+        recording = folder / row["recording"]
+        if not recording.exists() and "*" not in recording.name:
+            raise InputError(f"{where}: recording {row['recording']!r} is not in {folder}")
+        vibrometer = folder / row["vibrometer"] if row.get("vibrometer") else None
+        if vibrometer is not None and not vibrometer.exists():
+            raise InputError(f"{where}: vibrometer {row['vibrometer']!r} is not in {folder}")
+        place = _number(row.get("location"), mark, where, "location")
+        tests.append(
+            Test(
+                row["test"],
+                recording,
+                vibrometer,
+                _number(row.get("frequency_hz"), mark, where, "frequency_hz"),
+                _number(row.get("velocity_m_s"), mark, where, "velocity_m_s"),
+                None if place is None else within(f"{where}: location", place, 0.0, 1.0),
+            )
+        )
+    names = [test.name for test in tests]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None or "" in names:
+        raise InputError(f"{table.name}: test {twice!r} stands twice; each must have a name of its own")
+    return tests
+
+
+def _number(cell: str | None, mark: str, where: str, column: str) -> float | None:
+    if not cell:
+        return None
+    text = cell.replace(",", ".") if mark != "," else cell
+    try:
+        return positive(f"{where}: {column}", float(text))
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{where}: {column} = {shown(cell)}: must be a number") from None
+
+
+# ----------------------------------------------------------------------------------------------------
+# What all tests of a campaign have in common, from a TOML file or by name.
+
+
+_CAMERA = ("frame_rate", "pixel_size", "region")
+_SIGNAL = ("channel", "units", "sensitivity", "sampling_frequency", "columns")
+
+
+@dataclass(frozen=True)
+class CampaignSettings:
+    """Settings of every test.
+
+    Attributes
+    ----------
+    camera
+        ``frame_rate`` [Hz], ``pixel_size`` [m] and ``region`` as for :func:`snapbeam.lab.open_recording`.
+    tracking
+        How to track; the buckling level is needed for the response.
+    signal
+        ``channel``, ``units``, ``sensitivity``, ``sampling_frequency`` and ``columns`` as for
+        :func:`snapbeam.lab.read_signal`.
+    cycles
+        Cycles of excitation that the response class is asked for; the rule needs 20.
+    """
+
+    camera: Mapping[str, Any] = field(default_factory=dict)
+    tracking: TrackingSettings = field(default_factory=TrackingSettings)
+    signal: Mapping[str, Any] = field(default_factory=dict)
+    cycles: int = 200
+
+    def __post_init__(self) -> None:
+        for name, known in (("camera", _CAMERA), ("signal", _SIGNAL)):
+            for key in getattr(self, name):
+                if key not in known:
+                    raise InputError(f"{name} {key}: unknown; must be among {', '.join(known)}")
+        object.__setattr__(self, "cycles", integer("cycles", self.cycles, LEAST_CYCLES))
+        if self.tracking.buckling_level is None:
+            raise InputError(
+                "buckling_level (--buckling-level): must be given, in m, or no response can be told"
+            )
+        if not self.tracking.shaker:
+            raise InputError("shaker: must be followed in a campaign")
+
+    def fingerprint(self, *files: Path) -> str:
+        """A number that changes with any setting and any of the files."""
+        tracking = {
+            item.name: getattr(self.tracking, item.name) for item in dataclasses.fields(self.tracking)
+        }
+        parts = [
+            __version__,
+            repr(sorted(self.camera.items())),
+            repr(sorted(tracking.items())),
+            repr(sorted(self.signal.items())),
+        ]
+        parts.append(repr(self.cycles))
+        for file in files:
+            whole = sorted(file.iterdir()) if file.is_dir() else [file, file.with_suffix(".mraw")]
+            for one in whole:
+                if one.exists():
+                    state = one.stat()
+                    parts.append(f"{one.name} {state.st_size} {state.st_mtime_ns}")
+        return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:24]
+
+
+def load_settings(path: Path | None, changes: Mapping[str, Mapping[str, Any]]) -> CampaignSettings:
+    """Settings from a TOML file with sections camera, tracking, signal and campaign, and changes to them.
+
+    Parameters
+    ----------
+    path
+        The file; none if None.
+    changes
+        Values by section and name that go before the file's.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or holds an unknown section or name.
+    """
+    sections: dict[str, dict[str, Any]] = {"camera": {}, "tracking": {}, "signal": {}, "campaign": {}}
+    if path is not None:
+        try:
+            read = tomllib.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise InputError(f"settings = {str(path)!r}: cannot be read, {error.strerror}") from error
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise InputError(f"{path}: is no TOML, {error}") from error
+        for name, values in read.items():
+            if name not in sections or not isinstance(values, dict):
+                raise InputError(f"{path}: [{name}]: unknown section; must be among {', '.join(sections)}")
+            sections[name] |= values
+    for name, given in changes.items():
+        sections[name] |= {key: value for key, value in given.items() if value is not None}
+    for key in sections["campaign"]:
+        if key != "cycles":
+            raise InputError(f"[campaign] {key}: unknown; must be cycles")
+    region = sections["camera"].get("region")
+    if region is not None:
+        sections["camera"]["region"] = tuple(region)
+    tracking = TrackingSettings().changed(**sections["tracking"])
+    return CampaignSettings(
+        sections["camera"], tracking, sections["signal"], sections["campaign"].get("cycles", 200)
+    )
+
+
+# ----------------------------------------------------------------------------------------------------
+# One test of a campaign: tracked, aligned with its vibrometer, classed; what went wrong said, never raised.
+
+
+_NAN = math.nan
+
+
+@dataclass(frozen=True)
+class TestResult:
+    """One row of the table of tests.
+
+    ``status`` is "measured", or "spoiled" where the test gives no number to be trusted, and then ``reason``
+    says why; ``diagnostics`` are those of camera, vibrometer and alignment, as codes and words.  Numbers that
+    were not measured are NaN.
+    """
+
+    __test__ = False  # no test of pytest's
+
+    test: str
+    recording: str
+    vibrometer: str
+    status: str
+    reason: str
+    frequency_hz: float = _NAN
+    frequency_se_hz: float = _NAN
+    velocity_m_s: float = _NAN
+    velocity_se_m_s: float = _NAN
+    location: float = _NAN
+    response_class: str = ResponseClass.UNKNOWN.label
+    crossings: int = 0
+    cycles: float = _NAN
+    snr_db: float = _NAN
+    measured_share: float = _NAN
+    delay_s: float = _NAN
+    polarity: float = _NAN
+    gain: float = _NAN
+    diagnostics: tuple[tuple[str, str, str], ...] = ()
+    fingerprint: str = ""
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether any diagnostic is more than a note."""
+        return any(severity != Severity.INFO.value for _, severity, _ in self.diagnostics)
+
+
+def kept_result(path: Path, fingerprint: str) -> TestResult | None:
+    """A result kept from before, if it is of the same files and settings."""
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+        if values.get("fingerprint") != fingerprint:
+            return None
+        values["diagnostics"] = tuple((str(a), str(b), str(c)) for a, b, c in values["diagnostics"])
+        filled: dict[str, Any] = {name: _NAN if value is None else value for name, value in values.items()}
+        return TestResult(**filled)
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
+def run_test(test: Test, settings: CampaignSettings, folder: Path, fingerprint: str) -> TestResult:
+    """Measure one test and keep its tracked run and its result in *folder*."""
+    diagnostics: list[Diagnostic] = []
+    try:
+        result = _measured(test, settings, folder, diagnostics)
+    except (InputError, OSError) as error:
+        if isinstance(error, OSError):
+            fingerprint = ""  # perhaps it can be read the next time
+        reason = _wrong(diagnostics) or _short(str(error), test)
+        result = _row(
+            test, status="spoiled", reason=reason, diagnostics=tuple(_plain(one) for one in diagnostics)
+        )
+    result = replace(result, fingerprint=fingerprint)
+    plain = {
+        name: None if isinstance(value, float) and not math.isfinite(value) else value
+        for name, value in asdict(result).items()
+    }
+    with atomic_path(folder / f"{test.name}.json") as temporary:
+        temporary.write_text(json.dumps(plain, indent=1, ensure_ascii=False), encoding="utf-8")
+    return result
+
+
+def _row(test: Test, **values: Any) -> TestResult:
+    return TestResult(
+        test=test.name,
+        recording=test.recording.name,
+        vibrometer=test.vibrometer.name if test.vibrometer is not None else "",
+        **values,
+    )
+
+
+def _short(message: str, test: Test) -> str:
+    """A message without the folder of the test's files."""
+    return message.replace(f"{test.recording.parent}{os.sep}", "")
+
+
+def _wrong(diagnostics: list[Diagnostic]) -> str:
+    """The first diagnostic that leaves nothing to trust, in words; empty if there is none."""
+    return next((one.message for one in diagnostics if one.severity is Severity.ERROR), "")
+
+
+def _measured(
+    test: Test, settings: CampaignSettings, folder: Path, diagnostics: list[Diagnostic]
+) -> TestResult:
+    """The row of a test; *diagnostics* is filled as they come, for a test that ends half way."""
+    tracking = settings.tracking
+    if test.location is not None:
+        tracking = tracking.changed(location=test.location)
+    with open_recording(test.recording, **settings.camera) as recording:
+        tracked = track(recording, tracking)
+    write_netcdf(tracked, folder / f"{test.name}.nc")
+    diagnostics += diagnostics_of(tracked)
+    seen = measure_drive(shaker_signal(tracked), test.frequency)
+    drive, alignment = seen, None
+    if test.vibrometer is not None:
+        signal = read_signal(test.vibrometer, **settings.signal)
+        drive = measure_drive(signal, test.frequency, amplitude=_stated(signal, test))
+        diagnostics += drive.diagnostics
+        alignment = align(shaker_signal(tracked), signal, test.frequency)
+        diagnostics += alignment.diagnostics
+    response = measure_response(
+        tracked, drive.steady.frequency, cycles=settings.cycles, start=_start(seen, drive, alignment)
+    )
+    speed = 1.0 if drive.units == "m/s" else 2.0 * math.pi * drive.steady.frequency
+    reason = _wrong(diagnostics)
+    if not reason and response.response_class is ResponseClass.UNKNOWN:
+        reason = "class not told: " + "; ".join(response.reasons)
+    valid = tracked["valid"].values.astype(bool)
+    return _row(
+        test,
+        status="spoiled" if reason else "measured",
+        reason=reason,
+        frequency_hz=drive.steady.frequency,
+        frequency_se_hz=drive.steady.frequency_se,
+        velocity_m_s=speed * drive.steady.amplitude,
+        velocity_se_m_s=speed * drive.steady.amplitude_se,
+        location=float(tracked.attrs["location"]),
+        response=response.response_class.label,
+        crossings=response.zero_crossings,
+        cycles=response.cycles,
+        snr_db=drive.steady.sinad,
+        measured_share=float(np.mean(valid)),
+        delay_s=_NAN if alignment is None else alignment.delay,
+        polarity=_NAN if alignment is None else alignment.polarity,
+        gain=_NAN if alignment is None else alignment.gain,
+        diagnostics=tuple(_plain(one) for one in diagnostics),
+    )
+
+
+def _plain(diagnostic: Diagnostic) -> tuple[str, str, str]:
+    return diagnostic.code, diagnostic.severity.value, diagnostic.message
+
+
+def _stated(signal: xr.DataArray, test: Test) -> float | None:
+    """The amplitude that was set, in the unit of the signal, where the table gives it."""
+    if test.velocity is None:
+        return None
+    if signal.attrs["units"] == "m/s":
+        return test.velocity
+    return None if test.frequency is None else test.velocity / (2.0 * math.pi * test.frequency)
+
+
+def _start(seen: DriveMeasurement, drive: DriveMeasurement, alignment: Alignment | None) -> float | None:
+    """Start of the excitation on the camera's clock [s]: the vibrometer's where both are aligned, else the camera's."""
+    if alignment is not None and alignment.certain and drive.startup is not None:
+        return drive.startup.onset + alignment.delay
+    return None if seen.startup is None else seen.startup.onset
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+COLUMNS = (
+    "test", "recording", "vibrometer", "status", "frequency_hz", "frequency_se_hz", "velocity_m_s", "velocity_se_m_s",
+    "location", "response_class", "zero_crossings", "cycles", "snr_db", "measured_share", "delay_s", "polarity", "gain",
+    "diagnostics", "comment",
+)  # fmt: skip
+
+
+def run_campaign(
+    folder: Path,
+    settings: CampaignSettings,
+    output: Path,
+    *,
+    table: Path | None = None,
+    strict: bool = False,
+    progress: Callable[[int, int, TestResult | None], None] | None = None,
+) -> list[TestResult]:
+    """Measure every test of a folder.
+
+    Each test's tracked run (NetCDF) and result (JSON) are kept in ``output/tests`` as soon as they are there,
+    and ``output/tests.csv`` is written anew after each; a test whose files and settings have not changed since
+    is not measured again, so an interrupted campaign goes on where it was.
+
+    Parameters
+    ----------
+    folder
+        Recordings and vibrometer files.
+    settings
+        What all tests have in common.
+    output
+        Folder for the results; made if it is not there.
+    table
+        Which files are which test; by their names if left out.
+    strict
+        Whether a test with any doubtful diagnostic counts as spoiled.
+    progress
+        Called with (tests done, tests in all, the last one's result).
+
+    Raises
+    ------
+    InputError
+        If there is nothing to measure.  A test that cannot be measured is a row that says why.
+    """
+    tests = find_tests(folder, table, output)
+    kept = output / "tests"
+    try:
+        kept.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"output = {str(output)!r}: cannot be made, {error.strerror}") from error
+    check_table(output / "tests.csv")
+    results: list[TestResult] = []
+    if progress is not None:
+        progress(0, len(tests), None)
+    for test in tests:
+        fingerprint = settings.fingerprint(*_files(test)) + _set(test)
+        result = kept_result(kept / f"{test.name}.json", fingerprint)
+        if result is None:
+            result = run_test(test, settings, kept, fingerprint)
+        results.append(strictly(result) if strict else result)
+        write_table(output / "tests.csv", results)
+        if progress is not None:
+            progress(len(results), len(tests), results[-1])
+    return results
+
+
+def strictly(result: TestResult) -> TestResult:
+    """A result that is spoiled if anything makes it doubtful."""
+    if result.status != "measured" or not result.doubtful:
+        return result
+    words = next(words for _, severity, words in result.diagnostics if severity != "note")
+    return dataclasses.replace(result, status="spoiled", reason=words)
+
+
+def _files(test: Test) -> list[Path]:
+    return [path for path in (test.recording, test.vibrometer) if path is not None]
+
+
+def _set(test: Test) -> str:
+    """What a table says of a test, for its fingerprint."""
+    values = (test.frequency, test.velocity, test.location)
+    return (
+        ""
+        if not any(values)
+        else " " + " ".join("-" if value is None else f"{value:.12g}" for value in values)
+    )
+
+
+def write_table(path: Path, results: list[TestResult]) -> None:
+    """Write the table of tests, as ``snapbeam compare`` reads it."""
+    check_table(path)
+    with atomic_path(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        for result in results:
+            values = asdict(result)
+            values["diagnostics"] = " ".join(code for code, _, _ in result.diagnostics)
+            values["comment"] = result.reason
+            writer.writerow([_cell(values[name]) for name in COLUMNS])
+
+
+def check_table(path: Path) -> Path:
+    """Refuse, before any work, a table that cannot be written."""
+    return check_writable(path, "output", begin=",".join(COLUMNS))
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.9g}" if math.isfinite(value) else ""
+    return str(value)

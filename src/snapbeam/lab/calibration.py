@@ -1,0 +1,859 @@
+"""The model's beam from measured frequencies, decays and collisions, with uncertainties and in plain words.
+
+The paper adjusts the thickness to the straight beam's frequencies and the buckling level to those about the
+wells (section 3.3).  Here both are fitted at once by least squares, and what the data cannot tell is said.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.lab.diagnostics import KINDS_CALIBRATION
+from snapbeam.model.beam import Beam
+from snapbeam.model.boundary_conditions import BoundaryConditions
+from snapbeam.model.default_values import BEAM, MODES
+from snapbeam.model.imperfection import Imperfection
+from snapbeam.model.imperfection_identification import identify_imperfection
+from snapbeam.model.parameter_file import config_from_mapping, dump_config
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.uncertainty.measurements import HERTZ_TIME, ContactTest, Measurements, load_measurements
+from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.validation import InputError, InputTypeError, choice, integer, positive, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "ASSUMED",
+    "Calibration",
+    "ContactStiffness",
+    "ContactTest",
+    "Measurements",
+    "Residual",
+    "at_least",
+    "calibrate",
+    "directions",
+    "doubts",
+    "either_well",
+    "ends_section",
+    "imperfection_section",
+    "links",
+    "load_measurements",
+    "open_upwards",
+    "remarks",
+    "search",
+    "sensitivity",
+    "shape_findings",
+    "stiffness_from_impacts",
+    "uneven_beam",
+    "uneven_words",
+    "with_error",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# What makes two measured wells unequal.
+
+
+_UNITS = {"rise": "m", "point_load": "N", "uniform_load": "N/m"}
+
+
+def uneven_beam(beam: Beam, measured: Measurements, kind: str, modes: int) -> ReducedModel:
+    """The calibrated beam with the imperfection that gives each well its own first frequency.
+
+    Of the beam, the buckling level alone changes: two numbers from two frequencies, see
+    :func:`snapbeam.model.imperfection_identification.identify_imperfection`.
+    """
+    both = {}
+    for well in ("lower", "upper"):
+        values, shapes = (
+            getattr(measured, f"{well}_well_frequencies"),
+            getattr(measured, f"{well}_well_shape"),
+        )
+        own = (
+            [f for f, shape in zip(values, shapes, strict=True) if shape == "symmetric"] if shapes else values
+        )
+        if not own:
+            raise InputError(
+                f"imperfection = {kind!r}: needs the first frequency about both wells; the {well} one's is not given"
+            )
+        both[well] = float(own[0])
+    return identify_imperfection(beam, both["lower"], both["upper"], kind, modes)
+
+
+def uneven_words(kind: str, model: ReducedModel) -> str:
+    """What was found, and what it does not say."""
+    assert model.imperfection is not None and model.beam is not None
+    value, level = getattr(model.imperfection, kind), model.beam.buckling_level * 1e3
+    return (
+        f"{kind} = {value:.4g} {_UNITS[kind]} with a buckling level of {level:.4g} mm gives each well "
+        "its own first frequency; which kind of imperfection it is, two frequencies do not say"
+    )
+
+
+def imperfection_section(imperfection: Imperfection | None) -> dict[str, Any]:
+    """What differs from a perfect beam, as the section of a parameter file."""
+    if imperfection is None:
+        return {}
+    perfect = vars(Imperfection())
+    return {name: value for name, value in vars(imperfection).items() if not _same(value, perfect[name])}
+
+
+def ends_section(beam: Beam) -> dict[str, Any]:
+    """Ends that are no clamps, as the section of a parameter file."""
+    return {name: float(value) for name, value in vars(beam.boundary).items() if value is not None}
+
+
+def _same(value: Any, other: Any) -> bool:
+    return value is other or (isinstance(value, (int, float, str)) and value == other)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Least squares of a calibration: its minimum, its sensitivities, and what the data respond to.
+
+
+STARTS = (1.0, 0.75, 1.33, 0.55, 1.8)
+"""Buckling levels to start from, over the given one."""
+HIGHER = (1.05, 1.15, 1.3)
+"""Buckling levels that are tried beyond the one found, over it."""
+UNDETERMINED = 1e-5
+"""Least singular value of the relative sensitivities that counts as a response, over the greatest."""
+
+
+def sensitivity(frequencies: Callable[[_Array], _Array], logs: _Array, errors: _Array) -> _Array:
+    """Change of the frequencies, in standard errors, with the logarithms of the parameters."""
+    step = 1e-5
+    columns = [
+        (frequencies(logs + step * e) - frequencies(logs - step * e)) / (2.0 * step)
+        for e in np.eye(logs.size)
+    ]
+    return np.column_stack(columns) / errors[:, None]
+
+
+def search(
+    residual: Callable[[_Array], _Array], begin: _Array, keep: _Array, names: list[str], freedom: int
+) -> _Array:
+    """The least squares minimum; other buckling levels are tried where the first start meets the data badly.
+
+    Frequencies are told apart by their order only, and at b/r = 6.2 the first two change places: from the
+    wrong side of it the fit can end in a minimum that is none of the data's.
+    """
+    from scipy.optimize import least_squares
+
+    enough = freedom + 3.0 * math.sqrt(2.0 * freedom) + 1e-6
+    best, found = math.inf, begin
+    for factor in STARTS if "buckling_level" in names else STARTS[:1]:
+        start = begin + np.array([math.log(factor) if name == "buckling_level" else 0.0 for name in names])
+        result = least_squares(
+            lambda z, start=start: residual(start + keep @ z), np.zeros(keep.shape[1]), x_scale=0.1,
+            xtol=1e-10, ftol=1e-10, gtol=1e-10,
+        )  # fmt: skip
+        if 2.0 * result.cost < best:
+            best, found = 2.0 * result.cost, start + keep @ result.x
+        if best <= enough:
+            break
+    return found
+
+
+def open_upwards(residual: Callable[[_Array], _Array], logs: _Array, names: list[str]) -> bool:
+    """Whether any higher buckling level meets the data as well as the one found.
+
+    So it is where the only frequency about a well is that of the antisymmetric mode, which does not depend on
+    the level; the symmetric one lies above it from b/r = 6.2 on.
+    """
+    if "buckling_level" not in names:
+        return False
+    least = float(np.sum(residual(logs) ** 2))
+    higher = (logs + np.array([math.log(by) * (name == "buckling_level") for name in names]) for by in HIGHER)
+    return all(float(np.sum(residual(one) ** 2)) < least + 4.0 for one in higher)
+
+
+def directions(jacobian: _Array) -> _Array:
+    """Orthonormal combinations of parameters that the data respond to, one a column."""
+    _, singular, rows = np.linalg.svd(jacobian, full_matrices=False)
+    told = singular > UNDETERMINED * singular[0]
+    return np.asarray(rows[told].T)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Which of the modes about a well is meant: symmetric and antisymmetric ones change places at b/r = 6.2.
+
+
+_CROSSING = 0.05  # share within which the first two frequencies may be in the other order
+
+
+def shape_findings(beam: Beam, measured: Measurements, modes: int) -> list[Diagnostic]:
+    """Whether the order of the modes about a well is in doubt where nothing else tells them apart."""
+    told = [measured.lower_well_shape, measured.upper_well_shape]
+    given = [freq for freq in (measured.lower_well_frequencies, measured.upper_well_frequencies) if freq]
+    if modes < 2 or any(told) or not given:
+        return []
+    model = ReducedModel.from_beam(beam, modes)
+    if not (model.parity > 0).any():  # unequal ends: no mode is either
+        return []
+    symmetric = float(model.natural_frequencies[model.parity > 0][0])
+    other = model.natural_frequencies[model.parity < 0]
+    if not other.size:
+        return []
+    antisymmetric = float(other[0])
+    if antisymmetric < symmetric:
+        return [KINDS_CALIBRATION["antisymmetric"].found(frequency=antisymmetric)]
+    if symmetric > (1.0 - _CROSSING) * antisymmetric:
+        return [KINDS_CALIBRATION["crossing"].found(symmetric=symmetric, antisymmetric=antisymmetric)]
+    return []
+
+
+def either_well(beam: Beam, measured: Measurements, modes: int) -> tuple[float, ...]:
+    """Buckling level [m] that the first symmetric frequency of each well alone asks for; empty if they agree."""
+    from scipy.optimize import newton
+
+    goals = []
+    for state in ("lower_well", "upper_well"):
+        values, shapes = getattr(measured, f"{state}_frequencies"), getattr(measured, f"{state}_shape")
+        fitting = (
+            [f for f, shape in zip(values, shapes, strict=True) if shape == "symmetric"] if shapes else values
+        )
+        goals += list(fitting[:1])
+    if len(goals) < 2 or goals[0] == goals[1]:
+        return ()
+    level, levels = beam.buckling_level, []
+
+    def symmetric(at: float) -> float:
+        model = ReducedModel.from_beam(beam.replace(buckling_level=abs(at) * level), modes)
+        own = (
+            model.natural_frequencies[model.parity > 0]
+            if (model.parity > 0).any()
+            else model.natural_frequencies
+        )
+        return float(own[0])
+
+    here = symmetric(1.0)
+    for goal in goals:
+
+        def miss(factor: float, goal: float = goal) -> float:
+            return symmetric(factor) / goal - 1.0
+
+        try:
+            levels.append(level * float(newton(miss, 1.0, x1=goal / here + 1e-6, tol=1e-7, maxiter=12)))
+        except RuntimeError:  # no level gives that frequency
+            return ()
+    return tuple(levels)
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a calibration says in words: remarks on what was found, diagnostics on what to beware of.
+
+
+ASSUMED = 0.005
+"""Standard error of a frequency for which none is given, as a share of it."""
+
+_LINKED = 0.95  # correlation from which two parameters are said to be linked
+_VAGUE = 0.05  # relative standard error from which a parameter is said to be hardly known
+_SHOWN = {
+    "thickness": (1e3, "mm"),
+    "buckling_level": (1e3, "mm"),
+    "length": (1e3, "mm"),
+    "young_modulus": (1e-9, "GPa"),
+    "density": (1.0, "kg/m^3"),
+}
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def with_error(result: Calibration, name: str) -> str:
+    """A fitted parameter with its standard error, in the unit people read."""
+    scale, unit = _SHOWN[name]
+    value = result.values[name] * scale
+    if name not in result.standard_errors:
+        return f"{value:.5g} {unit}, not determined by the data"
+    return f"{value:.5g} +- {result.standard_errors[name] * scale:.2g} {unit}"
+
+
+def links(names: list[str], covariance: NDArray[np.float64], hidden: tuple[str, ...]) -> list[Diagnostic]:
+    """What to say of parameters that the data do not determine, link, or hardly tell."""
+    told = []
+    if len(hidden) == 1:
+        words = f"no measured frequency depends on {hidden[0]}: it keeps its start"
+        told.append(KINDS_CALIBRATION["undetermined"].found(told=words))
+    elif hidden:
+        words = (
+            f"the measured frequencies cannot tell {_listed(hidden)} apart: they depend on a combination of "
+            "them only; fix one of them by another measurement (the values given keep nearest to the start)"
+        )
+        told.append(KINDS_CALIBRATION["undetermined"].found(told=words))
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    for i, name in enumerate(names):
+        if name in hidden:
+            continue
+        if spread[i] > _VAGUE:
+            told.append(
+                KINDS_CALIBRATION["vague"].found(
+                    told=f"{name} is known to {spread[i]:.0%} only", share=spread[i]
+                )
+            )
+        for j, other in enumerate(names[:i]):
+            linked = 0.0 if other in hidden else covariance[i, j] / (spread[i] * spread[j])
+            if abs(linked) > _LINKED:
+                sense = "rises" if linked > 0.0 else "falls"
+                words = (
+                    f"{other} and {name} can hardly be told apart (correlation {linked:+.3f}): where one "
+                    f"rises the other {sense}"
+                )
+                told.append(KINDS_CALIBRATION["linked"].found(told=words, correlation=linked))
+    return told
+
+
+def at_least(level: float) -> Diagnostic:
+    """What to say where any buckling level [m] above the one found meets the data as well."""
+    text = (
+        f"any buckling_level above {level * 1e3:.4g} mm meets the measured frequencies as well: the first one about "
+        "a well may be that of the antisymmetric mode, which does not depend on the level; measure the symmetric one"
+    )
+    return KINDS_CALIBRATION["undetermined"].found(told=text, least=level)
+
+
+def remarks(result: Calibration, measured: Measurements) -> list[str]:
+    """What was found: the frequencies about the wells, and the measured geometry beside the model's."""
+    told = []
+    first = [
+        values[0] for values in (measured.lower_well_frequencies, measured.upper_well_frequencies) if values
+    ]
+    if first and result.well_frequencies is not None:
+        mean = float(np.mean(first))
+        told.append(
+            f"the model's first frequency about either well is {result.well_frequencies:.2f} Hz; measured mean "
+            f"{mean:.2f} Hz"
+        )
+        other = result.start_well_frequencies
+        if other is not None and abs(other / mean - 1.0) > 0.002:
+            told.append(
+                f"the buckling level the fit started from, {result.start.buckling_level * 1e3:.4g} mm "
+                f"(thickness {result.start.thickness * 1e3:.4g} mm), reproduces {other:.2f} Hz, "
+                f"{other - mean:+.2f} Hz from the measured mean"
+            )
+    for name in ("thickness", "buckling_level"):
+        gauge, value = getattr(measured, name), getattr(result.beam, name)
+        if gauge is not None:
+            told.append(
+                f"{name}: {value * 1e3:.4g} mm in the model, {gauge * 1e3:.4g} mm measured "
+                f"({value / gauge - 1.0:+.1%})"
+            )
+    if result.gauge_well_frequencies is not None:
+        told.append(
+            f"with the measured geometry the model's first frequency about a well would be "
+            f"{result.gauge_well_frequencies:.1f} Hz: the fitted numbers stand for all that the ideal clamped beam "
+            "leaves out, and are no gauge readings"
+        )
+    return told
+
+
+def doubts(result: Calibration, measured: Measurements) -> list[Diagnostic]:
+    """What to beware of: unequal wells, assumed errors, data the model does not meet."""
+    told = []
+    pairs = zip(measured.lower_well_frequencies, measured.upper_well_frequencies, strict=False)
+    for i, (one, two) in enumerate(pairs):
+        if one != two:
+            text = (
+                f"mode {i + 1}: wells at {one:g} and {two:g} Hz, {2.0 * abs(one - two) / (one + two):.1%} "
+                "apart: unequal wells lie outside the symmetric model, which has one frequency for both and "
+                "is fitted to their mean"
+            )
+            if i == 0 and len(result.either_well) == 2:
+                levels = " and ".join(f"{level * 1e3:.4g}" for level in result.either_well)
+                text += f"; either alone would ask for a buckling level of {levels} mm"
+            told.append(KINDS_CALIBRATION["unequal_wells"].found(told=text, first=one, second=two))
+    assumed = [
+        state
+        for state in ("straight_frequencies", "lower_well_frequencies", "upper_well_frequencies")
+        if getattr(measured, state) and getattr(measured, f"{state}_se") is None
+    ]
+    if assumed:
+        words = (
+            f"no standard errors given for {_listed(tuple(assumed))}: {ASSUMED:.1%} assumed, on which the "
+            "uncertainties rest"
+        )
+        told.append(KINDS_CALIBRATION["assumed_errors"].found(told=words))
+    for item in result.residuals:
+        if abs(item.deviation) > 3.0:
+            told.append(
+                KINDS_CALIBRATION["outlier"].found(
+                    told=item.name, model=item.model, measured=item.measured, apart=abs(item.deviation)
+                )
+            )
+    if result.scatter > 1.1:
+        told.append(KINDS_CALIBRATION["scatter"].found(scatter=result.scatter))
+    ratios = measured.damping_ratio
+    if len(ratios) > 1 and max(ratios) > 1.3 * min(ratios):
+        told.append(KINDS_CALIBRATION["damping_differs"].found(low=min(ratios), high=max(ratios)))
+    return told
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_Array = NDArray[np.float64]
+FITTED = ("thickness", "young_modulus", "density", "length", "buckling_level")
+
+
+@dataclass(frozen=True)
+class Residual:
+    """One measured frequency [Hz] beside the model's, and their difference in standard errors."""
+
+    name: str
+    measured: float
+    standard_error: float
+    model: float
+
+    @property
+    def deviation(self) -> float:
+        """(model - measured)/standard error."""
+        return (self.model - self.measured) / self.standard_error
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A calibrated beam.
+
+    ``beam`` is the result; ``values`` and ``standard_errors`` hold the fitted parameters by name (SI), in the
+    order of ``correlation``; a parameter that the data do not determine has no entry in ``standard_errors``
+    and is named in ``undetermined``.  ``scatter`` is the root of chi-square per degree of freedom by which
+    standard errors were raised, 1 if the data agree.  ``well_frequencies``, ``start_well_frequencies``, ``gauge_well_frequencies``
+    [Hz] are the first frequency about a well of the result, of the beam the fit started from, and of the
+    result with the gauge's geometry; ``either_well`` holds the buckling level [m] that each well alone would
+    ask for.  ``imperfection``, if one was asked for, gives each well its own first frequency; ``beam`` then has
+    the buckling level that goes with it.  ``remarks`` say in words what was found, ``diagnostics`` what to beware of.
+    """
+
+    beam: Beam
+    start: Beam
+    values: dict[str, float]
+    standard_errors: dict[str, float]
+    correlation: _Array = field(repr=False)
+    undetermined: tuple[str, ...]
+    residuals: tuple[Residual, ...]
+    scatter: float
+    degrees_of_freedom: int
+    modes: int
+    damping_ratio: float | None
+    damping_ratio_se: float | None
+    contact_stiffness: float | None
+    contact_stiffness_se: float | None
+    well_frequencies: float | None
+    start_well_frequencies: float | None
+    gauge_well_frequencies: float | None
+    either_well: tuple[float, ...]
+    remarks: tuple[str, ...]
+    diagnostics: tuple[Diagnostic, ...]
+    imperfection: Imperfection | None = None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """The diagnostics in words."""
+        return tuple(one.message for one in self.diagnostics)
+
+    def sections(self) -> dict[str, dict[str, Any]]:
+        """The result as the sections of a parameter file."""
+        beam: dict[str, Any] = {
+            name: float(getattr(self.beam, name))
+            for name in ("length", "thickness", "width", "density", "young_modulus")
+        }
+        if self.beam.is_buckled:
+            beam["buckling_level"] = float(self.beam.buckling_level)
+        else:
+            beam["axial_load"] = float(self.beam.axial_load)
+        sections: dict[str, dict[str, Any]] = {"beam": beam, "model": {"modes": self.modes}}
+        sections |= {"ends": ends_section(self.beam)} if self.beam.boundary != BoundaryConditions() else {}
+        sections |= {"imperfection": imperfection_section(self.imperfection)} if self.imperfection else {}
+        if self.damping_ratio is not None:
+            sections["model"]["damping_ratio"] = self.damping_ratio
+        if self.contact_stiffness is not None:
+            sections["contact"] = {"stiffness": self.contact_stiffness}
+        return sections
+
+    def summary(self) -> dict[str, Any]:
+        """The figures as plain numbers and words, in SI, for a JSON file."""
+        return {
+            "values": dict(self.values),
+            "standard_errors": dict(self.standard_errors),
+            "undetermined": list(self.undetermined),
+            "correlation": self.correlation.tolist(),
+            "residuals": [{**dataclasses.asdict(r), "deviation": r.deviation} for r in self.residuals],
+            "scatter": self.scatter,
+            "degrees_of_freedom": self.degrees_of_freedom,
+            "damping_ratio": self.damping_ratio,
+            "damping_ratio_se": self.damping_ratio_se,
+            "contact_stiffness": self.contact_stiffness,
+            "contact_stiffness_se": self.contact_stiffness_se,
+            "well_frequencies": self.well_frequencies,
+            "start_well_frequencies": self.start_well_frequencies,
+            "gauge_well_frequencies": self.gauge_well_frequencies,
+            "either_well": list(self.either_well),
+            "imperfection": imperfection_section(self.imperfection),
+            "remarks": list(self.remarks),
+            "diagnostics": [one.plain() for one in self.diagnostics],
+        }
+
+    def write_config(self, path: str | os.PathLike[str]) -> None:
+        """Write the parameter file that ``snapbeam map --config`` reads, with the diagnostics as comments."""
+        told = [f"{name} = {with_error(self, name)}" for name in self.values]
+        comment = ["Calibrated from measurements.", *told, *self.remarks]
+        comment += [f"Warning: {text}" for text in self.warnings]
+        dump_config(config_from_mapping(self.sections()), path, "\n".join(comment))
+
+
+def calibrate(
+    measured: Measurements,
+    beam: Beam = BEAM,
+    *,
+    fit: tuple[str, ...] | None = None,
+    modes: int = MODES,
+    imperfection: str | None = None,
+) -> Calibration:
+    """Fit a beam to what was measured of it.
+
+    Parameters
+    ----------
+    measured : Measurements
+    beam : Beam
+        What is known of the beam, and where the fit starts; parameters that are not fitted are kept.  Its own
+        frequencies are compared with the measured ones in the diagnostics.
+    fit : tuple of str, optional
+        Which of thickness, young_modulus, density, length and buckling_level to fit.  By default the
+        thickness if there are frequencies of the straight beam, and the buckling level if there are any
+        about a well.
+    modes : int
+        Number of buckling modes of the model, which is that used for maps.
+    imperfection : {"rise", "point_load", "uniform_load"}, optional
+        What makes the wells unequal, fitted last to the first frequencies about both; the parameter file then has
+        a section ``[imperfection]``.  Equal wells by default.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    InputError
+        If nothing was measured that the parameters could be fitted to, or an argument is unusable.
+
+    Notes
+    -----
+    Weighted least squares in the logarithms of the parameters (``scipy.optimize.least_squares``).  The
+    covariance is that of the linearised fit, raised by chi-square per degree of freedom where that exceeds 1.
+    A combination of parameters to which no measured frequency responds is found from the singular values of
+    the sensitivities; its parameters stay as near to the start as they can and get no standard error.
+    """
+    if not isinstance(measured, Measurements):
+        raise InputTypeError(f"measured: must be Measurements, not {type(measured).__name__}")
+    if not isinstance(beam, Beam):
+        raise InputTypeError(f"beam: must be a Beam, not {type(beam).__name__}")
+    count = integer("modes", modes, 1, 256)
+    data = _data(measured, count)
+    names = _fitted(measured, fit)
+    if not data and names:
+        raise InputError(f"measured: no frequency to fit {', '.join(names)} to")
+    wells = bool(measured.lower_well_frequencies or measured.upper_well_frequencies)
+    if wells and not beam.is_buckled:
+        raise InputError(
+            "beam: is straight, but frequencies about wells were measured; give a buckling_level (in the file of "
+            "--config)"
+        )
+    if beam.boundary.left_rotational_stiffness != beam.boundary.right_rotational_stiffness and any(
+        item.parity for item in data
+    ):
+        raise InputError(
+            "lower_well_shape, upper_well_shape: between unequal ends no mode is symmetric; give frequencies by order"
+        )
+    fitted_to = _fit(beam, data, names, count)
+    diagnostics = list(fitted_to.diagnostics)
+    result = _changed(beam, names, fitted_to.logs)
+    fitted = _model(result, data, count)
+    residuals = tuple(
+        Residual(item.name, item.measured, item.standard_error, float(f))
+        for item, f in zip(data, fitted, strict=True)
+    )
+    values, standard, correlation = fitted_to.values(names)
+    uneven = None if imperfection is None else uneven_beam(result, measured, imperfection, count)
+    damping, damping_se = _mean(measured.damping_ratio, measured.damping_ratio_se, 0.1)
+    tests = [test.stiffness() for test in measured.contact]
+    contact, contact_se = _mean(tuple(k for k, _ in tests), tuple(se for _, se in tests) or None, 0.1)
+    gauges = {name: getattr(measured, name) for name in ("thickness", "buckling_level")}
+    gauges = {name: value for name, value in gauges.items() if value is not None}
+    answer = Calibration(
+        beam=result,
+        start=beam,
+        values=values,
+        standard_errors=standard,
+        correlation=correlation,
+        undetermined=fitted_to.undetermined,
+        residuals=residuals,
+        scatter=fitted_to.scatter,
+        degrees_of_freedom=fitted_to.freedom,
+        modes=count,
+        damping_ratio=damping,
+        damping_ratio_se=damping_se,
+        contact_stiffness=contact,
+        contact_stiffness_se=contact_se,
+        well_frequencies=_first_frequency(result, count) if wells else None,
+        start_well_frequencies=_first_frequency(beam, count) if wells else None,
+        gauge_well_frequencies=_first_frequency(result.replace(**gauges), count)
+        if wells and gauges
+        else None,
+        either_well=either_well(result, measured, count),
+        remarks=(),
+        diagnostics=(),
+    )
+    diagnostics += shape_findings(result, measured, count) if wells else []
+    diagnostics += doubts(answer, measured)
+    told = remarks(answer, measured)
+    if uneven is not None and imperfection is not None:
+        assert uneven.beam is not None
+        told.append(uneven_words(imperfection, uneven))
+        answer = dataclasses.replace(answer, beam=uneven.beam, imperfection=uneven.imperfection)
+    return dataclasses.replace(answer, remarks=tuple(told), diagnostics=tuple(diagnostics))
+
+
+@dataclass(frozen=True)
+class _Fitted:
+    """What the measured frequencies say of the parameters that are fitted."""
+
+    logs: _Array
+    covariance: _Array
+    undetermined: tuple[str, ...]
+    scatter: float
+    freedom: int
+    diagnostics: tuple[Diagnostic, ...]
+
+    def values(self, names: list[str]) -> tuple[dict[str, float], dict[str, float], _Array]:
+        """Values and standard errors by name, and the correlations."""
+        values = {name: math.exp(log) for name, log in zip(names, self.logs, strict=True)}
+        spread = np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+        standard = {
+            name: values[name] * float(s)
+            for name, s in zip(names, spread, strict=True)
+            if name not in self.undetermined
+        }
+        if names and (spread > 0.0).all():
+            return values, standard, self.covariance / np.outer(spread, spread)
+        return values, standard, np.eye(len(names))
+
+
+def _fit(beam: Beam, data: list[_Datum], names: list[str], modes: int) -> _Fitted:
+    """Least squares in the logarithms of the parameters, along what the data respond to."""
+    begin = np.array([math.log(getattr(beam, name)) for name in names])
+    target = np.array([item.measured for item in data])
+    errors = np.array([item.standard_error for item in data])
+
+    def frequencies(logs: _Array) -> _Array:
+        return _model(_changed(beam, names, logs), data, modes)
+
+    def residual(logs: _Array) -> _Array:
+        return (frequencies(logs) - target) / errors
+
+    if not names:
+        return _Fitted(begin, np.zeros((0, 0)), (), 1.0, len(data), ())
+    keep = directions(sensitivity(frequencies, begin, errors))
+    freedom = len(data) - keep.shape[1]
+    logs = search(residual, begin, keep, names, freedom)
+    jacobian = sensitivity(frequencies, logs, errors)
+    # where the fit ends the data may respond to less than where it began
+    here = directions(jacobian)
+    if here.shape[1] < keep.shape[1]:
+        keep, freedom = here, len(data) - here.shape[1]
+    chi = float(np.sum(residual(logs) ** 2))
+    scatter = max(1.0, math.sqrt(chi / freedom)) if freedom > 0 else 1.0
+    inner = np.linalg.inv((jacobian @ keep).T @ (jacobian @ keep))
+    covariance = keep @ inner @ keep.T * scatter**2
+    undetermined = tuple(name for i, name in enumerate(names) if (keep @ keep.T)[i, i] < 1.0 - 1e-4)
+    diagnostics = list(links(names, covariance, undetermined))
+    if "buckling_level" not in undetermined and open_upwards(residual, logs, names):
+        undetermined += ("buckling_level",)
+        diagnostics.append(at_least(math.exp(logs[names.index("buckling_level")])))
+    if freedom <= 0:
+        diagnostics.append(KINDS_CALIBRATION["no_check"].found())
+    return _Fitted(logs, covariance, undetermined, scatter, freedom, tuple(diagnostics))
+
+
+@dataclass(frozen=True)
+class _Datum:
+    name: str
+    state: str
+    mode: int
+    parity: int  # of the mode, 0 where modes are told by their order only
+    measured: float
+    standard_error: float
+
+
+def _data(measured: Measurements, modes: int) -> list[_Datum]:
+    data = []
+    for state, word in (("straight", "straight"), ("lower_well", "lower well"), ("upper_well", "upper well")):
+        values = getattr(measured, f"{state}_frequencies")
+        errors = getattr(measured, f"{state}_frequencies_se") or [ASSUMED * value for value in values]
+        if len(values) > modes:
+            raise InputError(f"{state}_frequencies: {len(values)} frequencies for a model of {modes} modes")
+        shapes = getattr(measured, f"{state}_shape", ())
+        seen = {1: 0, -1: 0}
+        for i, (value, error) in enumerate(zip(values, errors, strict=True)):
+            if not shapes:
+                data.append(_Datum(f"{word}, mode {i + 1}", state, i, 0, value, error))
+                continue
+            parity = 1 if shapes[i] == "symmetric" else -1
+            name = f"{word}, {shapes[i]} mode {seen[parity] + 1}"
+            data.append(_Datum(name, state, seen[parity], parity, value, error))
+            seen[parity] += 1
+    return data
+
+
+def _fitted(measured: Measurements, fit: tuple[str, ...] | None) -> list[str]:
+    wells = bool(measured.lower_well_frequencies or measured.upper_well_frequencies)
+    if fit is None:
+        return ["thickness"] * bool(measured.straight_frequencies) + ["buckling_level"] * wells
+    if isinstance(fit, str) or len(set(fit)) < len(fit):
+        raise InputError(f"fit = {shown(fit)}: must be a tuple of different names among {', '.join(FITTED)}")
+    for name in fit:
+        choice("fit", name, FITTED)
+    if "buckling_level" in fit and not wells:
+        raise InputError("fit: the buckling_level needs a frequency measured about a well")
+    return list(fit)
+
+
+def _changed(beam: Beam, names: list[str], logs: _Array) -> Beam:
+    changes = {name: math.exp(log) for name, log in zip(names, logs, strict=True)}
+    return beam.replace(**changes) if changes else beam
+
+
+def _model(beam: Beam, data: list[_Datum], modes: int) -> _Array:
+    models = {
+        straight: ReducedModel.from_beam(beam.replace(axial_load=0.0) if straight else beam, modes)
+        for straight in {item.state == "straight" for item in data}
+    }
+    out = []
+    for item in data:
+        model = models[item.state == "straight"]
+        freq = model.natural_frequencies
+        if item.parity:
+            freq = freq[model.parity == item.parity]
+        out.append(freq[item.mode])
+    return np.array(out)
+
+
+def _first_frequency(beam: Beam, modes: int) -> float:
+    return float(ReducedModel.from_beam(beam, modes).natural_frequencies[0])
+
+
+def _mean(
+    values: tuple[float, ...] | Any, errors: tuple[float, ...] | Any, assumed: float
+) -> tuple[float | None, float | None]:
+    """Weighted mean and its standard error, raised by the scatter of the values where that is larger."""
+    if not values:
+        return None, None
+    x = np.asarray(values, dtype=np.float64)
+    s = np.asarray(errors, dtype=np.float64) if errors is not None else assumed * x
+    weight = 1.0 / s**2
+    mean = float(np.sum(weight * x) / weight.sum())
+    spread = float(np.sqrt(np.sum(weight * (x - mean) ** 2) / max(x.size - 1, 1)))
+    return mean, float(1.0 / np.sqrt(weight.sum())) * max(1.0, spread)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Contact stiffness from tracked impacts: their durations over the speeds at which tip and body close.
+#
+# For a force k d^1.5 between two bodies of effective mass m that close at v (Hertz), the contact lasts
+#
+#     T = 2.943 (5 m/(4 k))^0.4 v^-0.2 .
+#
+# The power of v checks that the impacts are such collisions; on a limp beam, which bends while it is in touch,
+# they are not, and then there is no stiffness to tell.
+
+
+_HERTZ_POWER = -0.2
+_LEAST_SPAN = 2.0  # factor by which speeds must differ for the power to be told
+_COARSE = 6.0  # frames
+
+
+@dataclass(frozen=True)
+class ContactStiffness:
+    """Contact stiffness [N/m^1.5] from impacts, with its standard error; ``exponent`` is the power of the speed.
+
+    ``impacts`` were used.
+    """
+
+    stiffness: float
+    stiffness_se: float
+    exponent: float
+    exponent_se: float
+    impacts: int
+    diagnostics: tuple[Diagnostic, ...]
+
+
+def stiffness_from_impacts(impacts: xr.Dataset, effective_mass: float) -> ContactStiffness:
+    """Fit the contact stiffness to the durations of tracked impacts.
+
+    Parameters
+    ----------
+    impacts : xarray.Dataset
+        From :func:`snapbeam.lab.contact_onsets`; those of which both ends were seen count.
+    effective_mass : float
+        1/(1/m_1 + 1/m_2) of the two bodies [kg].
+
+    Raises
+    ------
+    InputError
+        If fewer than three impacts can be used.
+    """
+    import xarray as xr
+
+    mass = positive("effective_mass", effective_mass, "kg")
+    if not isinstance(impacts, xr.Dataset):
+        raise InputTypeError(f"impacts: must be an xarray.Dataset, not {type(impacts).__name__}")
+    missing = [
+        name for name in ("duration", "duration_stderr", "closing_speed", "frames") if name not in impacts
+    ]
+    if missing:
+        raise InputError(f"impacts without {', '.join(missing)}: must come from contact_onsets()")
+    speed, duration = impacts["closing_speed"].values, impacts["duration"].values
+    error = impacts["duration_stderr"].values
+    good = np.isfinite(speed) & (speed > 0.0) & (duration > 0.0) & (impacts["bounded"].values == 1)
+    if good.sum() < 3:
+        raise InputError(
+            f"impacts: {int(good.sum())} of {speed.size} seen from end to end: must be at least 3"
+        )
+    log_v, log_t = np.log(speed[good]), np.log(duration[good])
+    spread = np.maximum(error[good] / duration[good], 1e-3)
+    weight = 1.0 / spread**2
+    middle = float((weight * log_v).sum() / weight.sum())
+    lever = float((weight * (log_v - middle) ** 2).sum())
+    level = float((weight * log_t).sum() / weight.sum())
+    exponent = float((weight * (log_v - middle) * log_t).sum()) / lever if lever > 0.0 else math.nan
+    rest = log_t - level - (log_v - middle) * (exponent if math.isfinite(exponent) else 0.0)
+    scatter = max(1.0, float(np.sqrt((weight * rest**2).sum() / max(good.sum() - 2, 1))))
+    exponent_se = scatter / math.sqrt(lever) if lever > 0.0 else math.inf
+    # the constant of the law, with its power held
+    constant = float((weight * (log_t - _HERTZ_POWER * log_v)).sum() / weight.sum())
+    held = log_t - _HERTZ_POWER * log_v - constant
+    constant_se = math.sqrt(1.0 / weight.sum()) * max(
+        1.0, float(np.sqrt((weight * held**2).sum() / max(good.sum() - 1, 1)))
+    )
+    stiffness = 1.25 * mass * (HERTZ_TIME / math.exp(constant)) ** 2.5
+    told = []
+    span = float(np.exp(np.ptp(log_v)))
+    if abs(exponent - _HERTZ_POWER) > max(4.0 * exponent_se, 0.1):
+        told.append(KINDS_CALIBRATION["exponent"].found(exponent=exponent, error=exponent_se))
+    elif span < _LEAST_SPAN or good.sum() < 5:
+        told.append(KINDS_CALIBRATION["few"].found(count=int(good.sum()), span=span))
+    frames = float(np.median(impacts["frames"].values[good]))
+    if frames < _COARSE:
+        told.append(KINDS_CALIBRATION["coarse"].found(frames=frames))
+    return ContactStiffness(
+        stiffness, 2.5 * constant_se * stiffness, exponent, exponent_se, int(good.sum()), tuple(told)
+    )

@@ -1,1 +1,0 @@
-"""A beam's parameters from what was measured on it."""

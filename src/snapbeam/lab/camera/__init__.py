@@ -1,1 +1,0 @@
-"""Recordings of a high-speed camera: read, checked, written."""

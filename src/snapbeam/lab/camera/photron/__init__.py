@@ -1,1 +1,0 @@
-"""Photron recordings: headers (.cih, .cihx) and pixels (.mraw), read and written."""

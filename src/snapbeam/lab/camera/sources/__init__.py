@@ -1,1 +1,0 @@
-"""Where frames come from: one small class per file format, all with the same few things."""

@@ -1,0 +1,11 @@
+"""Commands of the laboratory part."""
+
+COMMANDS = {
+    "track": "snapbeam.lab.cli.track:track",
+    "vibrometer": "snapbeam.lab.cli.vibrometer:vibrometer",
+    "fit-decay": "snapbeam.lab.cli.fit_decay:fit_decay",
+    "calibrate": "snapbeam.lab.cli.calibrate:calibrate",
+    "compare": "snapbeam.lab.cli.compare:compare",
+    "process-tests": "snapbeam.lab.cli.process_tests:process_tests",
+}
+"""Module and function of each command, by name."""

@@ -1,0 +1,272 @@
+"""``snapbeam calibrate``: the model's beam from measured frequencies, decays and collisions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from snapbeam.cli import parameter_options as opt
+from snapbeam.cli.console import door, file_line, out
+from snapbeam.cli.parameter_options import configured
+from snapbeam.lab.cli import options as lab
+
+if TYPE_CHECKING:
+    from snapbeam.uncertainty.measurements import ContactTest
+    from snapbeam.util.diagnostics import Diagnostic
+
+__all__ = [
+    "Config",
+    "Damping",
+    "EffectiveMass",
+    "Fit",
+    "FrequencySe",
+    "Impacts",
+    "LowerWell",
+    "MeasuredBucklingLevel",
+    "MeasuredThickness",
+    "Measurements",
+    "Modes",
+    "Output",
+    "Straight",
+    "UpperWell",
+    "calibrate",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Options of ``snapbeam calibrate``.
+
+
+_FIT = "Fit"
+
+
+_MEASURED = "Measured (instead of, or beside, the file)"
+
+
+def _list_option(about: str) -> Any:
+    return typer.Option(help=about, metavar="F,F", rich_help_panel=_MEASURED)
+
+
+Measurements = Annotated[
+    Path | None,
+    typer.Argument(help="TOML file with a section named measured.", metavar="[MEASUREMENTS]"),
+]
+Straight = Annotated[str | None, _list_option("Natural frequencies without load, Hz.")]
+LowerWell = Annotated[
+    str | None, _list_option("About the lower well, Hz; 81.3s or 159a says symmetric or antisymmetric.")
+]
+UpperWell = Annotated[str | None, _list_option("About the upper well, Hz, likewise.")]
+Damping = Annotated[str | None, _list_option("Damping ratios from free decays.")]
+FrequencySe = Annotated[
+    float | None, opt.number_option("Standard error of these frequencies, Hz (0.5 %).", _MEASURED)
+]
+MeasuredThickness = Annotated[
+    float | None, opt.number_option("Thickness by gauge, m, to compare with.", _MEASURED)
+]
+MeasuredBucklingLevel = Annotated[
+    float | None, opt.number_option("Buckling level by gauge, m, to compare with.", _MEASURED)
+]
+Impacts = Annotated[
+    Path | None,
+    typer.Option(
+        help="NetCDF file of tracked impacts on a heavy body, for the contact stiffness.",
+        metavar="FILE",
+        rich_help_panel=_MEASURED,
+    ),
+]
+EffectiveMass = Annotated[
+    float | None, opt.number_option("1/(1/m1 + 1/m2) of the two bodies of --impacts, kg.", _MEASURED)
+]
+Config = Annotated[
+    Path | None,
+    typer.Option("--config", "-c", help="TOML file of parameters of the beam and the model.", metavar="FILE"),
+]
+Fit = Annotated[
+    str | None,
+    typer.Option(
+        help="What to fit, among thickness, young_modulus, density, length, buckling_level; by default "
+        "what the measurements ask for.",
+        metavar="NAME,NAME",
+        rich_help_panel=_FIT,
+    ),
+]
+Imperfection = Annotated[
+    str | None,
+    typer.Option(
+        help="What makes the wells unequal, fitted to the first frequencies about both: rise, point_load or "
+        "uniform_load.",
+        rich_help_panel=_FIT,
+    ),
+]
+Modes = Annotated[int | None, opt.count_option("Number N of buckling modes, 1 to 256.", _FIT)]
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output",
+        "-o",
+        help="TOML file for snapbeam map --config to write.",
+        metavar="FILE",
+        rich_help_panel="Output",
+    ),
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+@door
+def calibrate(
+    measurements: Measurements = None,
+    straight: Straight = None,
+    lower_well: LowerWell = None,
+    upper_well: UpperWell = None,
+    damping: Damping = None,
+    frequency_se: FrequencySe = None,
+    measured_thickness: MeasuredThickness = None,
+    measured_buckling_level: MeasuredBucklingLevel = None,
+    impacts: Impacts = None,
+    effective_mass: EffectiveMass = None,
+    config: Config = None,
+    fit: Fit = None,
+    imperfection: Imperfection = None,
+    modes: Modes = None,
+    output: Output = None,
+    plot: opt.Plot = None,
+    report: lab.JsonFile = None,
+    strict: lab.Strict = False,
+) -> None:
+    """Fit thickness and buckling level to measured natural frequencies, and say what the data leave open.
+
+    Parameters that are not fitted come from --config, or from the measurements' own section beam, or are the
+    paper's.
+
+    Example: snapbeam calibrate --straight 80,221 --lower-well 81.3 --upper-well 80.5 --measured-thickness
+    0.44e-3 --measured-buckling-level 0.5e-3 -o beam.toml
+    """
+    from rich.table import Table
+
+    from snapbeam.lab.calibration import calibrate as fit_beam
+    from snapbeam.lab.calibration import with_error
+    from snapbeam.model.parameter_file import config_from_mapping, override
+    from snapbeam.plot.style import FIGURE_SUFFIXES, save_figure
+    from snapbeam.uncertainty.measurements import Measurements, load_measurements
+    from snapbeam.util.diagnostics import refuse
+    from snapbeam.util.files import check_writable
+    from snapbeam.util.validation import InputError
+
+    for name, path, suffixes in (
+        ("output", output, (".toml",)), ("plot", plot, FIGURE_SUFFIXES), ("json", report, (".json",)),
+    ):  # fmt: skip
+        if path is not None:
+            check_writable(path, name, suffixes)
+    settings = configured({"config": config, "model.modes": modes})
+    given: dict[str, Any] = {}
+    if measurements is not None:
+        from_file, sections = load_measurements(measurements)
+        given = {name: getattr(from_file, name) for name in from_file.__dataclass_fields__}
+        config_from_mapping(sections, str(measurements))
+        settings = override(settings, sections)
+    for name, text in (
+        ("straight_frequencies", straight), ("lower_well_frequencies", lower_well), ("upper_well_frequencies", upper_well),
+        ("damping_ratio", damping),
+    ):  # fmt: skip
+        if text is not None:
+            text, shapes = _shapes(text)
+            if shapes and not name.endswith("well_frequencies"):
+                raise InputError(f"{name} = {text!r}: only frequencies about a well carry a shape, s or a")
+            if shapes:
+                given[name.replace("_frequencies", "_shape")] = shapes
+            given[name] = lab.numbers(name, text)
+            given[f"{name}_se"] = frequency_se if "freq" in name else None
+    for name, value in (("thickness", measured_thickness), ("buckling_level", measured_buckling_level)):
+        if value is not None:
+            given[name] = value
+    told: tuple[Diagnostic, ...] = ()
+    if impacts is not None:
+        if effective_mass is None:
+            raise InputError(
+                "effective_mass (--effective-mass): must be given with impacts (--impacts), in kg"
+            )
+        tests, told = _contact_tests(impacts, effective_mass)
+        given["contact"] = (*given.get("contact", ()), *tests)
+    if not given:
+        raise InputError("measurements: give a TOML file, or frequencies as options; see --help")
+    beam = settings.model.beam
+    assert beam is not None
+    chosen = tuple(name.strip() for name in fit.split(",")) if fit else None
+    result = fit_beam(
+        Measurements(**given), beam, fit=chosen, modes=settings.model.modes, imperfection=imperfection
+    )
+    console = out()
+    for name in result.values:
+        console.print(f"  {name:<20}{with_error(result, name)}")
+    if result.damping_ratio is not None:
+        console.print(f"  {'damping_ratio':<20}{result.damping_ratio:.5g} +- {result.damping_ratio_se:.2g}")
+    if result.contact_stiffness is not None:
+        words = f"{result.contact_stiffness:.4g} +- {result.contact_stiffness_se:.2g} N/m^1.5"
+        console.print(f"  {'contact stiffness':<20}{words}")
+    table = Table(box=None, pad_edge=False)
+    for title in ("", "measured (Hz)", "model (Hz)", "difference (standard errors)"):
+        table.add_column(title, justify="right" if title else "left")
+    for item in result.residuals:
+        measured = f"{item.measured:.4g} +- {item.standard_error:.2g}"
+        table.add_row(item.name, measured, f"{item.model:.3f}", f"{item.deviation:+.2f}")
+    console.print(table)
+    for text in result.remarks:
+        console.print(f"- {text}")
+    diagnostics = (*told, *result.diagnostics)
+    lab.tell_findings(console, diagnostics)
+    if strict:
+        refuse(diagnostics, "calibration")
+    if output is not None:
+        result.write_config(output)
+        console.print(f"Written: {file_line(output)}")
+    if plot is not None:
+        from snapbeam.lab.plot.calibration import plot_calibration
+
+        save_figure(plot_calibration(result), plot)
+        console.print(f"Written: {file_line(plot)}")
+    if report is not None:
+        lab.write_json(report, result.summary())
+        console.print(f"Written: {file_line(report)}")
+
+
+def _shapes(text: str) -> tuple[str, tuple[str, ...]]:
+    """Numbers without the letters behind them, and the shapes that these say: ``159a,165s``."""
+    words = {"s": "symmetric", "a": "antisymmetric"}
+    parts = [part.strip() for part in text.split(",")]
+    if not any(part[-1:] in words for part in parts):
+        return text, ()
+    return ",".join(part[:-1] if part[-1:] in words else part for part in parts), tuple(
+        words.get(part[-1:], part) for part in parts
+    )
+
+
+def _contact_tests(
+    path: Path, effective_mass: float
+) -> tuple[tuple[ContactTest, ...], tuple[Diagnostic, ...]]:
+    """The contact stiffness of tracked impacts as one test, and what is to be said of it."""
+    from snapbeam.cli.console import open_result
+    from snapbeam.lab.calibration import stiffness_from_impacts
+    from snapbeam.lab.tracking.track import contact_onsets
+    from snapbeam.uncertainty.measurements import HERTZ_TIME, ContactTest
+    from snapbeam.util.validation import InputError
+
+    found = stiffness_from_impacts(contact_onsets(open_result(path)), effective_mass)
+    out().print(
+        f"  impacts             {found.impacts}, duration with speed to the power {found.exponent:+.2f} +- "
+        f"{found.exponent_se:.2f}: {found.stiffness:.3g} +- {found.stiffness_se:.1g} N/m^1.5"
+    )
+    if any(one.code == "contact.exponent" for one in found.diagnostics):
+        raise InputError(f"{path}: {found.diagnostics[0].message}")
+    # one collision at 1 m/s that stands for all
+    duration = HERTZ_TIME * (1.25 * effective_mass / found.stiffness) ** 0.4
+    share = (
+        found.stiffness_se / found.stiffness / 2.69
+    )  # a test's error of both its numbers gives 2.69 times itself
+    test = ContactTest(
+        closing_speed=1.0, duration=duration, effective_mass=effective_mass, relative_error=max(share, 1e-6)
+    )
+    return (test,), found.diagnostics

@@ -1,0 +1,190 @@
+"""``snapbeam compare``: measured beside simulated, a run or dots on a map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from snapbeam.cli import parameter_options as opt
+from snapbeam.cli.console import door, file_line, open_result, out
+from snapbeam.lab.cli import options as lab
+from snapbeam.util.status_codes import ResponseClass
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from snapbeam.util.diagnostics import Diagnostic
+
+__all__ = ["compare"]
+
+
+_RUN = "Measured run"
+
+
+@door
+def compare(
+    measured: Annotated[
+        Path,
+        typer.Argument(
+            help="CSV table of measured responses, or NetCDF file of a tracked run.", metavar="MEASURED"
+        ),
+    ],
+    simulated: Annotated[
+        Path, typer.Argument(help="NetCDF file of a map, or of a run.", metavar="SIMULATED")
+    ],
+    frequency: Annotated[float | None, opt.number_option("Excitation frequency, Hz.", _RUN)] = None,
+    start: Annotated[float | None, opt.number_option("Start of the excitation, s.", _RUN)] = None,
+    cycles: Annotated[
+        int, opt.count_option("Cycles of excitation the response class is asked for (200).", _RUN)
+    ] = 200,
+    window: opt.Window = None,
+    plot: opt.Plot = None,
+    overlay: Annotated[
+        bool,
+        typer.Option(
+            "--overlay",
+            help="Draw both waveforms of --plot over each other, and their difference.",
+            rich_help_panel="Output",
+        ),
+    ] = False,
+    report: lab.JsonFile = None,
+    strict: lab.Strict = False,
+) -> None:
+    """Compare measured responses with a simulated map, or a measured waveform with a simulated one.
+
+    A CSV table of responses is laid on a map: the share that agrees and a table of measured against simulated
+    classes.  A tracked run is put beside a simulated one, aligned by the shaker's phase.
+
+    Example: snapbeam compare tests.csv map.nc --plot agreement.png
+    """
+    from snapbeam.plot.style import FIGURE_SUFFIXES, save_figure
+    from snapbeam.util.diagnostics import refuse
+    from snapbeam.util.files import check_writable
+
+    if plot is not None:
+        check_writable(plot, "plot", FIGURE_SUFFIXES)
+    if report is not None:
+        check_writable(report, "json", (".json",))
+    dataset = open_result(simulated)
+    if measured.suffix.lower() == ".csv":
+        summary, figure = _dots(measured, dataset, plot is not None)
+        diagnostics: tuple[Diagnostic, ...] = ()
+    else:
+        summary, figure, diagnostics = _run(
+            open_result(measured),
+            dataset,
+            frequency,
+            start,
+            cycles,
+            opt.parse_window(window),
+            ("overlay" if overlay else "beside") if plot is not None else "",
+        )
+    console = out()
+    if plot is not None and figure is not None:
+        save_figure(figure, plot)
+        console.print(f"Written: {file_line(plot)}")
+    if strict:
+        refuse(diagnostics, str(measured))
+    if report is not None:
+        lab.write_json(report, summary)
+        console.print(f"Written: {file_line(report)}")
+
+
+def _dots(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None]:
+    from rich.table import Table
+
+    from snapbeam.lab.compare_maps import compare_measured_points
+    from snapbeam.sweeps.measured_points import read_measured_points
+
+    attrs = dataset.attrs
+    dots = read_measured_points(
+        path,
+        reference_frequency=attrs.get("reference_frequency"),
+        buckling_level=attrs.get("beam_buckling_level"),
+    )
+    result = compare_measured_points(dots, dataset)
+    console = out()
+    low, high = result.agreement_interval
+    if result.used:
+        console.print(
+            f"{result.used} of {len(dots)} measured responses count; {100.0 * result.agreement:.0f} % agree "
+            f"with the map (95 %: {100.0 * low:.0f} to {100.0 * high:.0f} %), "
+            f"{100.0 * result.snap_agreement:.0f} % on whether the beam snaps through"
+        )
+    table = Table(box=None, pad_edge=False)
+    table.add_column("measured \\ simulated")
+    for kind in result.classes:
+        table.add_column(_short(kind), justify="right", no_wrap=True)
+    for kind, row in zip(result.classes, result.confusion, strict=True):
+        table.add_row(_short(kind), *map(str, row))
+    console.print(table)
+    for note in result.notes:
+        console.print(f"[yellow]note[/] {note}")
+    figure = None
+    if draw:
+        from snapbeam.lab.plot.comparison import plot_dot_comparison
+
+        figure = plot_dot_comparison(dataset, dots, result)
+    return result.summary(), figure
+
+
+def _short(kind: ResponseClass) -> str:
+    return kind.label.replace("interwell ", "").replace(" interwell", "")
+
+
+def _run(
+    run: xr.Dataset,
+    model: xr.Dataset,
+    frequency: float | None,
+    start: float | None,
+    cycles: int,
+    window: tuple[float, float] | None,
+    draw: str,
+) -> tuple[dict, Figure | None, tuple[Diagnostic, ...]]:
+    import numpy as np
+
+    from snapbeam.lab.compare_waveforms import compare_waveforms, measure_response
+    from snapbeam.util.diagnostics import diagnostics_of
+
+    onsets = None
+    if "penetration_mm" in run:
+        from snapbeam.lab.tracking.track import contact_onsets
+
+        onsets = contact_onsets(run)["onset"].values
+    result = compare_waveforms(run, model, frequency, start=start, measured_onsets=onsets)
+    seen = measure_response(run, frequency, cycles=cycles, start=start)
+    console = out()
+    console.print(f"  measured class      {seen.description}")
+    console.print(
+        f"  beam                rms difference {result.rms_difference:.4g} b of {result.measured_rms:.4g} b"
+    )
+    console.print(f"  correlation         {result.correlation:.4f}")
+    console.print(
+        f"  shaker              rms difference {result.shaker_rms_difference:.4g} b, amplitude ratio "
+        f"{result.amplitude_ratio:.4f}"
+    )
+    parted = "never" if np.isnan(result.parted) else f"at cycle {result.parted:.2f}"
+    console.print(f"  the two part        {parted} (by more than {result.apart:.2g} b)")
+    diagnostics = (*diagnostics_of(run), *result.diagnostics)
+    lab.tell_findings(console, diagnostics)
+    summary = {
+        "measured_response": seen.response_class.label,
+        "measured_crossings": seen.zero_crossings,
+        "reasons": list(seen.reasons),
+        "rms_difference_b": result.rms_difference,
+        "correlation": result.correlation,
+        "shaker_rms_difference_b": result.shaker_rms_difference,
+        "amplitude_ratio": result.amplitude_ratio,
+        "shift_cycles": result.shift,
+        "parted_cycle": result.parted,
+        "diagnostics": [one.plain() for one in diagnostics],
+    }
+    figure = None
+    if draw:
+        from snapbeam.lab.plot.comparison import plot_waveform_comparison, plot_waveform_overlay
+
+        figure = (plot_waveform_overlay if draw == "overlay" else plot_waveform_comparison)(result, window)
+    return summary, figure, diagnostics

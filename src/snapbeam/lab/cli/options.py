@@ -1,0 +1,153 @@
+"""What the laboratory commands share: the options of a signal file, diagnostics, and figures as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from snapbeam.cli import parameter_options as opt
+from snapbeam.cli.console import write_json
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from snapbeam.util.diagnostics import Diagnostic
+
+__all__ = [
+    "Channel",
+    "Columns",
+    "JsonFile",
+    "SamplingFreq",
+    "Sensitivity",
+    "SignalFile",
+    "Strict",
+    "Units",
+    "numbers",
+    "open_signal",
+    "tell_findings",
+    "whole_numbers",
+    "write_json",
+]
+
+
+_SIGNAL = "Signal"
+_OUTPUT = "Output"
+
+SignalFile = Annotated[
+    Path,
+    typer.Argument(
+        help="Text table, WAV, UFF-58, TDMS, LVM, MATLAB, HDF5 or NumPy file of a time series.",
+        metavar="SIGNAL",
+    ),
+]
+Channel = Annotated[
+    str | None,
+    typer.Option(help="Name of the channel, or its number from 0.", rich_help_panel=_SIGNAL, metavar="NAME"),
+]
+Units = Annotated[
+    str | None,
+    typer.Option(
+        help="Unit of the numbers where the file does not say, such as mm/s.", rich_help_panel=_SIGNAL
+    ),
+]
+Sensitivity = Annotated[
+    str | None,
+    typer.Option(
+        help="What a volt, or full scale (FS) of a sound file, stands for: '125 mm/s/V', '100 mV/g', '0.5 m/s/FS'.",
+        rich_help_panel=_SIGNAL,
+    ),
+]
+SamplingFreq = Annotated[
+    float | None,
+    opt.number_option("Samples per second, Hz, where the file does not say.", _SIGNAL),
+]
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        help="Names and units of the columns of a table without a header: 'time [s],velocity [mm/s]'.",
+        rich_help_panel=_SIGNAL,
+        metavar="NAME [UNIT],...",
+    ),
+]
+Strict = Annotated[
+    bool,
+    typer.Option(
+        "--strict",
+        help="Refuse a result with any diagnostic that makes it doubtful; write none.",
+        rich_help_panel=_OUTPUT,
+    ),
+]
+JsonFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--json",
+        help="JSON file of the figures to write; - for standard output, in place of the words.",
+        rich_help_panel=_OUTPUT,
+        metavar="FILE",
+    ),
+]
+
+
+def open_signal(
+    path: Path,
+    channel: str | None,
+    units: str | None,
+    sensitivity: str | None,
+    sampling_frequency: float | None,
+    columns: str | None = None,
+) -> xr.DataArray:
+    """Read a signal; a channel given as a whole number is counted, unless one has that name."""
+    from snapbeam.lab.signal_files import read_channels, read_signal
+
+    chosen: str | int | None = channel
+    if channel is not None and channel.isdigit():
+        names = [entry["name"] for entry in read_channels(path, sampling_frequency, columns)]
+        chosen = channel if channel in names else int(channel)
+    return read_signal(
+        path,
+        chosen,
+        units=units,
+        sensitivity=sensitivity,
+        sampling_frequency=sampling_frequency,
+        columns=columns,
+    )
+
+
+def tell_findings(console: Console, diagnostics: Iterable[Diagnostic]) -> None:
+    """Print diagnostics, the gravest first, each with its code."""
+    order = {"wrong": 0, "doubt": 1, "note": 2}
+    style = {"wrong": "bold red", "doubt": "yellow", "note": "dim"}
+    for one in sorted(diagnostics, key=lambda diagnostic: order[diagnostic.severity.value]):
+        kind = one.severity.value
+        console.print(f"[{style[kind]}]{kind}[/] {escape(f'[{one.code}]')} {escape(one.message)}")
+
+
+def whole_numbers(name: str, text: str, count: int) -> tuple[int, ...]:
+    """Return *count* whole numbers separated by colons and commas, such as ``0:160,20:84``."""
+    from snapbeam.util.validation import InputError
+
+    try:
+        values = tuple(int(part) for part in text.replace(":", ",").split(","))
+    except ValueError:
+        values = ()
+    if len(values) != count:
+        example = ("0", "0:20", "", "0:160,20:84")[count - 1] if count <= 4 else ""
+        raise InputError(f"{name} = {text!r}: must be {count} whole numbers, such as {example}")
+    return values
+
+
+def numbers(name: str, text: str | None) -> tuple[float, ...]:
+    """Return numbers separated by commas; none if there is no text."""
+    from snapbeam.util.validation import InputError
+
+    if text is None:
+        return ()
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(f"{name} = {text!r}: must be numbers separated by commas") from None

@@ -1,0 +1,166 @@
+"""``snapbeam process-tests``: every test of a folder, to one table, thumbnails and dots on a map."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from snapbeam.cli import parameter_options as opt
+from snapbeam.cli.console import FAILED, answer, door, file_line, out
+from snapbeam.lab.cli import options as lab
+
+__all__ = ["process_tests"]
+
+
+_TESTS = "Tests"
+_CAMERA = "Camera"
+_OUTPUT = "Output"
+
+
+@door
+def process_tests(
+    folder: Annotated[
+        Path, typer.Argument(help="Folder of recordings and vibrometer files.", metavar="FOLDER")
+    ],
+    table: Annotated[
+        Path | None,
+        typer.Option(
+            help="Table of tests: test, recording, vibrometer, frequency_hz, velocity_m_s, location; without it "
+            "files are paired by their names.",
+            metavar="FILE", rich_help_panel=_TESTS,
+        ),
+    ] = None,
+    settings: Annotated[
+        Path | None,
+        typer.Option(
+            help="TOML file with sections camera, tracking, signal and campaign, as for Python.", metavar="FILE",
+            rich_help_panel=_TESTS,
+        ),
+    ] = None,
+    cycles: Annotated[
+        int | None, opt.count_option("Cycles that the response class is asked for (200).", _TESTS)
+    ] = None,
+    buckling_level: Annotated[float | None, opt.number_option("b, m.", _TESTS)] = None,
+    location: Annotated[float | None, opt.number_option("x_s, location of the contact.", _TESTS)] = None,
+    beam_thickness: Annotated[
+        float | None, opt.number_option("Thickness of the beam by gauge, m, to check by.", _TESTS)
+    ] = None,
+    frame_rate: Annotated[float | None, opt.number_option("Frames per second, Hz.", _CAMERA)] = None,
+    pixel_size: Annotated[float | None, opt.number_option("Metres per pixel.", _CAMERA)] = None,
+    side: Annotated[
+        str | None, typer.Option(help="Side of the beam the shaker stands on.", rich_help_panel=_CAMERA)
+    ] = None,
+    units: lab.Units = None,
+    sensitivity: lab.Sensitivity = None,
+    sampling_frequency: lab.SamplingFreq = None,
+    simulated: Annotated[
+        Path | None,
+        typer.Option("--map", help="Map to lay the responses on.", metavar="FILE", rich_help_panel=_OUTPUT),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output", "-o", help="Folder of the results; FOLDER/campaign by default.", metavar="FOLDER",
+            rich_help_panel=_OUTPUT,
+        ),
+    ] = None,
+    strict: lab.Strict = False,
+) -> None:  # fmt: skip
+    """Track, align and class every test of a folder, and write one table of them.
+
+    Each test is kept as soon as it is measured; begun again, the campaign goes on where it was, and measures
+    only what has changed.  A test that cannot be measured is a row that says why.  With --strict a test with
+    any doubtful diagnostic counts as spoiled.
+
+    Example: snapbeam process-tests tests/ --buckling-level 0.331e-3 --location 0.47619 --pixel-size 12e-6 --map
+    map.nc
+    """
+    from snapbeam.lab.batch import load_settings, run_campaign
+    from snapbeam.util.files import check_writable
+
+    wanted = load_settings(
+        settings,
+        {
+            "camera": {"frame_rate": frame_rate, "pixel_size": pixel_size},
+            "tracking": {
+                "buckling_level": buckling_level, "location": location, "beam_thickness": beam_thickness,
+                "side": side,
+            },
+            "signal": {"units": units, "sensitivity": sensitivity, "sampling_frequency": sampling_frequency},
+            "campaign": {"cycles": cycles},
+        },
+    )  # fmt: skip
+    target = folder / "campaign" if output is None else output
+    console = out()
+    for name in ("tests.png", "map.png"):
+        if target.is_dir():
+            check_writable(target / name)
+    results = run_campaign(folder, wanted, target, table=table, strict=strict, progress=_tell)
+    spoiled = [result for result in results if result.status != "measured"]
+    console.print(f"{len(results)} tests, {len(spoiled)} spoiled")
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from snapbeam.lab.plot.process_tests import plot_campaign
+    from snapbeam.plot.style import save_figure
+
+    files = [
+        target / "tests.csv",
+        save_figure(plot_campaign(results, target / "tests"), target / "tests.png"),
+    ]
+    if simulated is not None and len(spoiled) < len(results):
+        files.append(_on_map(target, simulated))
+    answer(tests=[asdict(result) for result in results], spoiled=len(spoiled), files=files)
+    for path in files:
+        console.print(f"Written: {file_line(path)}")
+    if len(spoiled) == len(results):
+        raise typer.Exit(FAILED)
+
+
+def _tell(done: int, total: int, result: Any) -> None:
+    """One line for each test."""
+    console = out()
+    if result is None:
+        console.print(f"{total} tests")
+        return
+    head = f"[{done}/{total}] {result.test}: "
+    if result.status == "measured":
+        console.print(
+            f"{head}{result.frequency_hz:.5g} Hz, {1e3 * result.velocity_m_s:.4g} mm/s, {result.response_class}",
+            markup=False,
+        )
+    else:
+        console.print(f"{head}spoiled: {result.reason}", markup=False)
+    for code, severity, words in result.diagnostics:
+        if severity != "note" and words != result.reason:
+            console.print(f"    {severity} [{code}] {words}", markup=False)
+
+
+def _on_map(target: Path, simulated: Path) -> Path:
+    """The responses on a map; the share that agrees is printed."""
+    from snapbeam.cli.console import open_result
+    from snapbeam.lab.compare_maps import compare_measured_points
+    from snapbeam.lab.plot.comparison import plot_dot_comparison
+    from snapbeam.plot.style import save_figure
+    from snapbeam.sweeps.measured_points import read_measured_points
+
+    dataset = open_result(simulated)
+    dots = read_measured_points(
+        target / "tests.csv",
+        reference_frequency=dataset.attrs.get("reference_frequency"),
+        buckling_level=dataset.attrs.get("beam_buckling_level"),
+    )
+    result = compare_measured_points(dots, dataset)
+    console = out()
+    if result.used:
+        low, high = result.agreement_interval
+        console.print(
+            f"{100 * result.agreement:.0f} % of {result.used} agree with the map "
+            f"(95 %: {100 * low:.0f} to {100 * high:.0f} %)"
+        )
+    for note in result.notes:
+        console.print(f"[yellow]note[/] {note}")
+    return save_figure(plot_dot_comparison(dataset, dots, result), target / "dots.png")

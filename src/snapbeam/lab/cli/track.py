@@ -1,0 +1,361 @@
+"""``snapbeam track``: displacement of beam and shaker from a high-speed recording."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from snapbeam.cli.console import answer, door, duration, file_line, out, progress
+from snapbeam.lab.cli import options as lab
+
+if TYPE_CHECKING:
+    from snapbeam.lab.camera import Recording
+
+__all__ = [
+    "Background",
+    "BeamThickness",
+    "BlurLimit",
+    "BucklingLevel",
+    "Columns",
+    "ContactColumn",
+    "FixedMark",
+    "Frame",
+    "FrameRate",
+    "Gamma",
+    "Location",
+    "Marker",
+    "Objects",
+    "Output",
+    "Picture",
+    "PixelSize",
+    "RecordingFile",
+    "Region",
+    "Report",
+    "RestDisplacement",
+    "RestFrames",
+    "ScaleMarks",
+    "Shaker",
+    "Side",
+    "Threshold",
+    "TipDistance",
+    "Video",
+    "VideoEvery",
+    "track",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Options of ``snapbeam track``.
+
+
+_CAMERA = "Camera"
+_SCENE = "Scene"
+_OUTPUT = "Output"
+
+
+RecordingFile = Annotated[
+    Path,
+    typer.Argument(
+        help="Photron .cih/.cihx, .cine, .avi, .mp4, .mov, TIFF, .npy, .h5, or a folder of numbered images.",
+        metavar="RECORDING",
+    ),
+]
+FrameRate = Annotated[
+    float | None,
+    typer.Option(help="Frames per second, Hz; needed for videos and images.", rich_help_panel=_CAMERA),
+]
+PixelSize = Annotated[
+    float | None,
+    typer.Option(help="Metres per pixel, such as 12e-6; needed unless in the file.", rich_help_panel=_CAMERA),
+]
+Region = Annotated[
+    str | None,
+    typer.Option(help="Part of the frame to use.", metavar="ROW:ROW,COLUMN:COLUMN", rich_help_panel=_CAMERA),
+]
+Side = Annotated[
+    str,
+    typer.Option(
+        help="Side of the beam the shaker stands on: below, above, left or right.",
+        rich_help_panel=_SCENE,
+    ),
+]
+Objects = Annotated[
+    str,
+    typer.Option(help="bright or dark against the background, or auto.", rich_help_panel=_SCENE),
+]
+Threshold = Annotated[
+    float | None,
+    typer.Option(help="Grey level to binarise at; Otsu's by default.", rich_help_panel=_SCENE),
+]
+ContactColumn = Annotated[
+    float | None,
+    typer.Option(help="Column of the contact; found from the tip by default.", rich_help_panel=_SCENE),
+]
+Shaker = Annotated[
+    bool, typer.Option("--shaker/--no-shaker", help="Follow the shaker too.", rich_help_panel=_SCENE)
+]
+Marker = Annotated[
+    bool,
+    typer.Option("--marker/--no-marker", help="Look for a sticker on the shaker.", rich_help_panel=_SCENE),
+]
+TipDistance = Annotated[
+    float | None,
+    typer.Option(help="From the shaker's tip to the sticker's nearer edge, m.", rich_help_panel=_SCENE),
+]
+BeamThickness = Annotated[
+    float | None,
+    typer.Option(help="Thickness of the beam by gauge, m, to check by.", rich_help_panel=_SCENE),
+]
+Columns = Annotated[int, typer.Option(help="Columns to fit the beam's edge in.", rich_help_panel=_SCENE)]
+BlurLimit = Annotated[
+    float | None,
+    typer.Option(help="Edge width, px, from which a frame is flagged as blurred.", rich_help_panel=_SCENE),
+]
+Gamma = Annotated[
+    float,
+    typer.Option(help="Exponent of grey level over light, to undo.", rich_help_panel=_CAMERA),
+]
+Background = Annotated[
+    Path | None,
+    typer.Option(
+        help="Image of the scene without beam and shaker, to subtract.",
+        metavar="FILE",
+        rich_help_panel=_CAMERA,
+    ),
+]
+FixedMark = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Part of the region that shows something that stands still; the camera's drift against it is "
+        "taken out. May be repeated.",
+        metavar="ROW:ROW,COLUMN:COLUMN",
+        rich_help_panel=_CAMERA,
+    ),
+]
+ScaleMarks = Annotated[
+    str | None,
+    typer.Option(
+        help="Pixel size from two marks a known distance apart, m: ROW,COLUMN:ROW,COLUMN=0.010.",
+        metavar="MARKS",
+        rich_help_panel=_CAMERA,
+    ),
+]
+RestFrames = Annotated[
+    str | None,
+    typer.Option(
+        help="Frames at rest: how many at the start, or FIRST:LAST+1; negative from the end.",
+        metavar="N or A:B",
+        rich_help_panel=_SCENE,
+    ),
+]
+BucklingLevel = Annotated[
+    float | None,
+    typer.Option(help="b, m, to normalise by; millimetres only by default.", rich_help_panel=_SCENE),
+]
+Location = Annotated[
+    float, typer.Option(help="x_s, location of the contact over length.", rich_help_panel=_SCENE)
+]
+RestDisplacement = Annotated[
+    float | None,
+    typer.Option(
+        help="Displacement of the beam at rest, m; the well facing the shaker by default.",
+        rich_help_panel=_SCENE,
+    ),
+]
+Output = Annotated[
+    Path,
+    typer.Option("--output", "-o", help="NetCDF file to write.", metavar="FILE", rich_help_panel=_OUTPUT),
+]
+Picture = Annotated[
+    Path | None,
+    typer.Option(help="Picture of a frame with its edges.", metavar="FILE", rich_help_panel=_OUTPUT),
+]
+Frame = Annotated[int, typer.Option(help="Number of the frame in --picture.", rich_help_panel=_OUTPUT)]
+Report = Annotated[
+    Path | None,
+    typer.Option(help="Picture of the quality over time.", metavar="FILE", rich_help_panel=_OUTPUT),
+]
+Video = Annotated[
+    Path | None,
+    typer.Option(help="Annotated video, .mp4, .mov or .avi.", metavar="FILE", rich_help_panel=_OUTPUT),
+]
+VideoEvery = Annotated[
+    int, typer.Option(help="Show every so many-th frame in --video.", rich_help_panel=_OUTPUT)
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+@door
+def track(
+    recording: RecordingFile,
+    frame_rate: FrameRate = None,
+    pixel_size: PixelSize = None,
+    region: Region = None,
+    side: Side = "below",
+    objects: Objects = "auto",
+    threshold: Threshold = None,
+    contact_column: ContactColumn = None,
+    shaker: Shaker = True,
+    marker: Marker = True,
+    tip_distance: TipDistance = None,
+    beam_thickness: BeamThickness = None,
+    columns: Columns = 24,
+    blur_limit: BlurLimit = None,
+    gamma: Gamma = 1.0,
+    background: Background = None,
+    fixed_mark: FixedMark = None,
+    scale_marks: ScaleMarks = None,
+    rest_frames: RestFrames = None,
+    buckling_level: BucklingLevel = None,
+    location: Location = 1 / 2.1,
+    rest_displacement: RestDisplacement = None,
+    output: Output = Path("track.nc"),
+    picture: Picture = None,
+    frame: Frame = 0,
+    report: Report = None,
+    video: Video = None,
+    video_every: VideoEvery = 1,
+    strict: lab.Strict = False,
+) -> None:
+    """Measure the displacement of beam and shaker in every frame of a high-speed recording.
+
+    Finds the beam, the shaker and a sticker on it, fits their edges to a fraction of a pixel, and writes the
+    displacements with standard errors and flags to a NetCDF file.  What could not be measured is flagged and
+    left out, never filled in.  What makes the result doubtful is said, and under --strict refused.
+
+    Example: snapbeam track test.cihx --pixel-size 12e-6 --buckling-level 0.335e-3 -o test.nc --picture
+    frame.png --report quality.png
+    """
+    from snapbeam.util.files import check_writable
+    from snapbeam.util.netcdf import write_netcdf
+    from snapbeam.util.validation import integer
+
+    check_writable(output, "output", (".nc",))
+    if picture is not None or report is not None:
+        from snapbeam.plot.style import FIGURE_SUFFIXES
+
+        for name, path in (("picture", picture), ("report", report)):
+            if path is not None:
+                check_writable(path, name, FIGURE_SUFFIXES)
+    if video is not None:
+        check_writable(video, "video", (".mp4", ".mov", ".avi"))
+    integer("frame", frame, 0)
+    integer("video_every", video_every, 1)
+    from snapbeam.lab.tracking.settings import TrackingSettings
+    from snapbeam.lab.tracking.track import track as track_recording
+    from snapbeam.lab.tracking.track import tracking_quality, tracking_report
+    from snapbeam.util.diagnostics import diagnostics_of, refuse
+
+    settings = TrackingSettings(
+        buckling_level=buckling_level, location=location, rest_displacement=rest_displacement,
+        rest_frames=_rest(rest_frames), beam_thickness=beam_thickness, side=side, objects=objects,
+        threshold=threshold, gamma=gamma, shaker=shaker, marker=marker, tip_distance=tip_distance, columns=columns,
+        contact_column=contact_column, blur_limit=blur_limit,
+        fixed_marks=[lab.whole_numbers("fixed_mark", text, 4) for text in fixed_mark or ()],  # type: ignore[misc]
+    )  # fmt: skip
+    part = None if region is None else lab.whole_numbers("region", region, 4)
+    start = time.monotonic()
+    with _opened(recording, frame_rate, pixel_size, part, scale_marks) as opened:
+        if picture is not None:
+            integer("frame", frame, 0, len(opened) - 1)
+        if background is not None:
+            settings = settings.changed(background=_picture(background, opened))
+        with progress(len(opened), "track", "frames") as tell:
+            dataset = track_recording(opened, settings, progress=tell)
+        elapsed = time.monotonic() - start
+        files = []
+        if picture is not None or report is not None:
+            import matplotlib
+
+            matplotlib.use("Agg")
+            from snapbeam.lab.plot.tracking import plot_frame, plot_tracking_quality
+            from snapbeam.plot.style import save_figure
+
+            if picture is not None:
+                files.append(save_figure(plot_frame(opened, dataset, frame), picture))
+            if report is not None:
+                files.append(save_figure(plot_tracking_quality(dataset), report))
+        if strict:  # the pictures show what is wrong; the result is not written
+            refuse(diagnostics_of(dataset), str(recording))
+        write_netcdf(dataset, output)
+        files.insert(0, output)
+        if video is not None:
+            from snapbeam.lab.plot.tracking import annotated_video
+
+            with progress(len(opened), "video", "frames") as tell:
+                files.append(annotated_video(opened, dataset, video, every=video_every, progress=tell))
+    found = diagnostics_of(dataset)
+    answer(
+        quality=tracking_quality(dataset), diagnostics=[asdict(diagnostic) for diagnostic in found],
+        seconds=elapsed, files=files,
+    )  # fmt: skip
+    console = out()
+    console.print(tracking_report(dataset, diagnostics=False), markup=False)
+    lab.tell_findings(console, found)
+    console.print(f"{len(opened) / elapsed:.0f} frames/s, {duration(elapsed)}")
+    for path in files:
+        console.print(f"wrote {file_line(path)}")
+
+
+def _rest(text: str | None) -> int | tuple[int, int] | None:
+    """Frames at rest from "20" or "-40:0"."""
+    if text is None:
+        return None
+    if ":" in text:
+        first, last = lab.whole_numbers("rest_frames", text, 2)
+        return first, last
+    return lab.whole_numbers("rest_frames", text, 1)[0]
+
+
+def _opened(
+    path: Path,
+    frame_rate: float | None,
+    pixel_size: float | None,
+    region: tuple[int, ...] | None,
+    scale_marks: str | None,
+) -> Recording:
+    """Open a recording, its pixel size taken from two marks if they are given."""
+    from snapbeam.lab.camera import open_recording, pixel_size_from_marks
+    from snapbeam.util.validation import InputError
+
+    part = None if region is None else (region[0], region[1], region[2], region[3])
+    if scale_marks is None:
+        return open_recording(path, frame_rate=frame_rate, pixel_size=pixel_size, region=part)
+    if pixel_size is not None:
+        raise InputError("pixel_size (--pixel-size) and scale_marks (--scale-marks): must be given only one")
+    try:
+        marks, length = scale_marks.split("=")
+        first, second = (tuple(float(v) for v in mark.split(",")) for mark in marks.split(":"))
+        distance = float(length)
+        if len(first) != 2 or len(second) != 2:
+            raise ValueError
+    except ValueError:
+        raise InputError(
+            f"scale_marks = {scale_marks!r}: must read ROW,COLUMN:ROW,COLUMN=METRES, such as 10,20:10,420=0.010"
+        ) from None
+    with open_recording(path, frame_rate=frame_rate, pixel_size=1e-6, region=part) as once:
+        size, error = pixel_size_from_marks(once, (first[0], first[1]), (second[0], second[1]), distance)
+    out().print(f"pixel size {size * 1e6:.4f} +- {error * 1e6:.4f} um from the marks")
+    return open_recording(path, frame_rate=frame_rate, pixel_size=size, region=part)
+
+
+def _picture(path: Path, recording: Recording) -> Any:
+    """A picture of the empty scene, cut to the region of a recording."""
+    from snapbeam.lab.image_sources import load_image
+    from snapbeam.util.validation import InputError
+
+    image = load_image(path)
+    top, bottom, left, right = recording.region
+    if image.shape == recording.shape:
+        return image
+    if image.shape[0] < bottom or image.shape[1] < right:
+        raise InputError(
+            f"background = {str(path)!r}: of shape {image.shape}, smaller than the recording's region"
+        )
+    return image[top:bottom, left:right]

@@ -1,0 +1,171 @@
+"""``snapbeam vibrometer``: amplitude, frequency, distortion and start-up of the shaker's measured motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from snapbeam.cli import parameter_options as opt
+from snapbeam.cli.console import door, file_line, out
+from snapbeam.lab.cli import options as lab
+
+__all__ = [
+    "Amplitude",
+    "AmplitudeFrom",
+    "Camera",
+    "DriveOutput",
+    "DriveSamplingFreq",
+    "Frequency",
+    "Near",
+    "Polarity",
+    "SnrLimit",
+    "vibrometer",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Options of ``snapbeam vibrometer``.
+
+
+Frequency = Annotated[
+    float | None, opt.number_option("Excitation frequency as set, Hz, as a guess.", "Drive")
+]
+SnrLimit = Annotated[
+    float | None, opt.number_option("Least ratio of sine to all else, dB, to accept (15).", "Drive")
+]
+Camera = Annotated[
+    Path | None,
+    typer.Option(
+        help="NetCDF file of the tracked recording of the same test, to align with.",
+        metavar="FILE",
+        rich_help_panel="Drive",
+    ),
+]
+Polarity = Annotated[
+    int | None,
+    typer.Option(
+        help="1 or -1: whether vibrometer and camera count the same direction as positive; found from the start.",
+        rich_help_panel="Drive",
+    ),
+]
+Near = Annotated[
+    float | None,
+    opt.number_option("Delay of the camera's clock, s, known to half a cycle, as from a trigger.", "Drive"),
+]
+Amplitude = Annotated[float | None, opt.number_option("Amplitude as set, m/s (or m), to check by.", "Drive")]
+AmplitudeFrom = Annotated[
+    str, typer.Option(help="vibrometer or camera: whose amplitude the drive has.", rich_help_panel="Drive")
+]
+DriveOutput = Annotated[
+    Path | None,
+    typer.Option(
+        help="NetCDF file of the drive, drift-free and resampled, to write.",
+        metavar="FILE",
+        rich_help_panel="Output",
+    ),
+]
+DriveSamplingFreq = Annotated[
+    float | None, opt.number_option("Samples per second of --drive-output, Hz (100000).", "Output")
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+@door
+def vibrometer(
+    signal: lab.SignalFile,
+    frequency: Frequency = None,
+    snr_limit: SnrLimit = None,
+    channel: lab.Channel = None,
+    units: lab.Units = None,
+    sensitivity: lab.Sensitivity = None,
+    sampling_frequency: lab.SamplingFreq = None,
+    columns: lab.Columns = None,
+    camera: Camera = None,
+    polarity: Polarity = None,
+    near: Near = None,
+    amplitude: Amplitude = None,
+    amplitude_from: AmplitudeFrom = "vibrometer",
+    drive_output: DriveOutput = None,
+    drive_sampling_frequency: DriveSamplingFreq = None,
+    plot: opt.Plot = None,
+    report: lab.JsonFile = None,
+    strict: lab.Strict = False,
+) -> None:
+    """Measure the shaker's motion in a vibrometer record and say whether the test is acceptable.
+
+    Fits the steady sine with standard errors, tells noise from distortion, finds and describes the start-up
+    transient, and on request aligns the record with a tracked recording and writes the measured drive for use
+    in the model.
+
+    Example: snapbeam vibrometer velocity.csv --frequency 100 --plot drive.png --json drive.json
+    """
+    from snapbeam.lab.vibrometer import SNR_LIMIT, measure_drive
+    from snapbeam.plot.style import FIGURE_SUFFIXES, save_figure
+    from snapbeam.util.diagnostics import doubtful, refuse
+    from snapbeam.util.files import check_writable
+    from snapbeam.util.netcdf import write_netcdf
+
+    for name, path, suffixes in (
+        ("plot", plot, FIGURE_SUFFIXES),
+        ("json", report, (".json",)),
+        ("drive_output", drive_output, (".nc",)),
+    ):
+        if path is not None:
+            check_writable(path, name, suffixes)
+    data = lab.open_signal(signal, channel, units, sensitivity, sampling_frequency, columns)
+    limit = SNR_LIMIT if snr_limit is None else snr_limit
+    drive = measure_drive(data, frequency, amplitude=amplitude, snr_limit=limit)
+    fit, summary = drive.steady, drive.summary()
+    console = out()
+    verdict = "[green]accepted[/]" if drive.accepted else "[bold red]not accepted[/]"
+    if drive.accepted and doubtful(drive.diagnostics):
+        verdict = "[yellow]accepted, but doubtful[/]"
+    console.print(f"{signal.name}: {verdict} (sine to noise and distortion above {limit:g} dB)")
+    console.print(f"  frequency    {fit.frequency:.6g} +- {fit.frequency_se:.1g} Hz")
+    console.print(f"  amplitude    {fit.amplitude:.6g} +- {fit.amplitude_se:.1g} {drive.units}")
+    console.print(f"  phase        {fit.phase:.5g} +- {fit.phase_se:.1g} rad at time 0")
+    console.print(f"  noise        {fit.snr:.1f} dB below the sine; with distortion {fit.sinad:.1f} dB")
+    console.print(
+        f"  distortion   {100.0 * fit.distortion:.3f} % (noise alone: {100.0 * fit.distortion_floor:.3f} %)"
+    )
+    console.print(f"  start-up     {summary['startup']}")
+    diagnostics = drive.diagnostics
+    alignment = None
+    if camera is not None:
+        from snapbeam.cli.console import open_result
+        from snapbeam.lab.drive_alignment import align
+        from snapbeam.lab.vibrometer import shaker_signal
+
+        alignment = align(shaker_signal(open_result(camera)), data, frequency, polarity=polarity, near=near)
+        diagnostics += alignment.diagnostics
+        summary["alignment"] = {
+            "delay_s": alignment.delay, "delay_se_s": alignment.delay_se, "certain": alignment.certain,
+            "polarity": alignment.polarity, "gain": alignment.gain, "gain_se": alignment.gain_se,
+            "clock_difference": alignment.clock_difference,
+            "diagnostics": [one.plain() for one in alignment.diagnostics],
+        }  # fmt: skip
+        console.print(f"  alignment    {alignment.description}")
+    lab.tell_findings(console, diagnostics)
+    if plot is not None:
+        from snapbeam.lab.plot.vibrometer import plot_drive
+
+        save_figure(plot_drive(data, drive), plot)
+        console.print(f"Written: {file_line(plot)}")
+    if strict:
+        refuse(diagnostics, str(signal))
+    if drive_output is not None:
+        from snapbeam.lab.drive_alignment import recorded_drive
+
+        resampled = recorded_drive(
+            data, drive_sampling_frequency or 1e5, measurement=drive, alignment=alignment, polarity=polarity,
+            amplitude_from=amplitude_from,
+        )  # fmt: skip
+        write_netcdf(resampled, drive_output)
+        console.print(f"Written: {file_line(drive_output)}")
+    if report is not None:
+        lab.write_json(report, summary)
+        console.print(f"Written: {file_line(report)}")

@@ -1,1 +1,0 @@
-"""Measured responses beside simulated ones: classes, maps, waveforms."""

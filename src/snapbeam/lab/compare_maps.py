@@ -1,0 +1,200 @@
+"""Measured responses beside simulated ones: dots on a map."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["DotComparison", "MeasuredPointsComparison", "compare_measured_points"]
+
+
+_Array = NDArray[np.float64]
+_AXES = ("frequency_ratio", "velocity_amplitude", "location")
+_NEAR = 0.02  # a dot belongs to a map if its fixed coordinate is within this share of the map's
+_CLASSES = tuple(kind for kind in ResponseClass if kind is not ResponseClass.UNKNOWN)
+
+
+class MeasuredPointsComparison(Protocol):
+    """Measured responses: arrays of one entry a test, as ``snapbeam.sweeps.measured_points.read_measured_points`` returns them."""
+
+    @property
+    def frequency_ratio(self) -> NDArray[np.float64]: ...
+    @property
+    def velocity_amplitude(self) -> NDArray[np.float64]: ...
+    @property
+    def location(self) -> NDArray[np.float64]: ...
+    @property
+    def response_class(self) -> NDArray[np.int8]: ...
+
+
+@dataclass(frozen=True)
+class DotComparison:
+    """Measured dots against a map.
+
+    ``table`` has one entry a dot: its coordinates, ``measured`` and ``simulated`` class (that of the
+    nearest point of the map), ``used`` (1 if it counts) and ``distance``, in steps of the map, to the
+    nearest point that has the measured class (NaN if none has).  ``confusion[i, j]`` counts dots of
+    measured class i and simulated class j, in the order of ``classes``.
+    """
+
+    table: xr.Dataset
+    confusion: NDArray[np.int64]
+    classes: tuple[ResponseClass, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def used(self) -> int:
+        """Dots that count."""
+        return int(self.confusion.sum())
+
+    @property
+    def agreement(self) -> float:
+        """Share of the dots that count whose class is that of the map; NaN if none counts."""
+        return float(np.trace(self.confusion)) / self.used if self.used else math.nan
+
+    @property
+    def agreement_interval(self) -> tuple[float, float]:
+        """Wilson's 95 % interval of the agreement."""
+        return _wilson(int(np.trace(self.confusion)), self.used)
+
+    @property
+    def snap_agreement(self) -> float:
+        """Share of the dots that count for which map and measurement agree whether the beam snaps at all."""
+        quiet = self.classes.index(ResponseClass.INTRAWELL)
+        snaps = np.delete(np.delete(self.confusion, quiet, 0), quiet, 1)
+        return float(self.confusion[quiet, quiet] + snaps.sum()) / self.used if self.used else math.nan
+
+    def summary(self) -> dict[str, Any]:
+        """The comparison as plain numbers and words."""
+        low, high = self.agreement_interval
+        return {
+            "dots": int(self.table.sizes["dot"]),
+            "used": self.used,
+            "agreement": self.agreement,
+            "agreement_low": low,
+            "agreement_high": high,
+            "snap_agreement": self.snap_agreement,
+            "classes": [kind.label for kind in self.classes],
+            "confusion": self.confusion.tolist(),
+            "notes": list(self.notes),
+        }
+
+
+def _wilson(successes: int, total: int) -> tuple[float, float]:
+    if total == 0:
+        return math.nan, math.nan
+    z = 1.959964
+    share = successes / total
+    middle = (share + z * z / (2 * total)) / (1.0 + z * z / total)
+    half = z / (1.0 + z * z / total) * math.sqrt(share * (1.0 - share) / total + z * z / (4.0 * total**2))
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def compare_measured_points(dots: MeasuredPointsComparison, dataset: xr.Dataset) -> DotComparison:
+    """Compare measured responses with a simulated map.
+
+    Parameters
+    ----------
+    dots : MeasuredDots
+    dataset : xarray.Dataset
+        A map: ``response_class`` over some of frequency_ratio, velocity_amplitude and location; the others are
+        scalar coordinates or attributes.
+
+    Raises
+    ------
+    InputError
+        If the dataset is no map.
+
+    Notes
+    -----
+    A dot does not count if it lies more than half a step outside the map, was measured at another value of a
+    coordinate that the map holds fixed (by more than 2 %), or has no class on either side.
+    """
+    import xarray as xr
+
+    if not isinstance(dataset, xr.Dataset) or "response_class" not in dataset:
+        raise InputError("dataset: must be a map with the variable response")
+    response = dataset["response_class"]
+    dims = [str(name) for name in response.dims]
+    if not dims or any(name not in _AXES for name in dims):
+        raise InputError(f"response with dimensions {dims}: must be among {', '.join(_AXES)}")
+    where = {name: np.asarray(getattr(dots, name), dtype=np.float64) for name in _AXES}
+    measured = np.asarray(dots.response_class, dtype=np.int8)
+    count = measured.size
+    inside, belongs = np.ones(count, dtype=bool), np.ones(count, dtype=bool)
+    place: dict[str, _Array] = {}
+    for name in _AXES:
+        value = where[name]
+        if name in dims:
+            axis = np.asarray(dataset[name].values, dtype=np.float64)
+            place[name] = _steps(axis, value)
+            inside &= (place[name] >= -0.5) & (place[name] <= axis.size - 0.5)
+            continue
+        fixed = dataset.coords[name].item() if name in dataset.coords else dataset.attrs.get(name)
+        if fixed is not None:
+            belongs &= np.isnan(value) | (np.abs(value - float(fixed)) <= _NEAR * abs(float(fixed)))
+    index = {
+        name: np.clip(np.nan_to_num(np.round(p)), 0, dataset.sizes[name] - 1) for name, p in place.items()
+    }
+    pick = {name: xr.DataArray(i.astype(np.int64), dims="dot") for name, i in index.items()}
+    simulated = response.isel(pick).values.astype(np.int8)
+    known = (measured != ResponseClass.UNKNOWN) & (simulated != ResponseClass.UNKNOWN)
+    used = inside & belongs & known
+    confusion = np.zeros((len(_CLASSES), len(_CLASSES)), dtype=np.int64)
+    np.add.at(confusion, (measured[used], simulated[used]), 1)
+    notes = []
+    for mask, text in (
+        (~inside, "outside the map"),
+        (inside & ~belongs, "measured at another value of a coordinate the map holds fixed"),
+        (inside & belongs & ~known, "without a class, measured or simulated"),
+    ):
+        if mask.any():
+            notes.append(f"{int(mask.sum())} of {count} dots do not count: {text}")
+    distance = _distance(response.values, dims, place, measured)
+    data: dict[str, Any] = {name: ("dot", where[name]) for name in _AXES}
+    data |= {
+        "measured": ("dot", measured),
+        "simulated": ("dot", np.where(inside & belongs, simulated, ResponseClass.UNKNOWN).astype(np.int8)),
+        "used": ("dot", used.astype(np.int8)),
+        "distance": (
+            "dot",
+            np.where(used, distance, np.nan),
+            {"long_name": "steps to the nearest point alike"},
+        ),
+    }
+    return DotComparison(xr.Dataset(data), confusion, _CLASSES, tuple(notes))
+
+
+def _steps(axis: _Array, value: _Array) -> _Array:
+    """Position of values on an axis counted in its points, going on evenly beyond its ends."""
+    if axis.size == 1:
+        return np.where(np.abs(value - axis[0]) <= _NEAR * abs(axis[0]), 0.0, np.nan)
+    position = np.interp(value, axis, np.arange(axis.size))
+    low, high = axis[1] - axis[0], axis[-1] - axis[-2]
+    position = np.where(value < axis[0], (value - axis[0]) / low, position)
+    return np.where(value > axis[-1], axis.size - 1 + (value - axis[-1]) / high, position)
+
+
+def _distance(
+    response: NDArray[np.integer], dims: list[str], place: dict[str, _Array], measured: NDArray[np.int8]
+) -> _Array:
+    grid = np.stack(np.meshgrid(*(np.arange(n) for n in response.shape), indexing="ij"), axis=-1)
+    points = np.stack([place[name] for name in dims], axis=-1)
+    distance = np.full(measured.size, np.nan)
+    for kind in np.unique(measured):
+        alike = grid[response == kind]
+        if alike.size:
+            for i in np.flatnonzero(measured == kind):
+                rounded = np.round(points[i])
+                distance[i] = np.sqrt(((alike - rounded) ** 2).sum(axis=1).min())
+    return distance

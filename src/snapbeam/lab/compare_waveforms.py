@@ -1,0 +1,468 @@
+"""A measured run beside a simulated one, on one clock: waveforms, spectra, impacts (Fig. 4 of the paper)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.lab.diagnostics import KINDS_COMPARISON
+from snapbeam.lab.signals import SignalSamples, make_signal
+from snapbeam.lab.sine_fit import SineFit, fit_sine
+from snapbeam.lab.vibrometer import measure_drive
+from snapbeam.simulation.dataset import check_trajectory
+from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.status_codes import ResponseClass, classify
+from snapbeam.util.validation import InputError, choice, integer, nonnegative, positive
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "MeasuredResponse",
+    "WaveformComparison",
+    "compare_waveforms",
+    "measure_response",
+    "start_of_shaker",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# When the excitation of a measured run starts, read from its own shaker.
+
+
+def start_of_shaker(run: xr.Dataset, frequency: float) -> float | None:
+    """The time [s] at which the shaker starts to move, where the run shows it at rest before; else None.
+
+    Parameters
+    ----------
+    run : xarray.Dataset
+        A run with ``striker_displacement`` over ``time`` [s].
+    frequency : float
+        Of the excitation [Hz].
+    """
+    time = np.asarray(run["time"].values, dtype=np.float64)
+    values = np.asarray(run["striker_displacement"].values, dtype=np.float64)
+    known = np.isfinite(values)
+    if np.count_nonzero(known) < 64:
+        return None
+    even = np.linspace(time[0], time[-1], time.size)
+    # only when it starts is asked, which no unit changes
+    signal = make_signal(np.interp(even, time[known], values[known]), "m", time=even, name="shaker")
+    try:
+        startup = measure_drive(signal, frequency).startup
+    except InputError:
+        return None
+    return None if startup is None else startup.onset
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_Array = NDArray[np.float64]
+_APART = 0.1  # b, by which two beams must differ to have parted
+_SHIFTED = 0.15  # cycles by which a known start may be off
+_RATIO = 0.05  # share by which the shakers' amplitudes may differ
+
+
+@dataclass(frozen=True)
+class WaveformComparison:
+    """A measured and a simulated run over the same cycles of excitation.
+
+    ``waveforms`` over ``cycle``: displacement and shaker displacement of both [b].  ``spectra`` over
+    ``frequency_ratio`` (multiples of the excitation): amplitude spectra of the two displacements [b].
+    ``shift`` [cycles] was added to the measured clock.  ``rms_difference`` [b] and ``correlation`` are
+    those of the beam, ``shaker_rms_difference`` [b] that of the shaker; ``measured_rms`` and
+    ``simulated_rms`` [b] are the beam's motion about its mean.  ``parted`` [cycles] is where the two beams
+    first stay more than ``apart`` [b] from each other for half a cycle, NaN if they never do.  ``diagnostics``
+    is what makes the comparison doubtful.
+    """
+
+    waveforms: xr.Dataset
+    spectra: xr.Dataset
+    shift: float
+    rms_difference: float
+    correlation: float
+    shaker_rms_difference: float
+    measured_rms: float
+    simulated_rms: float
+    amplitude_ratio: float
+    parted: float
+    apart: float
+    measured_impacts: _Array
+    simulated_impacts: _Array
+    diagnostics: tuple[Diagnostic, ...]
+
+
+def compare_waveforms(
+    measured: xr.Dataset,
+    simulated: xr.Dataset,
+    frequency: float | None = None,
+    *,
+    start: float | None = None,
+    cycles: tuple[float, float] | None = None,
+    measured_onsets: ArrayLike | None = None,
+    simulated_onsets: ArrayLike | None = None,
+) -> WaveformComparison:
+    """Put a measured run beside a simulated one, aligned by the phase of the shaker.
+
+    Parameters
+    ----------
+    measured, simulated : xarray.Dataset
+        Runs (see :mod:`snapbeam.simulation.dataset`) with ``displacement_at_striker`` and ``striker_displacement`` [b].
+    frequency : float, optional
+        Excitation frequency [Hz] of the measured run, where it has no coordinate ``cycle``.
+    start : float, optional
+        Start of the excitation in the measured run [s]; it says which cycle is the first, the phase of the
+        shaker says the rest.  Read from the shaker if left out, and the first sample if it begins in motion.
+    cycles : (float, float), optional
+        The part to compare, counted from the start; all that both have if left out.
+    measured_onsets, simulated_onsets : array_like, optional
+        Times of impacts [s], to be shown over cycles.
+
+    Raises
+    ------
+    InputError
+        If a run lacks the shaker, the two share fewer than two cycles, or no frequency is known.
+    """
+    import xarray as xr
+
+    for name, run in (("measured", measured), ("simulated", simulated)):
+        try:
+            check_trajectory(run, require=("displacement_at_striker", "striker_displacement"))
+        except InputError as error:
+            raise InputError(f"{name}: {error}") from error
+    if start is None and frequency is not None:
+        start = start_of_shaker(measured, positive("frequency", frequency, "Hz"))
+    clock, rate = _clock(measured, frequency, start)
+    if "cycle" not in simulated.coords:
+        raise InputError("simulated: must have the coordinate cycle")
+    model_clock = np.asarray(simulated["cycle"].values, dtype=np.float64)
+    model_rate = _cycles_per_second(simulated)
+    seen = _shaker_sine(measured, clock)
+    wanted = _shaker_sine(simulated, model_clock)
+    # cos(2 pi cycle + phase) of the measured shaker must turn with that of the simulated one
+    turn = (seen.phase - wanted.phase) / (2.0 * math.pi)
+    shift = (turn + 0.5) % 1.0 - 0.5
+    clock = clock + shift
+    low, high = max(clock[0], model_clock[0], 0.0), min(clock[-1], model_clock[-1])
+    if cycles is not None:
+        low, high = max(low, float(cycles[0])), min(high, float(cycles[1]))
+    if high - low < 2.0:
+        raise InputError(f"runs share {max(high - low, 0.0):.1f} cycles: must share at least 2")
+    step = max(float(np.median(np.diff(clock))), 1.0 / 400.0)
+    grid = low + step * np.arange(int((high - low) / step + 1e-9) + 1)
+    columns = {
+        "measured_displacement": _on(grid, clock, measured["displacement_at_striker"].values),
+        "simulated_displacement": _on(grid, model_clock, simulated["displacement_at_striker"].values),
+        "measured_shaker": _on(grid, clock, measured["striker_displacement"].values),
+        "simulated_shaker": _on(grid, model_clock, simulated["striker_displacement"].values),
+    }
+    waveforms = xr.Dataset(
+        {name: ("cycle", value, {"units": "1"}) for name, value in columns.items()},
+        {"cycle": ("cycle", grid, {"long_name": "cycles of excitation", "units": "1"})},
+    )
+    one, two = columns["measured_displacement"], columns["simulated_displacement"]
+    both = np.isfinite(one) & np.isfinite(two)
+    if both.sum() < 16:
+        raise InputError("measured: hardly any valid sample in the cycles that both runs have")
+    shaker = columns["measured_shaker"] - columns["simulated_shaker"]
+    shaker = shaker[np.isfinite(shaker)]
+    spread = float(np.std(one[both])), float(np.std(two[both]))
+    same = float(np.corrcoef(one[both], two[both])[0, 1]) if min(spread) > 0.0 else math.nan
+    apart = max(_APART, 5.0 * float(measured.attrs.get("displacement_error_b", 0.0)))
+    diagnostics = _findings(
+        columns, grid, shift, seen.amplitude / wanted.amplitude, start is not None or frequency is None
+    )
+    return WaveformComparison(
+        waveforms=waveforms,
+        spectra=_spectra(grid, step, columns),
+        shift=shift,
+        rms_difference=float(np.sqrt(np.mean((one[both] - two[both]) ** 2))),
+        correlation=same,
+        shaker_rms_difference=float(np.std(shaker)),
+        measured_rms=spread[0],
+        simulated_rms=spread[1],
+        amplitude_ratio=seen.amplitude / wanted.amplitude,
+        parted=_parted(grid, one - two, apart),
+        apart=apart,
+        diagnostics=tuple(diagnostics),
+        measured_impacts=_impacts(
+            measured_onsets, start or float(measured["time"][0]), rate, shift, low, high
+        ),
+        simulated_impacts=_impacts(simulated_onsets, 0.0, model_rate, 0.0, low, high),
+    )
+
+
+def _findings(
+    columns: dict[str, _Array], grid: _Array, shift: float, ratio: float, started: bool
+) -> list[Diagnostic]:
+    """What the two shakers say of the comparison; *started* says that their first cycle is known."""
+    told = []
+    if not started:
+        told.append(KINDS_COMPARISON["no_start"].found())
+    else:
+        same = _same_way(columns, grid, shift)
+        if abs(abs(shift) - 0.5) < 0.2 and same < -0.5:
+            told.append(KINDS_COMPARISON["turned_over"].found(correlation=same))
+        elif abs(shift) > _SHIFTED:
+            told.append(KINDS_COMPARISON["shifted"].found(shift=shift))
+    if abs(ratio - 1.0) > _RATIO:
+        told.append(KINDS_COMPARISON["amplitude"].found(ratio=ratio))
+    missing = float(np.mean(~np.isfinite(columns["measured_displacement"])))
+    if missing > 0.1:
+        told.append(KINDS_COMPARISON["gaps"].found(share_percent=100.0 * missing))
+    return told
+
+
+def _same_way(columns: dict[str, _Array], grid: _Array, shift: float) -> float:
+    """Correlation of the two shakers over the first cycles as they were started, the shift undone."""
+    early = grid <= grid[0] + 6.0
+    moved = np.interp(grid[early], grid - shift, columns["measured_shaker"], left=np.nan, right=np.nan)
+    other = columns["simulated_shaker"][early]
+    both = np.isfinite(moved) & np.isfinite(other)
+    if both.sum() < 32 or min(np.std(moved[both]), np.std(other[both])) == 0.0:
+        return 0.0
+    return float(np.corrcoef(moved[both], other[both])[0, 1])
+
+
+def _parted(grid: _Array, difference: _Array, apart: float) -> float:
+    """Cycle from which two runs stay apart for half a cycle on average; NaN if they never do."""
+    step = float(grid[1] - grid[0])
+    width = max(1, round(0.5 / step))
+    square = np.where(np.isfinite(difference), difference, 0.0) ** 2
+    mean = np.sqrt(np.convolve(square, np.ones(width) / width, mode="valid"))
+    beyond = np.flatnonzero(mean > apart)
+    return float(grid[beyond[0]]) if beyond.size else math.nan
+
+
+def _clock(run: xr.Dataset, frequency: float | None, start: float | None) -> tuple[_Array, float]:
+    time = np.asarray(run["time"].values, dtype=np.float64)
+    if frequency is None:
+        if "cycle" not in run.coords:
+            raise InputError("measured: has no coordinate cycle; state frequency (--frequency), Hz")
+        return np.asarray(run["cycle"].values, dtype=np.float64), _cycles_per_second(run)
+    rate = positive("frequency", frequency, "Hz")
+    begin = float(time[0]) if start is None else float(start)
+    return (time - begin) * rate, rate
+
+
+def _cycles_per_second(run: xr.Dataset) -> float:
+    time, cycle = run["time"].values, run["cycle"].values
+    return float((cycle[-1] - cycle[0]) / (time[-1] - time[0]))
+
+
+def _shaker_sine(run: xr.Dataset, clock: _Array) -> SineFit:
+    """The shaker's sine over cycles, fitted to the later two thirds of the run."""
+    values = np.asarray(run["striker_displacement"].values, dtype=np.float64)
+    good = np.isfinite(values) & (clock >= 0.0)
+    if good.sum() < 64:
+        raise InputError("run: the shaker was measured in fewer than 64 samples after the start")
+    span = clock[good][-1] - clock[good][0]
+    if span < 3.0:
+        raise InputError(f"run: {span:.1f} cycles of the shaker: must be at least 3")
+    begin = clock[good][0] + span / 3.0 if span > 6.0 else clock[good][0]
+    count = int(min((clock[good][-1] - begin) * 64, 20_000))
+    even = begin + (clock[good][-1] - begin) * np.arange(count) / count
+    samples = SignalSamples(
+        np.interp(even, clock[good], values[good]), even, count / (clock[good][-1] - begin)
+    )
+    return fit_sine(samples, 1.0, 1, fixed=True)
+
+
+def _on(grid: _Array, clock: _Array, values: NDArray[Any]) -> _Array:
+    """Values on a grid by straight lines, NaN where a neighbouring sample is missing."""
+    good = np.isfinite(values)
+    result = np.interp(grid, clock[good], np.asarray(values, dtype=np.float64)[good])
+    missing = np.interp(grid, clock, (~good).astype(np.float64)) > 0.0
+    result[missing] = np.nan
+    return result
+
+
+def _spectra(grid: _Array, step: float, columns: dict[str, _Array]) -> xr.Dataset:
+    import xarray as xr
+
+    window = np.hanning(grid.size)
+    data = {}
+    for name in ("measured_displacement", "simulated_displacement"):
+        values = columns[name]
+        good = np.isfinite(values)
+        filled = np.where(good, values, np.interp(grid, grid[good], values[good]))
+        amplitude = 2.0 * np.abs(np.fft.rfft((filled - filled.mean()) * window)) / window.sum()
+        data[name] = ("frequency_ratio", amplitude, {"units": "1"})
+    ratio = np.fft.rfftfreq(grid.size, step)
+    return xr.Dataset(data, {"frequency_ratio": ("frequency_ratio", ratio, {"units": "1"})})
+
+
+def _impacts(
+    onsets: ArrayLike | None, start: float, rate: float, shift: float, low: float, high: float
+) -> _Array:
+    if onsets is None:
+        return np.empty(0)
+    at = (np.asarray(onsets, dtype=np.float64) - start) * rate + shift
+    return at[(at >= low) & (at <= high)]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Response class of a measured run, by the rules used for simulations, or why it cannot be told.
+#
+# A measured displacement is noisy and may be short or have dropouts.  A crossing of zero counts only when the
+# displacement has gone beyond a hysteresis on the other side, several times the noise; what dropouts could hide
+# and what a record too short cannot show leave the class unknown, with the reason.
+
+
+_HYSTERESIS = 5.0  # in standard deviations of the noise
+LEAST_CYCLES = 20  # the rule of more than n/5 crossings in n cycles means nothing below n = 5
+_WHOLE = 0.98  # share of the wanted cycles that counts as all of them
+
+
+@dataclass(frozen=True)
+class MeasuredResponse:
+    """Class and counts of a measured run.
+
+    ``response_class`` is UNKNOWN where ``reasons`` say why.  ``zero_crossings`` is at least what happened: more may
+    hide in dropouts.  ``noise`` and ``hysteresis`` are in units of b; ``final_well`` is -1 or 1, the sign
+    at the end.
+    """
+
+    response_class: ResponseClass
+    zero_crossings: int
+    zero_crossings_last_quarter: int
+    last_zero_crossing: float
+    final_well: int
+    cycles: float
+    noise: float
+    hysteresis: float
+    longest_dropout: float
+    reasons: tuple[str, ...]
+
+    @property
+    def description(self) -> str:
+        """The result in words."""
+        counts = f"{self.zero_crossings} crossing(s) in {self.cycles:.1f} cycles"
+        if self.response_class is ResponseClass.UNKNOWN:
+            return f"class not told: {'; '.join(self.reasons)} ({counts})"
+        return (
+            f"{self.response_class.label} ({counts}, {self.zero_crossings_last_quarter} in the last quarter)"
+        )
+
+
+def measure_response(
+    run: xr.Dataset,
+    frequency: float | None = None,
+    *,
+    cycles: int = 200,
+    at: str = "displacement_at_striker",
+    noise: float | None = None,
+    start: float | None = None,
+) -> MeasuredResponse:
+    """Class a measured run by the zero crossings of its displacement.
+
+    Parameters
+    ----------
+    run : xarray.Dataset
+        A run (see :mod:`snapbeam.simulation.dataset`): displacements in units of b over time [s], zero midway between
+        the wells, and ``valid`` = 0 where nothing was found.
+    frequency : float, optional
+        Excitation frequency [Hz]; not needed if the run has the coordinate ``cycle``.
+    cycles : int
+        Cycles of excitation the class is asked for; the paper's experiments have 200.
+    at : {"displacement_at_striker", "midspan_displacement"}
+        Where to count: at the shaker, which for a shaker near the centre serves as well, or at the centre.
+    noise : float, optional
+        Standard deviation of the displacement's noise, in units of b; estimated from its third differences if
+        left out.
+    start : float, optional
+        Start of the excitation [s]; the first sample if left out.
+
+    Raises
+    ------
+    InputError
+        If the dataset is no run, or neither *frequency* nor ``cycle`` says how long a cycle is.
+    """
+    choice("at", at, ("displacement_at_striker", "midspan_displacement"))
+    check_trajectory(run, require=(at,))
+    wanted = integer("cycles", cycles, 1)
+    time = np.asarray(run["time"].values, dtype=np.float64)
+    values = np.array(run[at].values, dtype=np.float64)
+    good = np.isfinite(values)
+    if "valid" in run:
+        good &= run["valid"].values.astype(bool)
+    if start is not None:
+        good &= time >= start
+    if good.sum() < 16:
+        raise InputError(f"run: {int(good.sum())} valid sample(s) of {at}: must be at least 16")
+    if "cycle" in run.coords:
+        count = np.asarray(run["cycle"].values, dtype=np.float64)
+    else:
+        if frequency is None:
+            raise InputError("frequency: must be given, the run has no coordinate cycle")
+        begin = float(time[0]) if start is None else start
+        count = (time - begin) * positive("frequency", frequency, "Hz")
+    sigma = _noise(values, good) if noise is None else nonnegative("noise", noise, "b")
+    hysteresis = max(_HYSTERESIS * sigma, 1e-9)
+    shown, when, covered = values[good], time[good], count[good]
+
+    side, crossed = _crossings(shown, hysteresis)
+    total = min(float(covered[-1]), float(wanted))
+    inside = covered[crossed] <= wanted
+    crossed = crossed[inside]
+    late = int(np.count_nonzero(covered[crossed] > 0.75 * wanted))
+    last_index = int(np.flatnonzero(covered <= wanted)[-1])
+    final = int(side[last_index])
+    first = int(side[np.flatnonzero(side)[0]]) if side.any() else 0
+
+    gaps = np.diff(covered)
+    longest = float(gaps.max()) if gaps.size else 0.0
+    reasons = []
+    if hysteresis > 0.25:
+        reasons.append(f"the noise, {sigma:.2g} b, hides crossings (hysteresis {hysteresis:.2g} b)")
+    if first == 0 or final == 0:
+        reasons.append("the displacement never leaves the hysteresis about zero")
+    if wanted < LEAST_CYCLES:
+        reasons.append(f"too short to tell: {wanted} cycles, the rule needs {LEAST_CYCLES}")
+    certain_continuous = late > wanted / 20.0
+    if total < _WHOLE * wanted and not certain_continuous:
+        reasons.append(f"too short to tell: {total:.1f} of {wanted} cycles recorded")
+    typical = float(np.median(gaps)) if gaps.size else 0.0
+    if longest > max(0.25, 4.0 * typical) and not certain_continuous:
+        reasons.append(f"a dropout of {longest:.2f} cycles could hide crossings")
+    response = ResponseClass.UNKNOWN
+    if not reasons:
+        response = ResponseClass(int(classify(crossed.size, late, wanted, -first * final)))
+    return MeasuredResponse(
+        response_class=response,
+        zero_crossings=int(crossed.size),
+        zero_crossings_last_quarter=late,
+        last_zero_crossing=float(when[crossed[-1]]) if crossed.size else math.nan,
+        final_well=final,
+        cycles=total,
+        noise=sigma,
+        hysteresis=hysteresis,
+        longest_dropout=longest,
+        reasons=tuple(reasons),
+    )
+
+
+def _noise(values: _Array, good: NDArray[np.bool_]) -> float:
+    """Standard deviation of white noise from third differences of neighbouring valid samples."""
+    whole = good[:-3] & good[1:-2] & good[2:-1] & good[3:]
+    thirds = (values[3:] - 3.0 * values[2:-1] + 3.0 * values[1:-2] - values[:-3])[whole]
+    if thirds.size < 8:
+        raise InputError(
+            "run: too few neighbouring valid samples to estimate the noise; state noise, in units of b"
+        )
+    return float(np.median(np.abs(thirds)) / 0.6745 / math.sqrt(20.0))
+
+
+def _crossings(values: _Array, hysteresis: float) -> tuple[NDArray[np.int8], NDArray[np.intp]]:
+    """Side of each sample (0 until it first leaves the hysteresis) and where that changes."""
+    beyond = np.where(values > hysteresis, 1, np.where(values < -hysteresis, -1, 0)).astype(np.int8)
+    index = np.where(beyond != 0, np.arange(values.size), -1)
+    held = np.maximum.accumulate(index)
+    side = np.where(held >= 0, beyond[np.maximum(held, 0)], 0).astype(np.int8)
+    changes = np.flatnonzero((side[1:] != side[:-1]) & (side[:-1] != 0)) + 1
+    return side, changes

@@ -1,0 +1,286 @@
+"""The modes of a decay fitted: those that lie close at once, what is not asked for taken out, laws of damping tried."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from snapbeam.lab.decay.fit import FitResult, explain, fit_decay
+from snapbeam.lab.decay.model import (
+    Cycles,
+    DampingLaw,
+    ModeEstimate,
+    find_law,
+    hilbert_cycles,
+    noise_level,
+    peak_cycles,
+    regress,
+)
+from snapbeam.lab.decay.poles import Pole, Stabilisation, find_poles, thinned, without_poles
+from snapbeam.lab.decay.residual_diagnostics import misfit_of
+from snapbeam.lab.decay.window import CLOSE, ENERGY, Centres, Decay
+from snapbeam.lab.diagnostics import KINDS_DECAY
+from snapbeam.lab.signals import SignalSamples
+from snapbeam.lab.sine_fit import fit_sine
+from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.validation import InputError
+
+__all__ = ["fit_modes", "mode_by_cycles"]
+
+
+_MISFIT = 1.7  # times the noise that a fit may leave near the first mode
+_MANY = 12_000  # samples from which a record is thinned before it is fitted
+
+
+def _thinned(samples: SignalSamples, highest: float) -> SignalSamples:
+    """A long record at fourteen samples or more to the shortest period."""
+    factor = int(samples.sampling_frequency / (14.0 * highest))
+    if samples.values.size < _MANY or factor < 2:
+        return samples
+    return thinned(samples, max(min(factor, samples.values.size // 3000), 1))
+
+
+def fit_modes(
+    decay: Decay,
+    centres: Centres,
+    units: str,
+    soften: bool,
+    known: tuple[float, float] | None,
+) -> tuple[SignalSamples, FitResult, Cycles, list[Diagnostic], Stabilisation | None]:
+    """The modes fitted, those that lie close together and, in a short record, all of them, at once.
+
+    Modes that are not asked for are taken out first if they lie far away, and fitted beside if they do not.
+    """
+    clean = without_poles(decay.samples, centres.far, [*centres.own, *centres.near])
+    groups = [centres.wanted]
+    if clean.values.size >= _MANY and len(centres.wanted) > 1:
+        groups = _groups(centres.wanted)
+    diagram = centres.diagram
+    told: list[Diagnostic] = []
+    first: tuple[SignalSamples, FitResult, Cycles] | None = None
+    found: dict[float, ModeEstimate] = {}
+    for group in groups:
+        mine = [pole for pole in centres.own if pole.frequency in group]
+        others = [pole for pole in centres.own if pole not in mine]
+        beside = [pole for pole in centres.near if any(abs(pole.frequency / f - 1.0) < CLOSE for f in group)]
+        away = [pole for pole in centres.near if pole not in beside]
+        part = without_poles(clean, [*others, *away] if len(groups) > 1 else away, [*mine, *beside])
+        part = _thinned(part, max([*group, *(pole.frequency for pole in beside)]))
+        result, cycles, more, diagram = _group_fit(part, group, mine, beside, units, soften, known, diagram)
+        part, result, cycles, again = _lines_again(decay, part, result, cycles, units, soften, known)
+        told += [one for one in more if not again or one.code != KINDS_DECAY["misfit"].code]
+        found |= dict(zip(group, result.modes, strict=False))
+        first = first or (part, result, cycles)
+    assert first is not None
+    samples, result, cycles = first
+    modes = [found[f] for f in centres.wanted] + [mode for mode in result.modes if mode not in found.values()]
+    return samples, result._replace(modes=modes), cycles, told, diagram
+
+
+def _groups(frequencies: list[float]) -> list[list[float]]:
+    """Frequencies that lie close together, the first one's group first."""
+    groups: list[list[float]] = []
+    for f in frequencies:
+        near = next((group for group in groups if any(abs(f / g - 1.0) < CLOSE for g in group)), None)
+        if near is None:
+            groups.append([f])
+        else:
+            near.append(f)
+    return groups
+
+
+def _lines_again(
+    decay: Decay,
+    samples: SignalSamples,
+    result: FitResult,
+    cycles: Cycles,
+    units: str,
+    soften: bool,
+    known: tuple[float, float] | None,
+) -> tuple[SignalSamples, FitResult, Cycles, bool]:
+    """The fit once more, lines that do not decay fitted to what the modes left; as it was without such lines."""
+    if not decay.lines:
+        return samples, result, cycles, False
+    rest = SignalSamples(result.residual, samples.time, samples.sampling_frequency)
+    for line in decay.lines:
+        if line.frequency > 0.45 * samples.sampling_frequency:
+            continue
+        try:
+            left = fit_sine(rest, line.frequency, 1, fixed=True)
+        except InputError:
+            continue
+        wave = left.amplitude * np.cos(2.0 * math.pi * left.frequency * rest.time + left.phase)
+        rest = SignalSamples(rest.values - wave, rest.time, rest.sampling_frequency)
+    change = rest.values - result.residual
+    better = SignalSamples(samples.values + change, samples.time, samples.sampling_frequency)
+    law = None
+    if result.modes[0].law != "viscous":
+        mode = result.modes[0]
+        law = DampingLaw(mode.law, mode.law_strength, mode.law_strength_se, 0.0, 0.0)
+    again = fit_decay(better, result.modes, units, soften=soften, known=known, law=law)
+    return better, again, cycles, True
+
+
+def _group_fit(
+    samples: SignalSamples,
+    centres: list[float],
+    own: list[Pole],
+    beside: list[Pole],
+    units: str,
+    soften: bool,
+    known: tuple[float, float] | None,
+    diagram: Stabilisation | None,
+) -> tuple[FitResult, Cycles, list[Diagnostic], Stabilisation | None]:
+    """Modes fitted together; where they leave more than noise, a second law of damping or a close mode."""
+    start = float(samples.time[0])
+    guesses, cycles = _guesses(samples, centres, own, units, soften)
+    told: list[Diagnostic] = []
+    apart = [pole for pole in beside if _apart(samples, pole, guesses)]
+    guesses = [*guesses, *(_of_pole(pole) for pole in apart)]
+    result = fit_decay(samples, guesses, units, soften=soften, known=known)
+    alone = _own_cycles(samples, result, cycles)
+    law = find_law(
+        alone, start, 2.0 * math.pi * result.modes[0].natural_frequencies * result.modes[0].damping_ratio
+    )
+    left = misfit_of(samples, result.residual, result.modes).ratio
+    if law is not None:
+        result, left, told = _with_law(samples, result, left, units, soften, known, law)
+    if left > _MISFIT and len(guesses) < 8:
+        near = [pole for pole in beside if pole not in apart]
+        better, diagram = _with_close_mode(samples, result, near, units, diagram)
+        if better is not None:
+            result = better
+            first = better.modes[0].natural_frequencies
+            second = min(
+                (mode.natural_frequencies for mode in better.modes[1:]), key=lambda f: abs(f - first)
+            )
+            told = [KINDS_DECAY["close_modes"].found(first=first, second=second)]
+    return result, _own_cycles(samples, result, cycles), told, diagram
+
+
+def _apart(samples: SignalSamples, pole: Pole, modes: list[ModeEstimate]) -> bool:
+    """Whether a pole lies so far from all modes that it is none of the poles into which one that softens splits."""
+    span = samples.values.size / samples.sampling_frequency
+    return all(
+        abs(pole.frequency - mode.natural_frequencies)
+        > max(
+            8.0 / span, 2.0 * mode.damping_ratio * mode.natural_frequencies, 0.06 * mode.natural_frequencies
+        )
+        for mode in modes
+    )
+
+
+def _with_law(
+    samples: SignalSamples,
+    result: FitResult,
+    left: float,
+    units: str,
+    soften: bool,
+    known: tuple[float, float] | None,
+    law: DampingLaw,
+) -> tuple[FitResult, float, list[Diagnostic]]:
+    """The fit with a second law of damping where that is told apart and leaves less; else as it was."""
+    try:
+        other = fit_decay(samples, result.modes, units, soften=soften, known=known, law=law)
+    except InputError:
+        return result, left, []
+    first = other.modes[0]
+    rest = misfit_of(samples, other.residual, other.modes).ratio
+    told_apart = first.law_strength > 3.0 * first.law_strength_se
+    if not told_apart or other.noise_rms >= 0.999 * result.noise_rms or rest >= max(0.8 * left, _MISFIT):
+        return result, left, []
+    diagnostic = KINDS_DECAY["damping_law"].found(
+        told=first.law, strength=first.law_strength, error=first.law_strength_se
+    )
+    return other, rest, [diagnostic]
+
+
+def _of_pole(pole: Pole) -> ModeEstimate:
+    """A guess of a mode from its pole."""
+    nan = math.nan
+    zeta = max(pole.damping_ratio, 1e-5)
+    return ModeEstimate(pole.frequency, nan, zeta, nan, pole.amplitude, nan, 0.0, 0.0, 0.0, "pencil")
+
+
+def _guesses(
+    samples: SignalSamples, centres: list[float], poles: list[Pole], units: str, soften: bool
+) -> tuple[list[ModeEstimate], Cycles]:
+    """Each mode by its cycles, or by its pole where too few stand out; and the cycles of the first."""
+    sigma = noise_level(samples)
+    rest = samples
+    found: list[ModeEstimate] = []
+    kept: Cycles | None = None
+    for center in centres:
+        try:
+            estimate, cycles = mode_by_cycles(rest, center, sigma, units, "hilbert", soften and not found)
+        except InputError:
+            pole = next((one for one in poles if one.frequency == center), None)
+            if pole is None or kept is None:
+                raise
+            estimate, cycles = _of_pole(pole), kept
+        kept = kept or cycles
+        found.append(estimate)
+        if len(centres) > 1:
+            rest = SignalSamples(
+                explain(samples, found, units, soften).residual, samples.time, samples.sampling_frequency
+            )
+    assert kept is not None
+    return found, kept
+
+
+def mode_by_cycles(
+    rest: SignalSamples, center: float, sigma: float, units: str, method: str, soften: bool
+) -> tuple[ModeEstimate, Cycles]:
+    """A mode by its cycles, once more about its own mean frequency."""
+    maker = peak_cycles if method == "log_decrement" else hilbert_cycles
+    start = float(rest.time[0])
+    cycles = maker(rest, center, sigma)
+    estimate = regress(cycles, start, units, method, soften)
+    mean = float(np.polyfit(cycles.time, cycles.phase, 1, w=cycles.amplitude)[0] / (2.0 * math.pi))
+    if 0.8 * center < mean < 1.2 * center:
+        cycles = maker(rest, mean, sigma)
+        estimate = regress(cycles, start, units, method, soften)
+    return estimate, cycles
+
+
+def _own_cycles(samples: SignalSamples, result: FitResult, otherwise: Cycles) -> Cycles:
+    """The first mode's cycles with the other modes taken out."""
+    first = result.modes[0]
+    if len(result.modes) == 1:
+        return otherwise
+    try:
+        alone = SignalSamples(result.alone, samples.time, samples.sampling_frequency)
+        return hilbert_cycles(alone, first.natural_frequencies, noise_level(samples))
+    except InputError:
+        return otherwise
+
+
+def _with_close_mode(
+    samples: SignalSamples,
+    result: FitResult,
+    near: list[Pole],
+    units: str,
+    diagram: Stabilisation | None,
+) -> tuple[FitResult | None, Stabilisation | None]:
+    """The fit with one mode more, close to the first, if the pencil sees one and it explains what is left."""
+    first = result.modes[0].natural_frequencies
+    if len(near) < 2:
+        poles, fresh = find_poles(samples, noise_level(samples))
+        diagram = diagram or fresh
+        near = [
+            pole
+            for pole in poles
+            if pole.energy > ENERGY
+            and abs(pole.frequency / first - 1.0) < CLOSE
+            and pole.damping_ratio > -1e-3
+        ]
+    if len(near) < 2:
+        return None, diagram
+    others = [mode for mode in result.modes[1:] if abs(mode.natural_frequencies / first - 1.0) > CLOSE]
+    pair = [_of_pole(pole) for pole in near[:2]]
+    try:
+        better = fit_decay(samples, [pair[0], *others, pair[1]], units, soften=False)
+    except InputError:
+        return None, diagram
+    return (better if better.noise_rms < 0.9 * result.noise_rms else None), diagram

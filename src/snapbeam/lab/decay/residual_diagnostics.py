@@ -1,0 +1,209 @@
+"""What a fit leaves of a decay, and what that does to its standard errors."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
+
+from snapbeam.lab.decay.fit import FitResult
+from snapbeam.lab.decay.model import Cycles, ModeEstimate, envelope
+from snapbeam.lab.diagnostics import KINDS_DECAY
+from snapbeam.lab.signals import SignalSamples
+from snapbeam.util.diagnostics import Diagnostic
+
+__all__ = ["Misfit", "findings_about", "judged", "misfit_of", "sampled_findings", "widened"]
+
+
+_Array = NDArray[np.float64]
+_RATIO = 1.6  # of what is left to what the noise explains, from which the fit is in doubt
+_MATTERS = 0.003  # of the amplitude; what is left below that is of no matter
+_HARDENS = 6.0  # standard errors
+_RISE = 3e-4  # share of the frequency
+_BAND = 2.56  # of an analyser: its sampling frequency over its highest line
+_APART = 6.0  # standard errors by which two halves of a decay may differ
+
+
+class Misfit(NamedTuple):
+    """What a fit leaves near its first mode: over what noise explains (``ratio``), and over the amplitude."""
+
+    ratio: float
+    share: float
+
+
+def misfit_of(samples: SignalSamples, residual: _Array, modes: list[ModeEstimate]) -> Misfit:
+    """What is left within a narrow band about the first mode, against the noise beside that band.
+
+    The band is that of the decay itself, at least some lines of the spectrum wide.
+    """
+    first = modes[0]
+    n = residual.size
+    span = n / samples.sampling_frequency
+    rate = first.damping_ratio * 2.0 * math.pi * first.natural_frequencies
+    half = max(5.0 / span, 3.0 * rate / (2.0 * math.pi))
+    power = np.abs(np.fft.rfft(residual)) ** 2 / n
+    freq = np.fft.rfftfreq(n, 1.0 / samples.sampling_frequency)
+    away = np.abs(freq - first.natural_frequencies)
+    inside = away <= half
+    beside = (
+        (away > half)
+        & (away < max(12.0 * half, 0.5 * first.natural_frequencies))
+        & (freq > 0.3 * first.natural_frequencies)
+    )
+    for mode in modes[1:]:
+        own = np.abs(freq - mode.natural_frequencies) < max(
+            5.0 / span, 2.0 * mode.damping_ratio * mode.natural_frequencies
+        )
+        beside &= ~own
+    beside &= np.abs(freq - 2.0 * first.natural_frequencies) > half
+    if beside.sum() < 8 or inside.sum() < 3:
+        return Misfit(1.0, 0.0)
+    noise = float(np.median(power[beside])) / math.log(2.0)
+    left = float(power[inside].mean())
+    floor = (1e-7 * first.amplitude) ** 2
+    ratio = math.sqrt(left / max(noise, floor))
+    # what is left as an amplitude over the time the mode lives
+    alive = min(span, 0.5 / max(rate, 1e-9))
+    excess = max(float(power[inside].sum()) - noise * float(inside.sum()), 0.0)
+    share = math.sqrt(4.0 * excess / (alive * samples.sampling_frequency)) / first.amplitude
+    return Misfit(ratio, share)
+
+
+def judged(
+    samples: SignalSamples, result: FitResult, cycles: Cycles, misfit: Misfit, soften: bool
+) -> tuple[list[ModeEstimate], list[Diagnostic]]:
+    """The modes with standard errors that hold what the fit leaves, and what is to be said of that."""
+    told: list[Diagnostic] = []
+    first = result.modes[0]
+    rates, turns = _halves(cycles, first, float(samples.time[0]), soften)
+    omega = 2.0 * math.pi * first.natural_frequencies
+    damping_apart = abs(rates[0]) / omega
+    freq_apart = abs(turns[0]) / (2.0 * math.pi)
+    worse_damping, worse_frequency = (
+        abs(rates[0]) / max(rates[1], 1e-300),
+        abs(turns[0]) / max(turns[1], 1e-300),
+    )
+    doubtful = misfit.ratio > _RATIO and misfit.share > _MATTERS
+    if doubtful:
+        told.append(KINDS_DECAY["misfit"].found(ratio=misfit.ratio, share_percent=100.0 * misfit.share))
+    matters = damping_apart > 0.03 * first.damping_ratio or freq_apart > 3e-4 * first.natural_frequencies
+    if max(worse_damping, worse_frequency) > _APART and matters:
+        told.append(KINDS_DECAY["parts_differ"].found(frequency_se=worse_frequency, damping_se=worse_damping))
+        doubtful = True
+    if not doubtful:
+        return list(result.modes), told
+    grown = max(misfit.ratio, 1.0)
+    missed = misfit.share * first.damping_ratio
+    raised = dataclasses.replace(
+        first,
+        natural_frequencies_se=max(
+            first.natural_frequencies_se * grown, freq_apart, missed * first.natural_frequencies
+        ),
+        damping_ratio_se=max(first.damping_ratio_se * grown, damping_apart, missed),
+    )
+    others = [
+        dataclasses.replace(
+            mode,
+            natural_frequencies_se=mode.natural_frequencies_se * grown,
+            damping_ratio_se=mode.damping_ratio_se * grown,
+        )
+        for mode in result.modes[1:]
+    ]
+    return [raised, *others], told
+
+
+def _halves(
+    cycles: Cycles, mode: ModeEstimate, start: float, soften: bool
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """By how much the rate of decay [1/s] and the angular frequency [rad/s] of the two halves of a decay differ,
+    each with its standard error, after what the fit says of them is taken out."""
+    t = cycles.time - start
+    if t.size < 12:
+        return (0.0, math.inf), (0.0, math.inf)
+    omega = 2.0 * math.pi * mode.natural_frequencies
+    rate = mode.damping_ratio * omega
+    shape = envelope(mode.law, t, rate, mode.law_strength)
+    log_rest = np.log(cycles.amplitude) - np.log(shape)
+    s = mode.softening * mode.amplitude**2 if soften else 0.0
+    clock = t - s * cumulative_trapezoid(shape**2, t, initial=0.0)
+    phase_rest = cycles.phase - omega * math.sqrt(1.0 - mode.damping_ratio**2) * clock
+    weight = cycles.amplitude**2
+    # halves of equal weight, so that both tell as much
+    half = int(np.searchsorted(np.cumsum(weight), 0.5 * weight.sum()))
+    half = min(max(half, 6), t.size - 6)
+    out = []
+    for series in (log_rest, phase_rest):
+        slopes, errors = [], []
+        for part in (slice(0, half), slice(half, t.size)):
+            w, x, y = weight[part], t[part], series[part]
+            middle = float((w * x).sum() / w.sum())
+            spread = float((w * (x - middle) ** 2).sum())
+            slopes.append(float((w * (x - middle) * y).sum()) / spread)
+            rest = y - float((w * y).sum() / w.sum()) - slopes[-1] * (x - middle)
+            noise = max(cycles.noise**2, float((w * rest**2).sum()) / max(x.size - 2, 1))
+            errors.append(math.sqrt(noise / spread))
+        out.append((slopes[1] - slopes[0], math.hypot(*errors)))
+    return out[0], out[1]
+
+
+def sampled_findings(modes: tuple[ModeEstimate, ...], sampling_frequency: float) -> list[Diagnostic]:
+    """What is to be said of modes above the band that filters against aliasing keep clean."""
+    limit = sampling_frequency / _BAND
+    return [
+        KINDS_DECAY["above_band"].found(
+            frequency=mode.natural_frequencies,
+            limit_hz=limit,
+            folded=sampling_frequency - mode.natural_frequencies,
+        )
+        for mode in modes
+        if mode.natural_frequencies > limit
+    ]
+
+
+def widened(modes: tuple[ModeEstimate, ...], drift: float, added: float) -> tuple[ModeEstimate, ...]:
+    """Modes whose errors hold a *drift* of the frequency, a share of it, and a rate [1/s] *added* by a window."""
+    if drift == 0.0 and added == 0.0:
+        return modes
+    first = modes[0].amplitude ** 2
+    return tuple(
+        dataclasses.replace(
+            mode,
+            natural_frequencies_se=math.hypot(mode.natural_frequencies_se, drift * mode.natural_frequencies),
+            damping_ratio_se=math.hypot(
+                mode.damping_ratio_se,
+                added / (2.0 * math.pi * mode.natural_frequencies),
+                drift * mode.damping_ratio,
+            ),
+            softening_se=math.hypot(mode.softening_se, drift / first if mode.softening_se > 0.0 else 0.0),
+        )
+        for mode in modes
+    )
+
+
+def findings_about(
+    samples: SignalSamples, modes: tuple[ModeEstimate, ...], noise: float, soften: bool
+) -> list[Diagnostic]:
+    """What the numbers of a decay alone make doubtful."""
+    told = []
+    span = samples.values.size / samples.sampling_frequency
+    first = modes[0]
+    left = math.exp(-first.damping_ratio * 2.0 * math.pi * first.natural_frequencies * span)
+    if left > 0.7:
+        told.append(KINDS_DECAY["short"].found(left_percent=100.0 * left))
+    change = abs(first.softening) * first.amplitude**2
+    if soften and change > 0.1:
+        told.append(KINDS_DECAY["large"].found(change_percent=100.0 * change))
+    rise = -first.softening * first.amplitude**2
+    certain = -first.softening / first.softening_se if first.softening_se > 0.0 else 0.0
+    if soften and certain > _HARDENS and rise > _RISE:
+        half = 0.5 * samples.sampling_frequency
+        told.append(KINDS_DECAY["hardening"].found(rise_percent=100.0 * rise, certain=certain, half_hz=half))
+    if first.amplitude < 5.0 * noise:
+        told.append(KINDS_DECAY["faint"].found())
+    if first.damping_ratio < 2.0 * first.damping_ratio_se:
+        told.append(KINDS_DECAY["undamped"].found())
+    return told

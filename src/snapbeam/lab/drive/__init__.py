@@ -1,1 +1,0 @@
-"""The vibrometer's record of the shaker, aligned with the camera's and made into a drive."""

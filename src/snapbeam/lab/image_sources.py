@@ -1,0 +1,696 @@
+"""What the reader needs of a file format.
+
+A source knows its ``shape`` (height, width), its ``numbers`` (the number of each frame in the original
+numbering, so that a missing frame leaves a hole) and can ``read`` a run of frames.  Nothing is kept in memory
+between calls but an open decoder.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.lab.diagnostics import KINDS_RECORDING, LOSSY_ERROR
+from snapbeam.lab.photron import CameraHeader, check_pixels, read_header, read_mraw
+from snapbeam.util.diagnostics import Diagnostic
+from snapbeam.util.validation import InputError
+
+__all__ = [
+    "ARRAY_SUFFIXES",
+    "IMAGE_SUFFIXES",
+    "LOSSLESS",
+    "RECORDING_SUFFIXES",
+    "TIFF_SUFFIXES",
+    "VIDEO_SUFFIXES",
+    "ArraySource",
+    "FrameSource",
+    "ImageSource",
+    "PhotronSource",
+    "TiffSource",
+    "VideoSource",
+    "float_range",
+    "grey_of",
+    "images_of_header",
+    "load_image",
+    "open_source",
+    "scaled_floats",
+    "take_header",
+]
+
+
+_LUMA = np.array([0.299, 0.587, 0.114])
+
+
+class FrameSource:
+    """Frames of one file, folder or pattern.
+
+    Attributes
+    ----------
+    shape, numbers, max_value
+        (height, width); number of each frame; the largest grey level the file can hold.
+    frame_rate, pixel_size, exposure
+        [Hz], [m], [s], or None where the file does not say.
+    frame_rate_question, pixel_size_hint
+        What the file says that is not enough, for the refusal.
+    diagnostics, edge_error
+        What makes measurements doubtful, and the standard error [px] that the format adds to every edge.
+    metadata
+        What else the file says.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.shape = (0, 0)
+        self.numbers: NDArray[np.int64] = np.empty(0, dtype=np.int64)
+        self.max_value = 255
+        self.frame_rate: float | None = None
+        self.pixel_size: float | None = None
+        self.exposure: float | None = None
+        self.frame_rate_question = ""
+        self.pixel_size_hint = ""
+        self.diagnostics: tuple[Diagnostic, ...] = ()
+        self.edge_error = 0.0
+        self.metadata: dict[str, Any] = {}
+
+    def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
+        """Frames *start* to *stop* of the rows from the first up to the second, integers (n, rows, width)."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Release what is held open."""
+
+
+def grey_of(colors: NDArray[Any]) -> NDArray[Any]:
+    """Grey levels of pictures whose last axis is red, green, blue and perhaps opacity, of the same type."""
+    grey = colors[..., :3].astype(np.float64) @ _LUMA
+    return np.rint(grey).astype(colors.dtype) if colors.dtype.kind in "iu" else grey.astype(colors.dtype)
+
+
+def scaled_floats(values: NDArray[np.floating], full: float) -> NDArray[np.uint16] | None:
+    """Pictures of floating point numbers from 0 to *full* as whole levels up to 65535; None if outside."""
+    if not np.isfinite(values).all() or values.min() < 0.0 or values.max() > full * (1.0 + 1e-9):
+        return None
+    levels: NDArray[np.uint16] = np.rint(values * (65535.0 / full)).clip(0, 65535).astype(np.uint16)
+    return levels
+
+
+# ----------------------------------------------------------------------------------------------------
+# TIFF files of many pages.
+
+
+TIFF_SUFFIXES = (".tif", ".tiff")
+_LENGTH_UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "micron": 1e-6, "µm": 1e-6, "\\u00b5m": 1e-6}
+
+
+def _is_picture(shape: tuple[int, ...], dtype: Any) -> bool:
+    """Whether a page holds grey levels, or colours in its last axis, of a kind that is read."""
+    size = len(shape) == 2 or (len(shape) == 3 and shape[-1] in (3, 4))
+    return size and all(shape) and (dtype.kind == "f" or (dtype.kind == "u" and dtype.itemsize <= 2))
+
+
+def float_range(pictures: list[NDArray[Any]], path: Path) -> float:
+    """What full scale is in pictures of floating point numbers: 1, or the next of 8, 10, 12, 14 and 16 bits.
+
+    Raises
+    ------
+    InputError
+        If the numbers are no grey levels.
+    """
+    top = float(np.max([one.max() for one in pictures]))  # NaN if any is
+    low = float(np.min([one.min() for one in pictures]))
+    if not (np.isfinite(top) and low >= 0.0 and 0.0 < top <= 65535.0):
+        raise InputError(
+            f"{path}: pictures of numbers from {low:g} to {top:g}: must lie in [0, 1], or be grey levels up to 65535"
+        )
+    return next(full for full in (1.0, 255.0, 1023.0, 4095.0, 16383.0, 65535.0) if top <= full)
+
+
+class TiffSource(FrameSource):
+    """A TIFF file of many pages.  ImageJ's frame interval and calibrated pixel size are used if present."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        import tifffile
+
+        try:
+            self._file = tifffile.TiffFile(path)
+            pages = self._file.pages
+            count = len(pages)
+            first = pages[0] if count else None
+            if first is None or first.dtype is None or not _is_picture(first.shape, first.dtype):
+                kind = "no page" if first is None else f"pages of shape {first.shape} and type {first.dtype}"
+                raise InputError(
+                    f"{path}: holds {kind}; a recording has pages of grey levels or red, green and blue, unsigned "
+                    "integers of 8 or 16 bits or floating point numbers"
+                )
+            self.shape = (int(first.shape[0]), int(first.shape[1]))
+            self._dtype = first.dtype
+            self._colors = first.ndim == 3
+            if self._colors:
+                self.diagnostics += (KINDS_RECORDING["colour"].found(channels=first.shape[2]),)
+            if str(getattr(first.compression, "name", "NONE")).upper() in (
+                "JPEG",
+                "OJPEG",
+                "JPEG2000",
+                "WEBP",
+            ):
+                self.diagnostics += (KINDS_RECORDING["lossy"].found(error_px=LOSSY_ERROR),)
+                self.edge_error = LOSSY_ERROR
+            self._imagej(self._file.imagej_metadata or {}, first)
+        except InputError:
+            raise
+        except Exception as error:  # a damaged file makes tifffile raise many kinds
+            raise InputError(f"{path}: cannot be read as a TIFF file ({error})") from None
+        self.numbers = np.arange(count)
+        self._full = 0.0
+        if self._dtype.kind == "f":
+            self._full = float_range([self._page(k) for k in {0, count // 2, count - 1}], path)
+            self.max_value = 65535
+        else:
+            self.max_value = int(np.iinfo(self._dtype).max)
+
+    def _imagej(self, values: dict[str, Any], page: Any) -> None:
+        self.metadata = {
+            "format": "TIFF stack",
+            **{k: v for k, v in values.items() if k in ("fps", "finterval")},
+        }
+        interval = values.get("finterval")
+        if isinstance(interval, (int, float)) and interval > 0.0:
+            self.frame_rate = 1.0 / float(interval)
+        unit = _LENGTH_UNITS.get(str(values.get("unit", "")))
+        resolution = page.tags.get("XResolution")
+        if unit is not None and resolution is not None and resolution.value[0] > 0:
+            self.pixel_size = unit * resolution.value[1] / resolution.value[0]
+
+    def _page(self, index: int) -> NDArray[Any]:
+        try:
+            image = self._file.pages[index].asarray()
+        except Exception as error:  # a damaged page makes tifffile raise many kinds
+            raise InputError(f"{self.path}: page {index} cannot be read ({error})") from None
+        if image.shape[:2] != self.shape or (image.ndim == 3) != self._colors:
+            raise InputError(f"{self.path}: page {index} is of shape {image.shape}, not {self.shape}")
+        return grey_of(image) if self._colors else image
+
+    def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
+        kind = np.uint16 if self._full else self._dtype
+        out = np.empty((stop - start, rows[1] - rows[0], self.shape[1]), dtype=kind)
+        for index in range(start, stop):
+            image = self._page(index)[rows[0] : rows[1]]
+            levels = scaled_floats(image, self._full) if self._full else image
+            if levels is None:
+                raise InputError(
+                    f"{self.path}: page {index} holds numbers outside 0 to {self._full:g}, the range of the others"
+                )
+            out[index - start] = levels
+        return out
+
+    def close(self) -> None:
+        self._file.close()
+
+
+# ----------------------------------------------------------------------------------------------------
+# Stacks of pictures in arrays: NumPy's .npy and HDF5.
+
+
+ARRAY_SUFFIXES = (".npy", ".h5", ".hdf5")
+_RATES = ("frame_rate", "fps", "record_rate", "frame_rate_hz")
+_SIZES = ("pixel_size", "pixel_size_m")
+
+
+class ArraySource(FrameSource):
+    """A stack (frames, height, width), or with red, green and blue last, read from the disk as needed.
+
+    The attributes ``frame_rate`` [Hz], ``pixel_size`` [m] and ``exposure`` [s] of an HDF5 file are used.
+    """
+
+    def __init__(self, path: Path, dataset: str = "") -> None:
+        super().__init__(path)
+        self._file: Any = None
+        try:
+            self._stack = self._open(dataset)
+        except InputError:
+            self.close()
+            raise
+        except Exception as error:  # a damaged file makes both libraries raise many kinds
+            self.close()
+            raise InputError(f"{path}: cannot be read as a stack of pictures ({error})") from None
+        shape, dtype = self._stack.shape, self._stack.dtype
+        if not _is_stack(shape, dtype):
+            self.close()
+            raise InputError(
+                f"{path}: an array of shape {shape} and type {dtype}: must be (frames, height, width), or with 3 "
+                "colours last, of unsigned integers of 8 or 16 bits or floating point numbers"
+            )
+        self.shape = (int(shape[1]), int(shape[2]))
+        self.numbers = np.arange(shape[0])
+        self._colors = len(shape) == 4
+        if self._colors:
+            self.diagnostics += (KINDS_RECORDING["colour"].found(channels=shape[3]),)
+        self._full = 0.0
+        if dtype.kind == "f":
+            self._full = float_range(
+                [np.asarray(self._stack[k]) for k in {0, shape[0] // 2, shape[0] - 1}], path
+            )
+            self.max_value = 65535
+        else:
+            self.max_value = int(np.iinfo(dtype).max)
+
+    def _open(self, dataset: str) -> Any:
+        if self.path.suffix.lower() == ".npy":
+            self.metadata = {"format": "NumPy stack"}
+            return np.load(self.path, mmap_mode="r", allow_pickle=False)
+        import h5py
+
+        self._file = h5py.File(self.path, "r")
+        found: dict[str, Any] = {}
+
+        def visit(name: str, item: Any) -> None:
+            if not isinstance(item, h5py.Dataset) or not _is_stack(item.shape, item.dtype):
+                return
+            if item.external or item.is_virtual:
+                raise InputError(
+                    f"{self.path}: {name!r} has its pictures in another file: copy them into this one"
+                )
+            found[name] = item
+
+        self._file.visititems(visit)
+        if dataset:
+            if dataset not in found:
+                raise InputError(
+                    f"{self.path}: holds no stack {dataset!r}; its stacks are {', '.join(found) or 'none'}"
+                )
+            chosen = dataset
+        elif len(found) == 1:
+            chosen = next(iter(found))
+        else:
+            raise InputError(
+                f"{self.path}: holds {len(found)} stacks of pictures ({', '.join(found) or 'none'}); name one as in "
+                f"{self.path.name}::name"
+            )
+        levels = (found[chosen].attrs, found[chosen].parent.attrs, self._file.attrs)
+        self.frame_rate = self._attribute(levels, _RATES)
+        self.pixel_size = self._attribute(levels, _SIZES)
+        self.exposure = self._attribute(levels, ("exposure",))
+        self.metadata = {"format": "HDF5 stack", "dataset": chosen}
+        return found[chosen]
+
+    def _attribute(self, levels: tuple[Any, ...], names: tuple[str, ...]) -> float | None:
+        for level in levels:
+            for name in names:
+                if name in level:
+                    value = np.asarray(level[name])
+                    if value.size != 1 or value.dtype.kind not in "iuf" or not value.item() > 0.0:
+                        raise InputError(
+                            f"{self.path}: attribute {name!r} = {level[name]!r}: must be a positive number"
+                        )
+                    return float(value.item())
+        return None
+
+    def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
+        part = np.asarray(self._stack[start:stop, rows[0] : rows[1]])
+        if self._colors:
+            part = grey_of(part)
+        if not self._full:
+            return part
+        levels = scaled_floats(part, self._full)
+        if levels is None:
+            raise InputError(
+                f"{self.path}: frames {start} to {stop - 1} hold numbers outside 0 to {self._full:g}"
+            )
+        return levels
+
+    def close(self) -> None:
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+
+def _is_stack(shape: tuple[int, ...], dtype: Any) -> bool:
+    size = len(shape) == 3 or (len(shape) == 4 and shape[-1] in (3, 4))
+    return size and all(shape) and (dtype.kind == "f" or (dtype.kind == "u" and dtype.itemsize <= 2))
+
+
+# ----------------------------------------------------------------------------------------------------
+# Photron recordings: a header with its .mraw.
+
+
+_EVEN = 0.02  # share by which the kinds of pixels under a mosaic may differ and count as one
+
+
+def take_header(source: FrameSource, header: CameraHeader) -> None:
+    """Give a source what a header says of times and scales."""
+    source.frame_rate = header.timing.frame_rate
+    source.frame_rate_question = header.timing.question
+    source.pixel_size = header.pixel_size
+    source.pixel_size_hint = header.scale_hint
+    source.exposure = header.timing.exposure
+    source.diagnostics = header.diagnostics
+    source.metadata = {
+        "format": "Photron mraw"
+        if not header.image_suffix
+        else f"Photron header of {header.image_suffix} images",
+        "camera": header.camera,
+        "comment": header.comment,
+        "record_rate": header.timing.record_rate,
+        "skip": header.timing.skip,
+        "stored_bits": header.stored_bits,
+        "effective_bits": header.effective_bits,
+    }
+
+
+class PhotronSource(FrameSource):
+    """A .cih or .cihx header with its .mraw."""
+
+    def __init__(self, header: CameraHeader) -> None:
+        super().__init__(header.path)
+        self.header = header
+        self._gains: NDArray[np.float64] | None = None
+        check_pixels(header)
+        self.shape = (header.height, header.width)
+        self.numbers = np.arange(header.frame_count)
+        self.max_value = header.max_value
+        take_header(self, header)
+        if header.raw_colors:
+            self._gains, spread = _mosaic(self.read(0, 1, (0, self.shape[0]))[0])
+            if self._gains is not None:
+                self.diagnostics += (KINDS_RECORDING["mosaic"].found(spread_percent=100.0 * spread),)
+
+    def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
+        frames = read_mraw(self.header, start, stop, rows)
+        if self._gains is None:
+            return frames
+        full = np.tile(self._gains, (self.shape[0] // 2 + 1, self.shape[1] // 2 + 1))
+        part = full[rows[0] : rows[1], : self.shape[1]]
+        return np.rint(np.minimum(frames * part, self.max_value)).astype(frames.dtype)
+
+
+def _mosaic(frame: NDArray[Any]) -> tuple[NDArray[np.float64] | None, float]:
+    """Gains (2, 2) that bring the four kinds of pixels to one mean, and how far apart they are.
+
+    None for pixels that are all of one kind.
+    """
+    height, width = (size - size % 2 for size in frame.shape)
+    kinds = frame[:height, :width].astype(np.float64).reshape(height // 2, 2, width // 2, 2).mean((0, 2))
+    if not kinds.min() > 0.0:
+        return None, 0.0
+    spread = float(kinds.max() / kinds.min() - 1.0)
+    return (kinds.max() / kinds if spread > _EVEN else None), spread
+
+
+# ----------------------------------------------------------------------------------------------------
+# Numbered images, one a frame.
+
+
+IMAGE_SUFFIXES = (*TIFF_SUFFIXES, ".png", ".bmp", ".jpg", ".jpeg")
+
+
+def load_image(file: Path, *, grey: bool = True) -> NDArray[Any]:
+    """One picture of 8 or 16 bits or floating point numbers, (height, width), or with colours last.
+
+    Raises
+    ------
+    InputError
+        If the file is no such picture.
+    """
+    import cv2
+
+    try:
+        raw = np.fromfile(file, dtype=np.uint8)
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read ({error.strerror})") from None
+    image = cv2.imdecode(raw, cv2.IMREAD_UNCHANGED) if raw.size else None
+    if image is None:
+        raise InputError(f"{file}: cannot be read as an image")
+    if image.dtype not in (np.uint8, np.uint16, np.float32, np.float64):
+        raise InputError(f"{file}: pixels of type {image.dtype}: must be 8 or 16 bits or floating point")
+    if image.ndim == 3:
+        image = image[..., 2::-1]
+    return grey_of(image) if grey and image.ndim == 3 else image
+
+
+def images_of_header(header: CameraHeader) -> FrameSource:
+    """The numbered images beside a header that says its pixels are in images.
+
+    Those whose names begin with the header's; where there are none, all of that kind in its folder.
+
+    Raises
+    ------
+    InputError
+        If they are missing, or their number or size is not what the header says.
+    """
+    folder = header.path.parent
+    kinds = (".tif", ".tiff") if header.image_suffix == ".tif" else (header.image_suffix,)
+    kinds = (".jpg", ".jpeg") if header.image_suffix == ".jpg" else kinds
+    beside = sorted(one for one in folder.iterdir() if one.suffix.lower() in kinds)
+    own = [one for one in beside if one.name.startswith(header.path.stem)] or beside
+    if not own:
+        raise InputError(
+            f"{header.path}: its pixels are in {header.image_suffix} images, but none is beside it"
+        )
+    source = ImageSource(header.path, own)
+    if len(own) != header.frame_count or source.shape != (header.height, header.width):
+        raise InputError(
+            f"{header.path}: says {header.frame_count} frames of {header.height} x {header.width} pixels; beside it "
+            f"are {len(own)} {header.image_suffix} images of {source.shape[0]} x {source.shape[1]}"
+        )
+    found = source.diagnostics
+    take_header(source, header)
+    source.diagnostics += found
+    if source.max_value > header.max_value and header.effective_side == "lower":
+        source.max_value = header.max_value
+    return source
+
+
+class ImageSource(FrameSource):
+    """Numbered images, one a frame: a folder, or a pattern such as ``test_*.tif``.
+
+    The last number in each name is the number of its frame; a number that is absent is a frame that is
+    missing, and stays one.
+    """
+
+    def __init__(self, path: Path, names: list[Path] | None = None) -> None:
+        super().__init__(path)
+        folder, pattern = (path, "*") if path.is_dir() else (path.parent, path.name)
+        if names is None:
+            names = [one for one in sorted(folder.glob(pattern)) if one.suffix.lower() in IMAGE_SUFFIXES]
+        numbered: dict[int, Path] = {}
+        for one in names:
+            digits = re.findall(r"\d+", one.stem)
+            if not digits:
+                raise InputError(f"{one}: an image of a recording carries its number in its name")
+            number = int(digits[-1])
+            if number in numbered or number >= 2**40:
+                why = "doubles one" if number in numbered else "is too large"
+                raise InputError(f"{one}: the number {number} {why} in {folder}")
+            numbered[number] = one
+        if not numbered:
+            raise InputError(f"{path}: holds no numbered image ({', '.join(IMAGE_SUFFIXES)})")
+        order = sorted(numbered)
+        if order[-1] - order[0] > 20 * len(order) + 1000:
+            after = int(np.argmax(np.diff(order))) + 1
+            raise InputError(
+                f"{numbered[order[after]]}: the number {order[after]} follows {order[after - 1]}; too many "
+                "frames would be missing, so number the images of one recording in a row"
+            )
+        self._files = [numbered[number] for number in order]
+        self.numbers = np.array(order, dtype=np.int64) - order[0]
+        self._full = 0.0
+        first = self._load(0)
+        self.shape = (first.shape[0], first.shape[1])
+        self._dtype = first.dtype
+        if first.dtype.kind == "f":
+            count = len(self._files)
+            self._full = float_range([self._load(k) for k in {0, count // 2, count - 1}], path)
+            self.max_value = 65535
+        else:
+            self.max_value = int(np.iinfo(first.dtype).max)
+        self.metadata = {"format": "numbered images", "first_number": order[0]}
+        if any(one.suffix.lower() in (".jpg", ".jpeg") for one in self._files):
+            self.diagnostics += (KINDS_RECORDING["lossy"].found(error_px=LOSSY_ERROR),)
+            self.edge_error = LOSSY_ERROR
+
+    def _load(self, index: int) -> NDArray[Any]:
+        image = load_image(self._files[index], grey=False)
+        if image.ndim == 3:
+            if not any(one.code == KINDS_RECORDING["colour"].code for one in self.diagnostics):
+                self.diagnostics += (KINDS_RECORDING["colour"].found(channels=image.shape[2]),)
+            image = grey_of(image)
+        return image
+
+    def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
+        kind = np.uint16 if self._full else self._dtype
+        out = np.empty((stop - start, rows[1] - rows[0], self.shape[1]), dtype=kind)
+        for index in range(start, stop):
+            image = self._load(index)
+            if image.shape != self.shape or image.dtype != self._dtype:
+                raise InputError(
+                    f"{self._files[index]}: shape {image.shape} and type {image.dtype} differ from the first "
+                    f"frame's {self.shape} and {self._dtype}"
+                )
+            part = image[rows[0] : rows[1]]
+            levels = scaled_floats(part, self._full) if self._full else part
+            if levels is None:
+                raise InputError(f"{self._files[index]}: holds numbers outside 0 to {self._full:g}")
+            out[index - start] = levels
+        return out
+
+
+# ----------------------------------------------------------------------------------------------------
+# Video files and Phantom's .cine, decoded by PyAV.
+
+
+VIDEO_SUFFIXES = (".avi", ".mp4", ".mov", ".mkv", ".cine")
+LOSSLESS = (
+    "rawvideo", "ffv1", "huffyuv", "ffvhuff", "utvideo", "magicyuv", "lagarith", "png", "tiff", "bmp", "qtrle",
+    "v210", "v410", "r210", "r10k", "zmbv", "flashsv",
+)  # fmt: skip
+"""Names of the codecs that give back the pictures that went in."""
+
+
+class VideoSource(FrameSource):
+    """A video file, decoded by PyAV.
+
+    The rate in a video file is how fast it plays, seldom how fast it was recorded; it stands in the metadata
+    as ``playback_rate`` and is no frame rate.
+    """
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        import av
+
+        self._av = av
+        self._decoder: Iterator[NDArray[np.integer]] | None = None
+        self._next = 0
+        self._container: Any = None
+        try:
+            with av.open(str(path)) as container:
+                if not container.streams.video:
+                    raise InputError(f"{path}: holds no video stream")
+                stream = container.streams.video[0]
+                count = sum(1 for packet in container.demux(stream) if packet.size)
+                codec = stream.codec_context.name
+                if path.suffix.lower() == ".cine":
+                    self._cine(stream, container.metadata)
+                else:
+                    playback = stream.average_rate
+                    rate = None if playback is None else float(playback)
+                    self.metadata = {"format": f"video ({codec})", "playback_rate": rate}
+                if codec not in LOSSLESS:
+                    self.diagnostics += (KINDS_RECORDING["lossy"].found(error_px=LOSSY_ERROR),)
+                    self.edge_error = LOSSY_ERROR
+                name = stream.codec_context.pix_fmt or ""
+                self.shape = (stream.codec_context.height, stream.codec_context.width)
+        except (av.error.FFmpegError, OSError) as error:
+            way_out = ""
+            if path.suffix.lower() == ".cine":
+                way_out = (
+                    "; export it as an uncompressed AVI or as 16-bit TIFF images, and give frame_rate "
+                    "(--frame-rate)"
+                )
+            raise InputError(f"{path}: cannot be read as a video ({error}){way_out}") from None
+        if count == 0 or 0 in self.shape:
+            raise InputError(f"{path}: the video holds no frame")
+        if name not in ("gray", "gray8") and re.search(r"rgb|bgr|bayer|gbr|pal8", name):
+            self.diagnostics += (KINDS_RECORDING["colour"].found(channels=3),)
+        deep = re.search(r"(9|10|12|14|16|48)(le|be)", name)
+        self._format = "gray16le" if deep else "gray"
+        self.max_value = 65535 if deep else 255
+        self.numbers = np.arange(count)
+
+    def _cine(self, stream: Any, metadata: dict[str, str]) -> None:
+        """What the header of a Phantom recording says: how fast it was recorded, for once."""
+        rate = stream.average_rate or stream.base_rate or stream.guessed_rate
+        self.frame_rate = float(rate) if rate else float(1 / stream.time_base)
+        told = {**metadata, **stream.metadata}
+        shutter = float(told.get("shutter_ns", 0))
+        self.exposure = 1e-9 * shutter if 0.0 < 1e-9 * shutter <= 1.01 / self.frame_rate else None
+        self.metadata = {"format": "Phantom cine", "record_rate": self.frame_rate}
+
+    def _frames(self) -> Iterator[NDArray[np.integer]]:
+        self._container = self._av.open(str(self.path))
+        for frame in self._container.decode(video=0):
+            yield frame.to_ndarray(format=self._format)
+
+    def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
+        out = np.empty(
+            (stop - start, rows[1] - rows[0], self.shape[1]), np.uint16 if self.max_value > 255 else np.uint8
+        )
+        if self._decoder is None or self._next > start:
+            self.close()
+            self._decoder, self._next = self._frames(), 0
+        try:
+            while self._next < stop:
+                frame = next(self._decoder, None)
+                if frame is None:
+                    raise InputError(f"{self.path}: ends after frame {self._next} of {self.numbers.size}")
+                if frame.shape != self.shape:
+                    raise InputError(
+                        f"{self.path}: frame {self._next} is of shape {frame.shape}, not {self.shape}"
+                    )
+                if self._next >= start:
+                    out[self._next - start] = frame[rows[0] : rows[1]]
+                self._next += 1
+        except self._av.error.FFmpegError as error:
+            raise InputError(f"{self.path}: frame {self._next} cannot be decoded ({error})") from None
+        return out
+
+    def close(self) -> None:
+        if self._container is not None:
+            self._container.close()
+            self._container = None
+        self._decoder = None
+
+
+# ----------------------------------------------------------------------------------------------------
+# The source for a path, chosen by its suffix.
+
+
+RECORDING_SUFFIXES = (".cih", ".cihx", ".mraw", *VIDEO_SUFFIXES, *TIFF_SUFFIXES, *ARRAY_SUFFIXES)
+"""Ends of names of recordings that are one file."""
+
+
+def open_source(path: Path) -> FrameSource:
+    """The source for a path.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is of no known kind.
+    """
+    try:
+        return _open_source(path)
+    except ImportError as error:
+        raise InputError(f"{path}: reading it needs {error.name} (pip install 'snapbeam[lab]')") from error
+
+
+def _open_source(path: Path) -> FrameSource:
+    if path.is_dir() or any(mark in path.name for mark in "*?["):
+        return ImageSource(path)
+    name, _, dataset = str(path).partition("::")  # a dataset's name may hold "/"
+    path = path if path.exists() else Path(name)
+    dataset, suffix = dataset.replace("\\", "/"), path.suffix.lower()
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if suffix == ".mraw":
+        headers = [path.with_suffix(one) for one in (".cihx", ".cih") if path.with_suffix(one).exists()]
+        if not headers:
+            raise InputError(f"{path}: its header {path.stem}.cihx or {path.stem}.cih is not beside it")
+        path, suffix = headers[0], headers[0].suffix.lower()
+    if suffix in (".cih", ".cihx"):
+        header = read_header(path)
+        return images_of_header(header) if header.image_suffix else PhotronSource(header)
+    if suffix in VIDEO_SUFFIXES:
+        return VideoSource(path)
+    if suffix in TIFF_SUFFIXES:
+        return TiffSource(path)
+    if suffix in ARRAY_SUFFIXES:
+        return ArraySource(path, dataset)
+    raise InputError(
+        f"{path}: unknown kind of recording; known are {', '.join(RECORDING_SUFFIXES)}, a folder of numbered images "
+        "or a pattern such as 'test_*.png'"
+    )

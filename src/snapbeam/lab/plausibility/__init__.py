@@ -1,1 +1,0 @@
-"""What a measurement says against itself: diagnostics as data, one module an instrument."""

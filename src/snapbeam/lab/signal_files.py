@@ -1,0 +1,216 @@
+"""Files of measured time series, read into signals and written back.
+
+Units are stated, by the file or by the caller, or the file is refused; a file and a caller that
+contradict each other are refused too.  Whatever a reading library trips over comes out as an
+:class:`~snapbeam.InputError` that names the file.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from snapbeam.lab.signal_formats import READERS, WRITERS, Channel, Told
+from snapbeam.lab.signals import check_signal, make_signal, parse_sensitivity, si_unit
+from snapbeam.util.diagnostics import DiagnosticWarning
+from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.validation import InputError, InputTypeError, positive, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["read_channels", "read_signal", "write_signal"]
+
+
+def read_channels(
+    path: str | os.PathLike[str], sampling_frequency: float | None = None, columns: str | None = None
+) -> list[Channel]:
+    """Return every channel of a file as a dictionary, in the units of the file.
+
+    Parameters
+    ----------
+    path : path
+        ``.csv``/``.txt`` (a header names the columns, units in brackets; a column ``time`` or a comment
+        ``# sampling_frequency: 12000 Hz``), ``.wav``, ``.uff``/``.unv`` (dataset 58, ASCII or binary), ``.tdms``,
+        ``.h5``/``.hdf5``/``.nc``, ``.npz``/``.npy``.
+    sampling_frequency : float, optional
+        Samples per second [Hz] where the file does not say.
+
+    Returns
+    -------
+    list of dict
+        Keys ``data``, ``name``, ``unit_str``, and ``fs`` [Hz] or ``time`` [s].  ``unit_str`` is None
+        where the file states no unit.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, cut short, of no known kind, without sampling rate, or without a channel.
+    """
+    if not isinstance(path, (str, os.PathLike)):
+        raise InputTypeError(f"path = {shown(path)}: must be a path, not {type(path).__name__}")
+    source = Path(path)
+    reader = READERS.get(source.suffix.lower())
+    if reader is None:
+        raise InputError(f"{source}: unknown kind of file; a signal is one of {', '.join(sorted(READERS))}")
+    if not source.is_file():
+        raise InputError(f"{source}: no such file")
+    if source.stat().st_size == 0:
+        raise InputError(f"{source}: the file is empty")
+    rate = None if sampling_frequency is None else positive("sampling_frequency", sampling_frequency, "Hz")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            warnings.simplefilter("default", DiagnosticWarning)
+            channels = reader(source, Told(rate, columns))
+    except InputError as error:
+        raise InputError(error.args[0] if str(source) in str(error) else f"{source}: {error}") from error
+    except ImportError as error:
+        raise InputError(
+            f"{source}: reading {source.suffix} files needs {error.name}; install snapbeam[lab]"
+        ) from error
+    except MemoryError as error:
+        raise InputError(f"{source}: the header asks for more memory than there is") from error
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise InputError(f"{source}: not a readable {source.suffix} file ({reason})") from error
+    if not channels:
+        raise InputError(f"{source}: holds no channel of numbers")
+    for channel in channels:
+        told = channel.get("fs")
+        if rate is not None and told is not None and abs(told / rate - 1.0) > 1e-5:
+            raise InputError(
+                f"{source}: {channel['name']} is sampled at {told:.9g} Hz but sampling_frequency = {rate:g} "
+                "was given"
+            )
+        if told is None and "time" not in channel:
+            if rate is None:
+                raise InputError(
+                    f"{source}: {channel['name']} has no sampling rate; state sampling_frequency (--sampling-freq) in Hz"
+                )
+            channel["fs"] = rate
+    return channels
+
+
+def read_signal(
+    path: str | os.PathLike[str],
+    channel: str | int | None = None,
+    *,
+    units: str | None = None,
+    sensitivity: str | None = None,
+    sampling_frequency: float | None = None,
+    columns: str | None = None,
+) -> xr.DataArray:
+    """Read one channel of a file as a signal in SI.
+
+    Parameters
+    ----------
+    path : path
+        See :func:`read_channels`.
+    channel : str or int, optional
+        Its name, or its number from 0; needed if there are several.
+    units : str, optional
+        The unit of the numbers where the file does not say, such as ``"mm/s"``.
+    sensitivity : str, optional
+        What a volt or full scale stands for, such as ``"125 mm/s/V"`` or ``"0.5 m/s/FS"``; needed for
+        channels in volts that are to become velocities, and for sound files of integers.
+    sampling_frequency : float, optional
+        Samples per second [Hz] where the file does not say.
+
+    Returns
+    -------
+    xarray.DataArray
+        One dimension ``time`` [s]; attributes ``units``, ``long_name`` and ``source``.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the field: a missing or contradicting unit, an unknown channel, NaN, times that
+        do not increase or have gaps, a truncated file.
+    """
+    channels = read_channels(path, sampling_frequency, columns)
+    names = [entry["name"] for entry in channels]
+    listing = ", ".join(repr(name) for name in names)
+    if channel is None:
+        if len(channels) > 1:
+            raise InputError(f"{path}: holds the channels {listing}; choose one with channel (--channel)")
+        entry = channels[0]
+    elif isinstance(channel, int) and not isinstance(channel, bool):
+        if not 0 <= channel < len(channels):
+            raise InputError(f"{path}: channel = {channel}: must be 0 to {len(channels) - 1} ({listing})")
+        entry = channels[channel]
+    elif channel in names:
+        entry = channels[names.index(channel)]
+    else:
+        raise InputError(f"{path}: channel = {channel!r}: the file holds {listing}")
+    try:
+        return _to_signal(entry, units, sensitivity, Path(path).name)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+
+
+def _to_signal(entry: Channel, units: str | None, sensitivity: str | None, source: str) -> xr.DataArray:
+    name, stated = entry["name"], entry["unit_str"] or None
+    if stated and units and si_unit(name, stated) != si_unit(name, units):
+        raise InputError(f"{name} is in {stated!r} but units = {units!r} was given")
+    unit = stated or units
+    if unit is None and sensitivity is None:
+        raise InputError(
+            f"{name} has no stated unit; state units (--units), such as 'mm/s', or sensitivity (--sensitivity)"
+        )
+    scale, target, per = (
+        (1.0, "", "") if sensitivity is None else parse_sensitivity("sensitivity", sensitivity)
+    )
+    factor, base = si_unit(name, unit or per)
+    if sensitivity is not None:
+        if per != base:
+            raise InputError(f"{name} is in {unit!r} but sensitivity = {sensitivity!r} is per {per}")
+        factor, base = factor * scale, target
+    elif base == "FS":
+        raise InputError(
+            f"{name} is a fraction of full scale; state sensitivity (--sensitivity), such as '0.5 m/s/FS'"
+        )
+    data = np.asarray(entry["data"], dtype=np.float64)
+    bad = np.flatnonzero(~np.isfinite(data))
+    if bad.size:
+        raise InputError(
+            f"{name}, sample {bad[0]}: {data[bad[0]]!r} is not a finite number ({bad.size} such)"
+        )
+    kwargs: dict[str, Any] = {"time": entry["time"]} if "time" in entry else {}
+    if not kwargs:
+        kwargs = {"sampling_frequency": entry["fs"], "start": entry.get("time_offset", 0.0)}
+    signal = make_signal(data * factor, base, name=name, attrs={"source": source}, **kwargs)
+    check_signal(signal, name=name)
+    return signal
+
+
+def write_signal(
+    path: str | os.PathLike[str], signal: xr.DataArray, *, full_scale: float | None = None
+) -> Path:
+    """Write a signal to a CSV, WAV, UFF-58 (binary), TDMS, HDF5 or NumPy ``.npz`` file, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        The suffix chooses the kind.
+    signal : xarray.DataArray
+        See :mod:`snapbeam.lab.signals`.
+    full_scale : float, optional
+        For WAV, what full scale stands for in the unit of the signal; 32-bit integers are written.
+
+    Raises
+    ------
+    InputError
+        If the path cannot be written, or a WAV would clip or needs a rate that is no whole number of hertz.
+    """
+    target = check_writable(path, "path", tuple(WRITERS))
+    check_signal(signal)
+    if (full_scale is not None) != (target.suffix.lower() == ".wav"):
+        raise InputError("full_scale: must be stated for a WAV file, and for no other")
+    with atomic_path(target) as temporary:
+        WRITERS[target.suffix.lower()](temporary, signal, full_scale)
+    return target

@@ -1,0 +1,1142 @@
+"""Readers and writers by the end of a file's name."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+import warnings
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.lab.signals import check_signal, even_sampling, si_unit
+from snapbeam.util.diagnostics import Diagnostic, tell
+from snapbeam.util.netcdf import hdf5_stream
+from snapbeam.util.validation import InputError, positive
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "RATE_NAMES",
+    "READERS",
+    "TIME_NAMES",
+    "UNIT_NAMES",
+    "WRITERS",
+    "Channel",
+    "Table",
+    "TextBlock",
+    "Told",
+    "decoded",
+    "header_rate",
+    "header_unit",
+    "header_values",
+    "is_time",
+    "numbered",
+    "read_block",
+    "read_csv",
+    "read_hdf5",
+    "read_lvm",
+    "read_matlab",
+    "read_numpy",
+    "read_table",
+    "read_tdms",
+    "read_uff",
+    "read_wav",
+    "split_unit",
+    "to_number",
+    "with_time",
+    "write_csv",
+    "write_hdf5",
+    "write_npz",
+    "write_tdms",
+    "write_uff",
+    "write_wav",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# One channel as it comes out of a file, and what a reader is told beside the path.
+
+
+Channel = dict[str, Any]
+"""One channel in the units of the file: ``data``, ``name``, ``unit_str`` (None where the file states
+none), and ``fs`` [Hz] or ``time`` [s] where it has them."""
+
+RATE_NAMES = ("sampling_frequency", "sampling_frequency", "fs", "sample_rate", "samplerate", "wf_samplerate")
+UNIT_NAMES = ("units", "unit", "unit_str", "unit_string", "NI_UnitDescription")
+TIME_NAMES = ("time", "t", "zeit", "temps", "x-axis", "second", "seconds", "x_value")
+
+
+class Told(NamedTuple):
+    """What a person says of a file: samples per second [Hz], and the columns of a table without a header."""
+
+    rate: float | None = None
+    columns: str | None = None
+
+
+def is_time(name: str) -> bool:
+    """Whether a channel's name is that of a time axis."""
+    return name.strip().lower() in TIME_NAMES
+
+
+def with_time(channels: list[Channel]) -> list[Channel]:
+    """Take the time axes out of *channels* and give each to the channels of its group and length."""
+    axes: dict[str, Any] = {}
+    for channel in channels:
+        folder, _, last = channel["name"].rpartition("/")
+        if is_time(last):
+            factor, base = si_unit(channel["name"], channel["unit_str"] or "s")
+            if base != "s":
+                raise InputError(f"{channel['name']} is in {channel['unit_str']!r}, not in seconds")
+            axes[folder] = np.asarray(channel["data"], dtype=np.float64) * factor
+    signals = [c for c in channels if not is_time(c["name"].rpartition("/")[2])]
+    for channel in signals:
+        folder = channel["name"].rpartition("/")[0]
+        if "fs" in channel or folder not in axes:
+            continue
+        if axes[folder].size != np.size(channel["data"]):
+            raise InputError(
+                f"{channel['name']} has {np.size(channel['data'])} samples, its time axis {axes[folder].size}"
+            )
+        channel["time"] = axes[folder]
+    return signals
+
+
+def numbered(channels: list[Channel]) -> list[Channel]:
+    """Channels of which each has a name of its own."""
+    seen: dict[str, int] = {}
+    for channel in channels:
+        name = channel["name"]
+        seen[name] = seen.get(name, 0) + 1
+        if seen[name] > 1:
+            channel["name"] = f"{name} ({seen[name]})"
+    return channels
+
+
+# ----------------------------------------------------------------------------------------------------
+# NumPy's files: .npy with one channel, .npz with several, their units and their rate.
+
+
+def read_numpy(path: Path, _told: Told) -> list[Channel]:
+    loaded = np.load(path, allow_pickle=False)
+    if isinstance(loaded, np.ndarray):
+        if loaded.ndim != 1 or loaded.dtype.kind not in "iuf":
+            raise InputError(
+                f"array of {loaded.dtype} and shape {loaded.shape}: must be one channel of numbers"
+            )
+        return [{"data": loaded, "name": path.stem, "unit_str": None}]
+    with loaded:
+        arrays = {name: loaded[name] for name in loaded.files}
+    scalars = {name: value.item() for name, value in arrays.items() if value.ndim == 0}
+    stated = next((scalars[name] for name in RATE_NAMES if name in scalars), None)
+    channels: list[Channel] = []
+    for name, data in arrays.items():
+        if data.ndim != 1 or data.dtype.kind not in "iuf":
+            continue
+        units = (scalars.get(f"{name}_{key}", scalars.get(key)) for key in UNIT_NAMES)
+        unit = next((str(value) for value in units if value), None)
+        channel: Channel = {"data": data, "name": name, "unit_str": unit}
+        if stated is not None:
+            channel["fs"] = positive("sampling_frequency", stated, "Hz")
+        channels.append(channel)
+    return with_time(channels)
+
+
+def write_npz(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+    values, time, _ = check_signal(signal)
+    name = str(signal.name)
+    arrays: dict[str, Any] = {name: values, "time": time}
+    arrays |= {f"{name}_units": signal.attrs["units"], "time_units": "s"}
+    np.savez(path, **arrays)
+
+
+# ----------------------------------------------------------------------------------------------------
+# HDF5 files: one-dimensional datasets, units and rates in attributes.
+
+
+def read_hdf5(path: Path, _told: Told) -> list[Channel]:
+    import h5py
+
+    channels: list[Channel] = []
+    with h5py.File(path, "r") as file:
+
+        def visit(name: str, item: Any) -> None:
+            if not isinstance(item, h5py.Dataset) or item.ndim != 1 or item.dtype.kind not in "iuf":
+                return
+            if item.external or item.is_virtual:
+                raise InputError(
+                    f"path = {str(path)!r}: {name!r} has its numbers in another file: copy them into this one"
+                )
+            levels = [item.attrs, item.parent.attrs, file.attrs]
+            stated = next((item.attrs[key] for key in UNIT_NAMES if key in item.attrs), None)
+            rates = [level[key] for level in levels for key in RATE_NAMES if key in level]
+            unit = None if stated is None else _text(stated)
+            channel: Channel = {"data": item[()], "name": name, "unit_str": unit}
+            if rates:
+                channel["fs"] = positive(f"{name}: sampling rate", np.asarray(rates[0]).item(), "Hz")
+            channels.append(channel)
+
+        file.visititems(visit)
+    return with_time(channels)
+
+
+def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+    import h5py
+
+    values, time, _ = check_signal(signal)
+    with hdf5_stream(path) as stream, h5py.File(stream, "w") as file:
+        axis = file.create_dataset("time", data=time)
+        axis.attrs["units"] = "s"
+        data = file.create_dataset(str(signal.name), data=values)
+        data.attrs["units"] = signal.attrs["units"]
+
+
+def _text(value: Any) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Text tables of many dialects: where the header ends, what separates cells, what the header says.
+#
+# A table is a block of rows of numbers with the same count of cells, after any header.  Cells are separated by
+# semicolons, tabs, commas or blanks; with all but commas a comma may be the decimal sign, and points between
+# groups of three digits before it are left out.  Nothing is dropped: after the first row of numbers every line
+# must be one.
+
+
+_COMMENT = ("#", "%", "//", "!")
+_LOOK = 400  # lines in which the table must begin
+_ABOVE = 20
+"""Rows at the end whose numbers are compared."""
+_GROUPED = re.compile(r"[-+]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?([eE][-+]?\d+)?")
+
+
+@dataclass(frozen=True)
+class TextBlock:
+    """A text file taken apart.
+
+    ``header`` are the lines before the table and all comments; ``names`` and ``units`` the cells of the rows
+    that head the columns, None where there is no such row; ``rows`` the cells, on the ``lines`` of the file.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    names: tuple[str, ...] | None
+    units: tuple[str, ...] | None
+    rows: list[list[str]]
+    lines: list[int]
+    decimal_comma: bool
+
+
+def decoded(path: Path) -> str:
+    """The text of a file: UTF-8, UTF-16 or Latin-1.
+
+    Raises
+    ------
+    InputError
+        If it is no text.
+    """
+    raw = path.read_bytes()
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
+        kind = "utf-16"
+    elif raw[:400].count(0) > 0.3 * len(raw[:400]) and len(raw) % 2 == 0:
+        kind = "utf-16-le" if raw[1:400:2].count(0) > raw[0:400:2].count(0) else "utf-16-be"
+    else:
+        kind = "utf-8-sig"
+    if kind == "utf-8-sig" and b"\x00" in raw:
+        raise InputError(f"{path}: is no text (it holds zero bytes)")
+    try:
+        text = raw.decode(kind)
+    except UnicodeDecodeError:
+        if kind != "utf-8-sig":
+            raise InputError(f"{path}: is no text") from None
+        text = raw.decode("latin-1")
+    if "\x00" in text:
+        raise InputError(f"{path}: is no text (it holds zero bytes)")
+    return text
+
+
+def to_number(cell: str, decimal_comma: bool = False) -> float:
+    """The number in a cell; NaN if it holds none."""
+    text = cell.strip()
+    if decimal_comma and "," in text:
+        if text.count(",") > 1 or ("." in text and not _GROUPED.fullmatch(text)):
+            return math.nan
+        text = text.replace(".", "").replace(",", ".")
+    try:
+        return float(text) if "_" not in text else math.nan
+    except ValueError:
+        return math.nan
+
+
+def _cells(lines: list[str], separator: str | None) -> list[list[str]]:
+    if separator is None:
+        return [line.split() for line in lines]
+    rows = csv.reader(lines, delimiter=separator, skipinitialspace=True, strict=True)
+    return [[cell.strip() for cell in row] for row in rows]
+
+
+@dataclass(frozen=True)
+class _Dialect:
+    separator: str | None
+    decimal_comma: bool
+    first: int  # index of the first row of numbers
+    used: tuple[int, ...]  # cells of it that are no empty columns
+
+    def row_of(self, cells: list[str]) -> list[str]:
+        return [cells[i] if i < len(cells) else "" for i in self.used]
+
+
+def _is_row(cells: list[str], used: tuple[int, ...], decimal_comma: bool) -> bool:
+    return bool(used) and all(
+        i < len(cells) and math.isfinite(to_number(cells[i], decimal_comma)) for i in used
+    )
+
+
+def _dialects(lines: list[str]) -> list[_Dialect]:
+    """Every way in which a table can be seen in the first lines."""
+    found = []
+    few = lines[:_LOOK]
+    for separator, commas in (
+        (";", (True, False)),
+        ("\t", (False, True)),
+        (",", (False,)),
+        (None, (False, True)),
+    ):
+        try:
+            cells = _cells(few, separator)
+        except csv.Error:
+            continue
+        if len(cells) != len(few):
+            continue
+        for comma in commas:
+            for k, row in enumerate(cells):
+                used = tuple(i for i, cell in enumerate(row) if cell)
+                following = cells[k : k + 3]
+                if all(_is_row(one, used, comma) and sum(map(bool, one)) == len(used) for one in following):
+                    found.append(_Dialect(separator, comma, k, used))
+                    break
+    return found
+
+
+def _is_short(cells: list[list[str]]) -> bool:
+    """Whether the last number has fewer digits behind its point than those above it, which all have as many."""
+    column = [re.search(r"[.,](\d*)$", row[-1].strip()) for row in cells[-_ABOVE:] if row]
+    digits = {len(found[1]) for found in column[:-1] if found}
+    if len(digits) != 1 or len(column) < _ABOVE:
+        return False
+    last = column[-1]
+    return last is None or len(last[1]) < digits.pop()
+
+
+def read_block(path: Path, columns: int = 0) -> TextBlock:
+    """Take a text file apart.
+
+    Parameters
+    ----------
+    path
+        The file.
+    columns
+        How many columns there are, where a person says so.
+
+    Raises
+    ------
+    InputError
+        If there is no row of numbers, or the way to read it is not clear.
+    """
+    text = decoded(path)
+    numbered = [(i, line.rstrip("\r")) for i, line in enumerate(text.split("\n"), 1) if line.strip()]
+    comments = [line.strip().lstrip("#%/!").strip() for _, line in numbered if line.startswith(_COMMENT)]
+    numbered = [(i, line) for i, line in numbered if not line.startswith(_COMMENT)]
+    lines = [line for _, line in numbered]
+    if not lines:
+        raise InputError(f"{path}: holds no header and no row")
+    dialects = _dialects(lines)
+    if not dialects:
+        if len(lines) == 1:
+            raise InputError(f"{path}: holds a header and no row")
+        raise InputError(
+            f"{path}: no row of numbers in its first {min(len(lines), _LOOK)} lines; its columns may not be separated "
+            "by semicolons, tabs, commas or blanks"
+        )
+    dialect, names, units, taken = _best(path, lines, dialects, columns)
+    first = _earlier(lines, dialect)
+    try:
+        cells = _cells(lines[first:], dialect.separator)
+    except csv.Error as error:
+        raise InputError(f"{path}: is no table ({error})") from error
+    if len(cells) != len(lines) - first:
+        raise InputError(f"{path}: a quoted value runs over the end of a line")
+    if not text.endswith("\n") and _is_short(cells):
+        words = f"{path}: ends inside its last number, {cells[-1][-1].strip()!r}, as a copy that was broken off does"
+        tell([Diagnostic("signal.cut", words, {"lines": float(len(lines))})])
+    return TextBlock(
+        path=path,
+        header=(*comments, *(line for k, line in enumerate(lines[: dialect.first]) if k not in taken)),
+        names=names,
+        units=units,
+        rows=[_kept(row, dialect, numbered[first + k][0], path, names) for k, row in enumerate(cells)],
+        lines=[i for i, _ in numbered[first:]],
+        decimal_comma=dialect.decimal_comma,
+    )
+
+
+def _kept(
+    cells: list[str], dialect: _Dialect, line: int, path: Path, names: tuple[str, ...] | None
+) -> list[str]:
+    """The cells of a row that belong to the table's columns."""
+    whole = len(cells) > max(dialect.used)
+    extra = dialect.separator is None and len(cells) != len(dialect.used)
+    stray = [cell for i, cell in enumerate(cells) if cell and i > max(dialect.used)]
+    if not whole or extra or stray:
+        count = len([cell for cell in cells if cell]) if stray or extra else len(cells)
+        told = "the header names" if names else "the first has"
+        raise InputError(f"{path}: line {line} has {count} value(s), {told} {len(dialect.used)} column(s)")
+    return dialect.row_of(cells)
+
+
+def _earlier(lines: list[str], dialect: _Dialect) -> int:
+    """The first row of numbers, beside cells of the header too, as oscilloscopes write them."""
+    if not dialect.used or dialect.used[0] == 0:
+        return dialect.first
+    first = dialect.first
+    cells = _cells(lines[: dialect.first], dialect.separator)
+    while first > 0 and _is_row(cells[first - 1], dialect.used, dialect.decimal_comma):
+        first -= 1
+    return first
+
+
+def _best(
+    path: Path, lines: list[str], dialects: list[_Dialect], columns: int
+) -> tuple[_Dialect, tuple[str, ...] | None, tuple[str, ...] | None, set[int]]:
+    """The dialect whose header fits its columns, its names and units, and the lines these stand on."""
+    seen = [(one, *_heads(lines, one)) for one in dialects]
+    if columns:
+        seen = [entry for entry in seen if len(entry[0].used) == columns] or seen
+    named = [entry for entry in seen if entry[1] is not None]
+    if named:  # the earliest table, then the most columns
+        return min(named, key=lambda entry: (entry[0].first, -len(entry[0].used)))
+    best = min(seen, key=lambda entry: (entry[0].first, -len(entry[0].used)))
+    rivals = [
+        entry for entry in seen if entry[0].first == best[0].first and len(entry[0].used) != len(best[0].used)
+    ]
+    if rivals and not columns and best[0].separator == ",":
+        raise InputError(
+            f"{path}: without a header it is not clear whether commas part columns or decimals in "
+            f"{lines[best[0].first]!r}; give columns (--columns), such as 'time [s],velocity [mm/s]'"
+        )
+    return best
+
+
+def _heads(
+    lines: list[str], dialect: _Dialect
+) -> tuple[tuple[str, ...] | None, tuple[str, ...] | None, set[int]]:
+    """Names and units of the columns from the one or two lines before the table."""
+    above: list[tuple[int, list[str]]] = []
+    count = len(dialect.used)
+    for k in range(dialect.first - 1, max(dialect.first - 3, -1), -1):
+        cells = (
+            [lines[k].strip()]
+            if count == 1 and dialect.separator is None
+            else _cells([lines[k]], dialect.separator)[0]
+        )
+        row = dialect.row_of(cells)
+        fits = len([cell for cell in cells if cell]) >= count and all(row)
+        text = any(re.search(r"[^\W\d_]", cell) and not math.isfinite(to_number(cell)) for cell in row)
+        if dialect.separator is None and len(cells) != count:
+            fits = False
+        if not fits or not text:
+            break
+        above.append((k, row))
+    if not above:
+        return None, None, set()
+    at, last = above[0]
+    if len(above) == 2 and all(_like_unit(cell) for cell in last):
+        return tuple(above[1][1]), tuple(last), {at, above[1][0]}
+    return tuple(last), None, {at}
+
+
+def _like_unit(cell: str) -> bool:
+    from snapbeam.lab.signals import si_unit
+
+    word = cell.strip().strip("[]()").strip()
+    try:
+        si_unit("column", word)
+    except InputError:
+        return not word or word == "-" or word.lower() == "sequence"
+    return True
+
+
+# ----------------------------------------------------------------------------------------------------
+# LabVIEW's text files (.lvm): a header of the file, then for each segment its own and a table.
+
+
+_SEPARATORS = {"tab": "\t", "comma": ",", "semicolon": ";"}
+_END = "***end_of_header***"
+
+
+def read_lvm(path: Path, _told: Told) -> list[Channel]:
+    """Channels of the first segment of an .lvm file.
+
+    Raises
+    ------
+    InputError
+        If the header is not that of such a file, or the file holds several segments: they need not join.
+    """
+    lines = [line.rstrip("\r") for line in decoded(path).split("\n")]
+    if not lines[0].lower().startswith("labview measurement"):
+        raise InputError("does not begin with 'LabVIEW Measurement', so it is no .lvm file")
+    file_header, at = _header(lines, 0, None)
+    separator = _SEPARATORS.get(file_header.get("separator", ["Tab"])[0].lower(), "\t")
+    comma = file_header.get("decimal_separator", ["."])[0] == ","
+    header, at = _header(lines, at, separator)
+    if "samples" not in header or "delta_x" not in header:
+        raise InputError("has no segment header with Samples and Delta_X")
+    if any(_END == line.strip().strip(separator).lower() for line in lines[at:]):
+        raise InputError("holds several segments; save one to a file")
+    names = [cell.strip() for cell in lines[at].split(separator)]
+    rows = [(k + 1, line.split(separator)) for k, line in enumerate(lines) if k > at and line.strip()]
+    count = int(to_number(header.get("channels", ["0"])[0], comma) or 0)
+    columns = [k for k, name in enumerate(names) if name and name.lower() not in ("x_value", "comment")]
+    if not columns or (count and len(columns) != count):
+        raise InputError(f"line {at + 1}: names {len(columns)} channel(s), the header says {count}")
+    units = header.get("y_unit_label", [])
+    channels: list[Channel] = []
+    for number, k in enumerate(columns):
+        step = to_number(header["delta_x"][min(number, len(header["delta_x"]) - 1)], comma)
+        start = to_number(header.get("x0", ["0"])[min(number, len(header.get("x0", ["0"])) - 1)], comma)
+        if not (math.isfinite(step) and step > 0.0):
+            raise InputError(f"Delta_X = {header['delta_x'][0]!r}: must be a positive number of seconds")
+        samples = int(to_number(header["samples"][min(number, len(header["samples"]) - 1)], comma))
+        if len(rows) != samples:
+            raise InputError(f"the header promises {samples} samples, the file has {len(rows)}")
+        data = np.array([to_number(cells[k], comma) if k < len(cells) else math.nan for _, cells in rows])
+        bad = np.flatnonzero(~np.isfinite(data))
+        if bad.size:
+            raise InputError(f"line {rows[int(bad[0])][0]}, column {names[k]!r}: is not a finite number")
+        channels.append(
+            {
+                "data": data,
+                "name": names[k],
+                "unit_str": (units[number].strip() or None) if number < len(units) else None,
+                "fs": 1.0 / step,
+                "time_offset": start if math.isfinite(start) else 0.0,
+            }
+        )
+    return numbered(channels)
+
+
+def _header(lines: list[str], at: int, separator: str | None) -> tuple[dict[str, list[str]], int]:
+    """Fields of a header that ends with its mark, and the line after it."""
+    fields: dict[str, list[str]] = {}
+    for k in range(at, len(lines)):
+        line = lines[k].strip()
+        if line.strip("\t,;").lower() == _END:
+            return fields, k + 1
+        mark = separator or next((one for one in ("\t", ";", ",") if one in line), None)
+        if mark is not None and line:
+            key, *values = line.split(mark)
+            fields.setdefault(key.strip().lower(), [value.strip() for value in values if value.strip()])
+    raise InputError("the header has no end (***End_of_Header***)")
+
+
+# ----------------------------------------------------------------------------------------------------
+# MATLAB files: version 5 by SciPy, version 7.3 by h5py.  Numbers and text only; objects are left alone.
+
+
+_LONGEST_SIDE = 64  # channels in a matrix
+
+
+def read_matlab(path: Path, _told: Told) -> list[Channel]:
+    """Channels of a .mat file: vectors, columns of matrices, and those in structures.
+
+    A scalar named like ``fs`` is the sampling rate, a vector named like ``time`` the time axis, a text
+    ``<name>_units`` or ``units`` the unit.
+    """
+    with open(path, "rb") as file:
+        start = file.read(512)
+    if start[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in start[:128]:
+        values = _version_73(path)
+    else:
+        values = _version_5(path)
+    return _channels(values)
+
+
+def _version_5(path: Path) -> dict[str, Any]:
+    from scipy.io import loadmat
+
+    loaded = loadmat(path, squeeze_me=True, struct_as_record=True, chars_as_strings=True)
+    values: dict[str, Any] = {}
+
+    def take(name: str, item: Any, depth: int) -> None:
+        array = np.asarray(item)
+        if array.dtype.names and depth < 4:
+            for key in array.dtype.names:
+                inner = array[key]
+                take(
+                    f"{name}/{key}",
+                    inner.item() if inner.dtype == object and inner.ndim == 0 else inner,
+                    depth + 1,
+                )
+        elif array.dtype.kind in "iufU":
+            values[name] = array
+
+    for name, item in loaded.items():
+        if not name.startswith("__"):
+            take(name, item, 0)
+    return values
+
+
+def _version_73(path: Path) -> dict[str, Any]:
+    import h5py
+
+    values: dict[str, Any] = {}
+    with h5py.File(path, "r") as file:
+
+        def visit(name: str, item: Any) -> None:
+            if (
+                not isinstance(item, h5py.Dataset)
+                or name.startswith("#refs#")
+                or item.dtype.kind not in "iuf"
+            ):
+                return
+            if item.attrs.get("MATLAB_empty", 0):
+                return
+            array = np.asarray(item[()])
+            if item.attrs.get("MATLAB_class", b"") == b"char":
+                values[name] = np.array("".join(chr(int(code)) for code in array.ravel(order="F")))
+            else:
+                values[name] = np.squeeze(array.T)
+
+        file.visititems(visit)
+    return values
+
+
+def _channels(values: dict[str, Any]) -> list[Channel]:
+    rates = {name: value for name, value in values.items() if _last(name) in RATE_NAMES and value.size == 1}
+    channels: list[Channel] = []
+    for name, value in values.items():
+        if value.dtype.kind not in "iuf" or value.size < 2:
+            continue
+        if value.ndim == 2 and min(value.shape) <= _LONGEST_SIDE:
+            columns = value if value.shape[0] >= value.shape[1] else value.T
+        elif value.ndim == 1:
+            columns = value[:, None]
+        else:
+            continue
+        folder = name.rpartition("/")[0]
+        unit = _unit(values, name)
+        rate = next((rates[key] for key in rates if key.rpartition("/")[0] in (folder, "")), None)
+        for k in range(columns.shape[1]):
+            own = name if columns.shape[1] == 1 else f"{name} {k + 1}"
+            channel: Channel = {"data": columns[:, k].astype(np.float64), "name": own, "unit_str": unit}
+            if rate is not None:
+                channel["fs"] = positive(f"{own}: sampling rate", float(rate.item()), "Hz")
+            channels.append(channel)
+    if not channels:
+        raise InputError(
+            "holds no vector or matrix of numbers (objects and cells are not read; save as numbers)"
+        )
+    return with_time(channels)
+
+
+def _last(name: str) -> str:
+    return name.rpartition("/")[2].lower()
+
+
+def _unit(values: dict[str, Any], name: str) -> str | None:
+    folder = name.rpartition("/")[0]
+    for key in UNIT_NAMES:
+        common = () if is_time(_last(name)) else (f"{folder}/{key}" if folder else key,)
+        for candidate in (f"{name}_{key}", *common):
+            value = values.get(candidate)
+            if value is not None and value.dtype.kind == "U" and value.ndim == 0:
+                return str(value.item()).strip() or None
+    return None
+
+
+# ----------------------------------------------------------------------------------------------------
+# What the lines above a table say: sampling rate and units, under the names that instruments give them.
+
+
+_RATES = (
+    "samplingfreq", "samplingfrequency", "samplingfreqhz", "samplingfrequencyhz", "samplerate", "samplerate hz",
+    "sampleratehz", "samplingrate", "samplingratehz", "samplefrequency", "fs", "fshz", "abtastrate",
+)  # fmt: skip
+_STEPS = (
+    "sampleinterval", "samplingintervall", "samplinginterval", "sampleperiod", "samplingperiod", "timestep",
+    "timeincrement", "timeinterval", "deltat", "deltats", "dt", "dts", "xincrement", "increment", "resolutionx",
+)  # fmt: skip
+_LONGEST_LINE = 2000
+"""Letters of a line of a header that is looked into."""
+_PER_SECOND = {
+    "": 1.0,
+    "hz": 1.0,
+    "khz": 1e3,
+    "mhz": 1e6,
+    "s/s": 1.0,
+    "sa/s": 1.0,
+    "ks/s": 1e3,
+    "ms/s": 1e6,
+    "1/s": 1.0,
+}
+
+
+def header_values(lines: Iterable[str]) -> dict[str, str]:
+    """Keys and values of header lines such as ``Sample Rate: 12 kHz`` or ``Vertical Units,V``.
+
+    Keys lose everything but letters and digits; the first of two of one name counts.
+    """
+    values: dict[str, str] = {}
+    for line in lines:
+        if len(line) > _LONGEST_LINE:
+            continue
+        found = re.match(r'\s*"?([^:=,;\t"]+?)"?\s*([:=,;\t])\s*"?(.*?)"?\s*[,;\t]*\s*$', line)
+        if found:
+            key = re.sub(r"[^a-z0-9]", "", found[1].lower())
+            ends = r"[,;\t]" if found[2] == "," else r"[;\t]"  # else a comma may be the decimal sign
+            values.setdefault(key, re.split(ends, found[3])[0].strip().strip('"'))
+    return values
+
+
+def header_rate(values: dict[str, str], where: str) -> float | None:
+    """Samples per second [Hz] that a header states; None if it does not.
+
+    Raises
+    ------
+    InputError
+        If it states two that differ.
+    """
+    found: dict[str, float] = {}
+    for key, value in values.items():
+        number, unit = _quantity(value)
+        if not (math.isfinite(number) and number > 0.0):
+            continue
+        if key in _RATES and unit.lower() in _PER_SECOND:
+            found[key] = number * _PER_SECOND[unit.lower()]
+        elif key in _STEPS:
+            try:
+                factor, base = si_unit(key, unit or "s")
+            except InputError:
+                continue
+            if base == "s":
+                found[key] = 1.0 / (number * factor)
+    if found and max(found.values()) > 1.001 * min(found.values()):
+        told = ", ".join(f"{key} {value:.9g} Hz" for key, value in found.items())
+        raise InputError(f"{where}: the header contradicts itself about the sampling rate ({told})")
+    return next(iter(found.values()), None)
+
+
+def header_unit(values: dict[str, str], *keys: str) -> str | None:
+    """The unit that stands under one of *keys*, without a channel's name before it; None if none does."""
+    for key in keys:
+        word = values.get(key, "").rpartition(":")[2].strip()
+        if word:
+            return word
+    return None
+
+
+def _quantity(text: str) -> tuple[float, str]:
+    """Number and unit of ``"12 kHz"``, ``"CH1:2e-8"`` or ``"0,5 ms"``."""
+    found = re.fullmatch(r"(?:\w+:)?\s*([-+]?[0-9][0-9.,]*(?:[eE][-+]?\d+)?)\s*\[?([^\]]*)\]?", text.strip())
+    if not found:
+        return math.nan, ""
+    comma = "," in found[1] and "." not in found[1]
+    return to_number(found[1], comma), found[2].strip()
+
+
+# ----------------------------------------------------------------------------------------------------
+# Time series as text tables: one column a channel, units in the header, faults named by line and column.
+
+
+_LONGEST_NAME = 500
+"""Letters of a name of a column that a unit is looked for in."""
+_SUFFIX_UNITS = {
+    "_m_s": "m/s",
+    "_mm_s": "mm/s",
+    "_um_s": "um/s",
+    "_mm": "mm",
+    "_um": "um",
+    "_ms": "ms",
+    "_us": "us",
+    "_m": "m",
+    "_s": "s",
+    "_v": "V",
+    "_n": "N",
+    "_hz": "Hz",
+}
+
+
+class Table(NamedTuple):
+    """A text table: its ``columns`` of cells by name, the ``lines`` they stand on, and the lines above."""
+
+    path: Path
+    columns: dict[str, tuple[str, ...]]
+    lines: list[int]
+    header: tuple[str, ...]
+    decimal_comma: bool
+
+    def numbers(self, name: str) -> NDArray[np.float64]:
+        """Return a column as floats; refuse a cell that is no finite number, naming its line.
+
+        Raises
+        ------
+        InputError
+            Naming the file, the line, the column and the cell.
+        """
+        cells = self.columns[name]
+        try:
+            if self.decimal_comma:
+                raise ValueError
+            numbers = np.array(cells, dtype=np.float64)
+        except ValueError:
+            numbers = np.array([to_number(cell, self.decimal_comma) for cell in cells])
+        bad = np.flatnonzero(~np.isfinite(numbers))
+        if bad.size:
+            at = int(bad[0])
+            cell = self.columns[name][at]
+            raise InputError(
+                f"{self.path}: line {self.lines[at]}, column {name!r}: {cell!r} is not a finite number"
+            )
+        return numbers
+
+
+def read_table(path: Path, columns: str | None = None) -> Table:
+    """Read a text table; see :mod:`snapbeam.lab.signal_formats` for its dialects.
+
+    Parameters
+    ----------
+    path
+        The file.
+    columns
+        Names and units of the columns, separated by commas, instead of those in the file.
+
+    Raises
+    ------
+    InputError
+        If there is no header and no *columns*, no row, a row of another length, or a column without a name of
+        its own.
+    """
+    given = [name.strip() for name in columns.split(",")] if columns else []
+    block = read_block(path, len(given))
+    width = len(block.rows[0])
+    names = tuple(given) if given else _names(block)
+    if names is None:
+        raise InputError(
+            f"{path}: its first row, line {block.lines[0]}, has no header above it that names its {width} column(s); "
+            "give columns (--columns), such as 'time [s],velocity [mm/s]'"
+        )
+    if len(names) != width:
+        raise InputError(
+            f"{path}: columns (--columns) = {columns!r} names {len(names)}, the rows have {width}"
+        )
+    if "" in names or len(set(names)) < len(names):
+        raise InputError(f"{path}: columns {list(names)}: each must have a name of its own")
+    cells = zip(*block.rows, strict=True)
+    table = {name: tuple(column) for name, column in zip(names, cells, strict=True)}
+    return Table(path, table, block.lines, block.header, block.decimal_comma)
+
+
+def _names(block: TextBlock) -> tuple[str, ...] | None:
+    """Names of the columns with their units in brackets; None if there are none."""
+    if block.names is None:
+        values = header_values(block.header)
+        across, up = header_unit(values, "horizontalunits"), header_unit(values, "verticalunits")
+        if len(block.rows[0]) == 2 and across and up:  # an oscilloscope's table
+            return f"time [{across}]", f"{values.get('source', 'channel 1')} [{up}]"
+        return None
+    if block.units is None:
+        return block.names
+    joined = []
+    for name, unit in zip(block.names, block.units, strict=True):
+        word = unit.strip().strip("[]()").strip()
+        known = split_unit(name)[1] is not None or word in ("", "-")
+        joined.append(name if known else f"{name} [{word}]")
+    return tuple(joined)
+
+
+def read_csv(path: Path, told: Told) -> list[Channel]:
+    """Return the channels of a text table; see :func:`snapbeam.lab.signal_files.read_channels`."""
+    table = read_table(path, told.columns)
+    columns = {name: split_unit(name) for name in table.columns}
+    times = [name for name, (word, unit) in columns.items() if _is_time(word, unit)]
+    if len(times) > 1:
+        raise InputError(f"{path}: columns {times}: only one may be the time")
+    values = header_values(table.header)
+    rate = header_rate(values, str(path))
+    common: dict[str, Any] = {}
+    if times:
+        unit = columns[times[0]][1] or "s"
+        factor, base = si_unit(f"column {times[0]!r}", unit)
+        if base != "s":
+            raise InputError(f"{path}: column {times[0]!r} is in {unit!r}, not in seconds")
+        common["time"] = table.numbers(times[0]) * factor
+        if rate is not None:
+            _agree(path, common["time"], rate)
+    elif rate is not None:
+        common["fs"] = rate
+    upward = header_unit(values, "verticalunits", "yunit", "yunits", "unity")
+    return [
+        {"data": table.numbers(name), "name": word, "unit_str": unit or upward, **common}
+        for name, (word, unit) in columns.items()
+        if name not in times
+    ]
+
+
+def _is_time(word: str, unit: str | None) -> bool:
+    """Whether a column is the time: by its name, unless that is one of an axis with another unit."""
+    if not is_time(word) or unit is None or word.lower() not in ("x-axis", "x_value"):
+        return is_time(word)
+    return si_unit(f"column {word!r}", unit)[1] == "s"
+
+
+def _agree(path: Path, time: NDArray[np.float64], rate: float) -> None:
+    """Refuse a column of times that contradicts the rate in the header."""
+    if time.size < 3:
+        return
+    _, found = even_sampling(str(path), time)
+    if abs(found / rate - 1.0) * time.size > 1.0 and abs(found / rate - 1.0) > 1e-3:
+        raise InputError(
+            f"{path}: the column of times is sampled at {found:.9g} Hz, the header says {rate:.9g} Hz; give columns "
+            "(--columns) with another name for the wrong one"
+        )
+
+
+def write_csv(path: Path, signal: xr.DataArray, _full_scale: float | None = None) -> None:
+    """Write a signal as a table of time and value, 12 digits each."""
+    values, time, rate = check_signal(signal)
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(f"# sampling_frequency: {rate:.12g} Hz\n")
+        file.write(f"time [s],{signal.name} [{signal.attrs['units']}]\n")
+        np.savetxt(file, np.column_stack((time, values)), fmt="%.12g", delimiter=",")
+
+
+def split_unit(column: str) -> tuple[str, str | None]:
+    """Split ``"velocity [mm/s]"``, ``"velocity (mm/s)"`` or ``"velocity_mm_s"`` into name and unit.
+
+    A name that is a unit itself, such as ``Volt``, is one too.
+    """
+    if len(column) > _LONGEST_NAME:
+        return column, None
+    found = re.fullmatch(r"\s*(.*?)\s*[\[(]\s*(.+?)\s*[\])]\s*", column)
+    if found:
+        return found[1] or column, found[2]
+    for suffix, unit in _SUFFIX_UNITS.items():
+        if column.lower().endswith(suffix) and len(column) > len(suffix):
+            return column[: -len(suffix)], unit
+    if column.strip().lower() in ("volt", "volts", "second", "seconds"):
+        return column, column.strip()
+    return column, None
+
+
+# ----------------------------------------------------------------------------------------------------
+# LabVIEW's TDMS files.
+
+
+def read_tdms(path: Path, _told: Told) -> list[Channel]:
+    from nptdms import TdmsFile
+
+    file = TdmsFile.read(path)
+    if file.file_status.incomplete_final_segment:
+        raise InputError("the file is cut short: its last segment is incomplete")
+    channels: list[Channel] = []
+    for group in file.groups():
+        for entry in group.channels():
+            data = entry[:]
+            if data.dtype.kind not in "iuf" or data.size == 0:
+                continue
+            unit = next((str(entry.properties[k]) for k in UNIT_NAMES if entry.properties.get(k)), None)
+            channel: Channel = {"data": data, "name": f"{group.name}/{entry.name}", "unit_str": unit}
+            step = entry.properties.get("wf_increment")
+            if step is not None:
+                channel["fs"] = 1.0 / positive(f"{channel['name']}: wf_increment", step, "s")
+                channel["time_offset"] = float(entry.properties.get("wf_start_offset", 0.0))
+            channels.append(channel)
+    return with_time(channels)
+
+
+def write_tdms(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+    from nptdms import ChannelObject, TdmsWriter
+
+    values, time, rate = check_signal(signal)
+    properties = {
+        "wf_increment": 1.0 / rate,
+        "wf_start_offset": float(time[0]),
+        "wf_samples": values.size,
+        "unit_string": signal.attrs["units"],
+    }
+    with TdmsWriter(str(path)) as writer:
+        writer.write_segment([ChannelObject("snapbeam", str(signal.name), values, properties=properties)])
+
+
+# ----------------------------------------------------------------------------------------------------
+# Universal files, dataset 58, ASCII or binary.
+
+
+_UFF_UNITS = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N"}
+_UFF_TYPES = {unit: code for code, unit in _UFF_UNITS.items()}
+
+
+def read_uff(path: Path, _told: Told) -> list[Channel]:
+    import pyuff
+
+    sets = pyuff.UFF(str(path)).read_sets()
+    channels: list[Channel] = []
+    for entry in sets if isinstance(sets, list) else [sets]:
+        if entry.get("type") != 58 or entry.get("func_type") not in (0, 1):
+            continue
+        data = np.asarray(entry["data"])
+        name = _first(entry["id1"], f"channel {len(channels) + 1}")
+        if data.size != entry["num_pts"]:
+            raise InputError(
+                f"{name}: the header promises {entry['num_pts']} samples, the file has {data.size}"
+            )
+        if np.iscomplexobj(data):
+            raise InputError(f"{name}: complex numbers are no time series")
+        label = _first(entry.get("abscissa_axis_units_lab"), "s")
+        factor, base = si_unit(f"{name}: abscissa", label)
+        if base != "s":
+            raise InputError(f"{name}: the abscissa is in {label!r}, not in seconds")
+        channel: Channel = {
+            "data": data,
+            "name": name,
+            "unit_str": _first(entry.get("ordinate_axis_units_lab"), "") or None,
+        }
+        if entry["abscissa_spacing"] == 1:
+            step = float(entry["abscissa_inc"]) * factor
+            if not step > 0.0:
+                raise InputError(f"{name}: abscissa increment of {step!r} s")
+            channel["fs"] = _undo_rounding(step)
+            channel["time_offset"] = float(entry["abscissa_min"]) * factor
+        else:
+            channel["time"] = np.asarray(entry["x"]) * factor
+        channels.append(channel)
+    if not channels:
+        raise InputError("holds no whole time response in a dataset 58")
+    return numbered(channels)
+
+
+def _undo_rounding(step: float) -> float:
+    """The sampling rate [Hz] of a step stored with six digits: the whole number that rounds to it."""
+    whole = round(1.0 / step)
+    same = whole > 0 and float(f"{1.0 / whole:.5e}") == float(f"{step:.5e}")
+    return float(whole) if same else 1.0 / step
+
+
+def write_uff(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+    import pyuff
+
+    values, time, rate = check_signal(signal)
+    unit = signal.attrs["units"]
+    entry = pyuff.prepare_58(
+        binary=1,
+        id1=str(signal.name)[:80],
+        func_type=1,
+        rsp_node=1,
+        rsp_dir=3,
+        ref_node=0,
+        ref_dir=0,
+        data=values,
+        x=time,
+        num_pts=values.size,
+        abscissa_spacing=1,
+        abscissa_min=float(time[0]),
+        abscissa_inc=1.0 / rate,
+        abscissa_spec_data_type=17,
+        abscissa_axis_units_lab="s",
+        ordinate_spec_data_type=_UFF_TYPES.get(unit, 0),
+        ordinate_axis_units_lab=unit,
+        orddenom_spec_data_type=0,
+        z_axis_spec_data_type=0,
+        return_full_dict=False,
+    )
+    entry["n_bytes"] = values.nbytes
+    path.unlink(missing_ok=True)
+    pyuff.UFF(str(path)).write_sets([entry], mode="add")
+
+
+def _first(text: Any, otherwise: str) -> str:
+    word = str(text or "").strip()
+    return otherwise if word.upper() in ("", "NONE") else word
+
+
+# ----------------------------------------------------------------------------------------------------
+# Sound files: whole numbers are fractions of full scale, floating point numbers what the caller says.
+
+
+_INTEGER_SCALE = {"int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "uint8": (128.0, 128.0)}
+
+
+def read_wav(path: Path, _told: Told) -> list[Channel]:
+    from scipy.io import wavfile
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        rate, data = wavfile.read(path)  # 24 bits come as the upper ones of 32
+    if any(word in str(item.message) for item in caught for word in ("EOF", "prematurely", "incomplete")):
+        raise InputError("the sound file is cut short")
+    if rate <= 0:
+        raise InputError(f"sampling rate of {rate} Hz in the header")
+    size = path.stat().st_size
+    if size < data.nbytes:
+        raise InputError(f"the header promises {data.nbytes} bytes of samples, the file has {size}")
+    columns = data[:, None] if data.ndim == 1 else data
+    kind, unit = str(data.dtype), None
+    if kind in _INTEGER_SCALE:
+        middle, scale = _INTEGER_SCALE[kind]
+        columns, unit = (columns - middle) / scale, "FS"
+    elif data.dtype.kind != "f":
+        raise InputError(f"samples of type {kind} are not known")
+    return [
+        {"data": columns[:, i], "name": f"channel {i + 1}", "unit_str": unit, "fs": float(rate)}
+        for i in range(columns.shape[1])
+    ]
+
+
+def write_wav(path: Path, signal: xr.DataArray, full_scale: float | None) -> None:
+    from scipy.io import wavfile
+
+    values, _, rate = check_signal(signal)
+    scale = positive("full_scale", full_scale, signal.attrs["units"])
+    if abs(rate - round(rate)) > 1e-6 * rate:
+        raise InputError(f"sampling rate of {rate:.9g} Hz: a WAV file holds whole numbers of hertz only")
+    if np.abs(values).max() >= scale:
+        raise InputError(f"full_scale = {scale:g}: must exceed the largest value, {np.abs(values).max():g}")
+    wavfile.write(path, round(rate), np.round(values / scale * 2.0**31).astype(np.int32))
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+READERS: dict[str, Callable[[Path, Told], list[Channel]]] = {
+    ".csv": read_csv,
+    ".txt": read_csv,
+    ".asc": read_csv,
+    ".dat": read_csv,
+    ".tsv": read_csv,
+    ".lvm": read_lvm,
+    ".wav": read_wav,
+    ".uff": read_uff,
+    ".unv": read_uff,
+    ".tdms": read_tdms,
+    ".mat": read_matlab,
+    ".h5": read_hdf5,
+    ".hdf5": read_hdf5,
+    ".nc": read_hdf5,
+    ".npz": read_numpy,
+    ".npy": read_numpy,
+}
+WRITERS: dict[str, Callable[[Path, Any, float | None], None]] = {
+    ".csv": write_csv,
+    ".wav": write_wav,
+    ".uff": write_uff,
+    ".tdms": write_tdms,
+    ".h5": write_hdf5,
+    ".npz": write_npz,
+}

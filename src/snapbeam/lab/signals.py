@@ -1,0 +1,276 @@
+"""Measured time series: one evenly sampled, labelled array a channel, in SI.
+
+A *signal* here is an :class:`xarray.DataArray` with the one dimension ``time`` (seconds, evenly spaced), the
+attribute ``units`` (an SI unit) and ``long_name``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.util.validation import InputError, InputTypeError, finite, finite_array, positive, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "KNOWN_UNITS",
+    "SignalSamples",
+    "check_signal",
+    "even_sampling",
+    "make_signal",
+    "parse_sensitivity",
+    "si_unit",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Units of measured signals: into SI, and the sensitivities of sensors.
+
+
+_PREFIX = {"": 1.0, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9}
+_GRAVITY = 9.80665  # m/s^2, standard acceleration of free fall
+_INCH = 0.0254  # m
+_TO_SI: dict[str, tuple[float, str]] = {
+    **{f"{p}m": (s, "m") for p, s in _PREFIX.items()},
+    **{f"{p}m/s": (s, "m/s") for p, s in _PREFIX.items()},
+    **{f"{p}m/s^2": (s, "m/s^2") for p, s in _PREFIX.items()},
+    **{f"{p}N": (s, "N") for p, s in _PREFIX.items()},
+    **{f"{p}V": (s, "V") for p, s in _PREFIX.items()},
+    **{f"{p}s": (s, "s") for p, s in _PREFIX.items()},
+    **{f"{p}Hz": (s, "Hz") for p, s in _PREFIX.items()},
+    **{f"{p}Pa": (s, "Pa") for p, s in _PREFIX.items()},
+    "g": (_GRAVITY, "m/s^2"),
+    "g_n": (_GRAVITY, "m/s^2"),
+    "in": (_INCH, "m"),
+    "in/s": (_INCH, "m/s"),
+    "ips": (_INCH, "m/s"),
+    "in/s^2": (_INCH, "m/s^2"),
+    "FS": (1.0, "FS"),
+    "1": (1.0, "1"),
+    "b": (1.0, "b"),
+}
+for _odd in ("cs", "ks", "cV", "cHz", "cPa", "cN"):
+    _TO_SI.pop(_odd)
+_WORDS = {
+    "second": "s", "seconds": "s", "millisecond": "ms", "milliseconds": "ms", "volt": "V", "volts": "V",
+    "millivolts": "mV", "inch": "in", "inches": "in", "hertz": "Hz", "pascal": "Pa", "newton": "N",
+    "meter": "m", "metre": "m",
+}  # fmt: skip
+KNOWN_UNITS = (
+    "m, m/s, m/s^2, N, V, s, Hz or Pa with a prefix k, c, m, u or n, g, in, in/s, in/s^2, or FS (fraction of full "
+    "scale)"
+)
+
+
+def si_unit(name: str, unit: str) -> tuple[float, str]:
+    """Return the factor and the SI unit for *unit*, such as ``(1e-3, "m/s")`` for ``"mm/s"``.
+
+    Known are m, m/s, m/s^2, N, V, s, Hz and Pa with the prefixes k, c, m, u (or µ), n; g, the standard
+    acceleration of free fall; in, in/s, in/s^2; and FS, the fraction of full scale of a sound file.
+
+    Raises
+    ------
+    InputError
+        If the unit is unknown; *name* says whose unit it is.
+    """
+    if not isinstance(unit, str):
+        where = f"unit of {name}" if isinstance(name, str) else "unit"
+        raise InputTypeError(
+            f"{where} = {shown(unit)}: must be text such as 'mm/s', not {type(unit).__name__}"
+        )
+    word = unit.strip().replace("\u03bc", "u").replace("\u00b5", "u").replace(" ", "").replace("*", "")
+    word = _WORDS.get(word.lower(), word)
+    word = word.replace("sec", "s").replace("²", "^2").replace("/s/s", "/s^2").replace("/s2", "/s^2")
+    word = re.sub(r"s\^?-1$", "/s", re.sub(r"s\^?-2$", "/s^2", word)).replace("//", "/")
+    if word not in _TO_SI:
+        raise InputError(
+            f"unit of {name if isinstance(name, str) else 'a signal'} = {shown(unit)}: must be {KNOWN_UNITS}"
+        )
+    return _TO_SI[word]
+
+
+def parse_sensitivity(name: str, text: str) -> tuple[float, str, str]:
+    """Read a sensitivity: return the factor, the SI unit, and V or FS.
+
+    Either what a volt (or full scale) stands for, ``"125 mm/s/V"``, or the volts that a sensor gives,
+    ``"100 mV/g"``, ``"50 mV/Pa"``, ``"10 mV/(m/s^2)"``.
+
+    Raises
+    ------
+    InputError
+        If *text* is neither.
+    """
+    found = re.fullmatch(r"\s*([-+0-9.eE]+)\s*(\S.*)", text) if isinstance(text, str) else None
+    try:
+        number = float(found[1]) if found else float("nan")
+    except ValueError:
+        number = float("nan")
+    if found is None or not np.isfinite(number) or number == 0.0:
+        raise InputError(f"{name} = {text!r}: must read like '125 mm/s/V', '100 mV/g' or '0.5 m/s/FS'")
+    rest = found[2].replace(" ", "")
+    per = re.fullmatch(r"(.+)/(V|mV|FS)", rest)
+    if per is not None:
+        factor, unit = si_unit(name, per[1].strip("()"))
+        per_factor, base = si_unit(name, per[2])
+        return number * factor / per_factor, unit, base
+    gives = re.fullmatch(r"(u|m|)V/(.+)", rest)
+    if gives is None:
+        raise InputError(f"{name} = {text!r}: must read like '125 mm/s/V', '100 mV/g' or '0.5 m/s/FS'")
+    volts, _ = si_unit(name, f"{gives[1]}V")
+    factor, unit = si_unit(name, gives[2].strip("()"))
+    return factor / (number * volts), unit, "V"
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_LONG_NAMES = {
+    "m": "displacement", "m/s": "velocity", "m/s^2": "acceleration", "N": "force", "V": "voltage", "Pa": "pressure",
+}  # fmt: skip
+MINIMUM_SAMPLES = 16
+
+
+class SignalSamples(NamedTuple):
+    """The numbers of a signal: ``values`` and ``time`` [s] of shape (samples,), the sampling rate [Hz]."""
+
+    values: NDArray[np.float64]
+    time: NDArray[np.float64]
+    sampling_frequency: float
+
+
+def even_sampling(name: str, time: ArrayLike) -> tuple[float, float]:
+    """Return the start [s] and the sampling frequency [Hz] of an evenly sampled time axis.
+
+    Times rounded on printing are accepted as long as none is a fifth of a step away from an even grid.
+
+    Raises
+    ------
+    InputError
+        If the times are not finite, do not increase, have a gap, or are not evenly spaced.
+    """
+    times = finite_array(f"{name}: time", time, 1)
+    if times.size < 2:
+        raise InputError(f"{name}: {times.size} sample(s): must have at least 2")
+    steps = np.diff(times)
+    if (steps <= 0.0).any():
+        at = int(np.argmax(steps <= 0.0))
+        raise InputError(
+            f"{name}: time[{at + 1}] = {times[at + 1]:.9g} s must come after time[{at}] = {times[at]:.9g} s"
+        )
+    typical = float(np.median(steps))
+    if (steps > 1.5 * typical).any():
+        at = int(np.argmax(steps > 1.5 * typical))
+        raise InputError(
+            f"{name}: gap of {steps[at]:.6g} s after time[{at}] = {times[at]:.9g} s where the step is "
+            f"{typical:.6g} s: samples are missing; cut the signal there"
+        )
+    count = np.arange(times.size) - (times.size - 1) / 2
+    step = float(count @ times / (count @ count)) if times.size > 2 else typical
+    off = np.abs(times - (times.mean() + step * count)) / step
+    if off.max() > 0.2:
+        at = int(np.argmax(off))
+        raise InputError(
+            f"{name}: time[{at}] = {times[at]:.9g} s lies {off[at]:.2f} steps off an even grid: the signal "
+            "must be sampled evenly; resample it first"
+        )
+    if off.max() < 1e-6:
+        return float(times[0]), (times.size - 1) / float(times[-1] - times[0])
+    return float(times.mean() - step * (times.size - 1) / 2), 1.0 / step
+
+
+def make_signal(
+    values: ArrayLike,
+    units: str,
+    sampling_frequency: float | None = None,
+    *,
+    time: ArrayLike | None = None,
+    start: float = 0.0,
+    name: str = "signal",
+    attrs: Mapping[str, Any] | None = None,
+) -> xr.DataArray:
+    """Return a signal in SI from numbers with a stated unit and either a sampling rate or a time axis.
+
+    Parameters
+    ----------
+    values : array_like, shape (samples,)
+    units : str
+        The unit of *values*, such as ``"mm/s"``; the signal is converted to SI.
+    sampling_frequency : float, optional
+        Samples per second [Hz]; exactly one of this and *time*.
+    time : array_like, shape (samples,), optional
+        Times [s], evenly spaced.
+    start : float
+        Time of the first sample [s], with *sampling_frequency*.
+    name : str
+        Name of the channel.
+    attrs : mapping, optional
+        More attributes.
+
+    Raises
+    ------
+    InputError
+        For an unknown unit, numbers that are not finite, or a time axis that is not even.
+    """
+    import xarray as xr
+
+    array = finite_array(name, values, 1)
+    factor, unit = si_unit(name, units)
+    if (time is None) == (sampling_frequency is None):
+        raise InputError(f"{name}: must have exactly one of sampling_frequency (Hz) and time (s)")
+    if time is not None:
+        if np.shape(time) != array.shape:
+            raise InputError(
+                f"{name}: time of shape {np.shape(time)} and values of shape {array.shape}: must agree"
+            )
+        start, rate = even_sampling(name, time)
+    else:
+        rate = positive("sampling_frequency", sampling_frequency, "Hz")
+        start = finite("start", start)
+    long_name = _LONG_NAMES.get(unit, name)
+    return xr.DataArray(
+        array * factor,
+        dims="time",
+        coords={"time": ("time", start + np.arange(array.size) / rate, {"units": "s", "long_name": "time"})},
+        name=name,
+        attrs={**(attrs or {}), "units": unit, "long_name": long_name},
+    )
+
+
+def check_signal(
+    signal: xr.DataArray, units: str | tuple[str, ...] = (), name: str = "signal"
+) -> SignalSamples:
+    """Return the samples of *signal* if it is one: evenly sampled, finite, long enough and in one of *units*.
+
+    Raises
+    ------
+    InputError
+        Naming what is wrong: the dimensions, a missing or wrong unit, NaN, times that do not increase.
+    """
+    import xarray as xr
+
+    if not isinstance(signal, xr.DataArray):
+        raise InputTypeError(
+            f"{name}: must be an xarray.DataArray (see make_signal), not {type(signal).__name__}"
+        )
+    label = f"{name} {str(signal.name)!r}" if signal.name not in (None, name) else name
+    if signal.dims != ("time",) or "time" not in signal.coords:
+        raise InputError(
+            f"{label} with dimensions {signal.dims}: must have the one dimension time with its times"
+        )
+    allowed = (units,) if isinstance(units, str) else units
+    unit = signal.attrs.get("units")
+    if unit is None:
+        raise InputError(f"{label}: has no units; state them in attrs['units']")
+    if allowed and unit not in allowed:
+        raise InputError(f"{label} in units {shown(unit)}: must be in {' or '.join(allowed)}")
+    if signal.size < MINIMUM_SAMPLES:
+        raise InputError(f"{label}: {signal.size} sample(s): must have at least {MINIMUM_SAMPLES}")
+    values = finite_array(label, signal.values, 1)
+    start, rate = even_sampling(label, signal["time"].values)
+    return SignalSamples(values, start + np.arange(values.size) / rate, rate)

@@ -1,1 +1,0 @@
-"""Records of sensors: read from the formats that laboratories have, and their sines fitted."""

@@ -1,0 +1,997 @@
+"""A synthetic laboratory camera: what a recording of a known motion would look like, with the truth beside
+it.
+
+An ideal scene of a beam and a rounded shaker with a sticker is drawn as sharp edges, blurred by the optics,
+integrated over each pixel and over the exposure, lit unevenly, spoiled as asked, and given noise and a finite
+bit depth.  The optics are a Gaussian, as the tracker assumes, or a lens out of focus, as it does not.  The
+truth is the mean of the displacement over each exposure, exactly, for motion that is linear between the given
+samples.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numba
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.lab.camera import write_photron, write_video
+from snapbeam.lab.signals import make_signal
+from snapbeam.lab.tracking.edges import Floats, edge_profile
+from snapbeam.lab.tracking.settings import SIDES, Orientation
+from snapbeam.simulation.dataset import check_trajectory, trajectory_dataset
+from snapbeam.solver.compilation import keep_code
+from snapbeam.util.validation import (
+    InputError,
+    axis,
+    choice,
+    finite,
+    finite_array,
+    instance,
+    integer,
+    nonnegative,
+    positive,
+    shown,
+    within,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "FRAME_LISTS",
+    "TABLE_ENTRIES_PER_PIXEL",
+    "AreaPicture",
+    "Defects",
+    "Fixture",
+    "GaussianPicture",
+    "Outline",
+    "SyntheticCamera",
+    "SyntheticRecording",
+    "SyntheticStage",
+    "disk_kernel",
+    "expose",
+    "glare_light",
+    "lamp_light",
+    "read_out",
+    "render_recording",
+    "render_run",
+    "render_vibrometer",
+    "step_table",
+    "with_fixture",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# The picture of a few edges, summed over an exposure: compiled loops for the synthetic camera.
+
+
+TABLE_ENTRIES_PER_PIXEL = 256  # table entries per pixel
+
+
+def step_table(blur: float) -> NDArray[np.float64]:
+    """Change of an edge's light from one row to the next, tabulated over the row's offset from the edge.
+
+    The first and last offsets are -reach and +reach with reach = (entries - 1)/(2 FINE).
+    """
+    reach = int(np.ceil(5.0 * blur)) + 2
+    offsets = (
+        np.arange(-reach * TABLE_ENTRIES_PER_PIXEL, reach * TABLE_ENTRIES_PER_PIXEL + 1)
+        / TABLE_ENTRIES_PER_PIXEL
+    )
+    return edge_profile(offsets, blur) - edge_profile(offsets - 1.0, blur)
+
+
+@numba.njit
+def _add_edge(
+    steps: NDArray, column: int, row: float, height: float, table: NDArray
+) -> None:  # pragma: no cover
+    reach = (table.size - 1) // (2 * TABLE_ENTRIES_PER_PIXEL)
+    first = int(np.floor(row)) - reach + 1
+    for r in range(first, first + 2 * reach):
+        if r >= steps.shape[0]:
+            break
+        at = (r - row + reach) * TABLE_ENTRIES_PER_PIXEL
+        i = int(at)
+        if 0 <= i < table.size - 1:
+            share = at - i
+            value = height * (table[i] * (1.0 - share) + table[i + 1] * share)
+            steps[max(r, 0), column] += value
+
+
+@numba.njit
+def _expose(
+    steps: NDArray,
+    beam: NDArray,
+    tip: NDArray,
+    slope: NDArray,
+    thickness: float,
+    profile: NDArray,
+    cover: NDArray,
+    marker: tuple[float, float],
+    contrast: tuple[float, float, float],
+    table: NDArray,
+) -> None:  # pragma: no cover
+    """Add the edges of all instants of one exposure to *steps* (rows, columns), the change of light by row.
+
+    ``beam`` and ``tip`` are rows of the beam's far edge and of the tip at the contact at each instant;
+    ``slope`` the beam's drop at each column, ``profile`` the tip's, ``cover`` how much of a column the
+    shaker covers; ``marker`` where a sticker begins and ends behind the tip, ``contrast`` the steps of
+    light at the beam's, the shaker's and the sticker's edges.
+    """
+    weight = 1.0 / beam.size
+    marker_from, marker_to = marker
+    beam_step, shaker_step, marker_step = contrast
+    for n in range(beam.size):
+        for x in range(steps.shape[1]):
+            far = beam[n] + slope[x]
+            near = far + thickness
+            _add_edge(steps, x, far, weight * beam_step, table)
+            _add_edge(steps, x, near, -weight * beam_step, table)
+            if cover[x] > 0.0:
+                edge = max(tip[n] + profile[x], near)
+                _add_edge(steps, x, edge, weight * cover[x] * shaker_step, table)
+                if marker_step != 0.0:
+                    _add_edge(steps, x, tip[n] + marker_from, weight * cover[x] * marker_step, table)
+                    _add_edge(steps, x, tip[n] + marker_to, -weight * cover[x] * marker_step, table)
+
+
+expose = keep_code(_expose, numba.__version__)
+
+
+# ----------------------------------------------------------------------------------------------------
+# The synthetic laboratory's camera and scene, in sizes a person would measure.
+
+
+@dataclass(frozen=True)
+class SyntheticCamera:
+    """The camera: sampling, optics, light and noise.
+
+    Attributes
+    ----------
+    frame_rate, pixel_size
+        Frames per second [Hz]; metres per pixel.
+    shape
+        (height, width) of the region, pixels.
+    exposure
+        Shutter time [s], at most a frame; half a frame unless given.
+    bit_depth
+        Bits of a pixel, 8 to 16.
+    snr_db
+        20 log10(contrast of the beam's edge / standard deviation of the pixel noise); infinite for no noise.
+    blur
+        Blur of the optics, standard deviation in pixels.
+    lens
+        "gaussian", the edges that the tracker fits; "disk", a lens out of focus that sees areas.
+    light
+        Relative change of the light from left to right and from top to bottom.
+    """
+
+    frame_rate: float = 10_000.0
+    pixel_size: float = 12e-6
+    shape: tuple[int, int] = (384, 384)
+    exposure: float | None = None
+    bit_depth: int = 12
+    snr_db: float = 30.0
+    blur: float = 0.8
+    lens: str = "gaussian"
+    light: tuple[float, float] = (0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        rate = positive("frame_rate", self.frame_rate, "Hz")
+        positive("pixel_size", self.pixel_size, "m")
+        for name in ("shape", "light"):
+            if not isinstance(getattr(self, name), (tuple, list)) or len(getattr(self, name)) != 2:
+                raise InputError(f"{name} = {shown(getattr(self, name))}: must be a pair of numbers")
+        for name, value in zip(("shape[0]", "shape[1]"), self.shape, strict=True):
+            integer(name, value, 16, 8192)
+        exposure = 0.5 / rate if self.exposure is None else self.exposure
+        object.__setattr__(
+            self,
+            "exposure",
+            within("exposure", exposure, 0.0, 1.0 / rate * (1 + 1e-9), closed="right", unit="s"),
+        )
+        integer("bit_depth", self.bit_depth, 8, 16)
+        if not (isinstance(self.snr_db, float) and math.isinf(self.snr_db) and self.snr_db > 0.0):
+            within("snr_db", self.snr_db, -20.0, 200.0, closed="both", unit="dB")
+        choice("lens", self.lens, ("gaussian", "disk"))
+        within("blur", self.blur, 0.0, 20.0, closed="left", unit="px")
+        for name, change in zip(("light[0]", "light[1]"), self.light, strict=True):
+            within(name, change, -1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class SyntheticStage:
+    """The scene: sizes in metres, grey levels from 0 (black) to 1 (saturated).
+
+    ``marker_distance`` is from the tip to the sticker, ``marker_thickness`` its height along the motion; 0
+    for no sticker.  ``slope`` is the beam's at the contact.  A dark beam before bright light is
+    ``background`` above ``beam``.
+    """
+
+    beam_thickness: float = 0.4e-3
+    slope: float = 0.0
+    tip_radius: float = 2.5e-3
+    shaker_width: float = 2.0e-3
+    marker_distance: float = 0.35e-3
+    marker_thickness: float = 0.25e-3
+    side: str = "below"
+    background: float = 0.12
+    beam: float = 0.72
+    shaker: float = 0.66
+    marker: float = 0.2
+
+    def __post_init__(self) -> None:
+        for name in ("beam_thickness", "tip_radius", "shaker_width"):
+            positive(name, getattr(self, name), "m")
+        for name in ("marker_distance", "marker_thickness"):
+            nonnegative(name, getattr(self, name), "m")
+        within("slope", self.slope, -1.0, 1.0)
+        choice("side", self.side, SIDES)
+        for name in ("background", "beam", "shaker", "marker"):
+            within(name, getattr(self, name), 0.0, 1.0, closed="both")
+        if self.beam == self.background:
+            raise InputError(f"beam = {self.beam!r}: must differ from background = {self.background!r}")
+
+
+# ----------------------------------------------------------------------------------------------------
+# The scene drawn as ideal edges blurred by a Gaussian: the edge model that the tracker fits.
+
+
+class Outline:
+    """The scene's shapes in turned pixels, columns counted from the contact at ``centre``."""
+
+    def __init__(self, camera: SyntheticCamera, stage: SyntheticStage) -> None:
+        upright = stage.side in ("below", "above")
+        self.height, self.width = camera.shape if upright else camera.shape[::-1]
+        size = camera.pixel_size
+        self.stage = stage
+        self.thickness = stage.beam_thickness / size
+        self.centre = (self.width - 1) / 2.0
+        self.radius, self.half = stage.tip_radius / size, 0.5 * stage.shaker_width / size
+        self.marker = (stage.marker_distance / size, (stage.marker_distance + stage.marker_thickness) / size)
+
+    def profile(self, x: Floats) -> Floats:
+        """Rows of the tip's outline below its apex at columns *x* from the contact."""
+        reach = np.minimum(np.abs(x), self.radius)
+        return self.radius - np.sqrt(self.radius * self.radius - reach * reach)
+
+
+def lamp_light(camera: SyntheticCamera, height: int, width: int) -> NDArray[np.float32]:
+    """The lamp's unevenness over a turned picture."""
+    across = 1.0 + camera.light[0] * ((np.arange(width) - (width - 1) / 2.0) / width)
+    down = 1.0 + camera.light[1] * (np.arange(height) / height - 0.5)
+    light: NDArray[np.float32] = (down[:, None] * across[None, :]).astype(np.float32)
+    return light
+
+
+def glare_light(height: int, width: int, row: float, strength: float, wide: bool) -> NDArray[np.float32]:
+    """A reflection about *row*, in the middle columns or, if *wide*, in all."""
+    rows = (np.arange(height) - row) / (0.12 * height)
+    columns = np.zeros(width) if wide else (np.arange(width) - (width - 1) / 2.0) / (0.3 * width)
+    light: NDArray[np.float32] = (strength * np.exp(-(rows[:, None] ** 2) - columns[None, :] ** 2)).astype(
+        np.float32
+    )
+    return light
+
+
+class GaussianPicture:
+    """Draws the turned scene, shaker below, with edges blurred by a Gaussian."""
+
+    def __init__(self, camera: SyntheticCamera, stage: SyntheticStage) -> None:
+        self.outline = Outline(camera, stage)
+        x = np.arange(self.outline.width) - self.outline.centre
+        self.slope = stage.slope * x
+        self.profile = self.outline.profile(x)
+        half = self.outline.half
+        self.cover = edge_profile(x + half, camera.blur) - edge_profile(x - half, camera.blur)
+        self.cover[self.cover < 1e-6] = 0.0
+        self.tables = {False: step_table(camera.blur), True: step_table(camera.blur + 4.0)}
+
+    def draw(self, beam: Floats, tip: Floats, *, blurred: bool) -> NDArray[np.float32]:
+        """Light of one exposure without noise; ``beam`` and ``tip`` as for :func:`render_recording`."""
+        shape = self.outline
+        stage, thickness = shape.stage, shape.thickness
+        steps = np.zeros((shape.height, shape.width))
+        steps[0] = stage.background
+        sticker = stage.marker - stage.shaker if stage.marker_thickness > 0.0 else 0.0
+        expose(
+            steps,
+            beam - 0.5 * thickness,
+            tip + 0.5 * thickness,
+            self.slope,
+            thickness,
+            self.profile,
+            self.cover,
+            shape.marker,
+            (stage.beam - stage.background, stage.shaker - stage.background, sticker),
+            self.tables[blurred],
+        )
+        light: NDArray[np.float32] = np.cumsum(steps, axis=0).astype(np.float32)
+        return light
+
+
+# ----------------------------------------------------------------------------------------------------
+# The scene drawn as areas seen through a lens out of focus: an edge model that is not the tracker's.
+#
+# Every shape covers an exact share of each cell of a grid four times finer than the pixels, averaged over the
+# exposure; the cells are spread over the lens's disk of confusion and summed into pixels.  Nothing here knows
+# of error functions, so a tracker that fits them is not tested against itself.
+
+
+CELLS_PER_PIXEL = 4  # cells to a pixel, each way
+
+
+@numba.njit(cache=True)
+def _add(cover: NDArray, column: int, row: float, weight: float) -> None:  # pragma: no cover
+    """Add to the change of coverage by cell: everything below *row* (cells, 0 at the upper border)."""
+    if row <= 0.0:
+        cover[0, column] += weight
+        return
+    k = int(np.floor(row))
+    if k >= cover.shape[0]:
+        return
+    share = k + 1.0 - row
+    cover[k, column] += weight * share
+    if k + 1 < cover.shape[0]:
+        cover[k + 1, column] += weight * (1.0 - share)
+
+
+@numba.njit(cache=True)
+def _cover(
+    light: NDArray,
+    shaker: NDArray,
+    beam: NDArray,
+    tip: NDArray,
+    slope: NDArray,
+    profile: NDArray,
+    rod: NDArray,
+    sizes: NDArray,
+    levels: NDArray,
+) -> None:  # pragma: no cover
+    """Add the light of the beam at all instants, as changes by cell, to *light*, that of the rest to *shaker*.
+
+    ``sizes`` are the beam's thickness and the sticker's upper and lower border from the tip, ``levels`` the
+    steps of light at beam, shaker and sticker; ``rod`` the share of a column that the shaker covers.
+    """
+    weight = 1.0 / beam.size
+    for n in range(beam.size):
+        for x in range(light.shape[1]):
+            far = beam[n] + slope[x]
+            near = far + sizes[0]
+            _add(light, x, far, weight * levels[0])
+            _add(light, x, near, -weight * levels[0])
+            if rod[x] > 0.0:
+                part = weight * rod[x]
+                _add(shaker, x, max(tip[n] + profile[x], near), part * levels[1])
+                if levels[2] != 0.0:
+                    _add(shaker, x, max(tip[n] + sizes[1], near), part * levels[2])
+                    _add(shaker, x, max(tip[n] + sizes[2], near), -part * levels[2])
+
+
+def disk_kernel(radius: float) -> NDArray[np.float32]:
+    """A disk of *radius* cells, each cell weighted by the part of it inside, of sum 1."""
+    reach = int(np.ceil(radius + 0.5))
+    fine = (np.arange((2 * reach + 1) * 8) + 0.5) / 8.0 - reach - 0.5
+    inside = (fine[:, None] ** 2 + fine[None, :] ** 2 <= radius * radius).astype(np.float64)
+    kernel = inside.reshape(2 * reach + 1, 8, 2 * reach + 1, 8).sum((1, 3))
+    if not kernel.sum() > 0.0:
+        kernel[reach, reach] = 1.0
+    out: NDArray[np.float32] = (kernel / kernel.sum()).astype(np.float32)
+    return out
+
+
+class AreaPicture:
+    """Draws the turned scene, shaker below, area by area through a lens out of focus.
+
+    The disk of confusion has a standard deviation of the camera's ``blur`` along each axis, so its radius is
+    twice that.
+    """
+
+    def __init__(
+        self, camera: SyntheticCamera, stage: SyntheticStage, texture: float = 0.0, seed: int = 0
+    ) -> None:
+        self.outline = shape = Outline(camera, stage)
+        self.margin = int(np.ceil(2.0 * camera.blur)) + 1
+        cells = (shape.width + 2 * self.margin) * CELLS_PER_PIXEL
+        x = (np.arange(cells) + 0.5) / CELLS_PER_PIXEL - 0.5 - self.margin - shape.centre
+        self.slope = CELLS_PER_PIXEL * stage.slope * x
+        self.profile = CELLS_PER_PIXEL * shape.profile(x)
+        self.rod = np.clip((shape.half - np.abs(x)) * CELLS_PER_PIXEL + 0.5, 0.0, 1.0)
+        self.kernels = {False: disk_kernel(2.0 * CELLS_PER_PIXEL * camera.blur)}
+        self.kernels[True] = disk_kernel(2.0 * CELLS_PER_PIXEL * (camera.blur + 4.0))
+        self.grain: NDArray[np.float32] | None = None
+        if texture:
+            import cv2
+
+            rows = (shape.height + 2 * self.margin) * CELLS_PER_PIXEL
+            raw = np.random.default_rng([seed, 7]).standard_normal((2 * rows, cells)).astype(np.float32)
+            self.grain = 1.0 + 3.0 * CELLS_PER_PIXEL * texture * cv2.blur(
+                raw, (3 * CELLS_PER_PIXEL, 3 * CELLS_PER_PIXEL)
+            )
+
+    def draw(self, beam: Floats, tip: Floats, *, blurred: bool) -> NDArray[np.float32]:
+        """Light of one exposure without noise; rows of beam and tip as for :func:`render_recording`."""
+        import cv2
+
+        shape, margin = self.outline, self.margin
+        stage = shape.stage
+        rows = (shape.height + 2 * margin) * CELLS_PER_PIXEL
+        light, rod = np.zeros((rows, self.slope.size)), np.zeros((rows, self.slope.size))
+        # row r of a pixel's centre is the cell border (r + 1/2 + margin) FINE
+        far = (beam - 0.5 * shape.thickness + 0.5 + margin) * CELLS_PER_PIXEL
+        top = (tip + 0.5 * shape.thickness + 0.5 + margin) * CELLS_PER_PIXEL
+        sizes = np.array([shape.thickness, *shape.marker]) * CELLS_PER_PIXEL
+        marker = stage.marker - stage.shaker if stage.marker_thickness > 0.0 else 0.0
+        levels = np.array([stage.beam - stage.background, stage.shaker - stage.background, marker])
+        _cover(light, rod, far, top, self.slope, self.profile, self.rod, sizes, levels)
+        layers = [np.cumsum(layer, axis=0).astype(np.float32) for layer in (light, rod)]
+        if self.grain is not None:  # which moves with what it is on
+            for layer, rows_of in zip(layers, (far, top), strict=True):
+                shift = round(float(rows_of.mean())) % rows
+                layer *= self.grain[rows - shift : 2 * rows - shift]
+        fine: NDArray[Any] = np.float32(stage.background) + layers[0] + layers[1]
+        fine = cv2.filter2D(fine, -1, self.kernels[blurred], borderType=cv2.BORDER_REPLICATE)
+        inner = fine[
+            margin * CELLS_PER_PIXEL : (margin + shape.height) * CELLS_PER_PIXEL,
+            margin * CELLS_PER_PIXEL : -margin * CELLS_PER_PIXEL,
+        ]
+        cells = np.asarray(inner, dtype=np.float32).reshape(
+            shape.height, CELLS_PER_PIXEL, shape.width, CELLS_PER_PIXEL
+        )
+        pixels: NDArray[np.float32] = cells.mean((1, 3), dtype=np.float32)
+        return pixels
+
+
+# ----------------------------------------------------------------------------------------------------
+# What goes wrong in front of a camera and in it, to be drawn into a synthetic recording.
+
+
+FRAME_LISTS = ("glare_frames", "blurred_frames", "repeated_frames", "blank_frames", "hidden_frames")
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """A bar that crosses the picture and never moves: ``row`` of its middle in the turned picture and
+    ``thickness`` [px], grey ``level`` from 0 to 1."""
+
+    row: float
+    thickness: float
+    level: float
+
+    def __post_init__(self) -> None:
+        within("row", self.row, -1e4, 1e4, unit="px")
+        positive("thickness", self.thickness, "px")
+        within("level", self.level, 0.0, 1.0, closed="both")
+
+
+@dataclass(frozen=True)
+class Defects:
+    """Departures from the ideal camera and scene.
+
+    Attributes
+    ----------
+    glare_frames, blurred_frames, repeated_frames, blank_frames, hidden_frames
+        Numbers of frames with a reflection, 4 px more blur, a repeat of the frame before, black, or with the
+        beam hidden by something of the background's grey.
+    glare_strength, glare_wide
+        Light of the reflection over full scale, and whether it spans all columns.
+    gamma
+        Grey level = light**gamma.
+    gain
+        Light over what the camera's full scale takes.
+    flicker
+        Relative change of the light with mains frequency (100 Hz).
+    texture
+        Relative unevenness of the surfaces, which moves with them.
+    shot
+        Noise of bright pixels that grows with the root of the light: standard deviation at full scale.
+    fixture
+        A bar that never moves.
+    drift
+        Rows by which the whole picture has sunk at the end of the recording [px], evenly over time.
+    """
+
+    glare_frames: Sequence[int] = ()
+    blurred_frames: Sequence[int] = ()
+    repeated_frames: Sequence[int] = ()
+    blank_frames: Sequence[int] = ()
+    hidden_frames: Sequence[int] = ()
+    glare_strength: float = 4.0
+    glare_wide: bool = False
+    gamma: float = 1.0
+    gain: float = 1.0
+    flicker: float = 0.0
+    texture: float = 0.0
+    shot: float = 0.0
+    fixture: Fixture | None = None
+    drift: float = 0.0
+
+    def __post_init__(self) -> None:
+        positive("gamma", self.gamma)
+        positive("gain", self.gain)
+        for name in ("glare_strength", "flicker", "texture", "shot"):
+            nonnegative(name, getattr(self, name))
+        within("drift", self.drift, -1e3, 1e3, unit="px")
+
+    def frames(self, count: int) -> dict[str, frozenset[int]]:
+        """The spoiled frames by kind, of a recording of *count* frames.
+
+        Raises
+        ------
+        InputError
+            For a number that is no frame of the recording.
+        """
+        chosen = {}
+        for name in FRAME_LISTS:
+            values = getattr(self, name)
+            if isinstance(values, (str, int)):
+                raise InputError(f"{name} = {shown(values)}: must be a list of frame numbers")
+            chosen[name.removesuffix("_frames")] = frozenset(
+                integer(f"{name}[{i}]", value, 0, count - 1) for i, value in enumerate(values)
+            )
+        return chosen
+
+
+# ----------------------------------------------------------------------------------------------------
+# From light to grey levels: a fixed bar in view, exposure, the camera's curve, noise and bits.
+
+
+_FINE = 8  # rows of light drawn for a row of pixels
+
+
+def with_fixture(
+    light: NDArray[np.float32], fixture: Fixture, shift: float, blur: float
+) -> NDArray[np.float32]:
+    """Lay a bar behind which nothing shows over a picture; *shift* [px] moves it with the camera.
+
+    Its edges are ramps as wide as a disk of confusion of standard deviation *blur* [px].
+    """
+    within_pixel = (np.arange(_FINE) + 0.5) / _FINE - 0.5
+    rows = np.arange(light.shape[0])[:, None] + within_pixel
+    ramp = max(1.0, 2.0 * math.sqrt(3.0) * blur)
+    inside = 0.5 * fixture.thickness - np.abs(rows - fixture.row - shift)
+    cover = np.clip(0.5 + inside / ramp, 0.0, 1.0).mean(1).astype(np.float32)[:, None]
+    out: NDArray[np.float32] = light * (1.0 - cover) + np.float32(fixture.level) * cover
+    return out
+
+
+def read_out(
+    light: NDArray[np.float32],
+    camera: SyntheticCamera,
+    stage: SyntheticStage,
+    defects: Defects,
+    rng: np.random.Generator,
+) -> NDArray[np.uint16]:
+    """Grey levels of a picture of *light* (shares of full scale)."""
+    light = light * np.float32(defects.gain)
+    if math.isfinite(camera.snr_db):
+        noise = abs(stage.beam - stage.background) / 10.0 ** (camera.snr_db / 20.0)
+        light = light + np.float32(noise) * rng.standard_normal(light.shape, dtype=np.float32)
+    if defects.shot:
+        root = np.sqrt(np.clip(light, 0.0, None))
+        light = light + np.float32(defects.shot) * root * rng.standard_normal(light.shape, dtype=np.float32)
+    level = np.clip(light, 0.0, 1.0)
+    if defects.gamma != 1.0:
+        level = level ** np.float32(defects.gamma)
+    full = 2**camera.bit_depth - 1
+    grey: NDArray[np.uint16] = np.rint(level * full).astype(np.uint16)
+    return grey
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+class SyntheticRecording:
+    """Frames drawn on demand; made by :func:`render_recording`.
+
+    Attributes
+    ----------
+    truth
+        Dataset over ``time`` with ``displacement_mm``, ``shaker_displacement_mm`` and ``penetration_mm``,
+        means over each exposure, and ``disturbed``, 1 where a frame was spoiled on purpose.
+    """
+
+    def __init__(
+        self,
+        camera: SyntheticCamera,
+        stage: SyntheticStage,
+        defects: Defects,
+        truth: xr.Dataset,
+        instants: _Instants,
+        seed: int,
+    ) -> None:
+        self.camera = camera
+        self.stage = stage
+        self.defects = defects
+        self.truth = truth
+        self.seed = seed
+        self._instants = instants
+        self._turn = Orientation(stage.side, camera.shape)
+        self._picture = (
+            GaussianPicture(camera, stage)
+            if camera.lens == "gaussian"
+            else AreaPicture(camera, stage, defects.texture, seed)
+        )
+        shape = self._picture.outline
+        self._lamp = lamp_light(camera, shape.height, shape.width)
+        self._spoiled = defects.frames(len(self))
+
+    def __len__(self) -> int:
+        return int(self.truth.sizes["time"])
+
+    def frame(self, index: int) -> NDArray[np.uint16]:
+        """One frame, integers (height, width)."""
+        index = integer("index", index, 0, len(self) - 1)
+        if index in self._spoiled["blank"]:
+            return np.zeros(self.camera.shape, dtype=np.uint16)
+        if index > 0 and index in self._spoiled["repeated"]:
+            return self.frame(index - 1)
+        rng = np.random.default_rng([self.seed, index])
+        grey = read_out(self._light(index), self.camera, self.stage, self.defects, rng)
+        return _turn_back(self._turn, grey)
+
+    def _light(self, index: int) -> NDArray[np.float32]:
+        """Light of one frame on the sensor, shares of full scale, shaker below."""
+        defects, shape = self.defects, self._picture.outline
+        beam, tip = self._instants.rows(index)
+        shift = defects.drift * index / max(len(self) - 1, 1)
+        if index in self._spoiled["hidden"]:
+            beam = beam - 10.0 * shape.height
+        light = self._picture.draw(beam + shift, tip + shift, blurred=index in self._spoiled["blurred"])
+        if defects.fixture is not None:
+            light = with_fixture(light, defects.fixture, shift, self.camera.blur)
+        light = light * self._lamp
+        if index in self._spoiled["glare"]:
+            light = light + glare_light(
+                shape.height, shape.width, float(beam.mean()), defects.glare_strength, defects.glare_wide
+            )
+        if defects.flicker:
+            turn = 2.0 * math.pi * 100.0 * index / self.camera.frame_rate
+            light = light * np.float32(1.0 + defects.flicker * math.sin(turn))
+        return light
+
+    def __iter__(self) -> Iterator[NDArray[np.uint16]]:
+        for index in range(len(self)):
+            yield self.frame(index)
+
+    def write(self, path: str | Path) -> Path:
+        """Write the recording: ``.cihx`` (12-bit), ``.cih`` (16-bit), ``.avi`` or ``.mkv`` (8-bit).
+
+        A Photron file of an 8-bit camera holds 8 bits, one of more than 12 bits holds 16.
+        """
+        path = Path(path)
+        if path.suffix.lower() in (".avi", ".mkv"):
+            return write_video(path, self, max_value=2**self.camera.bit_depth - 1)
+        depth = self.camera.bit_depth
+        stored = 8 if depth == 8 else 12 if depth <= 12 and path.suffix.lower() == ".cihx" else 16
+        return write_photron(
+            path,
+            self,
+            frame_rate=self.camera.frame_rate,
+            pixel_size=self.camera.pixel_size,
+            exposure=self.camera.exposure,
+            bit_depth=stored,
+            effective_bits=depth,
+            comment=f"synthetic, seed {self.seed}",
+        )
+
+
+class _Instants:
+    """Rows of beam and tip at instants spread over each exposure, and their exact means."""
+
+    def __init__(
+        self,
+        time: Floats,
+        beam: Floats,
+        shaker: Floats,
+        camera: SyntheticCamera,
+        start: float,
+        zero_row: float,
+    ) -> None:
+        self.time, self.beam, self.shaker = time, beam, shaker
+        self.camera, self.start, self.zero_row = camera, start, zero_row
+        self.exposure = float(camera.exposure or 0.0)
+
+    def means(self, opened: Floats) -> tuple[Floats, Floats]:
+        """Mean displacements over the exposures that start at *opened*."""
+        closed = opened + self.exposure
+        out = []
+        for values in (self.beam, self.shaker):
+            total = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(self.time))])
+            gained = self._integral(closed, values, total) - self._integral(opened, values, total)
+            out.append(gained / self.exposure)
+        return out[0], out[1]
+
+    def _integral(self, at: Floats, values: Floats, total: Floats) -> Floats:
+        """Integral of the piecewise linear motion from its first sample; at rest before, held after."""
+        inside = np.clip(at, self.time[0], self.time[-1])
+        k = np.clip(np.searchsorted(self.time, inside, side="right") - 1, 0, self.time.size - 2)
+        step = inside - self.time[k]
+        slope = (values[k + 1] - values[k]) / (self.time[k + 1] - self.time[k])
+        part = total[k] + step * (values[k] + 0.5 * slope * step)
+        return (
+            part
+            + np.minimum(at - self.time[0], 0.0) * values[0]
+            + np.maximum(at - self.time[-1], 0.0) * values[-1]
+        )
+
+    def rows(self, index: int) -> tuple[Floats, Floats]:
+        """Rows of the beam's middle and of the tip less half a thickness, at instants of one exposure."""
+        opened = self.start + index / self.camera.frame_rate
+        ends = np.array([opened, opened + 0.5 * self.exposure, opened + self.exposure])
+        size = self.camera.pixel_size
+        travel = max(np.ptp(np.interp(ends, self.time, values)) for values in (self.beam, self.shaker)) / size
+        count = int(np.clip(np.ceil(travel / 0.2), 4, 40))
+        at = opened + self.exposure * (np.arange(count) + 0.5) / count
+        beam = self.zero_row - np.interp(at, self.time, self.beam) / size
+        return beam, self.zero_row - np.interp(at, self.time, self.shaker) / size
+
+
+def _turn_back(turn: Orientation, picture: NDArray[np.uint16]) -> NDArray[np.uint16]:
+    if turn.side in ("above", "left"):
+        picture = picture[::-1]
+    return np.ascontiguousarray(picture.T if turn.side in ("left", "right") else picture)
+
+
+def render_recording(
+    time: ArrayLike,
+    beam_displacement: ArrayLike,
+    striker_displacement: ArrayLike,
+    *,
+    camera: SyntheticCamera | None = None,
+    stage: SyntheticStage | None = None,
+    defects: Defects | None = None,
+    rest_frames: int = 10,
+    zero_row: float | None = None,
+    seed: int = 0,
+    **spoiled: Any,
+) -> SyntheticRecording:
+    """Draw what a high-speed camera would see of a known motion.
+
+    Parameters
+    ----------
+    time
+        Instants [s], shape (samples,), strictly increasing; several to a frame, for the motion is taken as
+        linear between them.
+    beam_displacement, striker_displacement
+        Displacement of the beam at the contact and of the shaker's tip [m], shape (samples,); they touch
+        where equal.
+    camera, stage
+        The camera and the scene; the paper's camera at 384 x 384 pixels unless given.
+    defects
+        What goes wrong; nothing unless given.
+    rest_frames
+        Frames before the motion begins, at the first displacement.
+    zero_row
+        Row of the middle of the beam at zero displacement, in the picture turned so that the shaker is below;
+        chosen so that everything stays in the region unless given.
+    seed
+        Of the noise; each frame's noise depends on the seed and its number only.
+    **spoiled
+        Fields of :class:`Defects`, such as ``blank_frames``, to change in *defects*.
+
+    Returns
+    -------
+    SyntheticRecording
+        Frames on demand, the truth, and :meth:`SyntheticRecording.write`.
+
+    Raises
+    ------
+    InputError
+        If arrays disagree or the scene does not fit in the region, with the number of rows it takes.
+    """
+    for name, value, kind in (("camera", camera, SyntheticCamera), ("stage", stage, SyntheticStage)):
+        if value is not None:
+            instance(name, value, kind, f"a {kind.__name__}")
+    if defects is not None:
+        instance("defects", defects, Defects, "Defects")
+    camera = SyntheticCamera() if camera is None else camera
+    stage = SyntheticStage() if stage is None else stage
+    known = [field.name for field in dataclasses.fields(Defects)]
+    for name in spoiled:
+        choice("defect", name, tuple(known))
+    defects = dataclasses.replace(Defects() if defects is None else defects, **spoiled)
+    instants = axis("time", time, -math.inf, math.inf)
+    if instants.size < 2:
+        raise InputError(f"time of {instants.size} sample: must hold at least 2")
+    beam = finite_array("beam_displacement", beam_displacement, 1)
+    shaker = finite_array("striker_displacement", striker_displacement, 1)
+    for name, values in (("beam_displacement", beam), ("striker_displacement", shaker)):
+        if values.size != instants.size:
+            raise InputError(f"{name} of {values.size} samples: time has {instants.size}")
+    rest = integer("rest_frames", rest_frames, 0)
+    seed = integer("seed", seed, 0)
+    sign = Orientation(stage.side, camera.shape).sign
+    row = (
+        _fitting_row(camera, stage, sign * beam, sign * shaker)
+        if zero_row is None
+        else finite("zero_row", zero_row)
+    )
+    span = instants[-1] - instants[0]
+    count = rest + math.floor((span - float(camera.exposure or 0.0)) * camera.frame_rate + 1e-9) + 1
+    if count <= rest:
+        raise InputError(f"time spans {span:g} s: must hold at least one exposure")
+    start = float(instants[0]) - rest / camera.frame_rate
+    moving = _Instants(instants, sign * beam, sign * shaker, camera, start, row)
+    means = moving.means(start + np.arange(count) / camera.frame_rate)
+    disturbed = np.zeros(count, dtype=np.int8)
+    for frames in defects.frames(count).values():
+        disturbed[list(frames)] = 1
+    truth = trajectory_dataset(
+        np.arange(count) / camera.frame_rate, attrs=_attributes(camera, stage, rest, row, seed)
+    )
+    for name, motion, long_name in (
+        ("displacement_mm", sign * means[0], "beam displacement, mean over the exposure"),
+        ("shaker_displacement_mm", sign * means[1], "shaker displacement, mean over the exposure"),
+        ("penetration_mm", means[1] - means[0], "penetration, mean over the exposure"),
+    ):
+        truth[name] = ("time", 1e3 * motion, {"units": "mm", "long_name": long_name})
+    truth["disturbed"] = ("time", disturbed, {"units": "1", "long_name": "whether the frame was spoiled"})
+    return SyntheticRecording(camera, stage, defects, truth, moving, seed)
+
+
+def _attributes(
+    camera: SyntheticCamera, stage: SyntheticStage, rest: int, row: float, seed: int
+) -> dict[str, Any]:
+    values = {f"camera_{name}": getattr(camera, name) for name in camera.__dataclass_fields__}
+    values |= {f"stage_{name}": getattr(stage, name) for name in stage.__dataclass_fields__}
+    plain = {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
+    return plain | {
+        "rest_frames": rest,
+        "zero_row": row,
+        "seed": seed,
+        "title": "truth of a synthetic recording",
+    }
+
+
+def _fitting_row(camera: SyntheticCamera, stage: SyntheticStage, beam: Floats, shaker: Floats) -> float:
+    """Row of zero displacement that centres what must be seen: beam, and sticker or tip."""
+    size = camera.pixel_size
+    height = camera.shape[0] if stage.side in ("below", "above") else camera.shape[1]
+    width = camera.shape[1] if stage.side in ("below", "above") else camera.shape[0]
+    margin = 8.0 + 3.0 * camera.blur
+    lean = abs(stage.slope) * width / 2.0
+    above = beam.max() / size + 0.5 * stage.beam_thickness / size + lean + margin
+    mark = stage.marker_distance + stage.marker_thickness if stage.marker_thickness > 0.0 else 8.0 * size
+    below = max(
+        -shaker.min() / size + (0.5 * stage.beam_thickness + mark) / size + margin,
+        -beam.min() / size + 0.5 * stage.beam_thickness / size + lean + margin,
+    )
+    need = math.ceil(above + below)
+    if need > height:
+        raise InputError(
+            f"shape = {camera.shape}: beam, shaker and their motion take {need} pixels along it; use a "
+            f"taller region, larger pixels than {size * 1e6:g} um, or give zero_row"
+        )
+    return (height - 1) / 2.0 + 0.5 * (above - below)
+
+
+# ----------------------------------------------------------------------------------------------------
+# From a simulated run to what a laboratory would have recorded of it: frames, and a vibrometer's signal.
+
+
+def render_run(
+    run: Any,
+    *,
+    camera: SyntheticCamera | None = None,
+    stage: SyntheticStage | None = None,
+    seed: int = 0,
+    **options: Any,
+) -> SyntheticRecording:
+    """Draw what a high-speed camera would see of a simulated run about the shaker.
+
+    Parameters
+    ----------
+    run
+        A run, or its dataset, with ``displacement_at_striker``, ``striker_displacement`` and the attribute
+        ``length_scale``, the buckling level b [m].
+    camera, stage, seed, **options
+        As for :func:`render_recording`.  Unless a stage is given, its beam is as thick as the run's and the
+        shaker stands on the run's side.
+    """
+    dataset = check_trajectory(
+        getattr(run, "dataset", run), ("displacement_at_striker", "striker_displacement")
+    )
+    attrs = dataset.attrs
+    if "length_scale" not in attrs:
+        raise InputError("run without the attribute length_scale: must say how many metres its unit b is")
+    scale = positive("length_scale", attrs["length_scale"], "m")
+    if stage is None:
+        plain = SyntheticStage()
+        stage = SyntheticStage(
+            side=attrs.get("side", plain.side),
+            beam_thickness=attrs.get("beam_thickness", plain.beam_thickness),
+        )
+    recording = render_recording(
+        dataset["time"].values,
+        scale * dataset["displacement_at_striker"].values,
+        scale * dataset["striker_displacement"].values,
+        camera=camera,
+        stage=stage,
+        seed=seed,
+        **options,
+    )
+    for name in ("displacement_at_striker", "striker_displacement", "penetration_normalised"):
+        values = recording.truth[f"{name}_mm"]
+        recording.truth[name] = ("time", values.values / (scale * 1e3), {**values.attrs, "units": "1"})
+    recording.truth.attrs["buckling_level"] = scale
+    return recording
+
+
+def render_vibrometer(
+    frequency: float,
+    velocity_amplitude: float,
+    *,
+    duration: float,
+    sampling_frequency: float = 20_000.0,
+    onset: float = 0.1,
+    start_up: float = 0.05,
+    start_up_share: float = 0.4,
+    phase: float = 0.0,
+    distortion: float = 0.0,
+    snr_db: float = 30.0,
+    seed: int = 0,
+) -> xr.DataArray:
+    """What a laser vibrometer would record of the shaker: rest, a start-up transient, a sine, and noise.
+
+    From the onset t0 on the velocity is V [1 - s exp(-(t - t0)/T)] cos(omega (t - t0) + phase), with the
+    share s and the time T of the start-up, and a second harmonic of relative size ``distortion``.
+
+    Parameters
+    ----------
+    frequency, velocity_amplitude
+        Of the steady motion [Hz], [m/s].
+    duration, sampling_frequency
+        Length [s] and rate [Hz] of the record.
+    onset, start_up, start_up_share
+        t0 [s], T [s] and s; 0 for a start-up that is over at once.
+    phase, distortion
+        Phase [rad] at the onset, and amplitude of the second harmonic over the first.
+    snr_db
+        20 log10(rms of the steady sine / standard deviation of the noise); infinite for none.
+    seed
+        Of the noise.
+
+    Returns
+    -------
+    xarray.DataArray
+        The signal [m/s] with the truth in its attributes; write it with :func:`write_signal`.
+    """
+    freq = positive("frequency", frequency, "Hz")
+    amplitude = positive("velocity_amplitude", velocity_amplitude, "m/s")
+    rate = positive("sampling_frequency", sampling_frequency, "Hz")
+    if rate <= 4.0 * freq:
+        raise InputError(
+            f"sampling_frequency = {rate:g}: must be more than 4 times the frequency, {4 * freq:g} Hz"
+        )
+    length = positive("duration", duration, "s")
+    begin = within("onset", onset, 0.0, length, closed="left", unit="s")
+    time_constant = nonnegative("start_up", start_up, "s")
+    share = within("start_up_share", start_up_share, -1.0, 1.0, closed="both")
+    second = within("distortion", distortion, 0.0, 1.0, closed="left")
+    if not (snr_db == math.inf):
+        within("snr_db", snr_db, -20.0, 200.0, closed="both", unit="dB")
+    rng = np.random.default_rng(integer("seed", seed, 0))
+    time = np.arange(round(length * rate)) / rate
+    since = np.maximum(time - begin, 0.0)
+    envelope = 1.0 - share * np.exp(-since / time_constant) if time_constant > 0.0 else np.ones_like(since)
+    angle = 2.0 * math.pi * freq * since + within("phase", phase, -1e6, 1e6, unit="rad")
+    velocity = amplitude * envelope * (np.cos(angle) + second * np.cos(2.0 * angle)) * (time >= begin)
+    noise = 0.0 if snr_db == math.inf else amplitude / math.sqrt(2.0) * 10.0 ** (-snr_db / 20.0)
+    truth = {
+        "true_frequency": freq,
+        "true_velocity_amplitude": amplitude,
+        "true_onset": begin,
+        "true_start_up": time_constant,
+        "true_noise": noise,
+        "seed": seed,
+    }
+    values = velocity + noise * rng.standard_normal(time.size)
+    return make_signal(values, "m/s", rate, name="shaker velocity", attrs=truth)

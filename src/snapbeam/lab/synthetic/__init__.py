@@ -1,1 +1,0 @@
-"""Recordings and signals with a known truth."""

@@ -1,0 +1,342 @@
+"""A tracked recording against itself: is it the beam, is it at rest, do its edges look like edges."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from snapbeam.lab.diagnostics import Kind, table
+from snapbeam.lab.tracking.measure import Rest, Touch, TrackedRows
+from snapbeam.lab.tracking.settings import BeamView, EdgeShape, Fields, FrameFlag, Scene, TrackingSettings
+from snapbeam.lab.tracking.survey import CLIPPED
+from snapbeam.util.diagnostics import Diagnostic, Severity
+
+__all__ = ["KINDS", "SeenMotion", "contact_shift", "never_touching", "rounding_shift", "tracking_findings"]
+
+
+NOTE, DOUBT, WRONG = Severity.INFO, Severity.WARNING, Severity.ERROR
+
+KINDS = table(
+    Kind(
+        "camera.no_motion", DOUBT,
+        "the range of the tracked beam over the recording, against its standard errors",
+        "what is tracked never moves by more than {range_px:.2f} px: it may be a clamp or a fixture; look at a "
+        "frame (--picture) and narrow region (--region)",
+        ("region",),
+    ),
+    Kind(
+        "camera.fixture", NOTE,
+        "bands of light whose edges stand still while another one moves",
+        "{count:.0f} bar(s) that never move cross the picture, the first at row {row:.0f} of the turned picture; "
+        "left out as no beam",
+    ),
+    Kind(
+        "camera.thickness", WRONG,
+        "thickness found in the picture, against that measured with a gauge",
+        "the beam found is {found_mm:.3f} mm thick, beam_thickness (--beam-thickness) says {known_mm:.3f} mm: "
+        "another object (narrow region, --region), or a wrong pixel_size (--pixel-size)",
+        ("beam_thickness", "pixel_size", "region"),
+    ),
+    Kind(
+        "camera.scale", WRONG,
+        "thickness of the beam in millimetres, against what a beam can have",
+        "at this pixel size the beam is {found_mm:.3g} mm thick; pixel_size (--pixel-size) is in metres, such as "
+        "12e-6",
+        ("pixel_size",),
+    ),
+    Kind(
+        "camera.no_rest", WRONG,
+        "how long the beam stays where it is at the start, against the rest of its motion",
+        "the recording begins in motion ({quiet:.0f} quiet frame(s)), so where the beam rests is not known and "
+        "all displacements are shifted by up to {shift_mm:.3g} mm, which is in their standard errors; give "
+        "rest_frames (--rest-frames), such as a range at the end, or record from before the start",
+        ("rest_frames",),
+    ),
+    Kind(
+        "camera.rest_moves", DOUBT,
+        "drift of the beam within the frames given as rest",
+        "the beam moves by {drift:.0f} standard errors within the rest_frames (--rest-frames) given",
+        ("rest_frames",),
+    ),
+    Kind(
+        "camera.gamma", DOUBT,
+        "asymmetry of the mean edge, finer than a pixel",
+        "edges look as if grey levels were light to the power {gamma:.2f} +- {error:.2f}: shaker and beam shift "
+        "against each other by {shift_px:.2f} px, which is in the shaker's standard errors; switch the camera's "
+        "curve off, or undo it with gamma (--gamma)",
+        ("gamma",),
+    ),
+    Kind(
+        "camera.overexposed", DOUBT,
+        "pixels in the middle of the beam that pile up at the highest grey level",
+        "{share_percent:.0f} % of the beam's pixels are saturated: its edges lie up to {shift_px:.2f} px off, "
+        "which is in the shaker's standard errors; less light, or a shorter exposure",
+    ),
+    Kind(
+        "camera.edge_shape", DOUBT,
+        "what a blurred step leaves of the mean edge, finer than a pixel",
+        "edges are no blurred steps (off by {misfit_percent:.1f} % of the contrast): sharpened, doubled or "
+        "structured; switch the camera's edge enhancement off, or choose another contact_column (--contact-column)",
+        ("contact_column",),
+    ),
+    Kind(
+        "camera.averaged", DOUBT,
+        "noise of pixels, against that of the same pixels a frame later",
+        "noise of one frame is still there in the next (correlation {correlation:.2f}): frames were averaged, by the "
+        "camera's noise reduction or by a program that changed the frame rate; positions lag by about {lag:.1f} "
+        "frame(s), which is in their standard errors; keep the frames as they were taken",
+    ),
+    Kind(
+        "camera.smoothed", DOUBT,
+        "noise of pixels, against that of their neighbours",
+        "noise of neighbouring pixels is alike (correlation {correlation:.2f}): pictures were enlarged, smoothed, "
+        "compressed or made of fields, so that edges are known {factor:.1f} times less well than they seem and lie "
+        "{made_px:.2f} px off, which is in the standard errors; keep the frames as they were taken",
+    ),
+    Kind(
+        "camera.interlaced", DOUBT,
+        "the edge in odd rows of fast frames, against that in even ones",
+        "odd and even rows differ by {share:.2f} of the step from frame to frame: interlaced video, whose rows are of "
+        "two instants; positions are of an instant up to half a frame off, which is in their standard errors; record "
+        "progressive frames, or part the fields into frames of their own",
+    ),
+    Kind(
+        "camera.fields", DOUBT,
+        "each frame against the mean of its neighbours, with turning sign",
+        "every other frame is shifted by {shift_px:.2f} px: fields of an interlaced video, made frames by repeating "
+        "rows; the shift is in the standard errors; take a program that puts each field's rows where they belong",
+    ),
+    Kind(
+        "camera.few_levels", DOUBT,
+        "grey levels between beam and background, and noise that would even out their rounding",
+        "the beam stands out by {levels:.1f} grey levels only: rounding moves edges by up to {shift_px:.2f} px, which "
+        "is in the standard errors; more light, or more bits",
+    ),
+    Kind(
+        "camera.sticker_alone", DOUBT,
+        "a band of one height below the beam with nothing beyond it, that never comes near the beam",
+        "all that is seen of the shaker is a band {height_px:.0f} px high that never comes nearer to the beam than "
+        "{gap_px:.0f} px: taken for a sticker on a dark shaker whose tip touches the beam in the first frames; "
+        "give tip_distance (--tip-distance), or marker=False (--no-marker) if the band is the tip",
+        ("tip_distance", "marker"),
+    ),
+    Kind(
+        "camera.never_touches", DOUBT,
+        "the gap between tip and beam over the recording, while the beam moves",
+        "the beam moves though what is taken for the tip never comes nearer to it than {gap_px:.1f} px: it may "
+        "be a sticker; look at a frame (--picture), give tip_distance (--tip-distance)",
+        ("tip_distance",),
+    ),
+    Kind(
+        "camera.contact_offset", DOUBT,
+        "penetration while beam and shaker move together, which is zero",
+        "while beam and shaker move together the tip seems to stand {depth_px:+.2f} +- {error_px:.2f} px inside the "
+        "beam: their edges are shifted against each other, which is in the shaker's standard errors; look for a "
+        "curve of the camera (--gamma), overexposure or a wrong tip_distance (--tip-distance)",
+        ("gamma", "tip_distance"),
+    ),
+    Kind(
+        "camera.inside", DOUBT,
+        "penetration of the tip into the beam, against what contact can give",
+        "the tip stands up to {depth_px:.1f} px inside the beam ({frames:.0f} frames): what is "
+        "taken for the tip is not, or beam and shaker are lit differently; give tip_distance (--tip-distance)",
+        ("tip_distance",),
+    ),
+    Kind(
+        "camera.jumps", DOUBT,
+        "positions that leave their neighbours for a few frames, as no motion does",
+        "{frames:.0f} frame(s) ({share_percent:.1f} %) left out because the position jumps and comes back",
+    ),
+    Kind(
+        "camera.distorted", DOUBT,
+        "thickness of the beam and shape of its edges in each frame, against the usual ones",
+        "{frames:.0f} frame(s) ({share_percent:.1f} %) in which the beam looks thicker or thinner, or its edge is no "
+        "step: light or another object lies on it; their standard errors are widened, or they are left out",
+    ),
+    Kind(
+        "camera.lost", DOUBT,
+        "share of the frames with a measurement",
+        "only {share_percent:.0f} % of the frames were measured; see the flags for the reasons",
+    ),
+    Kind(
+        "camera.striker_in_view", NOTE,
+        "something beyond the beam in most frames though no shaker is followed",
+        "a shaker is in view though shaker=False (--no-shaker): its columns are kept out of the search for the beam",
+        ("shaker",),
+    ),
+    Kind(
+        "camera.drift", NOTE,
+        "motion of marks that stand still",
+        "the camera moves by up to {drift_px:.2f} px against its fixed marks; taken out",
+    ),
+)  # fmt: skip
+
+_OFF = 0.1  # share by which the thickness may be off the known one
+_CONTACT = 6  # stretches of frames in contact from which an offset is told
+_LEVELS = 16.0  # grey levels of contrast
+_EVENED = 0.4  # grey levels of noise that even out their rounding
+_RARE = 0.05  # share of frames that may jump or be distorted without more than a note
+
+
+@dataclass(frozen=True)
+class SeenMotion:
+    """What the diagnostics of a tracked recording are drawn from, beside the scene.
+
+    ``penetration`` [px] of the tip into the beam, NaN where unknown, and that while they ``touch``; ``scale``
+    [mm/px]; ``drift`` [px] of the camera, the largest; ``fields`` of interlaced video.
+    """
+
+    rows: TrackedRows
+    rest: Rest
+    penetration: np.ndarray
+    touch: Touch
+    scale: float
+    drift: float
+    fields: Fields
+
+
+def tracking_findings(
+    scene: Scene, seen: SeenMotion, settings: TrackingSettings, offset_mm: float
+) -> tuple[Diagnostic, ...]:
+    """What a tracked recording says against itself; *offset_mm* is the error of the rest position."""
+    told = [*_of_the_beam(scene, seen, settings), *_of_the_rest(seen, settings, offset_mm)]
+    told += _of_the_edges(scene.shape, settings)
+    told += _of_the_pixels(scene, seen.fields)
+    told += _of_the_frames(seen.rows)
+    if scene.shaker is not None:
+        told += _of_the_tip(scene, seen)
+    if scene.striker_in_view:
+        told.append(KINDS["striker_in_view"].found())
+    if seen.drift > 0.05:
+        told.append(KINDS["drift"].found(drift_px=seen.drift))
+    return tuple(told)
+
+
+def contact_shift(touch: Touch, known: float) -> float:
+    """By how much [px] shaker and beam are shifted against each other, as far as their contact tells; 0 if not.
+
+    *known* is the standard error [px] of where tip and beam are, which explains as much.
+    """
+    shift = abs(touch.penetration)
+    told = touch.frames >= _CONTACT and shift > max(6.0 * touch.error, 4.0 * known, 0.06)
+    return shift if told else 0.0
+
+
+def rounding_shift(beam: BeamView) -> float:
+    """By how much [px] grey levels that were rounded to few move edges; 0 where they are many, or noise evens it
+    out."""
+    if beam.noise > _EVENED or beam.contrast > _LEVELS:
+        return 0.0
+    return 1.5 * max(beam.edge_width, 0.5) / beam.contrast
+
+
+def never_touching(penetration: np.ndarray, row: np.ndarray) -> float:
+    """Least gap [px] between tip and beam if the beam moves without ever being touched; else 0."""
+    known, seen = np.isfinite(penetration), np.isfinite(row)
+    if not known.any() or not seen.any() or np.ptp(np.percentile(row[seen], (0.5, 99.5))) <= 2.0:
+        return 0.0
+    closest = -float(np.percentile(penetration[known], 99.5))
+    return closest if closest > 3.0 else 0.0
+
+
+def _of_the_beam(scene: Scene, seen: SeenMotion, settings: TrackingSettings) -> list[Diagnostic]:
+    told = []
+    beam = scene.beam
+    if beam.fixtures:
+        told.append(KINDS["fixture"].found(count=len(beam.fixtures), row=beam.fixtures[0][0]))
+    row = seen.rows.row[np.isfinite(seen.rows.row)]
+    if row.size:
+        span = float(np.ptp(np.percentile(row, (0.5, 99.5))))
+        if span < max(0.3, 8.0 * float(np.nanmedian(seen.rows.error))):
+            told.append(KINDS["no_motion"].found(range_px=span))
+    found = beam.thickness * seen.scale
+    if not 0.005 <= found <= 30.0:
+        told.append(KINDS["scale"].found(found_mm=found))
+    if settings.beam_thickness is not None:
+        known = settings.beam_thickness * 1e3
+        if abs(found / known - 1.0) > _OFF + 0.5 * seen.scale / known:
+            told.append(KINDS["thickness"].found(found_mm=found, known_mm=known))
+    return told
+
+
+def _of_the_rest(seen: SeenMotion, settings: TrackingSettings, offset_mm: float) -> list[Diagnostic]:
+    if seen.rest.found:
+        return []
+    if settings.rest_frames is not None:
+        return [KINDS["rest_moves"].found(drift=seen.rest.drift)]
+    return [KINDS["no_rest"].found(quiet=2 * seen.rest.indices.size, shift_mm=offset_mm)]
+
+
+def _of_the_edges(shape: EdgeShape, settings: TrackingSettings) -> list[Diagnostic]:
+    if shape.clipped > CLIPPED:
+        return [
+            KINDS["overexposed"].found(share_percent=100.0 * shape.clipped, shift_px=2.0 * abs(shape.shift))
+        ]
+    if abs(shape.shift) > 0.02:
+        gamma = settings.gamma * shape.gamma
+        error = settings.gamma * shape.gamma_se
+        return [KINDS["gamma"].found(gamma=gamma, error=error, shift_px=2.0 * abs(shape.shift))]
+    if shape.misfit > 0.03:
+        return [KINDS["edge_shape"].found(misfit_percent=100.0 * shape.misfit)]
+    return []
+
+
+def _of_the_pixels(scene: Scene, fields: Fields) -> list[Diagnostic]:
+    told = []
+    if fields.apart > 0.0:
+        told.append(KINDS["interlaced"].found(share=fields.apart))
+    if fields.shift > 0.0:
+        told.append(KINDS["fields"].found(shift_px=fields.shift))
+    noise = scene.noise
+    if noise.lag > 0.0:
+        told.append(KINDS["averaged"].found(correlation=noise.in_time, lag=noise.lag))
+    if noise.factor > 1.0 or noise.across > 0.0:
+        alike = max(noise.along, noise.across)
+        told.append(KINDS["smoothed"].found(correlation=alike, factor=noise.factor, made_px=noise.made_up))
+    shift = rounding_shift(scene.beam)
+    if shift > 0.0:
+        told.append(KINDS["few_levels"].found(levels=scene.beam.contrast, shift_px=shift))
+    return told
+
+
+def _of_the_frames(rows: TrackedRows) -> list[Diagnostic]:
+    told = []
+    count = rows.row.size
+    for name, flag in (("jumps", FrameFlag.JUMP), ("distorted", FrameFlag.DISTORTED)):
+        frames = rows.flagged(flag)
+        if frames:
+            share = frames / count
+            severity = DOUBT if share > _RARE else NOTE
+            told.append(KINDS[name].found(severity, frames=frames, share_percent=100.0 * share))
+    share = float(np.isfinite(rows.row).mean())
+    if share < 0.9:
+        told.append(KINDS["lost"].found(share_percent=100.0 * share))
+    return told
+
+
+def _of_the_tip(scene: Scene, seen: SeenMotion) -> list[Diagnostic]:
+    shaker = scene.shaker
+    assert shaker is not None
+    told: list[Diagnostic] = []
+    gap = -seen.penetration
+    known = np.isfinite(gap)
+    if not known.any():
+        return told
+    error = np.hypot(seen.rows.error, seen.rows.shaker_error)
+    given = shaker.tip_source == "distance to the sticker as given"
+    if shaker.isolated and not given and shaker.sticker is not None:
+        # the sticker's own upper edge over the beam
+        nearest = float(np.nanmin(gap)) - shaker.tip_offset - 0.5 * shaker.sticker.thickness
+        told.append(KINDS["sticker_alone"].found(height_px=shaker.sticker.thickness, gap_px=nearest))
+    closest = never_touching(seen.penetration, seen.rows.row)
+    if closest > 0.0:
+        told.append(KINDS["never_touches"].found(gap_px=closest))
+    if contact_shift(seen.touch, scene.placed_error) > 0.0:
+        told.append(KINDS["contact_offset"].found(depth_px=seen.touch.penetration, error_px=seen.touch.error))
+    with np.errstate(invalid="ignore"):
+        deep = seen.penetration - 5.0 * error > 1.0
+    if np.count_nonzero(deep) >= 3:
+        depth = float(np.nanmax(np.where(deep, seen.penetration, np.nan)))
+        told.append(KINDS["inside"].found(depth_px=depth, frames=int(np.count_nonzero(deep))))
+    return told

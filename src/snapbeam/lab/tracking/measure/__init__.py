@@ -1,1 +1,0 @@
-"""Rows of beam and shaker in every frame, and what is wrong with each."""

@@ -1,0 +1,1041 @@
+"""Diagnostic the beam and the shaker in a sample of frames, before following them."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.optimize import minimize_scalar
+
+from snapbeam.lab.tracking.edges import (
+    EdgeFit,
+    Floats,
+    edge_profile,
+    fit_edges,
+    masked_median,
+    width_calibration,
+)
+from snapbeam.lab.tracking.measure import (
+    MIN_GAP,
+    BeamRows,
+    measure_beam,
+    sticker_rows,
+    sticker_thickness,
+    tip_edges,
+)
+from snapbeam.lab.tracking.settings import (
+    HALF,
+    BeamView,
+    EdgeShape,
+    NoiseShape,
+    Scene,
+    ShakerView,
+    Sticker,
+    TipOutline,
+    TrackingSettings,
+    gather,
+    spread_columns,
+)
+from snapbeam.util.validation import InputError
+
+__all__ = [
+    "CLIPPED",
+    "Apex",
+    "BeamBands",
+    "ColumnObjects",
+    "Wanted",
+    "beam_light",
+    "beam_view",
+    "column_objects",
+    "edge_shape",
+    "find_apex",
+    "find_bands",
+    "find_rod",
+    "find_sticker",
+    "fixed_bars",
+    "longest_stretch",
+    "noise_shape",
+    "otsu",
+    "pixel_noise",
+    "placed",
+    "rod_middle",
+    "saturation_level",
+    "shaker_view",
+    "survey",
+    "tip_outline",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Objects in each column of a binary sample, counted from the far side, and bars that never move.
+
+
+_STILL = 0.7  # share of the sample in which both edges of a bar must stand still
+_ACROSS = 0.6  # share of the columns that a bar or a beam crosses
+_MOVES = 2.0  # rows by which a beam must move to be told from a bar
+
+
+@dataclass(frozen=True)
+class ColumnObjects:
+    """The first two objects from the far side in each column of each frame, arrays (frames, columns).
+
+    ``start`` and ``end`` (one past the last row) of the first where ``found``; ``after`` and ``after_end`` of
+    the next where one ``follows``; ``further`` whether anything lies beyond that.  ``height`` counts the rows.
+    """
+
+    start: NDArray[np.intp]
+    end: NDArray[np.intp]
+    found: NDArray[np.bool_]
+    after: NDArray[np.intp]
+    after_end: NDArray[np.intp]
+    follows: NDArray[np.bool_]
+    further: NDArray[np.bool_]
+    height: int
+
+
+def column_objects(mask: NDArray[np.bool_]) -> ColumnObjects:
+    """The first two objects in each column of a mask (frames, rows, columns); specks of one row are none."""
+    rows = np.arange(mask.shape[1])[None, :, None]
+    solid = mask.copy()
+    solid[:, :-1] &= mask[:, 1:]
+    solid[:, -1] = False
+
+    def end_of(start: NDArray[np.intp]) -> NDArray[np.intp]:
+        filled = mask | (rows < start[:, None])
+        return np.where(filled.all(1), mask.shape[1], filled.argmin(1))
+
+    start, found = solid.argmax(1), solid.any(1)
+    end = end_of(start)
+    later = solid & (rows >= end[:, None])
+    after = later.argmax(1)
+    follows: NDArray[np.bool_] = np.asarray(later.any(1))
+    after_end = np.where(follows, end_of(after), mask.shape[1])
+    further: NDArray[np.bool_] = np.asarray((solid & (rows >= after_end[:, None])).any(1))
+    return ColumnObjects(start, end, found & (start > 0), after, after_end, follows, further, mask.shape[1])
+
+
+def longest_stretch(columns: NDArray[np.bool_]) -> tuple[int, int]:
+    """First and one past the last of the longest stretch of True."""
+    steps = np.diff(np.concatenate([[0], columns.astype(np.int8), [0]]))
+    starts, stops = np.flatnonzero(steps == 1), np.flatnonzero(steps == -1)
+    if not starts.size:
+        return 0, 0
+    best = int(np.argmax(stops - starts))
+    return int(starts[best]), int(stops[best])
+
+
+def fixed_bars(mask: NDArray[np.bool_]) -> tuple[tuple[int, int], ...]:
+    """Rows (first, one past the last) of bars that cross the picture and never move, beside a beam that does.
+
+    A bar that stands alone is none: it may be a beam at rest.
+    """
+    bars: list[tuple[int, int]] = []
+    left = mask.copy()
+    for bar in _still_bands(mask):
+        rest = left.copy()
+        rest[:, max(bar[0] - 1, 0) : bar[1] + 1] = False
+        if _moving_beam(rest):
+            bars.append(bar)
+            left = rest
+    return tuple(bars)
+
+
+def _still_bands(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Bands whose two edges stand still in most of the sample, across most columns."""
+    columns = np.unique(np.linspace(0, mask.shape[2] - 1, min(mask.shape[2], 32)).astype(int))
+    steps = np.diff(mask[:, :, columns].astype(np.int8), axis=1)
+    share = {}
+    for sign in (1, -1):
+        near = steps == sign
+        spread = near.copy()
+        spread[:, 1:] |= near[:, :-1]
+        spread[:, :-1] |= near[:, 1:]
+        share[sign] = spread.mean(0)  # (rows - 1, columns)
+    marks = np.zeros((mask.shape[1], columns.size), dtype=bool)
+    for c in range(columns.size):
+        rising = _peaks(share[1][:, c])
+        falling = _peaks(share[-1][:, c])
+        for first in rising:
+            stops = falling[falling > first]
+            if stops.size and not ((rising > first) & (rising < stops[0])).any():
+                marks[first + 1 : stops[0] + 1, c] = True
+    across = marks.mean(1) >= _ACROSS
+    edges = np.diff(np.concatenate([[0], across.astype(np.int8), [0]]))
+    return list(zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True))
+
+
+def _peaks(share: NDArray[np.floating]) -> NDArray[np.intp]:
+    """Middle of each stretch of rows at which an edge stands in most of the sample."""
+    still = share >= _STILL
+    steps = np.diff(np.concatenate([[0], still.astype(np.int8), [0]]))
+    middle: NDArray[np.intp] = (np.flatnonzero(steps == 1) + np.flatnonzero(steps == -1) - 1) // 2
+    return middle
+
+
+def _moving_beam(mask: NDArray[np.bool_]) -> bool:
+    """Whether what is left of a mask holds an object that crosses the picture, ends within it and moves."""
+    objects = column_objects(mask)
+    bounded = objects.found & (objects.end < mask.shape[1]) & (objects.end - objects.start >= 3)
+    if (bounded.mean(0) > 0.4).mean() < _ACROSS:
+        return False
+    where = np.where(bounded, objects.start, np.nan)
+    columns = np.flatnonzero(bounded.mean(0) > 0.4)
+    travel = np.nanpercentile(where[:, columns], 97, axis=0) - np.nanpercentile(where[:, columns], 3, axis=0)
+    return bool(np.median(travel) > _MOVES)
+
+
+# ----------------------------------------------------------------------------------------------------
+# The mean shape of the beam's edge, finer than a pixel, and what it says of the camera's curve.
+#
+# The edge crosses pixels at every phase, so the windows of a sample together hold its shape in steps of a
+# fraction of a pixel.  In light the edge is symmetric about itself, whatever the lens; a camera that stores
+# light**gamma bends it, and a step fitted to the bent edge lies off the true one.
+
+
+CLIPPED = 0.1  # share of saturated pixels in the middle of the beam that counts as overexposed
+_CLIPPED_SHIFT = 0.5  # px by which the edge of an overexposed object may lie off
+_STEP = 0.25  # px
+_REACH = 5.0
+_LEAST = 200  # windows
+_CERTAIN = 30.0  # chi-square by which a bent edge must be worse than a straight one
+_LIKELY = 0.4  # |log gamma| of a curve that is taken before stronger ones
+_CENTRES = 24  # tried on either side of 0
+_GAMMAS = np.exp(np.linspace(math.log(0.25), math.log(4.0), 81))
+
+
+def edge_shape(
+    windows: Floats, fit: EdgeFit, good: NDArray[np.bool_], width: float, sign: float, clipped: float
+) -> EdgeShape:
+    """Judge the mean edge of many windows.
+
+    Parameters
+    ----------
+    windows, fit
+        Grey levels (..., rows) and what :func:`fit_edges` made of them with *width* and *sign*.
+    good
+        Which windows to use.
+    width, sign
+        Blur of the edges [px]; +1 for objects brighter than the background.
+    clipped
+        Share of saturated pixels in the middle of the beam.
+    """
+    data, position = windows[good], fit.position[good]
+    unknown = EdgeShape(math.nan, math.nan, math.nan, _CLIPPED_SHIFT if clipped > CLIPPED else 0.0, clipped)
+    if data.shape[0] < _LEAST:
+        return unknown
+    rows = data.shape[-1]
+    offset = np.arange(rows) - (rows - 1) / 2.0 - position[:, None]
+    # each window by its own levels, so that uneven light does not count
+    contrast = fit.contrast[good]
+    model = edge_profile(offset, width)
+    level = (data * sign).mean(-1) - contrast * model.mean(-1)
+    share = (data * sign - level[:, None]) / contrast[:, None]
+    x, y, error = _binned(offset, share)
+    if x.size < 24 or clipped > CLIPPED:
+        return unknown
+    misfit = float(np.sqrt(np.mean((y - edge_profile(x, width)) ** 2)))
+    dark = level if sign > 0 else -(level + contrast)
+    ratio = float(np.median(dark / contrast))  # the dark side's grey level over the contrast
+    if not ratio > 1e-3:
+        return EdgeShape(misfit, math.nan, math.nan, 0.0, clipped)
+    gamma, error_of_gamma, shift = _symmetry(x, y, error, ratio, sign)
+    return EdgeShape(misfit, gamma, error_of_gamma, shift, clipped)
+
+
+def _symmetry(x: Floats, y: Floats, error: Floats, ratio: float, sign: float) -> tuple[float, float, float]:
+    """Gamma that makes the edge symmetric in light, its standard error, and where its centre then lies.
+
+    The centre is 0 where a linear camera will do.
+    """
+    outer = np.abs(x) > 0.8 * np.abs(x).max()
+    low, high = float(y[outer & (x < 0.0)].mean()), float(y[outer & (x > 0.0)].mean())
+    y, error = (y - low) / (high - low), error / (high - low)
+    found = np.array([_asymmetry(x, *_light(y, error, gamma, ratio, sign)) for gamma in _GAMMAS])
+    scatter, centres = found[:, 0], found[:, 1]
+    best = int(np.argmin(scatter))
+    freedom = max(float(np.count_nonzero((x > 0.0) & (x < 4.0))) - 2.0, 1.0)
+    unit = max(1.0, scatter[best] / freedom)
+    # a strong curve can bend one symmetric edge into another: one near 1 that does as well is the likelier, if curves
+    # on both sides of it do worse; where they only get worse towards 1, the strong one is what bent the edge
+    likely = np.flatnonzero(np.abs(np.log(_GAMMAS)) < _LIKELY)
+    other = int(likely[np.argmin(scatter[likely])])
+    least = scatter[other] <= scatter[[other - 1, other + 1]].min()
+    if least and (scatter[other] - scatter[best]) / unit < _CERTAIN:
+        best, unit = other, max(1.0, scatter[other] / freedom)
+    worse = (float(np.interp(0.0, np.log(_GAMMAS), scatter)) - scatter[best]) / unit
+    alike = (np.abs(scatter - scatter[best]) / unit < 1.0) & (
+        np.abs(np.log(_GAMMAS / _GAMMAS[best])) < _LIKELY
+    )
+    spread = np.log(_GAMMAS[alike])
+    log_se = max(0.5 * float(np.ptp(spread)), 0.5 * math.log(_GAMMAS[1] / _GAMMAS[0]))
+    gamma = float(_GAMMAS[best])
+    shift = float(centres[best]) if worse > _CERTAIN else 0.0
+    return gamma, gamma * log_se, shift
+
+
+def _light(y: Floats, error: Floats, gamma: float, ratio: float, sign: float) -> tuple[Floats, Floats]:
+    """Shares of light and their errors, from shares of grey levels that are light**gamma."""
+    bright = y if sign > 0 else 1.0 - y
+    grey = np.maximum(bright + ratio, 1e-6)
+    low, high = ratio ** (1.0 / gamma), (1.0 + ratio) ** (1.0 / gamma)
+    light = (grey ** (1.0 / gamma) - low) / (high - low)
+    slope = grey ** (1.0 / gamma - 1.0) / gamma / (high - low)
+    return (light if sign > 0 else 1.0 - light), error * slope
+
+
+def _asymmetry(x: Floats, light: Floats, error: Floats) -> tuple[float, float]:
+    """Chi-square of an edge turned about its centre against itself, least over the centre, and the centre."""
+    away = np.arange(0.5, 4.0 / _STEP) * _STEP
+
+    def chi(centre: float) -> float:
+        total = np.interp(centre + away, x, light) + np.interp(centre - away, x, light) - 1.0
+        spread = np.hypot(np.interp(centre + away, x, error), np.interp(centre - away, x, error))
+        return float(np.sum((total / np.hypot(spread, 5e-4)) ** 2))
+
+    near = min(np.linspace(-0.8, 0.8, 2 * _CENTRES + 1), key=chi)
+    step = 0.8 / _CENTRES
+    found = minimize_scalar(chi, bounds=(near - step, near + step), method="bounded", options={"xatol": 1e-4})
+    return float(found.fun), float(found.x)
+
+
+def _binned(offset: Floats, share: Floats) -> tuple[Floats, Floats, Floats]:
+    """Mean offset, mean share and its standard error in steps of a fraction of a pixel."""
+    index = np.floor((offset + _REACH) / _STEP).astype(int)
+    inside = (index >= 0) & (index < int(2 * _REACH / _STEP))
+    index, x, y = index[inside], offset[inside], share[inside]
+    count = np.bincount(index)
+    full = count >= 8
+    total = np.maximum(count, 1)
+    mean_x, mean = np.bincount(index, x) / total, np.bincount(index, y) / total
+    variance = np.bincount(index, y * y) / total - mean**2
+    error = np.sqrt(np.maximum(variance, 0.0) / total)
+    return mean_x[full], mean[full], error[full]
+
+
+# ----------------------------------------------------------------------------------------------------
+# The beam in a sample of frames: its levels, its thickness, the blur of its edges and where to measure it.
+
+
+_STEADY = 1.1  # blur of a frame over the usual one up to which its edges show the camera's own
+
+
+class BeamBands(NamedTuple):
+    """The beam as a band in each column (frames, columns): ``alone`` where nothing else merges with it."""
+
+    objects: ColumnObjects
+    alone: NDArray[np.bool_]
+    thickness: float
+
+
+def find_bands(objects: ColumnObjects, height: int, level: float, bright: bool) -> BeamBands:
+    """The band that crosses the picture.
+
+    Raises
+    ------
+    InputError
+        If none does, with what to change.
+    """
+    length = objects.end - objects.start
+    usable = objects.found & (objects.end < height) & (length >= 3)
+    way_out = "set region (--region), objects (--objects) or threshold (--threshold)"
+    if usable.mean() < 0.05:
+        raise InputError(
+            f"recording: no beam crosses the region at the threshold {level:.6g} for "
+            f"{'bright' if bright else 'dark'} objects; {way_out}"
+        )
+    thin = float(np.percentile(length[usable], 25))
+    alone = usable & (length <= 1.35 * thin + 2.0)
+    thickness = float(np.median(length[alone]))
+    seen = ((usable & (length >= 0.6 * thickness)).mean(0) > 0.4).mean()
+    if seen < 0.6:
+        raise InputError(
+            f"recording: an object of {thickness:.0f} rows is seen in only {100 * seen:.0f} % of the columns; "
+            f"the beam must cross the region, so {way_out}"
+        )
+    return BeamBands(objects, alone, thickness)
+
+
+def placed(
+    width: int, rod: tuple[int, int] | None, count: int, contact_column: float | None
+) -> tuple[float, NDArray[np.intp], tuple[NDArray[np.intp], ...], bool]:
+    """Contact column, columns to measure the beam in, groups that see it alone, and whether there are none.
+
+    Raises
+    ------
+    InputError
+        If the contact column leaves too little of the picture on one side.
+    """
+    centre = (rod[0] + rod[1] - 1) / 2.0 if rod is not None else (width - 1) / 2.0
+    centre = centre if contact_column is None else contact_column
+    half = max(20.0, (rod[1] - rod[0]) / 2.0) if rod is not None else max(20.0, width / 8.0)
+    half = min(half, centre - 2.0, width - 3.0 - centre)
+    if half < 2.0:
+        raise InputError(
+            f"contact_column (--contact-column) = {centre:g}: must leave at least 4 columns on both sides in "
+            "the region"
+        )
+    columns = spread_columns(int(np.ceil(centre - half)), int(np.floor(centre + half)), count)
+    if rod is None:
+        return centre, columns, (columns,), False
+    left = np.arange(max(0, rod[0] - 19), rod[0] - 3)
+    right = np.arange(rod[1] + 3, min(width, rod[1] + 19))
+    groups = tuple(one for one in (left, right) if one.size >= 4)
+    return centre, columns, groups or (columns,), not groups
+
+
+def beam_view(
+    frames: NDArray[np.floating],
+    smooth: NDArray[np.floating],
+    bands: BeamBands,
+    rough: BeamView,
+) -> tuple[BeamView, EdgeShape]:
+    """The beam to a fraction of a pixel, where it stands alone, and the shape of its edge.
+
+    ``rough`` holds all but contrast, edge width and thickness.
+    """
+    objects, alone = bands.objects, bands.alone
+    background, inside = _levels(smooth, objects, alone)
+    clear = ~objects.follows | (
+        objects.after - objects.end >= 2 * HALF
+    )  # else the tip's light is in the windows
+    good = alone & (clear if (alone & clear).mean() > 0.02 else True)
+    good[:, good.mean(0) < 0.1] = False
+    columns = np.flatnonzero(good.any(0))
+    columns = columns[np.unique(np.linspace(0, columns.size - 1, min(columns.size, 48)).astype(int))]
+    half = int(np.clip(bands.thickness // 2, 2, HALF))
+    good = good[:, columns]
+    far, near = objects.start[:, columns] - 0.5, objects.end[:, columns] - 0.5
+    width = _edge_width(frames, far, columns, good, half, rough.sign)
+    windows, fits, edges, usable = [], [], [], good.copy()
+    for rows, sign in ((near, -rough.sign), (far, rough.sign)):
+        window, within = gather(frames, rows, columns, half)
+        fit = fit_edges(window, width, sign=sign)
+        windows.append(window)
+        fits.append(fit)
+        edges.append(np.rint(rows) + fit.position)
+        usable &= within & np.isfinite(fit.position)
+    contrast, thickness, error = abs(inside - background), bands.thickness, 0.5
+    if usable.any():
+        contrast = float(np.median(fits[1].contrast[usable]))
+        thickness = float(np.median((edges[0] - edges[1])[usable]))
+        by_column = masked_median((edges[0] - edges[1]).T, usable.T)
+        by_column = by_column[np.isfinite(by_column)]
+        # the surface is uneven on the scale of three pixels: neighbouring columns count as one
+        independent = max(min(by_column.size, float(np.ptp(columns)) / 3.0), 1.0)
+        error = float(np.std(by_column)) / math.sqrt(independent)
+    clipped = max(
+        _hot(frames, rows, columns, good, rough.saturated) for rows in (0.5 * (far + near), far - half)
+    )
+    hot = float((windows[1][good] >= rough.saturated).mean()) if good.any() else 0.0
+    view = dataclasses.replace(
+        rough,
+        contrast=contrast,
+        thickness=thickness,
+        thickness_error=error,
+        edge_width=width,
+        width_table=width_calibration(width, 2 * half + 1),
+        hot_share=hot,
+    )
+    blur = masked_median(fits[1].width, usable)
+    steady = usable
+    if np.isfinite(
+        blur
+    ).any():  # an edge that speeds up within the exposure is bent whatever the camera's curve
+        steady = usable & (blur <= _STEADY * np.nanpercentile(blur, 25.0))[:, None]
+    return view, edge_shape(windows[1], fits[1], steady, width, rough.sign, clipped)
+
+
+def _hot(
+    frames: NDArray[np.floating],
+    rows: Floats,
+    columns: NDArray[np.intp],
+    good: NDArray[np.bool_],
+    level: float,
+) -> float:
+    """Share of saturated pixels about the given rows."""
+    windows, seen = gather(frames, rows, columns, 1)
+    return float((windows[seen & good] >= level).mean()) if (seen & good).any() else 0.0
+
+
+def _levels(
+    smooth: NDArray[np.floating], objects: ColumnObjects, alone: NDArray[np.bool_]
+) -> tuple[float, float]:
+    """Grey levels of the background beyond the beam and of the beam's middle."""
+    k, x = np.nonzero(alone & (objects.start >= 4))
+    if not k.size:
+        raise InputError(
+            "recording: the beam touches the edge of the region in every sampled frame; make region (--region) "
+            "taller"
+        )
+    middle = (objects.start[k, x] + objects.end[k, x]) // 2
+    return float(np.median(smooth[k, objects.start[k, x] - 4, x])), float(np.median(smooth[k, middle, x]))
+
+
+def _edge_width(
+    frames: NDArray[np.floating],
+    far: Floats,
+    columns: NDArray[np.intp],
+    good: NDArray[np.bool_],
+    half: int,
+    sign: float,
+) -> float:
+    """Blur of the far edge [px], by fits that start from the last one's."""
+    few = slice(None, None, max(1, frames.shape[0] // 16))
+    windows, inside = gather(frames[few], far[few], columns, half)
+    width = 1.0
+    for _ in range(4):
+        fit: EdgeFit = fit_edges(windows, width, sign=sign)
+        usable = inside & good[few] & np.isfinite(fit.position)
+        if not usable.any():
+            raise InputError(
+                "recording: the far edge of the beam could not be fitted; set threshold (--threshold) or region "
+                "(--region)"
+            )
+        found = float(np.median(fit.width[usable]))
+        width = float(np.clip(found, 0.3, 4.0)) if np.isfinite(found) else width
+    return width
+
+
+# ----------------------------------------------------------------------------------------------------
+# Grey levels of a sample: what parts objects from the background, how noisy pixels are, where they saturate.
+
+
+PILE = 5.0  # times more pixels at the highest level than just below it that tell saturation
+LEAST = 1e-4  # share of the pixels that must be at the highest level
+
+
+def otsu(frames: NDArray[np.floating]) -> float:
+    """Otsu's threshold of all pixels together, in their own grey levels."""
+    try:
+        import cv2
+    except ImportError as error:
+        raise InputError(
+            "threshold = None: diagnostic one needs OpenCV (pip install 'snapbeam[lab]'); or give threshold "
+            "(--threshold)"
+        ) from error
+    low, high = (float(level) for level in np.percentile(frames[:, ::2, ::2], (0.05, 99.95)))
+    if not high > low:
+        raise InputError(f"recording: all pixels are {low:g}, so there is no object to find")
+    scaled = np.clip((frames - low) * (65535.0 / (high - low)), 0.0, 65535.0).astype(np.uint16)
+    level, _ = cv2.threshold(scaled.reshape(-1, 1), 0, 65535, cv2.THRESH_BINARY + cv2.THRESH_OTSU)
+    return low + float(level) * (high - low) / 65535.0
+
+
+def pixel_noise(frames: NDArray[np.floating]) -> float:
+    """Standard deviation of the pixel noise, from differences along the beam.
+
+    Never less than that of rounding to whole grey levels, 1/sqrt(12).
+    """
+    few = frames[:: max(1, frames.shape[0] // 8)]
+    second = few[:, :, 2:] - 2.0 * few[:, :, 1:-1] + few[:, :, :-2]
+    return max(float(np.median(np.abs(second)) / 0.6745 / np.sqrt(6.0)), 1.0 / math.sqrt(12.0))
+
+
+def saturation_level(frames: NDArray[np.integer], max_value: float, noise: float) -> float:
+    """Grey level at which pixels are saturated, by what is seen as well as by what the file says.
+
+    A file of 16 bits may hold an image of 12, and its brightest pixels then pile up at 4095 though the file
+    could hold 65535.  The largest level of the file if none piles up.
+
+    Parameters
+    ----------
+    frames
+        Grey levels as recorded.
+    max_value
+        The largest level that the file can hold.
+    noise
+        Standard deviation of a pixel.
+    """
+    top = float(frames.max())
+    here = np.count_nonzero(frames == top)
+    if here < LEAST * frames.size or here < 16:
+        return float(max_value)
+    if top >= max_value or _whole_bits(int(top)):
+        return top
+    reach = max(3.0 * noise, 3.0)
+    below = np.count_nonzero((frames >= top - reach) & (frames < top)) / reach
+    return top if noise > 0.5 and here > PILE * below else float(max_value)
+
+
+def _whole_bits(level: int) -> bool:
+    """Whether a level is the largest of 10, 12 or 14 bits, at either end of 16."""
+    return any(level in (2**bits - 1, (2**bits - 1) << (16 - bits)) for bits in (10, 12, 14))
+
+
+# ----------------------------------------------------------------------------------------------------
+# Whether the noise of pixels is a camera's own: new in every frame, and each pixel's for itself.
+
+
+_APART = 4  # frames after which no noise is left of one in the other
+_LEAST_NOISE = 1500  # even pixels
+_ROUNDED = 0.6  # grey levels; less noise than this is rounded away
+_EVEN = 6.0  # standard deviations by which even pixels may differ from their neighbours
+_CERTAIN_NOISE = 0.2  # correlation that is no chance, and more than a sensor's own
+
+
+def noise_shape(head: NDArray[np.floating]) -> NoiseShape:
+    """Correlation of the noise with that of the next frame, and of the next pixel along the beam and across it.
+
+    The difference of two frames holds the noise of both and no scene.  Neighbours in time differ by
+    2 sigma^2 (1 - r), frames further apart by 2 sigma^2, r the correlation.  Only pixels count about which the
+    picture is even, so that what moves does not; changes of the light are fitted and taken out.
+
+    Parameters
+    ----------
+    head
+        Turned frames that follow each other, (n, height, width).
+    """
+    none = NoiseShape(0.0, 0.0, 0.0)
+    if head.shape[0] < _APART + 3:
+        return none
+    mean = head.mean(0)
+    around = ndimage.maximum_filter(mean, 5) - ndimage.minimum_filter(mean, 5)
+    apart = [_noise_of(head[k + _APART], head[k], mean) for k in range(head.shape[0] - _APART)]
+    noise = max(float(np.median(np.abs(apart))) / 0.6745 / math.sqrt(2.0), _ROUNDED)
+    even = around < _EVEN * noise
+    even &= np.max(np.abs(apart), axis=0) < 6.0 * noise
+    even &= np.ptp(head, axis=0) > 0.0
+    if np.count_nonzero(even) < _LEAST_NOISE:
+        return none
+    far = float(np.median([np.var(one[even]) for one in apart]))
+    if far < 2.0 * _ROUNDED**2:
+        return none
+    near = [_noise_of(after, before, mean) for before, after in itertools.pairwise(head)]
+    in_time = 1.0 - float(np.median([np.var(one[even]) for one in near])) / far
+    along, across = (_alike(apart, even, axis) / far for axis in (1, 0))
+    return NoiseShape(
+        *(min(value, 0.9) if value > _CERTAIN_NOISE else 0.0 for value in (in_time, along, across))
+    )
+
+
+def _alike(apart: list[Floats], even: NDArray[np.bool_], axis: int) -> float:
+    """Mean product of neighbouring pixels, both of them even, along an axis."""
+    here, there = slice(1, None), slice(None, -1)
+    first, second = ((slice(None), one) if axis else (one, slice(None)) for one in (here, there))
+    both = even[first] & even[second]
+    return float(np.median([np.mean(one[first][both] * one[second][both]) for one in apart]))
+
+
+def _noise_of(after: NDArray[np.floating], before: NDArray[np.floating], mean: Floats) -> Floats:
+    """The difference of two frames without a change of light between them."""
+    step: Floats = (after - before).astype(np.float64)
+    level = mean - mean.mean()
+    total = float(np.sum(level * level))
+    slope = float(np.sum(step * level)) / total if total > 0.0 else 0.0
+    left: Floats = step - np.median(step - slope * level) - slope * level
+    return left
+
+
+# ----------------------------------------------------------------------------------------------------
+# Looking for a sticker on the shaker: a band between two steps of opposite sign.
+
+
+SEEN = 0.3  # share of the sample in which a sticker must be seen
+
+
+def rod_middle(rod: tuple[int, int], share: float = 0.5) -> NDArray[np.intp]:
+    """The middle *share* of the columns that the shaker covers, at least five."""
+    centre, half = (rod[0] + rod[1] - 1) / 2.0, max(2.0, share * (rod[1] - rod[0]) / 2.0)
+    return np.arange(int(np.ceil(centre - half)), int(np.floor(centre + half)) + 1)
+
+
+def find_sticker(
+    smooth: NDArray[np.floating],
+    columns: NDArray[np.intp],
+    begin: NDArray[np.intp],
+    contrast: float,
+    sign: float = 0.0,
+) -> Sticker | None:
+    """Look for a band in the middle columns of the shaker; None if there is none.
+
+    Parameters
+    ----------
+    smooth
+        Smoothed frames of the sample (n, height, width).
+    columns
+        Columns in the middle of the shaker.
+    begin
+        Row of each frame from which to look, -1 for frames to leave out.
+    contrast
+        Of the beam.
+    sign
+        Sign of the band's upper step, where it is known.
+    """
+    profiles = smooth[:, :, columns].mean(-1)
+    steps = np.zeros_like(profiles)
+    steps[:, 2:-2] = profiles[:, 4:] - profiles[:, :-4]
+    found: list[tuple[int, int, int, float]] = []
+    for k in np.flatnonzero(begin >= 0):
+        peaks = _peaks_sticker(steps[k], int(begin[k]), 0.3 * contrast)
+        if len(peaks) >= 2 and peaks[0][1] * peaks[1][1] < 0.0 and peaks[1][0] - peaks[0][0] >= 4:
+            found.append((int(k), peaks[0][0], peaks[1][0], peaks[0][1]))
+    if len(found) < SEEN * profiles.shape[0]:
+        return None
+    upper = sign or float(np.sign(np.median([step for *_, step in found])))
+    size = float(np.median([bottom - top for _, top, bottom, _ in found]))
+    same = [one for one in found if abs(one[2] - one[1] - size) <= 2.0 and one[3] * upper > 0.0]
+    if len(same) < SEEN * profiles.shape[0]:
+        return None
+    margin = int(np.clip(min(smooth.shape[1] - 1 - bottom for _, _, bottom, _ in same), 2, HALF))
+    cut = [
+        profiles[k, top - margin : top + round(size) + margin + 1]
+        for k, top, bottom, _ in same
+        if top + round(size) + margin < smooth.shape[1]
+    ]
+    if not cut:
+        return None
+    return Sticker(
+        columns=spread_columns(int(columns[0]), int(columns[-1]), 24),
+        thickness=size,
+        sign=upper,
+        contrast=float(np.median([abs(step) for *_, step in same])),
+        template=np.median(np.array(cut, dtype=np.float64), axis=0),
+        head=margin,
+    )
+
+
+def _peaks_sticker(steps: NDArray[np.floating], begin: int, height: float) -> list[tuple[int, float]]:
+    """Rows and values of the extremes of each run of *steps* beyond *height*, from *begin* down."""
+    peaks: list[tuple[int, float]] = []
+    row = begin
+    while row < steps.size:
+        if abs(steps[row]) > height:
+            stop = row
+            while stop < steps.size and steps[stop] * steps[row] > 0.0 and abs(steps[stop]) > height:
+                stop += 1
+            part = np.abs(steps[row:stop])
+            peak = round(float((part * np.arange(row, stop)).sum() / part.sum()))
+            if row > begin:  # a run under way at the start belongs to the tip
+                peaks.append((peak, float(steps[peak])))
+            row = stop
+        else:
+            row += 1
+    return peaks
+
+
+# ----------------------------------------------------------------------------------------------------
+# The tip of the shaker: its outline, learned where it stands clear of the beam, and its apex.
+
+
+_OFF_CENTRE = 0.05  # share of the shaker's width by which its tip may be off its middle, standard deviation
+
+
+def beam_light(
+    frames: NDArray[np.floating], columns: NDArray[np.intp], near: Floats, thickness: float
+) -> Floats:
+    """Contrast of the beam in each column: its middle less the background beyond it, median over frames."""
+    middle, inside = gather(frames, near - 0.5 * thickness, columns, 1)
+    beyond, seen = gather(frames, near - thickness - 5.0, columns, 1)
+    return masked_median((middle.mean(-1) - beyond.mean(-1)).T, (inside & seen).T)
+
+
+def tip_outline(rows: Floats, good: NDArray[np.bool_], reference: Floats) -> tuple[Floats, NDArray[np.int64]]:
+    """Outline t of rows = reference(frame) + t(column), by medians in turn if it is not known."""
+    known = np.isfinite(reference)
+    shift = np.where(known, reference, masked_median(rows, good))
+    profile: Floats = np.zeros(rows.shape[1])
+    for _ in range(1 if known.any() else 12):
+        use = good & np.isfinite(shift)[:, None] & (known[:, None] if known.any() else True)
+        profile = masked_median((rows - shift[:, None]).T, use.T)
+        if not known.any():
+            shift = masked_median(rows - profile, good & np.isfinite(profile))
+    counted = (good & (known[:, None] if known.any() else True)).sum(0)
+    return profile, counted
+
+
+class Apex(NamedTuple):
+    """Where the tip comes nearest to the beam: its row, the row's standard error, its column from the contact's."""
+
+    row: float
+    error: float
+    column: float
+
+
+def find_apex(outline: TipOutline, rod: tuple[int, int], contact_column: float) -> Apex | None:
+    """The apex of an outline; None if it is not known on both sides of the contact.
+
+    The outline is taken as symmetric, y = a + b (x - c)^2 + d (x - c)^4, about a column c near the middle of
+    the shaker: a flat tip alone would not tell it.  Columns nearer than three pixels to each other count as
+    one, for the surface is uneven on that scale.
+    """
+    x, y = outline.columns - contact_column, outline.profile
+    size = float(rod[1] - rod[0])
+    inner = np.abs(x) <= 0.4 * size
+    if inner.sum() < 5 or x[inner].min() > -0.1 * size or x[inner].max() < 0.1 * size:
+        return None
+    half = float(np.abs(x[inner]).max())
+    covered = inner.sum() >= 12 and np.diff(np.sort(x[inner])).max() < 0.2 * size
+    u, v = x[inner] / half, y[inner]
+    middle = (0.5 * (rod[0] + rod[1] - 1) - contact_column) / half
+    powers = (0, 2, 4) if covered else (0, 2)
+    independent = max(2.0 * half / 3.0, len(powers) + 2.0)
+
+    def fitted(centre: float) -> tuple[Floats, float]:
+        design = np.stack([(u - centre) ** power for power in powers], axis=1)
+        solution = np.linalg.lstsq(design, v, rcond=None)[0]
+        return solution, float(np.mean((v - design @ solution) ** 2))
+
+    spread = max(fitted(middle)[1], 1e-4)
+    grid = middle + np.linspace(-0.5, 0.5, 201)
+    cost = [
+        independent * fitted(c)[1] / spread + ((c - middle) * half / (_OFF_CENTRE * size)) ** 2 for c in grid
+    ]
+    centre = float(grid[int(np.argmin(cost))])
+    solution, variance = fitted(centre)
+    rounded = float(np.polynomial.polynomial.polyval(0.9, _full(solution, powers))) - float(solution[0]) > 0.3
+    error = math.sqrt(max(variance, 1e-5) * 2.0 / independent)
+    return Apex(float(solution[0]), error, centre * half) if rounded or covered else None
+
+
+def _full(solution: Floats, powers: tuple[int, ...]) -> Floats:
+    out = np.zeros(5)
+    out[list(powers)] = solution
+    return out
+
+
+# ----------------------------------------------------------------------------------------------------
+# The shaker in a sample of frames: the columns it covers, its sticker and its tip.
+
+
+_CLEAR = 4.0  # rows from the beam within which a mark that stands alone may be the tip itself
+
+
+class Wanted(NamedTuple):
+    """What a person asks of the shaker: to look for a sticker, where its tip is [px], to keep the column.
+
+    ``head`` counts the frames at the start of the sample that are neighbours.
+    """
+
+    marker: bool
+    tip_distance: float | None
+    fixed_column: bool
+    head: int
+
+
+def find_rod(bands: BeamBands) -> tuple[int, int] | None:
+    """Columns in which something stands beyond the beam in most of the sample; None if too few."""
+    objects = bands.objects
+    merged = objects.found & (objects.end - objects.start > 1.35 * bands.thickness + 2.0)
+    share = (merged | (bands.alone & objects.follows)).mean(0)
+    rod = longest_stretch(ndimage.binary_closing(share > 0.7, iterations=2) | (share > 0.7))
+    return rod if rod[1] - rod[0] >= 5 else None
+
+
+def shaker_view(
+    view: BeamView,
+    frames: NDArray[np.floating],
+    smooth: NDArray[np.floating],
+    bands: BeamBands,
+    rod: tuple[int, int],
+    wanted: Wanted,
+) -> tuple[ShakerView, float]:
+    """The shaker, and the column at which its tip comes nearest to the beam.
+
+    Raises
+    ------
+    InputError
+        If neither tip nor sticker can be followed, with the way out.
+    """
+    beam = measure_beam(view, frames)
+    near = beam.row + view.thickness
+    middle = rod_middle(rod)
+    isolated = wanted.marker and _stands_alone(bands, middle, near)
+    sticker = None
+    if wanted.marker:
+        begin = _begin(view, bands, middle, isolated)
+        sticker = find_sticker(smooth, middle, begin, view.contrast, view.sign if isolated else 0.0)
+    isolated = isolated and sticker is not None
+    reference = np.full(frames.shape[0], np.nan)
+    if sticker is not None:
+        size = sticker_thickness(view, sticker, frames, near)
+        sticker = dataclasses.replace(sticker, thickness=size)
+        reference = sticker_rows(view, sticker, frames, near).row
+    outline = _outline(view, frames, bands, rod, beam, reference, learn=not isolated)
+    column = view.contact_column
+    shown = ShakerView(rod, sticker, outline, np.nan, 0.0, "", isolated)
+    if sticker is not None and wanted.tip_distance is not None:
+        offset = -(wanted.tip_distance + 0.5 * sticker.thickness)
+        return dataclasses.replace(
+            shown, tip_offset=offset, tip_source="distance to the sticker as given"
+        ), column
+    apex = None if isolated else find_apex(outline, rod, column)
+    if apex is not None:
+        column += 0.0 if wanted.fixed_column else apex.column
+        source = "tip seen apart from the beam"
+        return dataclasses.replace(
+            shown, tip_offset=apex.row, tip_error=apex.error, tip_source=source
+        ), column
+    if sticker is not None:
+        offset = _offset_at_rest(beam, near, reference, wanted.head)
+        source = "assumed to touch the beam in the first frames"
+        return dataclasses.replace(shown, tip_offset=offset, tip_source=source), column
+    raise InputError(
+        "recording: the shaker's tip never stands clear of the beam and carries no sticker that could be found, "
+        "so it cannot be followed; set region (--region) or threshold (--threshold), or track the beam alone "
+        "with shaker=False (--no-shaker)"
+    )
+
+
+def _stands_alone(bands: BeamBands, middle: NDArray[np.intp], near: Floats) -> bool:
+    """Whether all that is seen below the beam is a band of one height that never comes near it.
+
+    So a bright sticker on a shaker as dark as the background looks; a bright shaker reaches the border.
+    """
+    objects = bands.objects
+    shown = bands.alone[:, middle] & objects.follows[:, middle]
+    frames = shown.mean(1) > 0.5
+    if frames.mean() < 0.3:
+        return False
+    ends = ~objects.further[:, middle] & (objects.after_end[:, middle] < objects.height)
+    if (ends & shown)[frames].sum() < 0.8 * shown[frames].sum():
+        return False
+    size = (objects.after_end - objects.after)[:, middle]
+    height = np.array([np.median(size[k][shown[k]]) for k in np.flatnonzero(frames)])
+    top = np.array([np.median(objects.after[k, middle][shown[k]]) for k in np.flatnonzero(frames)])
+    gap = (top - near[frames])[np.isfinite(near[frames])]
+    even = np.ptp(np.percentile(height, (10, 90))) <= 2.5
+    return bool(even and gap.size and np.percentile(gap, 2) > _CLEAR)
+
+
+def _begin(view: BeamView, bands: BeamBands, middle: NDArray[np.intp], isolated: bool) -> NDArray[np.intp]:
+    """Row in each frame of the sample from which to look for a sticker; -1 where nothing is seen."""
+    objects = bands.objects
+    begin = np.full(objects.start.shape[0], -1, dtype=np.intp)
+    for k in range(begin.size):
+        apart = bands.alone[k, middle] & objects.follows[k, middle]
+        if apart.mean() > 0.5:
+            if isolated:
+                begin[k] = int(np.median(objects.end[k, middle][apart])) + 2
+            else:
+                begin[k] = int(np.median(objects.after[k, middle][apart])) + 4
+        elif objects.found[k, middle].any() and not isolated:
+            begin[k] = int(np.median(objects.start[k, middle][objects.found[k, middle]]) + view.thickness) + 4
+    return begin
+
+
+def _outline(
+    view: BeamView,
+    frames: NDArray[np.floating],
+    bands: BeamBands,
+    rod: tuple[int, int],
+    beam: BeamRows,
+    reference: Floats,
+    *,
+    learn: bool,
+) -> TipOutline:
+    """The tip's outline where it stands clear of the beam, counted from the sticker if there is one."""
+    columns = spread_columns(rod[0] + 1, rod[1] - 2, 48)
+    if not learn:
+        nothing: Floats = np.empty(0)
+        return TipOutline(np.empty(0, dtype=np.intp), nothing, nothing)
+    objects = bands.objects
+    near = beam.row + view.thickness
+    edge = near[:, None] + beam.slope[:, None] * (columns - view.contact_column)
+    tip = objects.after[:, columns] - 0.5
+    apart = bands.alone[:, columns] & objects.follows[:, columns] & (tip - edge >= MIN_GAP + 0.5)
+    light = beam_light(frames, columns, edge, view.thickness)
+    rows, good, _ = tip_edges(view, frames, columns, tip, edge, apart, light)
+    outline, counted = tip_outline(rows, good, reference)
+    if np.isfinite(reference).any():
+        # Once more where the sticker says that there is a gap, so that noise does not choose the frames.
+        tip = reference[:, None] + outline
+        rows, good, _ = tip_edges(view, frames, columns, tip, edge, tip - edge >= MIN_GAP, light)
+        outline, counted = tip_outline(rows, good, reference)
+    known = (counted >= max(3, 0.05 * frames.shape[0])) & np.isfinite(light)
+    return TipOutline(columns[known], outline[known], light[known])
+
+
+def _offset_at_rest(beam: BeamRows, near: Floats, reference: Floats, head: int) -> float:
+    """Row of the near edge over the sticker while both rest at the start, where the paper's tests touch."""
+    still = np.isfinite(near[:head]) & np.isfinite(reference[:head])
+    if not still.any():
+        raise InputError(
+            "recording: beam or sticker is not seen in the first frames; set region (--region) or threshold "
+            "(--threshold), or give tip_distance (--tip-distance)"
+        )
+    first = int(still.argmax())
+    limit = 4.0 * float(np.nanmax(beam.error[:head])) + 1e-6
+    for rows in (near, reference):
+        still &= np.abs(rows[:head] - rows[first]) <= limit
+    return float((near[:head] - reference[:head])[still].mean())
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+def survey(
+    frames: NDArray[np.floating],
+    settings: TrackingSettings,
+    *,
+    saturated: float,
+    pixel_size: float,
+    head: int,
+) -> Scene:
+    """Find everything in a sample of frames.
+
+    Parameters
+    ----------
+    frames
+        Turned frames (n, height, width), the first *head* of them neighbours.
+    settings
+        What is known of the recording.
+    saturated
+        Grey level of saturated pixels, infinite if there are none.
+    pixel_size
+        Metres per pixel.
+
+    Raises
+    ------
+    InputError
+        If no beam, or no shaker where one is wanted, can be found.
+    """
+    height, width = frames.shape[1:]
+    smooth = ndimage.uniform_filter(frames, size=(0, 3, 3))
+    level = otsu(smooth) if settings.threshold is None else settings.threshold
+    far = float(np.median(smooth[:, :3]))
+    bright = far < level if settings.objects == "auto" else settings.objects == "bright"
+    mask = smooth > level if bright else smooth < level
+    fixtures = fixed_bars(mask)
+    for first, last in fixtures:
+        mask[:, max(first - 1, 0) : last + 1] = False
+    bands = find_bands(column_objects(mask), height, level, bright)
+    rod = find_rod(bands)
+    if settings.shaker and rod is None:
+        raise InputError(
+            "recording: no shaker is seen beyond the beam; set region (--region), side (--side), objects "
+            "(--objects) or threshold (--threshold), or track the beam alone with shaker=False (--no-shaker)"
+        )
+    centre, columns, groups, merged = placed(width, rod, settings.columns, settings.contact_column)
+    rough = BeamView(
+        threshold=level,
+        bright=bright,
+        contrast=math.nan,
+        noise=pixel_noise(frames),
+        saturated=saturated,
+        hot_share=0.0,
+        edge_width=1.0,
+        width_table=width_calibration(1.0, 2 * HALF + 1),
+        thickness=bands.thickness,
+        thickness_error=0.5,
+        columns=columns,
+        contact_column=centre,
+        groups=groups,
+        merged=merged,
+        fixtures=tuple((max(first - 1, 0), last + 1) for first, last in fixtures),
+    )
+    view, shape = beam_view(frames, smooth, bands, rough)
+    noise = noise_shape(frames[:head])
+    if not settings.shaker or rod is None:
+        return Scene(view, None, shape, noise, rod is not None)
+    distance = None if settings.tip_distance is None else settings.tip_distance / pixel_size
+    wanted = Wanted(settings.marker, distance, settings.contact_column is not None, head)
+    shaker, column = shaker_view(view, frames, smooth, bands, rod, wanted)
+    centre, columns, groups, merged = placed(width, rod, settings.columns, column)
+    view = dataclasses.replace(view, contact_column=centre, columns=columns, groups=groups, merged=merged)
+    return Scene(view, shaker, shape, noise, False)

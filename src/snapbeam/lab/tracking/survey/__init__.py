@@ -1,1 +1,0 @@
-"""Diagnostic out from a sample of frames what a recording shows, before it is followed."""

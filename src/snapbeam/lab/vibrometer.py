@@ -1,0 +1,1031 @@
+"""What a laser vibrometer says about the shaker: steady sine, start-up transient, flaws of the record.
+
+The paper accepts a test when the signal-to-noise ratio of the shaker's velocity exceeds 15 dB, and names the
+start-up transient as a cause of disagreement with simulations (sections 2 and 4.1).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.lab.decay.poles import Line, without_lines
+from snapbeam.lab.diagnostics import KINDS_VIBROMETER
+from snapbeam.lab.signals import SignalSamples, check_signal, make_signal
+from snapbeam.lab.sine_fit import (
+    Clipping,
+    Flaw,
+    SineFit,
+    find_clipping,
+    find_flaws,
+    fit_sine,
+    sound_samples,
+    spectral_peak,
+    stuck_runs,
+)
+from snapbeam.util.diagnostics import Diagnostic, doubtful
+from snapbeam.util.validation import InputError, finite, positive, within
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "SNR_LIMIT",
+    "DriveLines",
+    "DriveMeasurement",
+    "StartUp",
+    "beside_lines",
+    "displacement_from_velocity",
+    "find_drive_lines",
+    "find_onset",
+    "measure_drive",
+    "mended",
+    "moves_outside",
+    "moving_part",
+    "robust_fit",
+    "settled_cycles",
+    "shaker_signal",
+    "steady_fit",
+    "with_wander",
+    "without_hum",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# The steady sine of a shaker's record: without its flaws, and with errors that hold its wandering.
+
+
+_PULLED = 1.8  # times the noise by which phases off a line are no chance
+_SMOOTH = 0.6  # of twice the variance, which the square of steps has on average where parts are by chance
+_IN_A_ROW = 5  # steady cycles that end a start-up
+
+
+def robust_fit(samples: SignalSamples, frequency: float, harmonics: int) -> SineFit:
+    """A sine fitted to what is sound of a record: twice, the second time without its flaws."""
+    fit = fit_sine(samples, frequency, harmonics)
+    flaws = find_flaws(samples, fit)
+    if not flaws:
+        return fit
+    keep = sound_samples(samples.values.size, flaws)
+    return fit if keep.mean() < 0.5 else fit_sine(samples, fit.frequency, harmonics, keep=keep)
+
+
+def steady_fit(samples: SignalSamples, frequency: float) -> tuple[SineFit, list[Flaw], Clipping]:
+    """The steady sine without dropouts and cut tops, these, and the levels at which tops are cut."""
+    fit = fit_sine(samples, frequency)
+    flaws: list[Flaw] = []
+    for _ in range(3):
+        found = find_flaws(samples, fit)
+        keep = sound_samples(samples.values.size, found)
+        if not found or keep.mean() < 0.5:
+            break
+        flaws, fit = found, fit_sine(samples, fit.frequency, keep=keep)
+    clipping = find_clipping(samples, fit)
+    if not clipping.found:
+        return fit, flaws, clipping
+    # what a sine leaves of cut tops is no flaw of another kind
+    cut = clipping.touches(samples.values)
+    keep = ~cut
+    if keep.mean() < 0.25:
+        return dataclasses.replace(fit, amplitude_se=0.5 * fit.amplitude), [], clipping
+    inner = fit_sine(samples, fit.frequency, 1, keep=keep)
+    whole = SignalSamples(
+        np.where(cut, inner.waveform(samples.time), samples.values), samples.time, samples.sampling_frequency
+    )
+    flaws = find_flaws(whole, inner, keep)
+    keep &= sound_samples(keep.size, flaws)
+    if flaws and keep.mean() > 0.25:
+        inner = fit_sine(samples, fit.frequency, 1, keep=keep)
+    doubt = max(inner.amplitude_se, 0.01 * inner.amplitude, 0.15 * abs(inner.amplitude - fit.amplitude))
+    restored = dataclasses.replace(
+        fit, amplitude=inner.amplitude, amplitude_se=doubt,
+        phase=inner.phase, phase_se=max(inner.phase_se, fit.phase_se),
+        offset=inner.offset, offset_se=max(inner.offset_se, 0.5 * abs(inner.offset - fit.offset)),
+        frequency=inner.frequency, frequency_se=max(inner.frequency_se, fit.frequency_se),
+        harmonic_amplitude=np.append(inner.harmonic_amplitude[:1], fit.harmonic_amplitude[1:]),
+        harmonic_phase=np.append(inner.harmonic_phase[:1], fit.harmonic_phase[1:]),
+    )  # fmt: skip
+    return restored, flaws, clipping
+
+
+def settled_cycles(cycles: NDArray[np.complex128], tol: float) -> tuple[int, float]:
+    """Cycles of the start-up, and the share of cycles that stray from the steady sine after it."""
+    settled = 0
+    ok = np.ones(cycles.size, dtype=bool)
+    for _ in range(3):
+        late = cycles[max(settled, cycles.size // 3) :]
+        reference = np.median(late.real) + 1j * np.median(late.imag)
+        ok = np.abs(cycles / reference - 1.0) <= tol
+        runs = np.convolve(ok, np.ones(_IN_A_ROW), mode="valid") > _IN_A_ROW - 0.5
+        first = np.flatnonzero(runs[: max(cycles.size // 2, 1)])
+        settled = int(first[0]) if first.size else cycles.size // 2
+    return settled, float(np.mean(~ok[settled:])) if ok[settled:].size else 0.0
+
+
+def with_wander(
+    steady: SineFit,
+    times: _Array,
+    cycles: NDArray[np.complex128],
+    flaws: list[Flaw],
+    samples: SignalSamples,
+    begin: float,
+) -> tuple[SineFit, float]:
+    """The sine with standard errors that hold its wandering, and by what share its parts stray."""
+    used = (times >= begin) & (times < steady.stop)
+    for flaw in flaws:
+        low, high = samples.time[flaw.first], samples.time[min(flaw.last, samples.time.size - 1)]
+        used &= (times < low - 1.0 / steady.frequency) | (times > high + 1.0 / steady.frequency)
+    if used.sum() < 16:
+        return steady, 0.0
+    parts = [np.abs(part).mean() for part in np.array_split(cycles[used], 8)]
+    spread = float(np.std(parts, ddof=1)) / math.sqrt(_counts(np.array(parts)))
+    wander = float(np.std(np.abs(cycles[used]))) / steady.amplitude
+    return dataclasses.replace(
+        steady,
+        amplitude_se=max(steady.amplitude_se, spread),
+        frequency_se=max(steady.frequency_se, _pulling(times[used], cycles[used])),
+    ), wander
+
+
+def _pulling(times: _Array, cycles: NDArray[np.complex128]) -> float:
+    """Standard error [Hz] of the mean of a frequency that wanders; 0 where phases stay on a line within their noise.
+
+    The phase is averaged over eighths of the record, and the frequencies from one to the next scatter.
+    """
+    phase = np.unwrap(np.angle(cycles)) / (2.0 * math.pi)
+    parts = np.array_split(np.arange(phase.size), 8)
+    at = np.array([times[part].mean() for part in parts])
+    mean = np.array([phase[part].mean() for part in parts])
+    own = []
+    for part in parts:
+        left = phase[part] - np.polyval(np.polyfit(times[part] - times[part].mean(), phase[part], 1),
+                                        times[part] - times[part].mean())  # fmt: skip
+        own.append(float(np.std(left, ddof=2)) / math.sqrt(part.size) if part.size > 2 else math.inf)
+    off = mean - np.polyval(np.polyfit(at, mean, 1), at)
+    if float(np.sqrt(np.mean(off**2))) < _PULLED * float(np.sqrt(np.mean(np.square(own)))):
+        return 0.0
+    rates = np.diff(mean) / np.diff(at)
+    return float(np.std(rates, ddof=1)) / math.sqrt(_counts(rates))
+
+
+def _counts(parts: _Array) -> float:
+    """How many of the parts of a record count for their mean: all, or one where they follow each other smoothly.
+
+    A slow change, as the beat of two lines too close to be parted, is no scatter that a mean evens out.
+    """
+    about = parts - parts.mean()
+    total = float((about * about).sum())
+    steps = float((np.diff(parts) ** 2).sum())
+    return 1.0 if total > 0.0 and steps < _SMOOTH * total else float(parts.size)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Lines in a shaker's record beside its own: mains hum, which is there at rest too, and a second motion.
+
+
+_MOST = 4
+_HARMONICS = 10
+_ABOVE = 16.0  # times the power about it by which a line stands out
+_LEAST = 0.005  # of the drive's amplitude
+_HUM_ALIKE = 0.35  # of a hum's amplitude by which it may differ at rest
+_SURE = 0.25  # of its amplitude to which a line must be known at rest
+
+
+class DriveLines(NamedTuple):
+    """Lines that are there at rest as well (``hum``), and those ``beside`` the drive that are not, or may not be."""
+
+    hum: tuple[Line, ...]
+    beside: tuple[Line, ...]
+
+
+def find_drive_lines(samples: SignalSamples, first: int, last: int, rough: SineFit) -> DriveLines:
+    """Lines beside a drive and its harmonics, of more than half a percent of its amplitude.
+
+    They are sought in what the sine leaves of the steady motion, and their frequencies fitted together with its own.
+    Hum goes on with the same amplitude and phase through the rest before the start; a record without such a rest
+    cannot tell it from a motion.
+
+    Parameters
+    ----------
+    samples
+        The record.
+    first, last
+        Samples of the moving part.
+    rough
+        The sine of its last two thirds.
+    """
+    begin = first + (last - first) // 3
+    part = SignalSamples(samples.values[begin:last], samples.time[begin:last], samples.sampling_frequency)
+    sound = sound_samples(part.values.size, find_flaws(part, rough))
+    rest = slice(0, max(first - 3 * round(samples.sampling_frequency / rough.frequency), 0))
+    base = rough.frequency
+    found: list[float] = []
+    for _ in range(_MOST):
+        left = _left(part, [base, *found], sound)[0]
+        peak = _peak(left, part.sampling_frequency, rough)
+        if peak is None:
+            break
+        base, *found = _refined(part, [base, *found, peak], sound)
+        if (
+            min(abs(found[-1] - f) for f in (base, *found[:-1])) * part.values.size
+            < 0.5 * part.sampling_frequency
+        ):
+            return DriveLines((), ())  # two that cannot be parted are a motion that wanders
+    if not found:
+        return DriveLines((), ())
+    moving = _phasors(part, [base, *found], sound)[1:]
+    still, error = _at_rest(samples, rest, found)
+    hum: list[Line] = []
+    beside: list[Line] = []
+    for frequency, here, there, unsure in zip(found, moving, still, error, strict=True):
+        line = Line(frequency, abs(here), float(np.angle(here)))
+        alike = abs(here - there) < max(_HUM_ALIKE * abs(here), 4.0 * unsure)
+        (hum if unsure < _SURE * abs(here) and alike else beside).append(line)
+    return DriveLines(
+        tuple(hum), tuple(line for line in beside if line.amplitude > 2.0 * _LEAST * rough.amplitude)
+    )
+
+
+def without_hum(samples: SignalSamples, lines: DriveLines) -> SignalSamples:
+    """A record less its hum."""
+    return without_lines(samples, list(lines.hum)) if lines.hum else samples
+
+
+def beside_lines(steady: SineFit, lines: DriveLines) -> SineFit:
+    """A sine whose standard errors hold what *lines* beside it may pull: a share 1/(pi df T) of their amplitude."""
+    span = steady.stop - steady.start
+    pull = math.hypot(
+        0.0,
+        *(
+            line.amplitude / max(1.0, math.pi * abs(line.frequency - steady.frequency) * span)
+            for line in lines.beside
+        ),
+    )
+    if pull == 0.0:
+        return steady
+    share = pull / steady.amplitude
+    return dataclasses.replace(
+        steady,
+        amplitude_se=math.hypot(steady.amplitude_se, pull),
+        phase_se=math.hypot(steady.phase_se, share),
+        frequency_se=math.hypot(steady.frequency_se, share / span),
+    )
+
+
+def _design(time: _Array, frequencies: list[float]) -> _Array:
+    """Offset, cosine and sine of each frequency, then the harmonics of the first."""
+    turns = [2.0 * math.pi * f * time for f in frequencies]
+    turns += [2.0 * math.pi * k * frequencies[0] * time for k in range(2, _HARMONICS + 1)]
+    columns = [np.ones_like(time)]
+    for turn in turns:
+        columns += [np.cos(turn), np.sin(turn)]
+    return np.column_stack(columns)
+
+
+def _left(part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_]) -> tuple[_Array, _Array]:
+    """What lines leave of a record, 0 where it is not sound, and their cosine and sine amplitudes."""
+    design = _design(part.time, frequencies)
+    used = design[sound]
+    gram = used.T @ used
+    solution: _Array = np.asarray(
+        np.linalg.lstsq(gram, used.T @ part.values[sound], rcond=1e-12)[0], dtype=np.float64
+    )
+    left: _Array = np.asarray(part.values - design @ solution, dtype=np.float64)
+    left[~sound] = 0.0
+    return left, solution
+
+
+def _phasors(
+    part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_]
+) -> NDArray[np.complex128]:
+    """Complex amplitudes c of lines Re(c exp(i 2 pi f t))."""
+    solution = _left(part, frequencies, sound)[1]
+    count = len(frequencies)
+    return np.asarray(solution[1 : 2 * count + 1 : 2] - 1j * solution[2 : 2 * count + 2 : 2])
+
+
+def _peak(left: _Array, rate: float, rough: SineFit) -> float | None:
+    """Frequency of the highest line of a spectrum that stands out, or None."""
+    n = left.size
+    window = np.hanning(n)
+    spectrum = np.abs(np.fft.rfft(left * window)) * 2.0 / window.sum()
+    freq = np.fft.rfftfreq(n, 1.0 / rate)
+    step = rate / n
+    spectrum[freq < 4.0 * step] = 0.0
+    at = int(np.argmax(spectrum))
+    near = (np.abs(freq - freq[at]) < 40.0 * step) & (np.abs(freq - freq[at]) > 4.0 * step)
+    near &= freq > 4.0 * step
+    if spectrum[at] < _LEAST * rough.amplitude or near.sum() < 16:
+        return None
+    about = float(np.median(spectrum[near] ** 2)) / math.log(2.0)
+    return float(freq[at]) if spectrum[at] ** 2 > _ABOVE * about else None
+
+
+def _refined(part: SignalSamples, frequencies: list[float], sound: NDArray[np.bool_]) -> list[float]:
+    """Frequencies of lines by least squares, amplitudes eliminated."""
+    from scipy.optimize import least_squares
+
+    step = part.sampling_frequency / part.values.size
+    start = np.array(frequencies)
+
+    def left(off: _Array) -> _Array:
+        return _left(part, (start + step * off).tolist(), sound)[0]
+
+    solved = least_squares(
+        left, np.zeros(start.size), bounds=(-1.5, 1.5), x_scale=0.1, diff_step=1e-3, max_nfev=15
+    )
+    return [float(f) for f in start + step * solved.x]
+
+
+def _at_rest(
+    samples: SignalSamples, rest: slice, frequencies: list[float]
+) -> tuple[NDArray[np.complex128], _Array]:
+    """Complex amplitudes of lines before the motion, and their standard errors; infinite without such a rest."""
+    time, values = samples.time[rest], samples.values[rest]
+    count = len(frequencies)
+    if time.size < 8 * (2 * count + 1) or (time[-1] - time[0]) * min(frequencies) < 1.0:
+        return np.zeros(count, dtype=np.complex128), np.full(count, math.inf)
+    turns = 2.0 * math.pi * np.outer(time, frequencies)
+    design = np.column_stack([np.ones(time.size), np.cos(turns), np.sin(turns)])
+    solution, *_ = np.linalg.lstsq(design, values, rcond=1e-12)
+    noise = float(np.std(values - design @ solution))
+    spread = noise * np.sqrt(np.diag(np.linalg.pinv(design.T @ design, rcond=1e-12)))
+    error = np.hypot(spread[1 : count + 1], spread[count + 1 :])
+    return solution[1 : count + 1] - 1j * solution[count + 1 :], error
+
+
+# ----------------------------------------------------------------------------------------------------
+# When a shaker starts: the likeliest instant, with an interval that is honest for gentle starts.
+#
+# From the start on the motion is a sine whose amplitude and phase are polynomials of time, of degree 0 to 5;
+# before it there is rest.  The likelihood of every instant follows from a linear least squares fit; degrees are
+# weighed by the Bayesian information criterion, so a start that could be a jump or a ramp has the spread of
+# both.
+
+
+_NOISE_FLOOR = 1e-6
+"""Of the amplitude: a record without noise is taken to have this much, or the sums that find its start
+would lose it to rounding."""
+_DEGREES = (0, 1, 2, 3, 5)
+_LONGEST = 4000  # samples that are fitted
+
+
+def _level(samples: SignalSamples, frequency: float, width: int) -> _Array:
+    """Amplitude of the motion at *frequency* over a cycle from each sample on."""
+    turn = np.exp(-2j * math.pi * frequency * (samples.time - samples.time[0]))
+    total = np.concatenate(([0.0], np.cumsum((samples.values - np.median(samples.values)) * turn)))
+    level: _Array = 2.0 * np.abs(total[width:] - total[:-width]) / width
+    return level
+
+
+def moving_part(samples: SignalSamples, frequency: float) -> tuple[int, int]:
+    """First and last (exclusive) sample of the longest stretch that oscillates at *frequency*.
+
+    Gaps of less than ten cycles are no end of the motion.
+    """
+    n = samples.values.size
+    width = max(3, round(samples.sampling_frequency / frequency))
+    if width >= n:
+        return 0, n
+    level = _level(samples, frequency, width)
+    on = level > 0.3 * np.quantile(level, 0.9)
+    bounds = np.flatnonzero(np.diff(np.concatenate(([0], on.astype(np.int8), [0])))).reshape(-1, 2)
+    joined = [bounds[0].tolist()]
+    for first, last in bounds[1:].tolist():
+        if first - joined[-1][1] < 10 * width:
+            joined[-1][1] = last
+        else:
+            joined.append([first, last])
+    start, stop = max(joined, key=lambda run: run[1] - run[0])
+    return int(start), min(int(stop) + width - 1, n)
+
+
+def moves_outside(samples: SignalSamples, frequency: float, first: int, last: int) -> float:
+    """How long [s] the record oscillates at *frequency* before *first* and after *last*, by a third as much."""
+    width = max(3, round(samples.sampling_frequency / frequency))
+    if width >= samples.values.size:
+        return 0.0
+    level = _level(samples, frequency, width)
+    on = level > 0.3 * np.quantile(level, 0.9)
+    on[max(first - width, 0) : last + width] = False
+    return float(np.count_nonzero(on)) / samples.sampling_frequency
+
+
+def find_onset(samples: SignalSamples, first: int, rough: SineFit) -> tuple[float | None, float]:
+    """Time [s] the motion starts and its standard error; None where the record begins in motion.
+
+    Parameters
+    ----------
+    samples
+        The record.
+    first
+        First sample of the moving part, up to a few cycles off.
+    rough
+        The steady sine.
+    """
+    width = round(samples.sampling_frequency / rough.frequency)
+    if first < max(8, width // 8):
+        return None, 0.0
+    early = _quiet_end(samples, first, rough, width)
+    quiet = samples.values[: max(early, 8)]
+    if early < 8 or float(np.std(quiet)) > 0.35 * rough.amplitude:
+        return None, 0.0
+    rest = _baseline(samples.time[: quiet.size], quiet)
+    noise = max(float(np.std(quiet - rest(samples.time[: quiet.size]))), _NOISE_FLOOR * rough.amplitude)
+    begin = max(early - 2 * width, 0)
+    end = min(first + 2 * width, samples.values.size)
+    every = max(1, (end - begin) // _LONGEST)
+    time = samples.time[begin:end:every]
+    values = samples.values[begin:end:every] - rest(time)
+    if time.size < 16:
+        return None, 0.0
+    candidates = time[
+        (time >= samples.time[max(early - width, 0)]) & (time < time[-1] - 0.7 / rough.frequency)
+    ]
+    coarse = candidates[:: max(1, candidates.size // 160)]
+    scans = [_scan(time, values, coarse, rough.frequency, degree, noise) for degree in _DEGREES]
+    step = float(coarse[1] - coarse[0]) if coarse.size > 1 else 1.0 / samples.sampling_frequency
+    # once more about the best instants, sample by sample
+    best = {float(coarse[int(np.argmin(scan))]) for scan in scans}
+    near = np.zeros(candidates.size, dtype=bool)
+    for at in best:
+        near |= np.abs(candidates - at) <= 2.0 * step
+    fine = np.union1d(coarse, candidates[near])
+    scans = [_scan(time, values, fine, rough.frequency, degree, noise) for degree in _DEGREES]
+    return _weighed(fine, scans, values.size, every / samples.sampling_frequency, width / every)
+
+
+def _baseline(time: _Array, quiet: _Array) -> np.polynomial.Polynomial:
+    """The level at rest, or a straight line where it drifts by more than its noise explains."""
+    level = np.polynomial.Polynomial([float(np.median(quiet))])
+    if quiet.size < 32:
+        return level
+    line = np.polynomial.Polynomial.fit(time, quiet, 1)
+    left = float(np.std(quiet - line(time)))
+    drift = abs(float(line(time[-1]) - line(time[0])))
+    return line if drift > 6.0 * left * math.sqrt(12.0 / quiet.size) + 1e-300 else level
+
+
+def _quiet_end(samples: SignalSamples, first: int, rough: SineFit, width: int) -> int:
+    """The last sample before the motion rises out of the noise, at least a cycle before *first*."""
+    level = _level(samples, rough.frequency, width)
+    sure = max(first - 30 * width, 1)
+    noise = (
+        1.4826 * float(np.median(level[:sure]))
+        if sure > 2 * width
+        else float(np.median(level[: max(first - width, 1)]))
+    )
+    limit = max(3.0 * noise, 0.01 * rough.amplitude)
+    below = np.flatnonzero(level[: max(first - width // 4, 1)] < limit)
+    return int(below[-1]) if below.size else 0
+
+
+def _scan(
+    time: _Array, values: _Array, starts: _Array, frequency: float, degree: int, noise: float
+) -> _Array:
+    """Chi-square of a motion that starts at each of *starts*."""
+    total = float(values @ values)
+    out = np.empty(starts.size)
+    omega = 2.0 * math.pi * frequency
+    span = float(time[-1] - starts[0])
+    for k, start in enumerate(starts):
+        after = time >= start - 1e-12
+        moved = values[after]
+        since = time[after] - start
+        turn = np.exp(1j * omega * since)
+        powers = (since[:, None] / span) ** np.arange(degree + 1)
+        columns = [turn.real[:, None] * powers, turn.imag[:, None] * powers]
+        for harmonic in (2, 3):  # distortion is no sign of a start
+            higher = turn**harmonic
+            columns += [higher.real[:, None] * powers[:, :2], higher.imag[:, None] * powers[:, :2]]
+        design = np.concatenate(columns, axis=1)
+        gram = design.T @ design
+        gram[np.diag_indices_from(gram)] *= 1.0 + 1e-10
+        right = design.T @ moved
+        explained = float(right @ np.linalg.solve(gram, right))
+        out[k] = (total - explained) / noise**2
+    return out
+
+
+def _weighed(
+    starts: _Array, scans: list[_Array], count: int, step: float, width: float
+) -> tuple[float, float]:
+    """Mean instant and its standard error over all instants and degrees.
+
+    What no degree explains is no noise: it is alike over a quarter of a cycle of *width* samples, so it counts
+    as so many times fewer samples.
+    """
+    freedom = max(count - 8, 1)
+    least = min(float(scan.min()) for scan in scans)
+    unit = max(1.0, least / freedom)
+    if unit > 1.0 + 4.0 * math.sqrt(2.0 / freedom):
+        unit *= max(0.25 * width, 1.0)
+    spacing = np.gradient(starts) if starts.size > 1 else np.ones(1)
+    weights = []
+    for degree, scan in zip(_DEGREES, scans, strict=True):
+        score = (scan - least) / unit + 2.0 * (degree + 1) * math.log(count)
+        weights.append(score)
+    table = np.array(weights)
+    share = np.exp(-0.5 * (table - table.min())) * spacing
+    share /= share.sum()
+    mean = float((share * starts).sum())
+    spread = math.sqrt(float((share * (starts - mean) ** 2).sum()))
+    return mean, math.hypot(1.25 * spread, 0.5 * step)  # a quarter more: the likelihood has many hills
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_Array = NDArray[np.float64]
+SNR_LIMIT = 15.0
+_STEADY = 0.03  # share by which the cycles of a steady motion may stray
+
+
+@dataclass(frozen=True)
+class StartUp:
+    """How the shaker started.
+
+    ``onset`` [s] and its uncertainty; ``duration`` [s] and ``cycles`` until amplitude and phase stay within
+    ``tolerance`` of the steady sine; ``overshoot``, the largest amplitude of a cycle over the steady one,
+    less 1 (0 if none exceeds it by more than the tolerance); ``first_cycle_ratio``, the amplitude of the
+    first cycle over the steady one.
+    """
+
+    onset: float
+    onset_uncertainty: float
+    duration: float
+    cycles: float
+    overshoot: float
+    first_cycle_ratio: float
+    tolerance: float
+
+    @property
+    def description(self) -> str:
+        """The start-up in words."""
+        first = f"first cycle {self.first_cycle_ratio:.3g} times the steady amplitude"
+        text = f"starts at {self.onset:.6g} s; {first}"
+        if self.duration == 0.0:
+            return f"{text}; steady at once (within {self.tolerance:.0%})"
+        over = f", overshoot {self.overshoot:.1%}" if self.overshoot > 0.0 else ", no overshoot"
+        return f"{text}; steady within {self.tolerance:.0%} after {self.cycles:.0f} cycle(s){over}"
+
+
+@dataclass(frozen=True)
+class DriveMeasurement:
+    """The measured motion of the shaker.
+
+    ``steady`` is the sine fitted after the start-up; ``startup`` is None where the record begins in motion;
+    ``stop`` [s] is the end of the motion or of the record; ``cycle_time`` [s] and ``cycle_amplitude`` follow
+    the amplitude cycle by cycle; ``accepted`` says whether ``steady.sinad`` exceeds ``snr_limit`` [dB].
+    ``flaws`` are samples (first, one past the last) that are no part of the motion, ``lines`` hum, which is taken
+    out, and lines beside the sine; ``clipping`` the levels at which tops are cut off; ``diagnostics`` what makes the
+    result doubtful.
+    """
+
+    steady: SineFit
+    startup: StartUp | None
+    stop: float
+    snr_limit: float
+    units: str
+    flaws: tuple[Flaw, ...]
+    lines: DriveLines
+    clipping: Clipping
+    diagnostics: tuple[Diagnostic, ...]
+    cycle_time: _Array = field(repr=False)
+    cycle_amplitude: _Array = field(repr=False)
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the steady motion is near enough to a sine: noise and distortion below the limit."""
+        return self.steady.sinad > self.snr_limit
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The diagnostics that make the result doubtful, in words."""
+        return tuple(one.message for one in doubtful(self.diagnostics))
+
+    @property
+    def has_start(self) -> bool:
+        """Whether the start-up is in the record and sound."""
+        broken = KINDS_VIBROMETER["dropout_in_start"].code
+        return self.startup is not None and all(one.code != broken for one in self.diagnostics)
+
+    def summary(self) -> dict[str, Any]:
+        """The figures as plain numbers and words, in SI, for a table or a JSON file."""
+        fit = self.steady
+        start = self.startup
+        return {
+            "accepted": self.accepted,
+            "units": self.units,
+            "frequency_hz": fit.frequency,
+            "frequency_se_hz": fit.frequency_se,
+            "amplitude": fit.amplitude,
+            "amplitude_se": fit.amplitude_se,
+            "phase_rad": fit.phase,
+            "phase_se_rad": fit.phase_se,
+            "offset": fit.offset,
+            "distortion": fit.distortion,
+            "distortion_floor": fit.distortion_floor,
+            "snr_db": fit.snr,
+            "sinad_db": fit.sinad,
+            "snr_limit_db": self.snr_limit,
+            "steady_from_s": fit.start,
+            "steady_to_s": fit.stop,
+            "onset_s": None if start is None else start.onset,
+            "onset_uncertainty_s": None if start is None else start.onset_uncertainty,
+            "startup_s": None if start is None else start.duration,
+            "overshoot": None if start is None else start.overshoot,
+            "first_cycle_ratio": None if start is None else start.first_cycle_ratio,
+            "startup": "the record begins in motion" if start is None else start.description,
+            "diagnostics": [one.plain() for one in self.diagnostics],
+        }
+
+
+def measure_drive(
+    signal: xr.DataArray,
+    frequency: float | None = None,
+    *,
+    amplitude: float | None = None,
+    snr_limit: float = SNR_LIMIT,
+    tolerance: float = 0.05,
+) -> DriveMeasurement:
+    """Measure the shaker's motion: find where it starts and settles, and fit the steady sine.
+
+    Dropouts and tops that are cut off are found in what the sine leaves and kept out of the fit.
+
+    Parameters
+    ----------
+    signal : xarray.DataArray
+        Velocity [m/s] or displacement [m] of the shaker.
+    frequency : float, optional
+        The excitation frequency [Hz] as set, used as a guess; the highest peak of the spectrum if left out.
+    amplitude : float, optional
+        The amplitude as set, in the unit of the signal, to check by.
+    snr_limit : float
+        Least ratio [dB] of the sine to noise and distortion of an acceptable test; the paper's 15 dB.
+    tolerance : float
+        How near to the steady sine a cycle must be, as a share of its amplitude, to count as steady.  Raised
+        to four times the noise of one cycle's amplitude where that is more.
+
+    Raises
+    ------
+    InputError
+        If the signal is no such signal, or holds fewer than five cycles of steady motion.
+    """
+    samples = check_signal(signal, ("m/s", "m"), "signal")
+    limit = finite("snr_limit", snr_limit)
+    tol = within("tolerance", tolerance, 0.0, 0.5)
+    stated = None if amplitude is None else positive("amplitude", amplitude)
+    if np.ptp(samples.values) == 0.0:
+        raise InputError(
+            f"signal: no oscillation, it is {samples.values[0]:g} everywhere: nothing was recorded; look at the cable, "
+            "or choose another channel (--channel)"
+        )
+    guess = spectral_peak(samples) if frequency is None else frequency
+    first, last = moving_part(samples, guess)
+    moving = _slice(samples, first, last)
+    outside = moves_outside(samples, guess, first, last)
+    span = moving.values.size / samples.sampling_frequency * guess
+    if span < 8.0:
+        raise InputError(
+            f"signal: the shaker moves for {span:.1f} cycles of {guess:g} Hz: must be at least 8"
+        )
+    rough = robust_fit(_slice(moving, moving.values.size // 3, None), guess, 3)
+    lines = find_drive_lines(samples, first, last, rough)
+    if lines.hum:
+        samples = without_hum(samples, lines)
+        first, last = moving_part(samples, rough.frequency)
+        moving = _slice(samples, first, last)
+        rough = robust_fit(_slice(moving, moving.values.size // 3, None), rough.frequency, 3)
+    onset, uncertainty = find_onset(samples, first, rough)
+    start = float(samples.time[0]) if onset is None else onset
+    period = 1.0 / rough.frequency
+    stop = float(moving.time[-1]) + 1.0 / samples.sampling_frequency
+    times, cycles = _cycle_phasors(samples, rough, start, stop)
+    noise = rough.noise_rms * math.sqrt(2.0 / (period * samples.sampling_frequency))
+    tol = max(tol, 4.0 * noise / rough.amplitude)
+    settled, stray = settled_cycles(cycles, tol)
+    margin = 1 if settled == 0 else max(2 * settled, 5)
+    begin = start + min(settled + margin, max(settled, cycles.size // 2)) * period
+    part = _between(samples, begin, stop - 0.25 * period)
+    steady, flaws, clipping = steady_fit(part, rough.frequency)
+    if steady.cycles < 5.0:
+        raise InputError(f"signal: only {steady.cycles:.1f} cycles of steady motion: must be at least 5")
+    shift = int(np.searchsorted(samples.time, part.time[0] - 0.25 / samples.sampling_frequency))
+    everywhere = [Flaw(flaw.first + shift, flaw.last + shift) for flaw in flaws]
+    steady, wander = with_wander(steady, times, cycles, everywhere, samples, begin)
+    steady = beside_lines(steady, lines)
+    startup = None
+    amplitudes = np.abs(cycles)
+    broken: list[Flaw] = []
+    if onset is not None:
+        startup = _start_up(onset, uncertainty, settled, period, amplitudes, steady.amplitude, tol)
+        broken = _broken_start(samples, onset, onset + settled * period, steady, clipping)
+    diagnostics = [
+        *_flaw_findings(samples, everywhere, broken, clipping),
+        *_doubts(steady, limit, wander, stray, frequency, stated),
+        *_start_findings(startup, period),
+        *_line_findings(lines, steady),
+        *(
+            [KINDS_VIBROMETER["interrupted"].found(outside_ms=1e3 * outside)]
+            if outside > 3.0 * period
+            else []
+        ),
+    ]
+    return DriveMeasurement(
+        steady=steady,
+        startup=startup,
+        stop=stop,
+        snr_limit=limit,
+        units=str(signal.attrs["units"]),
+        flaws=(*broken, *everywhere),
+        lines=lines,
+        clipping=clipping,
+        diagnostics=tuple(diagnostics),
+        cycle_time=times,
+        cycle_amplitude=amplitudes,
+    )
+
+
+def _start_up(
+    onset: float,
+    uncertainty: float,
+    settled: int,
+    period: float,
+    amplitudes: _Array,
+    steady: float,
+    tol: float,
+) -> StartUp:
+    peak = float(amplitudes[: settled + 1].max() / steady - 1.0)
+    return StartUp(
+        onset=onset,
+        onset_uncertainty=uncertainty,
+        duration=settled * period,
+        cycles=float(settled),
+        overshoot=peak if peak > tol else 0.0,
+        first_cycle_ratio=float(amplitudes[0] / steady),
+        tolerance=tol,
+    )
+
+
+def _broken_start(
+    samples: SignalSamples, onset: float, end: float, steady: SineFit, clipping: Clipping
+) -> list[Flaw]:
+    """Values that stand still, or jump farther than the motion can, between the onset and the steady motion.
+
+    The first quarter of a cycle may jump: a velocity can begin anywhere.
+    """
+    quarter = 0.25 / steady.frequency
+    inside = np.flatnonzero((samples.time > onset + quarter) & (samples.time < end + 4.0 * quarter))
+    if inside.size < 8:
+        return []
+    first = int(inside[0])
+    values = samples.values[inside]
+    fastest = 2.0 * math.pi * steady.frequency / samples.sampling_frequency * 2.5 * steady.amplitude
+    steps = np.abs(np.diff(values))
+    jumps = np.flatnonzero(steps > max(fastest, 0.3 * steady.amplitude) + 8.0 * steady.noise_rms)
+    least = max(5, int(0.06 * samples.sampling_frequency / steady.frequency))
+    cut = clipping.touches(values)
+    found = [run for run in stuck_runs(values, least) if not cut[run.first]]
+    if jumps.size >= 2:
+        found.append(Flaw(int(jumps[0]), int(jumps[-1]) + 2))
+    elif jumps.size:
+        found.append(Flaw(int(jumps[0]), int(jumps[0]) + 2))
+    return [Flaw(flaw.first + first, flaw.last + first) for flaw in found]
+
+
+def _flaw_findings(
+    samples: SignalSamples, flaws: list[Flaw], broken: list[Flaw], clipping: Clipping
+) -> list[Diagnostic]:
+    told = []
+    for name, some in (("dropout", flaws), ("dropout_in_start", broken)):
+        if some:
+            total = sum(flaw.last - flaw.first for flaw in some) / samples.sampling_frequency
+            at = float(samples.time[some[0].first])
+            told.append(KINDS_VIBROMETER[name].found(count=len(some), total_ms=1e3 * total, at=at))
+    if clipping.found:
+        told.append(KINDS_VIBROMETER["clipped"].found(share_percent=100.0 * clipping.share))
+    return told
+
+
+def _doubts(
+    steady: SineFit,
+    limit: float,
+    wander: float,
+    stray: float,
+    frequency: float | None,
+    stated: float | None,
+) -> list[Diagnostic]:
+    told = []
+    noise = steady.noise_rms * math.sqrt(2.0 * steady.cycles / steady.samples) / steady.amplitude
+    if wander > max(_STEADY, 3.0 * noise) or stray > 0.05:
+        told.append(KINDS_VIBROMETER["unsteady"].found(stray_percent=100.0 * max(wander, stray)))
+    if frequency is not None and abs(steady.frequency - frequency) > max(
+        0.002 * frequency, 6.0 * steady.frequency_se
+    ):
+        told.append(KINDS_VIBROMETER["frequency"].found(found=steady.frequency, stated=frequency))
+    if stated is not None and abs(steady.amplitude - stated) > max(0.05 * stated, 6.0 * steady.amplitude_se):
+        share = 100.0 * (steady.amplitude / stated - 1.0)
+        told.append(
+            KINDS_VIBROMETER["amplitude"].found(found=steady.amplitude, stated=stated, share_percent=share)
+        )
+    if steady.sinad <= limit:
+        cause = "noisy" if steady.snr <= limit else "distorted"
+        told.append(KINDS_VIBROMETER[cause].found(sinad_db=steady.sinad, limit_db=limit))
+    return told
+
+
+def _line_findings(lines: DriveLines, steady: SineFit) -> list[Diagnostic]:
+    told = []
+    for name, some in (("hum", lines.hum), ("second_line", lines.beside)):
+        for line in some:
+            share = 100.0 * line.amplitude / steady.amplitude
+            told.append(KINDS_VIBROMETER[name].found(frequency=line.frequency, share_percent=share))
+    return told
+
+
+def _start_findings(startup: StartUp | None, period: float) -> list[Diagnostic]:
+    if startup is None:
+        return [KINDS_VIBROMETER["no_rest"].found()]
+    if startup.onset_uncertainty > 0.05 * period:
+        return [KINDS_VIBROMETER["slow_start"].found(uncertainty_ms=1e3 * startup.onset_uncertainty)]
+    return []
+
+
+def _slice(samples: SignalSamples, first: int, last: int | None) -> SignalSamples:
+    return SignalSamples(samples.values[first:last], samples.time[first:last], samples.sampling_frequency)
+
+
+def _between(samples: SignalSamples, start: float, stop: float) -> SignalSamples:
+    inside = np.flatnonzero((samples.time >= start) & (samples.time < stop))
+    if inside.size == 0:
+        return _slice(samples, 0, 0)
+    return _slice(samples, int(inside[0]), int(inside[-1]) + 1)
+
+
+def _cycle_phasors(samples: SignalSamples, fit: SineFit, start: float, stop: float) -> tuple[_Array, Any]:
+    """Middle [s] and complex amplitude, turning with the fitted sine, of each whole cycle."""
+    period = 1.0 / fit.frequency
+    count = int((stop - start) * fit.frequency + 1e-6)
+    turn = 2.0 * math.pi * fit.frequency * samples.time
+    design = np.column_stack((np.ones_like(turn), np.cos(turn), np.sin(turn)))
+    index = np.floor((samples.time - start) * fit.frequency + 1e-9).astype(np.int64)
+    borders = np.searchsorted(index, np.arange(count + 1))
+    phasors = np.empty(count, dtype=np.complex128)
+    for n in range(count):
+        part = slice(borders[n], borders[n + 1])
+        _, c, s = np.linalg.lstsq(design[part], samples.values[part], rcond=None)[0]
+        phasors[n] = c - 1j * s
+    middle: _Array = start + (np.arange(count, dtype=np.float64) + 0.5) * period
+    return middle, phasors
+
+
+# ----------------------------------------------------------------------------------------------------
+# From the shaker's velocity to its displacement, without drift and without the flaws of the record.
+
+
+def displacement_from_velocity(
+    velocity: xr.DataArray, measurement: DriveMeasurement | None = None
+) -> xr.DataArray:
+    """Integrate the shaker's velocity to its displacement [m] without drift.
+
+    The velocity's cubic spline is integrated exactly.  What noise and offset add is a slow drift; it is found
+    where the truth is known, at rest (zero) and in steady motion (zero mean over a cycle), as a smoothing
+    spline that follows nothing faster than about four cycles, and subtracted.  The start-up transient is
+    bridged, so it keeps its shape.  Dropouts and cut tops are replaced by the steady sine.  The shaker's
+    suspension is taken to hold its mean position.
+
+    Parameters
+    ----------
+    velocity : xarray.DataArray
+        Velocity [m/s].
+    measurement : DriveMeasurement, optional
+        That of this velocity; measured here if left out.
+
+    Raises
+    ------
+    InputError
+        As :func:`measure_drive`.
+    """
+    from scipy.interpolate import CubicSpline, make_smoothing_spline
+
+    samples = check_signal(velocity, "m/s", "velocity")
+    drive = measurement or measure_drive(velocity)
+    samples = mended(samples, drive)
+    period = 1.0 / drive.steady.frequency
+    time = samples.time
+    quiet_until = time[0] if drive.startup is None else drive.startup.onset - drive.startup.onset_uncertainty
+    spline = CubicSpline(time, samples.values - drive.steady.offset)
+    position, integral = spline.antiderivative(1), spline.antiderivative(2)
+    settled = drive.steady.start if drive.startup is None else drive.startup.onset + drive.startup.duration
+    edges = [np.arange(settled, drive.steady.stop - period, period)]
+    if quiet_until - time[0] > period:
+        edges.append(np.arange(quiet_until - period, time[0], -period)[::-1])
+    if time[-1] - drive.stop > 10.0 * period:
+        edges.append(np.arange(drive.stop + 5.0 * period, time[-1] - period, period))
+    edge = np.sort(np.concatenate(edges))
+    mean = (integral(edge + period) - integral(edge)) / period
+    scaled = (edge + 0.5 * period - time[0]) / period
+    drift = make_smoothing_spline(scaled, mean, lam=(4.0 / (2.0 * math.pi)) ** 4)
+    values = position(time) - drift((time - time[0]) / period)
+    return make_signal(
+        values,
+        "m",
+        samples.sampling_frequency,
+        start=float(time[0]),
+        name="shaker displacement",
+        attrs={key: value for key, value in velocity.attrs.items() if key not in ("units", "long_name")},
+    )
+
+
+def mended(samples: SignalSamples, drive: DriveMeasurement) -> SignalSamples:
+    """A record without hum, whose flaws and cut tops are replaced by the motion about them; the same without any.
+
+    In steady motion that is the steady sine; in the start-up cut tops follow from a sine of changing amplitude
+    through what is left of the two cycles about them.
+    """
+    samples = without_hum(samples, drive.lines)
+    if not drive.flaws and not drive.clipping.found:
+        return samples
+    values = samples.values.copy()
+    bad = ~sound_samples(values.size, list(drive.flaws))
+    cut = drive.clipping.touches(samples.values) & (samples.time < drive.stop)
+    early = cut & (samples.time < drive.steady.start)
+    if drive.startup is not None:
+        early &= samples.time >= drive.startup.onset
+    late = bad | (cut & (samples.time >= drive.steady.start))
+    model = drive.steady.waveform(samples.time, harmonics=not drive.clipping.found)
+    values[late] = model[late]
+    for first, last in _stretches(early):
+        values[first:last] = _about(samples, drive, first, last, ~(cut | bad))
+    return SignalSamples(values, samples.time, samples.sampling_frequency)
+
+
+def _stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
+
+
+def _about(
+    samples: SignalSamples, drive: DriveMeasurement, first: int, last: int, sound: NDArray[np.bool_]
+) -> NDArray[np.float64]:
+    """The motion between two samples, from the sound ones up to a cycle away since the start."""
+    middle = 0.5 * (samples.time[first] + samples.time[last - 1])
+    period = 1.0 / drive.steady.frequency
+    since = samples.time - middle
+    begin = -math.inf if drive.startup is None else drive.startup.onset - middle
+    used = sound & (np.abs(since) < period) & (since >= begin)
+
+    def design(t: NDArray[np.float64]) -> NDArray[np.float64]:
+        turn = 2.0 * math.pi * t / period
+        wave = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        return np.concatenate([wave, wave * (t / period)[:, None]], axis=1)
+
+    if np.count_nonzero(used) < 12:
+        return samples.values[first:last]
+    solution = np.linalg.lstsq(design(since[used]), samples.values[used] - drive.steady.offset, rcond=None)[0]
+    return drive.steady.offset + design(since[first:last]) @ solution
+
+
+# ----------------------------------------------------------------------------------------------------
+# The shaker's motion as the camera saw it, as a signal on the camera's clock.
+
+
+_BRIDGED = 5  # frames
+
+
+def shaker_signal(tracked: xr.Dataset) -> xr.DataArray:
+    """The displacement of the shaker [m] in a tracked recording, at the middles of the exposures.
+
+    Gaps of up to five frames are bridged by a cubic spline; of what longer gaps part the longest stretch is
+    taken.  Only the sine and the start of the motion are read from it, which a few frames do not change.
+
+    Raises
+    ------
+    InputError
+        If no shaker was followed, or in too few frames.
+    """
+    from scipy.interpolate import CubicSpline
+
+    if "shaker_displacement_mm" not in tracked or "time" not in tracked.coords:
+        raise InputError(
+            "tracked: has no shaker_displacement_mm over time; it must come from track() with a shaker"
+        )
+    values = tracked["shaker_displacement_mm"].values
+    time = tracked["time"].values
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size < 16:
+        raise InputError(f"tracked: the shaker was found in {known.size} frame(s): must be at least 16")
+    breaks = np.flatnonzero(np.diff(known) > _BRIDGED + 1)
+    runs = np.split(known, breaks + 1)
+    used = max(runs, key=len)
+    whole = np.arange(used[0], used[-1] + 1)
+    filled = CubicSpline(time[used], values[used])(time[whole])
+    exposure = float(tracked.attrs.get("exposure", np.nan))
+    middle = 0.5 * exposure if np.isfinite(exposure) else 0.0
+    return make_signal(filled, "mm", time=time[whole] + middle, name="shaker seen by the camera")

@@ -1,0 +1,7 @@
+"""Public names; each is loaded when it is first used."""
+
+from .contact.stress import bending_stress as bending_stress
+from .contact.stress import hertz_stress as hertz_stress
+from .imperfection_identification import identify_imperfection as identify_imperfection
+from .natural_frequencies import exact_natural_frequencies as exact_natural_frequencies
+from .quasi_static import quasi_static_threshold as quasi_static_threshold

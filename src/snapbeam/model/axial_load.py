@@ -1,0 +1,172 @@
+"""An axial load that changes in time: parametric excitation, or a slow way through a quasi-static switch."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.drive.base import Drive, Scale, Timed
+from snapbeam.model.quantity import RUN, quantity
+from snapbeam.util.validation import InputTypeError, shown
+
+__all__ = ["LOADS", "AxialLoadModulation", "HarmonicLoad", "LoadMotion", "LoadRamp"]
+
+
+_Array = NDArray[np.float64]
+
+LOADS: dict[str, type[Drive]] = {}
+"""Every way in which a load changes, by the name it has in parameter files."""
+_STEEPEST = 1.875
+"""Greatest slope of x^3 (10 - 15 x + 6 x^2) on [0, 1]."""
+
+
+class LoadMotion(Drive):
+    """How the axial load differs from the one that the beam was reduced under, N: a drive whose *motion* is a force."""
+
+    registry: ClassVar[dict[str, type[Drive]]] = LOADS
+
+
+@dataclass(frozen=True, kw_only=True)
+class HarmonicLoad(LoadMotion):
+    """Parametric excitation, P(t) = P + P_1 sin(omega t + phase).
+
+    Parameters
+    ----------
+    frequency_ratio : float
+        omega over omega_1; the principal parametric resonance of the first mode lies near 2.
+    amplitude : float
+        P_1, N.
+    phase : float
+        At the start, rad.
+    """
+
+    frequency_ratio: float = quantity(
+        "1", "frequency of the axial load over the first natural frequency", low=0.0, scope=RUN,
+        short="load_frequency_ratio", symbol=r"\Omega",
+    )  # fmt: skip
+    amplitude: float = quantity(
+        "N",
+        "amplitude of the axial load",
+        low=0.0,
+        closed="left",
+        scope=RUN,
+        short="load_amplitude",
+        symbol="P_1",
+    )
+    phase: float = quantity(
+        "rad", "phase of the axial load at the start", default=0.0, low=-1e6, high=1e6, closed="both", scope=RUN,
+        short="load_phase",
+    )  # fmt: skip
+    name = "sine"
+    harmonic = True
+    number_names = ("omega", "amplitude")
+
+    def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """Angular frequency (rad/s) and amplitude (N)."""
+        return {"omega": columns["frequency_ratio"] * scale.omega, "amplitude": columns["amplitude"]}
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """One period of the sine."""
+        return np.asarray(2.0 * math.pi / (columns["frequency_ratio"] * scale.omega))
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """Its amplitudes, N and N/s."""
+        return columns["amplitude"], columns["amplitude"] * columns["frequency_ratio"] * scale.omega
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadRamp(LoadMotion, Timed):
+    """A load that changes smoothly from P to P + change and stays, x^3 (10 - 15 x + 6 x^2) of the share x of its way.
+
+    Long, it is quasi-static: a beam whose load falls below the critical one unbuckles, and buckles again, when the load
+    comes back, to the side that an imperfection favours.
+
+    Parameters
+    ----------
+    change : float
+        N, of either sign.
+    duration : float
+        Periods of the first mode that the change takes.
+    hold_periods : float
+        Periods that it stays; then it goes back as it came.  Infinite, as by default: it never goes back.
+    """
+
+    change: float = quantity("N", "change of the axial load", scope=RUN, short="load_change")
+    duration: float = quantity(
+        "1",
+        "periods of the first mode in which the axial load changes",
+        low=0.0,
+        scope=RUN,
+        short="load_duration",
+    )
+    hold_periods: float = quantity(
+        "1", "periods of the first mode after which the axial load goes back", default=1e9, low=0.0, closed="left",
+        scope=RUN, short="load_hold",
+    )  # fmt: skip
+    name = "ramp"
+    number_names = ("omega", "fastest", "change", "duration", "hold_periods")
+    amplitudes = ("change",)
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A period of the first mode."""
+        return np.full(columns["change"].size, 2.0 * math.pi / scale.omega)
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """The change in N, times in s."""
+        cycle = self.cycle(columns, scale)
+        duration = columns["duration"] * cycle
+        return {
+            "fastest": math.pi / duration,
+            "change": columns["change"],
+            "duration": duration,
+            "hold_periods": columns["hold_periods"] * cycle,
+        }
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """Its change, N, and its steepest, N/s."""
+        found = self.shape_numbers(columns, scale)
+        return np.maximum(found["change"], 0.0), _STEEPEST * np.abs(found["change"]) / found["duration"]
+
+    @staticmethod
+    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """Change of the load and its rate."""
+        t = argument / drive.omega
+        way = 1.0
+        if t > drive.duration + drive.hold_periods:
+            t, way = 2.0 * drive.duration + drive.hold_periods - t, -1.0
+        x = min(max(t / drive.duration, 0.0), 1.0)
+        share = x * x * x * (10.0 + x * (6.0 * x - 15.0))
+        rate = 30.0 * x * x * (1.0 - x) * (1.0 - x) / drive.duration
+        return drive.change * share, way * drive.change * rate
+
+    @staticmethod
+    def acceleration(drive: Any, memory: Any, argument: float) -> float:
+        """Nothing asks for it."""
+        return 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxialLoadModulation:
+    """An axial load P(t) = P + motion(t), P that under which the beam was reduced.
+
+    The beam's linear stiffness then is E I k_i^2 - P(t): beside the tension, m alpha'' + ... = (P(t) - P) alpha.  The
+    work of the change is that on the shortening alpha . alpha / 2 of the span.
+
+    Parameters
+    ----------
+    motion : LoadMotion
+        :class:`~snapbeam.HarmonicLoad` or :class:`~snapbeam.LoadRamp`.
+    """
+
+    motion: Drive
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.motion, LoadMotion):
+            raise InputTypeError(
+                f"motion = {shown(self.motion)}: must be a HarmonicLoad(frequency_ratio=2.0, amplitude=...) or a LoadRamp"
+            )

@@ -1,0 +1,99 @@
+"""A base that moves: the ends of the beam are shaken together, across the beam."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.boundary_conditions import modes_between
+from snapbeam.model.drive.base import Drive
+from snapbeam.model.quantity import STRUCTURE, check_fields, quantity
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.util.validation import InputError, InputTypeError, shown
+
+__all__ = ["DIRECTIONS", "BaseExcitation", "rigid_mass"]
+
+
+DIRECTIONS = ("up", "down")
+
+
+@dataclass(frozen=True, kw_only=True)
+class BaseExcitation:
+    """The motion y(t) of both ends of the beam together, in its plane and across it.
+
+    The beam is described in the frame of its ends, where every piece of it feels the inertial force
+    -rho S y''(t) per length:
+
+        m alpha'' + ... = -y''(t) rho S integral(phi) + phi(x_s) f.
+
+    Displacements, velocities, energies and the work of the base are those of that frame: the work is that of the
+    inertial force.  A run begins at rest in that frame, whatever the velocity of the base is.
+
+    Parameters
+    ----------
+    motion : Drive
+        y(t), such as an :class:`~snapbeam.AccelerationSine`, a :class:`~snapbeam.BandLimitedNoise` or a
+        :class:`~snapbeam.Burst`; any drive that has an acceleration.
+    direction : {"up", "down"}
+        Whether y counts positive towards the upper well or towards the lower one.
+    striker_on_base : bool
+        Whether what the striker is mounted on moves with the base: a stop in the same frame.  If not it stays in
+        space, and the tip moves by -y(t) in the frame of the ends.
+
+    Raises
+    ------
+    InputError
+        For a motion without an acceleration, such as a record or a free flight.
+    """
+
+    motion: Drive
+    direction: str = quantity(
+        "1", "way in which the base's motion counts positive", default="up", kind=str, choices=DIRECTIONS,
+        scope=STRUCTURE,
+    )  # fmt: skip
+    striker_on_base: bool = quantity(
+        "1", "whether the striker is mounted on the base", default=True, kind=bool, scope=STRUCTURE
+    )
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.motion, Drive):
+            raise InputTypeError(
+                f"motion = {shown(self.motion)}: must be a drive, such as AccelerationSine(frequency_ratio=1.2, ...)"
+            )
+        check_fields(self)
+        if not self.motion.can_excite_base():
+            known = ", ".join(repr(name) for name, kind in _shaking().items() if kind.can_excite_base())
+            raise InputError(
+                f"motion = {self.motion.name!r}: a base needs a motion with a known bound on its acceleration; must be "
+                f"one of {known}"
+            )
+        if self.motion.name == "chirp" and not self.striker_on_base:
+            raise InputError(
+                "striker_on_base = False with a chirp: at the end of its sweep the displacement has a kink that the "
+                "acceleration leaves out; let the base carry the striker, or use another motion"
+            )
+
+
+def rigid_mass(model: ReducedModel) -> NDArray[np.float64]:
+    """rho S integral(phi_i), kg m^-0.5, shape (N,): what an acceleration of the frame acts on.
+
+    Raises
+    ------
+    InputError
+        For a structure given by matrices, of which it is not known.
+    """
+    beam = model.beam
+    if beam is None:
+        raise InputError(
+            "base: shakes a beam; how the frame's acceleration pulls at a structure given by matrices is not known"
+        )
+    modes = modes_between(beam.boundary, beam.length, beam.bending_stiffness, model.modes)
+    return np.asarray(beam.mass_per_length * modes.integral)
+
+
+def _shaking() -> dict[str, type[Drive]]:
+    from snapbeam.model.drive.base import DRIVES
+
+    return DRIVES

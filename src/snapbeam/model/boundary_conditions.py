@@ -1,0 +1,84 @@
+"""How the ends of a beam are held: rotational springs and the axial stiffness of the supports."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from snapbeam.model.buckling_modes import BucklingModes, SpringModes
+from snapbeam.model.quantity import check_fields, quantity
+
+__all__ = ["CLAMPED", "BoundaryConditions", "Modes", "modes_between"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoundaryConditions:
+    """Ends that do not move sideways, each on a rotational spring.
+
+    E I phi'' = k_left phi' at the left end and -k_right phi' at the right one.  The buckling modes under these
+    conditions stay orthogonal in their slopes and, with the energy of the springs, in their curvatures, so that the
+    reduced model keeps its form; mass, shapes and critical loads change.
+
+    Supports that give way along the axis, with the stiffness K between them, share the stretching with the beam:
+    gamma = (E S/(2 L))/(1 + E S/(K L)).
+
+    Parameters
+    ----------
+    left_rotational_stiffness, right_rotational_stiffness : float, optional
+        Rotational stiffness, N m/rad: 0 is a pinned end, and clamped is what nothing is given for.
+    axial_support_stiffness : float, optional
+        K, N/m; rigid by default.
+    """
+
+    left_rotational_stiffness: float | None = quantity(
+        "N m/rad", "rotational stiffness of the left end", default=None, optional=True, low=0.0, closed="left",
+        symbol=r"k_\theta", short="ends_left",
+    )  # fmt: skip
+    right_rotational_stiffness: float | None = quantity(
+        "N m/rad", "rotational stiffness of the right end", default=None, optional=True, low=0.0, closed="left",
+        short="ends_right",
+    )  # fmt: skip
+    axial_support_stiffness: float | None = quantity(
+        "N/m", "axial stiffness of the supports", default=None, optional=True, low=0.0, short="ends_axial"
+    )
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def rotational_stiffness(self) -> bool:
+        """Whether an end gives way to rotation."""
+        return self.left_rotational_stiffness is not None or self.right_rotational_stiffness is not None
+
+    @property
+    def is_symmetric(self) -> bool:
+        """Whether both ends are held alike, so that modes are symmetric or antisymmetric."""
+        return self.left_rotational_stiffness == self.right_rotational_stiffness
+
+    @property
+    def is_clamped(self) -> bool:
+        """Whether both ends are clamped and rigid."""
+        return not self.rotational_stiffness and self.axial_support_stiffness is None
+
+
+CLAMPED = BoundaryConditions()
+"""The paper's."""
+
+
+# ----------------------------------------------------------------------------------------------------
+# The buckling modes of a beam, whatever its ends.
+
+
+Modes = BucklingModes | SpringModes
+
+
+def modes_between(ends: BoundaryConditions, length: float, bending_stiffness: float, count: int) -> Modes:
+    """The first *count* buckling modes of a beam of a length (m) and a bending stiffness (N m^2) between its ends."""
+    if not ends.rotational_stiffness:
+        return BucklingModes(length, count)
+    unit = bending_stiffness / length
+    left, right = (
+        math.inf if each is None else each / unit
+        for each in (ends.left_rotational_stiffness, ends.right_rotational_stiffness)
+    )
+    return SpringModes(length, count, left, right)

@@ -1,0 +1,127 @@
+"""What is doubtful about a system: assumptions left behind, and numbers that look like another unit."""
+
+from __future__ import annotations
+
+from snapbeam.model.beam import Beam
+from snapbeam.model.drive.sine import Sine
+from snapbeam.model.quantity import quantities
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.model.striker import Striker
+from snapbeam.util.diagnostics import Diagnostic
+
+__all__ = ["doubts_of"]
+
+
+_STEEP = 0.2
+"""Greatest slope of the buckled beam, pi b / L, up to which w is small against L."""
+_STOCKY = 0.1
+"""Thickness over length up to which shear and rotary inertia may be left out."""
+_LARGEST_RATIO = 20.0
+_LARGEST_AMPLITUDE = 20.0
+
+
+def doubts_of(model: ReducedModel, striker: Striker | None) -> tuple[Diagnostic, ...]:
+    """Diagnostics about a structure and what strikes it."""
+    found = [] if model.beam is None else _of_beam(model.beam) + _of_modes(model, model.beam)
+    if striker is not None and isinstance(striker.drive, Sine):
+        found += _of_sine(striker.drive, model)
+    if model.imperfection is not None and not model.is_bistable:
+        found.append(
+            Diagnostic(
+                "monostable",
+                "this imperfection leaves one well: the beam is monostable, and crossings of its centre are no "
+                "change of wells",
+            )
+        )
+    return tuple(found)
+
+
+def _of_beam(beam: Beam) -> list[Diagnostic]:
+    found = []
+    for name, item in quantities(Beam).items():
+        value = float(getattr(beam, name))
+        if item.plausible is None or value == 0.0:
+            continue
+        low, high, meant = item.plausible
+        if not low <= abs(value) <= high:
+            found.append(
+                Diagnostic(
+                    "implausible-size",
+                    f"beam.{name} = {value:g} {item.unit}: beams have {low:g} to {high:g} {item.unit}; "
+                    f"is it given in {meant}?",
+                    {name: value},
+                )
+            )
+    for name in ("thickness", "width"):
+        if getattr(beam, name) >= beam.length:
+            found.append(
+                Diagnostic(
+                    "implausible-size",
+                    f"beam.{name} = {getattr(beam, name):g} m is not less than beam.length = {beam.length:g} m; "
+                    "is one of them given in another unit?",
+                )
+            )
+    slope = 3.141592653589793 * beam.buckling_level / beam.length
+    if slope > _STEEP:
+        found.append(
+            Diagnostic(
+                "not-shallow",
+                f"the buckled beam has a slope of {slope:.2g}: the model takes the displacement as small against the "
+                "length (slopes up to 0.2), and its numbers are rough here",
+                {"slope": slope},
+            )
+        )
+    if beam.thickness / beam.length > _STOCKY:
+        found.append(
+            Diagnostic(
+                "not-slender",
+                f"the thickness is {beam.thickness / beam.length:.2g} of the length: shear and rotary inertia, which "
+                "the model leaves out, matter above 0.1",
+                {"thickness_over_length": beam.thickness / beam.length},
+            )
+        )
+    return found
+
+
+def _of_modes(model: ReducedModel, beam: Beam) -> list[Diagnostic]:
+    if (
+        model.modes < 2
+        or not beam.is_buckled
+        or model.parity[0] >= 0
+        or model.given_reference_frequency is not None
+    ):
+        return []
+    symmetric = float(model.natural_frequencies[model.parity > 0][0])
+    level = beam.buckling_level / beam.radius_of_gyration
+    return [
+        Diagnostic(
+            "first-mode-antisymmetric",
+            f"b/r = {level:.3g}: the lowest mode about a well is antisymmetric (of the beam itself above 6.21), and "
+            "omega_1, by which Omega and V are normalised, is its frequency "
+            f"({model.natural_frequencies[0]:.5g} Hz), although a striker at the centre cannot excite it; set "
+            f"model.reference_frequency = {symmetric:.5g} Hz to normalise by the first symmetric mode",
+            {"buckling_level_over_radius": level, "symmetric_frequencies": symmetric},
+        )
+    ]
+
+
+def _of_sine(drive: Sine, model: ReducedModel) -> list[Diagnostic]:
+    found = []
+    if drive.frequency_ratio >= _LARGEST_RATIO:
+        found.append(
+            Diagnostic(
+                "ratio-like-hertz",
+                f"drive.frequency_ratio = {drive.frequency_ratio:g}: a ratio to the first natural frequency "
+                f"({model.reference_frequency:.4g} Hz); is it given in Hz?",
+                {"frequency_ratio": drive.frequency_ratio},
+            )
+        )
+    if drive.velocity_amplitude >= _LARGEST_AMPLITUDE:
+        found.append(
+            Diagnostic(
+                "amplitude-like-speed",
+                f"drive.velocity_amplitude = {drive.velocity_amplitude:g}: a ratio to b omega_1; is it given in mm/s?",
+                {"velocity_amplitude": drive.velocity_amplitude},
+            )
+        )
+    return found

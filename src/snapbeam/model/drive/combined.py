@@ -1,0 +1,84 @@
+"""Several motions that kernels march as one drive: that of the tip, of the base, and of the axial load.
+
+A run has one clock, whose argument belongs to one drive.  If one thing alone moves, the argument is its own, and what
+repeats goes on repeating; of several each has its argument from the time since they began.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from snapbeam.model.drive.base import DRIVES, HORIZON, Drive
+
+__all__ = ["HORIZON", "MOST_STRIKERS", "PARTS", "Joined", "joined"]
+
+
+MOST_STRIKERS = 4
+"""Of one beam."""
+PARTS = ("tip", *(f"tip{i}" for i in range(1, MOST_STRIKERS)), "base", "load")
+"""What may move; tip1 is the tip of the second striker."""
+_SEPARATOR = "__"
+
+
+class Joined(Drive):
+    """Motions of several parts; subclasses are made by :func:`joined`, one for each mixture of kinds.
+
+    Kernels see the numbers of each part under its name, as ``base_amplitude``; unless one moves *alone*, its phase at
+    the start too.  Of a base they see the bound ``base_hardest`` on its acceleration, the sign ``base_sign`` with which
+    it counts in space, and ``base_follow``, how much of its motion the tip makes in the frame of the ends.
+    """
+
+    alone: ClassVar[bool] = False
+    """Whether one part alone moves, and the argument is its own."""
+
+
+def joined(kinds: Mapping[str, type[Drive]]) -> type[Joined]:
+    """The class of a mixture: the kinds of what moves, by part."""
+    from snapbeam.model.axial_load import LOADS
+
+    named = [(part, kinds[part]) for part in PARTS if part in kinds]
+    for part, kind in named:
+        known = LOADS if part == "load" else DRIVES
+        if known.get(kind.name) is not kind:
+            raise TypeError(f"{kind.__name__}: is registered under no name")
+    name = _SEPARATOR.join(["Joined", *(f"{part}{_SEPARATOR}{kind.name}" for part, kind in named)])
+    if name not in globals():
+        globals()[name] = _made(name, named)
+    found: type[Joined] = globals()[name]
+    return found
+
+
+def _made(name: str, named: list[tuple[str, type[Drive]]]) -> type[Joined]:
+    alone = len(named) == 1
+    numbers = ["omega", "fastest"]
+    for part, kind in named:
+        numbers += [f"{part}_{each}" for each in kind.number_names]
+        numbers += [] if alone else [f"{part}_phase"]
+    if any(part == "base" for part, _ in named):
+        numbers += ["base_hardest", "base_sign", "base_follow"]
+    body: dict[str, Any] = {
+        "__module__": __name__,
+        "__qualname__": name,
+        "__doc__": f"Moving: {', '.join(f'the {part} as {kind.name!r}' for part, kind in named)}.",
+        "parts": tuple(named),
+        "alone": alone,
+        "repeats": alone and named[0][1].is_periodic,
+        "number_names": tuple(numbers),
+        "amplitudes": tuple(f"{part}_{each}" for part, kind in named for each in kind.amplitudes),
+    }
+    return type(name, (Joined,), body)
+
+
+def __getattr__(name: str) -> type[Joined]:
+    """A mixture by its name, as another process knows it."""
+    first, *words = name.split(_SEPARATOR)
+    if first != "Joined" or not words or len(words) % 2:
+        raise AttributeError(name)
+    from snapbeam.model.axial_load import LOADS
+
+    pairs = dict(zip(words[::2], words[1::2], strict=True))
+    try:
+        return joined({part: (LOADS if part == "load" else DRIVES)[kind] for part, kind in pairs.items()})
+    except KeyError:
+        raise AttributeError(name) from None

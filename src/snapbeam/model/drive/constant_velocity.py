@@ -1,0 +1,65 @@
+"""A tip that flies, or presses, at a constant speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.drive.base import Scale, Timed
+from snapbeam.model.quantity import RUN, quantity
+
+__all__ = ["ConstantVelocity"]
+
+
+_Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConstantVelocity(Timed):
+    """A constant velocity towards the beam, w_s(t) = w_0 + v t, v = speed b omega_1.
+
+    Of a striker with a mass and no spring, that is a body thrown at the beam; without a mass it is a slow press, or a
+    fast one, that never stops.  A cycle is a period of the first mode.
+
+    Parameters
+    ----------
+    speed : float
+        Over b omega_1.
+    """
+
+    speed: float = quantity(
+        "1", "speed of the striker over b omega_1", low=0.0, closed="left", scope=RUN, short="striker_speed"
+    )
+
+    name = "constant_velocity"
+    number_names = ("omega", "fastest", "speed")
+    amplitudes = ("speed",)
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """A period of the first mode."""
+        return np.full(columns["speed"].size, 2.0 * math.pi / scale.omega)
+
+    def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """The speed in m/s."""
+        nothing = np.zeros(columns["speed"].size)
+        return {"fastest": nothing, "speed": columns["speed"] * scale.length * scale.omega}
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """It goes on and on."""
+        speed = columns["speed"] * scale.length * scale.omega
+        return np.where(speed > 0.0, np.inf, 0.0), speed
+
+    @staticmethod
+    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """v t and v."""
+        return drive.speed * (argument / drive.omega), drive.speed
+
+    @staticmethod
+    def acceleration(drive: Any, memory: Any, argument: float) -> float:
+        """None."""
+        return 0.0

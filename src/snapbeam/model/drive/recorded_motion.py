@@ -1,0 +1,190 @@
+"""A measured motion of the tip in place of a formula."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.model.drive.base import Drive, Scale
+from snapbeam.model.quantity import check_fields, quantity
+from snapbeam.util.validation import InputError, finite_array, instance, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["RecordedMotion"]
+
+
+_Array = NDArray[np.float64]
+_SPEED_MARGIN = 1.5
+"""Greatest speed of the cubic through a record over the greatest recorded one, at most."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedMotion(Drive):
+    """A measured motion of the tip, its start-up transient included.
+
+    The motion between samples is the cubic that matches displacement and velocity at both; the displacement of the
+    first sample is taken as zero.
+
+    Parameters
+    ----------
+    displacement, velocity : array_like of shape (samples,)
+        Displacement (m) and velocity (m/s), positive towards the beam's upper well; they must belong
+        together: over each interval the displacement changes by the velocities' mean, within a tenth
+        of the greatest change.
+    sampling_frequency : float
+        Samples per second, Hz.
+    frequency : float
+        Nominal frequency of the excitation, Hz: what a cycle is.
+    """
+
+    displacement: NDArray[np.float64] = quantity("m", "displacement of the tip, sampled", kind=object)
+    velocity: NDArray[np.float64] = quantity("m/s", "velocity of the tip, sampled", kind=object)
+    sampling_frequency: float = quantity("Hz", "samples per second", low=0.0)
+    frequency: float = quantity("Hz", "nominal frequency of the excitation", low=0.0, short="drive_frequency")
+
+    name = "recorded_motion"
+    number_names = ("omega", "table", "samples", "interval")
+    amplitudes = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        displacement, velocity = checked_record(self.displacement, self.velocity, self.sampling_frequency)
+        object.__setattr__(self, "displacement", displacement)
+        object.__setattr__(self, "velocity", velocity)
+
+    @classmethod
+    def from_dataset(cls, dataset: xr.Dataset) -> RecordedMotion:
+        """A drive from what :func:`snapbeam.lab.recorded_drive` returns, or from a file of it.
+
+        *dataset* has ``displacement`` (m) and ``velocity`` (m/s) over an even ``time`` (s), and the nominal
+        ``frequency`` (Hz) among its attributes.
+        """
+        import xarray as xr
+
+        instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+        missing = [name for name in ("time", "displacement", "velocity") if name not in dataset.variables]
+        if missing or "frequency" not in dataset.attrs:
+            raise InputError(
+                f"dataset without {', '.join(missing) or 'attribute frequency'}: must be a recorded drive with "
+                "time, displacement, velocity and frequency"
+            )
+        for name, unit in (("time", "s"), ("displacement", "m"), ("velocity", "m/s")):
+            given = dataset[name].attrs.get("units", unit)
+            if given != unit:
+                raise InputError(f"{name} with units {shown(given)}: must be in {unit!r}")
+        time = finite_array("time", dataset["time"].values, 1)
+        if time.size < 4:
+            raise InputError(f"time of {time.size} samples: must hold at least 4")
+        interval = (time[-1] - time[0]) / (time.size - 1)
+        if not interval > 0.0 or np.abs(np.diff(time) - interval).max() > 1e-6 * interval:
+            raise InputError("time: must be evenly spaced and increasing")
+        return cls(
+            displacement=dataset["displacement_at_striker"].values,
+            velocity=dataset["velocity_at_striker"].values,
+            sampling_frequency=1.0 / interval,
+            frequency=float(dataset.attrs["frequency"]),
+        )
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RecordedMotion):
+            return NotImplemented
+        numbers = (self.sampling_frequency, self.frequency) == (other.sampling_frequency, other.frequency)
+        return numbers and bool(
+            np.array_equal(self.displacement, other.displacement)
+            and np.array_equal(self.velocity, other.velocity)
+        )
+
+    def __hash__(self) -> int:
+        return hash(
+            (self.sampling_frequency, self.frequency, self.displacement.tobytes(), self.velocity.tobytes())
+        )
+
+    @property
+    def duration(self) -> float:
+        """Length of the record, s."""
+        return (self.displacement.size - 1) / self.sampling_frequency
+
+    def numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
+        """The argument of a record makes one turn over the whole of it."""
+        runs = next(iter(columns.values())).size
+        fixed = {
+            "omega": 2.0 * math.pi / self.duration,
+            "table": 0.0,
+            "samples": float(self.displacement.size),
+            "interval": 1.0 / self.sampling_frequency,
+        }
+        return {name: np.full(runs, value) for name, value in fixed.items()}
+
+    def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """One nominal period."""
+        return np.full(next(iter(columns.values())).size, 1.0 / self.frequency)
+
+    def bounds(self, columns: Mapping[str, _Array], scale: Scale) -> tuple[_Array, _Array]:
+        """What was recorded, with a margin for what lies between the samples."""
+        runs = next(iter(columns.values())).size
+        speed = _SPEED_MARGIN * float(np.abs(self.velocity).max())
+        highest = float((self.displacement - self.displacement[0]).max()) + speed / self.sampling_frequency
+        return np.full(runs, highest), np.full(runs, speed)
+
+    def mirrored_bounds(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+        """What was recorded in the other direction."""
+        runs = next(iter(columns.values())).size
+        speed = _SPEED_MARGIN * float(np.abs(self.velocity).max())
+        lowest = float((self.displacement - self.displacement[0]).min()) - speed / self.sampling_frequency
+        return np.full(runs, -lowest)
+
+    def samples(self) -> _Array:
+        """Displacement from the first sample and velocity, sample after sample."""
+        return np.column_stack((self.displacement - self.displacement[0], self.velocity)).ravel()
+
+    @staticmethod
+    def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+        """The cubic between two samples that matches both displacements and both velocities, and its derivative."""
+        at = min(argument / (drive.omega * drive.interval), drive.samples - 1.0)
+        i = min(int(at), int(drive.samples) - 2)
+        row = int(drive.table) + 2 * i
+        s, interval = at - i, drive.interval
+        w0, rise = memory[row], memory[row + 2] - memory[row]
+        a, b = memory[row + 1] * interval, memory[row + 3] * interval
+        c2, c3 = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
+        displacement = w0 + s * (a + s * (c2 + s * c3))
+        return displacement, (a + s * (2.0 * c2 + s * 3.0 * c3)) / interval
+
+    @staticmethod
+    def acceleration(drive: Any, memory: Any, argument: float) -> float:
+        """The second derivative of the cubic."""
+        at = min(argument / (drive.omega * drive.interval), drive.samples - 1.0)
+        i = min(int(at), int(drive.samples) - 2)
+        row = int(drive.table) + 2 * i
+        s, interval = at - i, drive.interval
+        rise = memory[row + 2] - memory[row]
+        a, b = memory[row + 1] * interval, memory[row + 3] * interval
+        c2, c3 = 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise
+        return (2.0 * c2 + 6.0 * c3 * s) / (interval * interval)
+
+
+def checked_record(displacement: ArrayLike, velocity: ArrayLike, rate: float) -> tuple[_Array, _Array]:
+    """Both as arrays, refused if they do not belong together."""
+    moved = finite_array("displacement", displacement, 1)
+    speed = finite_array("velocity", velocity, 1)
+    if moved.size < 4 or moved.shape != speed.shape:
+        raise InputError(
+            f"displacement of shape {moved.shape}, velocity of shape {speed.shape}: must be "
+            "equal and hold at least 4 samples"
+        )
+    change = np.diff(moved)
+    mean = 0.5 * (speed[1:] + speed[:-1]) / rate
+    worst = float(np.abs(change - mean).max())
+    if worst > 0.1 * max(float(np.abs(change).max()), 1e-30):
+        raise InputError(
+            f"velocity: does not belong to displacement: over one interval they differ by {worst:.3g} m; "
+            "resample both from one record"
+        )
+    return moved, speed

@@ -1,0 +1,392 @@
+"""Every equilibrium of a structure with one tension term under a constant side force, and none missed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.util.validation import InputError
+
+__all__ = [
+    "Equilibrium",
+    "Landscape",
+    "equilibria_of",
+    "landscape_of",
+    "least_energy_through",
+    "pinned_load",
+    "tangent_stiffness",
+]
+
+
+_Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Equilibrium:
+    """A shape in which a structure can rest.
+
+    Attributes
+    ----------
+    amplitude : array of shape (N,)
+        alpha.
+    energy : float
+        Potential energy, J, 0 for the straight structure.
+    unstable_directions : int
+        Negative eigenvalues of the tangent stiffness: 0 in a well, 1 at a saddle.
+    """
+
+    amplitude: _Array
+    energy: float
+    unstable_directions: int
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether it is a well."""
+        return self.unstable_directions == 0
+
+    def __repr__(self) -> str:
+        kinds = {0: "well", 1: "saddle"}
+        kind = kinds.get(self.unstable_directions, f"{self.unstable_directions} unstable directions")
+        return f"<Equilibrium: {kind} at {self.energy:.6g} J>"
+
+
+def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[tuple[_Array, int]]:
+    """All solutions alpha of K0 alpha + gamma (alpha . alpha) alpha = B.
+
+    With the eigenvalues kappa_i of K0 and B in its eigenvectors, alpha_i = B_i/(kappa_i + gamma s), where
+    s = alpha . alpha solves one secular equation,
+
+        h(s) = sum B_i^2/(kappa_i + gamma s)^2 - s = 0.
+
+    Between two of its poles h is convex and has no root or two; beyond the last it falls, with one root, the well of
+    least energy.  So all roots are found: the least value between two poles decides.  Where B_i = 0 and kappa_i < 0 a
+    pair with alpha_i of either sign may branch off at kappa_i + gamma s = 0.
+
+    The tangent stiffness is K0 + gamma s and 2 gamma alpha alpha^T, of rank one: it has as many negative
+    eigenvalues as there are kappa_i + gamma s < 0, less one where h rises.
+
+    Parameters
+    ----------
+    stiffness : array of shape (N,) or (N, N)
+        K0.
+    gamma : float
+        At least 0.
+    force : array of shape (N,)
+        B.
+
+    Returns
+    -------
+    list of pairs
+        alpha, shape (N,), and the number of negative eigenvalues there.
+    """
+    if stiffness.ndim == 1:
+        kappa, turned, axes = stiffness, force, None
+    else:
+        kappa, axes = np.linalg.eigh(stiffness)
+        turned = axes.T @ force
+    if gamma == 0.0:
+        found = [(turned / kappa, int((kappa < 0.0).sum()))]
+    else:
+        found = [_amplitude(kappa, turned, gamma, *root) for root in _roots(kappa, turned, gamma)]
+        found += _branches(kappa, turned, gamma)
+    return found if axes is None else [(axes @ each, index) for each, index in found]
+
+
+def _amplitude(
+    kappa: _Array, force: _Array, gamma: float, origin: int, shift: float, rises: bool
+) -> tuple[_Array, int]:
+    """alpha at s = s_origin + shift, the pole of mode *origin*, or 0 for -1; and how unstable it is."""
+    alpha = np.zeros_like(force)
+    pushed, gap = force != 0.0, _gap(kappa, gamma, origin, shift)
+    alpha[pushed] = (force / gap)[pushed]
+    return alpha, int((gap < 0.0).sum()) - int(rises)
+
+
+def _gap(kappa: _Array, gamma: float, origin: int, shift: float) -> _Array:
+    """kappa_i + gamma s, exact for the mode whose pole is near."""
+    with np.errstate(divide="ignore"):
+        at: _Array = (kappa if origin < 0 else kappa - kappa[origin]) + gamma * shift
+    return at
+
+
+def _roots(kappa: _Array, force: _Array, gamma: float) -> list[tuple[int, float, bool]]:
+    """The roots of the secular equation, each as a pole and the distance from it, and whether h rises there."""
+    pushed = np.flatnonzero(force != 0.0)
+    squares = force * force
+    poles = [int(i) for i in pushed[np.argsort(-kappa[pushed], kind="stable")] if kappa[i] <= 0.0]
+    edges = ([] if poles and kappa[poles[0]] == 0.0 else [-1]) + poles
+    place = {i: 0.0 if i < 0 else -float(kappa[i]) / gamma for i in edges}
+
+    def value(origin: int, shift: float) -> float:
+        gap = _gap(kappa, gamma, origin, shift)[pushed]
+        with np.errstate(divide="ignore"):
+            return float(np.sum(squares[pushed] / gap**2)) - place[origin] - shift
+
+    def slope(origin: int, shift: float) -> float:
+        gap = _gap(kappa, gamma, origin, shift)[pushed]
+        with np.errstate(divide="ignore"):
+            return -2.0 * gamma * float(np.sum(squares[pushed] / gap**3)) - 1.0
+
+    found: list[tuple[int, float, bool]] = []
+    for left, right in pairwise(edges):
+        width = place[right] - place[left]
+        if width <= 0.0:
+            continue
+        low = _lowest(slope, left, right, width)
+        if low is None or value(*low) >= 0.0:
+            continue
+        from_left = low[1] if low[0] == left else width + low[1]
+        from_right = low[1] if low[0] == right else low[1] - width
+        found.append(_bracketed(value, slope, left, from_left, +1.0))
+        found.append(_bracketed(value, slope, right, -from_right, -1.0))
+    last = edges[-1]
+    beyond = math.sqrt(float(squares.sum())) ** (2.0 / 3.0) / gamma ** (2.0 / 3.0) + 1e-300
+    while value(last, beyond) > 0.0:
+        beyond *= 2.0
+    found.append(_bracketed(value, slope, last, beyond, +1.0))
+    return found
+
+
+def _lowest(
+    slope: Callable[[int, float], float], left: int, right: int, width: float
+) -> tuple[int, float] | None:
+    """Where the convex function between two edges is least, from the nearer of them; None if at the left end."""
+    if slope(left, 0.5 * width) > 0.0:
+        if left < 0 and slope(left, 0.0) >= 0.0:
+            return None
+        return left, _distance(lambda t: slope(left, t), 0.5 * width, pole=left >= 0)
+    return right, -_distance(lambda t: -slope(right, -t), 0.5 * width, pole=True)
+
+
+def _bracketed(
+    value: Callable[[int, float], float],
+    slope: Callable[[int, float], float],
+    origin: int,
+    reach: float,
+    sign: float,
+) -> tuple[int, float, bool]:
+    """The root between a pole, or 0, and a place at the distance *reach* where the function is negative."""
+    shift = sign * _distance(lambda t: -value(origin, sign * t), reach, pole=origin >= 0)
+    for _ in range(_POLISHINGS):
+        change = value(origin, shift) / slope(origin, shift)
+        if not abs(change) < _SMALL * abs(shift):
+            break
+        shift -= change
+    return origin, shift, sign < 0.0
+
+
+def _distance(function: Callable[[float], float], reach: float, pole: bool) -> float:
+    """The root in (0, *reach*] of a function that is negative near 0 and positive at *reach*, by its logarithm if
+    0 is a pole of it."""
+    from scipy.optimize import brentq
+
+    if not function(reach) > 0.0:
+        return reach
+    if not pole:
+        return (
+            0.0 if function(0.0) >= 0.0 else float(brentq(function, 0.0, reach, xtol=1e-300, rtol=_ROUNDING))
+        )
+    low = math.log(reach)
+    while function(math.exp(low)) > 0.0:
+        low -= 4.0
+        if low < _LEAST:
+            return math.exp(_LEAST)
+    return math.exp(brentq(lambda u: function(math.exp(u)), low, math.log(reach), xtol=1e-15, rtol=_ROUNDING))
+
+
+_ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
+_LEAST = -700.0
+_POLISHINGS = 2
+_SMALL = 1e-6
+
+
+def _branches(kappa: _Array, force: _Array, gamma: float) -> list[tuple[_Array, int]]:
+    """The pairs that branch off in a mode without a side force of its own."""
+    found = []
+    for i in np.flatnonzero((force == 0.0) & (kappa < 0.0)):
+        alpha = np.zeros_like(force)
+        pushed = force != 0.0
+        gap = kappa - kappa[i]
+        if (gap[pushed] == 0.0).any():
+            continue
+        alpha[pushed] = force[pushed] / gap[pushed]
+        square = -float(kappa[i]) / gamma - float(alpha @ alpha)
+        if square > 0.0:
+            for sign in (-1.0, 1.0):
+                one = alpha.copy()
+                one[i] = sign * math.sqrt(square)
+                found.append((one, int((gap < 0.0).sum())))
+    return found
+
+
+# ----------------------------------------------------------------------------------------------------
+# The wells of a structure under a side force, the saddle between them and what it takes to cross.
+
+
+@dataclass(frozen=True, eq=False)
+class Landscape:
+    """Where a structure can rest."""
+
+    equilibria: tuple[Equilibrium, ...]
+    """By energy."""
+    lower: Equilibrium
+    """The well whose centre is lower; the only one if there is one only."""
+    upper: Equilibrium
+    saddle: Equilibrium | None
+    """The lowest between two wells; None if there is one well only."""
+
+    @property
+    def deepest(self) -> Equilibrium:
+        """The well of least energy."""
+        return self.lower if self.lower.energy <= self.upper.energy else self.upper
+
+    @property
+    def is_bistable(self) -> bool:
+        """Whether there are two wells."""
+        return self.saddle is not None
+
+
+def tangent_stiffness(stiffness: _Array, gamma: float, alpha: _Array) -> _Array:
+    """K0 + gamma (s Id + 2 alpha alpha^T), shape (N, N)."""
+    k0 = np.diag(stiffness) if stiffness.ndim == 1 else stiffness
+    tangent: _Array = k0 + gamma * (float(alpha @ alpha) * np.eye(alpha.size) + 2.0 * np.outer(alpha, alpha))
+    return tangent
+
+
+def landscape_of(stiffness: _Array, gamma: float, force: _Array, midspan_shape: _Array) -> Landscape:
+    """All equilibria under the side force B, told apart.
+
+    At most two of them are stable: beyond the second eigenvalue of K0 + gamma s the term 2 gamma alpha alpha^T, of rank
+    one, cannot make up for two negative ones.
+
+    Raises
+    ------
+    InputError
+        If no equilibrium is stable, or two wells cannot be told apart by the centre.
+    """
+    found = []
+    for alpha, unstable in equilibria_of(stiffness, gamma, force):
+        alpha.setflags(write=False)
+        bent = stiffness * alpha if stiffness.ndim == 1 else stiffness @ alpha
+        square = float(alpha @ alpha)
+        energy = 0.5 * float(alpha @ bent) + 0.25 * gamma * square * square - float(force @ alpha)
+        found.append(Equilibrium(amplitude=alpha, energy=energy, unstable_directions=unstable))
+    found.sort(key=lambda each: each.energy)
+    wells = [each for each in found if each.is_stable]
+    if not wells:
+        raise InputError("transverse_force: no equilibrium is stable; must push a structure that stiffens")
+    saddles = [each for each in found if each.unstable_directions == 1] or [
+        each for each in found if not each.is_stable
+    ]
+    if len(wells) < 2:
+        return Landscape(tuple(found), wells[0], wells[0], None)
+    lower, upper = sorted(wells[:2], key=lambda each: float(midspan_shape @ each.amplitude))
+    if not float(midspan_shape @ lower.amplitude) < float(midspan_shape @ upper.amplitude):
+        raise InputError("midspan_shape: must tell the two wells apart, but both lie at the same height")
+    return Landscape(tuple(found), lower, upper, saddles[0])
+
+
+# ----------------------------------------------------------------------------------------------------
+# What it takes a structure with unequal wells to pass a height: the bound behind early decision, with a side force.
+
+
+_HALVINGS = 120
+_BESIDE = 1e-9
+
+
+def least_energy_through(
+    stiffness: _Array, gamma: float, force: _Array, shapes: _Array, heights: _Array
+) -> _Array:
+    """Least potential energy of any amplitudes with c . alpha = r, J.
+
+    With S_cc = sum c_i^2/(K0_i - mu), S_cB = sum c_i B_i/(K0_i - mu) and S_BB alike, it is the greatest value of
+
+        (r - S_cB)^2/(2 S_cc) - S_BB/2 - mu^2/(4 gamma)
+
+    over mu below the first zero of S_cc.  For every mu, gamma s^2/4 >= -mu s/2 - mu^2/(4 gamma), s = alpha . alpha, so
+    that the least value of the quadratic form that is left, on the plane, is a lower bound.  It is attained: the bound
+    is concave in mu, its slope is -(s + mu/gamma)/2 with the s of the shape that is least, and vanishes at
+    mu = -gamma s.
+    Without B it is that of equal wells.
+
+    Parameters
+    ----------
+    stiffness : array of shape (N,)
+        K0, diagonal.
+    gamma : float
+    force : array of shape (N,)
+        B.
+    shapes : array of shape (runs, N)
+        c of each run.
+    heights : array of shape (runs,)
+        r, m.
+
+    Returns
+    -------
+    array of shape (runs,)
+    """
+    squares = shapes * shapes
+    different, which = np.unique(squares, axis=0, return_inverse=True)
+    high = np.array([pinned_load(row, stiffness) for row in different])[which.ravel()]
+    scale = float(np.abs(stiffness).max()) + float(np.abs(force).max()) ** (2.0 / 3.0) * gamma ** (1.0 / 3.0)
+
+    def shape(mu: _Array) -> _Array:
+        # at a pole the shape is a limit: beside it is near enough to say which way the bound rises
+        gap = stiffness - mu[:, None]
+        gap = np.where((gap == 0.0).any(axis=1)[:, None], gap - _BESIDE * scale, gap)
+        first = np.sum(squares / gap, axis=1)
+        held = (heights - np.sum(shapes * force / gap, axis=1)) / first
+        found: _Array = (force + held[:, None] * shapes) / gap
+        return found
+
+    def rises(mu: _Array) -> NDArray[np.bool_]:
+        alpha = shape(mu)
+        up: NDArray[np.bool_] = -np.sum(alpha * alpha, axis=1) > mu / gamma
+        return up
+
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low = np.minimum(high, 0.0) - scale
+        for _ in range(_HALVINGS):
+            falls = ~rises(low)
+            if not falls.any():
+                break
+            low = np.where(falls, high - 2.0 * (high - low), low)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            up = rises(middle)
+            low, high = np.where(up, middle, low), np.where(up, high, middle)
+        low = np.where((stiffness == low[:, None]).any(axis=1), low - _BESIDE * scale, low)
+        gap = stiffness - low[:, None]
+        first = np.sum(squares / gap, axis=1)
+        off = heights - np.sum(shapes * force / gap, axis=1)
+        value: _Array = (
+            0.5 * off * off / first - 0.5 * np.sum(force * force / gap, axis=1) - low * low / (4.0 * gamma)
+        )
+    return np.where(np.isfinite(value), value, -np.inf)
+
+
+def pinned_load(square: _Array, k0: _Array) -> float:
+    """Load, less that at hand, that buckles the structure pinned at a point: S_cc's first zero, or an untouched
+    mode.
+    """
+    touched = square > 1e-20 * square.max()
+    free = np.sort(k0[~touched])
+    poles = np.sort(k0[touched])
+    lowest_free = float(free[0]) if free.size else np.inf
+    if poles.size < 2:
+        return lowest_free if np.isfinite(lowest_free) else float(poles[0] + 1e6 * abs(poles[0]))
+    gap = poles[1] - poles[0]
+    low, high = poles[0] + 1e-13 * gap, poles[1] - 1e-13 * gap
+    # rises from -infinity to infinity; halved here: scipy.optimize would take a quarter of a second of each start
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if np.sum(square[touched] / (k0[touched] - middle)) > 0.0:
+            high = middle
+        else:
+            low = middle
+    return min(float(0.5 * (low + high)), lowest_free)

@@ -1,1 +1,0 @@
-"""The reduced model: buckling modes, their frequencies and matrices."""

@@ -1,0 +1,277 @@
+"""Harvesters: what turns the motion of a beam into power in a resistor, by a piezoelectric patch or by a coil."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.beam import Beam
+from snapbeam.model.boundary_conditions import modes_between
+from snapbeam.model.quantity import RUN, check_fields, quantity
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.util.validation import InputError, choice, finite, instance, positive, within
+
+__all__ = ["HARVESTERS", "ElectromagneticHarvester", "Harvester", "PiezoelectricHarvester"]
+
+
+_Array = NDArray[np.float64]
+
+HARVESTERS: dict[str, type[Harvester]] = {}
+"""Every harvester by the name it has in parameter files."""
+WIRINGS = ("parallel", "series")
+
+
+class Harvester:
+    """A circuit of one state beside the beam: a frozen dataclass.
+
+    With theta the row of the coupling in buckling modes, z what pulls back (the voltage, or the current the other way
+    round) and M and rho its inertia and its loss,
+
+        m alpha'' + ... = theta z,     M z' = -theta . alpha' - rho z,
+
+    so that what the beam gives, -z theta . alpha', is the change of M z^2/2 and the loss rho z^2, of which a share ends
+    in the load.
+    """
+
+    name: ClassVar[str] = ""
+    resistance: float
+    """Of the load, ohm."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if cls.name:
+            HARVESTERS[cls.name] = cls
+
+    def row(self, model: ReducedModel) -> _Array:
+        """theta of every buckling mode, shape (N,)."""
+        raise NotImplementedError
+
+    @property
+    def inertia(self) -> float:
+        """M; 0 if z follows the motion at once."""
+        raise NotImplementedError
+
+    @property
+    def unit(self) -> float:
+        """Volts or amperes, as a meter shows them, per unit of sqrt(M) z, the circuit's coordinate."""
+        return 1.0 / math.sqrt(self.inertia) if self.inertia > 0.0 else 1.0
+
+    def loss(self, resistance: _Array) -> _Array:
+        """rho of load resistances."""
+        raise NotImplementedError
+
+    def share(self, resistance: _Array) -> _Array:
+        """Share of the loss that ends in the load."""
+        raise NotImplementedError
+
+    def volts(self, resistance: _Array) -> _Array:
+        """Voltage across the load per z."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, kw_only=True)
+class PiezoelectricHarvester(Harvester):
+    """Piezoelectric layers on both faces of the beam, from one place to another, on a load resistor,
+
+        theta_i = Theta [phi_i'(x_2) - phi_i'(x_1)],     C v' = -v/R - theta . alpha',
+
+    with Theta the bending moment per volt.  Their own mass and stiffness are left out.
+
+    Parameters
+    ----------
+    moment_per_volt : float
+        Theta, N m/V.
+    capacitance : float
+        C, F.
+    resistance : float
+        R of the load, ohm.
+    patch_start, patch_end : float
+        x_1 and x_2 over the length.  A patch from clamp to clamp couples to nothing: the slopes at its ends are 0.
+    """
+
+    moment_per_volt: float = quantity(
+        "N m/V", "moment of the piezoelectric layers per volt", symbol=r"\Theta"
+    )
+    capacitance: float = quantity("F", "capacitance of the piezoelectric layers", low=0.0, symbol="C")
+    resistance: float = quantity("ohm", "load resistance", low=0.0, scope=RUN, symbol="R")
+    patch_start: float = quantity(
+        "1",
+        "where the layers begin, over the length",
+        default=0.0,
+        low=0.0,
+        high=1.0,
+        closed="both",
+        short="patch_start",
+    )
+    patch_end: float = quantity(
+        "1",
+        "where the layers end, over the length",
+        default=0.25,
+        low=0.0,
+        high=1.0,
+        closed="both",
+        short="patch_stop",
+    )
+    name = "piezo"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.patch_start >= self.patch_end:
+            raise InputError(
+                f"start = {self.patch_start:g}: must be less than patch_end = {self.patch_end:g}"
+            )
+
+    @classmethod
+    def from_material(
+        cls,
+        *,
+        stress_constant: float,
+        permittivity: float,
+        layer_thickness: float,
+        layer_width: float,
+        beam: Any,
+        resistance: float,
+        start: float = 0.0,
+        stop: float = 0.25,
+        wiring: str = "parallel",
+    ) -> PiezoelectricHarvester:
+        """Two equal layers, one on each face, by their material (Erturk and Inman, Piezoelectric Energy Harvesting,
+        Wiley 2011, ch. 3).
+
+        Parameters
+        ----------
+        stress_constant : float
+            The effective e_31, C/m^2; its sign turns the sign of the voltage.
+        permittivity : float
+            At constant strain, F/m.
+        layer_thickness, layer_width : float
+            Of each layer, m.
+        beam : Beam
+            Between them.
+        resistance : float
+            Of the load, ohm.
+        patch_start, patch_end : float
+            Over the length.
+        wiring : {"parallel", "series"}
+            Of the two layers: in parallel twice the moment per volt and twice the
+            capacitance of one, in series the moment of one and half its capacitance.
+        """
+        thick = positive("layer_thickness", layer_thickness, "m")
+        wide = positive("layer_width", layer_width, "m")
+        two = 2.0 if choice("wiring", wiring, WIRINGS) == "parallel" else 0.5
+        first, last = (
+            within(name, at, 0.0, 1.0, closed="both")
+            for name, at in (("patch_start", start), ("patch_end", stop))
+        )
+        area = wide * (last - first) * instance("beam", beam, Beam, "a Beam").length
+        arm = 0.5 * (beam.thickness + thick)
+        return cls(
+            moment_per_volt=(2.0 if two == 2.0 else 1.0)
+            * finite("stress_constant", stress_constant)
+            * wide
+            * arm,
+            capacitance=two * positive("permittivity", permittivity, "F/m") * area / thick,
+            resistance=resistance,
+            patch_start=start,
+            patch_end=stop,
+        )
+
+    def row(self, model: ReducedModel) -> _Array:
+        """Theta times the difference of the slopes."""
+        beam = _beam_of(model)
+        modes = modes_between(beam.boundary, beam.length, beam.bending_stiffness, model.modes)
+        slopes = [modes.slope(place * beam.length) for place in (self.patch_start, self.patch_end)]
+        return np.asarray(self.moment_per_volt * (slopes[1] - slopes[0]))
+
+    @property
+    def inertia(self) -> float:
+        """The capacitance."""
+        return self.capacitance
+
+    def loss(self, resistance: _Array) -> _Array:
+        """1/R."""
+        return np.asarray(1.0 / resistance)
+
+    def share(self, resistance: _Array) -> _Array:
+        """All."""
+        return np.ones_like(resistance)
+
+    def volts(self, resistance: _Array) -> _Array:
+        """It is the voltage."""
+        return np.ones_like(resistance)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElectromagneticHarvester(Harvester):
+    """A magnet on the beam and a coil on the frame, on a load resistor,
+
+        L_c i' = K w'(x_c) - (R + R_c) i,     f_c = -K i,
+
+    w' in the frame of the ends and f_c the force on the beam at x_c.  The magnet's mass is left out.
+
+    Parameters
+    ----------
+    force_factor : float
+        K, N/A or V s/m.
+    resistance : float
+        R of the load, ohm.
+    coil_resistance, inductance : float
+        R_c (ohm) and L_c (H) of the coil; without an inductance the current follows the velocity at once.
+    location : float
+        x_c over the length.
+    """
+
+    force_factor: float = quantity("N/A", "force of the coil per ampere", symbol="K")
+    resistance: float = quantity("ohm", "load resistance", low=0.0, scope=RUN, symbol="R")
+    coil_resistance: float = quantity(
+        "ohm", "resistance of the coil", default=0.0, low=0.0, closed="left", symbol=r"R_\mathrm{c}"
+    )
+    inductance: float = quantity(
+        "H", "inductance of the coil", default=0.0, low=0.0, closed="left", symbol=r"L_\mathrm{c}"
+    )
+    location: float = quantity(
+        "1", "place of the coil over the length", default=0.5, low=0.0, high=1.0, short="coil_location"
+    )
+    name = "coil"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def row(self, model: ReducedModel) -> _Array:
+        """K times the shape at the coil."""
+        return np.asarray(self.force_factor * model.shape_at(self.location))
+
+    @property
+    def inertia(self) -> float:
+        """The inductance."""
+        return self.inductance
+
+    @property
+    def unit(self) -> float:
+        """The current is -z."""
+        return -super().unit
+
+    def loss(self, resistance: _Array) -> _Array:
+        """R + R_c."""
+        return np.asarray(resistance + self.coil_resistance)
+
+    def share(self, resistance: _Array) -> _Array:
+        """R/(R + R_c)."""
+        return np.asarray(resistance / (resistance + self.coil_resistance))
+
+    def volts(self, resistance: _Array) -> _Array:
+        """-R i, i the current that z is the negative of."""
+        return -resistance
+
+
+def _beam_of(model: ReducedModel) -> Any:
+    if model.beam is None:
+        raise InputError(
+            "harvester: layers are glued to a beam; "
+            "of a structure given by matrices the slopes are not known; use a Coil"
+        )
+    return model.beam

@@ -1,0 +1,192 @@
+"""Axes of a map as people write them: a number, a list, or start:stop:count."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.model.parameters import lookup
+from snapbeam.model.system import System
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    axis,
+    choice,
+    finite,
+    finite_array,
+    flag,
+    instance,
+    shown,
+)
+
+__all__ = [
+    "PHYSICAL",
+    "Axis",
+    "Physical",
+    "checked_physical",
+    "from_physical",
+    "parse_axis",
+    "physical_name",
+    "to_physical",
+    "unit_of",
+]
+
+
+Axis = float | NDArray[np.float64]
+
+_FORMS = "a number, numbers separated by commas, or start:stop:count, such as 0.1:4:64"
+
+
+_WHOLE = "a whole number, whole numbers separated by commas, such as 1,32, or start:stop:count"
+
+
+def parse_axis(name: str, value: float | str | Sequence[float], *, whole: bool = False) -> Axis:
+    """Return *value* as one number, or as a strictly increasing axis.
+
+    Parameters
+    ----------
+    name : str
+        The parameter to name in a refusal.
+    value : float, str or sequence of float
+        ``0.18``, ``"0.18"``, ``"1/2.1"``, ``"0.1,0.2,0.5"``, or ``"0.1:4:64"`` for 64 points from 0.1 to 4,
+        both included.
+    whole : bool
+        Whether the numbers are to be whole, as a refusal then says.
+
+    Returns
+    -------
+    float or array of shape (points,)
+
+    Raises
+    ------
+    InputError
+        If it cannot be read so, is not finite, or does not increase.
+    """
+    instance("name", name, str, "text")
+    flag("whole", whole)
+    if isinstance(value, str):
+        return _parse_text(name, value, _WHOLE if whole else _FORMS)
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return _finite(name, shown(value), finite(name, value))
+    if isinstance(value, bool) or not isinstance(value, (Sequence, np.ndarray)):
+        raise InputTypeError(f"{name} = {shown(value)}: must be {_FORMS}")
+    return axis(name, value, -math.inf, math.inf)
+
+
+_MOST_POINTS = 10_000_000
+
+
+def _parse_text(name: str, text: str, forms: str) -> Axis:
+    parts = text.split(":")
+    if len(parts) == 3:
+        start, stop = (_number(name, text, part, forms) for part in parts[:2])
+        try:
+            count = int(parts[2])
+        except ValueError:
+            raise InputError(f"{name} = {text!r}: the count {parts[2]!r} must be a whole number") from None
+        if count < 2 or not start < stop:
+            raise InputError(f"{name} = {text!r}: start must be less than stop and count at least 2")
+        if count > _MOST_POINTS:
+            raise InputError(f"{name} = {text!r}: the count must be at most {_MOST_POINTS}")
+        return np.linspace(start, stop, count)
+    if len(parts) != 1:
+        raise InputError(f"{name} = {shown(text)}: must be {forms}")
+    numbers = [_number(name, text, part, forms) for part in text.split(",")]
+    return numbers[0] if len(numbers) == 1 else axis(name, numbers, -math.inf, math.inf)
+
+
+def _number(name: str, text: str, part: str, forms: str) -> float:
+    numerator, slash, denominator = part.partition("/")
+    try:
+        value = float(numerator) / float(denominator) if slash else float(part)
+    except (ValueError, ZeroDivisionError):
+        raise InputError(f"{name} = {shown(text)}: must be {forms}") from None
+    return _finite(name, text, value)
+
+
+def _finite(name: str, text: str, value: float) -> float:
+    if not math.isfinite(value):
+        raise InputError(f"{name} = {text}: must be finite")
+    return value
+
+
+# ----------------------------------------------------------------------------------------------------
+# Frequencies in Hz, velocities in m/s and places in m, where a person thinks so: made into ratios at the door.
+
+
+@dataclass(frozen=True)
+class Physical:
+    """A parameter in its physical unit."""
+
+    parameter: str
+    """Dotted name of the ratio."""
+    unit: str
+    words: str
+
+
+PHYSICAL: dict[str, Physical] = {
+    "drive.frequency_hz": Physical("drive.frequency_ratio", "Hz", "excitation frequency"),
+    "drive.velocity_m_s": Physical("drive.velocity_amplitude", "m/s", "velocity amplitude of the striker"),
+    "striker.location_m": Physical("striker.location", "m", "distance of the striker from the left clamp"),
+}
+"""What may be given instead of a ratio, by dotted name."""
+
+
+def physical_name(name: str) -> str | None:
+    """The dotted name of a parameter in its physical unit, by itself or by its last part; None if it is none."""
+    instance("name", name, str, "text")
+    found = [full for full in PHYSICAL if name in (full, full.partition(".")[2])]
+    return found[0] if found else None
+
+
+def unit_of(system: System, name: str) -> float:
+    """What a ratio of 1 is in the physical unit of *name*."""
+    scale, parameter = system.scale, PHYSICAL[name].parameter
+    if parameter == "drive.frequency_ratio":
+        return scale.omega / (2.0 * math.pi)
+    if parameter == "drive.velocity_amplitude":
+        return scale.length * scale.omega
+    if system.model.beam is None:
+        raise InputError("striker.location_m: a structure given by matrices has no length; give location")
+    return system.model.beam.length
+
+
+def _unit(system: System, name: str) -> float:
+    instance("system", system, System, "a System")
+    return unit_of(system, choice("name", name, tuple(PHYSICAL)))
+
+
+def from_physical(system: System, name: str, value: ArrayLike) -> Any:
+    """Ratios from values in the physical unit of *name*."""
+    unit = _unit(system, name)
+    return finite_array(name, value) / unit
+
+
+def checked_physical(system: System, name: str, value: float, shown: str) -> float:
+    """The ratio that a value in the physical unit of *name* is, refused, with the name *shown*, where it cannot be.
+
+    Raises
+    ------
+    InputError
+        If the ratio is out of its range; the message says both.
+    """
+    ratio, row = float(from_physical(system, name, value)), lookup(PHYSICAL[name].parameter)
+    short = row.name.partition(".")[2]
+    try:
+        row.quantity.check(short, ratio)
+    except InputError as error:
+        must = str(error).partition(": ")[2]
+        unit = PHYSICAL[name].unit
+        raise InputError(f"{shown} = {value:g} {unit}: is {short} = {ratio:.6g}, which {must}") from None
+    return ratio
+
+
+def to_physical(system: System, name: str, value: ArrayLike) -> Any:
+    """Values in the physical unit of *name* from ratios."""
+    unit = _unit(system, name)
+    return finite_array(name, value) * unit

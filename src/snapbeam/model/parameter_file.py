@@ -1,0 +1,763 @@
+"""What was given in a parameter file or on a command line: checked, completed from the paper, made into values."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import tomli_w
+from numpy.typing import NDArray
+
+from snapbeam.model.axial_load import LOADS
+from snapbeam.model.contact.base import LAWS
+from snapbeam.model.contact.hertz import HertzContact
+from snapbeam.model.contact.hunt_crossley import HuntCrossley
+from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION, MODES
+from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.harvester import HARVESTERS
+from snapbeam.model.integration import CYCLES, Integration
+from snapbeam.model.mapping import parts_from_mapping
+from snapbeam.model.parameter_axes import PHYSICAL, checked_physical, parse_axis, physical_name, unit_of
+from snapbeam.model.parameters import Parameter, lookup, parameters, row_of
+from snapbeam.model.quantity import quantities
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.model.striker import numbered
+from snapbeam.model.system import System
+from snapbeam.util.files import atomic_path, check_writable
+from snapbeam.util.validation import InputError, file_path, finite, instance, mapping, shown
+
+__all__ = [
+    "DEFAULT_AXES",
+    "DEFAULT_DRIVE",
+    "MATERIALS",
+    "SECTIONS",
+    "WANTED",
+    "Config",
+    "checked_sections",
+    "config_from_mapping",
+    "config_text",
+    "contact_of",
+    "contact_rivals",
+    "contradictions",
+    "dump_config",
+    "law_of",
+    "load_config",
+    "override",
+    "parsed_axis",
+    "same_axis",
+    "with_section",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Which law of contact was meant, and the numbers that follow from materials or from a wanted restitution.
+
+
+MATERIALS = {
+    "radius": ("m", "radius of the sphere", (1e-9, 10.0, "mm")),
+    "young_modulus": ("Pa", "Young's moduli of sphere and beam", None),
+    "poisson_ratio": ("1", "Poisson ratios of sphere and beam", None),
+}
+"""What a Hertzian stiffness may follow from: unit, words and plausible sizes."""
+WANTED = {
+    "restitution": ("1", "share of its speed that a free mass keeps, from which the loss follows"),
+    "speed": ("m/s", "at which it keeps that share"),
+}
+"""What a loss may follow from: unit and words."""
+_TELLING = {
+    "coefficient": "restitution", "damping_factor": "hunt_crossley", "restitution": "hunt_crossley", "speed": "hunt_crossley",
+    "layer_stiffness": "layer",
+    "linear_stiffness": "kelvin_voigt", "linear_damping": "kelvin_voigt", "force_at_1um": "power", "exponent": "power",
+}  # fmt: skip
+"""Names that one law alone has."""
+_SPHERES = ("hertz", "hunt_crossley", "layer")
+
+
+def law_of(values: Mapping[str, Any]) -> str:
+    """The law that is named, or that has the names that were given."""
+    if "type" in values:
+        return str(values["type"])
+    told = [law for name, law in _TELLING.items() if name in values]
+    return told[0] if told else "hertz"
+
+
+def contact_of(given: Mapping[str, Any]) -> dict[str, Any]:
+    """The section of a system, complete: the paper's stiffness where none was given, a loss from a restitution.
+
+    Raises
+    ------
+    InputError
+    """
+    values = dict(given)
+    law = values["type"] = law_of(values)
+    materials = {name: values.pop(name) for name in MATERIALS if name in values}
+    if materials:
+        moduli, ratios = tuple(materials["young_modulus"]), tuple(materials["poisson_ratio"])
+        values["stiffness"] = HertzContact.from_materials(materials["radius"], moduli, ratios).stiffness
+    if law in _SPHERES:
+        values.setdefault("stiffness", CONTACT.stiffness)
+    wanted = {name: values.pop(name) for name in WANTED if name in values}
+    if wanted:
+        if len(wanted) < len(WANTED):
+            raise InputError("[contact] restitution and speed belong together; one is missing")
+        if "damping_factor" in values or law != "hunt_crossley":
+            raise InputError(
+                "[contact] restitution and speed make the loss of type = 'hunt_crossley'; give no other"
+            )
+        values["damping_factor"] = HuntCrossley.from_restitution(
+            values["stiffness"], wanted["restitution"], wanted["speed"]
+        ).damping_factor
+    return values
+
+
+def contact_rivals() -> list[tuple[set[str], set[str]]]:
+    """What stands for the same thing: giving one set takes the other away."""
+    sphere, lossy = {"stiffness", *MATERIALS}, {"damping_factor", *WANTED}
+    spring, power = {"linear_stiffness", "linear_damping"}, {"force_at_1um", "exponent"}
+    pairs = [({"stiffness"}, set(MATERIALS)), ({"damping_factor"}, set(WANTED))]
+    pairs.append(({"layer_stiffness"}, lossy))
+    groups = [{"coefficient"}, sphere | lossy | {"layer_stiffness"}, spring, power]
+    pairs += [(one, other) for i, one in enumerate(groups) for other in groups[i + 1 :]]
+    return pairs
+
+
+# ----------------------------------------------------------------------------------------------------
+# Parameters that were given, checked one by one: names, kinds, sizes and units.
+
+
+SECTIONS = (
+    "beam", "model", "ends", "imperfection", "contact", "striker", "drive", "base", "axial", "harvester", "start",
+    "axes", "run",
+)  # fmt: skip
+_KINDS: dict[str, Mapping[str, type]] = {
+    "drive": DRIVES,
+    "base": {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()},
+    "axial": LOADS,
+    "harvester": HARVESTERS,
+}
+"""What a section may be of, where its ``type`` says so."""
+_OF_MAP = {"frequency_ratio": "drive", "velocity_amplitude": "drive", "location": "striker"}
+"""Names that a section [map] of version 0.1 may hold, and the sections they belong to."""
+_SYMBOLS = {
+    "E": "young_modulus", "L": "length", "N": "modes", "Omega": "frequency_ratio", "P": "axial_load",
+    "V": "velocity_amplitude", "b": "buckling_level", "e": "coefficient", "f1": "reference_frequency", "h": "thickness",
+    "k_c": "stiffness", "kc": "stiffness", "omega": "frequency_ratio", "rho": "density", "x_s": "location",
+    "xs": "location", "zeta": "damping_ratio",
+}  # fmt: skip
+
+
+def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, Any]], list[str]]:
+    """What was given, by section and name, and a line for everything that is wrong."""
+    lines: list[str] = []
+    found: dict[str, dict[str, Any]] = {}
+    for section, name, value, named in _entries(sections, lines):
+        if section != "axes" and name in found.get(section, {}):
+            message = f"{name}: is given in two sections"
+        else:
+            message = _checked(section, name, value, found)
+        if message:
+            lines.append(f"[{named}] {message}")
+    return found, lines
+
+
+def _entries(sections: Mapping[str, Any], lines: list[str]) -> list[tuple[str, str, Any, str]]:
+    """Section, name and value of everything given, and the section it was given in; faults go to *lines*."""
+    found = []
+    mapping("sections", sections)
+    shaker = sections.get("shaker")
+    single = set(shaker) if isinstance(shaker, Mapping) else set()
+    for section, values in sections.items():
+        if numbered(str(section))[0] not in (*SECTIONS, "shaker", "map"):
+            lines.append(f"[{section}]: unknown section{_nearest(str(section), list(SECTIONS))}")
+        elif not isinstance(values, Mapping):
+            lines.append(f"{section} = {shown(values)}: must be a section [{section}]")
+        else:
+            for name, value in values.items():
+                if section == "map" and name not in _OF_MAP:
+                    lines.append(f"[map] {name}: unknown key{_nearest(str(name), list(_OF_MAP))}")
+                    continue
+                place = _place(section, str(name), value)
+                if section == "map" and name in single:
+                    place = "axes", f"{_OF_MAP[name]}.{name}"  # of the map alone; the other is of single runs
+                found.append((*place, value, section))
+    return [(section, name, value, shown) for section, name, value, shown in found]
+
+
+def _place(section: str, name: str, value: Any) -> tuple[str, str]:
+    """Where something belongs.
+
+    Version 0.1 had the striker and its drive in one section, axes by short names, and the reference frequency in [integration].
+    """
+    if section == "shaker":
+        return ("drive" if name in ("frequency_ratio", "velocity_amplitude") else "striker"), name
+    if section == "map":
+        single = isinstance(value, (int, float)) and not isinstance(value, bool)
+        return (_OF_MAP[name], name) if single else ("axes", f"{_OF_MAP[name]}.{name}")
+    if section == "run" and name == "reference_frequency":
+        return "model", name
+    return section, name
+
+
+def _known(section: str, found: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Names that a section may hold."""
+    kind, number = numbered(section)
+    names = [row.name.partition(".")[2] for row in parameters().values() if row.section == kind]
+    if number > 1:
+        names = [name for name in names if row_of(f"{section}.{name}") is not None]
+        return names + {"drive": ["type"], "contact": ["type"]}.get(kind, [])
+    names += [name.partition(".")[2] for name in PHYSICAL if name.startswith(f"{section}.")]
+    names += ["type"] if section in _KINDS else []
+    return names + (["type", *MATERIALS, *WANTED] if section == "contact" else [])
+
+
+def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any]]) -> str:
+    """Enter a value in *found*, or return what is wrong with it."""
+    own = found.setdefault(section, {})
+    if section == "axes":
+        return _checked_axis(name, value, own)
+    if section == "start":
+        try:
+            row: Parameter | None = lookup(f"start.{name}")
+        except InputError:
+            return f"{name}: unknown key; must be amplitude[i], velocity[i] or striker_position"
+    else:
+        known = _known(section, found)
+        if name not in known and row_of(f"{section}.{name}") is None:
+            return f"{name}: unknown key{_nearest(name, known)}"
+        row = row_of(f"{section}.{name}")
+    if row is None:
+        message, checked = _special(section, name, value)
+    else:
+        message, checked = _by_row(row, name, value)
+    if not message:
+        own[name] = checked
+    return message
+
+
+def _by_row(row: Parameter, name: str, value: Any) -> tuple[str, Any]:
+    item = row.quantity
+    unit = "" if item.unit == "1" else f" in {item.unit}"
+    if item.kind is float and not (name == "damping_ratio" and isinstance(value, (list, np.ndarray))):
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            return f"{name} = {shown(value)}: must be a number{unit}", None
+        try:
+            value = finite(name, value)
+        except InputError:
+            return f"{name} = {shown(value)}: must be a finite number{unit}", None
+        message = _implausible(row, name, value)
+        if message:
+            return message, None
+    elif item.kind is int and (isinstance(value, bool) or not isinstance(value, int)):
+        return f"{name} = {shown(value)}: must be a whole number{unit}", None
+    elif item.kind is str and not isinstance(value, str):
+        return f"{name} = {shown(value)}: must be text", None
+    elif item.kind is object or isinstance(value, (list, np.ndarray)):
+        return _array(name, value)
+    try:
+        return "", item.check(name, value)
+    except InputError as error:
+        return str(error), None
+
+
+def _implausible(row: Parameter, name: str, value: float) -> str:
+    """What is said of a number so far from any beam that it must be in another unit; nothing of others."""
+    item = row.quantity
+    if not item.plausible or value == 0.0 or item.plausible[0] <= abs(value) <= item.plausible[1]:
+        return ""
+    low, high, meant = item.plausible
+    allowed = f"{low:g} to {high:g}{'' if item.unit == '1' else ' ' + item.unit}"
+    return f"{name} = {shown(value)}: must be {allowed}; is it given in {meant}?"
+
+
+def _array(name: str, value: Any) -> tuple[str, Any]:
+    try:
+        return "", np.array(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        return f"{name} = {shown(value)}: must be a list of numbers", None
+
+
+def _is_sum(section: str, value: Any) -> bool:
+    """Whether a kind is a sum of drives, such as ``"sine+burst"``, that the section may hold."""
+    if not isinstance(value, str) or "+" not in value or value not in DRIVES:
+        return False
+    return numbered(section)[0] == "drive" or (section == "base" and DRIVES[value].can_excite_base())
+
+
+def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
+    """What is in no row: the law, the drive's kind, materials, and physical units."""
+    if name in ("type", "type"):
+        known = LAWS if name == "type" else _KINDS[numbered(section)[0]]
+        if value not in known and not _is_sum(section, value):
+            return f"{name} = {value!r}: must be one of {', '.join(map(repr, known))}", None
+        return "", value
+    full = f"{section}.{name}"
+    if full in PHYSICAL or name == "radius" or name in WANTED:
+        unit = PHYSICAL[full].unit if full in PHYSICAL else "m"
+        unit = WANTED[name][0] if name in WANTED else unit
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            return f"{name} = {shown(value)}: must be a number in {unit}", None
+        window = MATERIALS[name][2] if name in MATERIALS else None
+        if window and not window[0] <= value <= window[1]:
+            return (
+                f"{name} = {shown(value)}: must be {window[0]:g} to {window[1]:g} m; is it given in {window[2]}?",
+                None,
+            )
+        return "", float(value)
+    pair = list(value) if isinstance(value, (list, tuple)) else None
+    if pair is None or len(pair) != 2 or not all(isinstance(each, (int, float)) for each in pair):
+        return f"{name} = {shown(value)}: must be a list of two numbers, of sphere and beam", None
+    if name == "young_modulus" and any(0.0 < each < 1e3 for each in pair):
+        return f"young_modulus = {shown(value)}: must be in Pa; is it given in GPa?", None
+    return "", [float(each) for each in pair]
+
+
+def _checked_axis(name: str, value: Any, own: dict[str, Any]) -> str:
+    try:
+        full = physical_name(name) or lookup(name).name
+        rivals = {full, *(key for key, row in PHYSICAL.items() if row.parameter == full)}
+        rivals |= {PHYSICAL[full].parameter} if full in PHYSICAL else set()
+        twice = sorted(rivals & own.keys())
+        if twice:
+            return f"{name}: the same axis is given as {twice[0]}"
+        parsed = parsed_axis(full, value)
+        if full not in PHYSICAL:
+            row, short = lookup(full), full.partition(".")[2]
+            for point in (parsed[0], parsed[-1]) if row.quantity.kind is float else parsed:
+                plain = point if isinstance(point, str) else point.item()
+                row.quantity.check(short, plain)
+                message = _implausible(row, short, plain) if isinstance(plain, float) else ""
+                if message:
+                    return message
+    except InputError as error:
+        return str(error)
+    own[full] = value
+    return ""
+
+
+def parsed_axis(name: str, value: Any) -> Any:
+    """The values of an axis: numbers, or words."""
+    row = None if name in PHYSICAL else lookup(name)
+    short = name.partition(".")[2] or name
+    if row is not None and row.quantity.kind in (str, bool):
+        words = value.split(",") if isinstance(value, str) else value
+        return np.array([row.quantity.check(short, word) for word in words])
+    return np.atleast_1d(parse_axis(short, value, whole=row is not None and row.quantity.kind is int))
+
+
+def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """What is wrong with values that are each in order."""
+    contact = found.get("contact", {})
+    given = [name for name in MATERIALS if name in contact]
+    if given and "stiffness" in contact:
+        return ["[contact] give stiffness, or radius, young_modulus and poisson_ratio, not both"]
+    if 0 < len(given) < len(MATERIALS):
+        return ["[contact] radius, young_modulus and poisson_ratio belong together; one is missing"]
+    if "coefficient" in contact and "type" not in contact and (given or "stiffness" in contact):
+        return ["[contact] give stiffness, of Hertz's law, or coefficient, of Newton's, not both"]
+    for full, row in PHYSICAL.items():
+        section, name, ratio = *full.split("."), row.parameter.partition(".")[2]
+        if {name, ratio} <= found.get(section, {}).keys():
+            return [f"[{section}] give {ratio} or {name}, not both"]
+    beam = found.get("beam", {})
+    length = beam.get("length", BEAM.length)
+    axes = found.get("axes", {})
+    for name in ("thickness", "width", "buckling_level"):
+        values = [("beam", beam[name])] if name in beam else []
+        if f"beam.{name}" in axes:
+            values.append(("axes", parsed_axis(f"beam.{name}", axes[f"beam.{name}"])[-1]))
+        for section, value in values:
+            if value >= length:
+                return [
+                    f"[{section}] {name} = {value:g} m: must be less than length = {length:g} m; is it given in mm?"
+                ]
+    return []
+
+
+def with_section(message: str, found: Mapping[str, Mapping[str, Any]]) -> str:
+    """The refusal of a value with the section that it stands in."""
+    name = message.partition(" ")[0].rstrip(":")
+    for section, values in found.items():
+        if name in values:
+            return f"[{section}] {message}"
+    return message
+
+
+def _nearest(name: str, known: list[str]) -> str:
+    close = [word for word in known if _SYMBOLS.get(name) == word or name.lower().startswith(word)]
+    close = close or difflib.get_close_matches(name.lower(), known, 1)
+    return f"; did you mean {close[0]!r}?" if close else f"; must be one of {', '.join(known)}"
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_Array = NDArray[np.float64]
+Sections = Mapping[str, Mapping[str, Any]]
+
+DEFAULT_DRIVE = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18}
+DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude": "0.01:0.65:40"}
+"""Of a map for which no axis is named."""
+_AROUND, _STRIKING = ("base", "axial", "harvester"), ("contact", "striker", "drive")
+# What stands for the same thing in a section: giving one set takes the other away.
+_RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
+    "beam": [({"buckling_level"}, {"axial_load"})],
+    "contact": contact_rivals(),
+    "drive": [({"frequency_ratio"}, {"frequency_hz"}), ({"velocity_amplitude"}, {"velocity_m_s"})],
+    "striker": [({"location"}, {"location_m"})],
+}
+
+
+@dataclass(frozen=True)
+class Config:
+    """Parameters that were given, by section; the paper's stand where nothing is given.
+
+    Attributes
+    ----------
+    given : mapping of str to mapping
+        Checked values by section and name.
+    """
+
+    given: Sections = field(default_factory=dict)
+
+    def section(self, name: str) -> dict[str, Any]:
+        """What was given of a section."""
+        return dict(self.given.get(name, {}))
+
+    @cached_property
+    def defaulted(self) -> tuple[str, ...]:
+        """Names of what takes the value of the paper's beam although another beam was spoken of."""
+        if not self.section("beam"):
+            return ()
+        found, swept = self._defaults(), self.axes() if self.section("axes") else {}
+        return tuple(
+            f"{section}.{name}"
+            for section in ("beam", "model", "contact")
+            for name in found[section]
+            if name not in self.section(section) and name != "modes" and f"{section}.{name}" not in swept
+        )
+
+    def whole(self, axes: Mapping[str, Any] | None = None) -> Config:
+        """Everything, what was not given too, as a file would hold it: to print, to keep, to start another file from.
+
+        Parameters
+        ----------
+        axes : mapping of str to array_like, optional
+            The axes by dotted name, in place of those that were given.
+        """
+        axes = self.axes() if axes is None and self.section("axes") else dict(axes or {})
+        if self.model.length_scale is None:  # a beam that does not buckle makes no system
+            sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
+            sections |= {name: self.section(name) for name in ("ends", "imperfection") if self.section(name)}
+        else:
+            sections = {
+                name: {key: value for key, value in values.items() if f"{name}.{key}" not in axes}
+                for name, values in self.system.to_mapping().items()
+            }
+            sections.pop("start", None)
+            if self.section("start"):
+                sections["start"] = self.section("start")
+        own = {name: getattr(self.integration, name) for name in quantities(Integration)}
+        if own["cycles"] is None:
+            own["cycles"] = CYCLES
+        sections["run"] = {
+            name: value for name, value in own.items() if value is not None and f"run.{name}" not in axes
+        }
+        if axes:
+            whole_number = {name: lookup(name).quantity.kind is int for name in axes}
+            sections["axes"] = {
+                name: np.asarray(values, dtype=int if whole_number[name] else None).tolist()
+                for name, values in axes.items()
+            }
+        return config_from_mapping(sections)
+
+    def _defaults(self) -> dict[str, dict[str, Any]]:
+        beam = {
+            name: getattr(BEAM, name) for name in ("length", "thickness", "width", "density", "young_modulus")
+        }
+        own = self.section("beam")
+        if not {"buckling_level", "axial_load"} & own.keys():
+            beam["buckling_level"] = BEAM.buckling_level
+        contact: dict[str, Any] = {}
+        of_contact = self.section("contact")
+        if (
+            law_of(of_contact) in ("hertz", "hunt_crossley", "layer")
+            and not {"stiffness", *MATERIALS} & of_contact.keys()
+        ):
+            contact = {"stiffness": CONTACT.stiffness}
+        drive = dict(DEFAULT_DRIVE)
+        given = self.section("drive")
+        if given.get("type", "sine") != "sine":
+            drive = {}
+        for physical, name in (("frequency_hz", "frequency_ratio"), ("velocity_m_s", "velocity_amplitude")):
+            if physical in given:
+                drive.pop(name, None)
+        return {
+            "beam": beam,
+            "model": {"modes": MODES, "damping_ratio": DAMPING_RATIO},
+            "contact": contact,
+            "striker": {} if "location_m" in self.section("striker") else {"location": LOCATION},
+            "drive": drive,
+        }
+
+    @cached_property
+    def system(self) -> System:
+        """The system; what is not given is the paper's.  Refused (InputError) if values do not go together."""
+        sections: dict[str, Any] = {
+            name: values | self.section(name) for name, values in self._defaults().items()
+        }
+        optional = ("ends", "imperfection", *_AROUND)
+        sections |= {name: self.section(name) for name in optional if self.section(name)}
+        sections |= self._further
+        if self._is_unstruck:
+            for name in _STRIKING:
+                del sections[name]
+            return self._started(System.from_mapping(sections))
+        sections["contact"] = contact_of(sections["contact"])
+        if self._stands_still:
+            sections["drive"] = {"type": "fixed"}
+        sections["drive"].setdefault("type", "sine")
+        later = {
+            f"{section}.{name}": sections[section].pop(name)
+            for section in ("drive", "striker")
+            for name in [key for key in sections[section] if f"{section}.{key}" in PHYSICAL]
+        }
+        for physical, value in later.items():
+            own = PHYSICAL[physical].parameter.partition(".")[2]
+            sections[physical.partition(".")[0]].setdefault(own, _stand_in(own, value))
+        system = System.from_mapping(sections)
+        if later:
+            system = system.replace(**{
+                PHYSICAL[name].parameter: checked_physical(system, name, value, name.partition(".")[2])
+                for name, value in later.items()
+            })  # fmt: skip
+        return self._started(system)
+
+    @property
+    def _further(self) -> dict[str, dict[str, Any]]:
+        """The sections of strikers beside the first, complete."""
+        found = {}
+        for name in self.given:
+            kind, number = numbered(name)
+            if number > 1:
+                found[name] = contact_of(self.section(name)) if kind == "contact" else self.section(name)
+                if kind == "drive":
+                    found[name].setdefault("type", "sine")
+        return found
+
+    @property
+    def _is_unstruck(self) -> bool:
+        """Whether a base or an axial load moves the beam, and nothing was said of a striker."""
+        moved = self.section("base") or self.section("axial")
+        return bool(moved) and not any(self.section(name) for name in _STRIKING)
+
+    @property
+    def _stands_still(self) -> bool:
+        """Whether there is a striker beside a base or an axial load, of whose motion nothing was said."""
+        return bool(self.section("base") or self.section("axial")) and not self.section("drive")
+
+    def _started(self, system: System) -> System:
+        """The system with the start that was given."""
+        start = self.section("start")
+        return (
+            system.replace(**{f"start.{name}": value for name, value in start.items()}) if start else system
+        )
+
+    @property
+    def model(self) -> ReducedModel:
+        """The reduced model alone, of a beam that need not be buckled."""
+        sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
+        sections |= {name: self.section(name) for name in ("ends", "imperfection") if self.section(name)}
+        found: ReducedModel = parts_from_mapping(sections)["model"]
+        return found
+
+    @cached_property
+    def integration(self) -> Integration:
+        """How runs are integrated."""
+        return Integration(**self.section("run"))
+
+    def axes(self, default: Mapping[str, str] | None = None) -> dict[str, _Array]:
+        """The axes, by dotted name, those in physical units made into ratios; *default* if none is named.
+
+        A single value makes an axis of one point.
+
+        Raises
+        ------
+        InputError
+            For values in physical units that are out of range.
+        """
+        given = self.section("axes") or dict(default or {})
+        found: dict[str, Any] = {}
+        for name, value in given.items():
+            parsed = parsed_axis(name, value)
+            if name in PHYSICAL:
+                ratios = [checked_physical(self.system, name, each, name) for each in parsed.tolist()]
+                found[PHYSICAL[name].parameter] = np.array(ratios)
+            else:
+                found[lookup(name).name] = parsed
+        self._require_fixed_units(found)
+        return found
+
+    def _require_fixed_units(self, axes: Mapping[str, Any]) -> None:
+        """Refuse numbers in Hz, m/s or m beside an axis that changes what they are a multiple of."""
+        own = [name for name in PHYSICAL if name.partition(".")[2] in self.section(name.partition(".")[0])]
+        for name in [*own, *(name for name in self.section("axes") if name in PHYSICAL)]:
+            for axis, values in axes.items():
+                if axis.partition(".")[0] not in ("beam", "ends", "imperfection", "model"):
+                    continue
+                there = [self.system.replace(**{axis: values[at].item()}) for at in (0, -1)]
+                if any(abs(unit_of(each, name) / unit_of(self.system, name) - 1.0) > 1e-9 for each in there):
+                    ratio = PHYSICAL[name].parameter
+                    raise InputError(
+                        f"{name}: is made into {ratio}, whose unit changes along {axis}; give {ratio}"
+                    )
+
+    def to_mapping(self) -> dict[str, dict[str, Any]]:
+        """What was given, plain, as a file would hold it."""
+        return {section: dict(values) for section, values in self.given.items() if values}
+
+
+def _stand_in(name: str, value: Any) -> float:
+    """A value that lets the system be made before the physical one is known."""
+    return 1.0 if name == "frequency_ratio" else 0.0 if name == "velocity_amplitude" else 0.5
+
+
+def config_from_mapping(sections: Mapping[str, Any], source: str = "") -> Config:
+    """Check nested parameters, as a TOML file holds them.
+
+    Parameters
+    ----------
+    sections : mapping of mapping
+        Values by section and name.  Sections ``shaker`` and ``map``, as version 0.1 had them, are read too.
+    source : str
+        Where they come from, to stand before each refusal.
+
+    Raises
+    ------
+    InputError
+        One line for each thing that is wrong: unknown names, wrong kinds, wrong units.
+    """
+    instance("source", source, str, "text")
+    found, lines = checked_sections(sections)
+    config = Config(found)
+    lines = lines or contradictions(found)
+    if not lines:
+        try:
+            config.model  # noqa: B018
+            if config.model.length_scale is not None:
+                config.system  # noqa: B018
+                config.axes()
+            config.integration  # noqa: B018
+        except InputError as error:
+            lines = [with_section(str(error), found)]
+    if lines:
+        raise InputError("\n".join(f"{source}: {line}" if source else line for line in lines))
+    return config
+
+
+def override(config: Config, sections: Mapping[str, Mapping[str, Any]]) -> Config:
+    """The parameters with others laid over them; what they contradict is taken away, None is left alone.
+
+    A value takes an axis over the same parameter away.
+    """
+    instance("config", config, Config, "a Config")
+    for name, own in mapping("sections", sections).items():
+        mapping(str(name), own)
+    merged: dict[str, dict[str, Any]] = {name: dict(values) for name, values in config.given.items()}
+    for section, values in sections.items():
+        own = {name: value for name, value in values.items() if value is not None}
+        target = merged.setdefault(section, {})
+        if section == "axes":
+            for name in own:
+                for same in same_axis(name):
+                    target.pop(same, None)
+        for one, other in [pair for both in _RIVALS.get(section, []) for pair in (both, both[::-1])]:
+            if one & own.keys() and not other & own.keys():
+                for name in other:
+                    target.pop(name, None)
+        target |= own
+        if section != "axes":
+            for name in own:
+                for same in same_axis(f"{section}.{name}"):
+                    merged.get("axes", {}).pop(same, None)
+    return config_from_mapping(merged)
+
+
+def same_axis(name: str) -> set[str]:
+    """The dotted names, that in a physical unit among them, of what *name* stands for; none if it is unknown."""
+    try:
+        physical = physical_name(name)
+        full = lookup(name).name if physical is None else PHYSICAL[physical].parameter
+    except InputError:
+        return set()
+    return {full, *(key for key, row in PHYSICAL.items() if row.parameter == full)}
+
+
+# ----------------------------------------------------------------------------------------------------
+# Reading and writing parameter files.
+
+
+def load_config(path: str | os.PathLike[str]) -> Config:
+    """Read a parameter file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read or is no TOML, and for anything :func:`config_from_mapping` refuses.
+    """
+    file = file_path("config", path)
+    try:
+        sections = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"config = {str(path)!r}: cannot be read, {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"config = {str(path)!r}: is no TOML, {error}") from error
+    except ValueError as error:  # an integer of thousands of digits
+        raise InputError(f"config = {str(path)!r}: cannot be read, {error}") from error
+    return config_from_mapping(sections, file.name)
+
+
+def dump_config(config: Config, path: str | os.PathLike[str], comment: str = "") -> None:
+    """Write what was given to a parameter file, whole or not at all, each key with what it means.
+
+    Parameters
+    ----------
+    config : Config
+    path : path
+        Ends in ``.toml``.
+    comment : str
+        Lines to stand at the top.
+    """
+    target = check_writable(path, "path", (".toml",))
+    with atomic_path(target) as temporary:
+        temporary.write_text(config_text(config, comment), encoding="utf-8")
+
+
+def config_text(config: Config, comment: str = "") -> str:
+    """What was given, as the text of a parameter file."""
+    instance("config", config, Config, "a Config")
+    instance("comment", comment, str, "text")
+    lines = [f"# {line}" for line in comment.splitlines()]
+    for section, values in config.to_mapping().items():
+        lines += [""] if lines else []
+        lines.append(f"[{section}]")
+        for name, value in values.items():
+            row = row_of(f"{section}.{name}")
+            physical = PHYSICAL.get(f"{section}.{name}")
+            if row is not None:
+                unit = "" if row.quantity.unit == "1" else f", {row.quantity.unit}"
+                lines.append(f"# {row.quantity.long_name}{unit}")
+            elif physical is not None:
+                lines.append(f"# {physical.words}, {physical.unit}")
+            lines.append(tomli_w.dumps({name: _plain(value)}).rstrip("\n"))
+    return "\n".join(lines) + "\n"
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value

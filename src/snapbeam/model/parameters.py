@@ -1,0 +1,265 @@
+"""The one table of parameters: dotted name, unit, limits, words, default and scope of everything that can be set.
+
+It is gathered from where the values are defined (:mod:`snapbeam.model.quantity`); parameter files, the command line,
+axes of sweeps, labels of pictures and attributes of files read it here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from snapbeam.model.axial_load import LOADS
+from snapbeam.model.base_excitation import BaseExcitation
+from snapbeam.model.beam import Beam
+from snapbeam.model.boundary_conditions import BoundaryConditions
+from snapbeam.model.contact.base import LAWS
+from snapbeam.model.drive.base import DRIVES
+from snapbeam.model.harvester import HARVESTERS
+from snapbeam.model.imperfection import Imperfection
+from snapbeam.model.integration import Integration
+from snapbeam.model.quantity import RUN, ParameterField, quantities
+from snapbeam.model.reduced_model import MODEL_QUANTITIES
+from snapbeam.model.state import START_NAME
+from snapbeam.model.striker import Striker, numbered
+from snapbeam.util.validation import InputError, shown
+
+__all__ = ["Parameter", "lookup", "parameters", "row_of", "short_names"]
+
+
+_NONE = dataclasses.MISSING
+_POWER = re.compile(r"\^([\d.]+)")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One row of the table.
+
+    Attributes
+    ----------
+    name : str
+        Dotted name, ``section.name``.
+    short : str
+        Name of the dimension or the attribute that holds it in a dataset.
+    quantity : Quantity
+        Unit, limits, words, symbol and scope.
+    default : object
+        What it is if nothing is given; None if it follows from others, is needed or has none.
+    kinds : tuple of str
+        Laws of contact, or drives, that have it; empty for the other sections.
+    """
+
+    name: str
+    short: str
+    quantity: ParameterField
+    default: Any = None
+    kinds: tuple[str, ...] = ()
+
+    @property
+    def section(self) -> str:
+        """What it is a parameter of."""
+        return self.name.partition(".")[0]
+
+    @property
+    def is_run(self) -> bool:
+        """Whether it may differ between the runs of one ensemble."""
+        return self.quantity.scope == RUN
+
+    @property
+    def label(self) -> str:
+        """Words, symbol and unit, for an axis of a picture."""
+        words = self.quantity.long_name[:1].upper() + self.quantity.long_name[1:]
+        symbol = f" ${self.quantity.symbol}$" if self.quantity.symbol else ""
+        raised = _POWER.sub(r"$^{\1}$", self.quantity.unit)
+        unit = "" if raised == "1" else f" ({raised})"
+        return f"{words}{symbol}{unit}"
+
+    @property
+    def limits(self) -> str:
+        """What is allowed, in words."""
+        item = self.quantity
+        if item.choices:
+            return " or ".join(item.choices)
+        if item.kind is bool:
+            return "true or false"
+        if item.kind is object:
+            return ""
+        if math.isinf(item.low) and math.isinf(item.high):
+            return "any"
+        left = "[" if item.closed in ("left", "both") or item.kind is int else "("
+        right = (
+            "]" if item.closed in ("right", "both") or (item.kind is int and item.high < math.inf) else ")"
+        )
+        return f"{left}{item.low:g}, {item.high:g}{right}"
+
+
+def _rows() -> Iterable[Parameter]:
+    own: tuple[tuple[str, type], ...] = (
+        ("beam", Beam),
+        ("ends", BoundaryConditions),
+        ("imperfection", Imperfection),
+        ("striker", Striker),
+        ("run", Integration),
+    )
+    for section, part in own:
+        yield from _of_class(section, part)
+    for row in _of_class("base", BaseExcitation):
+        yield dataclasses.replace(row, short=f"base_{row.short}")
+    for name, (item, default) in MODEL_QUANTITIES.items():
+        yield Parameter(f"model.{name}", item.short or name, item, default)
+    shaking = {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()}
+    several: tuple[tuple[str, Mapping[str, type]], ...] = (
+        ("contact", LAWS),
+        ("drive", DRIVES),
+        ("base", shaking),
+        ("axial", LOADS),
+        ("harvester", HARVESTERS),
+    )
+    for section, known in several:
+        for kind_name, kind in known.items():
+            for row in _of_class(section, kind):
+                row = _around(row) if section in _AROUND else row
+                yield dataclasses.replace(row, kinds=(kind_name,))
+
+
+_AROUND = {"base": "the base", "axial": "", "harvester": ""}
+"""Sections of what surrounds a beam, whose names in datasets say so, and what words of a drive are said of."""
+
+
+def _around(row: Parameter) -> Parameter:
+    """A parameter of what surrounds the beam, told from the striker's of the same name."""
+    section, _, name = row.name.partition(".")
+    of = _AROUND[section]
+    words = f"{row.quantity.long_name}, of {of}" if of else row.quantity.long_name
+    plain = name if row.short == name or section == "base" else row.short
+    plain = plain.removeprefix("load_")
+    return dataclasses.replace(
+        row, short=f"{section}_{plain}", quantity=dataclasses.replace(row.quantity, long_name=words)
+    )
+
+
+def _of_class(section: str, kind: type) -> Iterable[Parameter]:
+    defaults = {item.name: item.default for item in dataclasses.fields(kind)}
+    for name, item in quantities(kind).items():
+        default = defaults[name]
+        yield Parameter(f"{section}.{name}", item.short or name, item, None if default is _NONE else default)
+
+
+def parameters() -> dict[str, Parameter]:
+    """Every parameter by its dotted name, those of registered laws and drives included."""
+    return dict(_table(tuple(tuple(known.items()) for known in (LAWS, DRIVES, LOADS, HARVESTERS))))
+
+
+@lru_cache(maxsize=4)
+def _table(registered: tuple[tuple[tuple[str, type], ...], ...]) -> dict[str, Parameter]:
+    """The table while what is *registered* stays as it is."""
+    table: dict[str, Parameter] = {}
+    for row in _rows():
+        if row.name in table:
+            row = dataclasses.replace(row, kinds=(*table[row.name].kinds, *row.kinds))
+        table[row.name] = row
+    order = (
+        "beam", "model", "ends", "imperfection", "contact", "striker", "drive", "base", "axial", "harvester", "start",
+        "run",
+    )  # fmt: skip
+    return dict(sorted(table.items(), key=lambda item: order.index(item[1].section)))
+
+
+_OF_STRIKER = re.compile(r"(.+)_striker_([2-9])")
+_OF_TERM = re.compile(r"(.+)_([1-4])")
+_FIRST_ALONE = ("striker.mass", "striker.suspension_stiffness", "striker.suspension_damping")
+
+
+def row_of(name: str) -> Parameter | None:
+    """The row of a dotted name, of a striker beside the first too (``striker_2.location``); None if there is none."""
+    table, (section, _, field) = parameters(), name.partition(".")
+    kind, number = numbered(section)
+    row = table.get(f"{kind}.{field}")
+    found = _OF_TERM.fullmatch(field)
+    if row is None and found is not None and kind in ("drive", "base"):
+        row = table.get(f"{kind}.{found[1]}")
+        if row is not None:
+            words = f"{row.quantity.long_name}, of term {found[2]}"
+            own = dataclasses.replace(row.quantity, long_name=words)
+            row = dataclasses.replace(row, name=name, short=f"{row.short}_{found[2]}", quantity=own)
+    if number == 1 or row is None:
+        return row
+    if row.name in _FIRST_ALONE:
+        return None
+    words = f"{row.quantity.long_name}, of striker {number}"
+    quantity = dataclasses.replace(row.quantity, long_name=words)
+    return dataclasses.replace(row, name=name, short=f"{row.short}_striker_{number}", quantity=quantity)
+
+
+def _by_short(name: str, shorts: Mapping[str, str]) -> Parameter | None:
+    """The row of a striker beside the first, or of a term of a sum, by the name that datasets use."""
+    found = _OF_STRIKER.fullmatch(name)
+    striker = f"_{found[2]}" if found is not None else ""
+    plain = name if found is None else found[1]
+    term = _OF_TERM.fullmatch(plain)
+    if plain in shorts:
+        section, _, field = shorts[plain].partition(".")
+    elif term is not None and term[1] in shorts:
+        section, _, field = shorts[term[1]].partition(".")
+        field = f"{field}_{term[2]}"
+    else:
+        return None
+    return row_of(f"{section}{striker}.{field}")
+
+
+def short_names() -> dict[str, str]:
+    """Dotted names by the names that datasets use."""
+    return {row.short: name for name, row in parameters().items()}
+
+
+def lookup(name: str) -> Parameter:
+    """The row of a parameter, by its dotted name or by the name that datasets use.
+
+    ``initial_state.amplitude[i]`` and ``initial_state.velocity[i]`` stand for every mode i.
+
+    Raises
+    ------
+    InputError
+        If there is none: the message names the nearest.
+    """
+    if not isinstance(name, str):
+        raise InputError(f"parameter {shown(name)}: must be a name, such as 'drive.frequency_ratio'")
+    table = parameters()
+    row = row_of(name)
+    if row is not None:
+        return row
+    found = START_NAME.fullmatch(name.removeprefix("start."))
+    if found is not None:
+        of, mode = found[1], found[2]
+        over = "that of the well" if of == "amplitude" else "omega_1 times the amplitude of the well"
+        words = f"{of} of buckling mode {mode} at the start, over {over}"
+        return Parameter(f"start.{of}[{mode}]", f"start_{of}_{mode}", ParameterField("1", words, scope=RUN))
+    if name in ("initial_state.striker_position", "start_striker_position"):
+        words = "mid-position of the striker's tip in space"
+        return Parameter(
+            "initial_state.striker_position", "start_striker_position", ParameterField("m", words, scope=RUN)
+        )
+    shorts = short_names()
+    if name in shorts:
+        return table[shorts[name]]
+    row = _by_short(name, shorts)
+    if row is not None:
+        return row
+    tails: dict[str, list[str]] = {}
+    for full in (each for each in table if each.partition(".")[0] not in _AROUND):
+        tails.setdefault(full.partition(".")[2], []).append(full)
+    if len(tails.get(name, [])) == 1:
+        return table[tails[name][0]]
+    close = difflib.get_close_matches(name, [*table, *shorts], 3)
+    hint = (
+        f"; did you mean {' or '.join(map(repr, close))}?"
+        if close
+        else f"; see {', '.join(list(table)[:6])}, ..."
+    )
+    raise InputError(f"{name}: no parameter{hint}")

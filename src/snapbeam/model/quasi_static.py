@@ -1,0 +1,54 @@
+"""The threshold of a slow striker in closed form (Eq. 21)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.model.beam import Beam
+from snapbeam.util.validation import InputError, checked, finite_array
+
+__all__ = ["quasi_static_threshold"]
+
+
+@checked
+def quasi_static_threshold(
+    location: ArrayLike, frequency_ratio: ArrayLike, beam: Beam | None = None
+) -> NDArray[np.float64]:
+    """Velocity amplitude V_QS1 at which a slow shaker carries one mode over the unstable equilibrium.
+
+    Eq. (21), V_QS1 = Omega phi_1(x_s)/phi_1(1/2) = Omega (1 - cos 2 pi x_s)/2: the shaker's highest
+    position reaches the straight beam.
+
+    Parameters
+    ----------
+    location : array_like
+        x_s, each in (0, 1).
+    frequency_ratio : array_like
+        Omega, each greater than 0.  The two broadcast against each other.
+    beam : Beam, optional
+        Whose first buckling mode it is, where its ends turn; between clamps it is the same for every beam.
+
+    Returns
+    -------
+    array of the broadcast shape
+    """
+    x = finite_array("location", location)
+    ratio = finite_array("frequency_ratio", frequency_ratio)
+    if ((x <= 0.0) | (x >= 1.0)).any():
+        bad = x[(x <= 0.0) | (x >= 1.0)].flat[0]
+        raise InputError(f"location = {bad:g}: must lie in (0, 1)")
+    if (ratio <= 0.0).any():
+        raise InputError(f"frequency_ratio = {ratio[ratio <= 0.0].flat[0]:g}: must be greater than 0")
+    try:
+        np.broadcast_shapes(x.shape, ratio.shape)
+    except ValueError:
+        raise InputError(
+            f"location of shape {x.shape}, frequency_ratio of shape {ratio.shape}: must go together"
+        ) from None
+    if beam is not None and beam.boundary.rotational_stiffness:
+        shape = beam.buckling_modes(1).shape
+        share = shape(x * beam.length)[0] / float(shape(0.5 * beam.length)[0])
+        return np.asarray(ratio * share)
+    threshold: NDArray[np.float64] = np.asarray(ratio * np.sin(np.pi * x) ** 2)
+    return threshold

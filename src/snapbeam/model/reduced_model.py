@@ -1,0 +1,780 @@
+"""From a beam to numbers with names: mass, stiffness, wells, linear modes and damping; no time."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.model.beam import Beam
+from snapbeam.model.boundary_conditions import Modes
+from snapbeam.model.buckling_modes import (
+    MAX_MODES,
+    BucklingModes,
+    Structure,
+    checked_structure,
+    damping_ratios,
+)
+from snapbeam.model.equilibria import Equilibrium, Landscape, landscape_of, tangent_stiffness
+from snapbeam.model.imperfection import Imperfection, perfect_equilibria
+from snapbeam.model.quantity import ParameterField
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    finite_array,
+    integer,
+    positive,
+    shown,
+    within,
+)
+
+__all__ = [
+    "MODEL_QUANTITIES",
+    "LinearModes",
+    "ReducedModel",
+    "Wells",
+    "displacement_along",
+    "linear_modes_about",
+    "linear_modes_of_beam",
+    "linear_modes_of_structure",
+    "rank_one_eigenpairs",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Eigenvalues of the diagonal-plus-rank-one problems into which a buckled beam splits.
+
+
+_HALVINGS = 2200
+"""More than halve any interval of two numbers until no number lies between."""
+
+
+def rank_one_eigenpairs(diagonal: _Array, c: float) -> tuple[_Array, _Array]:
+    """Solve diag(d) y = lam (Id + c 1 1^T) y to high relative accuracy.
+
+    The eigenvalues are the roots of 1 - c' sum d_i/(d_i - lam) with c' = c/(1 + c n).  The sum falls
+    from +inf to -inf between neighbouring d_i, and from a positive value at lam = 0 to -inf at the
+    smallest d_i, so each interval holds exactly one root.  Bisection for its distance from the nearer
+    pole keeps the differences d_i - lam, and with them the eigenvectors y_i = 1/(d_i - lam), accurate
+    whatever the spread of the d_i, which grows like n^4 here (cf. Golub, SIAM Rev. 15, 1973).
+
+    Parameters
+    ----------
+    diagonal : array of shape (n,)
+        d_i >= 0, in any order.
+    c : float
+        Weight c > 0 of the rank-one part.
+
+    Returns
+    -------
+    eigenvalues : array of shape (n,)
+        Ascending.
+    vectors : array of shape (n, n)
+        Columns with Y^T (Id + c 1 1^T) Y = Id.
+    """
+    n = diagonal.size
+    if not (np.isfinite(diagonal).all() and math.isfinite(c)):
+        raise InputError(
+            "model: its frequencies are beyond what a number holds; are the units of the beam right?"
+        )
+    order = np.argsort(diagonal, kind="stable")
+    d = diagonal[order]
+    weight = c / (1.0 + c * n)
+
+    def secular(gap: _Array) -> _Array:
+        """1 - c' sum d_i/gap, for gap[i, j] = d_i - lam_j; a vanishing d_i drops out."""
+        safe = np.where(gap == 0.0, 1.0, gap)
+        terms = np.where(gap == 0.0, 0.0, d[:, np.newaxis] / safe)
+        return np.asarray(1.0 - weight * np.sum(terms, axis=0))
+
+    left = np.concatenate(([0.0], d[:-1]))
+    width = d - left
+    middle = left + 0.5 * width
+    near_left = secular(d[:, np.newaxis] - middle) < 0.0
+    origin = np.where(near_left, left, d)
+    from_origin = d[:, np.newaxis] - origin
+    low = np.where(near_left, 0.0, -0.5 * width)
+    high = np.where(near_left, 0.5 * width, 0.0)
+    for _ in range(_HALVINGS):
+        shift = 0.5 * (low + high)
+        if ((shift == low) | (shift == high)).all():
+            break
+        above = secular(from_origin - shift) > 0.0
+        low = np.where(above, shift, low)
+        high = np.where(above, high, shift)
+
+    gap = from_origin - shift
+    with np.errstate(divide="ignore"):
+        y = 1.0 / gap
+    for j in np.flatnonzero(width == 0.0):  # d_j = 0, or two equal d: the pole is the eigenvalue
+        y[:, j] = 0.0
+        y[j, j] = 1.0
+        if j > 0:
+            y[j - 1, j] = -1.0
+    y /= np.sqrt(np.sum(y**2, axis=0) + c * np.sum(y, axis=0) ** 2)
+    vectors = np.empty_like(y)
+    vectors[order] = y
+    return origin + shift, vectors
+
+
+# ----------------------------------------------------------------------------------------------------
+# Linear modes about a well.
+
+
+class LinearModes(NamedTuple):
+    """Angular frequencies (N,) ascending, mass-normalised columns (N, N), parities (N,); read-only."""
+
+    omega: _Array
+    vectors: _Array
+    parity: NDArray[np.int_]
+
+
+def linear_modes_of_beam(beam: Beam, count: int) -> LinearModes:
+    """Linear modes of a beam reduced on its first *count* buckling modes.
+
+    In the unknowns alpha_i/k_i each parity is a diagonal-plus-rank-one problem.  The tangent stiffness
+    about a well of a buckled beam is the Jacobian of Eq. (11),
+
+        K0_1 + 3 gamma a^2 = 2 (P - P_cr),    K0_i + gamma a^2 = E I (k_i^2 - k_1^2)  for i > 1.
+
+    (Eq. (A.2) prints 2 gamma a^2 for i > 1, which is not that Jacobian and contradicts the frequencies
+    that the paper gives.)
+    """
+    shapes = BucklingModes(beam.length, count)
+    k = shapes.wavenumber
+    if beam.is_buckled:
+        tangent = beam.bending_stiffness * (k**2 - k[0] ** 2)
+        # gamma a^2 = P - P_cr with a^2 = pi^2 b^2/(2 L)
+        tangent[0] = beam.nonlinear_stiffness * (math.pi * beam.buckling_level) ** 2 / beam.length
+    else:
+        tangent = beam.bending_stiffness * k**2 - beam.axial_load
+    diagonal = k**2 * tangent / beam.mass_per_length
+    eigenvalue = np.empty(count)
+    vectors = np.zeros((count, count))
+    for parity, c in ((1, 2.0), (-1, 2.0 / 3.0)):
+        index = np.flatnonzero(shapes.parity == parity)
+        if index.size:
+            eigenvalue[index], y = rank_one_eigenpairs(diagonal[index], c)
+            vectors[np.ix_(index, index)] = k[index, np.newaxis] * y / math.sqrt(beam.mass_per_length)
+    order = np.argsort(eigenvalue, kind="stable")
+    return _read_only(np.sqrt(eigenvalue[order]), vectors[:, order], shapes.parity[order])
+
+
+def linear_modes_of_structure(
+    mass: _Array, stiffness: _Array, nonlinear_stiffness: float, equilibrium: _Array
+) -> LinearModes:
+    """Linear modes of the tangent K0 + gamma (|a|^2 Id + 2 a a^T) at the equilibrium a.
+
+    An eigenvalue that rounding cannot tell from 0 is 0.
+
+    Raises
+    ------
+    InputError
+        If an eigenvalue is negative, so that the equilibrium is unstable.
+    """
+    import scipy.linalg
+
+    a = equilibrium
+    tangent = np.diag(stiffness) if stiffness.ndim == 1 else stiffness
+    tangent = tangent + nonlinear_stiffness * (a @ a * np.eye(a.size) + 2.0 * np.outer(a, a))
+    eigenvalue, vectors = scipy.linalg.eigh(tangent, mass)
+    rounding = 8.0 * a.size * np.finfo(np.float64).eps * np.abs(eigenvalue).max()
+    if eigenvalue[0] < -rounding:
+        raise InputError(
+            f"equilibrium = {a.tolist()}: must be stable, but the tangent stiffness has the negative "
+            f"eigenvalue {eigenvalue[0]:g} 1/s^2 there"
+        )
+    eigenvalue[np.abs(eigenvalue) <= rounding] = 0.0
+    return _read_only(np.sqrt(eigenvalue), vectors, np.zeros(a.size, dtype=np.int_))
+
+
+def linear_modes_about(mass: _Array, tangent: _Array, parity: NDArray[np.int_] | None = None) -> LinearModes:
+    """Linear modes of any tangent stiffness; each parity by itself where the tangent does not couple the two.
+
+    Raises
+    ------
+    InputError
+        If an eigenvalue is negative.
+    """
+    import scipy.linalg
+
+    count = mass.shape[0]
+    odd = np.zeros(count, dtype=bool) if parity is None else parity < 0
+    apart = parity is not None and not tangent[np.ix_(odd, ~odd)].any()
+    groups = [np.flatnonzero(~odd), np.flatnonzero(odd)] if apart else [np.arange(count)]
+    eigenvalue, vectors = np.empty(count), np.zeros((count, count))
+    for index in groups:
+        if index.size:
+            block = np.ix_(index, index)
+            eigenvalue[index], vectors[block] = scipy.linalg.eigh(tangent[block], mass[block])
+    rounding = 8.0 * count * np.finfo(np.float64).eps * np.abs(eigenvalue).max()
+    if eigenvalue.min() < -rounding:
+        raise InputError(f"equilibrium: must be stable, but has the eigenvalue {eigenvalue.min():g} 1/s^2")
+    eigenvalue[np.abs(eigenvalue) <= rounding] = 0.0
+    order = np.argsort(eigenvalue, kind="stable")
+    own = parity[order] if parity is not None and apart else np.zeros(count, dtype=np.int_)
+    return _read_only(np.sqrt(eigenvalue[order]), vectors[:, order], own)
+
+
+def _read_only(omega: _Array, vectors: _Array, parity: NDArray[np.int_]) -> LinearModes:
+    """The modes with the sign that makes the largest entry of each column positive."""
+    largest = np.argmax(np.abs(vectors), axis=0)
+    modes = LinearModes(omega, vectors * np.sign(vectors[largest, np.arange(omega.size)]), parity)
+    for array in modes:
+        array.setflags(write=False)
+    return modes
+
+
+# ----------------------------------------------------------------------------------------------------
+# The wells of a reduced model: where they are, what is between them, and which of them counts.
+
+
+class Wells:
+    """What follows from the potential energy of a reduced model."""
+
+    stiffness: _Array
+    nonlinear_stiffness: float
+    equilibrium: _Array
+    midspan_shape: _Array
+    transverse_force: _Array | None
+    imperfection: Imperfection | None
+    beam: Beam | None
+    natural_frequencies: Any
+    mass: _Array
+
+    def potential_energy(self, alpha: ArrayLike) -> _Array:
+        """Potential energy, J, of amplitudes of shape (..., N); 0 for the straight structure."""
+        a = self._amplitudes("alpha", alpha)
+        bent = a * self.stiffness if self.stiffness.ndim == 1 else a @ self.stiffness
+        square = np.sum(a * a, axis=-1)
+        energy: _Array = 0.5 * np.sum(a * bent, axis=-1) + 0.25 * self.nonlinear_stiffness * square**2
+        return energy if self.transverse_force is None else energy - a @ self.transverse_force
+
+    def kinetic_energy(self, alpha_velocity: ArrayLike) -> _Array:
+        """Kinetic energy, J, of amplitude velocities of shape (..., N)."""
+        v = self._amplitudes("alpha_velocity", alpha_velocity)
+        energy: _Array = 0.5 * np.sum(v * (v @ self.mass), axis=-1)
+        return energy
+
+    def _amplitudes(self, name: str, value: ArrayLike) -> _Array:
+        array = finite_array(name, value)
+        if array.ndim == 0 or array.shape[-1] != self.equilibrium.size:
+            raise InputError(
+                f"{name} of shape {array.shape}: must have the shape (..., {self.equilibrium.size}), a number a mode"
+            )
+        return array
+
+    @cached_property
+    def landscape(self) -> Landscape | None:
+        """The wells and the saddle of a structure with a side force; None without one."""
+        if self.transverse_force is None:
+            return None
+        return landscape_of(
+            self.stiffness, self.nonlinear_stiffness, self.transverse_force, self.midspan_shape
+        )
+
+    @cached_property
+    def equilibria(self) -> tuple[Equilibrium, ...]:
+        """Every shape in which the structure can rest, by energy, with its stability."""
+        if self.landscape is not None:
+            return self.landscape.equilibria
+        return perfect_equilibria(self.stiffness, self.nonlinear_stiffness)
+
+    @property
+    def wells(self) -> _Array:
+        """Amplitudes at the two wells, lower first, shape (2, N); twice the same if monostable."""
+        if self.landscape is not None:
+            return np.stack((self.equilibrium, self.landscape.upper.amplitude))
+        return np.stack((self.equilibrium, -self.equilibrium))
+
+    @cached_property
+    def mirrored(self) -> Self:
+        """The mirror image, upper and lower exchanged: the model itself if its wells are equal."""
+        if self.landscape is None or self.transverse_force is None:
+            return self
+        return dataclasses.replace(  # type: ignore[type-var]
+            self,
+            transverse_force=-self.transverse_force,
+            equilibrium=-self.landscape.upper.amplitude,
+            imperfection=None if self.imperfection is None else self.imperfection.mirrored,
+        )
+
+    @property
+    def _about_deepest(self) -> Self:
+        """The model, or its mirror image, whose lower well is the one of least energy."""
+        if self.landscape is None or not self.is_bistable:
+            return self
+        own, other = (each.energy for each in (self.landscape.lower, self.landscape.upper))
+        if own == other:  # by symmetry, though not that of the model's mirror image
+            return max(self, self.mirrored, key=lambda model: float(model.natural_frequencies[0]))
+        return self if own < other else self.mirrored
+
+    @property
+    def well_frequencies(self) -> _Array:
+        """Natural frequencies about the lower and about the upper well, Hz, ascending, shape (2, N)."""
+        return np.stack((self.natural_frequencies, self.mirrored.natural_frequencies))
+
+    @property
+    def dividing_height(self) -> float:
+        """Displacement of the centre that divides the wells, m: that of the lowest saddle; 0 between equal wells."""
+        if self.landscape is None or self.landscape.saddle is None:
+            return 0.0
+        return float(self.midspan_shape @ self.landscape.saddle.amplitude)
+
+    @property
+    def is_bistable(self) -> bool:
+        """Whether the structure has two wells."""
+        if self.landscape is not None:
+            return self.landscape.is_bistable
+        return bool(np.any(self.equilibrium != 0.0))
+
+    def require_bistable(self, what: str) -> None:
+        """Refuse a structure with a single equilibrium, naming *what* needs two wells."""
+        if self.is_bistable:
+            return
+        if self.beam is None:
+            raise InputError(f"{what} needs a bistable structure: give an equilibrium other than zero")
+        if self.imperfection is not None:
+            raise InputError(
+                f"{what} needs two wells: this imperfection leaves one; a smaller one leaves two, "
+                "and so does a greater axial_load"
+            )
+        raise InputError(
+            f"{what} needs a buckled beam: axial_load = {self.beam.axial_load:g} N must exceed the critical "
+            f"load of {self.beam.critical_load:g} N"
+        )
+
+    @property
+    def well_energy(self) -> float:
+        """Potential energy of either well, J: -(P - P_cr)^2/(4 gamma) for a buckled beam, 0 if straight.
+
+        Of unequal wells that of the lower one.
+        """
+        return float(self.potential_energy(self.equilibrium))
+
+    @cached_property
+    def saddle_energy(self) -> float:
+        """Energy of the lowest saddle between the wells, J.
+
+        Every equilibrium lies along an eigenvector of K0 with an eigenvalue kappa < 0, at the energy
+        -kappa^2/(4 gamma), or at 0.  The wells belong to the lowest eigenvalue and the lowest saddle
+        to the second, E I k_2^2 - P, if it is negative; otherwise it is the straight state, at 0.
+        Refused (InputError) if the structure has no second well.
+        """
+        self.require_bistable("saddle_energy")
+        if self.landscape is not None and self.landscape.saddle is not None:
+            return self.landscape.saddle.energy
+        kappa = np.sort(self.stiffness if self.stiffness.ndim == 1 else np.linalg.eigvalsh(self.stiffness))
+        second = min(float(kappa[1]), 0.0) if kappa.size > 1 else 0.0
+        return -(second**2) / (4.0 * self.nonlinear_stiffness) + 0.0
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_Array = NDArray[np.float64]
+
+MODEL_QUANTITIES: dict[str, tuple[ParameterField, Any]] = {
+    "modes": (
+        ParameterField("1", "number of buckling modes", kind=int, low=1, high=MAX_MODES, symbol="N"),
+        32,
+    ),
+    "damping_ratio": (
+        ParameterField(
+            "1", "damping ratio of every linear mode", low=0.0, high=1.0, closed="left", symbol=r"\zeta",
+            plausible=(0.0, 1.0, "percent"),
+        ),
+        0.005,
+    ),
+    "reference_frequency": (
+        ParameterField("Hz", "frequency that Omega and V are normalised by", low=0.0, optional=True, symbol="f_1"),
+        None,
+    ),
+}  # fmt: skip
+"""What a reduction takes beside the beam, and its default."""
+
+_LEAST_COMPLIANCE = 1e-300
+"""1/kg, below which the inverse is no number."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class ReducedModel(Wells):
+    """N modal amplitudes alpha with a mass, a stiffness and one tension term: the left side of Eq. (11),
+
+        m alpha'' + K0 alpha + gamma (alpha . alpha) alpha = phi(x_s) f,
+
+    whose potential energy is U = alpha . K0 alpha / 2 + gamma (alpha . alpha)^2 / 4, and less B . alpha, with B on
+    the right, where a constant side force B makes the wells unequal.  Made by :meth:`from_beam` or
+    :meth:`from_matrices`; arrays are read-only.
+
+    Attributes
+    ----------
+    mass : array of shape (N, N)
+        Mass matrix m; kg m for a beam, whose displacement w = alpha . phi (m) has alpha and phi in m^0.5.
+    stiffness : array of shape (N,) or (N, N)
+        Linear stiffness K0 of the straight structure, N for a beam: its diagonal, or the full matrix if one
+        was given.
+    nonlinear_stiffness : float
+        gamma, N/m for a beam.
+    well_amplitude : array of shape (N,)
+        Amplitudes at rest in the lower well, (-sqrt((P - P_cr)/gamma), 0, ...); of a structure with one equilibrium
+        that one, zeros if it is perfect.
+    length_scale : float or None
+        Length that normalises displacements, m: the buckling level b; of a beam that the load alone would not buckle
+        the height of the centre in the well of least energy; None for a straight beam.
+    damping_ratio : array of shape (N,)
+        Damping ratio of each linear mode about a well, by ascending frequency.
+    midspan_shape : array of shape (N,)
+        phi_i at the centre, whose displacement tells the wells apart.
+    contact_shape : array of shape (N,) or None
+        phi_i at the shaker if it does not depend on the location (given by matrices).
+    beam : Beam or None
+        What the model was reduced from.
+    given_reference_frequency : float or None
+        Frequency to normalise with, Hz, if it is not the first natural frequency.
+    transverse_force : array of shape (N,) or None
+        B, of a structure whose wells are unequal.
+    imperfection : Imperfection or None
+        What B follows from.
+    """
+
+    mass: _Array
+    stiffness: _Array
+    nonlinear_stiffness: float
+    well_amplitude: _Array
+    length_scale: float | None
+    damping_ratio: _Array
+    midspan_shape: _Array
+    contact_shape: _Array | None = None
+    beam: Beam | None = None
+    given_reference_frequency: float | None = None
+    transverse_force: _Array | None = None
+    imperfection: Imperfection | None = None
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    def __repr__(self) -> str:
+        wells = "two wells" if self.is_bistable else "one equilibrium"
+        of = "given by matrices" if self.beam is None else f"of {self.beam!r}"
+        return f"<ReducedModel: {self.modes} modes, {wells}, first at {self.natural_frequencies[0]:.4g} Hz, {of}>"
+
+    @classmethod
+    def from_beam(
+        cls,
+        beam: Beam,
+        modes: int = 32,
+        damping_ratio: ArrayLike = 0.005,
+        reference_frequency: float | None = None,
+        imperfection: Imperfection | None = None,
+    ) -> ReducedModel:
+        """Galerkin reduction of a beam on its first buckling modes (Eqs. 10-15).
+
+        In the wavenumbers k_i the matrices are closed forms.  With c_ij = 2 for two symmetric modes,
+        2/3 for two antisymmetric ones and 0 otherwise,
+
+            m_ij = rho S (delta_ij + c_ij) / (k_i k_j),    K0_i = E I k_i^2 - P,    gamma = E S/(2 L).
+
+        Parameters
+        ----------
+        beam : Beam
+        modes : int
+            Number of modes N, 1 to 256.
+        damping_ratio : float or array of shape (N,)
+            Damping ratio of the linear modes about a well, each in [0, 1).
+        reference_frequency : float, optional
+            Frequency that normalises the excitation, Hz; the first natural frequency by default, of unequal wells about
+            the one of least energy.
+        imperfection : Imperfection, optional
+            What makes the wells unequal; one that is nothing is left out.  Damping is that of the linear modes about
+            the well that the striker pushes away from, and the same matrix everywhere.
+
+        Raises
+        ------
+        InputError
+            For a number of modes or a damping ratio out of range.
+        """
+        if not isinstance(beam, Beam):
+            raise InputTypeError(f"beam = {shown(beam)}: must be a Beam")
+        count = integer("modes", modes, 1, MAX_MODES)
+        shapes = beam.buckling_modes(count)
+        k = shapes.wavenumber
+        if isinstance(shapes, BucklingModes):
+            mass = beam.mass_per_length * (np.eye(count) + _coupling(shapes.parity)) / np.outer(k, k)
+        else:
+            mass = beam.mass_per_length * shapes.overlap
+        gamma = beam.nonlinear_stiffness
+        equilibrium = np.zeros(count)
+        # alpha_1 = -b/phi_1(1/2); K0 from E I (k_i^2 - k_1^2) - (P - P_cr), free of cancellation
+        if isinstance(shapes, BucklingModes):
+            equilibrium[0] = -math.pi * beam.buckling_level / math.sqrt(2.0 * beam.length)
+        else:
+            equilibrium[0] = -beam.buckling_level / float(shapes.shape(0.5 * beam.length)[0])
+        if beam.is_buckled:
+            stiffness = beam.bending_stiffness * (k**2 - k[0] ** 2) - gamma * equilibrium[0] ** 2
+        else:
+            stiffness = beam.bending_stiffness * k**2 - beam.axial_load
+        length_scale, force = (beam.buckling_level if beam.is_buckled else None), None
+        if imperfection is not None and not isinstance(imperfection, Imperfection):
+            raise InputTypeError(f"imperfection = {shown(imperfection)}: must be an Imperfection")
+        if imperfection is not None and imperfection.is_none:
+            imperfection = None
+        if imperfection is not None:
+            initial = imperfection.initial_shape(shapes)
+            force = beam.bending_stiffness * k**2 * initial + imperfection.transverse_load(shapes, beam)
+            # an initial shape acts as a side force, and as a load of gamma s0 more
+            stiffness = stiffness - gamma * float(initial @ initial)
+            found = landscape_of(stiffness, gamma, force, shapes.shape(0.5 * beam.length))
+            equilibrium = found.lower.amplitude
+            if length_scale is None:
+                height = abs(float(shapes.shape(0.5 * beam.length) @ found.deepest.amplitude))
+                length_scale = height if height > 0.0 else None
+        return cls(
+            mass=mass,
+            stiffness=stiffness,
+            nonlinear_stiffness=gamma,
+            well_amplitude=equilibrium,
+            length_scale=length_scale,
+            damping_ratio=damping_ratios(damping_ratio, count),
+            midspan_shape=shapes.shape(0.5 * beam.length),
+            beam=beam,
+            given_reference_frequency=None
+            if reference_frequency is None
+            else positive("reference_frequency", reference_frequency, "Hz"),
+            transverse_force=force,
+            imperfection=imperfection,
+        )
+
+    @classmethod
+    def from_matrices(
+        cls,
+        mass: ArrayLike,
+        stiffness: ArrayLike,
+        *,
+        contact_shape: ArrayLike,
+        midspan_shape: ArrayLike | None = None,
+        nonlinear_stiffness: float = 0.0,
+        equilibrium: ArrayLike | None = None,
+        length_scale: float = 1.0,
+        damping_ratio: ArrayLike = 0.0,
+        reference_frequency: float | None = None,
+        transverse_force: ArrayLike | None = None,
+    ) -> ReducedModel:
+        """A model of any structure, given by its matrices; a free mass (stiffness 0) is one.
+
+        Parameters
+        ----------
+        mass : array of shape (N, N)
+            Mass matrix, symmetric and positive definite.
+        stiffness : array of shape (N,) or (N, N)
+            Linear stiffness of the unstressed structure: a diagonal or a symmetric matrix.
+        contact_shape : array of shape (N,)
+            Displacement under the shaker per unit of each coordinate.
+        midspan_shape : array of shape (N,), optional
+            The same for the point whose sign tells the wells apart; the contact point if not given.
+        nonlinear_stiffness : float
+            gamma of the term gamma (alpha . alpha) alpha, at least 0.
+        well_amplitude : array of shape (N,), optional
+            Coordinates at rest in the lower well (where the displacement of the centre is not
+            positive); zeros if not given.  It must be a stable equilibrium.
+        length_scale : float
+            Length that normalises displacements, m.
+        damping_ratio : float or array of shape (N,)
+            Damping ratio of each linear mode about the equilibrium, each in [0, 1).
+        reference_frequency : float, optional
+            Frequency that normalises the excitation, Hz; needed if the first natural frequency is 0.
+        transverse_force : array of shape (N,), optional
+            Constant force B that makes the wells unequal; the equilibria then follow from it and are not given.
+
+        Raises
+        ------
+        InputError
+            For matrices of the wrong shape, not symmetric or not positive definite, values that are not
+            finite or out of range, or an equilibrium that is none or is unstable.
+        """
+        given = checked_structure(
+            Structure(
+                mass=mass,
+                stiffness=stiffness,
+                contact_shape=contact_shape,
+                midspan_shape=midspan_shape,
+                nonlinear_stiffness=nonlinear_stiffness,
+                equilibrium=equilibrium,
+                length_scale=length_scale,
+                damping_ratio=damping_ratio,
+                reference_frequency=reference_frequency,
+                transverse_force=transverse_force,
+            )
+        )
+        model = cls(**given)
+        model._linear_modes()  # refuses an unstable equilibrium here rather than at its first use
+        return model
+
+    # ------------------------------------------------------------------ shapes
+
+    @property
+    def modes(self) -> int:
+        """Number of modes N."""
+        return self.well_amplitude.size
+
+    def shape_at(self, location: ArrayLike) -> _Array:
+        """phi_i at a location x_s in [0, 1] of the length, or at each of several; shape (..., N), m^0.5.
+
+        A model given by matrices has its one contact point and returns it whatever the location.
+        """
+        at: Any = location if isinstance(location, (int, float)) else finite_array("location", location)
+        if np.ndim(at) == 0:
+            at = within("location", at, 0.0, 1.0, closed="both")
+        elif at.size and (at.min() < 0.0 or at.max() > 1.0):
+            raise InputError(f"location from {at.min():g} to {at.max():g}: must lie in [0, 1]")
+        if self.beam is None:
+            assert self.contact_shape is not None
+            one = self.contact_shape
+            return np.broadcast_to(one, (*at.shape, self.modes)) if np.ndim(at) else one
+        return np.moveaxis(self.beam.buckling_modes(self.modes).shape(at * self.beam.length), 0, -1)
+
+    @cached_property
+    def lightest_contact_mass(self) -> float:
+        """Least :meth:`contact_mass` between 2 % and half of the span, kg, looked for at 25 places.
+
+        The other half of a beam is the mirror image of the first.
+        """
+        last = 0.5 if self.beam is None or self.beam.boundary.is_symmetric else 0.98
+        return min(self.contact_mass(location) for location in np.linspace(0.02, last, 25).tolist())
+
+    def contact_mass(self, location: float) -> float:
+        """Mass met by an impulse at *location*, kg: 1/(phi . m^-1 phi).
+
+        It falls like rho S L / N as modes are added.
+        """
+        location = within("location", location, 0.0, 1.0)
+        compliance = float(np.sum((self.linear_modes.T @ self.shape_at(location)) ** 2))
+        if not compliance > _LEAST_COMPLIANCE:
+            raise InputError(
+                f"location = {shown(location)}: is so near a clamp that the beam does not move there"
+            )
+        return 1.0 / compliance
+
+    # ------------------------------------------------------------------ linear modes about a well
+
+    def _linear_modes(self) -> LinearModes:
+        if self.transverse_force is not None or (
+            self.beam is not None and self.beam.boundary.rotational_stiffness
+        ):
+            tangent = tangent_stiffness(self.stiffness, self.nonlinear_stiffness, self.well_amplitude)
+            parity = None if self.beam is None else self.beam.buckling_modes(self.modes).parity
+            return linear_modes_about(self.mass, tangent, parity)
+        if self.beam is not None:
+            return linear_modes_of_beam(self.beam, self.modes)
+        return linear_modes_of_structure(
+            self.mass, self.stiffness, self.nonlinear_stiffness, self.well_amplitude
+        )
+
+    @cached_property
+    def _linear(self) -> LinearModes:
+        return self._linear_modes()
+
+    @property
+    def omega(self) -> _Array:
+        """Angular natural frequencies about a well, rad/s, ascending, shape (N,)."""
+        return self._linear.omega
+
+    @cached_property
+    def natural_frequencies(self) -> _Array:
+        """Natural frequencies about a well, Hz, ascending, shape (N,)."""
+        freq: _Array = self.omega / (2.0 * math.pi)
+        freq.setflags(write=False)
+        return freq
+
+    @property
+    def linear_modes(self) -> _Array:
+        """Linear modes about a well, the columns of V with V^T m V = Id, shape (N, N)."""
+        return self._linear.vectors
+
+    @property
+    def parity(self) -> NDArray[np.int_]:
+        """+1 for each symmetric linear mode, -1 for each antisymmetric one, 0 if not known; shape (N,)."""
+        return self._linear.parity
+
+    @cached_property
+    def tension_matrix(self) -> _Array:
+        """G = V^T V, through which the tension couples the linear modes; exactly 0 across parities."""
+        return _symmetric(self.linear_modes.T @ self.linear_modes)
+
+    @cached_property
+    def damping_matrix(self) -> _Array:
+        """C = m V diag(2 zeta omega) V^T m, the same about both wells, shape (N, N)."""
+        mv = self.mass @ self.linear_modes
+        return _symmetric((mv * (2.0 * self.damping_ratio * self.omega)) @ mv.T)
+
+    @property
+    def reference_frequency(self) -> float:
+        """Frequency that normalises the excitation, Hz: the first natural one unless one was given.
+
+        Refused (InputError) if that frequency is 0, of a free mass or a beam at its critical load, and none was given.
+        """
+        if self.given_reference_frequency is not None:
+            return self.given_reference_frequency
+        first = float(self._about_deepest.natural_frequencies[0])
+        if first == 0.0:
+            raise InputError(
+                "reference_frequency is not given and the first natural frequency is 0: "
+                "give reference_frequency in Hz, greater than 0"
+            )
+        return first
+
+
+def _symmetric(matrix: _Array) -> _Array:
+    """A matrix symmetric but for rounding, made exactly so and read-only."""
+    symmetric: _Array = 0.5 * (matrix + matrix.T)
+    symmetric.setflags(write=False)
+    return symmetric
+
+
+def _coupling(parity: NDArray[np.int_]) -> _Array:
+    """c_ij of the mass matrix: 2 between symmetric modes, 2/3 between antisymmetric ones."""
+    symmetric = (parity > 0).astype(np.float64)
+    antisymmetric = 1.0 - symmetric
+    coupling: _Array = 2.0 * np.outer(symmetric, symmetric) + 2.0 / 3.0 * np.outer(
+        antisymmetric, antisymmetric
+    )
+    return coupling
+
+
+# ----------------------------------------------------------------------------------------------------
+# The shape of a beam along its length, from the amplitudes of its buckling modes.
+
+
+def displacement_along(
+    length: float, amplitude: ArrayLike, positions: ArrayLike, modes: Modes | None = None
+) -> NDArray[np.float64]:
+    """Displacement w = sum alpha_i phi_i(x), m.
+
+    Parameters
+    ----------
+    length : float
+        L, m.
+    amplitude : array_like of shape (..., N)
+        alpha, m^0.5.
+    positions : array_like of shape (points,)
+        x over L, each in [0, 1].
+    modes : optional
+        Buckling modes of other ends than clamps.
+
+    Returns
+    -------
+    array of shape (..., points)
+    """
+    alpha, x = finite_array("amplitude", amplitude), finite_array("positions", positions, 1)
+    if x.size and (x.min() < 0.0 or x.max() > 1.0):
+        raise InputError(f"positions from {x.min():g} to {x.max():g}: must lie in [0, 1]")
+    between = BucklingModes(length, alpha.shape[-1]) if modes is None else modes
+    shapes = between.shape(np.clip(x * length, 0.0, length))
+    return np.asarray(alpha @ shapes)

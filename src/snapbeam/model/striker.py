@@ -1,0 +1,251 @@
+"""The striker: a tip that moves as prescribed and pushes the beam where they touch."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.drive.base import Drive
+from snapbeam.model.drive.combined import MOST_STRIKERS
+from snapbeam.model.drive.recorded_motion import RecordedMotion
+from snapbeam.model.drive.sine import Sine
+from snapbeam.model.quantity import RUN, STRUCTURE, check_fields, quantity
+from snapbeam.util.validation import InputError, InputTypeError, shown
+
+__all__ = ["SIDES", "ContactPair", "Shaker", "Striker", "check_others", "numbered", "parted"]
+
+
+SIDES = ("below", "above")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Striker:
+    """A tip at one place of the beam, on one side of it, and how it moves.
+
+    Parameters
+    ----------
+    drive : Drive
+        Motion about the mid-position, such as a :class:`~snapbeam.Sine`.
+    location : float
+        Position of the tip over the length of the beam, x_s, in (0, 1).
+    side : {"below", "above"}
+        Side of the beam the tip pushes from.  ``"below"``: it pushes upward on the beam at rest in
+        its lower well.  ``"above"`` is the mirror image, downward on the upper well.
+    gap : float, optional
+        Distance, m, between the mid-position and the beam at rest in the well that a run begins in; negative
+        presses.  By default the tip touches the beam at the start, wherever the beam then is.
+    mass : float, optional
+        Mass of the striker, kg; infinite by default: the tip moves as its drive says, whatever it strikes.  With a
+        mass the drive is the motion that the tip has as long as nothing touches it, and the contact force moves the
+        body from it: m_s x'' + c_s x' + k_s x = -f.
+    suspension_stiffness : float
+        Stiffness k_s of its suspension, N/m; 0 is a free flying mass.
+    suspension_damping : float
+        Damper c_s of its suspension, N s/m, below critical; a coil of force factor K on a resistance R adds K^2/R.
+    """
+
+    drive: Drive
+    location: float = quantity(
+        "1", "location of the striker over the length", default=1.0 / 2.1, low=0.0, high=1.0, scope=RUN,
+        symbol=r"x_\mathrm{s}",
+    )  # fmt: skip
+    side: str = quantity(
+        "1", "side that the striker pushes from", default="below", kind=str, choices=SIDES, scope=STRUCTURE
+    )
+    gap: float | None = quantity(
+        "m", "distance between the mid-position of the tip and the beam at rest", default=None, optional=True,
+        scope=RUN, symbol="g", short="striker_gap", plausible=(0.0, 1.0, "mm"),
+    )  # fmt: skip
+
+    mass: float | None = quantity(
+        "kg", "mass of the striker", default=None, optional=True, low=0.0, symbol=r"m_\mathrm{s}", short="striker_mass",
+        plausible=(1e-15, 1e4, "g"),
+    )  # fmt: skip
+    suspension_stiffness: float = quantity(
+        "N/m", "stiffness of the striker's suspension", default=0.0, low=0.0, closed="left",
+        symbol=r"k_\mathrm{s}", short="striker_suspension_stiffness",
+    )  # fmt: skip
+    suspension_damping: float = quantity(
+        "N s/m", "damper of the striker's suspension", default=0.0, low=0.0, closed="left",
+        symbol=r"c_\mathrm{s}", short="striker_suspension_damping",
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.drive, Drive):
+            raise InputTypeError(
+                f"drive = {shown(self.drive)}: must be a drive, such as Sine(frequency_ratio=1.2, ...)"
+            )
+        check_fields(self)
+        if self.mass is None:
+            for name in ("suspension_stiffness", "suspension_damping"):
+                if getattr(self, name) != 0.0:
+                    raise InputError(
+                        f"{name} = {getattr(self, name):g}: a striker without a mass moves as prescribed; give its mass"
+                    )
+        elif self.damping_ratio >= 1.0:
+            critical = 2.0 * math.sqrt(self.suspension_stiffness * self.mass)
+            raise InputError(
+                f"suspension_damping = {self.suspension_damping:g} N s/m: must be less than {critical:g} N s/m, critical for its mass and "
+                "spring; a stiffer spring lets it be greater"
+            )
+
+    @property
+    def damping_ratio(self) -> float:
+        """Of the suspension, c_s/(2 sqrt(k_s m_s)); infinite for a damper without a spring."""
+        if self.mass is None or self.suspension_damping == 0.0:
+            return 0.0
+        return (
+            self.suspension_damping / (2.0 * math.sqrt(self.suspension_stiffness * self.mass))
+            if self.suspension_stiffness > 0.0
+            else math.inf
+        )
+
+
+# ----------------------------------------------------------------------------------------------------
+# The paper's shaker: a striker with a sinusoidal drive, written down in four numbers.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shaker:
+    """A shaker whose tip has a sinusoidal velocity and starts in contact with the beam at rest (Eq. 16).
+
+    With the buckling level b and the first natural frequency omega_1, both of the model in use, the
+    tip moves as
+
+        w_s(t) = w_b(x_s, 0) + (V b omega_1 / omega) sin(omega t),    omega = Omega omega_1.
+
+    It is short for ``Striker(drive=Sine(frequency_ratio=..., velocity_amplitude=...), location=..., side=...)``.
+
+    Parameters
+    ----------
+    frequency_ratio : float
+        Excitation frequency over the first natural frequency, Omega, greater than 0.
+    velocity_amplitude : float
+        Velocity amplitude over b omega_1, V; 0 is a shaker at rest.
+    location : float
+        Position of the tip over the length of the beam, x_s, in (0, 1).
+    side : {"below", "above"}
+        Side of the beam the shaker pushes from.  ``"below"``: it pushes upward on the beam at rest in
+        its lower well.  ``"above"`` is the mirror image, downward on the upper well.
+    """
+
+    frequency_ratio: float
+    velocity_amplitude: float
+    location: float = 1.0 / 2.1
+    side: str = "below"
+
+    def __post_init__(self) -> None:
+        striker = self.striker()
+        for name in ("frequency_ratio", "velocity_amplitude"):
+            object.__setattr__(self, name, getattr(striker.drive, name))
+        for name in ("location", "side"):
+            object.__setattr__(self, name, getattr(striker, name))
+
+    def striker(self) -> Striker:
+        """The striker that it is."""
+        drive = Sine(frequency_ratio=self.frequency_ratio, velocity_amplitude=self.velocity_amplitude)
+        return Striker(drive=drive, location=self.location, side=self.side)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Strikers beside the first one: several strike one beam, each with its own place, side, law and drive.
+
+
+_NUMBERED = re.compile(r"(striker|drive|contact)_([2-9])")
+
+
+@dataclass(frozen=True)
+class ContactPair:
+    """A striker beside the first one, and the law by which it touches.
+
+    Parameters
+    ----------
+    striker : Striker
+        Without a gap its tip touches the beam at rest in the well that the first striker pushes away from.
+    contact : ContactLaw
+    """
+
+    striker: Striker
+    contact: ContactLaw
+
+
+def numbered(section: str) -> tuple[str, int]:
+    """The kind of a section and the number of its striker: ``drive_2`` is the drive of the second; 1 of any other."""
+    found = _NUMBERED.fullmatch(section)
+    return (section, 1) if found is None else (found[1], int(found[2]))
+
+
+def parted(striker: Any, contact: Any, others: tuple[ContactPair, ...]) -> dict[str, Any]:
+    """The first striker and its law, and the others with theirs, of a sequence of strikers.
+
+    Raises
+    ------
+    InputError
+        For laws that are neither one for all nor one each, and for a sequence beside *others*.
+    """
+    if not isinstance(striker, (list, tuple)) or not striker:
+        raise InputError(
+            f"contact = {shown(contact)}: laws in a sequence belong to strikers in a sequence, one each"
+        )
+    if others:
+        raise InputError("others: the sequence striker = [...] says all of them; leave others out")
+    laws: Sequence[Any] = contact if isinstance(contact, (list, tuple)) else [contact] * len(striker)
+    if len(laws) != len(striker):
+        raise InputError(
+            f"contact: {len(laws)} laws for {len(striker)} strikers; give one law for all, or one each"
+        )
+    made = [each.striker() if isinstance(each, Shaker) else each for each in striker]
+    rest = tuple(ContactPair(*pair) for pair in zip(made[1:], laws[1:], strict=True))
+    return {"striker": made[0], "contact": laws[0], "others": rest}
+
+
+def check_others(system: Any) -> None:
+    """Refuse strikers beside the first that are none, or that do not go with the rest of a system."""
+    others = system.further_contacts
+    if not isinstance(others, tuple) or not all(isinstance(each, ContactPair) for each in others):
+        raise InputTypeError(f"others = {shown(others)}: must be a tuple of Another; or give striker = [...]")
+    if not others:
+        return
+    if system.striker is None:
+        raise InputError("others: strikers beside a first one; give striker = [...]")
+    if len(others) >= MOST_STRIKERS:
+        raise InputError(f"striker: {len(others) + 1} strikers; must be at most {MOST_STRIKERS}")
+    if system.contact is not None and system.contact.impulsive:
+        raise InputError(
+            f"contact = {system.contact!r} with several strikers: Newton's law knows one wall; use a HertzContact, or "
+            "a HuntCrossley of the same restitution for the first striker"
+        )
+    if isinstance(system.striker.drive, RecordedMotion):
+        raise InputError(
+            "drive = 'recorded' with several strikers: a record has a clock of its own; drive them by formulas"
+        )
+    for number, each in enumerate(others, 2):
+        _check_one(number, each)
+
+
+def _check_one(number: int, another: ContactPair) -> None:
+    striker, contact = another.striker, another.contact
+    if not isinstance(striker, Striker):
+        raise InputTypeError(f"striker {number} = {shown(striker)}: must be a Striker or a Shaker")
+    if not isinstance(contact, ContactLaw):
+        raise InputTypeError(
+            f"contact {number} = {shown(contact)}: must be a law of contact, such as HertzContact(stiffness)"
+        )
+    if contact.impulsive or contact.rate_dependent:
+        raise InputError(
+            f"contact_{number} = {contact!r}: two forces that depend on the velocity have no exact kick together; of "
+            "several strikers the first alone may lose energy, the others take a HertzContact or a PowerLaw"
+        )
+    if striker.mass is not None:
+        raise InputError(
+            f"striker_{number}.mass = {striker.mass:g}: of several strikers the first alone may be a body; leave the "
+            "mass out, or make this one the first"
+        )
+    if isinstance(striker.drive, RecordedMotion):
+        raise InputError(
+            f"drive_{number} = 'recorded': a record has a clock of its own; drive it by a formula, or let it be still"
+        )

@@ -1,0 +1,38 @@
+"""The optional parts of snapbeam: packages with commands, plots and tests of their own.
+
+The rest of snapbeam imports none of them. A part lists its commands in the dictionary ``COMMANDS`` of its module
+``cli``. Deleting the folder of a part removes its commands and nothing else.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from types import ModuleType
+
+__all__ = ["PARTS", "installed_parts", "load_part"]
+
+PARTS = {
+    "lab": "lab",  # camera recordings, vibrometer signals, free decays, calibration, comparison with simulations
+    "explorer": "explorer",  # interactive maps in the browser
+    "paper": "",  # figures and claims of the source paper
+}
+"""Name of the package of each part, and the extra of the distribution that installs what it needs."""
+
+
+def installed_parts() -> list[str]:
+    """Names of the parts whose folder exists."""
+    return [name for name in PARTS if find_spec(f"snapbeam.{name}") is not None]
+
+
+def load_part(name: str) -> ModuleType:
+    """Import a part.
+
+    Raises
+    ------
+    AttributeError
+        If there is no such part, as ``snapbeam.<name>`` raises it.
+    """
+    if name not in PARTS or find_spec(f"snapbeam.{name}") is None:
+        raise AttributeError(f"module 'snapbeam' has no attribute {name!r}")
+    return import_module(f"snapbeam.{name}")

@@ -1,0 +1,137 @@
+"""Axes of pictures over any parameter: what stands along them, and how their points are spread."""
+
+from __future__ import annotations
+
+import textwrap
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axis import Axis
+from matplotlib.ticker import FuncFormatter
+from numpy.typing import NDArray
+
+from snapbeam.model.parameters import Parameter, lookup
+from snapbeam.plot.style import cell_edges
+from snapbeam.util.validation import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["AXIS_LABELS", "axis_label", "dress", "edges_of", "is_geometric", "positions", "symbol_of"]
+
+
+_Array = NDArray[np.float64]
+
+AXIS_LABELS = {
+    "frequency_ratio": r"Excitation frequency $\Omega$",
+    "location": r"Striker location $x_\mathrm{s}$",
+    "velocity_amplitude": r"Velocity amplitude $V$",
+    "modes": r"Number of modes $N$",
+}
+"""Labels of the paper's own axes; those of the others are in the table of parameters."""
+_LONGEST = 44
+"""Characters of a line along an axis of a picture of one column."""
+_SMALL, _LARGE = 0.01, 1e4
+"""Between these the greatest number along an axis is shown as it is."""
+_PREFIXES = {
+    "m": ((-3, "m"), (-6, "µ")),
+    "Pa": ((9, "G"), (6, "M"), (3, "k")),
+    "s": ((-3, "m"), (-6, "µ")),
+}
+"""Powers of ten, from great to small, that have a prefix before a unit."""
+_DECADES = 10.0
+"""Greatest over least value, from which points in geometric progression are drawn on an axis of powers."""
+
+
+def axis_label(dataset: xr.Dataset, name: str) -> str:
+    """What stands along an axis of a picture: words, symbol and unit of the parameter, in lines that fit."""
+    if name in AXIS_LABELS:
+        return AXIS_LABELS[name]
+    row = _parameter(dataset, name)
+    if row is not None:
+        text = row.label
+    else:
+        labels = dataset[name].attrs if name in dataset.coords else {}
+        unit = labels.get("units", "1")
+        text = f"{labels.get('long_name', name)}{'' if unit == '1' else f' ({unit})'}"
+    power, unit = _power(dataset, name)
+    if power:
+        text = f"{text.rpartition(' (')[0] or text} ({unit})"
+    return textwrap.fill(text, _LONGEST, break_long_words=False)
+
+
+def _power(dataset: xr.Dataset, name: str) -> tuple[int, str]:
+    """The power of ten that numbers along an axis are counted in, so that ticks are short, and the unit that makes."""
+    points, words = positions(dataset, name)
+    most = float(np.abs(points).max())
+    if (
+        words is not None
+        or name in AXIS_LABELS
+        or is_geometric(points)
+        or most == 0.0
+        or _SMALL <= most < _LARGE
+    ):
+        return 0, ""
+    row = _parameter(dataset, name)
+    unit = "1" if row is None else row.quantity.unit
+    for power, prefix in _PREFIXES.get(unit, ()):
+        if most >= 0.01 * 10.0**power:
+            return power, f"{prefix}{unit}"
+    power = int(np.floor(np.log10(most)))
+    return power, f"10$^{{{power}}}${'' if unit == '1' else f' {unit}'}"
+
+
+def symbol_of(dataset: xr.Dataset, name: str) -> str:
+    """The symbol of an axis, or its name."""
+    row = _parameter(dataset, name)
+    return name if row is None or not row.quantity.symbol else f"${row.quantity.symbol}$"
+
+
+def _parameter(dataset: xr.Dataset, name: str) -> Parameter | None:
+    """The row of the table for an axis: as its coordinate says, or by its name, as in files of version 0.1."""
+    full = dataset[name].attrs.get("parameter", name) if name in dataset.coords else name
+    try:
+        return lookup(str(full))
+    except InputError:
+        return None
+
+
+def positions(dataset: xr.Dataset, name: str) -> tuple[_Array, list[str] | None]:
+    """Where the points of an axis are drawn; words and whole numbers stand side by side, with their names."""
+    values = np.asarray(dataset[name].values)
+    if values.dtype.kind in "fc":
+        return values.astype(np.float64), None
+    return np.arange(values.size, dtype=np.float64), [str(value) for value in values]
+
+
+def is_geometric(points: _Array) -> bool:
+    """Whether points follow each other by a factor, over a power of ten or more."""
+    if points.size < 3 or points[0] <= 0.0 or points[-1] < _DECADES * points[0]:
+        return False
+    factors = points[1:] / points[:-1]
+    return bool(np.allclose(factors, factors[0], rtol=1e-6))
+
+
+def edges_of(dataset: xr.Dataset, name: str) -> _Array:
+    """Borders of the cells about the points of an axis: midway, or midway between powers."""
+    points, words = positions(dataset, name)
+    if words is not None:
+        return cell_edges(points)
+    if is_geometric(points):
+        edges: _Array = np.exp(cell_edges(np.log(points)))
+        return edges
+    return cell_edges(points, 0.0 if points[0] >= 0.0 else -np.inf, 1.0 if name == "location" else np.inf)
+
+
+def dress(axis: Axis, dataset: xr.Dataset, name: str) -> None:
+    """Label an axis, and give it a scale and ticks that suit its points."""
+    points, words = positions(dataset, name)
+    axis.set_label_text(axis_label(dataset, name))
+    if words is not None:
+        axis.set_ticks(points.tolist(), words)
+    elif is_geometric(points):
+        set_scale = axis.axes.set_xscale if axis.axis_name == "x" else axis.axes.set_yscale  # type: ignore[attr-defined]
+        set_scale("log")
+    power, _ = _power(dataset, name)
+    if power:
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**power:.6g}"))

@@ -1,0 +1,454 @@
+"""Bifurcation diagrams, with the orbits that branches follow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from cmcrameri import cm
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+
+from snapbeam.plot.axes import dress, edges_of, positions
+from snapbeam.plot.style import axes_or_new, fix_ticks, house_style
+from snapbeam.util.status_codes import RunStatus
+from snapbeam.util.validation import InputError, checked
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "plot_basins",
+    "plot_diagram",
+    "plot_edge",
+    "plot_exponents",
+    "plot_lifetimes",
+    "plot_section",
+    "plot_survival",
+]
+
+
+_UP, _DOWN, _LINE = "#16245E", "#B03A27", "#000000"
+_STARTS = "#8A8A8A"
+_EVENTS = {"fold": "s", "flip": "D", "Neimark-Sacker": "o", "branch point": "^", "grazing": "x"}
+
+
+@checked
+def plot_diagram(
+    dataset: xr.Dataset | None,
+    ax: Axes | None = None,
+    *,
+    branches: Sequence[xr.Dataset] = (),
+    variable: str = "midspan_displacement",
+) -> Axes:
+    """Draw a bifurcation diagram, swept up and down, with branches of orbits over it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset, optional
+        Of :func:`snapbeam.dynamics.bifurcation_diagram`.
+    branches : sequence of xarray.Dataset
+        Of :meth:`snapbeam.dynamics.Branch.to_dataset`: stable solid, unstable dashed, events as marks.
+    variable : str
+        What is drawn of the diagram; branches have ``midspan_displacement`` alone, at every return.
+
+    Raises
+    ------
+    InputError
+        If there is nothing to draw, or branches are asked for beside another variable.
+    """
+    if dataset is None and not branches:
+        raise InputError("dataset: give a diagram or at least one branch")
+    if branches and variable != "midspan_displacement":
+        raise InputError(
+            f"variable = {variable!r}: branches have midspan_displacement alone; draw one or the other"
+        )
+    first = dataset if dataset is not None else branches[0]
+    along = str(first.attrs.get("along", ""))
+    with house_style():
+        ax = axes_or_new(ax, "double", 84.0)
+        handles: list[Line2D] = []
+        if dataset is not None:
+            if variable not in dataset:
+                raise InputError(f"no {variable} among {list(map(str, dataset.variables))}")
+            handles += _points(dataset, ax, along, variable)
+            dress(ax.xaxis, dataset, along)
+        for branch in branches:
+            handles += _branch(branch, ax, along)
+        if dataset is None:
+            dress(ax.xaxis, branches[0].swap_dims(orbit=along).drop_duplicates(along), along)
+        words = {"midspan_displacement": "Centre displacement once a period, over $b$"}
+        ax.set_ylabel(words.get(variable, variable.replace("_", " ")))
+        unique = {handle.get_label(): handle for handle in handles}
+        ax.legend(handles=list(unique.values()), loc="best", ncols=2)
+        fix_ticks(ax)
+    return ax
+
+
+def _points(dataset: xr.Dataset, ax: Axes, along: str, variable: str) -> list[Line2D]:
+    handles = []
+    colors = {"up": _UP, "down": _DOWN}
+    sweeps = [str(name) for name in dataset["sweep"].values]
+    for name in sorted(sweeps, key=lambda each: each in colors):
+        part = dataset[variable].isel(sweep=sweeps.index(name)).transpose(along, "period")
+        x = np.repeat(dataset[along].values, part.sizes["period"])
+        size = 1.1 if name == "down" else 2.0
+        color = colors.get(name, _STARTS)
+        ax.plot(x, part.values.ravel(), ",", color=color, alpha=0.9, rasterized=True)
+        ax.plot(
+            x, part.values.ravel(), ".", color=color, markersize=size, markeredgewidth=0.0, rasterized=True
+        )
+        text = {"up": "swept up", "down": "swept down"}.get(name, "from many starts")
+        handles.append(Line2D([], [], marker=".", linestyle="", color=color, label=text))
+    return handles
+
+
+def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
+    x, stable = branch[along].values, branch["stable"].values
+    returns = branch["center_returns"].transpose("return", "orbit").values
+    # up to the stable orbits beside them, so that no gap is left
+    beside = ~stable | np.append(~stable[1:], False) | np.append(False, ~stable[:-1])
+    for y in returns:
+        ax.plot(x, np.where(stable, y, np.nan), color=_LINE, linewidth=1.1)
+        ax.plot(x, np.where(beside, y, np.nan), color=_LINE, linewidth=0.9, dashes=(3, 2))
+    handles = [
+        Line2D([], [], color=_LINE, linewidth=1.1, label="stable orbit"),
+        Line2D([], [], color=_LINE, linewidth=0.9, dashes=(3, 2), label="unstable orbit"),
+    ]
+    for kind, value, after in zip(
+        branch["event_kind"].values, branch["event_value"].values, branch["event_after"].values, strict=True
+    ):
+        at = int(after)
+        near = returns[:, at : at + 2].mean(axis=1)
+        mark = _EVENTS[str(kind)]
+        ax.plot(
+            np.full(near.size, value),
+            near,
+            mark,
+            color=_LINE,
+            markersize=3.5,
+            markerfacecolor="white",
+            linestyle="",
+        )
+        handles.append(
+            Line2D(
+                [],
+                [],
+                marker=mark,
+                linestyle="",
+                color=_LINE,
+                markersize=3.5,
+                markerfacecolor="white",
+                label=str(kind),
+            )
+        )
+    return handles
+
+
+# ----------------------------------------------------------------------------------------------------
+# Lifetimes over one parameter or two, and what still snaps over time.
+
+
+_UP_LIFETIMES = "#16245E"
+
+
+@checked
+def plot_lifetimes(
+    dataset: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    limits: tuple[float, float] | None = None,
+    legend: bool = True,
+) -> Axes:
+    """Draw the lifetime of snapping: along one parameter with its interval, or over two in colours.
+
+    Points without a lifetime are white where nothing snapped and hatched where runs snap on with no end seen.  *limits*
+    are those of the colours, in cycles.
+
+    Raises
+    ------
+    InputError
+        If the dataset holds no lifetimes over one or two parameters.
+    """
+    if "lifetime" not in dataset:
+        raise InputError(f"no lifetimes among {list(map(str, dataset.variables))}")
+    dims = [str(name) for name in dataset["lifetime"].dims]
+    if not 1 <= len(dims) <= 2 or "point" in dims:
+        raise InputError(f"lifetime over {dims}: is drawn over one or two parameters")
+    with house_style():
+        ax = axes_or_new(ax)
+        if len(dims) == 1:
+            x, _ = positions(dataset, dims[0])
+            low, high = dataset["lifetime_low"].values, dataset["lifetime_high"].values
+            top = np.where(np.isfinite(high), high, np.nan)
+            ax.fill_between(x, low, top, color=_UP_LIFETIMES, alpha=0.25, linewidth=0.0, label="interval")
+            ax.plot(x, dataset["lifetime"].values, color=_UP_LIFETIMES, label="lifetime")
+            ax.set_yscale("log")
+            ax.set_ylabel("Lifetime of snapping (cycles)")
+            ax.legend(loc="best")
+            dress(ax.xaxis, dataset, dims[0])
+        else:
+            _lifetime_cells(dataset, ax, dims, limits, legend)
+        fix_ticks(ax)
+    return ax
+
+
+def _lifetime_cells(
+    dataset: xr.Dataset, ax: Axes, dims: list[str], limits: tuple[float, float] | None, legend: bool
+) -> None:
+    values = dataset["lifetime"].values.T
+    known = values[np.isfinite(values) & (values > 0.0)]
+    edges = [edges_of(dataset, name) for name in dims]
+    if known.size:
+        low, high = (float(np.quantile(known, share)) for share in (0.02, 0.98))
+        norm = LogNorm(*((max(low, 1.0), max(high, low) * 1.001) if limits is None else limits))
+        cells = ax.pcolormesh(*edges, values, cmap=cm.batlow, norm=norm, rasterized=True)
+        figure = ax.get_figure()
+        assert figure is not None
+        figure.colorbar(cells, ax=ax, label="Lifetime of snapping (cycles)", extend="both")
+    endless = np.isnan(values) & (dataset["runs_snapping"].values.T > 0)
+    hatched: dict[str, Any] = {"facecolor": "white", "edgecolor": "0.4", "hatch": "//////", "linewidth": 0.0}
+    for row, column in np.argwhere(endless):
+        low, left = edges[1][row], edges[0][column]
+        size = edges[0][column + 1] - left, edges[1][row + 1] - low
+        ax.add_patch(Rectangle((left, low), *size, **hatched))
+    if endless.any() and legend:
+        ax.legend(
+            handles=[Patch(**hatched, label="snaps on, no end seen")],
+            loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
+        )  # fmt: skip
+    dress(ax.xaxis, dataset, dims[0])
+    dress(ax.yaxis, dataset, dims[1])
+
+
+@checked
+def plot_survival(
+    dataset: xr.Dataset, ax: Axes | None = None, *, labels: Sequence[str] | None = None
+) -> Axes:
+    """Draw the share of runs that still snap over cycles, and the fitted exponential, for up to five points.
+
+    The curve ends where nothing more can be known, the quiet cycles before the end; a ring there is the share of runs
+    that were still snapping, whose lifetimes are longer than was seen.
+    """
+    if "last_snap" not in dataset:
+        raise InputError("dataset: holds no lifetimes of starts")
+    runs = dataset.transpose(..., "start")
+    rows = np.atleast_2d(runs["last_snap"].values).reshape(-1, runs.sizes["start"])
+    if len(rows) > 5:
+        raise InputError(f"dataset: has {len(rows)} points; choose at most 5 of them")
+    tau, delay = (np.atleast_1d(runs[name].values).ravel() for name in ("lifetime", "delay"))
+    with house_style():
+        ax = axes_or_new(ax)
+        seen = float(dataset.attrs["cycles"]) - float(dataset.attrs["quiet"])
+        settled = runs["final_well_proven"].values.astype(bool) | (
+            runs["status"].values == int(RunStatus.EARLY_STOP)
+        )
+        settled = np.atleast_2d(settled).reshape(rows.shape)
+        good = rows.shape[1] - np.atleast_1d(runs["runs_failed"].values).ravel()
+        open_ends = False
+        for i, row in enumerate(rows):
+            color = cm.batlow(0.05 + 0.7 * i / max(len(rows) - 1, 1))
+            lasting = (row > seen) & ~settled[i]
+            times = np.sort(row[np.isfinite(row) & ~lasting])
+            # a run that never snapped ended at once; one that failed is none
+            share = (times.size + lasting.sum() - np.arange(1, times.size + 1)) / good[i]
+            going = float(lasting.sum() / good[i])
+            if going > 0.0:
+                open_ends = True
+                last = max(seen, times[-1]) if times.size else seen
+                times, share = np.append(times, last), np.append(share, going)
+                ax.plot(last, going, "o", color=color, markerfacecolor="white", markersize=4.0, zorder=4)
+            alone = f"{row.size} runs" if len(rows) == 1 else f"point {i + 1}"
+            name = labels[i] if labels is not None else alone
+            ax.step(np.append(0.0, times), np.append(1.0, share), where="post", color=color, label=name)
+            if np.isfinite(tau[i]) and np.isfinite(delay[i]):
+                begun = float((row > delay[i]).sum() / good[i])
+                t = np.linspace(delay[i], times[-1], 200)
+                ax.plot(
+                    t, begun * np.exp(-(t - delay[i]) / tau[i]), color=color, dashes=(4, 2), linewidth=0.7
+                )
+        ax.set(
+            xlabel="Cycles",
+            ylabel="Share of runs still snapping",
+            yscale="log",
+            ylim=(0.6 / rows.shape[1], 1.3),
+        )
+        ax.set_xlim(left=0.0)
+        handles, _ = ax.get_legend_handles_labels()
+        handles.append(Line2D([], [], color="0.3", dashes=(4, 2), linewidth=0.7, label="fitted"))
+        if open_ends:
+            ring = Line2D(
+                [], [], linestyle="none", marker="o", color="0.3", markerfacecolor="white", markersize=4.0,
+                label="still snapping",
+            )  # fmt: skip
+            handles.append(ring)
+        ax.legend(handles=handles, loc="best", handlelength=1.0, fontsize=6)
+        fix_ticks(ax)
+    return ax
+
+
+# ----------------------------------------------------------------------------------------------------
+# What is seen in the space of states: exponents, sections, basins, the state between.
+
+
+_UP_STATES, _DOWN_STATES = "#16245E", "#B03A27"
+_UNDECIDED = "#858585"
+
+
+@checked
+def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw Lyapunov exponents: how they converge over periods, or the largest over one or two parameters."""
+    if "exponent" not in dataset:
+        raise InputError(f"no exponents among {list(map(str, dataset.variables))}")
+    dims = [str(name) for name in dataset["exponent"].dims if name != "exponent_number"]
+    with house_style():
+        ax = axes_or_new(ax)
+        if "running" in dataset:
+            period = np.arange(1, dataset.sizes["period"] + 1)
+            ax.axhline(0.0, color="0.6", linewidth=0.5)
+            shown = min(dataset.sizes["exponent_number"], 10)
+            for number in range(shown):
+                color = cm.batlow(0.85 * number / max(shown - 1, 1))
+                label = rf"$\lambda_{{{number + 1}}}$"
+                ax.plot(period, dataset["running"].values[:, 0, number], color=color, label=label)
+            ax.legend(loc="best", ncols=2)
+            ax.set(xlabel="Periods of the drive", ylabel=r"Lyapunov exponent so far (s$^{-1}$)", xscale="log")
+        elif len(dims) == 1:
+            x, _ = positions(dataset, dims[0])
+            value = dataset["exponent"].isel(exponent_number=0).values
+            error = dataset["exponent_error"].isel(exponent_number=0).values
+            ax.axhline(0.0, color="0.6", linewidth=0.5)
+            ax.fill_between(
+                x, value - 2 * error, value + 2 * error, color=_UP_STATES, alpha=0.25, linewidth=0.0
+            )
+            ax.plot(x, value, color=_UP_STATES)
+            ax.set_ylabel(r"Largest Lyapunov exponent (s$^{-1}$)")
+            dress(ax.xaxis, dataset, dims[0])
+        elif len(dims) == 2:
+            value = dataset["exponent"].isel(exponent_number=0).values.T
+            most = float(np.nanmax(np.abs(value))) or 1.0
+            edges = [edges_of(dataset, name) for name in dims]
+            cells = ax.pcolormesh(*edges, value, cmap=cm.vik, vmin=-most, vmax=most, rasterized=True)
+            figure = ax.get_figure()
+            assert figure is not None
+            figure.colorbar(cells, ax=ax, label=r"Largest Lyapunov exponent (s$^{-1}$)")
+            dress(ax.xaxis, dataset, dims[0])
+            dress(ax.yaxis, dataset, dims[1])
+        else:
+            raise InputError(f"exponent over {dims}: is drawn over one or two parameters")
+        fix_ticks(ax)
+    return ax
+
+
+@checked
+def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_displacement") -> Axes:
+    """Draw a Poincare section: a displacement against its velocity."""
+    y = x.replace("displacement_at_striker", "velocity_at_striker")
+    if x not in dataset or y not in dataset:
+        raise InputError(f"no {x} and {y} among {list(map(str, dataset.variables))}")
+    with house_style():
+        ax = axes_or_new(ax)
+        ax.plot(
+            dataset[x].values,
+            dataset[y].values,
+            ".",
+            color=_UP_STATES,
+            markersize=2.0,
+            markeredgewidth=0.0,
+            rasterized=True,
+        )
+        where = "Centre" if x.startswith("center") else "Contact point's"
+        ax.set(xlabel=f"{where} displacement, over $b$", ylabel=rf"{where} velocity, over $b\,\omega_1$")
+        fix_ticks(ax)
+    return ax
+
+
+@checked
+def plot_basins(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw basins of attraction: a colour an attractor, grey where it is undecided, attractors as rings."""
+    if "basin" not in dataset:
+        raise InputError(f"no basins among {list(map(str, dataset.variables))}")
+    names = [str(name) for name in dataset["basin"].dims]
+    labels = dataset["basin"].values
+    count = int(dataset["basin"].attrs["flag_values"].max()) + 1
+    colors = [_UNDECIDED, *(cm.batlow(0.08 + 0.84 * i / max(count - 1, 1)) for i in range(count))]
+    meanings = str(dataset["basin"].attrs["flag_meanings"]).split()
+    with house_style():
+        ax = axes_or_new(ax, height=84.0)
+        edges = [edges_of(dataset, name) for name in names]
+        norm = BoundaryNorm(np.arange(-1.5, count), count + 1)
+        ax.pcolormesh(*edges, labels.T, cmap=ListedColormap(colors), norm=norm, rasterized=True)
+        for points in dataset["attractor_points"].values:
+            ax.plot(
+                *points.T, "o", color="black", markerfacecolor="white", markersize=3.0, markeredgewidth=0.8
+            )
+        for axis, name in ((ax.xaxis, names[0]), (ax.yaxis, names[1])):
+            axis.set_label_text(_coordinate(name))
+        ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+        handles = [
+            Patch(
+                facecolor=colors[i],
+                edgecolor="black",
+                linewidth=0.4,
+                label=(f"{i - 1}: " if i else "") + meanings[i].replace("_", " "),
+            )
+            for i in range(count + 1)
+            if i > 0 or (labels == -1).any()
+        ]
+        figure = ax.get_figure(root=True)
+        assert figure is not None
+        figure.legend(handles=handles, loc="outside lower center", ncols=3)
+        fix_ticks(ax)
+    return ax
+
+
+def plot_edge(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw an edge state: the first coordinate once a period, and the unstable orbit that it settles on."""
+    if "orbit_state" not in dataset or "state" not in dataset:
+        raise InputError(f"no edge state among {list(map(str, dataset.variables))}")
+    name = str(dataset["coordinate"].values[0])
+    values = dataset["state"].values[:, 0]
+    with house_style():
+        ax = axes_or_new(ax)
+        for at, words in ((-1.0, "well"), (0.0, "straight")):
+            if name == "amplitude[1]" and values.min() - 0.3 < at < values.max() + 0.3:
+                ax.axhline(at, color="0.75", linewidth=0.5, zorder=0)
+                ax.annotate(
+                    words, (1.0, at), (2.0, 0.0), xycoords=("axes fraction", "data"), textcoords="offset points",
+                    va="center", fontsize=6, color="0.4",
+                )  # fmt: skip
+        period = np.arange(1, values.size + 1)
+        ax.plot(
+            period,
+            values,
+            ".-",
+            color=_UP_STATES,
+            linewidth=0.7,
+            markersize=3.5,
+            label="between the two outcomes",
+        )
+        points = dataset["orbit_state"].values[:, 0]
+        out = int((np.hypot(dataset["multiplier_real"], dataset["multiplier_imag"]) > 1.0).sum())
+        for i, point in enumerate(points):
+            words = f"orbit of period {points.size}, {out} multiplier{'s' if out != 1 else ''} outside"
+            ax.axhline(
+                point, color=_DOWN_STATES, linewidth=0.9, dashes=(4, 2), label=words if i == 0 else None
+            )
+        figure = ax.get_figure(root=True)
+        assert figure is not None
+        figure.legend(*ax.get_legend_handles_labels(), loc="outside lower center", ncols=1)
+        ax.set(xlabel="Period of the drive", ylabel=_coordinate(name))
+        fix_ticks(ax)
+    return ax
+
+
+def _coordinate(name: str) -> str:
+    """Symbol of a coordinate of a state."""
+    if name.startswith("amplitude["):
+        return rf"Amplitude $\alpha_{{{name[10:-1]}}}$ over that of the well"
+    if name.startswith("velocity["):
+        return rf"Velocity $\dot\alpha_{{{name[9:-1]}}}$ over $\omega_1$ times that amplitude"
+    return name

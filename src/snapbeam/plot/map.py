@@ -1,0 +1,596 @@
+"""The map of response types over two of frequency, amplitude and location (Figs. 6-8 of the paper)."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import cmcrameri.cm as crameri
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis, XAxis
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from snapbeam.model.quasi_static import quasi_static_threshold
+from snapbeam.plot.agreement import draw_agreement
+from snapbeam.plot.axes import axis_label, dress, edges_of, positions, symbol_of
+from snapbeam.plot.style import (
+    BEAM_COLOR,
+    CLASS_COLORS,
+    beam_text,
+    class_cells,
+    fix_ticks,
+    house_style,
+    new_figure,
+)
+from snapbeam.solver.statistics import STATISTICS
+from snapbeam.sweeps.measured_points import MeasuredPoints
+from snapbeam.util.si_prefixes import scale_of
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError, InputTypeError, checked, finite_array, instance, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "UPWARD",
+    "class_handles",
+    "draw_dots",
+    "draw_threshold_line",
+    "plot_points",
+    "plot_response_map",
+    "plot_statistic",
+    "scaled_values",
+    "subtitle",
+    "wants_powers",
+]
+
+
+_Array = NDArray[np.float64]
+
+UPWARD = ("velocity_amplitude", "location")
+"""Axes that are drawn upward rather than across, the first of them first."""
+
+_CURVES = ("min_midspan_displacement", "max_midspan_displacement")
+"""Drawn over the classes of a map over one axis."""
+_NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
+
+
+@checked
+def plot_response_map(
+    dataset: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    dots: MeasuredPoints | None = None,
+    threshold_line: bool = False,
+    legend: bool = True,
+) -> Axes:
+    """Draw the response class of every run of a map as one cell; over one axis, with how far the centre moves.
+
+    Cell borders lie midway between the points of an axis, the outermost as far out as the next one in (but
+    not below zero, nor beyond the end of the beam).  Cells of a map with repeats are the paler the fewer
+    of them agree (``class_fraction``).
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A map with the variable ``response`` over one or two axes of more than one point, or over a list of points
+        (:func:`plot_points`).
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure one column wide by default.
+    dots : Dots, optional
+        Measured responses, drawn as dots in the colours of their classes.  Those measured at another value
+        of the map's fixed coordinate (by more than 2 %) are left out, with a warning.
+    threshold_line : bool
+        Whether to draw the quasi-static threshold V_QS1 of one mode (Eq. 21), dashed.
+    legend : bool
+        Whether to say below the map what the colours mean, and how many of the runs have each.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset is no map of one or two axes.
+    """
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if "response_class" in dataset and dataset["response_class"].dims == ("point",):
+        pass  # import-removed
+
+        return plot_points(
+            dataset, "response_class", ax, dots=dots, threshold_line=threshold_line, legend=legend
+        )
+    if "response_class" in dataset and _is_line(dataset):
+        return _line(dataset, ax, dots is not None or threshold_line, legend)
+    across, upward, kinds = _two_axes(dataset)
+    edges = tuple(edges_of(dataset, name) for name in (across, upward))
+    fixed = {
+        name: _scalar(dataset, name)
+        for name in ("frequency_ratio", "location", "velocity_amplitude")
+        if name not in (across, upward)
+    }
+    with house_style():
+        own = new_figure("single", 92.0 if legend else 70.0) if ax is None else None
+        if own is not None:
+            ax = own.add_subplot()
+        assert ax is not None
+        class_cells(ax, edges[0], edges[1], kinds)
+        fix_ticks(ax)
+        dress(ax.xaxis, dataset, across)
+        dress(ax.yaxis, dataset, upward)
+        ax.set_title(subtitle(dataset, (across, upward)), loc="left")
+        handles = class_handles(kinds)
+        if "class_fraction" in dataset:
+            handles.append(draw_agreement(ax, dataset, (across, upward), edges))
+        ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
+        if threshold_line:
+            handles.append(draw_threshold_line(ax, across, upward, fixed))
+        if dots is not None:
+            handles.append(draw_dots(ax, dots, across, upward, fixed))
+        if legend and own is not None:
+            own.legend(handles=handles, loc="outside lower center", ncols=2)
+        elif legend:
+            ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2)
+    return ax
+
+
+def _is_line(dataset: xr.Dataset) -> bool:
+    response = dataset["response_class"].squeeze()
+    return response.ndim == 1 and "point" not in response.dims
+
+
+def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) -> Axes:
+    """A map over one axis."""
+    if overlaid:
+        raise InputError("dots, threshold_line: are drawn over two axes; this map has one")
+    name = str(dataset["response_class"].squeeze().dims[0])
+    with house_style():
+        own = new_figure("single", 84.0 if legend else 62.0) if ax is None else None
+        ax = own.add_subplot() if own is not None else ax
+        assert ax is not None
+        fix_ticks(ax)
+        _draw_line(ax, dataset, name)
+        ax.set_title(subtitle(dataset, (name,)), loc="left")
+        handles = class_handles(dataset["response_class"].values)
+        if legend and own is not None:
+            own.legend(handles=handles, loc="outside lower center", ncols=2)
+        elif legend:
+            ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
+    return ax
+
+
+def _draw_line(ax: Axes, dataset: xr.Dataset, name: str) -> None:
+    """Draw classes along the axis *name*, with the least and the greatest displacement of the centre above them."""
+    points, _ = positions(dataset, name)
+    edges = edges_of(dataset, name)
+    kinds = dataset["response_class"].squeeze().values[None, :]
+    low, high = -1.6, 1.6
+    curves = [dataset[key].squeeze().values for key in _CURVES if key in dataset]
+    if curves and np.isfinite(np.concatenate(curves)).any():
+        low, high = min(low, np.nanmin(curves[0])), max(high, np.nanmax(curves[-1]))
+    pad = 0.08 * (high - low)
+    class_cells(ax, edges, np.array([low - pad, high + pad]), kinds)
+    for curve in curves:
+        ax.plot(points, curve, color="white", linewidth=2.0)
+        ax.plot(points, curve, ".-", color="black", linewidth=0.8, markersize=2.5)
+    dress(ax.xaxis, dataset, name)
+    ax.set_ylabel("Centre displacement $w/b$,\nleast and greatest")
+    ax.set(xlim=edges[[0, -1]], ylim=(low - pad, high + pad))
+
+
+def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if "response_class" not in dataset:
+        raise InputError(f"no map: it has no variable 'response' among {list(map(str, dataset.variables))}")
+    response = dataset["response_class"].squeeze()
+    named = [str(name) for name in response.dims]
+    if len(named) != 2 or "point" in named:
+        sizes = ", ".join(f"{name} {size}" for name, size in response.sizes.items()) or "none"
+        raise InputError(
+            f"a map is drawn over two axes of more than one point; this one has {sizes}: select one point of the "
+            "others, as with dataset.isel(location=0)"
+        )
+    upward = next((name for name in UPWARD if name in named), named[1])
+    across = named[0] if named[1] == upward else named[1]
+    return across, upward, response.transpose(upward, across).values
+
+
+def _scalar(dataset: xr.Dataset, name: str) -> float | None:
+    return float(dataset[name].squeeze()) if name in dataset.coords and dataset[name].size == 1 else None
+
+
+def subtitle(dataset: xr.Dataset, axes: tuple[str, ...]) -> str:
+    """The beam, and what holds for the whole map: modes, cycles and the paper's coordinates that are no axes."""
+    parts = []
+    if "modes" in dataset.attrs:
+        parts.append(f"$N$ = {int(dataset.attrs['modes'])}")
+    if "cycles" in dataset.attrs:
+        parts.append(f"{int(dataset.attrs['cycles'])} cycles")
+    for name in ("frequency_ratio", "velocity_amplitude", "location"):
+        value = _scalar(dataset, name)
+        if name not in axes and value is not None:
+            parts.append(f"{symbol_of(dataset, name)} = {value:.4g}")
+    beam = "" if any(name.startswith("beam") for name in axes) else beam_text(dataset.attrs)
+    return "\n".join(line for line in (beam, ", ".join(parts)) if line)
+
+
+def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]:
+    """Return what a legend needs to say which colour is which class.
+
+    Parameters
+    ----------
+    kinds : int8 array, optional
+        Classes of runs, whose shares then stand beside the names; unknown ones are named if there are any.
+    """
+    if kinds is not None:
+        try:
+            shown_kinds = np.asarray(kinds, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            raise InputTypeError("kinds: must be an array of class codes") from None
+        # points that a picture leaves out are NaN in it
+        kinds = finite_array("kinds", shown_kinds[shown_kinds == shown_kinds]).astype(np.int8)
+    handles: list[Patch | Line2D] = []
+    for kind in (*(k for k in ResponseClass if k >= 0), ResponseClass.UNKNOWN):
+        count = 0 if kinds is None else int((kinds == kind).sum())
+        if count or kind is not ResponseClass.UNKNOWN:
+            label = kind.label if kinds is None else f"{kind.label}, {_percent(count, kinds.size)}"
+            handles.append(Patch(facecolor=CLASS_COLORS[kind], edgecolor="black", linewidth=0.4, label=label))
+    return handles
+
+
+def _percent(count: int, total: int) -> str:
+    share = 100.0 * count / max(total, 1)
+    return "<0.1 %" if 0.0 < share < 0.1 else f"{share:.1f} %"
+
+
+def draw_threshold_line(ax: Axes, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+    """Draw V_QS1 of one mode (Eq. 21) over two of the paper's coordinates, the third of them fixed."""
+    x = np.linspace(*ax.get_xlim(), 402)[1:-1]
+    if {across, upward} - {"frequency_ratio", "location", "velocity_amplitude"}:
+        raise InputError(
+            f"threshold_line: is drawn over frequency ratio, location and velocity amplitude, not {across}, {upward}"
+        )
+    if (across, upward) == ("frequency_ratio", "location"):
+        height = np.linspace(*ax.get_ylim(), 402)[1:-1]
+        line = _given(fixed, "velocity_amplitude") / quasi_static_threshold(height, 1.0), height
+    elif across == "location":
+        line = x, quasi_static_threshold(x, _given(fixed, "frequency_ratio"))
+    else:
+        line = x, quasi_static_threshold(_given(fixed, "location"), x)
+    ax.plot(*line, color="white", linewidth=1.8)
+    label = r"quasi-static, $V_\mathrm{QS1}$"
+    return ax.plot(*line, color="black", linewidth=0.9, dashes=(4, 2), label=label)[0]
+
+
+def _given(fixed: dict[str, float | None], name: str) -> float:
+    value = fixed[name]
+    if value is None:
+        raise InputError(f"threshold_line: needs the map's {name}, which the dataset does not say")
+    return value
+
+
+def draw_dots(
+    ax: Axes, dots: MeasuredPoints, across: str, upward: str, fixed: dict[str, float | None]
+) -> Line2D:
+    """Draw measured responses over a map, those at other values of its fixed coordinates left out with a warning."""
+    keep = np.ones(len(dots), dtype=bool)
+    for name, value in fixed.items():
+        there = getattr(dots, name)
+        if value is not None:
+            keep &= np.isnan(there) | (np.abs(there - value) <= _NEAR * abs(value))
+    for name in (across, upward):
+        keep &= ~np.isnan(getattr(dots, name))
+    if not keep.all():
+        named = ", ".join(f"{name} = {value:.4g}" for name, value in fixed.items() if value is not None)
+        warnings.warn(
+            f"{int((~keep).sum())} of {len(dots)} measured points do not belong to {named} and are left out",
+            stacklevel=3,
+        )
+    colors = [CLASS_COLORS[ResponseClass(int(kind))] for kind in dots.response_class[keep]]
+    where = getattr(dots, across)[keep], getattr(dots, upward)[keep]
+    outside = (
+        (where[0] < ax.get_xlim()[0])
+        | (where[0] > ax.get_xlim()[1])
+        | (where[1] < ax.get_ylim()[0])
+        | (where[1] > ax.get_ylim()[1])
+    )
+    if outside.any():
+        warnings.warn(
+            f"{int(outside.sum())} of {len(dots)} measured points lie outside the map", stacklevel=3
+        )
+    ax.scatter(*where, s=26, c="white", linewidths=0.0, zorder=3)
+    ax.scatter(*where, s=14, c=colors, edgecolors="black", linewidths=0.6, zorder=4)
+    return Line2D(
+        [], [], linestyle="", marker="o", markersize=4, markerfacecolor="white", markeredgecolor="black",
+        markeredgewidth=0.6, label=f"measured, {int(keep.sum())}",
+    )  # fmt: skip
+
+
+# ----------------------------------------------------------------------------------------------------
+# Maps of a statistic, such as the peak force or the striker's work, over one or two axes.
+
+
+_DECADES = 300.0
+"""Greatest over least value, from which colours go by powers of ten."""
+
+
+@checked
+def plot_statistic(
+    dataset: xr.Dataset, name: str, ax: Axes | None = None, *, log: bool | None = None
+) -> Axes:
+    """Draw a statistic of a map: colours over two axes, a curve over one, coloured dots of a list of points.
+
+    Cells of runs that failed, or that have none of it, are grey.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A map.
+    name : str
+        One of :data:`snapbeam.STATISTICS`, or any other variable over the axes.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure one column wide by default.
+    log : bool, optional
+        Whether colours, or the axis, go by powers of ten; by default where the values span more than two of them.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If there is no such variable, or it is over more than two axes.
+    """
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if instance("name", name, str, "text") not in dataset:
+        raise InputError(f"variable = {shown(name)}: the map has {', '.join(map(str, dataset.data_vars))}")
+    if dataset[name].dims == ("point",):
+        pass  # import-removed
+
+        return plot_points(dataset, name, ax)
+    values = dataset[name].squeeze()
+    dims = [str(each) for each in values.dims]
+    if not 1 <= len(dims) <= 2 or "point" in dims:
+        sizes = ", ".join(f"{key} {size}" for key, size in values.sizes.items()) or "none"
+        raise InputError(
+            f"a statistic is drawn over one or two axes; this one has {sizes}: select one point of the others, as with "
+            "dataset.isel(location=0)"
+        )
+    scaled, label = scaled_values(dataset, name)
+    data = values.copy(data=scaled.reshape(values.shape))
+    if log is None:
+        log = wants_powers(scaled)
+    with house_style():
+        if ax is None:
+            ax = new_figure("single", 74.0).add_subplot()
+        fix_ticks(ax)
+        if len(dims) == 1:
+            points, _ = positions(dataset, dims[0])
+            ax.plot(points, data.values, ".-", color=BEAM_COLOR, markersize=3)
+            dress(ax.xaxis, dataset, dims[0])
+            ax.set_ylabel(label)
+            ax.set_yscale("log" if log else "linear")
+        else:
+            upward = next((each for each in UPWARD if each in dims), dims[1])
+            across = dims[0] if dims[1] == upward else dims[1]
+            field = np.ma.masked_invalid(data.transpose(upward, across).values)
+            positive = scaled[scaled > 0.0]
+            norm = LogNorm(positive.min(), positive.max()) if log else Normalize()
+            ax.set_facecolor("0.8")
+            mesh = ax.pcolormesh(
+                edges_of(dataset, across), edges_of(dataset, upward), field, cmap=crameri.batlow, norm=norm,
+                rasterized=field.size > 20_000,
+            )  # fmt: skip
+            ax.figure.colorbar(mesh, ax=ax, label=label, pad=0.02).ax.tick_params(labelsize=7)
+            dress(ax.xaxis, dataset, across)
+            dress(ax.yaxis, dataset, upward)
+        ax.set_title(subtitle(dataset, (*dims,)), loc="left")
+    return ax
+
+
+def scaled_values(dataset: xr.Dataset, name: str) -> tuple[_Array, str]:
+    """Values of a variable in a unit that suits them, and what stands beside them."""
+    values = dataset[name].values.astype(np.float64)
+    factor, label = _label(dataset, name, values)
+    scaled: _Array = values / factor
+    return scaled, label
+
+
+def wants_powers(values: _Array) -> bool:
+    """Whether values span so much that colours go by powers of ten: none negative, more than two of them."""
+    good = values[np.isfinite(values)]
+    positive = good[good > 0.0]
+    return bool(positive.size and (good >= 0.0).all() and positive.max() > _DECADES * positive.min())
+
+
+def _label(dataset: xr.Dataset, name: str, values: np.ndarray) -> tuple[float, str]:
+    """What values are divided by, and what stands beside them."""
+    attrs = dataset[name].attrs
+    row = STATISTICS.get(name)
+    words = str(attrs.get("long_name", row.long_name if row else name))
+    unit = str(attrs.get("units", row.unit if row else "1"))
+    words = words[:1].upper() + words[1:]
+    if unit == "1":
+        return 1.0, words
+    factor, scaled = scale_of(values, unit)
+    return factor, f"{words} ({scaled})"
+
+
+# ----------------------------------------------------------------------------------------------------
+# Lists of points, as a random sweep or a search makes them: a dot for each, over two of their parameters.
+
+
+_AREA = 2600.0
+"""Square points of ink that all dots together take, about; each has between the two below."""
+_SMALLEST, _LARGEST = 2.0, 22.0
+_PAPER = (
+    ("frequency_ratio", "velocity_amplitude"),
+    ("location", "velocity_amplitude"),
+    ("frequency_ratio", "location"),
+)
+_SHARE = 0.04
+"""Room beyond the outermost dots, as a share of the axis."""
+
+
+@checked
+def plot_points(
+    dataset: xr.Dataset,
+    name: str = "response_class",
+    ax: Axes | None = None,
+    *,
+    across: str | None = None,
+    upward: str | None = None,
+    dots: MeasuredPoints | None = None,
+    threshold_line: bool = False,
+    legend: bool = True,
+) -> Axes:
+    """Draw the response class, or a statistic, of each point of a list where its own values stand.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        What :func:`snapbeam.sweep` made of a list of points: variables over ``point``, parameters as coordinates.
+    name : str
+        ``"response_class"``, one of :data:`snapbeam.STATISTICS`, or any other variable over the points.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure one column wide by default.
+    across, upward : str, optional
+        Parameters along the axes; by default two of those that differ, velocity amplitude or location upward.
+    dots, threshold_line
+        Measured responses and V_QS1, as :func:`plot_response_map` draws them; they need axes, and values common to all
+        points, of the paper's coordinates.
+    legend : bool
+        Whether to say below what the colours mean, and how many of the points have each class.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    InputError
+        If the dataset is no list of points, or its points have no such variable or parameters.
+    """
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if instance("name", name, str, "text") not in dataset.data_vars or dataset[name].dims != ("point",):
+        named = [str(key) for key, item in dataset.data_vars.items() if item.dims == ("point",)]
+        raise InputError(f"variable = {shown(name)}: the points have {', '.join(named) or 'no variables'}")
+    along = _along(dataset, across, upward)
+    of_class = name == "response_class"
+    with house_style():
+        own = new_figure("single", 92.0 if of_class and legend else 74.0) if ax is None else None
+        if own is not None:
+            ax = own.add_subplot()
+        assert ax is not None
+        fix_ticks(ax)
+        at = [_place(axis, dataset, each) for axis, each in zip((ax.xaxis, ax.yaxis), along, strict=True)]
+        size = float(np.clip(_AREA / max(at[0].size, 1), _SMALLEST, _LARGEST))
+        look: dict[str, Any] = {"s": size, "linewidths": 0.2 if size > 6.0 else 0.0, "edgecolors": "black"}
+        look["rasterized"] = at[0].size > 5000
+        handles: list[Any] = []
+        if of_class:
+            kinds = dataset[name].values.astype(int)
+            ax.scatter(at[0], at[1], c=[CLASS_COLORS[ResponseClass(int(kind))] for kind in kinds], **look)
+            handles += class_handles(kinds)
+        else:
+            _statistic(ax, dataset, name, at, look)
+        handles += _over(ax, dataset, along, dots, threshold_line)
+        if legend and handles and own is not None:
+            own.legend(handles=handles, loc="outside lower center", ncols=2)
+        elif legend and handles:
+            ax.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2)
+        ax.set_title(subtitle(dataset, along), loc="left")
+    return ax
+
+
+def _over(
+    ax: Axes, dataset: xr.Dataset, along: tuple[str, str], dots: MeasuredPoints | None, threshold_line: bool
+) -> list[Any]:
+    """Draw what lies over the points; what a legend needs for it."""
+    if dots is None and not threshold_line:
+        return []
+    if along not in _PAPER:
+        raise InputError(
+            "dots, threshold_line: need velocity amplitude, or location, upward over frequency or location, "
+            f"not {along[1]} over {along[0]}"
+        )
+    fixed: dict[str, float | None] = {}
+    for name in {name for pair in _PAPER for name in pair} - set(along):
+        values = np.unique(dataset[name].values) if name in dataset.coords else np.empty(0)
+        fixed[name] = float(values[0]) if values.size == 1 else None
+    handles: list[Any] = [draw_threshold_line(ax, *along, fixed)] if threshold_line else []
+    return handles if dots is None else [*handles, draw_dots(ax, dots, *along, fixed)]
+
+
+def _along(dataset: xr.Dataset, across: str | None, upward: str | None) -> tuple[str, str]:
+    """The names of the coordinates along the two axes."""
+    names = [
+        str(name)
+        for name, item in dataset.coords.items()
+        if item.dims == ("point",) and name != "point" and "parameter" in item.attrs
+    ]
+    for what, given in (("across", across), ("upward", upward)):
+        if given is not None and given not in names:
+            raise InputError(
+                f"{what} = {shown(given)}: the points are given by {', '.join(names) or 'nothing'}"
+            )
+    differing = [name for name in names if np.unique(dataset[name].values).size > 1]
+    free = [name for name in (*differing, *names) if name not in (across, upward)]
+    if upward is None:
+        upward = next((name for name in UPWARD if name in free), None) or (free[-1] if free else None)
+    if across is None:
+        across = next((name for name in free if name != upward), None)
+    if across is None or upward is None or across == upward:
+        raise InputError(
+            f"points are drawn over two parameters; these are given by {', '.join(names) or 'none'}"
+        )
+    return across, upward
+
+
+def _place(axis: Axis, dataset: xr.Dataset, name: str) -> NDArray[np.float64]:
+    """Where the points stand along an axis, which is labelled; words stand side by side."""
+    values = dataset[name].values
+    axis.set_label_text(axis_label(dataset.drop_vars("point", errors="ignore"), name))
+    if values.dtype.kind in "fiu":
+        places = values.astype(np.float64)
+    else:
+        words, inverse = np.unique(values.astype(str), return_inverse=True)
+        axis.set_ticks(np.arange(words.size).tolist(), words.tolist())
+        places = inverse.astype(np.float64)
+    low, high = float(places.min()), float(places.max())
+    margin = _SHARE * (high - low) or 0.5
+    limits = axis.axes.set_xlim if isinstance(axis, XAxis) else axis.axes.set_ylim
+    limits(low - margin, high + margin)
+    return places
+
+
+def _statistic(
+    ax: Axes, dataset: xr.Dataset, name: str, at: list[NDArray[np.float64]], look: dict[str, Any]
+) -> None:
+    """Dots in colours by their value; those without one are hollow."""
+    values, label = scaled_values(dataset, name)
+    good = np.isfinite(values)
+    log = wants_powers(values)
+    norm = LogNorm() if log else Normalize()
+    drawn = ax.scatter(at[0][good], at[1][good], c=values[good], cmap=crameri.batlow, norm=norm, **look)
+    if not good.all():
+        ax.scatter(
+            at[0][~good],
+            at[1][~good],
+            **look | {"facecolors": "none", "linewidths": 0.4, "edgecolors": "0.5"},
+        )
+    ax.figure.colorbar(drawn, ax=ax, label=label, pad=0.02).ax.tick_params(labelsize=7)

@@ -1,0 +1,402 @@
+"""The waveform of one run: who is where, how deep they meet, how hard they push (Fig. 3 of the paper)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import cmcrameri.cm as crameri
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
+
+from snapbeam.plot.style import (
+    BEAM_COLOR,
+    CENTER_COLOR,
+    SHAKER_COLOR,
+    caption,
+    fix_ticks,
+    house_style,
+    new_figure,
+)
+from snapbeam.simulation.dataset import check_trajectory
+from snapbeam.simulation.run import Run
+from snapbeam.util.si_prefixes import scale_of
+from snapbeam.util.validation import InputError, checked, choice, finite, integer
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "across",
+    "dataset_of",
+    "plot_energies",
+    "plot_modal_amplitudes",
+    "plot_phase_portrait",
+    "plot_run",
+    "plot_spectrum",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# What else a run shows: amplitudes of its modes, energies, spectrum, phase portrait.
+
+
+_ENERGIES = (
+    ("energy_beam", "in the beam", BEAM_COLOR),
+    ("energy_contact", "in the contact", SHAKER_COLOR),
+    ("energy_dissipated", "dissipated", "#858585"),
+    ("striker_work", "striker's work", CENTER_COLOR),
+)
+
+
+def dataset_of(run: Run | xr.Dataset, *needed: str) -> xr.Dataset:
+    """The time series of a run, given as a run or as its dataset; refused if it lacks a variable."""
+    return check_trajectory(run.dataset if isinstance(run, Run) else run, require=needed)
+
+
+def across(dataset: xr.Dataset) -> tuple[str, str]:
+    """The variable that a run is drawn over, and its label."""
+    if "cycle" in dataset.variables:
+        return "cycle", r"Cycles of excitation $\tau$"
+    return "time", "Time (s)"
+
+
+def _axes(ax: Axes | None, dataset: xr.Dataset) -> Axes:
+    if ax is None:
+        ax = new_figure("single", 66.0).add_subplot()
+        ax.set_title(caption(dataset, 2), loc="left", fontsize=7)
+    fix_ticks(ax)
+    return ax
+
+
+@checked
+def plot_modal_amplitudes(run: Run | xr.Dataset, ax: Axes | None = None, *, modes: int = 5) -> Axes:
+    """Draw the amplitudes of the first *modes* buckling modes, over that of the well.
+
+    Parameters
+    ----------
+    run : Run or xarray.Dataset
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure one column wide by default.
+    modes : int
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    dataset = dataset_of(run, "modal_amplitude")
+    count = min(integer("modes", modes, 1), dataset.sizes["mode"])
+    name, label = across(dataset)
+    alpha = dataset["modal_amplitude"].values
+    well = _well_amplitude(dataset)
+    with house_style():
+        ax = _axes(ax, dataset)
+        for i in range(count):
+            color = crameri.batlow(0.85 * i / max(count - 1, 1))
+            ax.plot(
+                dataset[name],
+                alpha[:, i] / (well or 1.0),
+                color=color,
+                label=rf"$\alpha_{{{i + 1}}}$",
+                zorder=-i,
+            )
+        unit = r"$\alpha_i\,/\,|\alpha_1|$ in the well" if well else r"$\alpha_i$ (m$^{1/2}$)"
+        ax.set(xlabel=label, ylabel=f"Modal amplitude {unit}")
+        ax.margins(x=0.0)
+        _legend(ax, count)
+    return ax
+
+
+def _well_amplitude(dataset: xr.Dataset) -> float | None:
+    """Amplitude of the first mode in a well: b = 2 sqrt(2 L)/(2 pi) alpha_1, from the attributes."""
+    if {"beam_length", "beam_buckling_level"} <= set(dataset.attrs):
+        return float(
+            np.pi * dataset.attrs["beam_buckling_level"] / np.sqrt(2.0 * dataset.attrs["beam_length"])
+        )
+    return None
+
+
+def _legend(ax: Axes, entries: int) -> None:
+    """A legend in a row above the curves, where it crosses none."""
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + 0.16 * (high - low))
+    ax.legend(loc="upper left", ncols=entries, columnspacing=1.0, handlelength=1.2)
+
+
+@checked
+def plot_energies(run: Run | xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw where the striker's work went: into the beam, the contact, and damping.
+
+    Parameters
+    ----------
+    run : Run or xarray.Dataset
+    ax : matplotlib.axes.Axes, optional
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    dataset = dataset_of(run, "energy_beam")
+    name, label = across(dataset)
+    found = [(key, words, color) for key, words, color in _ENERGIES if key in dataset]
+    factor, unit = scale_of(np.concatenate([dataset[key].values for key, _, _ in found]), "J")
+    with house_style():
+        ax = _axes(ax, dataset)
+        for key, words, color in found:
+            ax.plot(dataset[name], dataset[key] / factor, color=color, label=words)
+        ax.set(xlabel=label, ylabel=f"Energy ({unit})")
+        ax.margins(x=0.0)
+        low, high = ax.get_ylim()
+        ax.set_ylim(low, high + 0.24 * (high - low))
+        ax.legend(loc="upper left", ncols=2)
+    return ax
+
+
+@checked
+def plot_spectrum(
+    run: Run | xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    variable: str = "midspan_displacement",
+    window: Any = None,
+) -> Axes:
+    """Draw the amplitude spectrum of a run, from evenly spaced samples under a Hann window.
+
+    Parameters
+    ----------
+    run : Run or xarray.Dataset
+    ax : matplotlib.axes.Axes, optional
+    variable : str
+        A variable over time, by name.
+    window : pair of float, optional
+        First and last cycle to take; everything by default.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Over the excitation frequency where the run has cycles, else over hertz.
+    """
+    dataset = dataset_of(run, variable)
+    choice(
+        "variable", variable, tuple(str(key) for key in dataset.data_vars if dataset[key].dims == ("time",))
+    )
+    name, _ = across(dataset)
+    x, y = dataset[name].values, dataset[variable].values
+    if window is not None:
+        inside = (x >= window[0]) & (x <= window[1])
+        x, y = x[inside], y[inside]
+    if x.size < 16:
+        raise InputError(f"window = {window}: must hold at least 16 samples")
+    even = np.linspace(x[0], x[-1], min(x.size, 1 << 17))
+    y = np.interp(even, x, y)
+    weight = np.hanning(even.size)
+    spectrum = 2.0 * np.abs(np.fft.rfft((y - y.mean()) * weight)) / weight.sum()
+    frequency = np.fft.rfftfreq(even.size, float(even[1] - even[0]))
+    unit = dataset[variable].attrs.get("units", "1")
+    with house_style():
+        ax = _axes(ax, dataset)
+        ax.plot(frequency[1:], spectrum[1:], color=BEAM_COLOR, linewidth=0.6)
+        top = 12.0 if name == "cycle" else float(frequency[-1])
+        shown = spectrum[1:][frequency[1:] <= top]
+        ax.set(xlim=(0.0, top), yscale="log", ylim=(max(shown.max() * 1e-5, 1e-300), shown.max() * 2.0))
+        ax.set_xlabel(r"Frequency $f\,/\,f_\mathrm{excitation}$" if name == "cycle" else "Frequency (Hz)")
+        words = str(dataset[variable].attrs.get("long_name", variable)).replace(", over b", " over $b$")
+        ax.set_ylabel(f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}")
+    return ax
+
+
+@checked
+def plot_phase_portrait(
+    run: Run | xr.Dataset, ax: Axes | None = None, *, of: str = "center", strobe: bool = True
+) -> Axes:
+    """Draw velocity over displacement, with a dot at each whole cycle of excitation.
+
+    Parameters
+    ----------
+    run : Run or xarray.Dataset
+    ax : matplotlib.axes.Axes, optional
+    of : {"center", "striker"}
+        The point of the beam.
+    strobe : bool
+        Whether to mark whole cycles.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    before = "center_" if choice("of", of, ("center", "striker")) == "center" else ""
+    dataset = dataset_of(run, f"{before}displacement", f"{before}velocity")
+    w, v = (dataset[f"{before}{name}"].values for name in ("displacement_at_striker", "velocity_at_striker"))
+    with house_style():
+        ax = _axes(ax, dataset)
+        ax.plot(w, v, color="0.6", linewidth=0.4, rasterized=w.size > 20_000)
+        if strobe and "cycle" in dataset.variables:
+            cycle = dataset["cycle"].values
+            whole = np.arange(np.ceil(cycle[0]), np.floor(cycle[-1]) + 1.0)
+            ax.plot(
+                np.interp(whole, cycle, w), np.interp(whole, cycle, v), ".", color=SHAKER_COLOR, markersize=3,
+                label="whole cycles",
+            )  # fmt: skip
+            _legend(ax, 1)
+        ax.set(xlabel="Displacement $w/b$", ylabel=r"Velocity $\dot w\,/\,b\omega_1$")
+    return ax
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_CURVES = (
+    ("midspan_displacement", "beam, centre", CENTER_COLOR),
+    ("displacement_at_striker", "beam, at the striker", BEAM_COLOR),
+    ("striker_displacement", "striker", SHAKER_COLOR),
+)
+_MANY = 20_000  # samples above which a curve is stored as pixels in a vector file
+
+
+@checked
+def plot_run(
+    run: Run | xr.Dataset, window: tuple[float, float] | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw the displacements, the penetration and the contact force of a run, and its hardest impact closer.
+
+    Left, over cycles of excitation: the whole run or a window.  Right, over time: the samples about
+    the greatest contact force within the window, from a little before the contact to a little after it.  A
+    measured run, which has no force, is drawn without what it lacks.
+
+    Parameters
+    ----------
+    run : Run or xarray.Dataset
+        A run, or a dataset that follows :data:`snapbeam.simulation.dataset.SCHEMA`.
+    window : pair of float, optional
+        First and last cycle to draw; everything by default.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw the displacements alone; by default a new figure of two columns holds everything.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Of the displacements.
+
+    Raises
+    ------
+    InputError
+        If the dataset is no run or the window holds less than two samples.
+    """
+    dataset = dataset_of(run, "displacement_at_striker")
+    axis_name, label = across(dataset)
+    part = _cut(dataset, axis_name, window)
+    has_force = "contact_force" in part and bool((part["contact_force"] > 0.0).any())
+    rows = 1 + ("penetration_normalised" in part) + ("contact_force" in part)
+    if ax is not None:
+        return _alone(ax, part, part[axis_name].values, label)
+    with house_style():
+        figure = new_figure("double", 35.0 + 28.0 * rows)
+        grid = figure.add_gridspec(
+            rows, 2 if has_force else 1, width_ratios=(2.2, 1.0) if has_force else None,
+            height_ratios=(1.6, 1.0, 1.0)[:rows],
+        )  # fmt: skip
+        force = scale_of(part["contact_force"].values, "N") if "contact_force" in part else (1.0, "N")
+        left = _column(figure, grid, 0, part, part[axis_name].values, force)
+        left[-1].set_xlabel(label)
+        first, last = float(part[axis_name][0]), float(part[axis_name][-1])
+        left[0].set_xlim(_from(first, last), last)
+        left[0].set_ylabel("Displacement $w/b$")
+        handles, labels = left[0].get_legend_handles_labels()
+        figure.legend(
+            handles, labels, loc="outside upper left", ncols=3, title=caption(dataset), alignment="left",
+            title_fontsize=7,
+        )  # fmt: skip
+        figure.align_ylabels(left)
+        if has_force:
+            near, seconds, peak = _hardest_impact(part)
+            scale, unit = scale_of(seconds, "s")
+            around = seconds / scale
+            right = _column(figure, grid, 1, near, around, force)
+            right[-1].set_xlabel(
+                f"Time after $\\tau$ = {peak:.4g} ({unit})" if across == "cycle" else f"Time ({unit})"
+            )
+            right[0].set_xlim(min(around[0], -0.12 * around[-1]), around[-1])
+    return left[0]
+
+
+def _alone(ax: Axes, part: xr.Dataset, x: np.ndarray, label: str) -> Axes:
+    """The displacements, on axes that somebody else made."""
+    with house_style():
+        for name, words, color in _CURVES:
+            if name in part:
+                ax.plot(x, part[name].values, color=color, label=words, rasterized=x.size > _MANY)
+        ax.axhline(0.0, color="0.6", linewidth=0.5, zorder=0)
+        ax.set(xlabel=label, ylabel="Displacement $w/b$", xlim=(_from(x[0], x[-1]), x[-1]))
+        low, high = ax.get_ylim()
+        ax.set_ylim(low, high + 0.15 * (high - low))
+        ax.legend(loc="upper left", ncols=3)
+        fix_ticks(ax)
+    return ax
+
+
+def _from(first: float, last: float) -> float:
+    """Where an axis begins: a little before the start of a run, so that an impact that begins at once is seen."""
+    return first if first > 0.0 else first - 0.01 * (last - first)
+
+
+def _cut(dataset: xr.Dataset, across: str, window: tuple[float, float] | None) -> xr.Dataset:
+    if window is None:
+        return dataset
+    first, last = (finite(f"window[{at}]", value) for at, value in enumerate(window))
+    inside = (dataset[across].values >= first) & (dataset[across].values <= last)
+    if inside.sum() < 2:
+        end = float(dataset[across][-1])
+        raise InputError(
+            f"window = ({first:g}, {last:g}): must hold at least two samples of a run of {end:g} cycles"
+        )
+    return dataset.isel(time=inside)
+
+
+def _column(
+    figure: Figure, grid: GridSpec, at: int, part: xr.Dataset, x: np.ndarray, force_scale: tuple[float, str]
+) -> list[Axes]:
+    rows = grid.nrows
+    axes: list[Axes] = []
+    for row in range(rows):
+        axes.append(figure.add_subplot(grid[row, at], sharex=axes[0] if axes else None))
+        fix_ticks(axes[-1])
+        axes[-1].tick_params(labelbottom=row == rows - 1)
+        axes[-1].margins(x=0.0)
+    pixels = x.size > _MANY
+    for name, label, color in _CURVES:
+        if name in part:
+            axes[0].plot(x, part[name].values, color=color, label=label, rasterized=pixels)
+    if at == 0:
+        axes[0].axhline(0.0, color="0.6", linewidth=0.5, zorder=0)
+    row = 1
+    if "penetration_normalised" in part:
+        depth = 1e3 * np.maximum(part["penetration_normalised"].values, 0.0)
+        axes[row].plot(x, depth, color=BEAM_COLOR, rasterized=pixels)
+        axes[row].set_ylim(bottom=0.0)
+        if at == 0:
+            axes[row].set_ylabel("Penetration\n$d$ ($10^{-3}\\,b$)")
+        row += 1
+    if "contact_force" in part:
+        factor, unit = force_scale
+        axes[row].plot(x, part["contact_force"].values / factor, color=BEAM_COLOR, rasterized=pixels)
+        axes[row].set_ylim(bottom=0.0)
+        if at == 0:
+            axes[row].set_ylabel(f"Contact\nforce $f$ ({unit})")
+    return axes
+
+
+def _hardest_impact(part: xr.Dataset) -> tuple[xr.Dataset, np.ndarray, float]:
+    """The samples about the greatest force: the contact around it and as much again on either side."""
+    force, time = part["contact_force"].values, part["time"].values
+    peak = int(np.nanargmax(force))
+    apart = np.flatnonzero(~(force > 0.0))
+    before = apart[apart < peak]
+    after = apart[apart > peak]
+    start = int(before[-1]) if before.size else 0
+    stop = int(after[0]) if after.size else len(force) - 1
+    margin = 0.6 * (time[stop] - time[start])
+    inside = (time >= time[start] - margin) & (time <= time[stop] + margin)
+    near = part.isel(time=inside)
+    cycle = float(part["cycle"][start]) if "cycle" in part.variables else 0.0
+    return near, near["time"].values - time[start], cycle

@@ -1,0 +1,305 @@
+"""One house style for every picture: widths of a journal, one font, colours anyone can tell apart."""
+
+from __future__ import annotations
+
+import os
+import textwrap
+from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.util.diagnostics import Diagnostic, Severity
+from snapbeam.util.files import MADE_BY, atomic_path, check_writable
+from snapbeam.util.si_prefixes import prefixed
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError, choice, finite_array, positive
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "BEAM_COLOR",
+    "CENTER_COLOR",
+    "CLASS_COLORS",
+    "COLUMN_WIDTHS",
+    "FIGURE_SUFFIXES",
+    "SHAKER_COLOR",
+    "beam_text",
+    "caption",
+    "cell_edges",
+    "class_cells",
+    "draw_findings",
+    "figure_legend",
+    "findings_height",
+    "fix_ticks",
+    "house_style",
+    "new_figure",
+    "panel_letters",
+    "save_figure",
+]
+
+
+COLUMN_WIDTHS = {"single": 90.0, "double": 190.0}
+"""Widths of one and of two columns of a page, mm."""
+
+FIGURE_SUFFIXES = (".png", ".pdf", ".svg")
+
+# Chosen so that any two differ clearly in colour (CIE 1976 colour difference) for normal vision and under
+# simulated protanopia, deuteranopia and tritanopia (Machado, Oliveira and Fernandes 2009, severity 1); the
+# tests hold the difference above 28 and the five lightnesses at least 8 apart.
+CLASS_COLORS = {
+    ResponseClass.INTRAWELL: "#B03A27",
+    ResponseClass.TRANSIENT_1: "#16245E",
+    ResponseClass.TRANSIENT_2: "#70BBF0",
+    ResponseClass.CONTINUOUS: "#C3DD8A",
+    ResponseClass.UNKNOWN: "#858585",
+}
+"""Colour of each response class: red, dark blue, light blue, green; grey where the class is unknown."""
+
+BEAM_COLOR = "#000000"
+SHAKER_COLOR = "#B03A27"
+CENTER_COLOR = "#70BBF0"
+
+_RC: Any = {
+    "axes.axisbelow": True,
+    "axes.labelsize": 8,
+    "axes.linewidth": 0.6,
+    "axes.titlesize": 8,
+    "figure.constrained_layout.use": True,
+    "figure.dpi": 150,
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 8,
+    "legend.fontsize": 7,
+    "legend.columnspacing": 1.4,
+    "legend.frameon": False,
+    "legend.handlelength": 1.4,
+    "lines.linewidth": 0.9,
+    "mathtext.fontset": "dejavusans",
+    "path.simplify_threshold": 0.5,
+    "pdf.fonttype": 42,
+    "savefig.dpi": 300,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "snapbeam",
+    "xtick.labelsize": 7,
+    "xtick.major.width": 0.6,
+    "ytick.labelsize": 7,
+    "ytick.major.width": 0.6,
+}
+
+
+def house_style() -> AbstractContextManager[None]:
+    """Return a context in which Matplotlib draws in the house style."""
+    return mpl.rc_context(_RC)
+
+
+def fix_ticks(*axes: Axes) -> None:
+    """Give the ticks of *axes* the house style for good; Matplotlib makes them only when it draws."""
+    for ax in axes:
+        ax.tick_params(labelsize=_RC["xtick.labelsize"], width=_RC["xtick.major.width"])
+
+
+def new_figure(width: str = "single", height: float = 75.0) -> Figure:
+    """Return an empty figure in the house style, known to pyplot so that notebooks show it.
+
+    Parameters
+    ----------
+    width : {"single", "double"}
+        One column (90 mm) or two (190 mm).
+    height : float
+        Height, mm.
+    """
+    import matplotlib.pyplot as plt
+
+    millimetres = COLUMN_WIDTHS[choice("width", width, tuple(COLUMN_WIDTHS))]
+    with house_style():
+        return plt.figure(figsize=(millimetres / 25.4, positive("height", height, "mm") / 25.4))
+
+
+def axes_or_new(ax: Axes | None, width: str = "single", height: float = 72.0) -> Axes:
+    """The axes that were given, or those of a new figure."""
+    return new_figure(width, height).add_subplot() if ax is None else ax
+
+
+def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
+    """Write a figure, or the one that axes are in, to PNG (300 dots per inch), PDF or SVG, by the suffix.
+
+    The file is whole or not there.
+
+    Raises
+    ------
+    InputError
+        If the path cannot be written or has another suffix.
+    """
+    target = check_writable(path, "plot", FIGURE_SUFFIXES)
+    if isinstance(figure, Axes):
+        whole = figure.get_figure(root=True)
+        assert whole is not None
+        figure = whole
+    kind = target.suffix.lower().lstrip(".")
+    stamp = {
+        "pdf": {"Creator": MADE_BY, "CreationDate": None},
+        "svg": {"Creator": MADE_BY, "Date": None},
+    }.get(kind, {"Description": MADE_BY})
+    with house_style(), atomic_path(target) as temporary:
+        figure.savefig(temporary, format=kind, metadata=stamp)
+    return target
+
+
+# ----------------------------------------------------------------------------------------------------
+# What stands on a picture: numbers with prefixes that suit them, the beam and the drive, the class.
+
+
+def beam_text(attrs: Any) -> str:
+    """The beam in a few words, from the attributes of a file; empty if they say nothing of one."""
+    if not {"beam_length", "beam_thickness"} <= set(attrs):
+        return ""
+    words = [f"beam {prefixed(attrs['beam_length'], 'm')} × {prefixed(attrs['beam_thickness'], 'm')}"]
+    if attrs.get("beam_buckling_level"):
+        words.append(f"$b$ = {prefixed(attrs['beam_buckling_level'], 'm')}")
+    return ", ".join(words)
+
+
+def caption(dataset: xr.Dataset, lines: int = 1) -> str:
+    """Beam, modes, drive and class of a run or a map, as far as its attributes say them, in one line or two."""
+    attrs = dataset.attrs
+    what, how = [beam_text(attrs)], []
+    if "modes" in attrs:
+        what.append(f"$N$ = {int(attrs['modes'])}")
+    if "frequency_ratio" in attrs and "frequency_ratio" not in dataset.dims:
+        text = rf"$\Omega$ = {attrs['frequency_ratio']:.4g}"
+        if "reference_frequency" in attrs:
+            text += f" ({prefixed(attrs['frequency_ratio'] * attrs['reference_frequency'], 'Hz')})"
+        how.append(text)
+    if "velocity_amplitude" in attrs and "velocity_amplitude" not in dataset.dims:
+        text = f"$V$ = {attrs['velocity_amplitude']:.4g}"
+        if {"reference_frequency", "length_scale"} <= set(attrs):
+            speed = (
+                attrs["velocity_amplitude"]
+                * 2.0
+                * np.pi
+                * attrs["reference_frequency"]
+                * attrs["length_scale"]
+            )
+            text += f" ({prefixed(speed, 'm/s')})"
+        how.append(text)
+    if "location" in attrs and "location" not in dataset.dims:
+        how.append(rf"$x_\mathrm{{s}}$ = {attrs['location']:.3g}")
+    parts = [", ".join(part for part in each if part) for each in (what, how)]
+    text = ("\n" if lines > 1 else ", ").join(part for part in parts if part)
+    kind = attrs.get("response_class")
+    return f"{text}: {kind}" if isinstance(kind, str) and text else text
+
+
+# ----------------------------------------------------------------------------------------------------
+# Parts that figures of several panels share: letters, cells of response classes, one legend.
+
+
+_Array = NDArray[np.float64]
+
+
+def panel_letters(axes: Iterable[Axes], first: str = "A", *, offset: float = -16.0) -> None:
+    """Write a bold capital beside the upper left corner of each of *axes*, *offset* points to its right."""
+    for at, ax in enumerate(axes):
+        ax.annotate(
+            chr(ord(first) + at),
+            (0.0, 1.0),
+            (offset, 3.0),
+            xycoords="axes fraction",
+            textcoords="offset points",
+            fontsize=9,
+            fontweight="bold",
+            ha="right",
+            va="bottom",
+            annotation_clip=False,
+        )
+
+
+def cell_edges(points: ArrayLike, low: float = -np.inf, high: float = np.inf) -> _Array:
+    """Borders midway between the points of an axis; the outermost as far out as the next one in."""
+    x = finite_array("points", points, 1)
+    if x.size < 2:
+        raise InputError(f"points = {x.tolist()}: must be at least two")
+    middle = 0.5 * (x[1:] + x[:-1])
+    first, last = max(2.0 * x[0] - middle[0], low), min(2.0 * x[-1] - middle[-1], high)
+    return np.concatenate([[first], middle, [last]])
+
+
+def class_cells(ax: Axes, x: ArrayLike, y: ArrayLike, kinds: ArrayLike) -> None:
+    """Colour cells by their response class.
+
+    Parameters
+    ----------
+    x, y : array_like
+        Borders of the cells, of shapes (columns + 1,) and (rows + 1,), or both (rows + 1, columns + 1).
+    kinds : array_like, shape (rows, columns)
+        :class:`~snapbeam.ResponseClass` of each.
+    """
+    order = sorted(CLASS_COLORS)
+    ax.pcolormesh(
+        np.asarray(x),
+        np.asarray(y),
+        np.asarray(kinds),
+        cmap=ListedColormap([CLASS_COLORS[kind] for kind in order]),
+        norm=BoundaryNorm(np.arange(order[0] - 0.5, order[-1] + 1.0), len(order)),
+        rasterized=True,
+    )
+
+
+def figure_legend(figure: Figure, handles: Sequence[Artist], columns: int = 4) -> Legend:
+    """One legend for all panels, below them."""
+    return figure.legend(handles=list(handles), loc="outside lower center", ncols=columns)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Diagnostics of a measurement in its picture: a box of words below, red where the numbers are doubtful.
+
+
+_LINE = 2.9  # mm
+_COLORS = {Severity.INFO: "0.35", Severity.WARNING: SHAKER_COLOR, Severity.ERROR: SHAKER_COLOR}
+
+
+def _lines(diagnostics: Iterable[Diagnostic], width: float, most: int) -> list[tuple[str, str]]:
+    """Wrapped lines and their colours, the gravest diagnostics first, at most so many diagnostics."""
+    order = {Severity.ERROR: 0, Severity.WARNING: 1, Severity.INFO: 2}
+    chosen = sorted(diagnostics, key=lambda one: order[one.severity])
+    out: list[tuple[str, str]] = []
+    for one in chosen[:most]:
+        text = f"{one.severity.value}: {one.message}"
+        for k, line in enumerate(textwrap.wrap(text, int(width / 1.02))):
+            out.append((line if k == 0 else f"    {line}", _COLORS[one.severity]))
+    if len(chosen) > most:
+        out.append((f"and {len(chosen) - most} more", "0.35"))
+    return out
+
+
+def findings_height(diagnostics: Iterable[Diagnostic], width: float, most: int = 6) -> float:
+    """Height [mm] that the diagnostics take below a picture of *width* [mm]; 0 if there are none."""
+    lines = _lines(diagnostics, width, most)
+    return _LINE * len(lines) + 2.0 if lines else 0.0
+
+
+def draw_findings(figure: Figure, diagnostics: Iterable[Diagnostic], most: int = 6) -> None:
+    """Write diagnostics along the lower edge of a figure made *findings_height* taller, and keep axes off it."""
+    width, height = (25.4 * float(size) for size in figure.get_size_inches())
+    lines = _lines(diagnostics, width, most)
+    if not lines:
+        return
+    share = (_LINE * len(lines) + 2.0) / height
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.set(rect=(0.0, share, 1.0, 1.0 - share))  # type: ignore[call-arg]
+    for k, (text, color) in enumerate(lines):
+        figure.text(
+            1.5 / width, share - (k + 0.9) * _LINE / height, text, color=color, fontsize=5.5, va="baseline"
+        )

@@ -1,0 +1,177 @@
+"""The threshold of the interwell response, as a band, for one or several numbers of modes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+
+from snapbeam.model.quasi_static import quasi_static_threshold
+from snapbeam.plot.axes import dress, edges_of, positions, symbol_of
+from snapbeam.plot.style import fix_ticks, house_style, new_figure
+from snapbeam.util.validation import InputError, checked, instance
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["plot_threshold"]
+
+
+_Array = NDArray[np.float64]
+_OPEN = "left open by failed runs"
+_NEEDED = ("lower_threshold", "upper_threshold", "lower_threshold_min", "upper_threshold_max", "outcome")
+
+_STYLES = (("#B03A27", "-"), ("#16245E", "-"), ("#4C97C8", "--"), ("#6E8B2F", "-."), ("#000000", ":"))
+
+
+@checked
+def plot_threshold(
+    dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static: bool = True, legend: bool = True
+) -> Axes:
+    """Draw the result of :func:`snapbeam.threshold`.
+
+    The line is the lowest value that makes an interwell response.  The shade reaches up to the value above which
+    every run is interwell, or to the end of the range if the highest run is intrawell.  A point without drawn
+    neighbours has a marker.  A triangle at the top means that no run is interwell.  Hatching marks the points
+    whose outcome is ``not_searched`` or ``undecided``.  A dotted line at a point shows how far failed runs
+    leave the threshold open.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Result of :func:`snapbeam.threshold` along one axis, or a curve for each point of a second axis.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure one column wide by default.
+    quasi_static : bool
+        Whether to draw the quasi-static threshold V_QS1 of one mode (Eq. 21), dashed.
+    legend : bool
+        Whether to name the curves.
+
+    Raises
+    ------
+    InputError
+        If the dataset holds no threshold curve.
+    """
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if not set(_NEEDED) <= set(dataset.variables):
+        raise InputError(f"no threshold curve among {list(map(str, dataset.variables))}")
+    dims = [str(name) for name in dataset["lower_threshold"].squeeze().dims]
+    if not 1 <= len(dims) <= 2:
+        raise InputError(
+            f"threshold over {dims}: is drawn along one axis, a curve for each point of another one"
+        )
+    along = dims[-1] if len(dims) == 1 or dims[-1] != "modes" else dims[0]
+    others = [name for name in dims if name != along]
+    raised = str(dataset.attrs.get("along", "velocity_amplitude"))
+    x, _ = positions(dataset, along)
+    edges = edges_of(dataset, along)
+    curves = (
+        [dataset.isel({others[0]: at}) for at in range(dataset.sizes[others[0]])] if others else [dataset]
+    )
+    curves = [curve.squeeze() for curve in curves]
+    if len(curves) > len(_STYLES):
+        raise InputError(f"dataset: has {len(curves)} curves; at most {len(_STYLES)} can be told apart")
+    with house_style():
+        if ax is None:
+            ax = new_figure("single", 70.0).add_subplot()
+        for curve, (color, dashes) in zip(curves, _STYLES, strict=False):
+            _draw_curve(ax, curve, x, (color, dashes), _label(dataset, curve, others, raised))
+        quasi_static = (
+            quasi_static and raised == "velocity_amplitude" and along in ("frequency_ratio", "location")
+        )
+        if quasi_static:
+            ax.plot(x, _quasi_static(dataset, along, x), color="black", linewidth=0.8, dashes=(4, 2),
+                    label=r"quasi-static, $V_\mathrm{QS1}$")  # fmt: skip
+        amplitude = dataset[raised].values
+        upper = dataset["upper_threshold_max"].where(dataset["lower_threshold"].notnull(), -np.inf)
+        closed = bool(upper.notnull().all()) and bool(np.isfinite(upper).any())
+        top = min(amplitude[-1], 1.4 * float(upper.max())) if closed else amplitude[-1]
+        fix_ticks(ax)
+        dress(ax.xaxis, dataset, along)
+        dress(ax.yaxis, dataset, raised)
+        low = amplitude[0] if ax.get_yscale() == "log" else min(0.0, amplitude[0])
+        ax.set(xlim=x[[0, -1]], ylim=(low, top))
+        marks = _mark_no_threshold(ax, curves, x, edges)
+        if "cycles" in dataset.attrs:
+            step = float(np.max(np.diff(amplitude)))
+            ax.set_title(
+                f"{int(dataset.attrs['cycles'])} cycles, steps of {step:.2g} in {symbol_of(dataset, raised)}",
+                loc="left",
+            )
+        if legend:
+            shade = Patch(facecolor="0.75", label="up to where all runs are interwell")
+            handles, _ = ax.get_legend_handles_labels()
+            ax.legend(handles=[*handles, shade, *marks], loc="best", frameon=True, edgecolor="none")
+    return ax
+
+
+def _draw_curve(ax: Axes, curve: xr.Dataset, x: _Array, style: tuple[str, str], label: str) -> None:
+    """Draw one band, its isolated points and the intervals that failed runs leave open."""
+    color, dashes = style
+    end = float(curve[str(curve.attrs.get("along", "velocity_amplitude"))][-1])
+    first, always, least, most = (np.atleast_1d(curve[name].values) for name in _NEEDED[:4])
+    found = np.isfinite(first)
+    always = np.where(found & ~np.isfinite(always), end, always)
+    most = np.where(found & ~np.isfinite(most), end, most)
+    ax.fill_between(x, first, always, color=color, alpha=0.25, linewidth=0.0)
+    ax.plot(x, first, dashes, color=color, linewidth=1.1, label=label)
+    alone = found & ~np.append(found[1:], False) & ~np.append(False, found[:-1])
+    ax.plot(x[alone], first[alone], "o", color=color, markersize=3.0, clip_on=False)
+    ax.vlines(x[alone], first[alone], always[alone], color=color, alpha=0.25, linewidth=3.0)
+    for low, high in ((least, first), (always, most)):
+        wide = found & (low < high)
+        if wide.any():
+            known = _OPEN in ax.get_legend_handles_labels()[1]
+            ax.vlines(
+                x[wide], low[wide], high[wide], color=color, linewidth=0.9, linestyle=":",
+                label="" if known else _OPEN,
+            )  # fmt: skip
+
+
+def _mark_no_threshold(ax: Axes, curves: list[xr.Dataset], x: _Array, edges: _Array) -> list[Patch]:
+    """Mark the points without a threshold, and return the legend handles of the hatching."""
+    labelled = False
+    above = ax.get_xaxis_transform()
+    codes = np.array([np.atleast_1d(curve["outcome"].values) for curve in curves])
+    kinds = str(curves[0]["outcome"].attrs["flag_meanings"]).split()
+    for number, (color, _) in zip(range(len(curves)), _STYLES, strict=False):
+        none = codes[number] == kinds.index("no_interwell_in_range")
+        if none.any():
+            ax.plot(
+                x[none], np.full(int(none.sum()), 0.98), "^", color=color, markersize=3.5, transform=above,
+                clip_on=False, label="" if labelled else "no interwell response in range",
+            )  # fmt: skip
+            labelled = True
+    handles = []
+    for kind, hatch, label in (
+        ("undecided", "....", "undecided: runs failed"),
+        ("not_searched", "////", "not searched"),
+    ):
+        chosen = (codes == kinds.index(kind)).any(axis=0)
+        look: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.5", "hatch": hatch, "linewidth": 0.0}
+        for at in np.flatnonzero(chosen):
+            ax.axvspan(edges[at], edges[at + 1], zorder=0.5, **look)
+        if chosen.any():
+            handles.append(Patch(label=label, **look))
+    return handles
+
+
+def _label(dataset: xr.Dataset, curve: xr.Dataset, others: list[str], raised: str) -> str:
+    """What one curve is called."""
+    if others:
+        value = curve[others[0]].item()
+        text = str(value) if isinstance(value, (int, str)) else f"{value:.4g}"
+        return f"{symbol_of(dataset, others[0])} = {text}"
+    modes = dataset.attrs.get("modes")
+    return f"lowest interwell {symbol_of(dataset, raised)}" if modes is None else f"$N$ = {int(modes)}"
+
+
+def _quasi_static(dataset: xr.Dataset, along: str, x: np.ndarray) -> np.ndarray:
+    if along == "location":
+        return np.asarray(quasi_static_threshold(x, float(dataset["frequency_ratio"])))
+    return np.asarray(quasi_static_threshold(float(dataset["location"]), x))

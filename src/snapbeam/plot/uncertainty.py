@@ -1,0 +1,431 @@
+"""Designs that were tried, and what was found among them: a goal against another, or over a variable."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from cmcrameri import cm
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm
+from matplotlib.lines import Line2D
+from matplotlib.ticker import EngFormatter
+
+from snapbeam.model.parameters import lookup
+from snapbeam.model.quasi_static import quasi_static_threshold
+from snapbeam.plot.axes import dress, edges_of, is_geometric, positions, symbol_of
+from snapbeam.plot.style import CLASS_COLORS, fix_ticks, house_style, new_figure
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError, instance, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from snapbeam.sweeps.measured_points import MeasuredPoints
+
+__all__ = ["plot_designs", "plot_probability", "plot_quantiles", "plot_tornado"]
+
+
+_TRIED, _BROKEN = "#4C97C8", "0.8"
+_STATES = (("fails", "X", "#B03A27"), ("undecided", "D", "#C3DD8A"), ("holds", "o", "#16245E"))
+_GOAL = "tried_goal_"
+_DECADE = 10.0
+"""Greatest over least value from which an axis is one of powers."""
+
+
+def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None = None) -> Axes:
+    """Draw what :func:`snapbeam.uncertainty.optimize_design` found: the first goal over the second, or over a variable.
+
+    Designs that kept their limits while they were sought are small dots; those reported have the intervals of fresh
+    draws, and a sign that says whether their limits hold there.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    over : str, optional
+        A variable, such as ``"location"``; the second goal by default, or the first variable if there is one goal.
+    ax : matplotlib.axes.Axes, optional
+
+    Raises
+    ------
+    InputError
+        If the dataset holds no designs, or nothing of that name.
+    """
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if "holds" not in dataset or "tried" not in dataset.dims:
+        raise InputError(f"no designs among {list(map(str, dataset.variables))}")
+    names = [str(name) for name in dataset.data_vars]
+    goals = [name[len(_GOAL) :] for name in names if name.startswith(_GOAL)]
+    variables = [name[6:] for name in names if name.startswith("tried_") and not name.startswith(_GOAL)]
+    if over is None:
+        across = f"goal_{goals[1]}" if len(goals) > 1 else variables[0]
+    elif over in variables:
+        across = over
+    else:
+        raise InputError(f"over = {shown(over)}: must be one of {', '.join(variables)}")
+    up = f"goal_{goals[0]}"
+    with house_style():
+        if ax is None:
+            ax = new_figure("single", 74.0).add_subplot()
+        x, y = dataset[f"tried_{across}"].values, dataset[f"tried_{up}"].values
+        kept = (dataset["violation"].values == 0.0) & np.isfinite(y)
+        ax.scatter(x[kept], y[kept], s=4, color=_TRIED, linewidths=0.0, label="tried, limits kept")
+        for code, (word, marker, color) in enumerate(_STATES):
+            own = dataset["holds"].values == code
+            if own.any():
+                _reported(dataset, ax, across, up, own, marker, color, f"limits: {word}")
+        ax.set(xlabel=_label(dataset, across), ylabel=_label(dataset, up))
+        for values, scale in ((x[kept], ax.set_xscale), (y[kept], ax.set_yscale)):
+            if values.size and values.min() > 0.0 and values.max() > _DECADE * values.min():
+                scale("log")
+        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+        fix_ticks(ax)
+    return ax
+
+
+def _reported(
+    dataset: xr.Dataset, ax: Axes, across: str, up: str, own: np.ndarray, marker: str, color: str, label: str
+) -> None:
+    x, y = dataset[across].values[own], dataset[up].values[own]
+    bars = [_errors(dataset, name, own) for name in (across, up)]
+    ax.errorbar(
+        x, y, xerr=bars[0], yerr=bars[1], fmt=marker, color=color, markersize=5, markeredgecolor="black",
+        markeredgewidth=0.5, ecolor="black", elinewidth=0.8, capsize=2.0, label=label, zorder=3,
+    )  # fmt: skip
+
+
+def _errors(dataset: xr.Dataset, name: str, own: np.ndarray) -> np.ndarray | None:
+    if f"{name}_low" not in dataset:
+        return None
+    middle, low, high = (dataset[f"{name}{end}"].values[own] for end in ("", "_low", "_high"))
+    found = np.stack([middle - low, high - middle])
+    return np.where(np.isfinite(found), found, 0.0)
+
+
+def _label(dataset: xr.Dataset, name: str) -> str:
+    labels = dataset[name].attrs
+    unit, words = str(labels.get("units", "1")), str(labels.get("long_name", name))
+    return f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}"
+
+
+# ----------------------------------------------------------------------------------------------------
+# Probabilities over one parameter, with their interval, or over two, with contours of equal probability.
+
+
+_LEVELS = (0.05, 0.5, 0.95)
+_WORDS = {
+    "snap": "P(snap-through)",
+    "continuous": "P(continuous snap-through)",
+    "first_well": "P(ends in the first well)",
+    "other_well": "P(ends in the other well)",
+}
+_LINES = (("#B03A27", "-"), ("#16245E", "--"), ("#4C97C8", "-."), ("#000000", ":"))
+_DASHES: dict[float, Any] = {0.05: ":", 0.5: "-", 0.95: "--"}
+
+
+def plot_probability(
+    dataset: xr.Dataset,
+    outcome: str = "snap",
+    ax: Axes | None = None,
+    *,
+    dots: MeasuredPoints | None = None,
+    levels: tuple[float, ...] = _LEVELS,
+) -> Axes:
+    """Draw a probability map of one outcome.
+
+    Over two parameters colours say the probability, in tenths, and lines where it passes *levels*; points whose
+    interval is wider than was asked for have a small cross.  Over one parameter the line has its interval as a band.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`snapbeam.uncertainty.probability_map` over one or two parameters.
+    outcome : str
+    ax : matplotlib.axes.Axes, optional
+    dots : Dots, optional
+        Measured responses to lay over it, in the colours of their classes.
+    levels : tuple of float
+        Probabilities, increasing, each in (0, 1).
+
+    Raises
+    ------
+    InputError
+        If the dataset holds no such map.
+    """
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if "probability" not in dataset or "outcome" not in dataset["probability"].dims:
+        raise InputError(f"no probabilities among {list(map(str, dataset.variables))}")
+    known = [str(name) for name in dataset["outcome"].values]
+    if outcome not in known:
+        raise InputError(f"outcome = {shown(outcome)}: must be one of {', '.join(known)}")
+    data = dataset.sel(outcome=outcome)
+    dims = [str(name) for name in data["probability"].dims if data.sizes[name] > 1]
+    data = data.squeeze()
+    if not 1 <= len(dims) <= 2 or "point" in dims:
+        raise InputError(f"probability over {dims}: is drawn over one or two parameters")
+    with house_style():
+        if ax is None:
+            ax = new_figure("single", 72.0).add_subplot()
+        if len(dims) == 1:
+            _line(data, ax, dims[0], outcome, levels)
+        else:
+            _cells(data, ax, dims, outcome, levels)
+        if dots is not None and len(dims) == 2:
+            _lay_dots(ax, dims, dots)
+        fix_ticks(ax)
+    return ax
+
+
+def _line(data: xr.Dataset, ax: Axes, name: str, outcome: str, levels: tuple[float, ...]) -> None:
+    x, _ = positions(data, name)
+    low, high = data["probability_low"].values, data["probability_high"].values
+    for level in levels:
+        ax.axhline(level, color="0.75", linewidth=0.6, zorder=0)
+    share = 100.0 * float(data.attrs.get("confidence", 0.95))
+    ax.fill_between(x, low, high, color="#16245E", alpha=0.25, linewidth=0.0, label=f"{share:g} % interval")
+    ax.plot(
+        x, data["probability"].values, color="#16245E", marker="o", markersize=2.2, label="share of the runs"
+    )
+    ax.set(ylim=(-0.02, 1.02), ylabel=_WORDS.get(outcome, outcome))
+    ax.legend(loc="best")
+    dress(ax.xaxis, data, name)
+
+
+def _cells(data: xr.Dataset, ax: Axes, dims: list[str], outcome: str, levels: tuple[float, ...]) -> None:
+    values = data["probability"].transpose(dims[1], dims[0]).values
+    edges = [edges_of(data, name) for name in dims]
+    colors = cm.davos_r.resampled(10)
+    cells = ax.pcolormesh(
+        *edges, values, cmap=colors, norm=BoundaryNorm(np.linspace(0.0, 1.0, 11), 10), rasterized=True
+    )
+    figure = ax.get_figure()
+    assert figure is not None
+    bar = figure.colorbar(cells, ax=ax, label=_WORDS.get(outcome, outcome), ticks=np.linspace(0.0, 1.0, 6))
+    bar.ax.tick_params(labelsize=7, width=0.6)
+    x, y = (positions(data, name)[0] for name in dims)
+    drawn = [level for level in levels if np.nanmin(values) < level < np.nanmax(values)]
+    handles: list[Any] = []
+    if min(values.shape) > 1:
+        for level in drawn:
+            style = _DASHES.get(level, "-")
+            # twice, so that it is seen on light and on dark
+            ax.contour(x, y, values, levels=[level], colors="white", linewidths=2.0, linestyles="-")
+            ax.contour(x, y, values, levels=[level], colors="#B03A27", linewidths=1.0, linestyles=style)
+            handles.append(Line2D([], [], color="#B03A27", linestyle=style, label=f"P = {level:g}"))
+    wide = np.argwhere(~data["reached"].transpose(dims[1], dims[0]).values)
+    if wide.size:
+        marks = ax.scatter(
+            x[wide[:, 1]],
+            y[wide[:, 0]],
+            marker="x",
+            s=8,
+            color="0.35",
+            linewidths=0.6,
+            label="wider than asked",
+        )
+        handles.append(marks)
+    dress(ax.xaxis, data, dims[0])
+    dress(ax.yaxis, data, dims[1])
+    for at, axis in ((0, ax.set_xlim), (1, ax.set_ylim)):
+        axis(edges[at][0], edges[at][-1]) if not is_geometric(edges[at]) else None
+    if handles:
+        ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+
+
+def _lay_dots(ax: Axes, dims: list[str], dots: MeasuredPoints) -> None:
+    for kind in ResponseClass:
+        own = dots.response_class == kind
+        if own.any():
+            ax.scatter(
+                getattr(dots, dims[0])[own], getattr(dots, dims[1])[own], s=12, color=CLASS_COLORS[kind],
+                edgecolors="black", linewidths=0.5, zorder=3, label=kind.label,
+            )  # fmt: skip
+
+
+# ----------------------------------------------------------------------------------------------------
+# Quantile thresholds over one parameter: lines with their intervals as bands.
+
+
+_STYLES = (
+    ("#4C97C8", ":"),
+    ("#B03A27", "-"),
+    ("#16245E", "--"),
+    ("#6E8B2F", "-."),
+    ("#000000", (0, (1, 1, 5, 1))),
+)
+
+
+def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static: bool = False) -> Axes:
+    """Draw what :func:`snapbeam.uncertainty.quantile_threshold` found over one parameter.
+
+    A line a probability with its interval as a band; a cross where the probability is seen to fall somewhere, so that
+    the threshold is not one.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    ax : matplotlib.axes.Axes, optional
+    quasi_static : bool
+        Whether to draw V_QS1 (Eq. 21) too, over frequency ratio or location.
+
+    Raises
+    ------
+    InputError
+        If the dataset holds no such thresholds, or those over more than one parameter.
+    """
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if "threshold" not in dataset or "quantile" not in dataset["threshold"].dims:
+        raise InputError(f"no quantile thresholds among {list(map(str, dataset.variables))}")
+    data = dataset.squeeze([name for name in dataset["monotone"].dims if dataset.sizes[name] == 1])
+    dims = [str(name) for name in data["monotone"].dims]
+    if len(dims) != 1 or "point" in dims:
+        raise InputError(f"thresholds over {dims}: are drawn over one parameter")
+    if data.sizes["quantile"] > len(_STYLES):
+        raise InputError(
+            f"dataset: has {data.sizes['quantile']} lines; at most {len(_STYLES)} can be told apart"
+        )
+    along, raised = dims[0], str(data.attrs["along"])
+    bottom, top = (float(each) for each in data.attrs["between"])
+    x, _ = positions(data, along)
+    with house_style():
+        if ax is None:
+            ax = new_figure("single", 70.0).add_subplot()
+        for level, (color, dashes) in zip(data["quantile"].values, _STYLES, strict=False):
+            one = data.sel(quantile=level)
+            low, high = (np.clip(one[f"threshold_{end}"].values, bottom, top) for end in ("low", "high"))
+            ax.fill_between(x, low, high, color=color, alpha=0.22, linewidth=0.0)
+            ax.plot(
+                x,
+                one["threshold"].values,
+                linestyle=dashes,
+                color=color,
+                linewidth=1.1,
+                label=f"P = {level:g}",
+            )
+        if quasi_static:
+            _quasi_static(data, ax, along, x)
+        falls = ~data["monotone"].values
+        if falls.any():
+            middle = data["threshold"].sel(quantile=0.5, method="nearest").values
+            ax.plot(x[falls], middle[falls], "x", color="black", markersize=4, label="not monotone")
+        fix_ticks(ax)
+        dress(ax.xaxis, data, along)
+        symbol = symbol_of(data, raised)
+        ax.set(xlim=x[[0, -1]], ylabel=f"Threshold of {symbol}")
+        reach = np.nanmax(np.where(np.isfinite(data["threshold_high"]), data["threshold_high"], np.nan))
+        ax.set_ylim(min(0.0, bottom), min(top, 1.08 * float(reach)) if np.isfinite(reach) else top)
+        share = 100.0 * float(data.attrs.get("confidence", 0.95))
+        ax.set_title(f"{int(data['runs'].max())} runs a point, {share:g} % bands", loc="left")
+        ax.legend(loc="best")
+    return ax
+
+
+def _quasi_static(data: xr.Dataset, ax: Axes, along: str, x: np.ndarray) -> None:
+    if along not in ("location", "frequency_ratio"):
+        raise InputError(f"quasi_static over {along}: is known over location and frequency_ratio")
+    place = x if along == "location" else float(data["location"])
+    ratio = x if along == "frequency_ratio" else float(data["frequency_ratio"])
+    line = quasi_static_threshold(place, ratio)
+    ax.plot(x, line, color="black", linewidth=0.8, dashes=(4, 2), label=r"quasi-static, $V_\mathrm{QS1}$")
+
+
+# ----------------------------------------------------------------------------------------------------
+# Tornado pictures: how far an answer moves with each parameter, the most telling on top.
+
+
+_UP, _DOWN, _TOTAL = "#B03A27", "#16245E", "#70BBF0"
+
+
+def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw what :func:`snapbeam.uncertainty.sensitivity` found, a bar a parameter, with intervals.
+
+    Locally, bars reach from the mean answer to those with the parameter one standard score down and up; how much that
+    is in the parameter's own unit stands beside its name.  Of indices, the first order and, if there is one, the total.
+
+    Raises
+    ------
+    InputError
+        If the dataset holds no sensitivities.
+    """
+    import xarray as xr
+
+    instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
+    if "parameter" not in dataset.dims or not {"effect", "first_order"} & set(map(str, dataset.variables)):
+        raise InputError(f"no sensitivities among {list(map(str, dataset.variables))}")
+    local = "effect" in dataset
+    weight = np.abs(dataset["effect" if local else "first_order"].values)
+    data = dataset.isel(parameter=np.argsort(weight, kind="stable"))
+    place = np.arange(data.sizes["parameter"])
+    with house_style():
+        if ax is None:
+            ax = new_figure("single", 28.0 + 10.0 * place.size).add_subplot()
+        if local:
+            _bars(data, ax, place)
+        else:
+            _indices(data, ax, place)
+        ax.set_yticks(place, [_name(data, i, local) for i in range(place.size)])
+        ax.tick_params(axis="y", length=0)
+        for side in ("top", "right", "left"):
+            ax.spines[side].set_visible(False)
+        fix_ticks(ax)
+    return ax
+
+
+def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
+    middle = float(data.attrs["answer_mean"])
+    half, low, high = (data[f"effect{end}"].values for end in ("", "_low", "_high"))
+    for sign, color, label in ((-1.0, _DOWN, "parameter lower"), (1.0, _UP, "parameter higher")):
+        ax.barh(place, sign * half, left=middle, height=0.62, color=color, label=label)
+    error = np.stack([half - low, high - half])
+    ax.errorbar(
+        middle + half, place, xerr=error, fmt="none", ecolor="black", elinewidth=0.8, capsize=2.0,
+        label=f"{100.0 * float(data.attrs['confidence']):g} % interval",
+    )  # fmt: skip
+    ax.axvline(middle, color="black", linewidth=0.6)
+    unit = str(data.attrs["answer_units"])
+    words = str(data.attrs["answer"]).replace("omega_1", r"$\omega_1$")
+    text = f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}"
+    ax.set_xlabel(textwrap.fill(text, 40))
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2, columnspacing=0.9)
+
+
+def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
+    both = "total_order" in data
+    height = 0.36 if both else 0.62
+    kinds = [("first_order", _DOWN, "first order", 0.19 if both else 0.0)]
+    kinds += [("total_order", _TOTAL, "total", -0.19)] if both else []
+    for name, color, label, shift in kinds:
+        value, low, high = (data[f"{name}{end}"].values for end in ("", "_low", "_high"))
+        ax.barh(place + shift, value, height=height, color=color, label=label)
+        ax.errorbar(
+            value, place + shift, xerr=np.stack([value - low, high - value]), fmt="none", ecolor="black",
+            elinewidth=0.8, capsize=2.0,
+        )  # fmt: skip
+    ax.axvline(0.0, color="black", linewidth=0.6)
+    ax.set_xlabel(f"Share of the variance: {data.attrs['answer']}")
+    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
+
+
+def _name(data: xr.Dataset, at: int, local: bool) -> str:
+    """What stands beside a bar: the parameter and, locally, how much it is moved by, in its own unit."""
+    name = str(data["parameter"].values[at])
+    row = lookup(name)
+    section, _, text = name.partition(".")
+    text = text.replace("_", " ")
+    if section == "contact":
+        text = f"contact {text}"
+    if not local:
+        return text
+    step = float(data["step"][at])
+    if row.quantity.unit == "1":
+        return f"{text}\n± {step:.2g}"
+    unit = re.sub(r"\^([\d.]+)", r"$^{\1}$", row.quantity.unit)
+    return f"{text}\n± {EngFormatter(unit, places=1)(step)}"

@@ -1,1 +1,0 @@
-"""One run: asked for, integrated, recorded, classed, kept."""

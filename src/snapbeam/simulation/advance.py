@@ -1,0 +1,219 @@
+"""Going on from a state: the primitive that questions about dynamics are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.model.integration import Integration
+from snapbeam.model.state import ModalState, State, rest_state
+from snapbeam.model.system import System
+from snapbeam.simulation.request import require_motion
+from snapbeam.simulation.states import states_of
+from snapbeam.solver.assemble import make_ensemble
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.registry import resolve
+from snapbeam.solver.statistics import Landings, statistics_of
+from snapbeam.util.diagnostics import counting
+from snapbeam.util.status_codes import RunStatus
+from snapbeam.util.validation import InputError, InputTypeError, finite_array, flag, instance, positive, shown
+
+__all__ = ["advance"]
+
+
+_Array = NDArray[np.float64]
+
+_REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
+PASSED = (
+    "status", "zero_crossings", "impacts", "peak_force", "impulse", "striker_work", "gross_work", "energy_dissipated",
+    "min_displacement", "max_displacement", "min_midspan_displacement", "max_midspan_displacement", "contact_time_fraction",
+)  # fmt: skip
+"""Statistics of the way that a state has behind it."""
+
+
+def advance(
+    system: System,
+    state: State | None = None,
+    periods: float = 1,
+    tangent: ArrayLike | None = None,
+    *,
+    integration: Integration | None = None,
+    save_every_period: bool = False,
+    progress: Callable[[int, int], object] | bool | None = None,
+) -> State:
+    """Where a system stands some periods of the excitation after it stood in a state.
+
+    Steps land on every whole period, and what follows depends on the state there alone: two calls of one period
+    each give, bit for bit, what one call of two periods gives (under a recorded drive to rounding).
+    :func:`~snapbeam.simulate` does not land in between and agrees to the error of its accuracy level.
+
+    Parameters
+    ----------
+    system : System
+    state : State, optional
+        One state, or a batch of them, which all cores march side by side; the system's start by default.
+    periods : float
+        Periods of the excitation, greater than 0; of the first mode where nothing strikes.
+    tangent : array_like of shape (..., k, 2, N), optional
+        Small changes of amplitudes (m^0.5) and velocities (m^0.5/s) to carry along by the tangent flow of the same
+        steps: k of them for each state, or the same k for all.
+    integration : Integration, optional
+        Steps, accuracy, threads.  States go on on the CPU, for *periods*, and no run is decided early.
+    save_every_period : bool
+        Whether to give the states after each period, along a new first dimension, instead of the last one; their
+        ``passed`` is of the whole way, but for the status, which is of each state.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with states; True writes a line to standard error.
+
+    Returns
+    -------
+    State
+        With ``passed``, what happened on the way (its statistics have the shape of the batch; a contact that is
+        still going on is none of the impacts yet), and ``tangent``, if some were given.  A state that the engine could
+        not reach has a ``passed["status"]`` that says why, and NaN for numbers.
+
+    Raises
+    ------
+    InputError
+        For bad input; for tangents under a law of contact whose force jumps; for more periods than a record holds.
+    """
+    if not isinstance(system, System):
+        raise InputTypeError(f"system = {shown(system)}: must be a System")
+    if state is not None and not isinstance(state, State):
+        raise InputTypeError(f"state = {shown(state)}: must be a State")
+    if system.further_contacts:
+        raise InputError(
+            "striker: a state says where one striker stands and since when it touches; of several strikers ask for "
+            "whole runs, by simulate or a sweep"
+        )
+    integration = instance(
+        "integration", Integration() if integration is None else integration, Integration, "an Integration"
+    )
+    span = positive("periods", periods)
+    save_every_period = flag("save_every_period", save_every_period)
+    report = counting(progress, "advance", "states")
+    if state is None:
+        require_motion(system)
+        state = (
+            system.initial_state
+            if system.initial_state is not None
+            else rest_state(system.model, system.striker)
+        )
+    if state.modes != system.model.modes:
+        raise InputError(
+            f"state of {state.modes} modes: must have the {system.model.modes} modes of the model"
+        )
+    if save_every_period and not float(span).is_integer():
+        raise InputError(f"periods = {span:g} with every = True: must be a whole number")
+    flat = state.flat()
+    if integration.tolerance is not None:
+        raise InputError(
+            f"tolerance = {integration.tolerance:g}: is for one run; give steps, or accuracy = 'reference'"
+        )
+    ensemble = make_ensemble(system, integration.replace(early_termination=False), start=flat, periods=span)
+    _, engine = resolve("cpu")
+    vectors = None
+    if tangent is None:
+        landings = engine.integrate_to_landing(ensemble, integration.threads, report)
+    else:
+        given = _checked_tangent(system, tangent, flat)
+        back = system.model.linear_modes.T @ system.model.mass
+        landings, moved = engine.integrate_tangents(ensemble, given @ back.T, integration.threads, report)
+        moved[~np.isin(landings.accumulators_of_runs["status"], _REACHED)] = np.nan
+        vectors = (moved @ system.model.linear_modes.T).reshape((*state.batch, *moved.shape[1:]))
+    found = _states(ensemble, landings, save_every_period)
+    passed = statistics_of(ensemble, landings.accumulators_of_runs)
+    return _shaped(found, state.batch, save_every_period, {name: passed[name] for name in PASSED}, vectors)
+
+
+def _checked_tangent(system: System, tangent: ArrayLike, flat: State) -> _Array:
+    if system.contact is not None and not system.contact.properties.smooth:
+        raise InputError(
+            f"tangent with contact = {shown(system.contact)}: its force jumps, so that the tangent flow does; give none"
+        )
+    if system.striker is not None and system.striker.mass is not None:
+        raise InputError(
+            f"tangent with striker mass = {system.striker.mass:g} kg: the tangent flow is that of the beam alone; give "
+            "none, or leave the mass out"
+        )
+    if system.harvester is not None:
+        raise InputError(
+            "tangent with a harvester: the tangent flow is that of the beam alone; give none, or leave it out"
+        )
+    if system.contact is not None and not system.contact.properties.tangent:
+        raise InputError(
+            f"tangent with contact = {system.contact!r}: the tangent flow is known for laws whose force depends on the "
+            "penetration alone, such as HertzContact(stiffness); give none"
+        )
+    given = finite_array("tangent", tangent)
+    shape = (2, flat.modes)
+    if given.ndim < 3 or given.shape[-2:] != shape:
+        raise InputError(f"tangent of shape {given.shape}: must have the shape (..., k, 2, {flat.modes})")
+    try:
+        return np.array(
+            np.broadcast_to(given.reshape(-1, *given.shape[-3:]), (flat.batch[0], *given.shape[-3:]))
+        )
+    except ValueError:
+        raise InputError(
+            f"tangent of shape {given.shape}: must have the batch {flat.batch} of the states before (k, 2, N)"
+        ) from None
+
+
+def _states(ensemble: Ensemble, landings: Landings, every: bool) -> list[State]:
+    """States after each period, or after the last one alone, with their status; NaN where a run did not come so far."""
+    count, accumulators = landings.q.shape[1], landings.accumulators_of_runs
+    failed = ~np.isin(accumulators["status"], _REACHED)
+    found = []
+    for at in range(count) if every else (count - 1,):
+        ticks = np.minimum((at + 1) * ensemble.runs["landing"], ensemble.runs["end"])
+        q, p = landings.q[:, at].copy(), landings.p[:, at].copy()
+        lost = failed & ((accumulators["time"] < ticks) | (at == count - 1))
+        q[lost], p[lost] = 0.0, 0.0
+        state = states_of(ensemble, q, p, landings.well_sign[:, at], landings.contact_ticks[:, at], ticks)
+        amplitude, velocity = state.amplitude.copy(), state.velocity.copy()
+        amplitude[lost], velocity[lost] = np.nan, np.nan
+        status: Any = np.where(lost, accumulators["status"], int(RunStatus.OK)).astype(np.int8)
+        found.append(replace(state, amplitude=amplitude, velocity=velocity, statistics={"status": status}))
+    return found
+
+
+def _shaped(
+    found: list[State],
+    batch: tuple[int, ...],
+    every: bool,
+    passed: dict[str, Any],
+    tangent: _Array | None,
+) -> State:
+    """States as one batch of the shape that was asked for."""
+    names = (
+        "amplitude",
+        "velocity",
+        "phase",
+        "striker_position",
+        "contact_time",
+        "striker_shift",
+        "striker_rate",
+        "circuit",
+    )
+    shape = (len(found), *batch) if every else batch
+    arrays = {}
+    for name in names:
+        stacked = np.stack([getattr(state, name) for state in found])
+        arrays[name] = stacked.reshape((*shape, *stacked.shape[2:]))
+    modal = None
+    if all(state.modal is not None for state in found):
+        parts: dict[str, Any] = {}
+        for name in ("q", "p", "home", "offset"):
+            stacked = np.stack([getattr(state.modal, name) for state in found])
+            parts[name] = stacked.reshape((*shape, *stacked.shape[2:]))
+        assert found[0].modal is not None
+        modal = ModalState(**parts, structure=found[0].modal.structure)
+    statistics = {name: values.reshape(batch) for name, values in passed.items()}
+    if every:
+        status = [np.asarray(state.statistics["status"]) for state in found if state.statistics is not None]
+        statistics["status"] = np.stack(status).reshape(shape)
+    return State(**arrays, tangent=tangent, statistics=statistics, modal=modal)

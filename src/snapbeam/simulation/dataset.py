@@ -1,0 +1,417 @@
+"""The labelled dataset of one run, simulated or measured: its names, dimensions and units.
+
+Displacements are normalised by the buckling level b and velocities by b omega_1, times are in seconds, ``cycle``
+counts periods of the excitation (the paper's tau).  A measured run has no modal amplitudes, force or energies, and
+may have dropouts: samples at which something was not found have ``valid`` = 0, and only there may a number be NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.system import System
+from snapbeam.solver.assemble import motions_of, tip_of
+from snapbeam.solver.ensemble import CircuitCoupling, Ensemble
+from snapbeam.solver.further_contacts import OFFSET, REST, SIGN
+from snapbeam.solver.statistics import Recorded
+from snapbeam.util.validation import InputError, InputTypeError, axis, finite_array, shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import ArrayLike
+
+__all__ = [
+    "SCHEMA",
+    "Variable",
+    "check_trajectory",
+    "impact_table",
+    "joined",
+    "run_dataset",
+    "strikers_of",
+    "trajectory_dataset",
+]
+
+
+class Variable(NamedTuple):
+    """What one variable of a run is: its dimensions, its unit and its name in words."""
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+
+
+SCHEMA: dict[str, Variable] = {
+    "time": Variable(("time",), "s", "time"),
+    "cycle": Variable(("time",), "1", "cycles of excitation"),
+    "mode": Variable(("mode",), "1", "buckling mode"),
+    "striker": Variable(("striker",), "1", "number of the striker"),
+    "displacement_at_striker": Variable(("time",), "1", "beam displacement at the striker, over b"),
+    "midspan_displacement": Variable(("time",), "1", "beam displacement at the centre, over b"),
+    "velocity_at_striker": Variable(("time",), "1", "beam velocity at the striker, over b omega_1"),
+    "midspan_velocity": Variable(("time",), "1", "beam velocity at the centre, over b omega_1"),
+    "striker_displacement": Variable(("time",), "1", "striker displacement, over b"),
+    "penetration_normalised": Variable(("time",), "1", "penetration, over b"),
+    "contact_force": Variable(("time",), "N", "contact force"),
+    "striker_displacements": Variable(("time", "striker"), "1", "displacement of each striker's tip, over b"),
+    "striker_penetrations": Variable(("time", "striker"), "1", "penetration of each striker, over b"),
+    "striker_forces": Variable(("time", "striker"), "N", "contact force of each striker"),
+    "modal_amplitude": Variable(("time", "mode"), "m^0.5", "modal amplitude"),
+    "modal_velocity": Variable(("time", "mode"), "m^0.5/s", "modal velocity"),
+    "energy_beam": Variable(("time",), "J", "kinetic and potential energy of the beam, above its well"),
+    "energy_contact": Variable(("time",), "J", "energy stored in the contact"),
+    "energy_striker": Variable(
+        ("time",), "J", "energy of the striker's motion beyond that of its drive, in its suspension included"
+    ),
+    "striker_work": Variable(("time",), "J", "work done by the striker"),
+    "energy_dissipated": Variable(("time",), "J", "energy dissipated"),
+    "base_displacement": Variable(("time",), "1", "displacement of the base in space, over b"),
+    "base_velocity": Variable(("time",), "1", "velocity of the base in space, over b omega_1"),
+    "base_work": Variable(("time",), "J", "work done by the base, in its frame"),
+    "load_change": Variable(("time",), "N", "axial load beyond that of the reduction"),
+    "load_work": Variable(("time",), "J", "work done by the change of the axial load"),
+    "voltage": Variable(("time",), "V", "voltage across the harvester's load"),
+    "power_load": Variable(("time",), "W", "power in the harvester's load"),
+    "energy_harvested": Variable(("time",), "J", "energy that ended in the harvester's load"),
+    "energy_circuit": Variable(("time",), "J", "energy stored in the harvester's circuit"),
+    "energy_lost_contact": Variable(("time",), "J", "part of it that was lost in contact"),
+    "valid": Variable(("time",), "1", "whether the sample was measured"),
+}
+"""Every variable a run may have, by name; ``time``, ``cycle`` and ``mode`` are coordinates."""
+
+_MODAL = ("modal_amplitude", "modal_velocity")
+_OF_STRIKERS = ("striker_displacements", "striker_penetrations", "striker_forces")
+_FORMER_UNITS = {"b": "1"}
+"""Units that files of version 0.1 give to numbers over b."""
+_COORDINATES = ("time", "cycle", "mode", "striker")
+
+
+def trajectory_dataset(
+    time: ArrayLike,
+    cycle: ArrayLike | None = None,
+    *,
+    attrs: Mapping[str, Any] | None = None,
+    **variables: ArrayLike,
+) -> xr.Dataset:
+    """Return a run as a labelled dataset.
+
+    Parameters
+    ----------
+    time : array_like, shape (samples,)
+        Seconds, strictly increasing.
+    cycle : array_like, shape (samples,), optional
+        Cycles of excitation since its start; left out of a run without excitation.
+    attrs : mapping, optional
+        What the run came from: parameters and provenance.
+    **variables : array_like
+        The variables of :data:`SCHEMA` by name, of shape (samples,), or (samples, modes) for
+        ``modal_amplitude`` and ``modal_velocity``.
+
+    Returns
+    -------
+    xarray.Dataset
+        With dimensions ``time`` and, if there are modal amplitudes, ``mode`` counted from 1; every variable
+        carries ``units`` and ``long_name``.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a wrong shape, times that do not increase, or numbers that are not finite.
+    """
+    import xarray as xr
+
+    coords: dict[str, Any] = {"time": _labelled("time", axis("time", time, -np.inf, np.inf, closed="both"))}
+    if cycle is not None:
+        coords["cycle"] = _labelled("cycle", finite_array("cycle", cycle, 1))
+    data = {}
+    for name, values in variables.items():
+        if name in _COORDINATES or name not in SCHEMA:
+            known = ", ".join(key for key in SCHEMA if key not in _COORDINATES)
+            raise InputError(f"{name}: not a variable of a run; the variables are {known}")
+        array = np.asarray(values)
+        if array.dtype.kind not in "biuf":
+            raise InputTypeError(f"{name}: must be an array of numbers, not of {array.dtype}")
+        data[name] = _labelled(name, array)
+        if name in _MODAL and array.ndim == 2:
+            coords["mode"] = _labelled("mode", np.arange(1, array.shape[1] + 1))
+        if name in _OF_STRIKERS and array.ndim == 2:
+            coords["striker"] = _labelled("striker", np.arange(1, array.shape[1] + 1))
+    length = len(coords["time"][1])
+    for name, (dims, values, _) in (*coords.items(), *data.items()):
+        if values.ndim != len(dims) or (dims[0] == "time" and values.shape[0] != length):
+            raise InputError(
+                f"{name} of shape {values.shape}: must have dimensions {dims}, with time of {length}"
+            )
+    dataset = xr.Dataset(data, coords, dict(attrs or {}))
+    check_trajectory(dataset, require=())
+    return dataset
+
+
+def _labelled(name: str, values: np.ndarray) -> tuple[tuple[str, ...], np.ndarray, dict[str, str]]:
+    quantity = SCHEMA[name]
+    return quantity.dims, values, {"units": quantity.units, "long_name": quantity.long_name}
+
+
+def check_trajectory(
+    dataset: xr.Dataset, require: Iterable[str] = ("displacement_at_striker",)
+) -> xr.Dataset:
+    """Return *dataset* if it follows the schema of a run; say what is wrong with it if not.
+
+    Variables beyond the schema are left alone, so that an experiment may add its own.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A run, simulated or measured.
+    require : iterable of str
+        The variables the caller cannot do without.
+
+    Raises
+    ------
+    InputError
+        If ``time`` or a required variable is missing, dimensions or units differ from :data:`SCHEMA`, times
+        do not increase strictly, or a number is not finite where ``valid`` does not say so.
+    """
+    import xarray as xr
+
+    if not isinstance(dataset, xr.Dataset):
+        raise InputTypeError(f"dataset: must be an xarray.Dataset, not {type(dataset).__name__}")
+    missing = [name for name in ("time", *require) if name not in dataset.variables]
+    if missing:
+        raise InputError(f"run without {', '.join(missing)}: it has {', '.join(map(str, dataset.variables))}")
+    valid = dataset["valid"].values.astype(bool) if "valid" in dataset else None
+    for name, quantity in SCHEMA.items():
+        if name not in dataset.variables:
+            continue
+        variable = dataset[name]
+        if variable.dims != quantity.dims:
+            raise InputError(f"{name} with dimensions {variable.dims}: must have dimensions {quantity.dims}")
+        units = variable.attrs.get("units")
+        if _FORMER_UNITS.get(str(units), units) != quantity.units:
+            raise InputError(f"{name} in units {shown(units)}: must be in {quantity.units!r}")
+        good = np.isfinite(variable.values)
+        if valid is not None and name not in _COORDINATES:
+            good = good | ~(valid if good.ndim == 1 else valid[:, None])
+        if not good.all():
+            at = tuple(int(i) for i in np.argwhere(~good)[0])
+            raise InputError(f"{name}{list(at)} = {float(variable.values[at])!r}: must be finite")
+    steps = np.diff(dataset["time"].values)
+    if (steps <= 0.0).any():
+        late = int(np.argmax(steps <= 0.0)) + 1
+        raise InputError(
+            f"time[{late}] = {float(dataset['time'][late])!r}: must be later than the one before"
+        )
+    return dataset
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a run with several strikers says of each: where its tip is, how deep it presses, and its force.
+
+
+def strikers_of(
+    ensemble: Ensemble, system: System, recorded: Recorded, values: _Array, first: _Array
+) -> dict[str, _Array]:
+    """Series of shape (samples, strikers), the first one's in column 0, and the energy that all contacts store.
+
+    *first* is where the first tip is, over b.  The engine writes down the first contact; those of the others follow
+    from where the beam is and their motions.
+    """
+    others, length = ensemble.others, system.scale.length
+    assert others is not None and system.striker is not None
+    count, samples = 1 + len(system.further_contacts), recorded.times.size
+    force, depth, tip = (np.zeros((samples, count)) for _ in range(3))
+    energy = values[:, 3].copy()
+    sign = ensemble.structure.sign
+    force[:, 0], depth[:, 0], tip[:, 0] = values[:, 1], values[:, 0] / length, first
+    for j, each in enumerate(system.further_contacts):
+        numbers, row = others.numbers[0, j], others.rows[others.places[0, j]]
+        reached = recorded.q @ row
+        motion, _ = tip_of(system, j + 2, recorded.times)
+        motion = motion + numbers[SIGN] * _follows(ensemble, system, recorded)
+        pressed = numbers[OFFSET] + motion - reached
+        contact: Any = each.contact
+        kind = contact.numbers_type()
+        law = kind(*(getattr(contact, name) for name in kind._fields))
+        touching = np.maximum(pressed, 0.0)
+        force[:, j + 1] = [contact.force(law, d) if d > 0.0 else 0.0 for d in touching.tolist()]
+        energy += [contact.energy(law, d) if d > 0.0 else 0.0 for d in touching.tolist()]
+        depth[:, j + 1] = pressed / length
+        tip[:, j + 1] = sign * numbers[SIGN] * (numbers[REST] + numbers[OFFSET] + motion) / length
+    return {
+        "striker_forces": force,
+        "striker_penetrations": depth,
+        "striker_displacements": tip,
+        "energy_contact": energy,
+    }
+
+
+def _follows(ensemble: Ensemble, system: System, recorded: Recorded) -> _Array:
+    """What a base does to tips that stand in space, in its frame, as seen from the first striker's side."""
+    if system.base_excitation is None or system.base_excitation.striker_on_base:
+        return np.zeros(recorded.times.size)
+    moved = motions_of(ensemble, system, recorded.times)["base"][0]
+    return np.asarray(-ensemble.structure.sign * moved)
+
+
+# ----------------------------------------------------------------------------------------------------
+# From the pieces that an engine wrote down to the datasets of a run.
+
+
+_Array = NDArray[np.float64]
+
+IMPACT_COLUMNS = (
+    ("onset", "s", "onset of the impact"),
+    ("duration", "s", "duration of the impact"),
+    ("peak_force", "N", "peak contact force"),
+    ("impulse", "N s", "impulse on the beam"),
+    ("striker", "1", "number of the striker"),
+)
+
+
+def joined(pieces: list[Recorded]) -> Recorded:
+    """Pieces of a run as one, its samples in the order of time."""
+    times, q, p, values, impacts = (
+        np.concatenate(parts) for parts in zip(*(piece[:5] for piece in pieces), strict=True)
+    )
+    order = np.argsort(times, kind="stable")
+    order = order[np.append(True, np.diff(times[order]) > 0.0)] if order.size else order
+    return Recorded(
+        times[order],
+        q[order],
+        p[order],
+        values[order],
+        impacts,
+        pieces[-1].accumulators_of_runs,
+        pieces[-1].last,
+    )
+
+
+def run_dataset(
+    ensemble: Ensemble,
+    system: System,
+    recorded: Recorded,
+    times: _Array | None,
+    period: float,
+    attrs: dict[str, Any],
+) -> xr.Dataset:
+    """The time series of a run.
+
+    *times* are the instants that were asked for; those that the run did not reach are NaN, with ``valid`` = 0.
+    """
+    structure, model = ensemble.structure, system.model
+    values = recorded.values.copy()
+    scale, speed = system.scale.length, system.scale.length * system.scale.omega
+    alpha, rate = structure.amplitudes(recorded.q), structure.velocities(recorded.p)
+    own = np.zeros(recorded.q.shape[0])
+    if structure.body_mass is not None:
+        body = model.modes
+        own = 0.5 * (recorded.p[:, body] ** 2 + (structure.omega[body] * recorded.q[:, body]) ** 2)
+        values[:, 2] -= own
+    if structure.circuit:
+        values[:, 2] -= 0.5 * recorded.p[:, -1] ** 2
+    if ensemble.tapped is not None:  # what the coil's own resistance takes
+        values[:, 5] += (1.0 - ensemble.tapped.share[0]) * values[:, 9]
+    location = 0.5 if system.striker is None else system.striker.location
+    shape = model.shape_at(location)
+    displacement = alpha @ shape / scale
+    variables: dict[str, _Array] = {
+        "displacement_at_striker": displacement,
+        "midspan_displacement": alpha @ model.midspan_shape / scale,
+        "velocity_at_striker": rate @ shape / speed,
+        "midspan_velocity": rate @ model.midspan_shape / speed,
+    }
+    struck = system.striker is not None
+    if struck:
+        penetration = values[:, 0] / scale
+        variables |= {
+            "striker_displacement": displacement + structure.sign * penetration,
+            "penetration_normalised": penetration,
+            "contact_force": values[:, 1],
+        }
+    variables |= {"modal_amplitude": alpha, "modal_velocity": rate, "energy_beam": values[:, 2]}
+    if struck:
+        variables |= {"energy_contact": values[:, 3], "striker_work": values[:, 4]}
+    if structure.body_mass is not None:
+        variables["energy_striker"] = own
+    variables["energy_dissipated"] = values[:, 5]
+    variables |= _around(ensemble, system, recorded, values)
+    if ensemble.others is not None:
+        of_each = strikers_of(ensemble, system, recorded, values, variables["striker_displacement"])
+        variables["energy_contact"] = of_each.pop("energy_contact")
+        variables |= of_each
+    if ensemble.tapped is not None:
+        variables |= _harvested(ensemble, ensemble.tapped, recorded, values)
+    if struck and system.contact is not None and system.contact.is_dissipative:
+        variables["energy_lost_contact"] = values[:, 6]
+    at = recorded.times
+    valid = np.asarray(np.isfinite(values[:, 2:]).all(axis=1) & np.isfinite(alpha).all(axis=1))
+    if times is not None and at.size < times.size:
+        missing = times.size - at.size
+        at, valid = times, np.concatenate((valid, np.zeros(missing, dtype=bool)))
+        variables = {
+            name: np.concatenate((array, np.full((missing, *array.shape[1:]), np.nan)))
+            for name, array in variables.items()
+        }
+    if not valid.all():
+        variables = {
+            name: np.where(valid if array.ndim == 1 else valid[:, None], array, np.nan)
+            for name, array in variables.items()
+        }
+        variables["valid"] = np.asarray(valid, dtype=np.int8)
+    return trajectory_dataset(at, at / period, attrs=attrs, **variables)
+
+
+def _harvested(
+    ensemble: Ensemble, tapped: CircuitCoupling, recorded: Recorded, values: _Array
+) -> dict[str, _Array]:
+    """What a run says of a harvester."""
+    structure = ensemble.structure
+    assert structure.tapped is not None
+    if structure.circuit:
+        y = structure.circuit_of(recorded.p)
+    else:
+        y = -tapped.rate[0] * (recorded.p @ structure.tapped)
+    lost = (tapped.rate[0] if structure.circuit else 1.0 / tapped.rate[0]) * y * y
+    found = {
+        "voltage": tapped.volts[0] * y,
+        "power_load": tapped.share[0] * lost,
+        "energy_harvested": tapped.share[0] * values[:, 9],
+    }
+    if structure.circuit:
+        found["energy_circuit"] = 0.5 * y * y
+    return found
+
+
+def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Array) -> dict[str, _Array]:
+    """What a run says of a moving base and of a changing axial load."""
+    found: dict[str, _Array] = {}
+    if system.base_excitation is None and system.axial_load is None:
+        return found
+    motions = motions_of(ensemble, system, recorded.times)
+    if system.base_excitation is not None:
+        found["base_displacement"] = motions["base"][0] / system.scale.length
+        found["base_velocity"] = motions["base"][1] / (system.scale.length * system.scale.omega)
+        found["base_work"] = values[:, 7]
+    if system.axial_load is not None:
+        found["load_change"] = motions["axial"][0]
+        found["load_work"] = values[:, 8]
+    return found
+
+
+def impact_table(table: _Array, attrs: dict[str, Any]) -> xr.Dataset:
+    """The impacts of a run, one after the other."""
+    import xarray as xr
+
+    data = {
+        name: (
+            "impact",
+            table[:, i].astype(np.int64) if name == "striker" else table[:, i],
+            {"units": units, "long_name": words},
+        )
+        for i, (name, units, words) in enumerate(IMPACT_COLUMNS[: table.shape[1]])
+    }
+    number = ("impact", np.arange(1, len(table) + 1), {"units": "1", "long_name": "number of the impact"})
+    return xr.Dataset(data, {"impact": number}, attrs)

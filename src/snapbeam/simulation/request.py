@@ -1,0 +1,57 @@
+"""Checks of the system and the integration that a run is requested with."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from snapbeam.model.drive.sine import Sine
+from snapbeam.model.integration import Integration
+from snapbeam.model.system import System
+from snapbeam.util.validation import InputError, InputTypeError, shown
+
+__all__ = ["cycle_of", "kernel_input", "require_motion"]
+
+
+def kernel_input(system: Any, integration: Any) -> tuple[System, Integration]:
+    """Check a system and an integration.
+
+    Parameters
+    ----------
+    system : System
+    integration : Integration or None
+        None stands for the default integration.
+
+    Raises
+    ------
+    InputError
+        If an argument has the wrong type, or nothing in the system can move.
+    """
+    if not isinstance(system, System):
+        raise InputTypeError(f"system = {shown(system)}: must be a System")
+    integration = Integration() if integration is None else integration
+    if not isinstance(integration, Integration):
+        raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
+    require_motion(system)
+    return system, integration
+
+
+def require_motion(system: System) -> None:
+    """Refuse a system in which nothing could move."""
+    if system.striker is None and system.initial_state is None and not system.moving:
+        raise InputError(
+            "striker = None: a beam that nothing strikes needs a start to move from (initial_state)"
+        )
+
+
+def cycle_of(system: System) -> float:
+    """Seconds of one cycle of excitation, or of the first mode where nothing strikes."""
+    freq = system.model.reference_frequency
+    if system.primary_excitation is None:
+        return 1.0 / freq
+    drive = system.primary_excitation[1]
+    if isinstance(drive, Sine):
+        return 1.0 / (freq * drive.frequency_ratio)
+    columns = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
+    return float(drive.cycle(columns, system.scale)[0])

@@ -1,0 +1,117 @@
+"""A run: what it did, sample by sample, impact by impact and in a few numbers."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from snapbeam.model.integration import Integration
+from snapbeam.model.state import State
+from snapbeam.model.system import System
+from snapbeam.simulation.summary import RunSummary
+from snapbeam.simulation.tolerance import ErrorEstimate
+from snapbeam.solver.statistics import STATISTICS
+from snapbeam.util.display import html_table, plotter
+from snapbeam.util.validation import choice
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["Run"]
+
+
+_KINDS = ("run", "modal_amplitudes", "energies", "spectrum", "phase_portrait")
+
+
+def _described(system: System) -> list[tuple[str, str, str]]:
+    """Sections of a system and what stands in them."""
+    return [line.partition("  ") for line in system.describe().splitlines()]
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A recorded run.
+
+    Attributes
+    ----------
+    dataset : xarray.Dataset
+        Time series: the variables of :data:`snapbeam.simulation.dataset.SCHEMA`.
+    summary : Outcome
+        The class and the statistics.
+    impacts : xarray.Dataset
+        Onset, duration, peak force and impulse of each impact.
+    system : System
+        What was run, and
+    integration : Integration
+        how.
+    accuracy : Accuracy or None
+        What an asked tolerance gave.
+    final_state : State or None
+        Where the run stands at its end; None if it failed.
+    """
+
+    dataset: xr.Dataset
+    summary: RunSummary
+    impacts: xr.Dataset
+    system: System
+    integration: Integration
+    accuracy: ErrorEstimate | None = None
+    final_state: State | None = None
+
+    @classmethod
+    def of(cls, tables: Callable[[], tuple[xr.Dataset, xr.Dataset]], **parts: Any) -> Run:
+        """A run whose dataset and impacts are made by *tables* when one of them is first asked for.
+
+        Who wants the outcome alone, as ``snapbeam simulate`` without a file does, waits for neither; *parts* are the
+        other attributes.
+        """
+        run = cls.__new__(cls)
+        vars(run).update({"accuracy": None, "final_state": None} | parts | {"_tables": tables})
+        return run
+
+    def __getattr__(self, name: str) -> Any:
+        tables = vars(self).get("_tables")
+        if name in ("dataset", "impacts") and tables is not None:
+            dataset, impacts = tables()
+            vars(self).update(dataset=dataset, impacts=impacts)
+            vars(self).pop("_tables", None)
+        if name in vars(self):
+            return vars(self)[name]
+        raise AttributeError(f"{type(self).__name__} has no {name!r}")
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the run to a NetCDF file, whole or not at all; :func:`snapbeam.load` reads it back.
+
+        Raises
+        ------
+        InputError
+            If *path* cannot be written or does not end in ``.nc``.
+        """
+        from snapbeam.simulation.save import save_run
+
+        save_run(self, path)
+
+    def plot(self, kind: str = "run", ax: Any = None, **options: Any) -> Any:
+        """Draw the run: ``"run"``, ``"modal_amplitudes"``, ``"energies"``, ``"spectrum"`` or ``"phase_portrait"``.
+
+        Options are those of the function ``plot_...`` of :mod:`snapbeam.plot`; returns the axes.
+        """
+        choice("type", kind, _KINDS)
+        return plotter(f"plot_{kind}")(self, ax=ax, **options)
+
+    def _repr_html_(self) -> str:
+        shown = ("zero_crossings", "impacts", "peak_force", "striker_work", "contact_time_fraction")
+        rows = [
+            (STATISTICS[name].long_name, f"{self.summary[name]:.5g}", STATISTICS[name].unit) for name in shown
+        ]
+        rows += [(section, line.strip(), "") for section, _, line in _described(self.system)]
+        return html_table(f"Run: {self.summary.response_class.label}, {self.summary.status.advice}", rows)
+
+    def __repr__(self) -> str:
+        samples = self.dataset.sizes["time"]
+        return f"<Run {self.summary.response_class.label}, {samples} samples, {self.impacts.sizes['impact']} impacts>"

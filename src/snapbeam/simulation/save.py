@@ -1,0 +1,156 @@
+"""Runs on disk: one NetCDF file with everything a run is."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from snapbeam.model.integration import Integration
+from snapbeam.model.quantity import quantities
+from snapbeam.model.state import State
+from snapbeam.model.system import System
+from snapbeam.simulation.dataset import check_trajectory
+from snapbeam.simulation.run import Run
+from snapbeam.simulation.summary import RunSummary
+from snapbeam.simulation.tolerance import ErrorEstimate
+from snapbeam.solver.statistics import STATISTICS
+from snapbeam.util.files import check_writable
+from snapbeam.util.netcdf import read_netcdf, write_netcdf
+from snapbeam.util.status_codes import ResponseClass, RunStatus
+from snapbeam.util.validation import InputError, file_path
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = ["compressed", "description", "load", "outcome_dataset", "save_run"]
+
+
+_FORMAT = "snapbeam run 2"
+_GROUPS = ("impacts", "outcome")
+_END = ("amplitude", "velocity", "phase", "striker_position", "contact_time", "striker_shift", "striker_rate")
+_COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
+
+
+def save_run(run: Run, path: str | os.PathLike[str]) -> None:
+    """Write a run; see :meth:`snapbeam.Run.save`.
+
+    The root group holds the time series, the groups ``impacts`` and ``outcome`` the rest; the system, the
+    integration, the accuracy and the end are JSON in attributes of the root.
+    """
+    target = check_writable(path, "path", (".nc",))
+    root = run.dataset.assign_attrs(description(run.system, run.integration, run.accuracy, run.final_state))
+    groups = {None: root, "impacts": run.impacts.assign_attrs({}), "outcome": outcome_dataset(run.summary)}
+    write_netcdf(groups, target, {name: compressed(dataset) for name, dataset in groups.items()})
+
+
+def description(
+    system: System, integration: Integration, accuracy: ErrorEstimate | None, end: State | None
+) -> dict[str, str]:
+    """The attributes of a file from which a run is read again."""
+    described = {
+        "snapbeam_format": _FORMAT,
+        "snapbeam_system": _json(system.to_mapping()),
+        "snapbeam_integration": _json({name: getattr(integration, name) for name in quantities(Integration)}),
+    }
+    if accuracy is not None:
+        described["snapbeam_accuracy"] = _json(vars(accuracy))
+    if end is not None:
+        described["snapbeam_end"] = _json({name: getattr(end, name) for name in _END})
+    return described
+
+
+def load(path: str | os.PathLike[str]) -> Run:
+    """Read a run that :meth:`snapbeam.Run.save` wrote.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or holds no run.
+    """
+    path = file_path("path", path)
+    dataset = read_netcdf(path)
+    attrs = dict(dataset.attrs)
+    if attrs.pop("snapbeam_format", None) != _FORMAT:
+        raise InputError(f"path = {str(path)!r}: is no file of a run that Run.save wrote")
+    parts = {name: read_netcdf(path, group=name) for name in _GROUPS}
+    try:
+        system = System.from_mapping(_arrays(json.loads(attrs.pop("snapbeam_system"))))
+        integration = Integration(**json.loads(attrs.pop("snapbeam_integration")))
+        accuracy = (
+            ErrorEstimate(**json.loads(attrs.pop("snapbeam_accuracy")))
+            if "snapbeam_accuracy" in attrs
+            else None
+        )
+        end = _state(json.loads(attrs.pop("snapbeam_end"))) if "snapbeam_end" in attrs else None
+    except (KeyError, TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"path = {str(path)!r}: its description is damaged ({error})") from None
+    dataset = check_trajectory(dataset.drop_attrs(deep=False).assign_attrs(attrs))
+    values = {str(name): array.values.item() for name, array in parts["outcome"].variables.items()}
+    return Run(dataset, RunSummary(values), parts["impacts"], system, integration, accuracy, end)
+
+
+def outcome_dataset(outcome: RunSummary) -> xr.Dataset:
+    """The statistics of a run as scalar variables, with what their codes mean."""
+    import xarray as xr
+
+    variables: dict[str, Any] = {}
+    for name, value in outcome.items():
+        row = STATISTICS[name]
+        labels: dict[str, Any] = {"units": row.unit, "long_name": row.long_name}
+        kinds: type[ResponseClass] | type[RunStatus] | None = None
+        if name in ("response_class", "status"):
+            kinds = ResponseClass if name == "response_class" else RunStatus
+            labels |= code_flags(kinds)
+        variables[name] = ((), np.asarray(int(value) if kinds else value).astype(row.dtype), labels)
+    return xr.Dataset(variables)
+
+
+def code_flags(kinds: type[ResponseClass] | type[RunStatus]) -> dict[str, Any]:
+    """What codes mean, as the attributes that the CF conventions give them."""
+    return {
+        "flag_values": np.array([int(kind) for kind in kinds], dtype=np.int8),
+        "flag_meanings": " ".join(
+            kind.label.replace(" ", "_") if isinstance(kind, ResponseClass) else kind.name.lower()
+            for kind in kinds
+        ),
+    }
+
+
+def compressed(dataset: xr.Dataset) -> dict[Any, dict[str, Any]]:
+    """How the variables of a dataset are encoded."""
+    return {name: _COMPRESSION for name, variable in dataset.variables.items() if variable.ndim}
+
+
+def _json(value: Any) -> str:
+    return json.dumps(_plain(value), sort_keys=True)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (np.ndarray, np.generic)):
+        return _plain(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and value != value:
+        return None
+    return value
+
+
+def _arrays(sections: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    return {
+        section: {
+            name: np.array(value) if isinstance(value, list) else value for name, value in values.items()
+        }
+        for section, values in sections.items()
+    }
+
+
+def _state(values: dict[str, Any]) -> State:
+    given: dict[str, Any] = {
+        name: np.nan if value is None else np.array(value) for name, value in values.items()
+    }
+    return State(**given)

@@ -1,0 +1,456 @@
+"""One run, recorded: the beam, the striker, and everything that can be read off them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from typing import Any, NamedTuple, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from snapbeam.model.drive.recorded_motion import RecordedMotion
+from snapbeam.model.integration import Integration
+from snapbeam.model.parameters import lookup
+from snapbeam.model.quantity import quantities
+from snapbeam.model.state import State
+from snapbeam.model.striker import numbered
+from snapbeam.model.system import System
+from snapbeam.simulation.dataset import impact_table, joined, run_dataset
+from snapbeam.simulation.request import cycle_of, kernel_input
+from snapbeam.simulation.run import Run
+from snapbeam.simulation.states import states_of
+from snapbeam.simulation.summary import RunSummary
+from snapbeam.simulation.tolerance import ErrorEstimate, steps_for
+from snapbeam.solver.assemble import make_ensemble, plans_of, run_columns
+from snapbeam.solver.cpu.driver import usable_cores
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.registry import resolve
+from snapbeam.solver.statistics import Recorded, statistics_of
+from snapbeam.solver.step_size import Plan
+from snapbeam.util.diagnostics import Diagnostic, counting, sharing, tell
+from snapbeam.util.provenance import array_hash, made_by
+from snapbeam.util.status_codes import RunStatus
+from snapbeam.util.validation import InputError, InputTypeError, finite_array, shown
+
+__all__ = [
+    "CONVENTIONS",
+    "MEMORY_LIMIT",
+    "Prepared",
+    "attributes_of",
+    "check_memory",
+    "describe_system",
+    "end_state",
+    "prepared",
+    "reached_by",
+    "said_of",
+    "simulate",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Systems and integrations as attributes of files: every parameter by name.
+
+
+CONVENTIONS = "CF-1.11"
+_LONGEST = 1024
+"""Numbers of an array that an attribute may hold."""
+
+
+def describe_system(system: System, plan: Plan) -> dict[str, Any]:
+    """The parameters of a system but those of its drive and striker, and its steps, as attributes."""
+    model = system.model
+    damping = model.damping_ratio
+    attrs: dict[str, Any] = {
+        "modes": model.modes,
+        "damping_ratio": float(damping[0]) if np.all(damping == damping[0]) else damping.tolist(),
+        "length_scale": model.length_scale,
+        "reference_frequency": model.reference_frequency,
+        "step": plan.step,
+        "order": plan.order,
+        "longest_contact_step": plan.step / 2**plan.coarsest,
+        "shortest_contact_step": plan.step / 2**plan.finest,
+    }
+    if system.contact is not None:
+        attrs["contact_law"] = system.contact.name
+        attrs |= _short(system.contact)
+    if model.beam is not None:
+        attrs |= {name: float(value) for name, value in _short(model.beam).items()}
+        attrs |= _short(model.beam.boundary)
+    if model.imperfection is not None:
+        attrs |= _short(model.imperfection)
+    sections = system.to_mapping() if system.has_environment else {}
+    for section in ("base", "axial", "harvester"):
+        for name, value in sections.get(section, {}).items():
+            short = f"{section}_kind" if name == "type" else lookup(f"{section}.{name}").short
+            attrs[short] = int(value) if isinstance(value, bool) else value
+    return attrs | _of_others(system)
+
+
+def _of_others(system: System) -> dict[str, Any]:
+    """What is said of the strikers beside the first."""
+    attrs: dict[str, Any] = {"strikers": 1 + len(system.further_contacts)} if system.further_contacts else {}
+    for section, values in system.to_mapping().items() if system.further_contacts else ():
+        number = numbered(section)[1]
+        if number > 1:
+            attrs |= {
+                f"{name}_striker_{number}"
+                if name in ("type", "type")
+                else lookup(f"{section}.{name}").short: value
+                for name, value in values.items()
+            }
+    return attrs
+
+
+def _short(part: Any) -> dict[str, Any]:
+    """The quantities of a part by the names they have in datasets."""
+    return {
+        item.short or name: getattr(part, name)
+        for name, item in quantities(type(part)).items()
+        if isinstance(getattr(part, name), (float, int, str))
+    }
+
+
+def attributes_of(
+    title: str,
+    system: System,
+    integration: Integration,
+    plan: Plan,
+    more: dict[str, Any],
+    points: Any = None,
+) -> dict[str, Any]:
+    """The attributes of a file: a title, every parameter, what made it, and the hash of all of it.
+
+    *points* tell one sweep from another.
+    """
+    attrs: dict[str, Any] = {"Conventions": CONVENTIONS, "title": title}
+    attrs |= describe_system(system, plan) | more
+    own = _plain(integration)
+    attrs["system_hash"] = system.hash
+    attrs["system"] = json.dumps(_short_arrays(system.to_mapping()), sort_keys=True)
+    attrs["integration"] = json.dumps(own, sort_keys=True)
+    identity = {"system": system.hash, "integration": own, "more": more}
+    return attrs | made_by(identity if points is None else identity | {"points": points})
+
+
+def _short_arrays(value: Any) -> Any:
+    """Plain values; an array too long for an attribute is named by its hash."""
+    if isinstance(value, np.ndarray):
+        if value.size > _LONGEST:
+            return {"shape": list(value.shape), "sha256": array_hash(value)}
+        return value.tolist()
+    if isinstance(value, dict):
+        return {key: _short_arrays(item) for key, item in value.items()}
+    return value
+
+
+def _plain(integration: Integration) -> dict[str, Any]:
+    return {name: getattr(integration, name) for name in quantities(Integration) if name != "threads"}
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a recorded run is made of before its first step, and what is said of it after its last.
+
+
+_Array = NDArray[np.float64]
+
+_SAMPLES_PER_CYCLE = 200
+"""Regular samples of a run per cycle of the excitation or of the first mode, whichever is the faster."""
+MEMORY_LIMIT = 4 * 2**30
+"""Bytes that the samples of a run may take."""
+_ENERGY_ERROR = 1e-3
+"""Of the gross work, from which a run says that it misses its energy ledger."""
+_ENDED = (RunStatus.OK, RunStatus.EARLY_STOP)
+
+
+class Prepared(NamedTuple):
+    """A run that can begin."""
+
+    system: System
+    integration: Integration
+    plan: Plan
+    accuracy: ErrorEstimate | None
+    """What an asked tolerance gave."""
+    ensemble: Ensemble
+    times: _Array | None
+    """Instants that were asked for, s."""
+    samples: int
+    """Instants to record, beside the ends of steps in contact."""
+    end: float
+    """s"""
+    period: float
+    """Of a cycle, s."""
+
+    @property
+    def instants(self) -> _Array:
+        """To record, s."""
+        return np.linspace(0.0, self.end, self.samples) if self.times is None else self.times
+
+
+def prepared(system: System, integration: Integration, sample_times: ArrayLike | None) -> Prepared:
+    """Choose the steps of a run and the instants to record; says what is doubtful of the system.
+
+    Raises
+    ------
+    InputError
+        For bad input.
+    """
+    tell(system.diagnostics())
+    plan, accuracy = plans_of(system, integration, run_columns(system, {}))[0], None
+    if integration.tolerance is not None:
+        plan, accuracy = steps_for(system, integration)
+    ensemble = make_ensemble(system, integration, plan=plan)
+    end = float(ensemble.runs["tick"][0]) * int(ensemble.runs["end"][0])
+    period = cycle_of(system)
+    times = None if sample_times is None else _checked_times(sample_times, end)
+    count = _regular_count(system, end, period) if times is None else times.size
+    return Prepared(system, integration, plan, accuracy, ensemble, times, count, end, period)
+
+
+def said_of(run: Prepared, outcome: RunSummary, accumulators_of_runs: Any) -> dict[str, Any]:
+    """The attributes of a run that ended; says where it misses its energy ledger."""
+    lasted = run.end / run.period
+    more: dict[str, Any] = _own_attributes(run.system, run.integration, lasted)
+    more["response_class"] = outcome.response_class.label
+    more["status"] = f"{outcome.status.name}: {outcome.status.advice}"
+    attrs = attributes_of("run of a struck bistable beam", run.system, run.integration, run.plan, more)
+    attrs["gross_work"] = float(accumulators_of_runs["gross_work"][0])
+    attrs["energy_error"] = _energy_error(accumulators_of_runs)
+    tell(_unbalanced(attrs["energy_error"]))
+    if run.accuracy is not None:
+        attrs |= run.accuracy.attributes()
+    return attrs
+
+
+def _own_attributes(system: System, integration: Integration, lasted: float) -> dict[str, Any]:
+    """What attributes say of the drive, the striker and how long it went on."""
+    striker = system.striker
+    attrs: dict[str, Any] = {"cycles": round(lasted, 9), "engine": "cpu"}
+    if striker is not None and striker.drive.harmonic:
+        attrs |= {
+            name: getattr(striker.drive, name)
+            for name in ("frequency_ratio", "velocity_amplitude")
+            if hasattr(striker.drive, name)
+        }
+    elif striker is not None and isinstance(striker.drive, RecordedMotion):
+        attrs |= {
+            "drive": "recorded_motion",
+            "frequency_ratio": striker.drive.frequency / system.model.reference_frequency,
+        }
+    if striker is not None:
+        attrs |= {"location": striker.location, "side": striker.side}
+    attrs["early_termination"] = int(integration.early_termination)
+    return attrs
+
+
+def _energy_error(accumulators_of_runs: Any) -> float:
+    """What the ledger of a recorded run misses at its end, over the gross work: 0 for exact steps.
+
+    The striker's work less what the beam and the contact gained and what was dissipated, as it was integrated.
+    """
+    accumulators = accumulators_of_runs[0]
+    with np.errstate(invalid="ignore"):  # a run that failed has no numbers
+        given = accumulators["work"] + accumulators["base_work"] + accumulators["load_work"]
+        missed = (
+            given
+            - (accumulators["energy"] - accumulators["first_energy"])
+            - accumulators["dissipated"]
+            - accumulators["circuit_energy"]
+        )
+    scale = (
+        float(accumulators["gross_work"])
+        or float(abs(accumulators["first_energy"]) + abs(accumulators["energy"]))
+        or 1.0
+    )
+    return float(missed) / scale
+
+
+def _unbalanced(error: float) -> list[Diagnostic]:
+    if not abs(error) > _ENERGY_ERROR:
+        return []
+    return [
+        Diagnostic(
+            "ledger-missed",
+            f"the run misses its energy ledger by {abs(error):.2g} of the gross work: its steps are too "
+            "long for what the beam does; use accuracy = 'reference', a tolerance, or a smaller step",
+            {"energy_error": error},
+        )
+    ]
+
+
+def _regular_count(system: System, end: float, period: float) -> int:
+    fastest = min(period, 1.0 / system.model.reference_frequency)
+    count = end / fastest * _SAMPLES_PER_CYCLE
+    if count > 1e9:
+        raise InputError(
+            f"a run of {count:.3g} samples is too long to record: give sample_times, or fewer cycles"
+        )
+    return math.ceil(count) + 1
+
+
+def check_memory(system: System, samples: int, with_contacts: bool) -> None:
+    """Refuse a run whose samples would not fit, before anything is computed."""
+    row = 8 * (4 * system.model.modes + 20)
+    size = samples * row * (1.5 if with_contacts else 1.0)
+    if size > MEMORY_LIMIT:
+        raise InputError(
+            f"{samples} samples of {system.model.modes} modes would take {size / 2**30:.1f} GiB, the limit is "
+            f"{MEMORY_LIMIT / 2**30:.0f} GiB: give fewer sample_times, or fewer cycles, or have "
+            "it written in pieces by simulate_to_file (--stream)"
+        )
+
+
+def _checked_times(sample_times: ArrayLike, end: float) -> _Array:
+    times = finite_array("sample_times", sample_times, 1).copy()
+    if times.size == 0:
+        raise InputError("sample_times = []: must hold at least one instant")
+    if (np.diff(times) <= 0.0).any():
+        raise InputError("sample_times: must be strictly increasing")
+    if times[0] < 0.0 or times[-1] > end * (1.0 + 1e-9):
+        raise InputError(
+            f"sample_times from {times[0]:g} to {times[-1]:g} s: must lie within the run, 0 to {end:g} s"
+        )
+    return times
+
+
+def reached_by(recorded: Recorded, until: float) -> Recorded:
+    """The samples up to where a run came that did not go to its end."""
+    kept = recorded.times <= until
+    return recorded._replace(
+        times=recorded.times[kept], q=recorded.q[kept], p=recorded.p[kept], values=recorded.values[kept]
+    )
+
+
+def end_state(ensemble: Ensemble, recorded: Recorded, outcome: RunSummary) -> State | None:
+    """Where a run stands at its end; None if it failed."""
+    if outcome.status not in _ENDED:
+        return None
+    last, time = recorded.last, int(recorded.accumulators_of_runs["time"][0])
+    states = states_of(
+        ensemble,
+        last.q[None],
+        last.p[None],
+        np.array([last.well_sign]),
+        np.array([last.contact_ticks]),
+        np.array([time]),
+    )
+    return states[0]
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+@overload
+def simulate(
+    system: System,
+    integration: Integration | None = None,
+    *,
+    sample_times: ArrayLike | None = None,
+    progress: Callable[[float], object] | bool | None = None,
+) -> Run: ...
+
+
+@overload
+def simulate(
+    system: Sequence[System],
+    integration: Integration | None = None,
+    *,
+    sample_times: ArrayLike | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
+) -> list[Run]: ...
+
+
+def simulate(
+    system: System | Sequence[System],
+    integration: Integration | None = None,
+    *,
+    sample_times: ArrayLike | None = None,
+    progress: Any = None,
+) -> Run | list[Run]:
+    """Integrate one run and record it.
+
+    The beam starts at rest in the well that the striker pushes it out of (the lower one for a striker below), the tip
+    touching it (Eqs. 11-18), or where the system says.  Without a striker the beam vibrates freely from the system's
+    start, and a cycle is one of the first mode.
+
+    Parameters
+    ----------
+    system : System, or a list of them
+        What is run; several are run side by side on all cores (``integration.threads``).
+    integration : Integration, optional
+        How: cycles, steps or accuracy or tolerance, early decision.  One recorded run is always the CPU's work.
+    sample_times : array_like, optional
+        Instants to record, s, ascending, from 0 to the end of the run.  By default 200 per cycle of the
+        excitation or of the first mode, and the ends of the steps of each impact.  Instants that a run which was
+        decided early or failed did not reach are NaN, with ``valid`` = 0.
+    progress : callable, optional
+        Called with the share of the run that is done, several times a second; True writes a line to standard error.
+        Of several runs: called as ``progress(done, total)``.
+
+    Returns
+    -------
+    Run, or a list of them
+
+    Raises
+    ------
+    InputError
+        For bad input, and for a run whose samples would take more than 4 GiB.  A run that fails numerically does not
+        raise: ``run.outcome.status`` says why.
+    """
+    if isinstance(system, (list, tuple)):
+        return _several(system, integration, sample_times, progress)
+    system, integration = kernel_input(system, integration)
+    report = sharing(progress, "run")
+    run = prepared(system, integration, sample_times)
+    times, ensemble = run.times, run.ensemble
+    check_memory(system, run.samples, times is None)
+    _, engine = resolve("cpu")
+    recorded = joined(list(engine.record(ensemble, run.instants, times is None, report)))
+    if report is not None:
+        report(1.0)
+    outcome = RunSummary.from_statistics(
+        statistics_of(ensemble, recorded.accumulators_of_runs, run.end / run.period)
+    )
+    if times is None and outcome.status != RunStatus.OK:
+        recorded = reached_by(
+            recorded, float(recorded.accumulators_of_runs["time"][0] * ensemble.runs["tick"][0])
+        )
+        if recorded.times.size == 0:
+            times = np.zeros(1)  # it failed before anything could be written down
+    attrs = said_of(run, outcome, recorded.accumulators_of_runs)
+    return Run.of(
+        lambda: (
+            run_dataset(ensemble, system, recorded, times, run.period, attrs),
+            impact_table(recorded.impacts, attrs),
+        ),
+        outcome=outcome,
+        system=system,
+        integration=integration,
+        accuracy=run.accuracy,
+        end=end_state(ensemble, recorded, outcome),
+    )
+
+
+def _several(
+    systems: Sequence[Any], integration: Integration | None, sample_times: ArrayLike | None, progress: Any
+) -> list[Run]:
+    """Runs of several systems, on all cores: kernels give up the interpreter's lock."""
+    report = counting(progress, "simulate", "runs")
+    for at, system in enumerate(systems):
+        if not isinstance(system, System):
+            raise InputTypeError(f"system[{at}] = {shown(system)}: must be a System")
+    checked = [kernel_input(system, integration) for system in systems]
+    threads = next((each.threads for _, each in checked), None) or usable_cores()
+    with ThreadPoolExecutor(max_workers=max(1, min(threads, len(systems) or 1))) as pool:
+        waiting = [pool.submit(simulate, system, each, sample_times=sample_times) for system, each in checked]
+        try:
+            for done, future in enumerate(as_completed(waiting), 1):
+                future.result()
+                if report is not None:
+                    report(done, len(systems))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return [future.result() for future in waiting]

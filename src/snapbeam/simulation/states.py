@@ -1,0 +1,55 @@
+"""From an engine's coordinates to states, and back without losing a bit."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.state import ModalState, State
+from snapbeam.solver.assemble import FAR_AWAY
+from snapbeam.solver.ensemble import Ensemble
+
+__all__ = ["circuit_unit", "states_of"]
+
+
+_Array = NDArray[np.float64]
+_Integers = NDArray[np.int64]
+
+
+def circuit_unit(ensemble: Ensemble) -> float:
+    """What a circuit's coordinate is multiplied by to give volts or amperes."""
+    harvester = ensemble.harvester
+    if harvester is None or harvester.inertia == 0.0:
+        return 1.0
+    return harvester.unit
+
+
+def states_of(
+    ensemble: Ensemble, q: _Array, p: _Array, well_sign: _Integers, contact_ticks: _Integers, ticks: _Integers
+) -> State:
+    """States of the runs of an ensemble, a batch of shape (runs,).
+
+    *q* and *p* of shape (runs, N) are linear modes about the well *home*; *ticks* is when.
+    """
+    structure, runs = ensemble.structure, ensemble.runs
+    far = (well_sign < 0)[:, None]
+    first = np.where(far, q + structure.shift, q)
+    # a sine comes round after each turn; a record has an end
+    comes_round = ensemble.drive.harmonic or (ensemble.drive.parts and ensemble.drive.is_periodic)
+    turned = (ticks % runs["period"] if comes_round else ticks) / runs["period"]
+    tick = runs["tick"]
+    return State(
+        amplitude=structure.amplitudes(first),
+        velocity=structure.velocities(p),
+        phase=runs["phase"] + 2.0 * math.pi * turned,
+        striker_position=np.where(
+            runs["offset"] > FAR_AWAY, structure.sign * (runs["rest_contact"] + runs["offset"]), np.nan
+        ),
+        contact_time=np.where(contact_ticks >= 0, contact_ticks * tick, -1.0),
+        striker_shift=structure.body_of(q),
+        striker_rate=structure.body_of(p),
+        circuit=structure.circuit_of(p) * circuit_unit(ensemble),
+        modal=ModalState(q, p, well_sign.astype(np.float64), np.array(runs["offset"]), structure.hash),
+    )

@@ -1,0 +1,104 @@
+"""The outcome of a run: its class and its statistics, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.solver.statistics import STATISTICS
+from snapbeam.util.display import html_table
+from snapbeam.util.status_codes import ResponseClass, RunStatus
+from snapbeam.util.validation import InputError, integer, mapping
+
+__all__ = ["RunSummary"]
+
+
+class RunSummary(Mapping[str, Any]):
+    """What one run did, in a few numbers: a mapping, and the same as attributes.
+
+    The names, units and meanings are those of :data:`snapbeam.STATISTICS`; displacements are over b, velocities
+    over b omega_1.  A run that failed has ``response`` UNKNOWN and a ``status`` whose ``advice`` says why.  A run
+    decided early (``early_stop_time`` in seconds, NaN otherwise) has the certain class, but extremes and counts that
+    stop there.  ``final_well_proven`` says whether the run provably stays in the well it ended in; ``final_well`` is the
+    sign of w(1/2) at the end.
+    """
+
+    response: ResponseClass
+    status: RunStatus
+    crossings: int
+    zero_crossings_last_quarter: int
+    last_zero_crossing: float
+    final_well: int
+    final_well_proven: bool
+    min_displacement: float
+    max_displacement: float
+    min_midspan_displacement: float
+    max_midspan_displacement: float
+    peak_force: float
+    impacts: int
+    contact_time_fraction: float
+    early_stop_time: float
+
+    def __init__(self, values: Mapping[str, Any]) -> None:
+        mapping("values", values)
+        if missing := {"response_class", "status"} - set(values):
+            raise InputError(f"values: without {', '.join(sorted(missing))}")
+        found = {
+            name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()
+        }
+        found["response_class"], found["status"] = (
+            ResponseClass(found["response_class"]),
+            RunStatus(found["status"]),
+        )
+        self._values = found
+
+    @classmethod
+    def from_statistics(cls, statistics: Mapping[str, NDArray[np.generic]], index: int = 0) -> RunSummary:
+        """One run of what :func:`snapbeam.solver.statistics.statistics_of` returns."""
+        mapping("statistics", statistics)
+        index = integer(
+            "index", index, 0, max(0, min((np.size(each) for each in statistics.values()), default=1) - 1)
+        )
+        return cls({name: array[index] for name, array in statistics.items()})
+
+    def __getattr__(self, name: str) -> Any:
+        values = self.__dict__.get("_values", {})
+        if name in values:
+            return values[name]
+        raise AttributeError(f"{type(self).__name__} has no {name!r}; it has {', '.join(values)}")
+
+    def __getitem__(self, name: str) -> Any:
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._values]
+
+    def __repr__(self) -> str:
+        ended = "" if self.status is RunStatus.OK else f", {self.status.name}"
+        return (
+            f"<Outcome {self.response.label}{ended}, {self.zero_crossings} crossings, {self.impacts} impacts>"
+        )
+
+    def _repr_html_(self) -> str:
+        rows = [line.split(maxsplit=1) for line in self.to_text().splitlines()]
+        return html_table(f"Outcome: {self.response.label}", rows)
+
+    def to_text(self) -> str:
+        """Every statistic with its unit and its meaning, a line each."""
+        lines = []
+        for name, value in self._values.items():
+            row = STATISTICS.get(name)
+            unit, words = ("", "") if row is None else (row.unit, row.long_name)
+            shown = value.label if isinstance(value, ResponseClass) else getattr(value, "name", value)
+            text = f"{shown:.6g}" if isinstance(shown, float) else str(shown)
+            lines.append(f"{name:26s} {text:>16s} {'' if unit == '1' else unit:4s} {words}")
+        return "\n".join(lines)

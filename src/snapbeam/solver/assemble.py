@@ -1,0 +1,618 @@
+"""From a system and its runs to an ensemble: everything turned into modal numbers and ticks."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.contact.hertz import HertzContact
+from snapbeam.model.drive.base import HORIZON, Drive
+from snapbeam.model.drive.combined import joined
+from snapbeam.model.drive.sine import Sine
+from snapbeam.model.early_termination import decidable_energy, passed_heights
+from snapbeam.model.integration import Integration
+from snapbeam.model.quantity import RUN as RUN_SCOPE
+from snapbeam.model.quantity import quantities
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.model.state import State, rest_state
+from snapbeam.model.striker import numbered
+from snapbeam.model.system import System
+from snapbeam.solver.ensemble import RUN, CircuitCoupling, Ensemble, FurtherContactTable
+from snapbeam.solver.excitation import tip_motion
+from snapbeam.solver.further_contacts import LAW, NUMBERS, OFFSET, REST, SIGN, SPEED
+from snapbeam.solver.step_size import Clocked, Plan, choose_base_step, clocked, most_steps
+from snapbeam.solver.structure import Structure, structure_of
+from snapbeam.util.validation import InputError
+
+__all__ = [
+    "FAR_AWAY",
+    "Driven",
+    "begun_at",
+    "cycles_of",
+    "driven_of",
+    "fastest_of",
+    "make_ensemble",
+    "motions_of",
+    "others_of",
+    "phases_of",
+    "plans_of",
+    "run_columns",
+    "tip_of",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# The strikers beside the first one, for every run of an ensemble.
+
+
+def others_of(
+    system: System, structure: Structure, columns: Mapping[str, _Array], runs: int
+) -> FurtherContactTable | None:
+    """Where they are and what they touch by; their motions are in the ensemble's drive.
+
+    A striker stands where its tip touches the beam at rest in the first well, or its gap away from that.
+    """
+    if not system.further_contacts:
+        return None
+    count = len(system.further_contacts)
+    numbers, places = np.zeros((runs, count, NUMBERS)), np.zeros((runs, count), dtype=np.int64)
+    rows: list[_Array] = []
+    for j, each in enumerate(system.further_contacts):
+        number, striker = j + 2, each.striker
+        assert system.striker is not None
+        sign = 1.0 if striker.side == system.striker.side else -1.0
+        location = columns[f"striker_{number}.location"]
+        different, which = np.unique(location, return_inverse=True)
+        shapes = np.array([structure.model.shape_at(float(x)) for x in different])
+        places[:, j] = len(rows) + which
+        rows += [sign * structure.row_of_beam(structure.row(shape)) for shape in shapes]
+        numbers[:, j, REST] = sign * structure.sign * structure.rests(shapes)[which]
+        begun = _begun(striker.drive, columns, f"drive_{number}", system, runs)
+        gap = columns.get(f"striker_{number}.gap", np.full(runs, np.nan))
+        numbers[:, j, OFFSET] = np.where(np.isnan(gap), -begun, -gap)
+        numbers[:, j, SIGN] = sign
+        numbers[:, j, SPEED] = _speed(striker.drive, columns, f"drive_{number}", system, runs)
+        names = type(each.contact).numbers_type()._fields
+        for k, name in enumerate(names):
+            numbers[:, j, LAW + k] = columns[f"contact_{number}.{name}"]
+    return FurtherContactTable(
+        tuple(type(each.contact) for each in system.further_contacts), numbers, places, np.array(rows)
+    )
+
+
+def _own(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
+    names = len(section) + 1
+    own = {name[names:]: values for name, values in columns.items() if name.startswith(f"{section}.")}
+    return own or {"": np.zeros(runs)}
+
+
+def _begun(drive: Drive, columns: Mapping[str, _Array], section: str, system: System, runs: int) -> _Array:
+    """How far the tip is from its mid-position at the start, m."""
+    own = _own(columns, section, runs)
+    phase = columns.get(f"{section}.phase", np.zeros(runs))
+    if not phase.any():
+        return np.zeros(runs)
+    found, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
+    made: Any = kind.numbers_type()
+    table = np.stack([found[name] for name in kind.number_names], axis=1)
+    return np.array(
+        [tip_motion(made(*row), np.empty(0), at)[0] for row, at in zip(table, phase, strict=True)]
+    )
+
+
+def _speed(drive: Drive, columns: Mapping[str, _Array], section: str, system: System, runs: int) -> _Array:
+    """Greatest speed of the tip in the frame of the ends, m/s."""
+    speed = drive.bounds(_own(columns, section, runs), system.scale)[1]
+    base = system.base_excitation
+    if base is not None and not base.striker_on_base:
+        speed = speed + base.motion.bounds(_own(columns, "base", runs), system.scale)[1]
+    return speed
+
+
+# ----------------------------------------------------------------------------------------------------
+# What moves in every run of an ensemble, and as which drive kernels march it.
+
+
+class Driven(NamedTuple):
+    """What the drive is, for every run."""
+
+    kind: type[Drive]
+    numbers: _Array
+    period: _Array
+    """Of one cycle, s."""
+    highest: _Array
+    """From the mid-position, m."""
+    speed: _Array
+    samples: _Array
+
+
+def cycles_of(system: System, columns: Mapping[str, _Array]) -> _Array:
+    """Seconds of one cycle of excitation of each run, or of the first mode where nothing moves, shape (runs,)."""
+    runs = next(iter(columns.values())).size if columns else 1
+    leads = system.primary_excitation
+    if leads is None:
+        return 2.0 * math.pi / (np.ones(runs) * system.scale.omega)
+    section, drive = leads
+    return drive.cycle(_own_driven(columns, section, runs), system.scale)
+
+
+def phases_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
+    """Argument of the drive at the start of each run: of several motions their own phases count instead."""
+    if len(system.moving) > 1:
+        return np.zeros(runs)
+    name = next((f"{section}.phase" for section, _ in system.moving), "drive.phase")
+    return columns.get(name, np.zeros(runs))
+
+
+def _own_driven(columns: Mapping[str, _Array], section: str, runs: int) -> dict[str, _Array]:
+    """Parameters of a drive in a section, of which there may be none."""
+    names = len(section) + 1
+    own = {name[names:]: values for name, values in columns.items() if name.startswith(f"{section}.")}
+    return own or {"": np.zeros(runs)}
+
+
+def driven_of(system: System, columns: Mapping[str, _Array], runs: int) -> Driven:
+    """Arrange the striker's drive, or it and what else moves, for kernels."""
+    if any(section != "drive" for section, _ in system.moving):
+        return _together(system, columns, runs)
+    scale, striker = system.scale, system.striker
+    if striker is None:
+        numbers = np.tile([1.0 * scale.omega, 0.0], (runs, 1))
+        return Driven(
+            Sine, numbers, cycles_of(system, columns), np.full(runs, -np.inf), np.zeros(runs), np.empty(0)
+        )
+    drive = striker.drive
+    own = _own_driven(columns, "drive", runs)
+    found = drive.numbers(own, scale)
+    highest, speed = drive.bounds(own, scale)
+    samples = drive.samples() * (1.0 if striker.side == "below" else -1.0)
+    if striker.side == "above":
+        highest = drive.mirrored_bounds(own, scale)
+    table = np.stack([found[name] for name in drive.number_names], axis=1)
+    return Driven(
+        drive.integrated_as or type(drive), table, cycles_of(system, columns), highest, speed, samples
+    )
+
+
+def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Driven:
+    """The motions of a system with a base, a load or several strikers as one drive.
+
+    Nothing is said of how high the tip comes to be used: no such run is decided by it.
+    """
+    scale, names = system.scale, {"drive": "tip", "base": "base", "axial": "load"}
+    names |= {f"drive_{number}": f"tip{number - 1}" for number in range(2, 2 + len(system.further_contacts))}
+    kinds: dict[str, type[Drive]] = {}
+    found: dict[str, _Array] = {}
+    speed, fastest = np.zeros(runs), np.zeros(runs)
+    for section, drive in system.moving:
+        part, own = names[section], _own_driven(columns, section, runs)
+        numbers = drive.numbers(own, scale)
+        kinds[part] = drive.integrated_as or type(drive)
+        found |= {f"{part}_{name}": numbers[name] for name in drive.number_names}
+        found[f"{part}_phase"] = columns.get(f"{section}.phase", np.zeros(runs))
+        fastest = np.maximum(fastest, numbers["fastest" if "fastest" in numbers else "omega"])
+        if section == "drive":
+            speed = speed + drive.bounds(own, scale)[1]
+    if system.base_excitation is not None:
+        own, base = _own_driven(columns, "base", runs), system.base_excitation
+        sign = 1.0 if base.direction == "up" else -1.0
+        side = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
+        follow = 0.0 if base.striker_on_base or system.striker is None else -side * sign
+        found["base_hardest"] = base.motion.peak_acceleration(own, scale)
+        found["base_sign"], found["base_follow"] = np.full(runs, sign), np.full(runs, follow)
+        speed = speed + abs(follow) * base.motion.bounds(own, scale)[1]
+    kind, cycle = joined(kinds), cycles_of(system, columns)
+    only = next(iter(kinds)) if kind.alone else ""
+    found["omega"] = found[f"{only}_omega"] if only else 2.0 * math.pi / (HORIZON * cycle)
+    found["fastest"] = fastest
+    table = np.stack([found[name] for name in kind.number_names], axis=1)
+    return Driven(kind, table, cycle, np.full(runs, np.inf), speed, np.empty(0))
+
+
+def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
+    """Greatest angular frequency of the base and of the axial load, rad/s; 0 without them."""
+    found = np.zeros(runs)
+    for section, drive in system.moving:
+        if section in ("base", "axial"):
+            numbers = drive.numbers(_own_driven(columns, section, runs), system.scale)
+            found = np.maximum(found, numbers["fastest" if "fastest" in numbers else "omega"])
+    return found
+
+
+def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, tuple[_Array, _Array]]:
+    """Displacement (m) and velocity (m/s) of the base in space, and change (N) and rate of the load, at instants.
+
+    *ensemble* is that of the one run, which may begin in the middle of its drives.
+    """
+    found = {}
+    begun, alone = float(ensemble.runs["phase"][0]), getattr(ensemble.drive, "alone", True)
+    if not alone:
+        times = times + begun / float(ensemble.drive_numbers[0, ensemble.drive.number_names.index("omega")])
+    for section, drive in system.moving:
+        if section not in ("base", "axial"):
+            continue
+        own = {name: np.array([value]) for name, value in drive.values().items()}
+        numbers, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
+        table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
+        arguments = numbers["omega"][0] * times + (begun if alone else float(getattr(drive, "phase", 0.0)))
+        pairs = np.array([tip_motion(table, np.empty(0), at) for at in arguments.tolist()]).reshape(-1, 2)
+        sign = (
+            -1.0
+            if section == "base"
+            and system.base_excitation is not None
+            and system.base_excitation.direction == "down"
+            else 1.0
+        )
+        found[section] = sign * pairs[:, 0], sign * pairs[:, 1]
+    return found
+
+
+def tip_of(system: System, number: int, times: _Array) -> tuple[_Array, _Array]:
+    """Displacement from its mid-position (m) and velocity (m/s) of a striker of several, the first being 1.
+
+    Seen from its own side, in the frame of the ends but without what a base does to it.  Of systems whose run begins
+    with their drives.
+    """
+    striker = system.further_contacts[number - 2].striker if number > 1 else system.striker
+    assert striker is not None
+    drive = striker.drive
+    own = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
+    numbers, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
+    table = kind.numbers_type()(*(float(numbers[name][0]) for name in kind.number_names))
+    arguments = numbers["omega"][0] * times + float(getattr(drive, "phase", 0.0))
+    pairs = np.array([tip_motion(table, np.empty(0), at) for at in arguments.tolist()]).reshape(-1, 2)
+    return pairs[:, 0], pairs[:, 1]
+
+
+def begun_at(driven: Driven, phase: _Array) -> _Array:
+    """How far the tip is from its mid-position at the start, m."""
+    if driven.kind.harmonic:
+        amplitude = driven.numbers[:, driven.kind.number_names.index("amplitude")]
+        return np.where(phase == 0.0, 0.0, amplitude * np.sin(phase))
+    numbers = driven.kind.numbers_type()
+    begun = [
+        tip_motion(numbers(*row), driven.samples, at)[0]
+        for row, at in zip(driven.numbers, phase, strict=True)
+    ]
+    return np.array(begun)
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_Array = NDArray[np.float64]
+_Integers = NDArray[np.int64]
+
+_LOWEST = {"standard": 1e-9, "reference": 1e-13}
+"""Height of a flight after an impact that lasts no time, over b, below which chatter ends in sticking."""
+_RESOLVED = 24.0
+"""Flight steps, at least, in a period of a base's or an axial load's fastest part."""
+_TAPPED = {"standard": 0.35, "reference": 0.1}
+"""Longest step with a harvester, over the reciprocal of the greatest angular frequency with an open circuit. It
+is in the kicks, and at 0.5 a run of one or three modes still loses up to 5e-3 of its gross work."""
+FAR_AWAY = -1e30
+"""Penetration, m, of a tip that is not there."""
+
+
+def make_ensemble(
+    system: System,
+    integration: Integration,
+    points: Mapping[str, _Array] | None = None,
+    *,
+    plan: Plan | None = None,
+    start: State | None = None,
+    periods: float | None = None,
+    step_factor: float = 1.0,
+) -> Ensemble:
+    """Arrange runs of a system for an engine.
+
+    Parameters
+    ----------
+    system : System
+    integration : Integration
+    points : mapping of str to array of shape (runs,), optional
+        Parameters of scope *run* that differ between the runs, by dotted name.
+    plan : Plan, optional
+        Steps, in place of those that *integration* asks for.
+    start : State, optional
+        One start for all runs, or a batch with one for each; the system's by default.
+    periods : float, optional
+        Cycles to march, a state handed out after each; by default the cycles of *integration*, in one go.
+    step_factor : float
+        Times the length of every step.
+
+    Raises
+    ------
+    InputError
+        For parameters that cannot differ between the runs of an ensemble, and for more steps than can be counted.
+    """
+    columns = run_columns(system, points or {})
+    state = (system.initial_state or rest_state(system.model, system.striker)) if start is None else start
+    runs = next(iter(columns.values())).size if columns else 1
+    if state.batch and runs in (1, state.batch[0]):
+        runs = state.batch[0]
+    columns = {name: np.array(np.broadcast_to(values, (runs,))) for name, values in columns.items()}
+    side = _side(system, state, goes_on=periods is not None)
+    structure = structure_of(system.model, side, system.striker, system.base_excitation, system.harvester)
+    plans = plans_of(system, integration, columns) if plan is None else [plan] * runs
+    if step_factor != 1.0:
+        plans = [each._replace(step=step_factor * each.step) for each in plans]
+    driven = driven_of(system, columns, runs)
+    table = np.zeros(runs, dtype=RUN)
+    places = _places(structure, table, columns.get("striker.location", np.full(runs, 0.5)))
+    starts = _starts(structure, table, state, 1.0 if system.harvester is None else system.harvester.unit)
+    table["phase"] = np.where(np.isnan(state.phase), phases_of(system, columns, runs), state.phase)
+    table["offset"] = _offsets(system, structure, state, columns, table, places.rows, starts, driven)
+    table["tip_speed"] = driven.speed
+    tapped = _tapped(system, columns, runs)
+    if tapped is not None:
+        table["circuit_rate"] = tapped.rate
+    highest = table["rest_contact"] + table["offset"] + driven.highest
+    if structure.body_mass is not None or driven.kind.parts or system.further_contacts:
+        highest = np.full(highest.shape, np.inf)  # a body goes wherever it is thrown, and a shaken beam too
+    time = clocked(table, system, integration, driven.period, plans, periods)
+    _decisions(table, system, structure, integration, time, places.location, highest)
+    table["lowest"] = system.scale.length * _LOWEST[integration.accuracy]
+    law: type[ContactLaw] = HertzContact if system.contact is None else type(system.contact)
+    return Ensemble(
+        structure=structure,
+        scale=system.scale,
+        order=plans[0].order,
+        law=law,
+        drive=driven.kind,
+        runs=table,
+        law_numbers=_law_numbers(law, system, columns, runs),
+        drive_numbers=driven.numbers,
+        samples=driven.samples,
+        location=places.location,
+        highest=highest,
+        contact_rows=places.rows,
+        starts=starts,
+        max_steps=most_steps(integration, system.model.modes),
+        high_omega=integration.high_frequency_ratio * system.scale.omega,
+        cycles=time.cycles,
+        tapped=tapped,
+        harvester=system.harvester,
+        others=others_of(system, structure, columns, runs),
+    )
+
+
+def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Array]:
+    """Every parameter of scope *run* of a system as an array of shape (runs,), by dotted name.
+
+    *points* holds those that differ between the runs; the others are the system's own.
+    """
+    size = next(iter(points.values())).size if points else 1
+    own: dict[str, float] = {}
+    parts: list[tuple[str, Any]] = [("contact", system.contact), ("striker", system.striker)]
+    for number, each in enumerate(system.further_contacts, 2):
+        parts += [(f"contact_{number}", each.contact), (f"striker_{number}", each.striker)]
+        own |= {f"drive_{number}.{name}": value for name, value in each.striker.drive.values().items()}
+    for section, part in parts:
+        if part is not None:
+            own |= {
+                f"{section}.{name}": value
+                for name, value in vars(part).items()
+                if isinstance(value, float) and quantities(type(part))[name].scope == RUN_SCOPE
+            }
+    if system.striker is not None:
+        own |= {f"drive.{name}": value for name, value in system.striker.drive.values().items()}
+    if system.harvester is not None:
+        own["harvester.resistance"] = float(system.harvester.resistance)
+    for section, around in (("base", system.base_excitation), ("axial", system.axial_load)):
+        if around is not None:
+            own |= {f"{section}.{name}": value for name, value in around.motion.values().items()}
+    columns = {name: np.full(size, value) for name, value in own.items()}
+    for name, values in points.items():
+        section, _, field = name.partition(".")
+        strikers = 0 if system.striker is None else 1 + len(system.further_contacts)
+        may_gap = field == "gap" and numbered(section)[0] == "striker" and numbered(section)[1] <= strikers
+        if name not in columns and not may_gap:
+            raise InputError(f"{name}: no parameter that may differ between the runs of one ensemble")
+        columns[name] = np.asarray(values, dtype=np.float64)
+    return columns
+
+
+def plans_of(system: System, integration: Integration, columns: Mapping[str, _Array]) -> list[Plan]:
+    """The steps of each run: they follow from the structure and from the run's own contact.
+
+    A striker with a mass meets the beam for a shorter time, as the two masses together do: m_s m/(m_s + m).
+    """
+    plans, striker = _plans_of(system, integration, columns), system.striker
+    further = [
+        _plans_of(system, integration, columns, f"contact_{number}", each.contact)
+        for number, each in enumerate(system.further_contacts, 2)
+    ]
+    if further:
+        plans = [_serving(each) for each in zip(plans, *further, strict=True)]
+    if integration.step is None and (system.base_excitation is not None or system.axial_load is not None):
+        fastest = fastest_of(system, columns, len(plans))
+        plans = [
+            each._replace(step=min(each.step, 2.0 * math.pi / (_RESOLVED * rate)))
+            for each, rate in zip(plans, fastest.tolist(), strict=True)
+        ]
+    if integration.step is None and system.harvester is not None:
+        tapped = _tapped(system, columns, len(plans))
+        assert tapped is not None
+        # a circuit couples the fastest modes too, and is in its kicks
+        longest = _TAPPED[integration.accuracy] / _fastest_open(system)
+        rates = tapped.rate if system.harvester.inertia > 0.0 else np.zeros(len(plans))
+        plans = [
+            each._replace(step=min(each.step, longest, 1.0 / rate if rate > 0.0 else math.inf))
+            for each, rate in zip(plans, rates.tolist(), strict=True)
+        ]
+    if striker is None or striker.mass is None:
+        return plans
+    mass = _struck(system).lightest_contact_mass
+    more = max(0, math.ceil(0.5 * math.log2(1.0 + mass / striker.mass) - 1e-9))
+    return [each._replace(coarsest=each.coarsest + more, finest=each.finest + more) for each in plans]
+
+
+def _fastest_open(system: System) -> float:
+    """Greatest angular frequency of the beam in its well, rad/s, while no current flows: theta^2/C stiffens it."""
+    model, harvester = _struck(system), system.harvester
+    assert harvester is not None
+    stiffness = np.diag(model.omega**2)
+    if harvester.inertia > 0.0:
+        row = model.linear_modes.T @ harvester.row(model)
+        stiffness = stiffness + np.outer(row, row) / harvester.inertia
+    return float(np.sqrt(np.linalg.eigvalsh(stiffness)[-1]))
+
+
+def _struck(system: System) -> ReducedModel:
+    """The model as the striker sees it, so that mirror images are stepped alike."""
+    above = system.striker is not None and system.striker.side == "above"
+    return system.model.mirrored if above else system.model
+
+
+def _serving(plans: Sequence[Plan]) -> Plan:
+    """Steps that serve several contacts: as short as the shortest of them, in flight and in contact."""
+    step = min(each.step for each in plans)
+    longest = min(each.step * 0.5**each.coarsest for each in plans)
+    shortest = min(each.step * 0.5**each.finest for each in plans)
+    coarsest, finest = (math.ceil(math.log2(step / each) - 1e-9) for each in (longest, shortest))
+    return plans[0]._replace(step=step, coarsest=max(0, coarsest), finest=max(0, coarsest, finest))
+
+
+def _plans_of(
+    system: System,
+    integration: Integration,
+    columns: Mapping[str, _Array],
+    section: str = "contact",
+    contact: ContactLaw | None = None,
+) -> list[Plan]:
+    """The steps that a contact asks for: that of the first striker, or another one's."""
+    of_contact = {
+        name.partition(".")[2]: values for name, values in columns.items() if name.startswith(f"{section}.")
+    }
+    step, accuracy = integration.step, integration.accuracy
+    runs = next(iter(columns.values())).size if columns else 1
+    contact = contact or (system.contact if system.striker is not None else None)
+    if contact is None or not of_contact:
+        return [choose_base_step(_struck(system), contact, step=step, accuracy=accuracy)] * runs
+    table = np.stack(list(of_contact.values()), axis=1)
+    different, which = np.unique(table, axis=0, return_inverse=True)
+    plans = [
+        choose_base_step(
+            _struck(system),
+            dataclasses.replace(contact, **dict(zip(of_contact, map(float, row), strict=True))),  # type: ignore[type-var]
+            step=step,
+            accuracy=accuracy,
+        )
+        for row in different
+    ]
+    return [plans[i] for i in which.ravel()]
+
+
+def _side(system: System, state: State, goes_on: bool) -> str:
+    if system.striker is not None:
+        return system.striker.side
+    if goes_on:
+        # the same from call to call, whichever well it comes to
+        return "below"
+    # seen from the well the beam starts in, so that mirror images are mirrored to the bit
+    first = state.flat()[0]
+    return "above" if float(first.amplitude @ system.model.midspan_shape) > 0.0 else "below"
+
+
+class _Places(NamedTuple):
+    location: _Array
+    rows: _Array
+
+
+def _places(structure: Structure, table: NDArray[Any], location: _Array) -> _Places:
+    different, which = np.unique(location, return_inverse=True)
+    shapes = np.array([structure.model.shape_at(float(x)) for x in different])
+    table["contact_row"] = which
+    table["rest_contact"] = structure.sign * structure.rests(shapes)[which]
+    table["rest_center"] = structure.center_rest
+    return _Places(location, np.array([structure.row(shape) for shape in shapes]))
+
+
+def _starts(structure: Structure, table: NDArray[Any], state: State, unit: float) -> _Array:
+    """q and p of every start; which start and home each run has is entered in the table."""
+    flat, modal = state.flat(), state.flat().modal
+    count = flat.batch[0]
+    table["start_row"] = np.arange(table.size) if count > 1 else 0
+    table["home"], table["contact_time"] = 1.0, flat.contact_time
+    if modal is not None and modal.structure == structure.hash:
+        table["home"] = modal.well_sign
+        return np.stack((modal.q, modal.p), axis=1)
+    parts = (flat.amplitude, flat.velocity, flat.striker_shift, flat.striker_rate, flat.circuit / unit)
+    pairs = [structure.to_modal(*each) for each in zip(*parts, strict=True)]
+    return np.array(pairs)
+
+
+def _offsets(
+    system: System,
+    structure: Structure,
+    state: State,
+    columns: Mapping[str, _Array],
+    table: NDArray[Any],
+    rows: _Array,
+    starts: _Array,
+    driven: Driven,
+) -> _Array:
+    """Penetration of the tip at mid-stroke into the beam at rest in the first well."""
+    if system.striker is None:
+        return np.full(table.size, FAR_AWAY)
+    flat, modal = state.flat(), state.flat().modal
+    position = structure.sign * flat.striker_position - table["rest_contact"]
+    if modal is not None and modal.structure == structure.hash:
+        # to the bit, unless the striker now strikes at another place
+        same = structure.sign * (table["rest_contact"] + modal.offset) == flat.striker_position
+        return np.where(same, modal.offset, position)
+    pairs = {(int(run["contact_row"]), int(run["start_row"])) for run in table}
+    reach = {(workspace, at): float(rows[workspace] @ starts[at, 0]) for workspace, at in pairs}
+    touching = np.array([reach[int(run["contact_row"]), int(run["start_row"])] for run in table])
+    begun = begun_at(driven, table["phase"])
+    offset = touching - begun
+    if "striker.gap" in columns:
+        offset = np.where(np.isnan(columns["striker.gap"]), offset, -columns["striker.gap"])
+    return np.asarray(np.where(np.isnan(flat.striker_position), offset, position))
+
+
+def _tapped(system: System, columns: Mapping[str, _Array], runs: int) -> CircuitCoupling | None:
+    """The circuit of a harvester, for every run."""
+    harvester = system.harvester
+    if harvester is None:
+        return None
+    resistance = columns.get("harvester.resistance", np.zeros(runs))
+    loss, inertia = harvester.loss(resistance), harvester.inertia
+    rate = loss / inertia if inertia > 0.0 else 1.0 / loss
+    unit = 1.0 / math.sqrt(inertia) if inertia > 0.0 else 1.0
+    return CircuitCoupling(rate, harvester.share(resistance), harvester.volts(resistance) * unit)
+
+
+def _law_numbers(law: type[ContactLaw], system: System, columns: Mapping[str, _Array], runs: int) -> _Array:
+    names = law.numbers_type()._fields
+    if system.contact is None or system.striker is None:
+        return np.zeros((runs, len(names)))
+    return np.stack([columns[f"contact.{name}"] for name in names], axis=1)
+
+
+def _decisions(
+    table: NDArray[Any],
+    system: System,
+    structure: Structure,
+    integration: Integration,
+    time: Clocked,
+    location: _Array,
+    highest: _Array,
+) -> None:
+    """When a run may end early."""
+    table["decide_crossings"], table["decide_energy"] = -1, -math.inf
+    properties = system.contact is None or system.contact.properties.energy_bound
+    if not integration.early_termination or not properties or system.further_contacts:
+        return
+    table["decide_crossings"] = int(time.cycles / 20.0)
+    table["decide_reach"] = np.maximum(highest, 0.0)
+    if structure.uneven is not None:
+        table["decide_reach"] = passed_heights(structure.model, location, highest)
+    table["decide_energy"] = decidable_energy(structure.model, location, highest)

@@ -1,0 +1,360 @@
+"""Laws of contact as kernels see them: which functions belong to a law follows from the type of its numbers.
+
+A law is a class in :mod:`snapbeam.model.contact` (or anybody's) with plain scalar functions; they are compiled here,
+once, for whichever engine asks.  In Numba's simulator they run as they stand.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any, NamedTuple
+
+from snapbeam.solver.compilation import compiled, inlined, overloaded
+from snapbeam.solver.interpolation import cubic
+from snapbeam.solver.simd import Lanes, select_less
+
+__all__ = [
+    "Loss",
+    "contact_energy",
+    "contact_force",
+    "contact_slope",
+    "felt_force",
+    "is_impulsive",
+    "is_rate_dependent",
+    "jumps",
+    "kick_force",
+    "lossy_kick",
+    "mark_of",
+    "peak_force",
+    "released_at",
+    "scalar_function",
+    "zero_force_crossing",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# A kick by a contact that loses energy: exact at a fixed place, where the rate of penetration alone changes.
+#
+# During a kick the places stand still and the velocities change.  Under a force max(0, F + C v) the rate v of
+# penetration obeys, with the tension's push a = c.k along the contact's row c and B = c.c,
+#
+#     v' = -a - B max(0, F + C v),
+#
+# one linear equation where the bodies press and another where they do not; once across is all that its solutions go.
+# The functions below are its flow over a *weight* of either sign, so that a symmetric composition stays symmetric.
+
+
+# Nodes and weights of Gauss's rule of four points on [0, 1].
+_NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970262)
+_WEIGHTS = (0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692)
+_SMALL = 0.05
+
+
+class Loss(NamedTuple):
+    """What a kick gave."""
+
+    impulse: float
+    lost: float
+    """Energy, J: what the bodies gave to the contact beyond what it stores."""
+
+
+@compiled
+def _share(x):
+    """(1 - exp(-x))/x."""
+    return -math.expm1(-x) / x if x != 0.0 else 1.0
+
+
+@compiled
+def _second_share(x):
+    """(1 - (1 - exp(-x))/x)/x, 1/2 at 0."""
+    if abs(x) > _SMALL:
+        return (1.0 - _share(x)) / x
+    total = 1.0 / 362880.0
+    total = 1.0 / 40320.0 - x * total
+    total = 1.0 / 5040.0 - x * total
+    total = 1.0 / 720.0 - x * total
+    total = 1.0 / 120.0 - x * total
+    total = 1.0 / 24.0 - x * total
+    total = 1.0 / 6.0 - x * total
+    return 0.5 - x * total
+
+
+@compiled
+def _pressing(force, damping, mobility, push, rate, span):
+    """Impulse over a *span* in which the bodies press all the time, and the energy lost."""
+    x = mobility * damping * span
+    felt = force + damping * rate
+    impulse = felt * span * _share(x) - damping * push * span * span * _second_share(x)
+    driven, squares = push + mobility * force, 0.0
+    for i in range(4):
+        part = _NODES[i] * span
+        fallen = mobility * damping * part
+        v = rate * math.exp(-fallen) - driven * part * _share(fallen)
+        squares += _WEIGHTS[i] * v * v
+    return Loss(impulse, damping * squares * span)
+
+
+@compiled
+def lossy_kick(force, damping, mobility, push, rate, weight):
+    """The impulse of a kick and what is lost in it.
+
+    *force* F and *damping* C at the place, *mobility* B = c.c (1/kg), *push* a = c.k (m/s^2), *rate* v of penetration
+    before the kick, *weight* in s.
+    """
+    felt = force + damping * rate
+    if felt > 0.0:
+        span, x = weight, 0.0
+        # the force vanishes where exp(-B C t) = g/(F + C v + g), g = a/B, if it does within the span
+        ratio = mobility * felt / push if push != 0.0 else 0.0
+        if ratio > -1.0 and ratio != 0.0:
+            x = math.log1p(ratio)
+            falls = x / (mobility * damping) if damping > 0.0 else math.inf
+            if falls / weight > 0.0 and falls / weight < 1.0:
+                span = falls
+        pressed = _pressing(force, damping, mobility, push, rate, span)
+        rest = weight - span
+        if rest == 0.0:
+            return pressed
+        # apart from there on, while the penetration is as it was: what the contact stores is not given back
+        v = rate - push * span - mobility * pressed.impulse
+        return Loss(pressed.impulse, pressed.lost - force * (v * rest - 0.5 * push * rest * rest))
+    # apart; the rate changes by the push alone until the bodies press, if they do
+    detect_contact_event = felt / (damping * push) if damping * push != 0.0 else math.inf
+    span = weight
+    if detect_contact_event / weight >= 0.0 and detect_contact_event / weight < 1.0:
+        span = detect_contact_event
+    lost = -force * (rate * span - 0.5 * push * span * span)
+    rest = weight - span
+    if rest == 0.0:
+        return Loss(0.0, lost)
+    pressed = _pressing(force, damping, mobility, push, rate - push * span, rest)
+    return Loss(pressed.impulse, lost + pressed.lost)
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+@cache
+def scalar_function(kind: type, name: str) -> Any:
+    """The scalar function *name* of a law or a drive, compiled into whatever calls it."""
+    return inlined(getattr(kind, name))
+
+
+def contact_force(law: Any, penetration: float) -> float:
+    """The force on tip and beam, N; none when apart."""
+    return type(law).owner.force(law, penetration) if penetration > 0.0 else 0.0
+
+
+def contact_energy(law: Any, penetration: float) -> float:
+    """Energy stored in the contact, J; none when apart."""
+    return type(law).owner.energy(law, penetration) if penetration > 0.0 else 0.0
+
+
+def contact_slope(law: Any, penetration: float) -> float:
+    """Derivative of the force, N/m; none when apart."""
+    return type(law).owner.slope(law, penetration) if penetration > 0.0 else 0.0
+
+
+def _when_touching(kind: type, name: str) -> Any:
+    function = scalar_function(kind, name)
+
+    def implementation(law, penetration):
+        if penetration > 0.0:
+            return function(law, penetration)
+        return 0.0
+
+    return implementation
+
+
+@overloaded(contact_force)
+def _contact_force(law, penetration):
+    if isinstance(penetration, Lanes):
+        force = scalar_function(law.instance_class.owner, "force")
+        return lambda law, penetration: select_less(0.0, penetration, force(law, penetration), 0.0)
+    return _when_touching(law.instance_class.owner, "force")
+
+
+@overloaded(contact_energy)
+def _contact_energy(law, penetration):
+    return _when_touching(law.instance_class.owner, "energy")
+
+
+@overloaded(contact_slope)
+def _contact_slope(law, penetration):
+    return _when_touching(law.instance_class.owner, "slope")
+
+
+def peak_force(law: Any, deepest: float) -> float:
+    """Greatest force of a contact, N, from what a book calls the deepest point of it.
+
+    That is the greatest penetration, or, under a law whose impacts last no time or whose force is not greatest where
+    the penetration is, the greatest force while the bodies stay together.
+    """
+    owner = type(law).owner
+    return deepest if owner.impulsive or owner.rate_dependent else contact_force(law, deepest)
+
+
+@overloaded(peak_force)
+def _peak_force(law, deepest):
+    owner = law.instance_class.owner
+    if owner.impulsive or owner.rate_dependent:
+        return lambda law, deepest: deepest
+    return lambda law, deepest: contact_force(law, deepest)
+
+
+def is_impulsive(law: Any) -> bool:
+    """Whether impacts under the law last no time."""
+    return bool(type(law).owner.impulsive)
+
+
+@overloaded(is_impulsive)
+def _is_impulsive(law):
+    impulsive = bool(law.instance_class.owner.impulsive)
+    return lambda law: impulsive
+
+
+def is_rate_dependent(law: Any) -> bool:
+    """Whether the force under the law depends on the rate of penetration."""
+    return bool(type(law).owner.rate_dependent)
+
+
+@overloaded(is_rate_dependent)
+def _is_rate_dependent(law):
+    rate_dependent = bool(law.instance_class.owner.rate_dependent)
+    return lambda law: rate_dependent
+
+
+def jumps(law: Any) -> bool:
+    """Whether a force that is integrated begins with a jump, so that it matters when exactly it begins."""
+    owner = type(law).owner
+    return bool(owner.rate_dependent and not owner.properties.smooth)
+
+
+@overloaded(jumps)
+def _jumps(law):
+    owner = law.instance_class.owner
+    found = bool(owner.rate_dependent and not owner.properties.smooth)
+    return lambda law: found
+
+
+def felt_force(law: Any, penetration: float, rate: float) -> float:
+    """The force on tip and beam, N, at a penetration and its rate."""
+    owner: Any = type(law).owner
+    if not owner.rate_dependent or penetration <= 0.0:
+        return contact_force(law, penetration)
+    return max(0.0, float(owner.force(law, penetration) + owner.damping_coefficient(law, penetration) * rate))
+
+
+@overloaded(felt_force)
+def _felt_force(law, penetration, rate):
+    owner = law.instance_class.owner
+    if not owner.rate_dependent:
+        return lambda law, penetration, rate: contact_force(law, penetration)
+    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping_coefficient")
+
+    def implementation(law, penetration, rate):
+        if penetration > 0.0:
+            return max(0.0, force(law, penetration) + damping(law, penetration) * rate)
+        return 0.0
+
+    return implementation
+
+
+def kick_force(law: Any, penetration: float, rate: float, mobility: float, push: float, weight: float) -> Any:
+    """The mean force of a kick of *weight* seconds, N, and the energy lost in it; see :func:`lossy_kick`.
+
+    Of laws that lose energy; *rate* is that of the penetration before the kick.
+    """
+    raise TypeError("kick_force runs in compiled code only")
+
+
+@overloaded(kick_force)
+def _kick_force(law, penetration, rate, mobility, push, weight):
+    owner = law.instance_class.owner
+    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping_coefficient")
+
+    def implementation(law, penetration, rate, mobility, push, weight):
+        if weight == 0.0:
+            return Loss(0.0, 0.0)
+        # at the very onset rounding leaves a penetration of either sign
+        at = max(penetration, 0.0)
+        given = lossy_kick(force(law, at), damping(law, at), mobility, push, rate, weight)
+        return Loss(given.impulse / weight, given.lost)
+
+    return implementation
+
+
+def mark_of(law: Any, penetration: float, rate: float) -> float:
+    """What a book keeps the greatest of in a contact: the penetration, or the force of a law that loses energy."""
+    return max(penetration, 0.0) if not type(law).owner.rate_dependent else felt_force(law, penetration, rate)
+
+
+@overloaded(mark_of)
+def _mark_of(law, penetration, rate):
+    if law.instance_class.owner.rate_dependent:
+        return lambda law, penetration, rate: felt_force(law, penetration, rate)
+    return lambda law, penetration, rate: max(penetration, 0.0)
+
+
+def zero_force_crossing(law: Any, d0: float, v0: float, d1: float, v1: float, length: float) -> float:
+    """Where in (0, 1) of a step in contact the force vanishes or begins, though the penetration does not; -1: nowhere.
+
+    Penetration and rate are those at the two ends, the cubic through them is followed.
+    """
+    raise TypeError("slack_at runs in compiled code only")
+
+
+@overloaded(zero_force_crossing)
+def _slack_at(law, d0, v0, d1, v1, length):
+    owner = law.instance_class.owner
+    if not owner.rate_dependent:
+        return lambda law, d0, v0, d1, v1, length: -1.0
+    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping_coefficient")
+
+    def implementation(law, d0, v0, d1, v1, length):
+        if d0 <= 0.0:
+            return -1.0
+        first = force(law, d0) + damping(law, d0) * v0
+        low, high, last = 0.0, 1.0, -1.0
+        if d1 > 0.0:
+            last = force(law, d1) + damping(law, d1) * v1
+        if first * last >= 0.0:
+            return -1.0
+        c0, c1, c2, c3 = cubic(d0, v0, d1, v1, length)
+        for _ in range(40):
+            s = 0.5 * (low + high)
+            d = c0 + s * (c1 + s * (c2 + s * c3))
+            felt = -1.0
+            if d > 0.0:
+                felt = force(law, d) + damping(law, d) * (c1 + s * (2.0 * c2 + s * 3.0 * c3)) / length
+            if felt * first > 0.0:
+                low = s
+            else:
+                high = s
+        return high
+
+    return implementation
+
+
+def released_at(law: Any, penetration: float, rate: float) -> float:
+    """The way to the release, m: the penetration, or what is left of it until the force vanishes, roughly."""
+    raise TypeError("released_at runs in compiled code only")
+
+
+@overloaded(released_at)
+def _released_at(law, penetration, rate):
+    owner = law.instance_class.owner
+    if not owner.rate_dependent:
+        return lambda law, penetration, rate: penetration
+    force, damping = scalar_function(owner, "force"), scalar_function(owner, "damping_coefficient")
+
+    def implementation(law, penetration, rate):
+        if penetration > 0.0 and rate < 0.0:
+            felt = force(law, penetration) + damping(law, penetration) * rate
+            left = damping(law, 0.0) * rate
+            if felt > 0.0 and left < 0.0:
+                return penetration * felt / (felt - left)
+        return penetration
+
+    return implementation

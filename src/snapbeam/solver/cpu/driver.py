@@ -1,0 +1,383 @@
+"""The CPU engine's driver: threads that take runs from a queue, and one run in slices."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from threading import Lock
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.drive.combined import MOST_STRIKERS
+from snapbeam.solver.compilation import kernel, ready
+from snapbeam.solver.cpu.integrate import KernelOutput, integrate_ensemble, integrate_recorded
+from snapbeam.solver.cpu.memory import Memory, Packed, lay_out, pack
+from snapbeam.solver.cpu.recording import MARKS, REALS, VALUES, Outputs
+from snapbeam.solver.cpu.run_lanes.integrate import integrate_run_lanes
+from snapbeam.solver.cpu.run_lanes.memory import lay_out_few, suits
+from snapbeam.solver.cpu.state import KernelInput, Scratch
+from snapbeam.solver.cpu.tangent import TANGENT_ROWS, integrate_tangent
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.events import PIECES
+from snapbeam.solver.further_contacts import several
+from snapbeam.solver.registered_statistics import extras_of_table
+from snapbeam.solver.simd import WIDTH
+from snapbeam.solver.statistics import Landings, Last, Recorded, empty_accumulators
+from snapbeam.util.status_codes import RunStatus
+
+__all__ = ["integrate_tangents", "integrate_to_landing", "record", "run_ensemble", "usable_cores"]
+
+
+_Array = NDArray[np.float64]
+_Integers = NDArray[np.int64]
+_CHUNK_STEPS = 3_000_000
+"""Flight steps per task at most: a second or so, so that progress is smooth."""
+_CHUNKS = 4
+"""Tasks per thread at least, of _FEW runs each at least, so that the threads end together."""
+_FEW = 4
+FEW_MODES = 12
+"""Modes up to which eight runs in a register are faster: 1.98 times with 8, 1.03 with 16 (benchmarks/README.md)."""
+FEWEST_STEPS = 5e6
+"""Flight steps asked for, of one kind of ensembles, from which on what they save pays for another kernel."""
+_WORK: dict[tuple[Any, ...], float] = {}
+_ASKING = Lock()
+_POLL = 0.2
+"""Seconds after which an interrupt is heard."""
+_SLICE_STEPS = 200_000
+"""Steps of a recorded run between two looks at what else is wanted: some 0.1 s."""
+_SLICE_BYTES = 32 * 2**20
+"""Size of a slice's buffers, at most."""
+
+
+def usable_cores() -> int:
+    """Cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1
+
+
+def _packed(ensemble: Ensemble) -> Packed:
+    others = None if ensemble.others is None else several(ensemble.others.laws)
+    return pack(ensemble.structure, ensemble.high_omega, forced=ensemble.forced, several=others)
+
+
+def _asked(ensemble: Ensemble, packed: Packed, memory: Memory | None) -> KernelInput:
+    """The ensemble in this engine's layout; without *memory*, of a drive that looks nothing up."""
+    law, drive = ensemble.law.numbers_type(), ensemble.drive.numbers_type()
+    return KernelInput(
+        runs=ensemble.runs,
+        law_numbers=ensemble.law_numbers,
+        drive_numbers=ensemble.drive_numbers if memory is None else memory.drive_numbers,
+        contact_rows=packed.spread(ensemble.contact_rows),
+        starts=packed.spread(ensemble.starts),
+        law=law(*[0.0] * len(law._fields)),
+        drive=drive(*[0.0] * len(drive._fields)),
+        other_numbers=None if ensemble.others is None else ensemble.others.numbers,
+        other_places=None if ensemble.others is None else ensemble.others.places,
+        other_rows=None if ensemble.others is None else packed.spread(ensemble.others.rows),
+        extras=extras_of_table(),
+        max_steps=ensemble.max_steps,
+        high=bool(ensemble.structure.high_modes(ensemble.high_omega).any()),
+    )
+
+
+def _room(ensemble: Ensemble) -> Scratch:
+    longest = float(ensemble.step_times.max())
+    pieces = 2 * max(8, math.ceil(PIECES * ensemble.fastest * longest / (2.0 * math.pi)) + 1)
+    return Scratch(np.empty((pieces + 1, 4)), np.empty(pieces * 4 * WIDTH))
+
+
+def _kernel(march: Callable[..., Any], ensemble: Ensemble) -> Any:
+    moving = [kind for _, kind in ensemble.drive.parts]
+    parts = [*moving, *(term for kind in (ensemble.drive, *moving) for term in kind.terms)]
+    others = () if ensemble.others is None else (several(ensemble.others.laws), *ensemble.others.laws)
+    kinds = (ensemble.law, ensemble.drive, *parts, *others, type(extras_of_table()).owner)
+    return kernel(march.py_func, kinds)  # type: ignore[attr-defined]
+
+
+def _chunks(work: _Array, threads: int) -> list[_Integers]:
+    """The runs of each task, longest first: tasks of so little *work* that every thread gets several."""
+    order = np.argsort(-work, kind="stable")
+    share = work.sum() / max(1.0, min(threads * _CHUNKS, work.size / _FEW))
+    most = _CHUNK_STEPS if threads == 1 else min(_CHUNK_STEPS, share)
+    cuts = np.unique(np.cumsum(work[order]) // most, return_index=True)[1][1:]
+    return np.split(order, cuts)
+
+
+def run_ensemble(
+    ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
+) -> NDArray[Any]:
+    """March every run of an ensemble; returns a book a run.
+
+    Runs are handed out longest first, a chunk at a time; what a run gives does not depend on which thread
+    marched it or on what it was marched with.
+    """
+    return _march(ensemble, threads, progress, landings=0).accumulators_of_runs
+
+
+def integrate_to_landing(
+    ensemble: Ensemble, threads: int | None = None, progress: Callable[[int, int], object] | None = None
+) -> Landings:
+    """As :func:`run_ensemble`, and the states at every landing."""
+    landings = int(-(-ensemble.runs["end"][0] // ensemble.runs["landing"][0]))
+    return _march(ensemble, threads, progress, landings)
+
+
+def integrate_tangents(
+    ensemble: Ensemble,
+    tangents: _Array,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+) -> tuple[Landings, _Array]:
+    """As :func:`integrate_to_landing`, with tangents carried along to the end.
+
+    Parameters
+    ----------
+    tangents : array of shape (runs, k, 2, N)
+        Small changes of q and p of each run.
+
+    Returns
+    -------
+    landings : Landings
+    tangents : array of shape (runs, k, 2, N)
+    """
+    landings = int(-(-ensemble.runs["end"][0] // ensemble.runs["landing"][0]))
+    packed = _packed(ensemble)
+    size = packed.layout.size
+    spread = packed.spread(tangents).reshape(*tangents.shape[:2], 2 * size)
+    march = _kernel(integrate_tangent, ensemble)
+    rows = TANGENT_ROWS + 2 * tangents.shape[1]
+
+    def arguments(which: _Integers, kernel_output: KernelOutput) -> tuple[Any, ...]:
+        memory = lay_out(ensemble, packed, rows)
+        first = memory.layouts[1].g - rows * size + TANGENT_ROWS * size
+        kernel_input, scratch = _asked(ensemble, packed, memory), _room(ensemble)
+        return (
+            memory.memory,
+            memory.blocks,
+            memory.layouts[0],
+            memory.stages,
+            kernel_input,
+            which,
+            scratch,
+            kernel_output,
+            spread,
+            first,
+        )
+
+    found = _spread_over(ensemble, packed, march, arguments, threads, progress, landings)
+    return found, spread.reshape(*tangents.shape[:2], 2, size)[..., packed.rows]
+
+
+def _march(
+    ensemble: Ensemble,
+    threads: int | None,
+    progress: Callable[[int, int], object] | None,
+    landings: int,
+) -> Landings:
+    packed = _packed(ensemble)
+    if landings == 0 and _few_modes_pay(ensemble, packed):
+        return _spread_over(ensemble, packed, *_side_by_side(ensemble, packed), threads, progress, landings)
+    march = _kernel(integrate_ensemble, ensemble)
+
+    def arguments(which: _Integers, kernel_output: KernelOutput) -> tuple[Any, ...]:
+        memory = lay_out(ensemble, packed)
+        kernel_input, scratch = _asked(ensemble, packed, memory), _room(ensemble)
+        return (
+            memory.memory,
+            memory.blocks,
+            memory.layouts,
+            memory.stages,
+            kernel_input,
+            which,
+            scratch,
+            kernel_output,
+        )
+
+    return _spread_over(ensemble, packed, march, arguments, threads, progress, landings)
+
+
+def _few_modes_pay(ensemble: Ensemble, packed: Packed) -> bool:
+    """Whether to march eight runs in a register: where that is faster and, once compiled, worth it.
+
+    Both layouts give the same bits, so that how much was asked for before may decide.
+    """
+    if ensemble.size < WIDTH or not suits(ensemble, packed, FEW_MODES):
+        return False
+    kind = (packed.members, ensemble.order, ensemble.law, ensemble.drive)
+    with _ASKING:
+        _WORK[kind] = _WORK.get(kind, 0.0) + float(ensemble.work.sum())
+        return _WORK[kind] >= FEWEST_STEPS
+
+
+def _side_by_side(
+    ensemble: Ensemble, packed: Packed
+) -> tuple[Callable[..., None], Callable[[_Integers, KernelOutput], tuple[Any, ...]]]:
+    """The march of eight runs in a register, and its arguments."""
+    order = np.argsort(packed.rows)
+    kernel_input = _asked(ensemble, packed, None)._replace(
+        contact_rows=np.ascontiguousarray(ensemble.contact_rows[:, order]),
+        starts=np.ascontiguousarray(ensemble.starts[..., order]),
+    )
+
+    def arguments(which: _Integers, kernel_output: KernelOutput) -> tuple[Any, ...]:
+        scratch = _room(ensemble)
+        memory = lay_out_few(ensemble, packed, scratch.looked.shape[0] - 1)
+        return (
+            memory.m,
+            memory.n,
+            memory.shape,
+            memory.world,
+            kernel_input,
+            which,
+            scratch,
+            kernel_output,
+            empty_accumulators(1),
+        )
+
+    return _kernel(integrate_run_lanes, ensemble), arguments
+
+
+def _spread_over(
+    ensemble: Ensemble,
+    packed: Packed,
+    march: Callable[..., None],
+    arguments: Callable[[_Integers, KernelOutput], tuple[Any, ...]],
+    threads: int | None,
+    progress: Callable[[int, int], object] | None,
+    landings: int,
+) -> Landings:
+    """Hand the runs to threads, in chunks; *arguments* are those of *march*, whose memory is a thread's own."""
+    size = packed.layout.size
+    kernel_output = KernelOutput(
+        empty_accumulators(ensemble.size, _beside(ensemble)),
+        np.empty((ensemble.size, landings, 2 * size)),
+        np.empty((ensemble.size, landings, 2), dtype=np.int64),
+        np.zeros(1, dtype=np.int64),
+    )
+    threads = threads or usable_cores()
+    ready(march, *arguments(np.zeros(1, dtype=np.int64), kernel_output))
+    if progress is not None:
+        progress(0, ensemble.size)
+
+    def integrate_chunk(which: _Integers) -> int:
+        march(*arguments(which, kernel_output))
+        return which.size
+
+    done = 0
+    with ThreadPoolExecutor(threads) as pool:
+        pending: set[Future[int]] = {
+            pool.submit(integrate_chunk, chunk) for chunk in _chunks(ensemble.work, threads)
+        }
+        try:
+            while pending:
+                finished, pending = wait(pending, timeout=_POLL, return_when=FIRST_COMPLETED)
+                done += sum(future.result() for future in finished)
+                if progress is not None and finished:
+                    progress(done, ensemble.size)
+        except BaseException:
+            kernel_output.pulse[0] = 1
+            pool.shutdown(wait=True, cancel_futures=True)
+            raise
+    q, p = kernel_output.states[..., packed.rows], kernel_output.states[..., size + packed.rows]
+    return Landings(
+        kernel_output.accumulators_of_runs, q, p, kernel_output.homes[..., 0], kernel_output.homes[..., 1]
+    )
+
+
+def _last(
+    memory: _Array, packed: Packed, aside: tuple[_Integers, _Array], accumulators_of_runs: NDArray[Any]
+) -> Last:
+    """Where a run that was laid aside stands."""
+    marks, reals = aside
+    q, p = memory[marks[4] : marks[4] + packed.layout.size], memory[marks[5] : marks[5] + packed.layout.size]
+    since = int(marks[0] - accumulators_of_runs["onset"][0]) if marks[10] else -1
+    return Last(q[packed.rows], p[packed.rows], int(reals[0]), since)
+
+
+class _Buffers(NamedTuple):
+    """How much a slice of a recorded run holds."""
+
+    samples: int
+    impacts: int
+    most: int
+
+
+def _buffers(ensemble: Ensemble, times: _Array, size: int) -> _Buffers:
+    """Room for a slice: at least for what a single step may hold."""
+    span = 2.0 * float(ensemble.step_times[0]) * (1.0 + 1e-9)
+    most = int((np.searchsorted(times, times + span, side="right") - np.arange(times.size)).max(initial=0))
+    row = 8 * (2 * size + VALUES + 1)
+    samples = max(2 * most + 4, min(times.size + 4096, _SLICE_BYTES // row))
+    return _Buffers(samples, 4096, most + 1)
+
+
+def _beside(ensemble: Ensemble) -> int:
+    """How many strikers there are beside the first."""
+    return 0 if ensemble.others is None else len(ensemble.others.laws)
+
+
+def _impact_rows(ensemble: Ensemble, buffers: _Buffers) -> _Array:
+    """Room for impacts, the first striker's number in each row if there are several."""
+    return np.ones((buffers.impacts + MOST_STRIKERS, 4 if ensemble.others is None else 5))
+
+
+def record(
+    ensemble: Ensemble,
+    times: _Array,
+    in_contact: bool,
+    progress: Callable[[float], object] | None = None,
+) -> Iterator[Recorded]:
+    """March the one run of an ensemble once, and give what it wrote down in pieces, in order.
+
+    Parameters
+    ----------
+    times : array of shape (instants,)
+        Instants to record, s, ascending.
+    in_contact : bool
+        Whether to record the ends of the steps in contact too.
+    progress : callable, optional
+        Called with the share of the run that is done, several times a second.
+    """
+    packed = _packed(ensemble)
+    size, march = packed.layout.size, _kernel(integrate_recorded, ensemble)
+    memory, accumulators_of_runs = lay_out(ensemble, packed), empty_accumulators(1, _beside(ensemble))
+    kernel_input, scratch = _asked(ensemble, packed, memory), _room(ensemble)
+    buffers = _buffers(ensemble, times, size)
+    aside = np.zeros(MARKS, dtype=np.int64), np.zeros(REALS)
+    aside[0][0] = -1
+    marks = np.zeros(3, dtype=np.int64)
+    accumulators, end = accumulators_of_runs[0], float(ensemble.runs["end"][0])
+    outputs = Outputs(
+        times, np.empty(buffers.samples), np.empty((buffers.samples, 2 * size)),
+        np.empty((buffers.samples, VALUES)), _impact_rows(ensemble, buffers), marks, buffers.most, in_contact,
+    )  # fmt: skip
+    arguments = (
+        memory.memory, memory.blocks, memory.layouts[0], memory.stages, kernel_input, scratch, accumulators, outputs, aside, _SLICE_STEPS,
+    )  # fmt: skip
+    ready(march, *arguments)
+    while True:
+        march(*arguments)
+        running = accumulators_of_runs["status"][0] == RunStatus.INTERRUPTED
+        full = accumulators_of_runs["samples"][0] + buffers.most + 3 > buffers.samples
+        held = int(accumulators_of_runs["impacts"][0] - marks[1])
+        if not running or full or held >= buffers.impacts:
+            count = int(accumulators_of_runs["samples"][0])
+            rows = outputs.rows[:count]
+            yield Recorded(
+                outputs.at[:count].copy(), rows[:, packed.rows], rows[:, size + packed.rows],
+                outputs.values[:count].copy(), outputs.impacts[:held].copy(), accumulators_of_runs.copy(),
+                _last(memory.memory, packed, aside, accumulators_of_runs),
+            )  # fmt: skip
+            if not running:
+                return
+            marks[1] += held
+            outputs.impacts[:, 4:] = 1.0
+            aside[0][1] = 0
+        if progress is not None:
+            progress(float(accumulators_of_runs["time"][0]) / end)

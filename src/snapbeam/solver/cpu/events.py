@@ -1,0 +1,524 @@
+"""After a step of a run: was the contact met or left in it, and what is kept of it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from numba.extending import overload
+
+from snapbeam.solver.compilation import INLINE_HERE, compiled, inlined
+from snapbeam.solver.contact_force import felt_force, jumps, zero_force_crossing
+from snapbeam.solver.cpu.dot import dot
+from snapbeam.solver.cpu.mode_lanes import (
+    beam_energy,
+    flow_coefficients,
+    modal_energies,
+    modal_energy,
+    propagate_free,
+    signals,
+    speed_bound,
+)
+from snapbeam.solver.cpu.recording import record_aside, record_contact, record_instants
+from snapbeam.solver.cpu.state import IntegratorState, Rows, StepControl, cut_slot, look_slot
+from snapbeam.solver.cpu.step import (
+    Step,
+    accumulate_environment_work,
+    observe,
+    prepare,
+    take_step,
+    with_circuit_acceleration,
+)
+from snapbeam.solver.cpu.terms.base_and_load import extra_speed
+from snapbeam.solver.cpu.terms.circuit import (
+    accumulate_circuit,
+    circuit_speed_bound,
+    disable_long_steps,
+    missed_onset,
+    validity_horizon,
+)
+from snapbeam.solver.cpu.terms.further_contact_events import (
+    accumulate_further_contacts,
+    first_further_event,
+    observe_further_contacts,
+    refine_further_onsets,
+    store_further_contacts,
+    trusted,
+    update_further_contacts,
+)
+from snapbeam.solver.cpu.terms.second_well import (
+    about_level,
+    above_own_well,
+    add_potential_energy,
+    at_center,
+    second_well,
+)
+from snapbeam.solver.events import (
+    TRUST,
+    ContactKinematics,
+    accumulate_displacement,
+    accumulate_energy,
+    close_impact,
+    count_zero_crossings_in_step,
+    first_contact_onset,
+    is_low_energy,
+    refine_onset,
+    safe_interval,
+)
+from snapbeam.solver.excitation import seen_from, turned_motion
+from snapbeam.solver.interpolation import (
+    cubic,
+    first_downcrossing,
+    first_upcrossing,
+    turning_point,
+    update_extrema,
+)
+from snapbeam.solver.physics import sincos, tension_energy
+from snapbeam.solver.registered_statistics import observe as observe_extras
+from snapbeam.solver.simd import WIDTH, lanes_sum, load
+from snapbeam.util.status_codes import RunStatus
+
+__all__ = ["accept_step", "locate_peak_force", "sample_inside_step"]
+
+
+# ----------------------------------------------------------------------------------------------------
+# The hardest moment of a contact: the deepest, or that of the greatest force where the rate counts too.
+
+
+_PARTS = 24
+"""Of a step, at whose ends the force is looked at."""
+
+
+def locate_peak_force(
+    memory: Any,
+    blocks: Any,
+    layout: Any,
+    stages: Any,
+    run: Any,
+    tip: Any,
+    now: Any,
+    step: Any,
+    seen1: Any,
+    sample: Any,
+    accumulators: Any,
+    outputs: Any,
+) -> Any:
+    """The greatest penetration of a contact so far, or the greatest force under a law that loses energy.
+
+    Returns that and how many samples there are: a moment inside the step is one where the run is recorded.
+    """
+    raise TypeError("hardest_point runs in compiled code only")
+
+
+@inlined
+def aside(step, run, length, size):
+    """*step*, cut to *length* and written to the spare rows: a look ahead."""
+    return Step(
+        0, cut_slot(run), length, step.phase, step.touching, step.q, step.p, step.k,
+        run.spare, run.spare + size, run.spare + 2 * size, step.r
+    )  # fmt: skip
+
+
+@inlined
+def _deepest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs):
+    """The greatest penetration of a contact so far, its turning point within the step included.
+
+    Returns that and how many samples there are: the turning point is one where the run is recorded.
+    """
+    seen, deepest = now.seen, max(accumulators.deepest, seen1.d)
+    turn = turning_point(seen.d, seen.dv, seen1.d, seen1.dv, step.length) if seen.dv > 0.0 else -1.0
+    if (
+        turn > 0.0
+        and update_extrema(seen.d, deepest, seen.d, seen.dv, seen1.d, seen1.dv, step.length)[1] > deepest
+    ):
+        part, size = turn * step.length, layout.size
+        prepare(memory, layout, stages, run.struck.drive, part, cut_slot(run))
+        ledger = None if outputs is None else True
+        short = aside(step, run, part, size)
+        here = take_step(memory, blocks, layout, stages, tip, short, ledger)
+        there = step.phase + tip.drive.omega * part
+        about = observe(memory, layout, tip, there, run.spare, run.spare + size)
+        if outputs is not None:
+            when = now.t * run.clock.tick + part
+            sample = record_aside(
+                memory, layout, tip, now, short, here, when, about, sample, accumulators, outputs
+            )
+        deepest = max(deepest, about.d)
+    return deepest, sample
+
+
+@inlined
+def _greatest_force(
+    memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+):
+    """The greatest force of a contact so far: looked for on the cubic through the step, then stepped to."""
+    seen, law = now.seen, tip.law
+    greatest = max(
+        accumulators.deepest, max(felt_force(law, seen.d, seen.dv), felt_force(law, seen1.d, seen1.dv))
+    )
+    c0, c1, c2, c3 = cubic(seen.d, seen.dv, seen1.d, seen1.dv, step.length)
+    best, at = greatest, 0.0
+    for i in range(1, _PARTS):
+        s = i / _PARTS
+        d = c0 + s * (c1 + s * (c2 + s * c3))
+        force = felt_force(law, d, (c1 + s * (2.0 * c2 + s * 3.0 * c3)) / step.length)
+        if force > best:
+            best, at = force, s
+    if at > 0.0:
+        part, size = at * step.length, layout.size
+        prepare(memory, layout, stages, run.struck.drive, part, cut_slot(run))
+        ledger = None if outputs is None else True
+        short = aside(step, run, part, size)
+        here = take_step(memory, blocks, layout, stages, tip, short, ledger)
+        there = step.phase + tip.drive.omega * part
+        about = observe(memory, layout, tip, there, run.spare, run.spare + size)
+        if outputs is not None:
+            when = now.t * run.clock.tick + part
+            sample = record_aside(
+                memory, layout, tip, now, short, here, when, about, sample, accumulators, outputs
+            )
+        greatest = max(greatest, felt_force(law, about.d, about.dv))
+    return greatest, sample
+
+
+@overload(locate_peak_force, jit_options=INLINE_HERE)
+def _hardest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs):
+    law = tip.types[tip.fields.index("law")]
+    chosen = _greatest_force if law.instance_class.owner.rate_dependent else _deepest_point
+
+    def implementation(
+        memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+    ):
+        return chosen(
+            memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+        )
+
+    return implementation
+
+
+# ----------------------------------------------------------------------------------------------------
+# A look inside a free step: what the gap and the centre do between its ends.
+
+
+@compiled
+def sample_inside_step(memory, layout, tip, flow, pieces, piece, step, with_center, scratch):
+    """Follow a free step in *pieces* short ones, each one exact linear flow, and note what is seen.
+
+    The tension's acceleration, known at both ends of the step, is taken as linear in between: exact
+    enough for signals whose fastest mode the pieces resolve.  Row i of ``room.looked`` becomes the penetration, its
+    rate, and, if *with_center*, the displacement of the centre from rest and its rate.
+    """
+    looked, parts = scratch.looked, scratch.parts
+    q, p, k, k1 = step.q, step.p, step.k, step.k1
+    propagate_free(memory, layout, layout.contact, flow, pieces, piece, q, p, k, k1, with_center, parts)
+    size, drive = layout.size, tip.drive
+    contact0, contact1 = dot(memory, size, layout.contact, k), dot(memory, size, layout.contact, k1)
+    center0, center1 = dot(memory, size, layout.center, k), dot(memory, size, layout.center, k1)
+    turn_sine, turn_cosine = sincos(drive.omega * piece)
+    sine, cosine = sincos(step.phase)
+    w, rate, c, c_rate = signals(memory, layout, q, p)
+    # kicks stand on the borders of the pieces, half a kick at the first; seen rates are half a kick ahead
+    for i in range(pieces + 1):
+        done, owed = i / pieces, 0.5 * piece
+        if i == 0:
+            owed = 0.0
+        else:
+            at = 4 * WIDTH * (i - 1)
+            w, rate = lanes_sum(load(parts, at)), lanes_sum(load(parts, at + WIDTH))
+            if with_center:
+                c, c_rate = lanes_sum(load(parts, at + 2 * WIDTH)), lanes_sum(load(parts, at + 3 * WIDTH))
+        argument = step.phase + i * piece * drive.omega
+        motion, velocity = turned_motion(drive, memory, argument, sine, cosine)
+        looked[i, 0] = tip.offset + motion - w
+        looked[i, 1] = velocity - rate - owed * ((1.0 - done) * contact0 + done * contact1)
+        looked[i, 2] = c
+        looked[i, 3] = c_rate + owed * ((1.0 - done) * center0 + done * center1)
+        sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
+_LOCATIONS = 4
+"""Newton steps in which the onset of a force that begins with a jump is located, at most."""
+_DIVERGED, _STEP_LIMIT = int(RunStatus.DIVERGED), int(RunStatus.STEP_LIMIT)
+
+
+class ContactEvent(NamedTuple):
+    """What a step met: whether it enters or leaves the contact, where it is cut, and how it was looked into."""
+
+    event: bool
+    cut: int
+    """Ticks; 0: the contact begins with the step."""
+    entry: float
+    """Seconds into the step at which the gap closes; negative: it does not."""
+    safe_gap: int
+    safe_center: int
+    pieces: int
+    piece: float
+
+
+@inlined
+def cut_step(step, run, ticks, length):
+    """*step*, of another length and prepared in the slot for those."""
+    return Step(
+        ticks, cut_slot(run), length, step.phase, step.touching, step.q, step.p, step.k,
+        step.q1, step.p1, step.k1, step.r
+    )  # fmt: skip
+
+
+@inlined
+def detect_contact_event(memory, layout, run, now, tip, step, seen1, scratch):
+    """Whether and where a step enters or leaves the contact."""
+    seen, clock, tick = now.seen, run.clock, run.clock.tick
+    safe_gap, safe_center = now.control.safe_gap, now.control.safe_center
+    event, cut, entry, pieces, piece = False, step.ticks, -1.0, 0, 0.0
+    after = now.t + step.ticks
+    if step.touching:
+        if seen1.d <= 0.0:
+            event = True
+            if seen.d > 0.0:
+                fall = first_downcrossing(seen.d, seen.dv, seen1.d, seen1.dv, step.length)
+                cut = max(1, int(fall * step.ticks))
+        slack = zero_force_crossing(tip.law, seen.d, seen.dv, seen1.d, seen1.dv, step.length)
+        if slack >= 0.0 and slack * step.ticks + 1.0 < cut:
+            # the force has an edge there, though the contact goes on
+            event, cut = False, int(slack * step.ticks) + 1
+        return ContactEvent(event, cut, entry, safe_gap, safe_center, pieces, piece)
+    size, known = layout.size, validity_horizon(layout.circuit, run.step_time)
+    if after > safe_gap:
+        bound = speed_bound(memory, layout, layout.contact, step.q, step.p)
+        bound = circuit_speed_bound(
+            memory, size, layout.omega, layout.circuit, layout.contact, step.q, step.p, bound, TRUST * known
+        )
+        bound += extra_speed(layout.forced, memory, size, tip.drive, layout.contact, TRUST * run.step_time)
+        push = dot(memory, size, layout.contact, step.k)
+        safe_gap = now.t + int(safe_interval(-seen.d, bound, run.tip_speed, push, known) / tick)
+    if after > safe_center:
+        bound = speed_bound(memory, layout, layout.center, step.q, step.p)
+        bound = circuit_speed_bound(
+            memory, size, layout.omega, layout.circuit, layout.center, step.q, step.p, bound, TRUST * known
+        )
+        bound += extra_speed(layout.forced, memory, size, tip.drive, layout.center, TRUST * run.step_time)
+        push = dot(memory, size, layout.center, step.k)
+        safe_center = now.t + int(
+            safe_interval(abs(at_center(layout.uneven, seen.c)), bound, 0.0, push, known) / tick
+        )
+    safe_gap = trusted(memory, layout.others, now.t, safe_gap)
+    safe_center = trusted(memory, layout.others, now.t, safe_center)
+    if after > min(safe_gap, safe_center):
+        look, pieces = look_slot(run), run.step_pieces
+        if step.ticks == 2 * clock.step:
+            pieces *= 2
+        elif step.ticks != clock.step:
+            look += 4 * size
+            pieces = max(2, math.ceil(step.length / run.finest_look))
+            flow_coefficients(memory, layout, step.length / pieces, look)
+        piece = step.length / pieces
+        free = with_circuit_acceleration(memory, layout, run.spare, step)
+        sample_inside_step(memory, layout, tip, look, pieces, piece, free, after > safe_center, scratch)
+        if after > safe_gap:
+            entry = first_contact_onset(scratch.looked, pieces, piece)
+            if entry >= 0.0:
+                event, cut = True, min(step.ticks, int(entry / tick))
+    if missed_onset(layout.circuit, event, seen.d, seen1.d):
+        entry = first_upcrossing(seen.d, seen.dv, seen1.d, seen1.dv, step.length) * step.length
+        event, cut = True, min(step.ticks, int(entry / tick))
+    return ContactEvent(event, cut, entry, safe_gap, safe_center, pieces, piece)
+
+
+@inlined
+def swap_rows(rows):
+    """The end of a step becomes the beginning of the next."""
+    return Rows(rows.q1, rows.p1, rows.k1, rows.q, rows.p, rows.k)
+
+
+@inlined
+def monitor_energy(
+    memory, layout, run, now, t, state, seen1, control, event, status, accumulators, kernel_input
+):
+    """After some steps, or a release, the energy is looked at: is the beam quiet, is its future certain?
+
+    *state* is where q and p stand, and g.q and q.Gq.  Returns what is kept in mind, and the status.
+    """
+    clock, beat, quiet, last = run.clock, control.beat, control.quiet, control.monitor_energy
+    released = event and not control.touching
+    if released or (beat & 7) == 0:
+        q, p, gq, qr = state
+        high = 0.0
+        near = second_well(memory, layout.size, layout.uneven, now.well_sign, q, run.spare)
+        if kernel_input.high:
+            linear, high = modal_energies(memory, layout, near, p)
+        else:
+            linear = modal_energy(memory, layout, near, p)
+        accumulate_energy(
+            accumulators, beam_energy(memory, layout, near, p, linear), high, (t - last) * clock.tick
+        )
+        last = t
+        if not control.touching:
+            energy = linear + tension_energy(layout.gamma, gq, qr)
+            if layout.uneven is not None:
+                energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
+            energy = add_potential_energy(memory, layout.size, layout.uneven, q, energy)
+            quiet = is_low_energy(
+                above_own_well(layout.uneven, now.well_sign, energy), layout.gamma, layout.stretch
+            )
+            quiet = disable_long_steps(layout.circuit, quiet)
+            if not event and now.well_sign < 0.0 and (beat & 15) == 0 and seen1.w > clock.decide_reach:
+                if at_center(layout.uneven, seen1.c) > 0.0 and energy < clock.decide_energy:
+                    status = _EARLY_STOP
+    if clock.decide_crossings >= 0 and accumulators.zero_crossings_last_quarter > clock.decide_crossings:
+        status = _EARLY_STOP
+    if status == _RUNNING and accumulators.steps >= clock.max_steps:
+        status = _STEP_LIMIT
+    return StepControl(control.touching, quiet, control.safe_gap, control.safe_center, last, beat), status
+
+
+@inlined
+def accept_step(
+    memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs
+):
+    """Where a run stands after a step, cut at the contact's edge if it met one, with its statistics kept.
+
+    Returns that and the step that was taken.  *outputs* are what is recorded, or None.
+    """
+    layout, stages, clock, tick = workspace.layout, workspace.stages, run.clock, run.clock.tick
+    ledger = None if outputs is None else True
+    tip = seen_from(run.struck, now.well_sign, run.rest_contact)
+    rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
+    t, seen, touching = now.t, now.seen, now.control.touching
+    omega = tip.drive.omega
+    about = observe(memory, layout, tip, step.phase + omega * step.length, step.q1, step.p1)
+    if not math.isfinite(about.d + about.dv):
+        return (
+            IntegratorState(
+                t, now.well_sign, now.stretch, now.rows, seen, now.control, now.sample, now.landed, _DIVERGED
+            ),
+            step,
+        )
+    contact_event = detect_contact_event(memory, layout, run, now, tip, step, about, scratch)
+    there = step.phase + omega * step.length
+    observe_further_contacts(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
+    edge = first_further_event(
+        memory, layout, layout.others, look_slot(run), run, t, tip.drive, step, scratch
+    )
+    if edge < contact_event.cut:
+        contact_event = ContactEvent(
+            False,
+            edge,
+            -1.0,
+            contact_event.safe_gap,
+            contact_event.safe_center,
+            contact_event.pieces,
+            contact_event.piece,
+        )
+    if contact_event.cut < 1:
+        if contact_event.event:
+            accumulators.touching, accumulators.onset = 1, t
+        update_further_contacts(memory, layout.others, 0, t, 0.0, tick, accumulators, outputs)
+        status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
+        control = StepControl(
+            touching or contact_event.event,
+            now.control.quiet,
+            contact_event.safe_gap,
+            contact_event.safe_center,
+            now.control.monitor_energy,
+            now.control.beat,
+        )
+        return IntegratorState(
+            t, now.well_sign, now.stretch, now.rows, seen, control, now.sample, now.landed, status
+        ), step
+    whole, cut = step.ticks, contact_event.cut
+    looks = 0 if touching or not contact_event.event else _LOCATIONS if jumps(tip.law) else 1
+    due = edge < whole and not contact_event.event
+    while cut != step.ticks:
+        step = cut_step(step, run, cut, cut * tick)
+        prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
+        done = take_step(memory, blocks, layout, stages, tip, step, ledger)
+        there = step.phase + omega * step.length
+        about = observe(memory, layout, tip, there, step.q1, step.p1)
+        observe_further_contacts(memory, layout.size, layout.others, tip.drive, there, step.q1, step.p1)
+        least = (clock.step >> clock.finest) * tick
+        if looks > 0:
+            looks -= 1
+            cut = refine_onset(clock, cut, whole, about, 0.5 * tick if jumps(tip.law) else least)
+        cut = refine_further_onsets(memory, layout.others, clock, contact_event.cut, cut, whole, least, due)
+        due = False
+    store_further_contacts(memory, layout.others)
+    seen1 = ContactKinematics(
+        about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv
+    )
+    sample = now.sample
+    if outputs is not None:
+        sample = record_instants(memory, blocks, layout, stages, run, tip, now, step, accumulators, outputs)
+
+    # statistics of the step
+    if touching:
+        accumulators.deepest, sample = locate_peak_force(
+            memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+        )
+        accumulators.impulse += done.impulse
+        accumulators.work += done.work
+        accumulators.gross_work += done.gross
+        accumulators.lost += done.lost
+    accumulate_further_contacts(memory, layout.others, touching, done, accumulators)
+    accumulate_environment_work(layout.forced, accumulators, done.given)
+    accumulate_circuit(memory, layout, layout.circuit, step.p1, accumulators, done.tap)
+    if outputs is not None:
+        accumulators.dissipated += done.dissipated + done.lost
+    accumulate_displacement(accumulators, seen, seen1, step.length)
+    if touching or t + step.ticks > contact_event.safe_center:
+        count_zero_crossings_in_step(
+            accumulators, clock, t, step.length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1),
+            scratch.looked, at_center(layout.uneven, rest_center), contact_event.pieces, contact_event.piece,
+        )  # fmt: skip
+    observe_extras(kernel_input.extras, accumulators, t * tick, step.length, seen, seen1, touching)
+
+    # accept
+    t += step.ticks
+    status = _RUNNING if t < clock.end else _OK
+    quiet, safe_gap, safe_center = now.control.quiet, contact_event.safe_gap, contact_event.safe_center
+    if contact_event.event:
+        safe_gap, safe_center = t, t
+        if touching:
+            if outputs is None:
+                close_impact(accumulators, None, 0, tip.law, t, tick)
+            else:
+                close_impact(accumulators, outputs.impacts, outputs.marks[1], tip.law, t, tick)
+            seen1 = ContactKinematics(seen1.w, seen1.wv, min(seen1.d, 0.0), seen1.dv, seen1.c, seen1.cv)
+        else:
+            accumulators.touching, accumulators.onset = 1, t
+    update_further_contacts(
+        memory, layout.others, contact_event.cut, t, step.length, tick, accumulators, outputs
+    )
+    touching = touching != contact_event.event
+    control = StepControl(
+        touching, quiet, safe_gap, safe_center, now.control.monitor_energy, now.control.beat
+    )
+    state = step.q1, step.p1, done.gq, done.qr
+    control, status = monitor_energy(
+        memory,
+        layout,
+        run,
+        now,
+        t,
+        state,
+        seen1,
+        control,
+        contact_event.event,
+        status,
+        accumulators,
+        kernel_input,
+    )
+    if outputs is not None:
+        sample = record_contact(
+            memory, layout, run, tip, now, step, done, seen1, sample, accumulators, outputs
+        )
+    stretch = 2.0 * done.gq + done.qr
+    return (
+        IntegratorState(
+            t, now.well_sign, stretch, swap_rows(now.rows), seen1, control, sample, now.landed, status
+        ),
+        step,
+    )

@@ -1,0 +1,239 @@
+"""The CPU engine's march: two trajectories at a time, each with steps that its own contacts decide.
+
+In free flight a trajectory takes steps of a fixed length, or of twice that while its energy is low, as many as
+a bound on the speed of the gap says are safe; near the tip it looks inside each step with a resolution finer
+than the fastest mode, and a step that would enter the contact is cut where it does.  In contact, steps grow
+from the onset and shrink towards the release, which is located too, so that the edges of the force fall
+between steps.  Time is an integer number of ticks; the argument of the drive comes from that integer alone.
+
+A kick waits for the sums of the one before, so that one trajectory alone leaves a core waiting.  Two are
+marched side by side, a step of each at a time; when one ends, the next run takes its place.  They share nothing
+but the structure: results do not depend on batch, order or threads.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from snapbeam.solver.compilation import compiled, inlined
+from snapbeam.solver.contact_force import released_at
+from snapbeam.solver.cpu.control import accept_any_step
+from snapbeam.solver.cpu.recording import has_room, restore_state, save_state
+from snapbeam.solver.cpu.state import (
+    IntegratorState,
+    StepControl,
+    Workspace,
+    begin,
+    change_origin,
+    cut_slot,
+    finish,
+    phase_at,
+    restart_from_state,
+    run_of,
+)
+from snapbeam.solver.cpu.step import Step, StepIncrement, prepare, take_step, take_two
+from snapbeam.solver.cpu.terms.base_and_load import ExternalWork, enter_forces
+from snapbeam.solver.cpu.terms.circuit import CircuitIncrement
+from snapbeam.solver.cpu.terms.discontinuities import up_to_discontinuity
+from snapbeam.solver.cpu.terms.further_contact_events import (
+    close_further_contacts,
+    further_contacts_step_level,
+)
+from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, mirror_further_contacts
+from snapbeam.solver.cpu.terms.second_well import has_crossed_to_other_well
+from snapbeam.solver.events import contact_level, flight_level, ticks_of
+from snapbeam.solver.excitation import seen_from
+from snapbeam.util.status_codes import RunStatus
+
+__all__ = ["KernelOutput", "integrate_ensemble", "integrate_recorded", "propose_step"]
+
+
+_RUNNING = int(RunStatus.INTERRUPTED)
+_NO_STEP = Step(0, 0, 0.0, 0.0, False, 0, 0, 0, 0, 0, 0, 0)
+_NOTHING_DONE = StepIncrement(
+    0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ExternalWork(0.0, 0.0, 0.0), CircuitIncrement(0.0, 0.0, 0.0, 0.0)
+)
+
+
+class KernelOutput(NamedTuple):
+    """Where a march of many puts what it finds."""
+
+    accumulators_of_runs: Any
+    """A record a run."""
+    states: Any
+    """States at landings, q and p about the well at hand, shape (runs, landings, 2 rows); none if of length 0."""
+    homes: Any
+    """That well, and the ticks since the present contact began (-1: apart), shape (runs, landings, 2)."""
+    pulse: Any
+    """Not 0: stop."""
+
+
+@inlined
+def propose_step(memory, blocks, workspace, run, now, accumulators):
+    """The next step of a run, and where it stands: about the other well, if it has crossed over."""
+    layout, clock, well_sign, stretch, t = workspace.layout, run.clock, now.well_sign, now.stretch, now.t
+    rows, seen, control = now.rows, now.seen, now.control
+    r = layout.work + 9 * layout.size
+    if layout.stretch > 0.0 and has_crossed_to_other_well(layout.uneven, seen.c, well_sign, run.rest_center):
+        there = phase_at(run, t)
+        enter_forces(layout.forced, memory, run.struck.drive, there)
+        evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, there, rows.q, 0.0, False)
+        mirror_further_contacts(memory, layout.others, -well_sign)
+        stretch = change_origin(memory, blocks, layout, well_sign, rows.q, rows.k, r)
+        well_sign = -well_sign
+    accumulators.steps += 1
+    level = flight_level(clock, control.quiet, stretch, layout.stretch)
+    if control.touching:
+        left = released_at(run.struck.law, seen.d, seen.dv)
+        level = max(level, contact_level(clock, (t - accumulators.onset) * clock.tick, left, seen.dv))
+    level = further_contacts_step_level(memory, layout.others, clock, t, control.touching, level)
+    ticks, at = ticks_of(clock, level), run.coefficients + (level + 1) * run.slot
+    # up to the next state that is handed out, to a jump of the drive's velocity, or to the end
+    limit = min((now.landed + 1) * clock.landing, clock.end)
+    limit = up_to_discontinuity(run.struck.drive, run.phase, clock.period, t, limit)
+    if t + ticks > limit:
+        ticks, at = limit - t, cut_slot(run)
+        prepare(memory, layout, workspace.stages, run.struck.drive, ticks * clock.tick, at)
+    length, phase = ticks * clock.tick, phase_at(run, t)
+    step = Step(
+        ticks, at, length, phase, control.touching, rows.q, rows.p, rows.k, rows.q1, rows.p1, rows.k1, r
+    )
+    return IntegratorState(
+        t, well_sign, stretch, rows, seen, _beaten(control), now.sample, now.landed, now.status
+    ), step
+
+
+@inlined
+def _beaten(control):
+    """One step more."""
+    return StepControl(
+        control.touching,
+        control.quiet,
+        control.safe_gap,
+        control.safe_center,
+        control.monitor_energy,
+        control.beat + 1,
+    )
+
+
+@inlined
+def store_state(memory, blocks, layout, run, now, accumulators, i, kernel_output):
+    """Keep the state of a run that has come to a landing, and begin again from it alone."""
+    if kernel_output.states.shape[1] == 0 or now.t < min((now.landed + 1) * run.clock.landing, run.clock.end):
+        return now
+    size, rows, landed = layout.size, now.rows, now.landed
+    for row in range(size):
+        kernel_output.states[i, landed, row] = memory[rows.q + row]
+        kernel_output.states[i, landed, size + row] = memory[rows.p + row]
+    kernel_output.homes[i, landed, 0] = int(now.well_sign)
+    kernel_output.homes[i, landed, 1] = now.t - accumulators.onset if now.control.touching else -1
+    if now.status != _RUNNING:
+        return now
+    again, _ = restart_from_state(
+        memory, blocks, layout, run, now.t, now.well_sign, rows, now.control.touching, landed + 1, now.sample
+    )
+    return again
+
+
+@compiled
+def integrate_ensemble(memory, blocks, layouts, stages, kernel_input, which, scratch, kernel_output):
+    """March the runs *which*, two at a time; *memory* and *room* belong to the caller's thread.
+
+    *layouts* are two places in memory that share the rows of the structure.
+    """
+    place_a, place_b = Workspace(layouts[0], stages), Workspace(layouts[1], stages)
+    accumulators_of_runs, goes_on = kernel_output.accumulators_of_runs, kernel_output.states.shape[1] > 0
+    live_a, live_b, following = True, False, 1
+    i_a = which[0]
+    i_b = i_a
+    book_a = accumulators_of_runs[i_a]
+    book_b = book_a
+    run_a, now_a = begin(memory, blocks, place_a, kernel_input, i_a, book_a)
+    run_b, now_b = run_a, now_a
+    step_a, step_b, done_a, done_b = _NO_STEP, _NO_STEP, _NOTHING_DONE, _NOTHING_DONE
+    while live_a or live_b or following < which.size:
+        if kernel_output.pulse[0] != 0:
+            break
+        if not live_a and following < which.size:
+            i_a = which[following]
+            book_a = accumulators_of_runs[i_a]
+            run_a, now_a = begin(memory, blocks, place_a, kernel_input, i_a, book_a)
+            live_a, following = True, following + 1
+        if not live_b and following < which.size:
+            i_b = which[following]
+            book_b = accumulators_of_runs[i_b]
+            run_b, now_b = begin(memory, blocks, place_b, kernel_input, i_b, book_b)
+            live_b, following = True, following + 1
+        if live_a:
+            now_a, step_a = propose_step(memory, blocks, place_a, run_a, now_a, book_a)
+        if live_b:
+            now_b, step_b = propose_step(memory, blocks, place_b, run_b, now_b, book_b)
+        tip_a = seen_from(run_a.struck, now_a.well_sign, run_a.rest_contact)
+        tip_b = seen_from(run_b.struck, now_b.well_sign, run_b.rest_contact)
+        if live_a and live_b:
+            done_a, done_b = take_two(
+                memory, blocks, stages, layouts[0], tip_a, step_a, layouts[1], tip_b, step_b
+            )
+        elif live_a:
+            done_a = take_step(memory, blocks, layouts[0], stages, tip_a, step_a, None)
+        else:
+            done_b = take_step(memory, blocks, layouts[1], stages, tip_b, step_b, None)
+        if live_a:
+            now_a, _ = accept_any_step(
+                memory, blocks, place_a, run_a, now_a, step_a, done_a, scratch, book_a, kernel_input, None
+            )
+            now_a = store_state(memory, blocks, layouts[0], run_a, now_a, book_a, i_a, kernel_output)
+            if now_a.status != _RUNNING:
+                if not goes_on:
+                    close_further_contacts(memory, layouts[0].others, book_a, None, now_a.t, run_a.clock.tick)
+                finish(memory, blocks, layouts[0], run_a, now_a, book_a, None, 0, goes_on)
+                live_a = False
+        if live_b:
+            now_b, _ = accept_any_step(
+                memory, blocks, place_b, run_b, now_b, step_b, done_b, scratch, book_b, kernel_input, None
+            )
+            now_b = store_state(memory, blocks, layouts[1], run_b, now_b, book_b, i_b, kernel_output)
+            if now_b.status != _RUNNING:
+                if not goes_on:
+                    close_further_contacts(memory, layouts[1].others, book_b, None, now_b.t, run_b.clock.tick)
+                finish(memory, blocks, layouts[1], run_b, now_b, book_b, None, 0, goes_on)
+                live_b = False
+    if live_a:
+        book_a.time, book_a.status = now_a.t, _RUNNING
+    if live_b:
+        book_b.time, book_b.status = now_b.t, _RUNNING
+
+
+# ----------------------------------------------------------------------------------------------------
+# The CPU engine's march of one run that is recorded: in slices, so that it can be watched, stopped and drained.
+
+
+@compiled
+def integrate_recorded(
+    memory, blocks, layout, stages, kernel_input, scratch, accumulators, outputs, aside, budget
+):
+    """March the first run until it ends, *outputs* are full or *budget* steps are taken.
+
+    *aside* is a pair of arrays in which the run is laid aside; the first integer there, if negative, says that
+    it has not begun.
+    """
+    workspace, (marks, reals) = Workspace(layout, stages), aside
+    if marks[0] < 0:
+        run, now = begin(memory, blocks, workspace, kernel_input, 0, accumulators)
+    else:
+        now = restore_state(marks, reals)
+        run = run_of(memory, layout, stages, kernel_input, 0)
+    left = budget
+    while now.status == _RUNNING and left > 0 and has_room(now, accumulators, outputs):
+        left -= 1
+        now, step = propose_step(memory, blocks, workspace, run, now, accumulators)
+        tip = seen_from(run.struck, now.well_sign, run.rest_contact)
+        done = take_step(memory, blocks, layout, stages, tip, step, True)
+        now, _ = accept_any_step(
+            memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs
+        )
+    if now.status != _RUNNING:
+        close_further_contacts(memory, layout.others, accumulators, outputs, now.t, run.clock.tick)
+        finish(memory, blocks, layout, run, now, accumulators, outputs.impacts, outputs.marks[1], False)
+    accumulators.time, accumulators.status, accumulators.samples = now.t, now.status, now.sample
+    save_state(now, marks, reals)

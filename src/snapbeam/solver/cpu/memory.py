@@ -1,0 +1,232 @@
+"""The CPU engine's layout: a structure in padded rows, eight modes a register, and room to march in."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.solver.cpu.mode_lanes import Layout
+from snapbeam.solver.cpu.terms.base_and_load import TimeDependentForces
+from snapbeam.solver.cpu.terms.circuit import Circuit
+from snapbeam.solver.cpu.terms.further_contacts import FurtherContacts
+from snapbeam.solver.cpu.terms.second_well import Uneven
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.further_contacts import NUMBERS, Several
+from snapbeam.solver.simd import WIDTH
+from snapbeam.solver.splitting import Stages, in_memory, slot_length
+from snapbeam.solver.structure import Structure
+
+__all__ = ["Memory", "Packed", "lay_out", "pack"]
+
+
+_Array = NDArray[np.float64]
+
+_LONGEST_DECAY = 4.0
+"""zeta omega t up to which :func:`~snapbeam.solver.physics.decay_less_one` is accurate."""
+_SLOWEST = 1e-12
+"""Stands for no damping, 1/s."""
+_ALIGNMENT = 64
+WORK_ROWS = 10
+"""Rows that a march works in: q, p, k at both ends of a step and of a look ahead, and G q."""
+
+
+class Packed(NamedTuple):
+    """A structure in rows."""
+
+    memory: _Array
+    blocks: NDArray[np.int64]
+    """First row, row after the last, and columns of each block of coupled modes."""
+    layout: Layout
+    rows: NDArray[np.int64]
+    """Row of each linear mode, shape (N,)."""
+    members: tuple[int, ...]
+    """Modes of each block."""
+
+    def spread(self, values: _Array) -> _Array:
+        """Numbers of modes, shape (..., N), as padded rows, shape (..., rows)."""
+        out = np.zeros((*values.shape[:-1], self.layout.size))
+        out[..., self.rows] = values
+        return out
+
+
+def _blocks_of(coupled: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Number of the block of each mode, in the order of their first modes: every mode takes the least of those that
+    it is coupled to, until none changes.
+
+    It is five lines of scipy.sparse.csgraph, which takes longer to load than many a run to march.
+    """
+    among = coupled | coupled.T | np.eye(len(coupled), dtype=bool)
+    label = np.arange(len(coupled))
+    while True:
+        least = np.where(among, label, len(label)).min(axis=1)
+        if (least == label).all():
+            return np.unique(label, return_inverse=True)[1]
+        label = least
+
+
+def pack(
+    structure: Structure,
+    high_omega: float = np.inf,
+    forced: bool = False,
+    several: type[Several] | None = None,
+) -> Packed:
+    """Arrange a structure in rows.
+
+    Linear modes that the tension does not couple (the symmetric and the antisymmetric ones) become
+    separate blocks, each padded to a multiple of eight rows.  *forced*: with room for a moving base or a changing load.
+    *several*: with room for strikers beside the first.
+    """
+    label = _blocks_of(structure.coupling != 0.0)
+    omega, zeta = structure.omega, structure.damping_ratio
+    blocks: list[int] = []
+    rows = np.empty(omega.size, dtype=np.int64)
+    size = 0
+    held: list[int] = []
+    for b in range(label.max() + 1):
+        members = np.flatnonzero(label == b)
+        held.append(members.size)
+        rows[members] = size + np.arange(members.size)
+        stop = size + -(-members.size // WIDTH) * WIDTH
+        unroll = 4 if stop - size > WIDTH else 2
+        blocks += [size, stop, -(-members.size // unroll) * unroll]
+        size = stop
+
+    def padded(values: _Array, fill: float = 0.0) -> _Array:
+        out = np.full(size, fill)
+        out[rows] = values
+        return out
+
+    full = np.zeros((size, size))
+    full[np.ix_(rows, rows)] = structure.coupling
+    strips = []
+    for start, stop, columns in zip(blocks[::3], blocks[1::3], blocks[2::3], strict=True):
+        at = start
+        while at < stop:
+            height = 2 * WIDTH if at + 2 * WIDTH <= stop else WIDTH
+            strips.append(full[at : at + height, start : start + columns].T.ravel())
+            at += height
+    pieces = {
+        "omega": padded(omega),
+        "omega_squared": padded(omega * omega),
+        "omega_damped": padded(omega * np.sqrt(1.0 - zeta * zeta), 1.0),
+        "damping": padded(zeta * omega),
+        "g": padded(structure.well),
+        "contact": np.zeros(size),
+        "center": padded(structure.center),
+        "shift": padded(structure.shift),
+        "high": padded(structure.high_modes(high_omega).astype(np.float64)),
+        "tension": np.concatenate(strips),
+    }
+    away = structure.uneven
+    if away is not None:
+        pieces |= {"far": padded(away.force), "second": padded(away.second), "here": np.zeros(size + WIDTH)}
+    if forced:
+        pieces["shaken"] = padded(
+            np.zeros(omega.size)
+            if structure.add_base_acceleration is None
+            else structure.add_base_acceleration
+        )
+        pieces["now"] = np.zeros(WIDTH)
+    if structure.tapped is not None:
+        pieces |= {"tapped": padded(structure.tapped), "rate": np.zeros(WIDTH)}
+    if forced or structure.tapped is not None:
+        pieces["kick"] = np.zeros(size)
+    if several is not None:
+        pieces["striker_rows"] = np.zeros(len(several.laws) * size)
+        pieces["strikers"] = np.zeros(len(several.laws) * NUMBERS)
+    starts = np.concatenate(([0], np.cumsum([piece.size for piece in pieces.values()])))
+    placed = dict(zip(pieces, map(int, starts), strict=False))
+    uneven, forces, circuit, others = None, None, None, None
+    kick = placed.pop("kick", 0)
+    if forced:
+        forces = TimeDependentForces(placed.pop("shaken"), placed.pop("now"), kick)
+    if structure.tapped is not None:
+        element = int(rows[-1]) if structure.circuit else None
+        circuit = Circuit(placed.pop("tapped"), placed.pop("rate"), kick, element)
+    if several is not None:
+        others = FurtherContacts(placed.pop("striker_rows"), placed.pop("strikers"), several.numbers_type()())
+    if away is not None:
+        own = placed.pop("far"), placed.pop("second"), placed.pop("here")
+        uneven = Uneven(*own, away.lift, away.depth, away.level)
+    moving = bool(np.all(omega * np.sqrt(1.0 - zeta * zeta) > 0.0))
+    gentle = _LONGEST_DECAY / max(float((zeta * omega).max()), _SLOWEST) if moving else 0.0
+    layout = Layout(
+        size=size,
+        **placed,
+        work=int(starts[-1]),
+        gamma=structure.nonlinear_stiffness,
+        stretch=structure.stretch,
+        gentle=gentle,
+        uneven=uneven,
+        forced=forces,
+        circuit=circuit,
+        others=others,
+        body=None if structure.body_mass is None else int(rows[structure.equilibrium.size]),
+    )
+    return Packed(
+        np.concatenate(list(pieces.values())), np.array(blocks, dtype=np.int64), layout, rows, tuple(held)
+    )
+
+
+class Memory(NamedTuple):
+    """Everything that one thread needs to march runs of an ensemble, in one flat array."""
+
+    memory: _Array
+    blocks: NDArray[np.int64]
+    layouts: tuple[Layout, Layout]
+    """Two places that share the rows of the structure."""
+    stages: Stages
+    drive_numbers: _Array
+    """With the place of the drive's samples in memory."""
+
+
+def lay_out(ensemble: Ensemble, packed: Packed, extra_rows: int = 0) -> Memory:
+    """A copy of a structure's rows with room for two runs, aligned to whole registers.
+
+    *extra_rows* are added to the work rows of the first place.
+    """
+    size, first = packed.layout.size, packed.layout
+    slots = (ensemble.finest + 3) * slot_length(ensemble.order, size) + 8 * size
+    work = (WORK_ROWS + extra_rows) * size + slots
+    second = first._replace(
+        g=first.work + work, contact=first.work + work + size, work=first.work + work + 2 * size
+    )
+    if first.uneven is not None:
+        second = second._replace(
+            work=second.work + size + WIDTH, uneven=first.uneven._replace(here=second.work)
+        )
+    if first.forced is not None or first.circuit is not None:
+        now = second.work
+        rate, kick = now + WIDTH, now + 2 * WIDTH
+        second = second._replace(
+            work=kick + size,
+            forced=None if first.forced is None else first.forced._replace(now=now, kick=kick),
+            circuit=None if first.circuit is None else first.circuit._replace(rate=rate, kick=kick),
+        )
+    if first.others is not None:
+        count = len(type(first.others.kinds).owner.laws)
+        rows = second.work
+        second = second._replace(
+            work=rows + count * (size + NUMBERS),
+            others=first.others._replace(rows=rows, numbers=rows + count * size),
+        )
+    at = second.work + WORK_ROWS * size + slots
+    stages, weights = in_memory(
+        ensemble.order, at, general=ensemble.law.rate_dependent, coupled=first.circuit is not None
+    )
+    table = stages.flow + weights.size
+    length = table + ensemble.samples.size
+    raw = np.zeros(length + _ALIGNMENT // 8)
+    skipped = (-raw.ctypes.data % _ALIGNMENT) // 8
+    memory: _Array = raw[skipped : skipped + length]
+    memory[: first.work] = packed.memory
+    memory[second.g : second.g + size] = memory[first.g : first.g + size]
+    memory[stages.flow : table] = weights
+    memory[table:] = ensemble.samples
+    numbers: Any = ensemble.drive_numbers
+    if "table" in ensemble.drive.number_names:
+        numbers = numbers.copy()
+        numbers[:, ensemble.drive.number_names.index("table")] += table
+    return Memory(memory, packed.blocks, (first, second), stages, numbers)

@@ -1,0 +1,397 @@
+"""Operations on rows of modes, eight at a time: what the CPU engine's steps are made of.
+
+Everything a march needs stands in one flat array, *memory*; a row is the index at which it begins, a
+multiple of eight long, and holds the modes of one structure, each block of coupled modes padded with
+zeros.  The tension matrix G is stored block by block in strips of sixteen (last: eight) rows, each strip
+column by column, so that the product G q streams through it once.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from snapbeam.solver.compilation import called, inlined
+from snapbeam.solver.cpu.dot import dot
+from snapbeam.solver.cpu.terms.base_and_load import add_base_acceleration
+from snapbeam.solver.cpu.terms.circuit import without_circuit
+from snapbeam.solver.cpu.terms.further_contacts import struck
+from snapbeam.solver.cpu.terms.second_well import add_static_load
+from snapbeam.solver.physics import (
+    decay_less_one,
+    mode_energy,
+    rotation,
+    sincos_cosm1,
+    tension_acceleration,
+    turned,
+)
+from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat, store, vabs
+
+__all__ = [
+    "Layout",
+    "acceleration_rows",
+    "beam_energy",
+    "beam_signals",
+    "dot",
+    "flow_coefficients",
+    "flow_rows",
+    "kick_and_flow",
+    "kick_rows",
+    "modal_energies",
+    "modal_energy",
+    "propagate_free",
+    "signals",
+    "speed_bound",
+    "tension_rows",
+    "tension_rows_twice",
+]
+
+
+class Layout(NamedTuple):
+    """Where a structure's rows begin in memory, and the two numbers that are no rows."""
+
+    size: int
+    """Length of a row."""
+    omega: int
+    omega_squared: int
+    omega_damped: int
+    damping: int
+    """zeta omega of each mode, 1/s."""
+    g: int
+    """V^T alpha_eq."""
+    contact: int
+    """V^T phi(x_s), with the sign of the shaker's side."""
+    center: int
+    """V^T phi(1/2), with the sign of the shaker's side."""
+    shift: int
+    """From the well the run begins in to the other, as q."""
+    high: int
+    """1 for a mode above the frequency from which energy counts as high, 0 for the others."""
+    tension: int
+    """G, packed in strips."""
+    work: int
+    """First of the rows that the march works in."""
+    gamma: float
+    """Tension stiffness, Eq. (15)."""
+    stretch: float
+    """Squared slopes of the beam in a well, alpha_eq . alpha_eq; 0 if there is one well only."""
+    gentle: float
+    """Longest flow, s, that polynomials serve; 0 if there is an overdamped or a still mode."""
+    uneven: Any
+    """Of unequal wells, an :class:`~snapbeam.solver.cpu.terms.second_well.Uneven`; else None."""
+    forced: Any
+    """Of a moving base or a changing load, a :class:`~snapbeam.solver.cpu.terms.base_and_load.TimeDependentForces`; else None."""
+    circuit: Any
+    """Of a harvester, a :class:`~snapbeam.solver.cpu.terms.circuit.Circuit`; else None."""
+    others: Any
+    """Of several strikers, an :class:`~snapbeam.solver.cpu.terms.further_contacts.FurtherContacts`; else None."""
+    body: Any
+    """Element of a row that holds the mode of a striker with mass; None without one."""
+
+
+@inlined
+def _close_rows(memory, g, q, r, row, product, total_g, total_r):
+    """Keep eight rows of G q; add their part to g.q and q.Gq."""
+    store(memory, r + row, product)
+    q_row = load(memory, q + row)
+    return fma(load(memory, g + row), q_row, total_g), fma(product, q_row, total_r)
+
+
+@inlined
+def tension_rows(memory, blocks, layout, q, r):
+    """r = G q; returns g.q and q.r.
+
+    *blocks* holds, for each block, its first row, the row after its last, and its columns.
+    """
+    g, at = layout.g, layout.tension
+    total_g, total_r = splat(0.0), splat(0.0)
+    for block in range(0, blocks.size, 3):
+        row, stop, columns = blocks[block], blocks[block + 1], blocks[block + 2]
+        column = q + row
+        last = column + columns
+        while row + 2 * WIDTH <= stop:
+            low0, high0, low1, high1 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+            low2, high2, low3, high3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+            here = column
+            while here < last:
+                q0, q1 = broadcast_load(memory, here), broadcast_load(memory, here + 1)
+                q2, q3 = broadcast_load(memory, here + 2), broadcast_load(memory, here + 3)
+                low0 = fma(load(memory, at), q0, low0)
+                high0 = fma(load(memory, at + WIDTH), q0, high0)
+                low1 = fma(load(memory, at + 2 * WIDTH), q1, low1)
+                high1 = fma(load(memory, at + 3 * WIDTH), q1, high1)
+                low2 = fma(load(memory, at + 4 * WIDTH), q2, low2)
+                high2 = fma(load(memory, at + 5 * WIDTH), q2, high2)
+                low3 = fma(load(memory, at + 6 * WIDTH), q3, low3)
+                high3 = fma(load(memory, at + 7 * WIDTH), q3, high3)
+                at += 8 * WIDTH
+                here += 4
+            low, high = (low0 + low1) + (low2 + low3), (high0 + high1) + (high2 + high3)
+            total_g, total_r = _close_rows(memory, g, q, r, row, low, total_g, total_r)
+            total_g, total_r = _close_rows(memory, g, q, r, row + WIDTH, high, total_g, total_r)
+            row += 2 * WIDTH
+        if row < stop:
+            even_sum, odd_sum = splat(0.0), splat(0.0)
+            here = column
+            while here < last:
+                even_sum = fma(load(memory, at), broadcast_load(memory, here), even_sum)
+                odd_sum = fma(load(memory, at + WIDTH), broadcast_load(memory, here + 1), odd_sum)
+                at += 2 * WIDTH
+                here += 2
+            total_g, total_r = _close_rows(memory, g, q, r, row, even_sum + odd_sum, total_g, total_r)
+    return lanes_sum(total_g), lanes_sum(total_r)
+
+
+@inlined
+def tension_rows_twice(memory, blocks, layout_a, q_a, r_a, layout_b, q_b, r_b):
+    """:func:`tension_rows` for two states at once, bit for bit, with G read only once."""
+    at = layout_a.tension
+    g_a, g_b, ar, br = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+    for block in range(0, blocks.size, 3):
+        row, stop, columns = blocks[block], blocks[block + 1], blocks[block + 2]
+        first, last = row, row + columns
+        while row + 2 * WIDTH <= stop:
+            al0, ah0, al1, ah1 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+            al2, ah2, al3, ah3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+            bl0, bh0, bl1, bh1 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+            bl2, bh2, bl3, bh3 = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+            column = first
+            while column < last:
+                a0, a1 = broadcast_load(memory, q_a + column), broadcast_load(memory, q_a + column + 1)
+                b0, b1 = broadcast_load(memory, q_b + column), broadcast_load(memory, q_b + column + 1)
+                low, high = load(memory, at), load(memory, at + WIDTH)
+                al0, ah0, bl0, bh0 = (
+                    fma(low, a0, al0),
+                    fma(high, a0, ah0),
+                    fma(low, b0, bl0),
+                    fma(high, b0, bh0),
+                )
+                low, high = load(memory, at + 2 * WIDTH), load(memory, at + 3 * WIDTH)
+                al1, ah1, bl1, bh1 = (
+                    fma(low, a1, al1),
+                    fma(high, a1, ah1),
+                    fma(low, b1, bl1),
+                    fma(high, b1, bh1),
+                )
+                a2, a3 = broadcast_load(memory, q_a + column + 2), broadcast_load(memory, q_a + column + 3)
+                b2, b3 = broadcast_load(memory, q_b + column + 2), broadcast_load(memory, q_b + column + 3)
+                low, high = load(memory, at + 4 * WIDTH), load(memory, at + 5 * WIDTH)
+                al2, ah2, bl2, bh2 = (
+                    fma(low, a2, al2),
+                    fma(high, a2, ah2),
+                    fma(low, b2, bl2),
+                    fma(high, b2, bh2),
+                )
+                low, high = load(memory, at + 6 * WIDTH), load(memory, at + 7 * WIDTH)
+                al3, ah3, bl3, bh3 = (
+                    fma(low, a3, al3),
+                    fma(high, a3, ah3),
+                    fma(low, b3, bl3),
+                    fma(high, b3, bh3),
+                )
+                at += 8 * WIDTH
+                column += 4
+            low, high = (al0 + al1) + (al2 + al3), (ah0 + ah1) + (ah2 + ah3)
+            g_a, ar = _close_rows(memory, layout_a.g, q_a, r_a, row, low, g_a, ar)
+            g_a, ar = _close_rows(memory, layout_a.g, q_a, r_a, row + WIDTH, high, g_a, ar)
+            low, high = (bl0 + bl1) + (bl2 + bl3), (bh0 + bh1) + (bh2 + bh3)
+            g_b, br = _close_rows(memory, layout_b.g, q_b, r_b, row, low, g_b, br)
+            g_b, br = _close_rows(memory, layout_b.g, q_b, r_b, row + WIDTH, high, g_b, br)
+            row += 2 * WIDTH
+        if row < stop:
+            a_even, a_odd, b_even, b_odd = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+            column = first
+            while column < last:
+                even, odd = load(memory, at), load(memory, at + WIDTH)
+                a_even = fma(even, broadcast_load(memory, q_a + column), a_even)
+                b_even = fma(even, broadcast_load(memory, q_b + column), b_even)
+                a_odd = fma(odd, broadcast_load(memory, q_a + column + 1), a_odd)
+                b_odd = fma(odd, broadcast_load(memory, q_b + column + 1), b_odd)
+                at += 2 * WIDTH
+                column += 2
+            g_a, ar = _close_rows(memory, layout_a.g, q_a, r_a, row, a_even + a_odd, g_a, ar)
+            g_b, br = _close_rows(memory, layout_b.g, q_b, r_b, row, b_even + b_odd, g_b, br)
+    return lanes_sum(g_a), lanes_sum(ar), lanes_sum(g_b), lanes_sum(br)
+
+
+@inlined
+def acceleration_rows(memory, layout, along_g, along_r, r, k):
+    """k = the modal acceleration by the change of tension, and by the side force where q has another origin."""
+    for row in range(0, layout.size, WIDTH):
+        g_row = load(memory, layout.g + row)
+        tension = tension_acceleration(along_g, along_r, g_row, load(memory, r + row))
+        tension = add_static_load(memory, layout.uneven, row, tension)
+        tension = struck(memory, layout.size, layout.others, row, tension)
+        store(memory, k + row, add_base_acceleration(memory, layout.forced, row, tension))
+
+
+@inlined
+def kick_rows(memory, layout, weight, k, force, p_from, p_to):
+    """p_to = p_from + weight (k + c force), c the contact's row."""
+    for row in range(0, layout.size, WIDTH):
+        total = fma(force, load(memory, layout.contact + row), load(memory, k + row))
+        store(memory, p_to + row, fma(weight, total, load(memory, p_from + row)))
+
+
+@inlined
+def kick_and_flow(memory, layout, flow, weight, along_g, along_r, r, force, q, p):
+    """In place: p += weight (tension + c force), then one flow of every linear mode."""
+    size = layout.size
+    for row in range(0, size, WIDTH):
+        k = tension_acceleration(along_g, along_r, load(memory, layout.g + row), load(memory, r + row))
+        k = add_static_load(memory, layout.uneven, row, k)
+        k = struck(memory, size, layout.others, row, k)
+        k = add_base_acceleration(memory, layout.forced, row, k)
+        k = fma(force, load(memory, layout.contact + row), k)
+        kicked = fma(weight, k, load(memory, p + row))
+        q_row, at = load(memory, q + row), flow + row
+        store(memory, q + row, turned(q_row, load(memory, at), load(memory, at + size), kicked))
+        at += 2 * size
+        store(memory, p + row, turned(kicked, load(memory, at + size), load(memory, at), q_row))
+
+
+@inlined
+def flow_rows(memory, size, flow, q_from, p_from, q_to, p_to):
+    """One flow of every linear mode."""
+    for row in range(0, size, WIDTH):
+        q_row, p_row, at = load(memory, q_from + row), load(memory, p_from + row), flow + row
+        store(memory, q_to + row, turned(q_row, load(memory, at), load(memory, at + size), p_row))
+        at += 2 * size
+        store(memory, p_to + row, turned(p_row, load(memory, at + size), load(memory, at), q_row))
+
+
+@inlined
+def modal_energy(memory, layout, q, p):
+    """Quadratic part of the energy, the sum of (p^2 + omega^2 q^2)/2."""
+    total = splat(0.0)
+    for row in range(0, layout.size, WIDTH):
+        omega = load(memory, layout.omega + row)
+        total = total + mode_energy(omega, load(memory, q + row), load(memory, p + row))
+    return lanes_sum(total)
+
+
+@inlined
+def modal_energies(memory, layout, q, p):
+    """As :func:`modal_energy`, and the part of it in the modes above a frequency."""
+    total, high = splat(0.0), splat(0.0)
+    for row in range(0, layout.size, WIDTH):
+        omega = load(memory, layout.omega + row)
+        energy = mode_energy(omega, load(memory, q + row), load(memory, p + row))
+        total = total + energy
+        high = fma(load(memory, layout.high + row), energy, high)
+    return lanes_sum(total), lanes_sum(high)
+
+
+@inlined
+def speed_bound(memory, layout, c, q, p):
+    """A speed that c.q cannot exceed by the linear flow alone: sum |c_j| (|p_j| + |omega_j q_j|)."""
+    total = splat(0.0)
+    for row in range(0, layout.size, WIDTH):
+        oq = load(memory, layout.omega + row) * load(memory, q + row)
+        total = fma(vabs(load(memory, c + row)), vabs(load(memory, p + row)) + vabs(oq), total)
+    return lanes_sum(total)
+
+
+@inlined
+def signals(memory, layout, q, p):
+    """Displacement of the contact point and of the centre from rest and their rates: c.q, c.p, e.q, e.p."""
+    cq, cp, eq, ep = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
+    for row in range(0, layout.size, WIDTH):
+        q_row, p_row = load(memory, q + row), load(memory, p + row)
+        c_row, e_row = load(memory, layout.contact + row), load(memory, layout.center + row)
+        cq, cp = fma(c_row, q_row, cq), fma(c_row, p_row, cp)
+        eq, ep = fma(e_row, q_row, eq), fma(e_row, p_row, ep)
+    return lanes_sum(cq), lanes_sum(cp), lanes_sum(eq), lanes_sum(ep)
+
+
+@inlined
+def beam_signals(memory, layout, q, p, w, rate):
+    """Displacement and velocity of the beam at the striker, of the products *w* and *rate* with the contact row.
+
+    With a striker that has mass, these products are of the beam minus the striker's own displacement.
+    """
+    return _without_body(memory, layout.body, layout.contact, q, p, w, rate)
+
+
+@inlined
+def _without_body(memory, body, contact, q, p, w, rate):
+    if body is None:
+        return w, rate
+    c = memory[contact + body]
+    return w - c * memory[q + body], rate - c * memory[p + body]
+
+
+@inlined
+def beam_energy(memory, layout, q, p, energy):
+    """The part of the modal *energy* that is in the beam: neither in a striker's mass nor in a circuit."""
+    beam = _without_energy_of(memory, layout.body, layout.omega, q, p, energy)
+    return without_circuit(memory, layout.circuit, p, beam)
+
+
+@inlined
+def _without_energy_of(memory, body, omega, q, p, energy):
+    if body is None:
+        return energy
+    return energy - mode_energy(memory[omega + body], memory[q + body], memory[p + body])
+
+
+@inlined
+def propagate_free(memory, layout, contact, flow, pieces, piece, q, p, k0, k1, center, parts):
+    """A free step in short pieces: signals at the end of each, one mode a lane, into *parts*; c is the row *contact*.
+
+    Row by row of modes, so that a row stays in registers all the way.  At the border of pieces i and i + 1
+    stands a kick by the tension's acceleration, linear from k0 to k1 (half a kick at the first).  Piece i
+    leaves c.q, c.p and, if *center*, e.q and e.p, each still eight sums, at ``parts[32 i]``.
+    """
+    size = layout.size
+    for row in range(0, size, WIDTH):
+        q_row, p_row = load(memory, q + row), load(memory, p + row)
+        k0_row, k1_row = load(memory, k0 + row), load(memory, k1 + row)
+        a11, a12 = load(memory, flow + row), load(memory, flow + size + row)
+        a21, a22 = load(memory, flow + 2 * size + row), load(memory, flow + 3 * size + row)
+        c_row, e_row = load(memory, contact + row), load(memory, layout.center + row)
+        for i in range(pieces):
+            done, kick, at = i / pieces, piece if i > 0 else 0.5 * piece, 4 * WIDTH * i
+            kicked = fma(kick * done, k1_row, p_row)
+            kicked = fma(kick * (1.0 - done), k0_row, kicked)
+            p_row = turned(kicked, a22, a21, q_row)
+            q_row = turned(q_row, a11, a12, kicked)
+            if row == 0:
+                for j in range(4):
+                    store(parts, at + j * WIDTH, splat(0.0))
+            store(parts, at, fma(c_row, q_row, load(parts, at)))
+            store(parts, at + WIDTH, fma(c_row, p_row, load(parts, at + WIDTH)))
+            if center:
+                store(parts, at + 2 * WIDTH, fma(e_row, q_row, load(parts, at + 2 * WIDTH)))
+                store(parts, at + 3 * WIDTH, fma(e_row, p_row, load(parts, at + 3 * WIDTH)))
+
+
+@called
+def flow_coefficients(memory, layout, length, at):
+    """Rows a11 - 1, a12, a21, a22 - 1 of the exact flow over *length* seconds, written from *at* on."""
+    size = layout.size
+    if abs(length) < layout.gentle:
+        for row in range(0, size, WIDTH):
+            apply_contact_loss, sigma = (
+                load(memory, layout.omega_damped + row),
+                load(memory, layout.damping + row),
+            )
+            squared = load(memory, layout.omega_squared + row)
+            sine, _, less_one = sincos_cosm1(apply_contact_loss * length)
+            lost = decay_less_one(sigma * length)
+            a11, a12, a21, a22 = rotation(sigma, squared, sine / apply_contact_loss, less_one, lost)
+            store(memory, at + row, a11)
+            store(memory, at + size + row, a12)
+            store(memory, at + 2 * size + row, a21)
+            store(memory, at + 3 * size + row, a22)
+        return
+    for j in range(size):
+        apply_contact_loss, sigma = memory[layout.omega_damped + j], memory[layout.damping + j]
+        sine, _, less_one = sincos_cosm1(apply_contact_loss * length)
+        over = sine / apply_contact_loss if apply_contact_loss > 0.0 else length
+        squared = memory[layout.omega_squared + j]
+        a11, a12, a21, a22 = rotation(sigma, squared, over, less_one, math.expm1(-sigma * length))
+        memory[at + j] = a11
+        memory[at + size + j] = a12
+        memory[at + 2 * size + j] = a21
+        memory[at + 3 * size + j] = a22

@@ -1,0 +1,259 @@
+"""What a recorded run writes down, and how it is laid aside and taken up again when its buffers are full."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from snapbeam.model.drive.combined import MOST_STRIKERS
+from snapbeam.solver.compilation import compiled, inlined
+from snapbeam.solver.contact_force import contact_energy, felt_force
+from snapbeam.solver.cpu.mode_lanes import modal_energy
+from snapbeam.solver.cpu.state import IntegratorState, Rows, StepControl, cut_slot
+from snapbeam.solver.cpu.step import Step, observe, prepare, take_step
+from snapbeam.solver.cpu.sticking import held_for, hold
+from snapbeam.solver.cpu.terms.further_contact_events import any_touches
+from snapbeam.solver.cpu.terms.second_well import add_potential_energy
+from snapbeam.solver.events import ContactKinematics
+from snapbeam.solver.physics import tension_energy
+
+__all__ = [
+    "MARKS",
+    "REALS",
+    "VALUES",
+    "Outputs",
+    "has_room",
+    "record_aside",
+    "record_contact",
+    "record_held",
+    "record_instants",
+    "restore_state",
+    "save_state",
+]
+
+
+VALUES = 10
+"""Penetration, contact force, beam energy, contact energy, work, dissipation, loss in contact, work of the base and of
+the axial load, and energy lost in the circuit, of a sample."""
+MARKS, REALS = 24, 10
+"""Integers and floats of a run that was laid aside."""
+_TOGETHER = ContactKinematics(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_MOST_IN_CONTACT = 96
+"""Steps of one contact whose ends are recorded."""
+
+
+class Outputs(NamedTuple):
+    """Where a march writes what is asked of it, until it is full."""
+
+    times: Any
+    """Instants to record, s, ascending."""
+    at: Any
+    """When each sample was taken, s; those of one step in any order."""
+    rows: Any
+    """q about the first well, then p, shape (samples, 2 rows)."""
+    values: Any
+    """Shape (samples, VALUES)."""
+    impacts: Any
+    """Onset, duration, peak force and impulse of each impact, of several strikers which one too, shape (rows, 4 or 5);
+    a few rows more than it takes to be full, since several may end with one step."""
+    marks: Any
+    """Instants recorded so far; impacts handed on before; samples of the present contact."""
+    most: int
+    """Instants that one step may hold."""
+    in_contact: bool
+    """Whether the ends of steps in contact are recorded too."""
+
+
+@inlined
+def has_room(now, accumulators, outputs):
+    """Whether another step's samples and impact fit."""
+    rows = now.sample + outputs.most + 3 <= outputs.at.size
+    return rows and accumulators.impacts - outputs.marks[1] < outputs.impacts.shape[0] - MOST_STRIKERS
+
+
+class _Instant(NamedTuple):
+    """What a sample is of."""
+
+    when: float
+    """s."""
+    q: int
+    """Where the state stands in memory."""
+    p: int
+    seen: ContactKinematics
+    energy: float
+    """Of the beam, J."""
+
+
+class _Sums(NamedTuple):
+    """Energies since the beginning of the run, J."""
+
+    work: float
+    dissipated: float
+    lost: float
+    base: float
+    load: float
+    circuit: float
+
+
+@inlined
+def _sums(accumulators):
+    """As a run's book has them."""
+    return _Sums(
+        accumulators.work,
+        accumulators.dissipated,
+        accumulators.lost,
+        accumulators.base_work,
+        accumulators.load_work,
+        accumulators.circuit_energy,
+    )
+
+
+@inlined
+def _sums_with(accumulators, done):
+    """The same with what a part of a step gave."""
+    return _Sums(
+        accumulators.work + done.work, accumulators.dissipated + done.dissipated + done.lost, accumulators.lost + done.lost,
+        accumulators.base_work + done.given.base, accumulators.load_work + done.given.load, accumulators.circuit_energy + done.tap.energy,
+    )  # fmt: skip
+
+
+@inlined
+def _write(memory, layout, well_sign, law, outputs, sample, instant, sums):
+    """One sample, about the first well."""
+    size, seen = layout.size, instant.seen
+    for row in range(size):
+        outputs.rows[sample, row] = memory[instant.q + row]
+        if well_sign < 0.0:
+            outputs.rows[sample, row] += memory[layout.shift + row]
+        outputs.rows[sample, size + row] = memory[instant.p + row]
+    outputs.at[sample] = instant.when
+    outputs.values[sample, 0] = seen.d
+    outputs.values[sample, 1] = felt_force(law, seen.d, seen.dv)
+    outputs.values[sample, 2] = instant.energy
+    outputs.values[sample, 3] = contact_energy(law, seen.d)
+    outputs.values[sample, 4] = sums.work
+    outputs.values[sample, 5] = sums.dissipated
+    outputs.values[sample, 6] = sums.lost
+    outputs.values[sample, 7] = sums.base
+    outputs.values[sample, 8] = sums.load
+    outputs.values[sample, 9] = sums.circuit
+
+
+@compiled
+def record_instants(memory, blocks, layout, stages, run, tip, now, step, accumulators, outputs):
+    """Write down what happens at the instants inside a step; returns how many samples there are then."""
+    clock, sample, size = run.clock, now.sample, layout.size
+    times, done = outputs.times, outputs.marks[0]
+    q2, p2 = run.spare, run.spare + size
+    while done < times.size:
+        if times[done] > (now.t + step.ticks) * clock.tick and now.t + step.ticks < clock.end:
+            break
+        part = min(max(0.0, times[done] - now.t * clock.tick), step.length)
+        prepare(memory, layout, stages, run.struck.drive, part, cut_slot(run))
+        short = Step(
+            0, cut_slot(run), part, step.phase, step.touching, step.q, step.p, step.k,
+            q2, p2, run.spare + 2 * size, step.r
+        )  # fmt: skip
+        here = take_step(memory, blocks, layout, stages, tip, short, True)
+        about = observe(memory, layout, tip, step.phase + tip.drive.omega * part, q2, p2)
+        energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, here.gq, here.qr)
+        energy = add_potential_energy(memory, size, layout.uneven, q2, energy)
+        instant = _Instant(times[done], q2, p2, about, energy)
+        _write(
+            memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums_with(accumulators, here)
+        )
+        sample, done = sample + 1, done + 1
+    outputs.marks[0] = done
+    # the slot for steps of any length holds the present step again, should it be a cut one
+    if step.at == cut_slot(run):
+        prepare(memory, layout, stages, run.struck.drive, step.length, step.at)
+    return sample
+
+
+@inlined
+def record_held(memory, blocks, layout, run, tip, now, step, accumulators, outputs):
+    """As :func:`record_instants`, of a step in which the tip carries a single mode."""
+    clock, sample, size, done = run.clock, now.sample, layout.size, outputs.marks[0]
+    times, q2, p2 = outputs.times, run.spare, run.spare + size
+    while done < times.size:
+        if times[done] > (now.t + step.ticks) * clock.tick and now.t + step.ticks < clock.end:
+            break
+        part = min(max(0.0, times[done] - now.t * clock.tick), step.length)
+        phase = step.phase + tip.drive.omega * part
+        _, work, _, dissipated, _ = held_for(memory, blocks, layout, run, tip, step.phase, part)
+        force, gq, qr = hold(memory, blocks, layout, tip, phase, q2, p2, run.spare + 2 * size)
+        energy = modal_energy(memory, layout, q2, p2) + tension_energy(layout.gamma, gq, qr)
+        energy = add_potential_energy(memory, size, layout.uneven, q2, energy)
+        so_far = _sums(accumulators)
+        sums = _Sums(
+            so_far.work + work,
+            so_far.dissipated + dissipated,
+            so_far.lost,
+            so_far.base,
+            so_far.load,
+            so_far.circuit,
+        )
+        instant = _Instant(times[done], q2, p2, _TOGETHER, energy)
+        _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, sums)
+        outputs.values[sample, 1] = force
+        sample, done = sample + 1, done + 1
+    outputs.marks[0] = done
+    return sample
+
+
+@inlined
+def record_aside(memory, layout, tip, now, short, here, when, about, sample, accumulators, outputs):
+    """Write down the end of a look ahead in contact; returns how many samples there are."""
+    if not outputs.in_contact:
+        return sample
+    energy = modal_energy(memory, layout, short.q1, short.p1) + tension_energy(layout.gamma, here.gq, here.qr)
+    energy = add_potential_energy(memory, layout.size, layout.uneven, short.q1, energy)
+    instant = _Instant(when, short.q1, short.p1, about, energy)
+    _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums_with(accumulators, here))
+    return sample + 1
+
+
+@inlined
+def record_contact(memory, layout, run, tip, now, step, done, seen1, sample, accumulators, outputs):
+    """Write down the end of a step in contact, of the first ones of each; returns how many samples there are."""
+    others, now_touching = layout.others, accumulators.touching != 0
+    if not outputs.in_contact or not any_touches(memory, others, step.touching or now_touching):
+        return sample
+    if not any_touches(memory, others, step.touching):
+        outputs.marks[2] = 0
+    when = (now.t + step.ticks) * run.clock.tick
+    if outputs.marks[2] >= _MOST_IN_CONTACT and any_touches(memory, others, now_touching):
+        return sample
+    outputs.marks[2] += 1
+    energy = modal_energy(memory, layout, step.q1, step.p1) + tension_energy(layout.gamma, done.gq, done.qr)
+    energy = add_potential_energy(memory, layout.size, layout.uneven, step.q1, energy)
+    instant = _Instant(when, step.q1, step.p1, seen1, energy)
+    _write(memory, layout, now.well_sign, tip.law, outputs, sample, instant, _sums(accumulators))
+    return sample + 1
+
+
+@compiled
+def save_state(now, marks, reals):
+    """Where a run stands, written down."""
+    rows, seen, control = now.rows, now.seen, now.control
+    marks[0], marks[1], marks[2], marks[3] = now.t, now.sample, now.landed, now.status
+    marks[4], marks[5], marks[6] = rows.q, rows.p, rows.k
+    marks[7], marks[8], marks[9] = rows.q1, rows.p1, rows.k1
+    marks[10], marks[11] = int(control.touching), int(control.quiet)
+    marks[12], marks[13], marks[14], marks[15] = (
+        control.safe_gap,
+        control.safe_center,
+        control.monitor_energy,
+        control.beat,
+    )
+    reals[0], reals[1] = now.well_sign, now.stretch
+    reals[2], reals[3], reals[4] = seen.w, seen.wv, seen.d
+    reals[5], reals[6], reals[7] = seen.dv, seen.c, seen.cv
+
+
+@compiled
+def restore_state(marks, reals):
+    """Where a run stood when it was laid aside."""
+    rows = Rows(marks[4], marks[5], marks[6], marks[7], marks[8], marks[9])
+    seen = ContactKinematics(reals[2], reals[3], reals[4], reals[5], reals[6], reals[7])
+    control = StepControl(marks[10] != 0, marks[11] != 0, marks[12], marks[13], marks[14], marks[15])
+    return IntegratorState(marks[0], reals[0], reals[1], rows, seen, control, marks[1], marks[2], marks[3])

@@ -1,0 +1,503 @@
+"""After a step of a run under Newton's law of impact: hits located, chatter that ends in sticking, release.
+
+One mode only.  A hit lasts no time: the relative velocity changes its sign and is multiplied by e.  Hits that follow
+each other ever faster (complete chatter) end in sticking: once the beam would leave the tip by less than can
+be seen, it is carried along, until the force that this takes would have to pull.  What comes after does not depend on
+when exactly the chatter ended, since a beam that is carried forgets how it arrived.
+
+Hits and releases are located on the trajectory itself, to the last bits, between two ticks; from there a free step
+of less than a tick leads to the next one.
+"""
+
+from __future__ import annotations
+
+import math
+
+from snapbeam.solver.compilation import compiled, inlined
+from snapbeam.solver.cpu.events import cut_step, detect_contact_event, monitor_energy, swap_rows
+from snapbeam.solver.cpu.recording import record_held, record_instants
+from snapbeam.solver.cpu.state import IntegratorState, StepControl, cut_slot, phase_at
+from snapbeam.solver.cpu.step import Step, observe, prepare, take_step
+from snapbeam.solver.cpu.sticking import PANELS, constraint_force, held_for, hold
+from snapbeam.solver.cpu.terms.second_well import about_level, at_center
+from snapbeam.solver.events import (
+    ContactKinematics,
+    accumulate_displacement,
+    close_impact,
+    contact_level,
+    count_zero_crossings_in_step,
+    ticks_of,
+)
+from snapbeam.solver.excitation import seen_from
+from snapbeam.solver.interpolation import cubic, first_upcrossing, root
+from snapbeam.solver.registered_statistics import observe as observe_extras
+from snapbeam.util.status_codes import RunStatus
+
+__all__ = ["accept_step_restitution", "carry"]
+
+
+# ----------------------------------------------------------------------------------------------------
+# A step in which the tip carries a single mode along, up to the release.
+
+
+_OK_CARRIED, _RUNNING_CARRIED = int(RunStatus.OK), int(RunStatus.INTERRUPTED)
+_BISECTIONS = 60
+
+
+@inlined
+def _release_between(memory, blocks, layout, run, tip, phase, low, high):
+    """Where between *low* (pushing) and *high* (pulling), s after *phase*, the force vanishes."""
+    omega = tip.drive.omega
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        if constraint_force(memory, blocks, layout, run, tip, phase + omega * middle) < 0.0:
+            high = middle
+        else:
+            low = middle
+    return low
+
+
+@compiled
+def _release(memory, blocks, layout, run, tip, phase, length):
+    """When within *length* the force first has to pull, s; negative if it does not.
+
+    The force is looked at in *PANELS* panels; where it dips between them, its least value is followed.
+    """
+    piece, omega = length / PANELS, tip.drive.omega
+    before = force = constraint_force(memory, blocks, layout, run, tip, phase)
+    if force < 0.0:
+        return 0.0
+    for i in range(1, PANELS + 1):
+        after = constraint_force(memory, blocks, layout, run, tip, phase + omega * (i * piece))
+        if after < 0.0:
+            return _release_between(memory, blocks, layout, run, tip, phase, (i - 1) * piece, i * piece)
+        if i > 1 and force < before and force <= after:
+            # the least of the parabola through the three
+            bend = before - 2.0 * force + after
+            if bend > 0.0:
+                at = (i - 1 + 0.5 * (before - after) / bend) * piece
+                if constraint_force(memory, blocks, layout, run, tip, phase + omega * at) < 0.0:
+                    return _release_between(memory, blocks, layout, run, tip, phase, (i - 2) * piece, at)
+        before, force = force, after
+    return -1.0
+
+
+@inlined
+def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators, kernel_input, outputs):
+    """Where a run stands after a step in which the tip carries the beam, up to the release if there is one.
+
+    Returns that and the step.
+    """
+    layout, clock, tick = workspace.layout, run.clock, run.clock.tick
+    rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
+    t, seen, control = now.t, now.seen, now.control
+    # however strongly it is stretched, a beam that is carried moves no faster than the tip
+    left = min((now.landed + 1) * clock.landing, clock.end) - t
+    ticks = min(ticks_of(clock, contact_level(clock, (t - accumulators.onset) * tick, 0.0, 0.0)), left)
+    ticks = max(1, ticks // 4)
+    length = ticks * tick
+    release = _release(memory, blocks, layout, run, tip, step.phase, length)
+    released = release >= 0.0
+    if released:
+        length = release
+        ticks = min(max(1, math.ceil(release / tick)), ticks)
+    impulse, work, gross, dissipated, peak = held_for(memory, blocks, layout, run, tip, step.phase, length)
+    step = Step(
+        ticks, step.at, length, step.phase, True, step.q, step.p, step.k, step.q1, step.p1, step.k1, step.r
+    )
+    there = step.phase + tip.drive.omega * length
+    sample = now.sample
+    if outputs is not None:
+        sample = record_held(memory, blocks, layout, run, tip, now, step, accumulators, outputs)
+    accumulators.impulse += impulse
+    accumulators.work += work
+    accumulators.gross_work += gross
+    accumulators.dissipated += dissipated
+    accumulators.deepest = max(accumulators.deepest, peak)
+    _, gq, qr = hold(memory, blocks, layout, tip, there, step.q1, step.p1, step.k1)
+    about = observe(memory, layout, tip, there, step.q1, step.p1)
+    seen1 = ContactKinematics(about.w + rest_contact, about.wv, 0.0, 0.0, about.c + rest_center, about.cv)
+    accumulate_displacement(accumulators, seen, seen1, length)
+    # a carried centre moves as the tip does, slowly enough for one cubic
+    count_zero_crossings_in_step(
+        accumulators, clock, t, length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1), scratch.looked,
+        at_center(layout.uneven, rest_center), 0, 0.0,
+    )  # fmt: skip
+    observe_extras(kernel_input.extras, accumulators, t * tick, length, seen, seen1, True)
+    t += ticks
+    status = _RUNNING_CARRIED if t < clock.end else _OK_CARRIED
+    rows, touching = swap_rows(now.rows), True
+    if released:
+        touching = False
+        after = (t - now.t) * tick - length
+        rest = Step(
+            0, cut_slot(run), after, there, False, step.q1, step.p1, step.k1,
+            step.q, step.p, step.k, step.r,
+        )  # fmt: skip
+        prepare(memory, layout, workspace.stages, run.struck.drive, after, rest.at)
+        done = take_step(memory, blocks, layout, workspace.stages, tip, rest, True)
+        gq, qr, rows = done.gq, done.qr, now.rows
+        accumulators.dissipated += done.dissipated
+        if outputs is None:
+            close_impact(accumulators, None, 0, tip.law, t, tick)
+        else:
+            close_impact(accumulators, outputs.impacts, outputs.marks[1], tip.law, t, tick)
+        about = observe(memory, layout, tip, phase_at(run, t), rows.q, rows.p)
+        d = min(about.d, 0.0)
+        seen1 = ContactKinematics(
+            about.w + rest_contact, about.wv, d, about.dv, about.c + rest_center, about.cv
+        )
+    kernel_output = StepControl(touching, control.quiet, t, t, control.monitor_energy, control.beat)
+    state = rows.q, rows.p, gq, qr
+    kernel_output, status = monitor_energy(
+        memory, layout, run, now, t, state, seen1, kernel_output, released, status, accumulators, kernel_input
+    )
+    return IntegratorState(
+        t, now.well_sign, 2.0 * gq + qr, rows, seen1, kernel_output, sample, now.landed, status
+    ), step
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_OK, _RUNNING, _DIVERGED = int(RunStatus.OK), int(RunStatus.INTERRUPTED), int(RunStatus.DIVERGED)
+_STEP_LIMIT = int(RunStatus.STEP_LIMIT)
+_LOCATIONS = 24
+"""Newton steps in which a hit is located, at most."""
+_NOISE = 1e-12
+"""Of the tip's speed: relative velocities that are rounding."""
+_SOON = 0.05
+"""Of the shortest period: how long the rest of a chatter may last to be taken as complete."""
+
+
+@inlined
+def apply_impact_law(memory, blocks, workspace, run, tip, p, seen, when, phase, accumulators, outputs):
+    """Newton's law; *p* is where the mode's velocity stands.  Returns whether the bodies stay together.
+
+    They do if the contact presses them together and what is left of the chatter, a geometric series of ever
+    shorter flights, is over soon and too low to be seen.
+    """
+    layout = workspace.layout
+    c, e = memory[layout.contact], tip.law.coefficient
+    speed = seen.wv + seen.dv
+    impulse = (1.0 + e) * seen.dv / (c * c)
+    memory[p] += c * impulse
+    accumulators.work += impulse * speed
+    accumulators.gross_work += abs(impulse * speed)
+    lost = 0.5 * (1.0 - e * e) * seen.dv * seen.dv / (c * c)
+    accumulators.dissipated += lost
+    accumulators.lost += lost
+    accumulators.total_impulse += impulse
+    if outputs is not None:
+        at = accumulators.impacts - outputs.marks[1]
+        if at < outputs.impacts.shape[0]:
+            outputs.impacts[at, 0] = when
+            outputs.impacts[at, 1] = 0.0
+            outputs.impacts[at, 2] = math.nan
+            outputs.impacts[at, 3] = impulse
+    accumulators.impacts += 1
+    spare, size = run.spare, layout.size
+    away = e * seen.dv
+    force, _, _ = hold(memory, blocks, layout, tip, phase, spare, spare + size, spare + 2 * size)
+    pressed = force * c * c
+    if not pressed > 0.0:
+        return False
+    height = 0.5 * away * away / pressed
+    if height <= run.lowest * 1e-4 or e == 0.0:
+        return True
+    if height > run.lowest or e >= 1.0:
+        return False
+    lasts = 2.0 * away / (pressed * (1.0 - e))
+    shortest = 2.0 * math.pi / max(memory[layout.omega], tip.drive.omega)
+    if lasts > _SOON * shortest:
+        return False
+    after = phase + tip.drive.omega * lasts
+    later, _, _ = hold(memory, blocks, layout, tip, after, spare, spare + size, spare + 2 * size)
+    return later > 0.0
+
+
+@inlined
+def _stuck(memory, workspace, run, seen, p, accumulators):
+    """What is left of the relative velocity after the last hit of a chatter is lost; begins the book of a contact."""
+    c = memory[workspace.layout.contact]
+    away = run.struck.law.coefficient * seen.dv
+    accumulators.impulse = -away / (c * c)
+    accumulators.work += accumulators.impulse * (seen.wv + seen.dv)
+    lost = 0.5 * away * away / (c * c)
+    accumulators.dissipated += lost
+    accumulators.lost += lost
+    accumulators.deepest = 0.0
+    accumulators.touching = 1
+
+
+@compiled
+def _rises(looked, pieces, piece, still, still_speed):
+    """When the penetration first becomes positive in a step that begins in touch; -1 if it does not.
+
+    As long as the gap is rounding (*still*) nothing has happened yet: the bodies part more slowly than can be seen.
+    """
+    i = 0
+    if abs(looked[0, 1]) <= still_speed:
+        while i < pieces and abs(looked[i + 1, 0]) <= still:
+            i += 1
+        if i < pieces and looked[i + 1, 0] > still:
+            return i * piece
+        i += 1
+    while i < pieces:
+        rise = _rise(min(looked[i, 0], 0.0), looked[i, 1], looked[i + 1, 0], looked[i + 1, 1], piece)
+        if rise >= 0.0:
+            return (i + rise) * piece
+        i += 1
+    return -1.0
+
+
+@inlined
+def _mend(looked, pieces, length, about):
+    """Bend what was seen inside a step to what is seen at its end.
+
+    It was seen by linear modes under a tension that changes evenly, and a hit of a beam that passes the tip by a
+    billionth of b is one all the same.  The bend is the cubic that begins with neither value nor slope.
+    """
+    off, slope = about.d - looked[pieces, 0], (about.dv - looked[pieces, 1]) * length
+    for i in range(1, pieces + 1):
+        u = i / pieces
+        looked[i, 0] += u * u * (off * (3.0 - 2.0 * u) + slope * (u - 1.0))
+        looked[i, 1] += u * (off * 6.0 * (1.0 - u) + slope * (3.0 * u - 2.0)) / length
+
+
+@inlined
+def _turns(u0, v0, u1, v1, h):
+    """Where in [0, 1] the cubic has its least and its greatest value between two falls; -1 and -1 if it only falls."""
+    _, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
+    inside = c2 * c2 - 3.0 * c1 * c3
+    if not (c3 < 0.0 and inside > 0.0):
+        return -1.0, -1.0
+    root_of = math.sqrt(inside)
+    # without differences of what is alike
+    bottom = c1 / (-c2 - root_of) if c2 > 0.0 else (c2 - root_of) / (-3.0 * c3)
+    return bottom, (c2 + root_of) / (-3.0 * c3)
+
+
+@compiled
+def _rise(u0, v0, u1, v1, h):
+    """As first_rise, and where the signal falls at both ends and has risen between them."""
+    rise = first_upcrossing(u0, v0, u1, v1, h)
+    if rise >= 0.0 or v0 > 0.0 or v1 > 0.0:
+        return rise
+    bottom, top = _turns(u0, v0, u1, v1, h)
+    if not (0.0 <= bottom < top < 1.0):
+        return -1.0
+    c0, c1, c2, c3 = cubic(u0, v0, u1, v1, h)
+    if ((c3 * top + c2) * top + c1) * top + c0 <= 0.0:
+        return -1.0
+    return root(c0, c1, c2, c3, bottom, top)
+
+
+@compiled
+def _entry(looked, pieces, piece):
+    """When the penetration first becomes positive; -1 if it does not."""
+    for i in range(pieces):
+        rise = _rise(looked[i, 0], looked[i, 1], looked[i + 1, 0], looked[i + 1, 1], piece)
+        if rise >= 0.0:
+            return (i + rise) * piece
+    return -1.0
+
+
+@compiled
+def _top(looked, pieces, piece, entry):
+    """When the penetration is greatest first after *entry*; the end of the step if it only grows."""
+    for i in range(min(int(entry / piece), pieces - 1), pieces):
+        v0, v1 = looked[i, 1], looked[i + 1, 1]
+        if v1 < 0.0:
+            if v0 > 0.0:
+                return (i + v0 / (v0 - v1)) * piece
+            _, top = _turns(looked[i, 0], v0, looked[i + 1, 0], v1, piece)
+            if (i + top) * piece > entry:
+                return (i + top) * piece
+    return pieces * piece
+
+
+@inlined
+def _cut_at(memory, blocks, workspace, run, tip, step, length):
+    """A step cut to *length*; what it gave, and what is seen there."""
+    cut = cut_step(step, run, 0, length)
+    prepare(memory, workspace.layout, workspace.stages, run.struck.drive, cut.length, cut.at)
+    done = take_step(memory, blocks, workspace.layout, workspace.stages, tip, cut, True)
+    phase = step.phase + tip.drive.omega * cut.length
+    return cut, done, observe(memory, workspace.layout, tip, phase, step.q1, step.p1)
+
+
+@inlined
+def _located(memory, blocks, workspace, run, tip, step, entry, top, at_end, still_speed):
+    """The step cut at the hit itself, by Newton's method on the trajectory; what it gave, and what is seen there.
+
+    *top* is where the penetration is greatest if it falls again within the step, *at_end* that at the end of the
+    whole step.  The last value says whether there is a hit at all: whether the bodies meet within the step, and do not
+    merely graze.
+    """
+    before, low, high = math.inf, 0.0, step.length
+    if at_end < 0.0 and top < step.length:
+        cut, done, about = _cut_at(memory, blocks, workspace, run, tip, step, top)
+        if about.d <= 0.0:
+            return cut, done, about, False
+        high, at_end = top, about.d
+    cut, done, about = _cut_at(memory, blocks, workspace, run, tip, step, entry)
+    for _ in range(_LOCATIONS):
+        if about.dv <= still_speed and not (at_end > 0.0 and about.d > 0.0):
+            break
+        change = -about.d / about.dv if about.dv > still_speed else -math.inf
+        if abs(change) >= 0.5 * before and before < math.inf:
+            break
+        wanted = cut.length + change
+        if about.d < 0.0:
+            low = cut.length
+        else:
+            high = cut.length
+        if wanted >= high and at_end < 0.0:
+            return cut, done, about, False  # they meet in the next step
+        if wanted < low or wanted > high:
+            # the way is bent: halve what is known to hold the hit
+            if high - low <= 4e-16 * step.length:
+                break
+            wanted, change = 0.5 * (low + high), math.inf
+        before = abs(change)
+        cut, done, about = _cut_at(memory, blocks, workspace, run, tip, step, wanted)
+    return cut, done, about, about.dv > still_speed
+
+
+@inlined
+def _moved_on(memory, blocks, workspace, run, tip, step, q, p, k, after, phase, together):
+    """From a hit or a release to the next tick, into the rows that the step began from; returns g.q and q.Gq."""
+    layout, stages = workspace.layout, workspace.stages
+    if together:
+        there = phase + tip.drive.omega * after
+        _, gq, qr = hold(memory, blocks, layout, tip, there, step.q, step.p, step.k)
+        return gq, qr
+    rest = Step(0, cut_slot(run), after, phase, False, q, p, k, step.q, step.p, step.k, step.r)
+    prepare(memory, layout, stages, run.struck.drive, after, rest.at)
+    done = take_step(memory, blocks, layout, stages, tip, rest, True)
+    return done.gq, done.qr
+
+
+@inlined
+def accept_step_restitution(
+    memory, blocks, workspace, run, now, step, done, scratch, accumulators, kernel_input, outputs
+):
+    """As :func:`snapbeam.solver.cpu.events.accept_step`, of a run whose impacts last no time."""
+    layout, clock, tick = workspace.layout, run.clock, run.clock.tick
+    tip = seen_from(run.struck, now.well_sign, run.rest_contact)
+    rest_contact, rest_center = now.well_sign * run.rest_contact, now.well_sign * run.rest_center
+    t, seen, control = now.t, now.seen, now.control
+    if control.touching:
+        return carry(
+            memory, blocks, workspace, run, tip, now, step, scratch, accumulators, kernel_input, outputs
+        )
+    still_speed = _NOISE * (run.tip_speed + abs(seen.wv))
+    if seen.d >= 0.0 and seen.dv > still_speed:
+        # in touch and closing before any step
+        q, p, k = now.rows.q, now.rows.p, now.rows.k
+        together = apply_impact_law(
+            memory, blocks, workspace, run, tip, p, seen, t * tick, step.phase, accumulators, outputs
+        )
+        if together:
+            _stuck(memory, workspace, run, seen, p, accumulators)
+            accumulators.onset = t
+            hold(memory, blocks, layout, tip, step.phase, q, p, k)
+        status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
+        away = 0.0 if together else tip.law.coefficient * seen.dv
+        wv = seen.wv + seen.dv + away
+        kernel_output = StepControl(together, False, t, t, control.monitor_energy, control.beat)
+        after = ContactKinematics(seen.w, wv, 0.0, -away, seen.c, memory_rate(memory, layout, p))
+        return IntegratorState(
+            t, now.well_sign, now.stretch, now.rows, after, kernel_output, now.sample, now.landed, status
+        ), step
+
+    about = observe(memory, layout, tip, step.phase + tip.drive.omega * step.length, step.q1, step.p1)
+    if not math.isfinite(about.d + about.dv):
+        return (
+            IntegratorState(
+                t, now.well_sign, now.stretch, now.rows, seen, control, now.sample, now.landed, _DIVERGED
+            ),
+            step,
+        )
+    contact_event = detect_contact_event(memory, layout, run, now, tip, step, about, scratch)
+    entry = contact_event.entry
+    if contact_event.pieces > 0:
+        _mend(scratch.looked, contact_event.pieces, step.length, about)
+        if t + step.ticks > contact_event.safe_gap:
+            entry = _entry(scratch.looked, contact_event.pieces, contact_event.piece)
+    if seen.d > -still_speed * run.step_time and contact_event.pieces > 0:
+        still = still_speed * run.step_time
+        entry = _rises(scratch.looked, contact_event.pieces, contact_event.piece, still, still_speed)
+    hit, ticks = False, step.ticks
+    if entry >= 0.0:
+        top = _top(scratch.looked, contact_event.pieces, contact_event.piece, entry)
+        located, done, about, hit = _located(
+            memory, blocks, workspace, run, tip, step, entry, top, about.d, still_speed
+        )
+        ticks = min(max(1, math.ceil(located.length / tick)), step.ticks)
+        if hit:
+            step = Step(
+                ticks, located.at, located.length, step.phase, False, step.q, step.p, step.k, step.q1, step.p1,
+                step.k1, step.r,
+            )  # fmt: skip
+        else:
+            step = cut_step(step, run, ticks, ticks * tick)
+            prepare(memory, layout, workspace.stages, run.struck.drive, step.length, step.at)
+            done = take_step(memory, blocks, layout, workspace.stages, tip, step, True)
+            about = observe(memory, layout, tip, step.phase + tip.drive.omega * step.length, step.q1, step.p1)
+    seen1 = ContactKinematics(
+        about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv
+    )
+    sample = now.sample
+    if outputs is not None:
+        sample = record_instants(
+            memory, blocks, layout, workspace.stages, run, tip, now, step, accumulators, outputs
+        )
+    accumulators.dissipated += done.dissipated
+    accumulate_displacement(accumulators, seen, seen1, step.length)
+    if hit or t + step.ticks > contact_event.safe_center:
+        count_zero_crossings_in_step(
+            accumulators, clock, t, step.length, about_level(layout.uneven, seen), about_level(layout.uneven, seen1),
+            scratch.looked, at_center(layout.uneven, rest_center), contact_event.pieces, contact_event.piece,
+        )  # fmt: skip
+    observe_extras(kernel_input.extras, accumulators, t * tick, step.length, seen, seen1, False)
+
+    t += step.ticks
+    status = _RUNNING if t < clock.end else _OK
+    rows, gq, qr, together = swap_rows(now.rows), done.gq, done.qr, False
+    if hit:
+        when, phase = now.t * tick + step.length, step.phase + tip.drive.omega * step.length
+        together = apply_impact_law(
+            memory, blocks, workspace, run, tip, step.p1, seen1, when, phase, accumulators, outputs
+        )
+        if together:
+            _stuck(memory, workspace, run, seen1, step.p1, accumulators)
+            accumulators.onset = t
+        gq, qr = _moved_on(
+            memory, blocks, workspace, run, tip, step, step.q1, step.p1, step.k1,
+            (t - now.t) * tick - step.length, phase, together,
+        )  # fmt: skip
+        rows = now.rows
+        about = observe(memory, layout, tip, phase_at(run, t), rows.q, rows.p)
+        d, dv = (0.0, 0.0) if together else (min(about.d, 0.0), about.dv)
+        seen1 = ContactKinematics(about.w + rest_contact, about.wv, d, dv, about.c + rest_center, about.cv)
+    safe_gap, safe_center = (t, t) if entry >= 0.0 else (contact_event.safe_gap, contact_event.safe_center)
+    kernel_output = StepControl(
+        together, control.quiet, safe_gap, safe_center, control.monitor_energy, control.beat
+    )
+    state = rows.q, rows.p, gq, qr
+    kernel_output, status = monitor_energy(
+        memory, layout, run, now, t, state, seen1, kernel_output, hit, status, accumulators, kernel_input
+    )
+    return IntegratorState(
+        t, now.well_sign, 2.0 * gq + qr, rows, seen1, kernel_output, sample, now.landed, status
+    ), step
+
+
+@inlined
+def memory_rate(memory, layout, p):
+    """Rate of the centre of a single mode."""
+    return memory[layout.center] * memory[p]

@@ -1,0 +1,544 @@
+"""The next step of every lane, and the flows that it needs."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from snapbeam.solver.compilation import compiled, inlined
+from snapbeam.solver.cpu.run_lanes import layout as at
+from snapbeam.solver.cpu.run_lanes.state import TWO_PI, flows_over, prepare, slot_of
+from snapbeam.solver.cpu.run_lanes.step import (
+    at_hand,
+    beam_energy,
+    bounds,
+    modal_energy,
+    modes_of,
+    propagate_free,
+    tension,
+)
+from snapbeam.solver.events import (
+    GRADING,
+    RELEASE,
+    STRETCHED,
+    ContactKinematics,
+    clock_of,
+    close_impact,
+    count_zero_crossings_in_step,
+    first_contact_onset,
+    low_energy_limit,
+    refine_onset,
+    safe_interval,
+)
+from snapbeam.solver.excitation import numbers_of
+from snapbeam.solver.interpolation import (
+    first_downcrossing,
+    hermite_overshoot_bound,
+    turning_point,
+    update_extrema,
+)
+from snapbeam.solver.physics import sincos, tension_energy
+from snapbeam.solver.simd import (
+    WIDTH,
+    bits,
+    broadcast_load,
+    halvings,
+    less,
+    load,
+    lowest,
+    mask_of,
+    pick,
+    power_of_two,
+    splat,
+    store,
+    vabs,
+    vfloor,
+    vmax,
+    vmin,
+    vtrunc,
+)
+
+__all__ = ["About", "accept", "cut_again", "end_contact", "fetch", "look_at", "meet", "probe", "propose_step"]
+
+
+_CUSTOM = -99.0
+"""Key of flows that were made for a step of any length."""
+
+
+@compiled
+def _change_wells(m, shape, world, which):
+    """Take the other well as the origin, in some lanes."""
+    well_sign, mask = load(m, at.HOME), mask_of(which)
+    for i in range(modes_of(shape)):
+        mode = at.MODE + i * at.MODE_ROWS
+        q, well = load(m, mode + at.Q), load(m, mode + at.SEEN_WELL)
+        store(m, mode + at.Q, pick(mask, q - well_sign * broadcast_load(m, mode + at.SHIFT), q))
+        store(m, mode + at.SEEN_WELL, pick(mask, 0.0 - well, well))
+    store(m, at.HOME, pick(mask, 0.0 - well_sign, well_sign))
+    gq, qr = tension(m, shape, world.gamma, mask, at.Q)
+    store(m, at.STRETCH, pick(mask, 2.0 * gq + qr, load(m, at.STRETCH)))
+
+
+@inlined
+def _flight(m, n, world):
+    """Halvings of the flight step in free flight, or -1."""
+    level = splat(0.0)
+    if world.stretch > 0.0:
+        far = halvings(vabs(load(m, at.STRETCH)), splat(STRETCHED * world.stretch))
+        level = vmin(vmax(far, level), load(m, at.FINEST))
+    return pick(mask_of(n[at.QUIET]), splat(-1.0), level)
+
+
+@inlined
+def _in_contact(m, level, touching):
+    """The same of the lanes in contact: graded from the onset and towards the release."""
+    dv = load(m, at.DV)
+    want = GRADING * ((load(m, at.T) - load(m, at.ONSET)) * load(m, at.TICK))
+    left = -RELEASE * load(m, at.D) / dv
+    want = vmax(pick(less(dv, 0.0), vmin(want, left), want), splat(0.0))
+    graded = vmax(halvings(load(m, at.STEP_TIME), want), load(m, at.COARSEST))
+    return pick(mask_of(touching), vmax(level, vmin(graded, load(m, at.FINEST))), level)
+
+
+@inlined
+def propose_step(m, n, shape, world):
+    """The length of the next step of every lane that begins one; returns those."""
+    fresh = n[at.LIVE] & ~(n[at.CUTTING] | n[at.ASIDE] | n[at.PROBED])
+    if world.stretch > 0.0:
+        across = load(m, at.C) * (load(m, at.HOME) * load(m, at.REST_CENTER))
+        crossed = bits(less(across, 0.0)) & fresh
+        if crossed:
+            _change_wells(m, shape, world, crossed)
+    which = mask_of(fresh)
+    one = pick(which, splat(1.0), splat(0.0))
+    store(m, at.STEPS, load(m, at.STEPS) + one)
+    store(m, at.BEAT, load(m, at.BEAT) + one)
+    level = _flight(m, n, world)
+    if n[at.TOUCHING] & fresh:
+        level = _in_contact(m, level, n[at.TOUCHING] & fresh)
+    ticks = load(m, at.STEP) * power_of_two(0.0 - level)
+    t, limit = load(m, at.T), load(m, at.LIMIT)
+    over = bits(less(limit, t + ticks)) & fresh
+    ticks = pick(mask_of(over), limit - t, ticks)
+    n[at.ODD] = (n[at.ODD] & ~fresh) | over
+    ticks = pick(which, ticks, load(m, at.TICKS))
+    store(m, at.TICKS, ticks)
+    store(m, at.LEVEL, pick(which, level, load(m, at.LEVEL)))
+    store(m, at.LENGTH, pick(mask_of(n[at.ASIDE]), load(m, at.LENGTH), ticks * load(m, at.TICK)))
+    phase = load(m, at.PHASE0) + TWO_PI * (load(m, at.WITHIN) / load(m, at.PERIOD))
+    sine, cosine = sincos(phase)
+    store(m, at.PHASE, phase)
+    store(m, at.SINE, sine)
+    store(m, at.COSINE, cosine)
+    return fresh
+
+
+@compiled
+def _make(m, shape, world, odd):
+    """Prepare steps of any length, and have them at hand."""
+    while odd:
+        lane = lowest(odd)
+        odd &= odd - 1
+        place = slot_of(world, lane, at.LEVELS - 1)
+        prepare(m, shape, world, place, m[at.LENGTH + lane], m[at.OMEGA + lane])
+        at_hand(m, shape, place, lane)
+        m[at.KEY + lane] = _CUSTOM
+
+
+@inlined
+def fetch(m, n, shape, world):
+    """Have the flows of every lane's step at hand."""
+    odd = (n[at.ODD] | n[at.ASIDE]) & n[at.LIVE]
+    level, key = load(m, at.LEVEL), load(m, at.KEY)
+    other = (bits(less(level, key)) | bits(less(key, level))) & n[at.LIVE] & ~odd
+    while other:
+        lane = lowest(other)
+        other &= other - 1
+        at_hand(m, shape, slot_of(world, lane, int(m[at.LEVEL + lane])), lane)
+        m[at.KEY + lane] = m[at.LEVEL + lane]
+    if odd:
+        _make(m, shape, world, odd)
+
+
+# ----------------------------------------------------------------------------------------------------
+# After a step of every lane: which enter or leave the contact in it, and where such steps are cut.
+
+
+class About(NamedTuple):
+    """What is seen at the ends of the steps, eight of each: beam at striker and centre from rest, the penetration."""
+
+    w: Any
+    wv: Any
+    d: Any
+    dv: Any
+    c: Any
+    cv: Any
+
+
+@compiled
+def look_at(m, look, lane, looked):
+    """What was seen inside the step of a lane, as the scalar functions have it; returns how many pieces."""
+    pieces = int(m[at.LOOK_PIECES + lane])
+    for i in range(pieces + 1):
+        for j in range(4):
+            looked[i, j] = m[look + (4 * i + j) * WIDTH + lane]
+    return pieces
+
+
+@inlined
+def _safe(m, shape, late, early_center):
+    """Until when the gap cannot close, and the centre cannot cross, in lanes where that has passed."""
+    bound, push, center_bound, center_push = bounds(m, shape)
+    t, tick, step_time = load(m, at.T), load(m, at.TICK), load(m, at.STEP_TIME)
+    zero = splat(0.0)
+    gap = safe_interval(zero - load(m, at.D), bound, load(m, at.TIP_SPEED), push, step_time)
+    store(m, at.SAFE_GAP, pick(mask_of(late), t + vtrunc(gap / tick), load(m, at.SAFE_GAP)))
+    center = safe_interval(vabs(load(m, at.C)), center_bound, zero, center_push, step_time)
+    store(m, at.SAFE_CENTER, pick(mask_of(early_center), t + vtrunc(center / tick), load(m, at.SAFE_CENTER)))
+
+
+@inlined
+def _look(m, shape, world, lookers, with_center):
+    """Look into the free steps of some lanes; returns where the penetration may have been positive."""
+    which, ticks, step = mask_of(lookers), load(m, at.TICKS), load(m, at.STEP)
+    length, pieces = load(m, at.LENGTH), load(m, at.PIECES)
+    single = ~(bits(less(ticks, step)) | bits(less(step, ticks)))
+    double = ~(bits(less(ticks, 2.0 * step)) | bits(less(2.0 * step, ticks)))
+    usual = single | double
+    other = vmax(splat(2.0), 0.0 - vfloor(0.0 - length / load(m, at.FINEST_LOOK)))
+    pieces = pick(mask_of(double), 2.0 * pieces, pieces)
+    pieces = pick(mask_of(usual), pieces, other)
+    store(m, at.LOOK_PIECES, pick(which, pieces, load(m, at.LOOK_PIECES)))
+    store(m, at.LOOK_PIECE, pick(which, length / pieces, load(m, at.LOOK_PIECE)))
+    key, had = pick(mask_of(usual), splat(0.0), ticks), load(m, at.LOOK_KEY)
+    stale = (bits(less(key, had)) | bits(less(had, key))) & lookers
+    if stale:
+        flows_over(m, shape, load(m, at.LOOK_PIECE), at.LOOK, mask_of(stale))
+        store(m, at.LOOK_KEY, pick(mask_of(stale), key, had))
+    most, left = 0, lookers
+    while left:
+        most = max(most, int(m[at.LOOK_PIECES + lowest(left)]))
+        left &= left - 1
+    return bits(less(0.0, propagate_free(m, shape, world.look, which, with_center, most)))
+
+
+@inlined
+def _cut(m, n, lane, cut):
+    """End the step of a lane after *cut* ticks, in another pass."""
+    bit = 1 << lane
+    n[at.CUTTING] |= bit
+    n[at.ODD] |= bit
+    m[at.WHOLE + lane] = m[at.TICKS + lane]
+    m[at.TICKS + lane] = cut
+
+
+@compiled
+def _leave(m, n, about_d, about_dv, leaving):
+    """Cut the steps in which the penetration falls below zero; returns the lanes whose steps end there as they are."""
+    store(m, at.TEMP, about_d)
+    store(m, at.TEMP1, about_dv)
+    whole = 0
+    while leaving:
+        lane = lowest(leaving)
+        leaving &= leaving - 1
+        n[at.EVENT] |= 1 << lane
+        ticks, d = int(m[at.TICKS + lane]), m[at.D + lane]
+        cut = ticks
+        if d > 0.0:
+            fall = first_downcrossing(
+                d, m[at.DV + lane], m[at.TEMP + lane], m[at.TEMP1 + lane], m[at.LENGTH + lane]
+            )
+            cut = max(1, int(fall * ticks))
+        if cut != ticks:
+            _cut(m, n, lane, cut)
+        else:
+            whole |= 1 << lane
+    return whole
+
+
+@compiled
+def _enter(m, n, look, rising, looked):
+    """Cut the steps in which the gap closes; returns those that end as they are, and those that touch at once."""
+    on, at_once = 0, 0
+    while rising:
+        lane = lowest(rising)
+        rising &= rising - 1
+        bit = 1 << lane
+        pieces = look_at(m, look, lane, looked)
+        entry = first_contact_onset(looked, pieces, m[at.LOOK_PIECE + lane])
+        if entry < 0.0:
+            on |= bit
+            continue
+        ticks = int(m[at.TICKS + lane])
+        cut = min(ticks, int(entry / m[at.TICK + lane]))
+        if cut < 1:
+            at_once |= bit
+            continue
+        n[at.EVENT] |= bit
+        if cut != ticks:
+            n[at.LOOKS] |= bit
+            _cut(m, n, lane, cut)
+        else:
+            on |= bit
+    return on, at_once
+
+
+@inlined
+def meet(m, n, shape, world, about, whole, looked):
+    """What the steps of the lanes *whole* meet; returns those that end as they are, and those that touch at once."""
+    if whole == 0:
+        return 0, 0
+    touching = whole & n[at.TOUCHING]
+    free = whole & ~touching
+    ends, at_once = whole, 0
+    if touching:
+        leaving = touching & ~bits(less(0.0, about.d))
+        if leaving:
+            ends = (ends & ~leaving) | _leave(m, n, about.d, about.dv, leaving)
+    if free:
+        after = load(m, at.T) + load(m, at.TICKS)
+        late, early = bits(less(load(m, at.SAFE_GAP), after)), bits(less(load(m, at.SAFE_CENTER), after))
+        if (late | early) & free:
+            _safe(m, shape, late & free, early & free)
+            late = bits(less(load(m, at.SAFE_GAP), after)) & free
+            early = bits(less(load(m, at.SAFE_CENTER), after)) & free
+            if late | early:
+                rising = _look(m, shape, world, late | early, early != 0) & late
+                if rising:
+                    on, at_once = _enter(m, n, world.look, rising, looked)
+                    ends = (ends & ~rising) | on
+    return ends, at_once
+
+
+@compiled
+def cut_again(m, n, kernel_input, d, dv, which):
+    """Cut the steps of lanes once more that enter the contact, where they did not meet it; returns those that do."""
+    store(m, at.TEMP, d)
+    store(m, at.TEMP1, dv)
+    again = 0
+    while which:
+        lane = lowest(which)
+        which &= which - 1
+        n[at.LOOKS] &= ~(1 << lane)
+        clock = clock_of(kernel_input.runs[n[at.RUNS + lane]], kernel_input.max_steps)
+        seen = ContactKinematics(0.0, 0.0, m[at.TEMP + lane], m[at.TEMP1 + lane], 0.0, 0.0)
+        least = (clock.step >> clock.finest) * clock.tick
+        ticks = int(m[at.TICKS + lane])
+        cut = refine_onset(clock, ticks, int(m[at.WHOLE + lane]), seen, least)
+        if cut != ticks:
+            m[at.TICKS + lane] = cut
+            again |= 1 << lane
+    return again
+
+
+@compiled
+def probe(m, n, d, dv, turning):
+    """Lanes whose contact is deepest inside the step at hand: a pass of theirs goes there first; returns those."""
+    store(m, at.TEMP, d)
+    store(m, at.TEMP1, dv)
+    found = 0
+    while turning:
+        lane = lowest(turning)
+        turning &= turning - 1
+        d0, v0, d1, v1 = m[at.D + lane], m[at.DV + lane], m[at.TEMP + lane], m[at.TEMP1 + lane]
+        length, deepest = m[at.LENGTH + lane], max(m[at.DEEPEST + lane], m[at.TEMP + lane])
+        turn = turning_point(d0, v0, d1, v1, length)
+        if turn > 0.0 and update_extrema(d0, deepest, d0, v0, d1, v1, length)[1] > deepest:
+            m[at.DEEPEST + lane] = deepest
+            m[at.LENGTH + lane] = turn * length
+            n[at.ASIDE] |= 1 << lane
+            found |= 1 << lane
+    return found
+
+
+# ----------------------------------------------------------------------------------------------------
+# Steps that are taken: statistics, contacts that begin and end, energy, and where every lane stands then.
+
+
+@compiled
+def _widen(m, low, high, u0, v0, which):
+    """Widen the extremes of some lanes by cubics that pass their ends; those are at the end of the step in TEMP."""
+    while which:
+        lane = lowest(which)
+        which &= which - 1
+        m[low + lane], m[high + lane] = update_extrema(
+            m[low + lane], m[high + lane], m[u0 + lane], m[v0 + lane],
+            m[at.TEMP + lane], m[at.TEMP1 + lane], m[at.LENGTH + lane],
+        )  # fmt: skip
+
+
+@inlined
+def _extremes(m, low, high, u0, v0, u1, v1, length, which):
+    before, rate = load(m, u0), load(m, v0)
+    lesser, greater = vmin(before, u1), vmax(before, u1)
+    swell = hermite_overshoot_bound(rate, v1, length)
+    least, most = load(m, low), load(m, high)
+    past = (bits(less(most, greater + swell)) | bits(less(lesser - swell, least))) & which
+    turning = bits(less(rate * v1, 0.0)) & past
+    mask = mask_of(which & ~turning)
+    store(m, low, pick(mask, vmin(least, lesser), least))
+    store(m, high, pick(mask, vmax(most, greater), most))
+    if turning:
+        store(m, at.TEMP, u1)
+        store(m, at.TEMP1, v1)
+        _widen(m, low, high, u0, v0, turning)
+
+
+@inlined
+def _add(m, row, which, more):
+    store(m, row, load(m, row) + pick(which, more, splat(0.0)))
+
+
+@inlined
+def _track(m, seen1, length, which):
+    """Extremes and mean squares, as :func:`~snapbeam.solver.events.accumulate_displacement` keeps them."""
+    _extremes(m, at.MIN_W, at.MAX_W, at.W, at.WV, seen1.w, seen1.wv, length, which)
+    _extremes(m, at.MIN_C, at.MAX_C, at.C, at.CV, seen1.c, seen1.cv, length, which)
+    mask, half = mask_of(which), 0.5 * length
+    peak, center_peak = load(m, at.PEAK_WV), load(m, at.PEAK_CV)
+    store(m, at.PEAK_WV, pick(mask, vmax(peak, vabs(seen1.wv)), peak))
+    store(m, at.PEAK_CV, pick(mask, vmax(center_peak, vabs(seen1.cv)), center_peak))
+    w, wv, c, cv = load(m, at.W), load(m, at.WV), load(m, at.C), load(m, at.CV)
+    _add(m, at.SQUARE_W, mask, half * (w * w + seen1.w * seen1.w))
+    _add(m, at.SQUARE_C, mask, half * (c * c + seen1.c * seen1.c))
+    _add(m, at.SQUARE_WV, mask, half * (wv * wv + seen1.wv * seen1.wv))
+    _add(m, at.SQUARE_CV, mask, half * (cv * cv + seen1.cv * seen1.cv))
+
+
+@compiled
+def _count(m, n, world, kernel_input, accumulators_of_runs, c1, cv1, which, looked):
+    """Count the crossings of the centre in the steps of some lanes."""
+    store(m, at.TEMP, c1)
+    store(m, at.TEMP1, cv1)
+    while which:
+        lane = lowest(which)
+        which &= which - 1
+        i = n[at.RUNS + lane]
+        accumulators, clock = accumulators_of_runs[i], clock_of(kernel_input.runs[i], kernel_input.max_steps)
+        pieces = 0
+        if not n[at.TOUCHING] & (1 << lane):
+            pieces = look_at(m, world.look, lane, looked)
+        seen = ContactKinematics(0.0, 0.0, 0.0, 0.0, m[at.C + lane], m[at.CV + lane])
+        seen1 = ContactKinematics(0.0, 0.0, 0.0, 0.0, m[at.TEMP + lane], m[at.TEMP1 + lane])
+        rest = m[at.HOME + lane] * m[at.REST_CENTER + lane]
+        start, length, piece = int(m[at.T + lane]), m[at.LENGTH + lane], m[at.LOOK_PIECE + lane]
+        count_zero_crossings_in_step(
+            accumulators, clock, start, length, seen, seen1, looked, rest, pieces, piece
+        )
+        m[at.SIDE + lane], m[at.LATE + lane] = accumulators.side, accumulators.zero_crossings_last_quarter
+
+
+@inlined
+def _crossings(m, n, world, kernel_input, accumulators_of_runs, seen1, length, after, which, looked):
+    """Where the centre may have crossed, have it counted."""
+    touching = which & n[at.TOUCHING]
+    near = bits(less(load(m, at.SAFE_CENTER), after)) & which & ~touching
+    if touching:
+        side = load(m, at.SIDE)
+        clear = vmin(side * load(m, at.C), side * seen1.c)
+        near |= touching & ~bits(less(hermite_overshoot_bound(load(m, at.CV), seen1.cv, length), clear))
+    if near:
+        _count(m, n, world, kernel_input, accumulators_of_runs, seen1.c, seen1.cv, near, looked)
+
+
+@inlined
+def end_contact(m, kernel_input, i, lane, accumulators, end):
+    """Enter the contact that ends at tick *end* in the book."""
+    law = numbers_of(kernel_input.law, kernel_input.law_numbers, i)
+    accumulators.deepest, accumulators.impulse = m[at.DEEPEST + lane], m[at.IMPULSE + lane]
+    close_impact(accumulators, None, 0, law, end, m[at.TICK + lane])
+    m[at.DEEPEST + lane] = m[at.IMPULSE + lane] = 0.0
+
+
+@compiled
+def _events(m, n, kernel_input, accumulators_of_runs, which):
+    """Contacts that begin and end where their lanes stand now."""
+    n[at.TOUCHING] ^= which
+    while which:
+        lane = lowest(which)
+        which &= which - 1
+        i, t = n[at.RUNS + lane], int(m[at.T + lane])
+        accumulators = accumulators_of_runs[i]
+        m[at.SAFE_GAP + lane] = m[at.SAFE_CENTER + lane] = m[at.T + lane]
+        if n[at.TOUCHING] & (1 << lane):
+            accumulators.touching, accumulators.onset = 1, t
+            m[at.ONSET + lane] = m[at.T + lane]
+        else:
+            end_contact(m, kernel_input, i, lane, accumulators, t)
+
+
+@inlined
+def _weigh(m, n, shape, world, seen1, released, events, which):
+    """After some steps, or a release, look at the energy; returns the lanes whose future is certain."""
+    beat = load(m, at.BEAT)
+    eighth = bits(less(beat - 8.0 * vfloor(0.125 * beat), 0.5))
+    due = (released | eighth) & which
+    if due == 0:
+        return 0
+    mask, t = mask_of(due), load(m, at.T)
+    linear, high = modal_energy(m, shape, at.Q1, at.P1)
+    span = (t - load(m, at.WEIGHED)) * load(m, at.TICK)
+    _add(m, at.ENERGY_TIME, mask, beam_energy(m, shape, linear) * span)
+    _add(m, at.HIGH_TIME, mask, high * span)
+    store(m, at.WEIGHED, pick(mask, t, load(m, at.WEIGHED)))
+    apart = due & ~n[at.TOUCHING]
+    energy = linear + tension_energy(world.gamma, load(m, at.GQ), load(m, at.QR))
+    quiet = bits(less(energy, low_energy_limit(world.gamma, world.stretch)))
+    n[at.QUIET] = (n[at.QUIET] & ~apart) | (quiet & apart)
+    sixteenth = bits(less(beat - 16.0 * vfloor(0.0625 * beat), 0.5))
+    sure = apart & ~events & sixteenth & bits(less(load(m, at.HOME), 0.0))
+    if sure:
+        sure &= bits(less(load(m, at.DECIDE_REACH), seen1.w)) & bits(less(0.0, seen1.c))
+        sure &= bits(less(energy, load(m, at.DECIDE_ENERGY)))
+    return sure
+
+
+@inlined
+def accept(m, n, shape, world, kernel_input, accumulators_of_runs, about, given, which, looked):
+    """Take the steps of the lanes *which*; returns those that are decided."""
+    mask, length = mask_of(which), load(m, at.LENGTH)
+    well_sign = load(m, at.HOME)
+    seen1 = ContactKinematics(
+        about.w + well_sign * load(m, at.REST_CONTACT), about.wv, about.d, about.dv,
+        about.c + well_sign * load(m, at.REST_CENTER), about.cv,
+    )  # fmt: skip
+    touching = which & n[at.TOUCHING]
+    if touching:
+        impulse, work, gross = given
+        pressed = mask_of(touching)
+        deepest = load(m, at.DEEPEST)
+        store(m, at.DEEPEST, pick(pressed, vmax(deepest, about.d), deepest))
+        _add(m, at.IMPULSE, pressed, impulse)
+        _add(m, at.WORK, pressed, work)
+        _add(m, at.GROSS, pressed, gross)
+    _track(m, seen1, length, which)
+    ticks, period = load(m, at.TICKS), load(m, at.PERIOD)
+    after = load(m, at.T) + ticks
+    _crossings(m, n, world, kernel_input, accumulators_of_runs, seen1, length, after, which, looked)
+    store(m, at.T, pick(mask, after, load(m, at.T)))
+    within = load(m, at.WITHIN)
+    turned = within + ticks
+    turned = pick(less(turned, period), turned, turned - period)
+    store(m, at.WITHIN, pick(mask, turned, within))
+    events = n[at.EVENT] & which
+    released = events & touching
+    if events:
+        _events(m, n, kernel_input, accumulators_of_runs, events)
+    for bit in (at.CUTTING, at.EVENT, at.LOOKS, at.PROBED):
+        n[bit] &= ~which
+    sure = _weigh(m, n, shape, world, seen1, released, events, which)
+    many = load(m, at.DECIDE_CROSSINGS)
+    sure |= bits(less(-0.5, many)) & bits(less(many, load(m, at.LATE))) & which
+    for i in range(modes_of(shape)):
+        mode = at.MODE + i * at.MODE_ROWS
+        for field in range(at.Q, at.K + WIDTH, WIDTH):
+            new = load(m, mode + field + at.Q1 - at.Q)
+            store(m, mode + field, pick(mask, new, load(m, mode + field)))
+    d = pick(mask_of(released), vmin(seen1.d, splat(0.0)), seen1.d)
+    store(m, at.W, pick(mask, seen1.w, load(m, at.W)))
+    store(m, at.WV, pick(mask, seen1.wv, load(m, at.WV)))
+    store(m, at.D, pick(mask, d, load(m, at.D)))
+    store(m, at.DV, pick(mask, seen1.dv, load(m, at.DV)))
+    store(m, at.C, pick(mask, seen1.c, load(m, at.C)))
+    store(m, at.CV, pick(mask, seen1.cv, load(m, at.CV)))
+    store(m, at.STRETCH, pick(mask, 2.0 * load(m, at.GQ) + load(m, at.QR), load(m, at.STRETCH)))
+    return sure

@@ -1,0 +1,203 @@
+"""The march of few modes: eight runs in a register, each with its own time, step, contact and well.
+
+In every pass each lane takes a step of its own.  One that is to be cut where the contact begins or ends takes that
+step in the next pass, while the others go on; so does one that has to be looked into for the deepest point of a
+contact.  A lane whose run has ended takes the next one.  Nothing passes from lane to lane, and every sum is taken in
+the order in which the other layout takes it: results are the same to the bit, whatever a run is marched with.
+"""
+
+from __future__ import annotations
+
+import math
+
+from snapbeam.solver.compilation import compiled, inlined
+from snapbeam.solver.contact_force import contact_energy
+from snapbeam.solver.cpu.run_lanes import layout as at
+from snapbeam.solver.cpu.run_lanes.control import (
+    About,
+    accept,
+    cut_again,
+    end_contact,
+    fetch,
+    meet,
+    probe,
+    propose_step,
+)
+from snapbeam.solver.cpu.run_lanes.state import seat
+from snapbeam.solver.cpu.run_lanes.step import beam_signals, modal_energy, signals, take, tension
+from snapbeam.solver.events import accumulate_open_contact
+from snapbeam.solver.excitation import numbers_of
+from snapbeam.solver.physics import shaker_motion, sincos, tension_energy
+from snapbeam.solver.simd import (
+    WIDTH,
+    bits,
+    lanes_tuple,
+    less,
+    load,
+    lowest,
+    mask_of,
+    pick,
+    store,
+    vabs,
+    vmax,
+)
+from snapbeam.util.status_codes import RunStatus
+
+__all__ = ["integrate_run_lanes"]
+
+
+_OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
+_DIVERGED, _STEP_LIMIT = int(RunStatus.DIVERGED), int(RunStatus.STEP_LIMIT)
+
+
+@inlined
+def _observe(m, shape):
+    """What is seen at the ends of the steps."""
+    well_sign = load(m, at.HOME)
+    offset = load(m, at.OFFSET) + (1.0 - well_sign) * load(m, at.REST_CONTACT)
+    omega = load(m, at.OMEGA)
+    sine, cosine = sincos(load(m, at.PHASE) + omega * load(m, at.LENGTH))
+    motion, velocity = shaker_motion(load(m, at.AMPLITUDE), omega, sine, cosine)
+    w, wv, c, cv = signals(m, shape, at.Q1, at.P1)
+    beam, beam_rate = beam_signals(m, shape, at.Q1, at.P1, w, wv)
+    return About(beam, beam_rate, offset + motion - w, velocity - wv, c, cv)
+
+
+@compiled
+def _finish(m, n, shape, world, kernel_input, lane, accumulators, status, goes_on):
+    """Close the book of a lane; its last contact too, unless the run is to go on from here."""
+    i, t, tick = n[at.RUNS + lane], int(m[at.T + lane]), m[at.TICK + lane]
+    law = numbers_of(kernel_input.law, kernel_input.law_numbers, i)
+    accumulators.deepest, accumulators.impulse = m[at.DEEPEST + lane], m[at.IMPULSE + lane]
+    if n[at.TOUCHING] & (1 << lane):
+        if goes_on:
+            accumulate_open_contact(accumulators, law, t, tick)
+        else:
+            end_contact(m, kernel_input, i, lane, accumulators, t)
+    if status == _EARLY_STOP:
+        accumulators.early_stop_time = t * tick
+    gq, qr = tension(m, shape, world.gamma, mask_of(0), at.Q)
+    linear, _ = modal_energy(m, shape, at.Q, at.P)
+    store(m, at.TEMP, linear + tension_energy(world.gamma, gq, qr))
+    accumulators.energy = m[at.TEMP + lane] + contact_energy(law, m[at.D + lane])
+    accumulators.displacement, accumulators.center = m[at.W + lane], m[at.C + lane]
+    accumulators.min_displacement, accumulators.max_displacement = m[at.MIN_W + lane], m[at.MAX_W + lane]
+    accumulators.min_center, accumulators.max_center = m[at.MIN_C + lane], m[at.MAX_C + lane]
+    accumulators.peak_velocity, accumulators.peak_midspan_velocity = (
+        m[at.PEAK_WV + lane],
+        m[at.PEAK_CV + lane],
+    )
+    accumulators.square_displacement, accumulators.square_center = (
+        m[at.SQUARE_W + lane],
+        m[at.SQUARE_C + lane],
+    )
+    accumulators.square_velocity, accumulators.square_midspan_velocity = (
+        m[at.SQUARE_WV + lane],
+        m[at.SQUARE_CV + lane],
+    )
+    accumulators.energy_time, accumulators.high_energy_time = m[at.ENERGY_TIME + lane], m[at.HIGH_TIME + lane]
+    accumulators.work, accumulators.gross_work = m[at.WORK + lane], m[at.GROSS + lane]
+    accumulators.steps = int(m[at.STEPS + lane])
+    accumulators.time, accumulators.status = t, status
+    n[at.LIVE] &= ~(1 << lane)
+
+
+@inlined
+def _begin_at_once(m, n, accumulators_of_runs, which):
+    """Contacts that begin with the step: it is taken again, in contact."""
+    n[at.TOUCHING] |= which
+    while which:
+        lane = lowest(which)
+        which &= which - 1
+        accumulators = accumulators_of_runs[n[at.RUNS + lane]]
+        accumulators.touching, accumulators.onset = 1, int(m[at.T + lane])
+        m[at.ONSET + lane] = m[at.T + lane]
+
+
+@inlined
+def _pass(m, n, shape, world, kernel_input, accumulators_of_runs, looked):
+    """A step of every lane; returns the lanes that are not finite, decided, over, and at their limit of steps."""
+    fresh = propose_step(m, n, shape, world)
+    fetch(m, n, shape, world)
+    live = n[at.LIVE]
+    touching = n[at.TOUCHING] & live
+    law = lanes_tuple(kernel_input.law, m, at.LAW)
+    given = take(m, shape, world.stages, world.gamma, touching != 0, mask_of(touching), law)
+    about = _observe(m, shape)
+    going = live
+    aside = n[at.ASIDE] & live
+    if aside:
+        deepest = load(m, at.DEEPEST)
+        store(m, at.DEEPEST, pick(mask_of(aside), vmax(deepest, about.d), deepest))
+        n[at.ASIDE] &= ~aside
+        n[at.PROBED] |= aside
+        going &= ~aside
+    failed = going & ~bits(less(vabs(about.d + about.dv), math.inf))
+    going &= ~failed
+    looks = n[at.LOOKS] & n[at.CUTTING] & going
+    ends, at_once = meet(m, n, shape, world, about, fresh & going, looked)
+    going = (going & ~fresh) | ends
+    if looks:
+        going &= ~cut_again(m, n, kernel_input, about.d, about.dv, looks)
+    if at_once:
+        _begin_at_once(m, n, accumulators_of_runs, at_once)
+    pressed = going & n[at.TOUCHING] & ~n[at.PROBED]
+    if pressed:
+        turning = bits(less(load(m, at.DV) * about.dv, 0.0)) & bits(less(0.0, load(m, at.DV))) & pressed
+        if turning:
+            going &= ~probe(m, n, about.d, about.dv, turning)
+    sure, over = 0, 0
+    if going:
+        sure = accept(m, n, shape, world, kernel_input, accumulators_of_runs, about, given, going, looked)
+        over = going & ~bits(less(load(m, at.T), load(m, at.END)))
+    spent = (going | at_once) & ~bits(less(load(m, at.STEPS), load(m, at.MAX_STEPS)))
+    return failed, sure, over, spent
+
+
+@compiled
+def integrate_run_lanes(m, n, shape, world, kernel_input, which, scratch, kernel_output, spare):
+    """March the runs *which*, eight at a time; *m* and *n* are the calling thread's own, *spare* is nobody's book."""
+    accumulators_of_runs, looked, following, goes_on = (
+        kernel_output.accumulators_of_runs,
+        scratch.looked,
+        0,
+        False,
+    )
+    n[at.LIVE] = 0
+    for lane in range(WIDTH):
+        # lanes that stay empty march what the first run begins with, unseen
+        i = which[min(lane, which.size - 1)]
+        if lane < which.size:
+            seat(m, n, shape, world, kernel_input, lane, i, accumulators_of_runs[i])
+            following += 1
+        else:
+            seat(m, n, shape, world, kernel_input, lane, i, spare[0])
+            n[at.LIVE] &= ~(1 << lane)
+    while n[at.LIVE]:
+        if kernel_output.pulse[0] != 0:
+            break
+        failed, sure, over, spent = _pass(m, n, shape, world, kernel_input, accumulators_of_runs, looked)
+        ended = failed | sure | over | spent
+        while ended:
+            lane = lowest(ended)
+            ended &= ended - 1
+            bit = 1 << lane
+            status = _STEP_LIMIT
+            if failed & bit:
+                status = _DIVERGED
+            elif sure & bit:
+                status = _EARLY_STOP
+            elif over & bit:
+                status = _OK
+            accumulators = accumulators_of_runs[n[at.RUNS + lane]]
+            _finish(m, n, shape, world, kernel_input, lane, accumulators, status, goes_on)
+            if following < which.size:
+                i = which[following]
+                following += 1
+                seat(m, n, shape, world, kernel_input, lane, i, accumulators_of_runs[i])
+    live = n[at.LIVE]
+    while live:
+        lane = lowest(live)
+        live &= live - 1
+        accumulators = accumulators_of_runs[n[at.RUNS + lane]]
+        accumulators.time, accumulators.status = int(m[at.T + lane]), _RUNNING

@@ -1,0 +1,214 @@
+"""A run takes a lane: what stays the same in it, the steps that are prepared for it, how it begins."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from snapbeam.solver.compilation import called, compiled, inlined
+from snapbeam.solver.contact_force import contact_energy, is_impulsive
+from snapbeam.solver.cpu.run_lanes import layout as at
+from snapbeam.solver.cpu.run_lanes.step import (
+    beam_signals,
+    groups_of,
+    modal_energy,
+    modes_of,
+    signals,
+    tension,
+)
+from snapbeam.solver.events import PIECES, ContactKinematics, begin_statistics, is_low_energy
+from snapbeam.solver.excitation import drive_rate, numbers_of
+from snapbeam.solver.physics import (
+    decay_less_one,
+    rotation,
+    shaker_motion,
+    sincos,
+    sincos_cosm1,
+    tension_energy,
+)
+from snapbeam.solver.simd import WIDTH, broadcast_load, load, mask_of, pick, store
+from snapbeam.solver.splitting import TURNS, Stages
+from snapbeam.util.status_codes import RunStatus
+
+__all__ = ["TWO_PI", "World", "flows_over", "prepare", "seat", "slot_of", "stand"]
+
+
+TWO_PI = 2.0 * math.pi
+_OK, _RUNNING = int(RunStatus.OK), int(RunStatus.INTERRUPTED)
+
+
+class World(NamedTuple):
+    """What all runs share beside the modes."""
+
+    stages: Stages
+    gamma: float
+    stretch: float
+    """Squared slopes in a well; 0 if there is one well only."""
+    slot: int
+    """Plain numbers of a prepared step."""
+    look: int
+    """Where in memory what a look inside a step sees begins."""
+
+
+@inlined
+def flows_over(m, shape, length, place, which):
+    """The exact flow of every mode over *length*, a time a lane, into the rows from *place* on of the lanes *which*."""
+    for i in range(modes_of(shape)):
+        mode = at.MODE + i * at.MODE_ROWS
+        apply_contact_loss, sigma = (
+            broadcast_load(m, mode + at.OMEGA_DAMPED),
+            broadcast_load(m, mode + at.DAMPING),
+        )
+        sine, _, less_one = sincos_cosm1(apply_contact_loss * length)
+        lost = decay_less_one(sigma * length)
+        squared = broadcast_load(m, mode + at.OMEGA_SQUARED)
+        a11, a12, a21, a22 = rotation(sigma, squared, sine / apply_contact_loss, less_one, lost)
+        row = mode + place
+        store(m, row, pick(which, a11, load(m, row)))
+        store(m, row + WIDTH, pick(which, a12, load(m, row + WIDTH)))
+        store(m, row + 2 * WIDTH, pick(which, a21, load(m, row + 2 * WIDTH)))
+        store(m, row + 3 * WIDTH, pick(which, a22, load(m, row + 3 * WIDTH)))
+
+
+@called
+def prepare(m, shape, world, place, length, omega):
+    """What a step of *length* needs, from *place* on: all modes' flows, and the turns of a drive of rate *omega*."""
+    for group in range(groups_of(shape)):
+        pairs = at.PAIRS + 4 * WIDTH * group
+        apply_contact_loss, sigma, squared = (
+            load(m, pairs),
+            load(m, pairs + WIDTH),
+            load(m, pairs + 2 * WIDTH),
+        )
+        part = load(m, pairs + 3 * WIDTH) * length
+        sine, _, less_one = sincos_cosm1(apply_contact_loss * part)
+        a11, a12, a21, a22 = rotation(
+            sigma, squared, sine / apply_contact_loss, less_one, decay_less_one(sigma * part)
+        )
+        store(m, place, a11)
+        store(m, place + WIDTH, a12)
+        store(m, place + 2 * WIDTH, a21)
+        store(m, place + 3 * WIDTH, a22)
+        place += 4 * WIDTH
+    for i in range(0, TURNS, WIDTH):
+        sine, cosine = sincos(load(m, world.stages.elapsed + i) * (length * omega))
+        store(m, place + i, sine)
+        store(m, place + TURNS + i, cosine)
+
+
+@inlined
+def slot_of(world, lane, level):
+    """Where the prepared step of a level stands."""
+    return at.TABLES + (lane * (at.LEVELS + 1) + level + 1) * world.slot
+
+
+@compiled
+def _prepare_all(m, shape, world, lane, levels):
+    """The steps of a lane at every level."""
+    step_time, omega = m[at.STEP_TIME + lane], m[at.OMEGA + lane]
+    for level in range(levels):
+        prepare(m, shape, world, slot_of(world, lane, level - 1), 2.0 * step_time / (1 << level), omega)
+
+
+@compiled
+def stand(m, shape, world, lane):
+    """What is seen of a lane that stands where Q and P say, and its tension; returns its energy without the contact."""
+    which = mask_of(1 << lane)
+    gq, qr = tension(m, shape, world.gamma, which, at.Q)
+    w, wv, c, cv = signals(m, shape, at.Q, at.P)
+    linear, _ = modal_energy(m, shape, at.Q, at.P)
+    phase = load(m, at.PHASE0) + TWO_PI * (load(m, at.WITHIN) / load(m, at.PERIOD))
+    sine, cosine = sincos(phase)
+    motion, velocity = shaker_motion(load(m, at.AMPLITUDE), load(m, at.OMEGA), sine, cosine)
+    well_sign, rest = load(m, at.HOME), load(m, at.REST_CONTACT)
+    offset = load(m, at.OFFSET) + (1.0 - well_sign) * rest
+    beam, beam_rate = beam_signals(m, shape, at.Q, at.P, w, wv)
+    store(m, at.W, pick(which, beam + well_sign * rest, load(m, at.W)))
+    store(m, at.WV, pick(which, beam_rate, load(m, at.WV)))
+    store(m, at.D, pick(which, offset + motion - w, load(m, at.D)))
+    store(m, at.DV, pick(which, velocity - wv, load(m, at.DV)))
+    store(m, at.C, pick(which, c + well_sign * load(m, at.REST_CENTER), load(m, at.C)))
+    store(m, at.CV, pick(which, cv, load(m, at.CV)))
+    store(m, at.STRETCH, pick(which, 2.0 * gq + qr, load(m, at.STRETCH)))
+    store(m, at.TEMP, linear + tension_energy(world.gamma, gq, qr))
+    return m[at.TEMP + lane]
+
+
+@compiled
+def _constants(m, shape, kernel_input, lane, i):
+    """What stays the same in run *i*."""
+    record = kernel_input.runs[i]
+    drive = numbers_of(kernel_input.drive, kernel_input.drive_numbers, i)
+    m[at.OMEGA + lane], m[at.AMPLITUDE + lane] = drive.omega, drive.amplitude
+    for f in range(kernel_input.law_numbers.shape[1]):
+        m[at.LAW + f * WIDTH + lane] = kernel_input.law_numbers[i, f]
+    step_time = record.step * record.tick
+    m[at.TICK + lane], m[at.STEP + lane], m[at.STEP_TIME + lane] = record.tick, record.step, step_time
+    m[at.PERIOD + lane], m[at.LANDING + lane] = record.period, record.landing
+    m[at.END + lane] = record.end
+    m[at.LIMIT + lane] = min(record.landing, record.end)
+    m[at.COARSEST + lane], m[at.FINEST + lane] = record.coarsest, record.finest
+    m[at.COARSE_TICKS + lane] = record.step >> record.coarsest
+    m[at.PHASE0 + lane], m[at.OFFSET + lane], m[at.HOME + lane] = (
+        record.phase,
+        record.offset,
+        record.well_sign,
+    )
+    m[at.REST_CONTACT + lane], m[at.REST_CENTER + lane] = record.rest_contact, record.rest_center
+    m[at.TIP_SPEED + lane] = record.tip_speed
+    m[at.DECIDE_REACH + lane], m[at.DECIDE_ENERGY + lane] = record.decide_reach, record.decide_energy
+    m[at.DECIDE_CROSSINGS + lane], m[at.MAX_STEPS + lane] = record.decide_crossings, kernel_input.max_steps
+    fastest = drive_rate(drive)
+    for j in range(modes_of(shape)):
+        mode = at.MODE + j * at.MODE_ROWS
+        fastest = max(fastest, m[mode + at.OMEGA_I])
+        m[mode + at.CONTACT + lane] = kernel_input.contact_rows[record.contact_row, j]
+        m[mode + at.Q + lane] = kernel_input.starts[record.start_row, 0, j]
+        m[mode + at.P + lane] = kernel_input.starts[record.start_row, 1, j]
+        m[mode + at.SEEN_WELL + lane] = record.well_sign * m[mode + at.WELL]
+    finest_look = TWO_PI / (PIECES * fastest)
+    m[at.FINEST_LOOK + lane], m[at.PIECES + lane] = finest_look, max(4, math.ceil(step_time / finest_look))
+
+
+@compiled
+def seat(m, n, shape, world, kernel_input, lane, i, accumulators):
+    """Put run *i* into a lane; its status."""
+    record, bit = kernel_input.runs[i], 1 << lane
+    n[at.RUNS + lane] = i
+    _constants(m, shape, kernel_input, lane, i)
+    _prepare_all(m, shape, world, lane, record.finest + 2)
+    m[at.KEY + lane], m[at.LOOK_KEY + lane], m[at.LOOK_PIECES + lane] = -99.0, -1.0, 0.0
+    m[at.T + lane] = m[at.WITHIN + lane] = 0.0
+    energy = stand(m, shape, world, lane)
+    seen = ContactKinematics(
+        m[at.W + lane], m[at.WV + lane], m[at.D + lane], m[at.DV + lane], m[at.C + lane], m[at.CV + lane]
+    )
+    law = numbers_of(kernel_input.law, kernel_input.law_numbers, i)
+    since = record.contact_time
+    touching = since >= 0.0
+    if not math.isfinite(since):
+        pressed = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
+        touching = pressed and not is_impulsive(law)
+    accumulators.touching, accumulators.onset = int(touching), 0
+    if math.isfinite(since) and since > 0.0:
+        accumulators.onset = -int(since / record.tick + 0.5)
+    begin_statistics(accumulators, seen.c, seen, law, energy + contact_energy(law, seen.d))
+    m[at.ONSET + lane], m[at.SIDE + lane], m[at.DEEPEST + lane] = (
+        accumulators.onset,
+        accumulators.side,
+        accumulators.deepest,
+    )
+    m[at.MIN_W + lane], m[at.MAX_W + lane] = accumulators.min_displacement, accumulators.max_displacement
+    m[at.MIN_C + lane], m[at.MAX_C + lane] = accumulators.min_center, accumulators.max_center
+    for row in range(at.PEAK_WV, at.DEEPEST, WIDTH):
+        m[row + lane] = 0.0
+    for row in (at.SAFE_GAP, at.SAFE_CENTER, at.WEIGHED, at.BEAT, at.STEPS, at.LATE):
+        m[row + lane] = 0.0
+    for j in range(at.TOUCHING, at.ODD + 1):
+        n[j] &= ~bit
+    n[at.LIVE] |= bit
+    if touching:
+        n[at.TOUCHING] |= bit
+    if is_low_energy(energy, world.gamma, world.stretch):
+        n[at.QUIET] |= bit
+    return _RUNNING if record.end > 0 else _OK

@@ -1,0 +1,501 @@
+"""The functions over modes, written out for a shape: one mode a variable, nothing in a loop.
+
+Sums over modes are taken in the very order in which the other layout takes them, eight modes to a register, so that
+both give the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from numba.extending import overload
+
+from snapbeam.solver.compilation import INLINE_HERE, inlined
+from snapbeam.solver.contact_force import contact_force
+from snapbeam.solver.cpu.run_lanes import layout as at
+from snapbeam.solver.interpolation import hermite_overshoot_bound
+from snapbeam.solver.physics import (
+    mode_energy,
+    shaker_motion,
+    sincos,
+    tension_acceleration,
+    tension_factors,
+    turned,
+)
+from snapbeam.solver.simd import (
+    WIDTH,
+    both,
+    broadcast_load,
+    fma,
+    less,
+    load,
+    move,
+    pick,
+    splat,
+    store,
+    vabs,
+    vmax,
+)
+from snapbeam.solver.splitting import TURNS
+
+__all__ = [
+    "TEXTS",
+    "Modes",
+    "at_hand",
+    "beam_energy",
+    "beam_signals",
+    "bounds",
+    "groups_of",
+    "made",
+    "modal_energy",
+    "modes_of",
+    "propagate_free",
+    "signals",
+    "take",
+    "tension",
+]
+
+
+_KNOWN = {
+    "__name__": __name__, "both": both, "hermite_overshoot_bound": hermite_overshoot_bound, "contact_force": contact_force, "fma": fma, "less": less,
+    "load": load, "move": move, "mode_energy": mode_energy, "pick": pick, "shaker_motion": shaker_motion,
+    "sincos": sincos, "splat": splat, "broadcast_load": broadcast_load, "store": store,
+    "tension_acceleration": tension_acceleration, "tension_factors": tension_factors, "turned": turned, "vabs": vabs,
+    "vmax": vmax,
+}  # fmt: skip
+
+
+class Modes:
+    """The modes of a shape, in the order of their rows in the other layout."""
+
+    def __init__(self, blocks: tuple[int, ...], flows: int) -> None:
+        self.count, self.flows, self.distinct = sum(blocks), flows, (flows + 1) // 2
+        self.rows: list[int] = []
+        """Padded row of each mode."""
+        self.blocks: list[range] = []
+        first = padded = 0
+        for size in blocks:
+            self.blocks.append(range(first, first + size))
+            self.rows += [padded + j for j in range(size)]
+            first, padded = first + size, padded + -(-size // WIDTH) * WIDTH
+
+    def each(self) -> range:
+        return range(self.count)
+
+    def place(self, i: int, field: int) -> int:
+        return at.MODE + i * at.MODE_ROWS + field
+
+    def row(self, i: int, field: int | str) -> str:
+        """A row of a mode; *field* may be the name of an argument."""
+        return (
+            f"load(m, {self.place(i, 0)} + {field})"
+            if isinstance(field, str)
+            else f"load(m, {self.place(i, field)})"
+        )
+
+    def number(self, i: int, which: int) -> str:
+        return f"broadcast_load(m, {self.place(i, which)})"
+
+    def total(self, term: Callable[[int], tuple[str, str]]) -> str:
+        """The sum over modes of products: a chain down each of the eight columns, then halves, quarters and pairs."""
+        columns: list[str | None] = [None] * WIDTH
+        for i in self.each():
+            column = self.rows[i] % WIDTH
+            before, (a, b) = columns[column], term(i)
+            columns[column] = f"({a} * {b})" if before is None else f"fma({a}, {b}, {before})"
+        return _tree(columns)
+
+    def plain_total(self, term: Callable[[int], str]) -> str:
+        """The sum over modes of plain terms, in the same order."""
+        columns: list[str | None] = [None] * WIDTH
+        for i in self.each():
+            column = self.rows[i] % WIDTH
+            before = columns[column]
+            columns[column] = term(i) if before is None else f"({before} + {term(i)})"
+        return _tree(columns)
+
+    def product(self, i: int) -> str:
+        """Row i of G q, of variables q0, q1, ..."""
+        block = next(each for each in self.blocks if i in each)
+        padded = -(-len(block) // WIDTH) * WIDTH
+        strip = (i - block.start) // (2 * WIDTH) * 2 * WIDTH
+        ways = 4 if strip + 2 * WIDTH <= padded else 2
+        sums: list[str | None] = [None] * ways
+        for j in block:
+            way = (j - block.start) % ways
+            element = f"broadcast_load(m, {at.COUPLING + i * at.MOST + j})"
+            before = sums[way]
+            sums[way] = f"({element} * q{j})" if before is None else f"fma({element}, q{j}, {before})"
+        if ways == 4:
+            return _add(_add(sums[0], sums[1]), _add(sums[2], sums[3])) or "splat(0.0)"
+        return _add(sums[0], sums[1]) or "splat(0.0)"
+
+
+def _add(a: str | None, b: str | None) -> str | None:
+    if a is None or b is None:
+        return a or b
+    return f"({a} + {b})"
+
+
+def _tree(columns: list[str | None]) -> str:
+    width = WIDTH
+    while width > 1:
+        width //= 2
+        columns = [_add(columns[i], columns[i + width]) for i in range(width)]
+    return columns[0] or "splat(0.0)"
+
+
+def made(name: str, lines: list[str]) -> Any:
+    found: dict[str, Any] = dict(_KNOWN)
+    exec(compile("\n".join(lines), f"<{name}>", "exec"), found)
+    return found[name]
+
+
+def _tension(modes: Modes) -> list[str]:
+    """g.q, q.Gq and the products r0, r1, ... of q0, q1, ... ; the well's numbers are g0, g1, ..."""
+    lines = [f"r{i} = {modes.product(i)}" for i in modes.each()]
+    lines += [f"gq = {modes.total(lambda i: (f'g{i}', f'q{i}'))}"]
+    lines += [f"qr = {modes.total(lambda i: (f'r{i}', f'q{i}'))}"]
+    return lines
+
+
+def _take(modes: Modes) -> list[str]:
+    head = ["def take(m, shape, stages, gamma, any_touching, touching, law):"]
+    body = [f"length = load(m, {at.LENGTH})", "gq, qr = splat(0.0), splat(0.0)"]
+    body += ["impulse, work, gross, force = splat(0.0), splat(0.0), splat(0.0), splat(0.0)"]
+    body += [f"offset = load(m, {at.OFFSET}) + (1.0 - load(m, {at.HOME})) * load(m, {at.REST_CONTACT})"]
+    body += [f"amplitude, omega = load(m, {at.AMPLITUDE}), load(m, {at.OMEGA})"]
+    body += [f"sine0, cosine0 = load(m, {at.SINE}), load(m, {at.COSINE})"]
+    for i in modes.each():
+        body += [
+            f"q{i}, p{i}, g{i} = {modes.row(i, at.Q)}, {modes.row(i, at.P)}, {modes.row(i, at.SEEN_WELL)}"
+        ]
+        body += [f"k{i} = {modes.row(i, at.K)}"]
+    body += [f"for stage in range({modes.flows + 1}):"]
+    stage = ["weight = broadcast_load(m, stages.kick + stage) * length", "if any_touching:"]
+    stage += [f"    sine = load(m, {at.TURN} + {WIDTH} * stage)"]
+    stage += [f"    cosine = load(m, {at.TURN + TURNS * WIDTH} + {WIDTH} * stage)"]
+    stage += ["    sine, cosine = sine0 * cosine + cosine0 * sine, cosine0 * cosine - sine0 * sine"]
+    stage += ["    motion, velocity = shaker_motion(amplitude, omega, sine, cosine)"]
+    dot = modes.total(lambda i: (modes.row(i, at.CONTACT), f"q{i}"))
+    stage += [f"    force = pick(touching, contact_force(law, offset + motion - {dot}), 0.0)"]
+    stage += ["    impulse = impulse + weight * force"]
+    stage += ["    work = work + weight * force * velocity"]
+    stage += ["    gross = gross + weight * vabs(force * velocity)"]
+    stage += ["if stage > 0:"]
+    stage += [f"    {line}" for line in _tension(modes)]
+    stage += ["    along_g, along_r = tension_factors(gamma, gq, qr)"]
+    stage += [f"    k{i} = tension_acceleration(along_g, along_r, g{i}, r{i})" for i in modes.each()]
+    stage += [f"p{i} = fma(weight, fma(force, {modes.row(i, at.CONTACT)}, k{i}), p{i})" for i in modes.each()]
+    stage += [f"if stage < {modes.flows}:"]
+    stage += [f"    flow = {4 * WIDTH} * min(stage, {modes.flows - 1} - stage)"]
+    for i in modes.each():
+        a11, a12, a21, a22 = (f"load(m, {modes.place(i, at.FLOW + c * WIDTH)} + flow)" for c in range(4))
+        stage += [f"    q{i}, p{i} = turned(q{i}, {a11}, {a12}, p{i}), turned(p{i}, {a22}, {a21}, q{i})"]
+    body += [f"    {line}" for line in stage]
+    for i in modes.each():
+        for field, value in ((at.Q1, f"q{i}"), (at.P1, f"p{i}"), (at.K1, f"k{i}")):
+            body += [f"store(m, {modes.place(i, field)}, {value})"]
+    body += [f"store(m, {at.GQ}, gq)", f"store(m, {at.QR}, qr)", "return impulse, work, gross"]
+    return head + [f"    {line}" for line in body]
+
+
+def _signals(modes: Modes) -> list[str]:
+    lines = ["def signals(m, shape, q, p):"]
+    for i in modes.each():
+        lines += [f"    q{i}, p{i} = {modes.row(i, 'q')}, {modes.row(i, 'p')}"]
+        lines += [f"    c{i}, e{i} = {modes.row(i, at.CONTACT)}, {modes.number(i, at.CENTER)}"]
+    found = [
+        modes.total(lambda i, row=row, of=of: (f"{row}{i}", f"{of}{i}"))  # type: ignore[misc]
+        for row, of in (("c", "q"), ("c", "p"), ("e", "q"), ("e", "p"))
+    ]
+    return [*lines, f"    return {', '.join(found)}"]
+
+
+def _tension_at(modes: Modes) -> list[str]:
+    """g.q and q.Gq of a state, and the tension's acceleration, into K where the mask is true."""
+    lines = ["def tension(m, shape, gamma, which, q):"]
+    for i in modes.each():
+        lines += [f"    q{i}, g{i} = {modes.row(i, 'q')}, {modes.row(i, at.SEEN_WELL)}"]
+    lines += [f"    {line}" for line in _tension(modes)]
+    lines += ["    along_g, along_r = tension_factors(gamma, gq, qr)"]
+    for i in modes.each():
+        lines += [
+            f"    store(m, {modes.place(i, at.K)}, pick(which, tension_acceleration(along_g, along_r, g{i}, r{i}),"
+            f" {modes.row(i, at.K)}))"
+        ]
+    return [*lines, "    return gq, qr"]
+
+
+def _bounds(modes: Modes) -> list[str]:
+    """Bounds of the speeds of contact point and centre by the linear flow, and what the tension pushes them with."""
+    lines = ["def bounds(m, shape):"]
+    for i in modes.each():
+        omega = modes.number(i, at.OMEGA_I)
+        lines += [f"    s{i} = vabs({modes.row(i, at.P)}) + vabs({omega} * {modes.row(i, at.Q)})"]
+        lines += [f"    k{i}, c{i} = {modes.row(i, at.K)}, {modes.row(i, at.CONTACT)}"]
+        lines += [f"    e{i} = {modes.number(i, at.CENTER)}"]
+    found = [
+        modes.total(lambda i: (f"vabs(c{i})", f"s{i}")),
+        modes.total(lambda i: (f"c{i}", f"k{i}")),
+        modes.total(lambda i: (f"vabs(e{i})", f"s{i}")),
+        modes.total(lambda i: (f"e{i}", f"k{i}")),
+    ]
+    return [*lines, f"    return {', '.join(found)}"]
+
+
+def _energies(modes: Modes) -> list[str]:
+    """Quadratic part of the energy, and the part of it in modes that count as high."""
+    lines = ["def modal_energy(m, shape, q, p):"]
+    for i in modes.each():
+        omega = modes.number(i, at.OMEGA_I)
+        lines += [f"    u{i} = mode_energy({omega}, {modes.row(i, 'q')}, {modes.row(i, 'p')})"]
+    total = modes.plain_total(lambda i: f"u{i}")
+    high = modes.total(lambda i: (modes.number(i, at.HIGH), f"u{i}"))
+    return [*lines, f"    return {total}, {high}"]
+
+
+def _glide(modes: Modes) -> list[str]:
+    """A free step in short pieces, as the other layout's :func:`~snapbeam.solver.cpu.events.sample_inside_step`.
+
+    Row i of a look is the penetration, its rate, the displacement of the centre and its rate; only lanes of *which*
+    that have so many pieces are written.  Returns, for each lane, the greatest value that the penetration may have
+    had: its cubics stay below.
+    """
+    head = ["def glide(m, shape, look, which, with_center, most):"]
+    body = [f"pieces, piece = load(m, {at.LOOK_PIECES}), load(m, {at.LOOK_PIECE})"]
+    body += [f"amplitude, omega = load(m, {at.AMPLITUDE}), load(m, {at.OMEGA})"]
+    body += [f"offset = load(m, {at.OFFSET}) + (1.0 - load(m, {at.HOME})) * load(m, {at.REST_CONTACT})"]
+    for i in modes.each():
+        body += [f"q{i}, p{i} = {modes.row(i, at.Q)}, {modes.row(i, at.P)}"]
+        body += [f"k{i}, l{i} = {modes.row(i, at.K)}, {modes.row(i, at.K1)}"]
+        body += [f"c{i}, e{i} = {modes.row(i, at.CONTACT)}, {modes.number(i, at.CENTER)}"]
+    total = modes.total
+    body += [
+        f"contact0 = {total(lambda i: (f'c{i}', f'k{i}'))}",
+        f"contact1 = {total(lambda i: (f'c{i}', f'l{i}'))}",
+    ]
+    body += [
+        f"center0 = {total(lambda i: (f'e{i}', f'k{i}'))}",
+        f"center1 = {total(lambda i: (f'e{i}', f'l{i}'))}",
+    ]
+    body += [
+        "turn_sine, turn_cosine = sincos(omega * piece)",
+        f"sine, cosine = load(m, {at.SINE}), load(m, {at.COSINE})",
+    ]
+    cq, cp = total(lambda i: (f"c{i}", f"q{i}")), total(lambda i: (f"c{i}", f"p{i}"))
+    eq, ep = total(lambda i: (f"e{i}", f"q{i}")), total(lambda i: (f"e{i}", f"p{i}"))
+    body += ["before, before_rate, begun, greatest = splat(0.0), splat(0.0), splat(0.0), splat(-1.0)"]
+    body += ["for i in range(most + 1):"]
+    step = ["done = i / pieces", "if i > 0:"]
+    # the piece that ends here, after the kick at its beginning
+    step += [
+        "    begun = (i - 1) / pieces",
+        "    kick = piece",
+        "    if i == 1:",
+        "        kick = 0.5 * piece",
+    ]
+    for i in modes.each():
+        a11, a12, a21, a22 = (modes.row(i, at.LOOK + c * WIDTH) for c in range(4))
+        step += [f"    kicked = fma(kick * begun, l{i}, p{i})"]
+        step += [f"    kicked = fma(kick * (1.0 - begun), k{i}, kicked)"]
+        step += [f"    p{i} = turned(kicked, {a22}, {a21}, q{i})"]
+        step += [f"    q{i} = turned(q{i}, {a11}, {a12}, kicked)"]
+    step += ["owed = 0.5 * piece", "if i == 0:", "    owed = splat(0.0)"]
+    step += ["motion, velocity = shaker_motion(amplitude, omega, sine, cosine)"]
+    step += [f"d = offset + motion - {cq}"]
+    step += [f"dv = velocity - {cp} - owed * ((1.0 - done) * contact0 + done * contact1)"]
+    step += [f"row = look + {4 * WIDTH} * i"]
+    step += ["written = both(which, less(i - 0.5, pieces))"]
+    step += ["store(m, row, pick(written, d, load(m, row)))"]
+    step += [f"store(m, row + {WIDTH}, pick(written, dv, load(m, row + {WIDTH})))"]
+    step += ["if with_center:"]
+    step += [f"    c = {eq}", f"    cv = {ep} + owed * ((1.0 - done) * center0 + done * center1)"]
+    step += [f"    store(m, row + {2 * WIDTH}, pick(written, c, load(m, row + {2 * WIDTH})))"]
+    step += [f"    store(m, row + {3 * WIDTH}, pick(written, cv, load(m, row + {3 * WIDTH})))"]
+    step += ["if i > 0:"]
+    step += ["    reach = vmax(before, d) + hermite_overshoot_bound(before_rate, dv, piece)"]
+    step += ["    greatest = pick(written, vmax(greatest, reach), greatest)"]
+    step += ["before, before_rate, begun = d, dv, done"]
+    step += [
+        "sine, cosine = sine * turn_cosine + cosine * turn_sine, cosine * turn_cosine - sine * turn_sine"
+    ]
+    body += [f"    {line}" for line in step]
+    return head + [f"    {line}" for line in [*body, "return greatest"]]
+
+
+def _at_hand(modes: Modes) -> list[str]:
+    """The flows and turns of a prepared step, from where they stand into one lane."""
+    lines = ["def at_hand(m, shape, place, lane):"]
+    for i in modes.each():
+        for flow in range(modes.distinct):
+            group, j = divmod(i * modes.distinct + flow, WIDTH)
+            for c in range(4):
+                to = modes.place(i, at.FLOW + (4 * flow + c) * WIDTH)
+                lines += [f"    move(m, {to} + lane, place + {(4 * group + c) * WIDTH + j})"]
+    turns = at.groups(modes.count, modes.distinct) * 4 * WIDTH
+    for stage in range(modes.flows + 1):
+        for part in (0, TURNS):
+            to = at.TURN + (part + stage) * WIDTH
+            lines += [f"    move(m, {to} + lane, place + {turns + part + stage})"]
+    return lines
+
+
+TEXTS = {
+    "at_hand": _at_hand, "take": _take, "signals": _signals, "tension": _tension_at, "bounds": _bounds,
+    "modal_energy": _energies,    "glide": _glide,
+}  # fmt: skip
+
+
+# ----------------------------------------------------------------------------------------------------
+# Functions over modes, each written out for the shape that it is called with.
+
+
+@cache
+def _function(name: str, shape: Any) -> Any:
+    """A function over the modes of a shape, compiled into whatever calls it."""
+    return inlined(made(name, TEXTS[name](Modes(shape.blocks, shape.flows))))
+
+
+def take(m: Any, shape: Any, stages: Any, gamma: float, any_touching: bool, touching: Any, law: Any) -> Any:
+    """A step of every lane, from Q, P and K to Q1, P1 and K1; returns impulse, work and gross work of the contact.
+
+    *touching* is the mask of those in contact.
+    """
+    raise TypeError("take runs in compiled code only")
+
+
+@overload(take, jit_options=INLINE_HERE)
+def _take_of(m, shape, stages, gamma, any_touching, touching, law):
+    written = _function("take", shape.instance_class)
+    return lambda m, shape, stages, gamma, any_touching, touching, law: written(
+        m, shape, stages, gamma, any_touching, touching, law
+    )
+
+
+def signals(m: Any, shape: Any, q: int, p: int) -> Any:
+    """Displacement of the contact point and of the centre from rest and their rates: c.q, c.p, e.q, e.p."""
+    raise TypeError("signals runs in compiled code only")
+
+
+@overload(signals, jit_options=INLINE_HERE)
+def _signals_of(m, shape, q, p):
+    written = _function("signals", shape.instance_class)
+    return lambda m, shape, q, p: written(m, shape, q, p)
+
+
+def beam_signals(m: Any, shape: Any, q: int, p: int, w: Any, wv: Any) -> Any:
+    """Displacement and velocity of the beam at the striker, as in the mode-lane layout."""
+    raise TypeError("beam_signals runs in compiled code only")
+
+
+@overload(beam_signals, jit_options=INLINE_HERE)
+def _beam_signals_of(m, shape, q, p, w, wv):
+    if shape.instance_class.body is None:
+        return lambda m, shape, q, p, w, wv: (w, wv)
+    body = at.MODE + shape.instance_class.body * at.MODE_ROWS
+
+    def without_body(m, shape, q, p, w, wv):
+        c = load(m, body + at.CONTACT)
+        return w - c * load(m, body + q), wv - c * load(m, body + p)
+
+    return without_body
+
+
+def beam_energy(m: Any, shape: Any, energy: Any) -> Any:
+    """Modal energy of the beam without the striker's mass, at the ends of the steps."""
+    raise TypeError("beam_energy runs in compiled code only")
+
+
+@overload(beam_energy, jit_options=INLINE_HERE)
+def _beam_energy_of(m, shape, energy):
+    if shape.instance_class.body is None:
+        return lambda m, shape, energy: energy
+    body = at.MODE + shape.instance_class.body * at.MODE_ROWS
+
+    def without_body(m, shape, energy):
+        omega = broadcast_load(m, body + at.OMEGA_I)
+        return energy - mode_energy(omega, load(m, body + at.Q1), load(m, body + at.P1))
+
+    return without_body
+
+
+def tension(m: Any, shape: Any, gamma: float, which: Any, q: int) -> Any:
+    """g.q and q.Gq; the tension's acceleration goes to K where the mask *which* is true."""
+    raise TypeError("tension runs in compiled code only")
+
+
+@overload(tension, jit_options=INLINE_HERE)
+def _tension_of(m, shape, gamma, which, q):
+    written = _function("tension", shape.instance_class)
+    return lambda m, shape, gamma, which, q: written(m, shape, gamma, which, q)
+
+
+def bounds(m: Any, shape: Any) -> Any:
+    """Of contact point and centre: a speed that the linear flow cannot exceed, and what the tension accelerates by."""
+    raise TypeError("bounds runs in compiled code only")
+
+
+@overload(bounds, jit_options=INLINE_HERE)
+def _bounds_of(m, shape):
+    written = _function("bounds", shape.instance_class)
+    return lambda m, shape: written(m, shape)
+
+
+def modal_energy(m: Any, shape: Any, q: int, p: int) -> Any:
+    """Quadratic part of the energy, and the part of it in modes that count as high."""
+    raise TypeError("modal_energy runs in compiled code only")
+
+
+@overload(modal_energy, jit_options=INLINE_HERE)
+def _energy_of(m, shape, q, p):
+    written = _function("modal_energy", shape.instance_class)
+    return lambda m, shape, q, p: written(m, shape, q, p)
+
+
+def propagate_free(m: Any, shape: Any, look: int, which: Any, with_center: bool, most: int) -> Any:
+    """A free step in pieces, noted from *look* on; returns what the penetration cannot exceed after the start."""
+    raise TypeError("glide runs in compiled code only")
+
+
+@overload(propagate_free, jit_options=INLINE_HERE)
+def _glide_of(m, shape, look, which, with_center, most):
+    written = _function("glide", shape.instance_class)
+    return lambda m, shape, look, which, with_center, most: written(m, shape, look, which, with_center, most)
+
+
+def modes_of(shape: Any) -> int:
+    """How many modes there are."""
+    return sum(type(shape).blocks)
+
+
+@overload(modes_of, jit_options=INLINE_HERE)
+def _modes_of(shape):
+    count = sum(shape.instance_class.blocks)
+    return lambda shape: count
+
+
+def at_hand(m: Any, shape: Any, place: int, lane: int) -> None:
+    """Have the flows and turns of the prepared step at *place* at hand in a lane."""
+    raise TypeError("at_hand runs in compiled code only")
+
+
+@overload(at_hand, jit_options=INLINE_HERE)
+def _at_hand_of(m, shape, place, lane):
+    written = _function("at_hand", shape.instance_class)
+    return lambda m, shape, place, lane: written(m, shape, place, lane)
+
+
+def groups_of(shape: Any) -> int:
+    """Groups of eight pairs of a mode and a distinct flow."""
+    kind = type(shape)
+    return at.groups(sum(kind.blocks), (kind.flows + 1) // 2)
+
+
+@overload(groups_of, jit_options=INLINE_HERE)
+def _groups_of(shape):
+    kind = shape.instance_class
+    count = at.groups(sum(kind.blocks), (kind.flows + 1) // 2)
+    return lambda shape: count

@@ -1,0 +1,337 @@
+"""A run of the CPU engine: what stays the same in it, where it stands, how it begins, lands and ends."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from snapbeam.solver.compilation import called, compiled, inlined
+from snapbeam.solver.contact_force import contact_energy, is_impulsive
+from snapbeam.solver.cpu.mode_lanes import (
+    Layout,
+    acceleration_rows,
+    flow_coefficients,
+    modal_energy,
+    tension_rows,
+)
+from snapbeam.solver.cpu.step import observe, prepare
+from snapbeam.solver.cpu.terms.base_and_load import changed_load, enter_forces
+from snapbeam.solver.cpu.terms.circuit import disable_long_steps, put_rate
+from snapbeam.solver.cpu.terms.further_contact_events import begin_further_contacts
+from snapbeam.solver.cpu.terms.further_contacts import evaluate_contacts, with_further_contact_energy
+from snapbeam.solver.cpu.terms.second_well import about_level, above_own_well, add_potential_energy, put
+from snapbeam.solver.events import (
+    PIECES,
+    Clock,
+    ContactKinematics,
+    accumulate_open_contact,
+    begin_statistics,
+    clock_of,
+    close_impact,
+    is_low_energy,
+)
+from snapbeam.solver.excitation import Tip, drive_rate, numbers_of, seen_from
+from snapbeam.solver.physics import tension_energy, tension_factors
+from snapbeam.solver.splitting import TURNS, Stages
+from snapbeam.util.status_codes import RunStatus
+
+__all__ = [
+    "IntegratorState",
+    "KernelInput",
+    "Rows",
+    "Run",
+    "Scratch",
+    "StepControl",
+    "Workspace",
+    "begin",
+    "change_origin",
+    "finish",
+    "restart_from_state",
+]
+
+
+_OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
+_TWO_PI = 2.0 * math.pi
+
+
+class KernelInput(NamedTuple):
+    """What is asked of the runs of an ensemble."""
+
+    runs: Any
+    law_numbers: Any
+    drive_numbers: Any
+    contact_rows: Any
+    starts: Any
+    law: Any
+    """Any numbers of the law, for their type; so is the drive's."""
+    drive: Any
+    other_numbers: Any
+    """Of the strikers beside the first, shape (runs, strikers, numbers); so are the places of their rows."""
+    other_places: Any
+    other_rows: Any
+    extras: Any
+    """Statistics that were registered, by type."""
+    max_steps: int
+    high: bool
+    """Whether some modes count as high."""
+
+
+class Workspace(NamedTuple):
+    """Where in memory a run is marched."""
+
+    layout: Layout
+    stages: Stages
+
+
+class Scratch(NamedTuple):
+    """What a thread works in beside memory: what a look inside a step saw, and partial sums."""
+
+    looked: Any
+    parts: Any
+
+
+class Rows(NamedTuple):
+    """Where the state stands, q, p and the tension's acceleration k, and where a step puts the next."""
+
+    q: int
+    p: int
+    k: int
+    q1: int
+    p1: int
+    k1: int
+
+
+class StepControl(NamedTuple):
+    """What a march keeps in mind from step to step."""
+
+    touching: bool
+    quiet: bool
+    """Whether the energy is so low that longer steps serve."""
+    safe_gap: int
+    """Until this tick the gap cannot close."""
+    safe_center: int
+    """Until this tick the centre cannot cross."""
+    weighed: int
+    """Tick at which the energy was last looked at."""
+    beat: int
+    """Steps since the run began or landed."""
+
+
+class Run(NamedTuple):
+    """What stays the same in a run."""
+
+    struck: Tip
+    """The tip as seen from the well that the run's rests are measured in."""
+    clock: Clock
+    phase: float
+    """Argument of the drive at the start."""
+    rest_contact: float
+    """Displacement of the contact point in that well, seen from the striker's side."""
+    rest_center: float
+    tip_speed: float
+    finest_look: float
+    """Longest piece that a step is looked into by, s."""
+    step_pieces: int
+    """Such pieces in a flight step."""
+    step_time: float
+    """Of the flight step, s."""
+    coefficients: int
+    """Where the prepared steps begin, one for each level from -1 on."""
+    slot: int
+    """Length of one."""
+    spare: int
+    """Rows for a look ahead: q, p, k."""
+    lowest: float
+    """Height of a flight that is too low to be seen, m: under Newton's law, where chatter ends."""
+
+
+class IntegratorState(NamedTuple):
+    """Where a run stands."""
+
+    t: int
+    """Ticks."""
+    well_sign: float
+    """+1 in the first well, -1 in the other: the origin of q."""
+    stretch: float
+    """Squared slopes beyond those of the well."""
+    rows: Rows
+    seen: ContactKinematics
+    control: StepControl
+    sample: int
+    """Instants recorded so far."""
+    landed: int
+    """States handed out so far."""
+    status: int
+
+
+@inlined
+def cut_slot(run):
+    """Where a step of any other length is prepared."""
+    return run.coefficients + (run.clock.finest + 2) * run.slot
+
+
+@inlined
+def look_slot(run):
+    """Where the flow over one piece of a flight step stands, and after it that over any other piece."""
+    return cut_slot(run) + run.slot
+
+
+@inlined
+def phase_at(run, t):
+    """Argument of the drive at a tick: from the whole number alone, never by addition."""
+    return run.phase + _TWO_PI * ((t % run.clock.period) / run.clock.period)
+
+
+@inlined
+def run_of(memory, layout, stages, kernel_input, i):
+    """What stays the same in run *i*; its prepared steps go into memory."""
+    record = kernel_input.runs[i]
+    size, work = layout.size, layout.work
+    struck = Tip(
+        record.offset,
+        numbers_of(kernel_input.law, kernel_input.law_numbers, i),
+        numbers_of(kernel_input.drive, kernel_input.drive_numbers, i),
+    )
+    clock = clock_of(record, kernel_input.max_steps)
+    coefficients, slot = work + 10 * size, (stages.flows + 1) // 2 * 4 * size + 2 * TURNS
+    step_time = clock.step * clock.tick
+    for level in range(clock.finest + 2):
+        length, at = 2.0 * step_time / (1 << level), coefficients + level * slot
+        prepare(memory, layout, stages, struck.drive, length, at)
+    fastest = drive_rate(struck.drive)
+    for row in range(size):
+        fastest = max(fastest, memory[layout.omega + row])
+    finest_look = _TWO_PI / (PIECES * fastest)
+    step_pieces = max(4, math.ceil(step_time / finest_look))
+    run = Run(
+        struck,
+        clock,
+        record.phase,
+        record.rest_contact,
+        record.rest_center,
+        record.tip_speed,
+        finest_look,
+        step_pieces,
+        step_time,
+        coefficients,
+        slot,
+        work + 6 * size,
+        record.lowest,
+    )
+    flow_coefficients(memory, layout, step_time / step_pieces, look_slot(run))
+    return run
+
+
+@called
+def restart_from_state(memory, blocks, layout, run, t, well_sign, rows, touching, landed, sample):
+    """Where a run stands at tick *t*, from its state alone: how it begins, and how it goes on from a landing."""
+    q, p, k, r = rows.q, rows.p, rows.k, layout.work + 9 * layout.size
+    enter_forces(layout.forced, memory, run.struck.drive, phase_at(run, t))
+    evaluate_contacts(memory, layout.size, layout.others, run.struck.drive, phase_at(run, t), q, 0.0, False)
+    gq, qr = tension_rows(memory, blocks, layout, q, r)
+    along_g, along_r = tension_factors(layout.gamma, gq, qr)
+    along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
+    acceleration_rows(memory, layout, along_g, along_r, r, k)
+    tip = seen_from(run.struck, well_sign, run.rest_contact)
+    about = observe(memory, layout, tip, phase_at(run, t), q, p)
+    rest_contact, rest_center = well_sign * run.rest_contact, well_sign * run.rest_center
+    seen = ContactKinematics(
+        about.w + rest_contact, about.wv, about.d, about.dv, about.c + rest_center, about.cv
+    )
+    energy = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
+    energy = add_potential_energy(memory, layout.size, layout.uneven, q, energy)
+    quiet = is_low_energy(above_own_well(layout.uneven, well_sign, energy), layout.gamma, layout.stretch)
+    status = _RUNNING if t < run.clock.end else _OK
+    control = StepControl(touching, disable_long_steps(layout.circuit, quiet), t, t, t, 0)
+    return IntegratorState(t, well_sign, 2.0 * gq + qr, rows, seen, control, sample, landed, status), energy
+
+
+@compiled
+def begin(memory, blocks, workspace, kernel_input, i, accumulators):
+    """Put run *i* into its place in memory; returns what stays and where it stands."""
+    layout, record = workspace.layout, kernel_input.runs[i]
+    size, work = layout.size, layout.work
+    for row in range(size):
+        memory[layout.contact + row] = kernel_input.contact_rows[record.contact_row, row]
+        memory[work + row] = kernel_input.starts[record.start_row, 0, row]
+        memory[work + size + row] = kernel_input.starts[record.start_row, 1, row]
+    run = run_of(memory, layout, workspace.stages, kernel_input, i)
+    rows = Rows(work, work + size, work + 2 * size, work + 3 * size, work + 4 * size, work + 5 * size)
+    if record.well_sign < 0.0:
+        for row in range(size):
+            memory[layout.g + row] = -memory[layout.g + row]
+    put(memory, size, layout.uneven, record.well_sign)
+    put_rate(memory, layout.circuit, record.circuit_rate)
+    begin_further_contacts(
+        memory,
+        size,
+        layout.others,
+        run.struck.drive,
+        kernel_input,
+        i,
+        phase_at(run, 0),
+        record.well_sign,
+        work,
+    )
+    now, energy = restart_from_state(memory, blocks, layout, run, 0, record.well_sign, rows, False, 0, 0)
+    seen, since = now.seen, record.contact_time
+    touching = since >= 0.0
+    if not math.isfinite(since):
+        # under a law whose impacts last no time, what is in touch and closing is about to hit
+        pressed = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
+        touching = pressed and not is_impulsive(run.struck.law)
+    accumulators.touching, accumulators.onset = int(touching), 0
+    if math.isfinite(since) and since > 0.0:
+        accumulators.onset = -int(since / run.clock.tick + 0.5)
+    begin_statistics(
+        accumulators,
+        about_level(layout.uneven, seen).c,
+        seen,
+        run.struck.law,
+        with_further_contact_energy(memory, layout.others, energy + contact_energy(run.struck.law, seen.d)),
+    )
+    control = StepControl(touching, now.control.quiet, 0, 0, 0, 0)
+    return run, IntegratorState(0, now.well_sign, now.stretch, rows, seen, control, 0, 0, now.status)
+
+
+@compiled
+def change_origin(memory, blocks, layout, well_sign, q, k, r):
+    """Take the other well, or where it would be if the two were equal, as the origin: exact, since the structure is the
+    same about both, but for a constant force if they are not.
+
+    About the well that the beam is in, the linear flow holds most of the motion of every mode; about
+    the far one, modes faster than the step would be held in place by kicks alone.
+    """
+    for row in range(layout.size):
+        memory[q + row] -= well_sign * memory[layout.shift + row]
+        memory[layout.g + row] = -memory[layout.g + row]
+    put(memory, layout.size, layout.uneven, -well_sign)
+    gq, qr = tension_rows(memory, blocks, layout, q, r)
+    along_g, along_r = tension_factors(layout.gamma, gq, qr)
+    along_g, along_r = changed_load(memory, layout.forced, along_g, along_r)
+    acceleration_rows(memory, layout, along_g, along_r, r, k)
+    return 2.0 * gq + qr
+
+
+@compiled
+def finish(memory, blocks, layout, run, now, accumulators, impacts, before, goes_on):
+    """Close a run's book; its last contact too, unless the run is to go on from here."""
+    q, p, tick = now.rows.q, now.rows.p, run.clock.tick
+    if now.control.touching:
+        if goes_on:
+            accumulate_open_contact(accumulators, run.struck.law, now.t, tick)
+        else:
+            close_impact(accumulators, impacts, before, run.struck.law, now.t, tick)
+    if now.status == _EARLY_STOP:
+        accumulators.early_stop_time = now.t * tick
+    gq, qr = tension_rows(memory, blocks, layout, q, layout.work + 9 * layout.size)
+    stored = modal_energy(memory, layout, q, p) + tension_energy(layout.gamma, gq, qr)
+    stored = add_potential_energy(memory, layout.size, layout.uneven, q, stored)
+    stored = stored + contact_energy(run.struck.law, now.seen.d)
+    accumulators.energy = with_further_contact_energy(memory, layout.others, stored)
+    accumulators.displacement, accumulators.center = now.seen.w, now.seen.c
+    if now.well_sign < 0.0:
+        # the place in memory is left as it was found
+        for row in range(layout.size):
+            memory[layout.g + row] = -memory[layout.g + row]
+    accumulators.time, accumulators.status, accumulators.samples = now.t, now.status, now.sample

@@ -1,0 +1,112 @@
+"""Where the velocity of a drive jumps, as at the end of a shock: no step may go across, or it loses its order.
+
+A drive names the times of its jumps (:attr:`~snapbeam.model.drive.base.Drive.edges`).  Of one that does not, as the
+paper's, nothing of this is compiled.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from numba.extending import overload
+
+from snapbeam.solver.compilation import INLINE_HERE, inlined
+
+__all__ = ["Jump", "jumps_of", "up_to_discontinuity"]
+
+
+_TWO_PI = 2.0 * math.pi
+_MARGIN = 2
+"""Ticks on either side of a jump, between which one step goes across it: far less than any error of a run."""
+
+
+class Jump(NamedTuple):
+    """A time at which a velocity jumps."""
+
+    time: str
+    """The number that holds it, s since what jumps began."""
+    begun: tuple[tuple[str, str], ...]
+    """Of each motion that it is part of, its argument's phase and rate: what jumps may have begun before the whole."""
+
+
+def jumps_of(kind: Any, prefix: str = "") -> list[Jump]:
+    """The times at which the velocity of a drive jumps, as numbers of it, those of its parts and terms included."""
+    parts = [(f"{prefix}{part}_", each, kind.alone) for part, each in kind.parts]
+    parts += [(f"{prefix}t{i}_", each, False) for i, each in enumerate(kind.terms, 1)]
+    found = [Jump(f"{prefix}{name}", ()) for name in kind.edges]
+    for own, each, alone in parts:
+        begun = () if alone else ((f"{own}phase", f"{own}omega"),)
+        found += [Jump(jump.time, jump.begun + begun) for jump in jumps_of(each, own)]
+    return found
+
+
+def _time_of(jump: Jump, fields: tuple[str, ...]) -> Any:
+    """A function of the numbers of a drive: when it jumps, s since the whole of it began."""
+    at = fields.index(jump.time)
+
+    @inlined
+    def own(drive):
+        return drive[at]
+
+    for phase, omega in jump.begun:
+        own = _later(own, fields.index(phase), fields.index(omega))
+    return own
+
+
+def _later(own: Any, phase: int, omega: int) -> Any:
+    @inlined
+    def later(drive):
+        return own(drive) - drive[phase] / drive[omega]
+
+    return later
+
+
+def _limited(jumps: list[Jump], fields: tuple[str, ...]) -> Any:
+    """A function that ends a step at the first border of any jump."""
+    time, rest = _time_of(jumps[0], fields), _limited(jumps[1:], fields) if len(jumps) > 1 else None
+
+    @inlined
+    def one(drive, phase, period, t, limit):
+        ticks = (time(drive) * drive.omega - phase) / _TWO_PI * period
+        if ticks > t - _MARGIN and ticks < limit + _MARGIN:
+            before, behind = int(ticks) - _MARGIN, int(ticks) + 1 + _MARGIN
+            if before > t:
+                return min(limit, before)
+            if behind > t:
+                return min(limit, behind)
+        return limit
+
+    if rest is None:
+        return one
+
+    @inlined
+    def all_of_them(drive, phase, period, t, limit):
+        return rest(drive, phase, period, t, one(drive, phase, period, t, limit))
+
+    return all_of_them
+
+
+def up_to_discontinuity(drive: Any, phase: float, period: int, t: int, limit: int) -> int:
+    """The tick at which a step from tick *t* ends at the latest: *limit*, or a border of a jump before it.
+
+    Parameters
+    ----------
+    drive : numbers of a drive
+    phase : float
+        Its argument at tick 0.
+    period : int
+        Ticks in which the argument makes a turn.
+    t, limit : int
+        Ticks.
+    """
+    raise TypeError("up_to_edge runs in compiled code only")
+
+
+@overload(up_to_discontinuity, jit_options=INLINE_HERE)
+def _up_to_edge(drive, phase, period, t, limit):
+    jumps = jumps_of(drive.instance_class.owner)
+    if not jumps:
+        return lambda drive, phase, period, t, limit: limit
+    limited = _limited(jumps, tuple(drive.fields))
+    return lambda drive, phase, period, t, limit: limited(drive, phase, period, t, limit)

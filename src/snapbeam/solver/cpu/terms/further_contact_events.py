@@ -1,0 +1,354 @@
+"""When the strikers beside the first one meet the beam and leave it, and what is kept of their contacts.
+
+Each is watched as the first one is: near the beam a free step is looked into, a step that would pass an edge of some
+contact is cut there, and steps in contact are graded.  A step ends at the first edge of all.
+"""
+
+from __future__ import annotations
+
+import math
+
+from snapbeam.solver.compilation import called, inlined
+from snapbeam.solver.cpu.dot import dot
+from snapbeam.solver.cpu.mode_lanes import flow_coefficients, propagate_free, speed_bound
+from snapbeam.solver.cpu.step import with_circuit_acceleration
+from snapbeam.solver.cpu.terms.base_and_load import extra_speed
+from snapbeam.solver.cpu.terms.circuit import circuit_speed_bound, validity_horizon
+from snapbeam.solver.cpu.terms.further_contacts import block, mirror_further_contacts, penetration_of
+from snapbeam.solver.events import TRUST, ContactKinematics, contact_level, refine_onset, safe_interval
+from snapbeam.solver.further_contacts import (
+    CUT,
+    DEEPEST,
+    DEPTH,
+    DEPTH1,
+    HERE,
+    IMPULSE,
+    KEPT,
+    LAW,
+    NUMBERS,
+    ONSET,
+    PUSHED,
+    RATE,
+    RATE1,
+    SAFE,
+    SIGN,
+    SPEED,
+    TOUCHING,
+    WORK,
+    WORKED,
+    count_of,
+    force_of,
+    motion_of,
+)
+from snapbeam.solver.interpolation import first_downcrossing, first_upcrossing, update_extrema
+from snapbeam.solver.simd import WIDTH, lanes_sum, load
+from snapbeam.solver.statistics import OTHER_IMPACTS, OTHER_IMPULSE, OTHER_PEAK, OTHER_WORK
+
+__all__ = [
+    "accumulate_further_contacts",
+    "any_touches",
+    "begin_further_contacts",
+    "close_further_contacts",
+    "first_further_event",
+    "further_contacts_step_level",
+    "observe_further_contacts",
+    "refine_further_onsets",
+    "store_further_contacts",
+    "trusted",
+    "update_further_contacts",
+]
+
+
+@called
+def _begin(memory, size, others, drive, kernel_input, i, argument, well_sign, q):
+    mirror_further_contacts(memory, others, well_sign)
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        depth, velocity = penetration_of(memory, size, others, drive, argument, j, q)
+        rate = velocity - dot(memory, size, others.rows + j * size, q + size)
+        memory[at + DEPTH], memory[at + RATE] = depth, rate
+        if depth > 0.0 or (depth == 0.0 and rate > 0.0):
+            memory[at + TOUCHING], memory[at + DEEPEST] = 1.0, max(depth, 0.0)
+
+
+@inlined
+def begin_further_contacts(memory, size, others, drive, kernel_input, i, argument, well_sign, q):
+    """Put the strikers of run *i* in memory; one that presses at the start touches from then on; p follows *q*."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        for number in range(NUMBERS):
+            memory[at + number] = kernel_input.other_numbers[i, j, number]
+        place = kernel_input.other_places[i, j]
+        for row in range(size):
+            memory[others.rows + j * size + row] = kernel_input.other_rows[place, row]
+    _begin(memory, size, others, drive, kernel_input, i, argument, well_sign, q)
+
+
+@inlined
+def any_touches(memory, others, touching):
+    """Whether the first striker touches, or another one."""
+    if others is None:
+        return touching
+    for j in range(count_of(others.kinds)):
+        touching = touching or memory[block(others, j) + TOUCHING] != 0.0
+    return touching
+
+
+@inlined
+def trusted(memory, others, t, until):
+    """Until when a bound holds that knows free flight alone: not beyond tick *t* while another striker touches."""
+    if others is None:
+        return until
+    return t if any_touches(memory, others, False) else until
+
+
+@inlined
+def further_contacts_step_level(memory, others, clock, t, touching, level):
+    """The level of a step, made finer for those that touch, and finer still where more than one contact lasts.
+
+    A beam that is pressed from several sides has the stiffness of all contacts, whose rates add as squares: of two
+    to four that is one halving.
+    """
+    if others is None:
+        return level
+    count = int(touching)
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        if memory[at + TOUCHING] != 0.0:
+            count += 1
+            elapsed = (t - memory[at + ONSET]) * clock.tick
+            level = max(level, contact_level(clock, elapsed, memory[at + DEPTH], memory[at + RATE]))
+    if count > 1:
+        level = max(level, min(clock.coarsest + 1, clock.finest))
+    return level
+
+
+@inlined
+def observe_further_contacts(memory, size, others, drive, argument, q, p):
+    """Note penetrations and their rates at the end of a step."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        depth, velocity = penetration_of(memory, size, others, drive, argument, j, q)
+        memory[at + DEPTH1] = depth
+        memory[at + RATE1] = velocity - dot(memory, size, others.rows + j * size, p)
+
+
+@called
+def _entry(memory, layout, others, drive, flow, pieces, piece, step, j, scratch):
+    """When within a free step the gap of striker j closes, s; -1 if it does not."""
+    size, row, parts = layout.size, others.rows + j * layout.size, scratch.parts
+    sign, here = memory[block(others, j) + SIGN], memory[block(others, j) + HERE]
+    propagate_free(memory, layout, row, flow, pieces, piece, step.q, step.p, step.k, step.k1, False, parts)
+    push0, push1 = dot(memory, size, row, step.k), dot(memory, size, row, step.k1)
+    before, rate_before = 0.0, 0.0
+    for i in range(pieces + 1):
+        done, owed = i / pieces, 0.5 * piece
+        if i == 0:
+            owed = 0.0
+            w, rate = dot(memory, size, row, step.q), dot(memory, size, row, step.p)
+        else:
+            at = 4 * WIDTH * (i - 1)
+            w, rate = lanes_sum(load(parts, at)), lanes_sum(load(parts, at + WIDTH))
+        motion, velocity = motion_of(drive, memory, step.phase + i * piece * drive.omega, j, sign)
+        depth = here + motion - w
+        closing = velocity - rate - owed * ((1.0 - done) * push0 + done * push1)
+        if i > 0:
+            rise = first_upcrossing(before, rate_before, depth, closing, piece)
+            if rise >= 0.0:
+                return (i - 1 + rise) * piece
+        before, rate_before = depth, closing
+    return -1.0
+
+
+@inlined
+def _looked_for(memory, layout, others, slot, run, drive, step, j, scratch):
+    """The same, in pieces as short as the fastest mode asks for."""
+    look, pieces = slot, run.step_pieces
+    if step.ticks == 2 * run.clock.step:
+        pieces *= 2
+    elif step.ticks != run.clock.step:
+        look += 4 * layout.size
+        pieces = max(2, math.ceil(step.length / run.finest_look))
+        flow_coefficients(memory, layout, step.length / pieces, look)
+    free = with_circuit_acceleration(memory, layout, run.spare, step)
+    return _entry(memory, layout, others, drive, look, pieces, step.length / pieces, free, j, scratch)
+
+
+@called
+def _edge(memory, layout, others, slot, run, t, drive, step, scratch):
+    """The tick of a step at which the first of the others meets or leaves the beam, and each one's own."""
+    size, tick, earliest = layout.size, run.clock.tick, step.ticks
+    after = t + step.ticks
+    # a contact changes how fast the others may close: nothing that was known in free flight holds while one lasts
+    busy = any_touches(memory, others, step.touching)
+    for j in range(count_of(others.kinds)):
+        at, row, cut = block(others, j), others.rows + j * size, -1
+        depth, rate, depth1, rate1 = (
+            memory[at + DEPTH], memory[at + RATE], memory[at + DEPTH1], memory[at + RATE1]
+        )  # fmt: skip
+        if memory[at + TOUCHING] != 0.0:
+            if depth1 <= 0.0:
+                cut = step.ticks
+                if depth > 0.0:
+                    cut = max(
+                        1, int(first_downcrossing(depth, rate, depth1, rate1, step.length) * step.ticks)
+                    )
+        else:
+            if busy:
+                memory[at + SAFE] = t
+            elif after > memory[at + SAFE]:
+                bound, known = (
+                    speed_bound(memory, layout, row, step.q, step.p),
+                    validity_horizon(layout.circuit, run.step_time),
+                )
+                bound = circuit_speed_bound(
+                    memory, size, layout.omega, layout.circuit, row, step.q, step.p, bound, TRUST * known
+                )
+                bound += extra_speed(layout.forced, memory, size, drive, row, TRUST * run.step_time)
+                push = dot(memory, size, row, step.k)
+                safe = safe_interval(-depth, bound, memory[at + SPEED], push, known)
+                memory[at + SAFE] = t + int(safe / tick)
+            entry = -1.0
+            if after > memory[at + SAFE]:
+                if step.touching:
+                    # what is looked into knows nothing of the first contact's force; the ends of the step do
+                    entry = first_upcrossing(depth, rate, depth1, rate1, step.length) * step.length
+                else:
+                    entry = _looked_for(memory, layout, others, slot, run, drive, step, j, scratch)
+            if entry >= 0.0:
+                cut = min(step.ticks, int(entry / tick))
+            elif depth1 > 0.0:
+                cut = step.ticks
+        memory[at + CUT] = cut
+        if cut >= 0:
+            earliest = min(earliest, cut)
+    return earliest
+
+
+@inlined
+def first_further_event(memory, layout, others, slot, run, t, drive, step, scratch):
+    """The tick within a step at which the first of the other strikers meets or leaves the beam; its end if none does.
+
+    *slot* is where the flow over a piece of a look stands.
+    """
+    if others is None:
+        return step.ticks
+    return _edge(memory, layout, others, slot, run, t, drive, step, scratch)
+
+
+@inlined
+def refine_further_onsets(memory, others, clock, edge, cut, whole, least, due):
+    """Where a step that was cut at *cut* is to be cut, knowing better how far the gap of one that enters there is.
+
+    Nothing new unless it is *due*: the *edge* at which the step was cut first is one of theirs.
+    """
+    if others is None:
+        return cut
+    if due:
+        for j in range(count_of(others.kinds)):
+            at = block(others, j)
+            if memory[at + TOUCHING] == 0.0 and memory[at + CUT] == edge:
+                seen = ContactKinematics(0.0, 0.0, memory[at + DEPTH1], memory[at + RATE1], 0.0, 0.0)
+                return refine_onset(clock, cut, whole, seen, least)
+    return cut
+
+
+@inlined
+def store_further_contacts(memory, others):
+    """Keep what the accepted step gave: a look ahead that follows writes over it."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        memory[at + KEPT], memory[at + WORKED] = memory[at + IMPULSE], memory[at + WORK]
+
+
+@inlined
+def accumulate_further_contacts(memory, others, touching, done, accumulators):
+    """Enter the work of each of the others in the statistics, and of all if the first does not touch."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        accumulators.others[j, OTHER_WORK] += memory[block(others, j) + WORKED]
+    if not touching:
+        accumulators.work += done.work
+        accumulators.gross_work += done.gross
+
+
+@inlined
+def _leave(memory, others, j, accumulators, outputs, t, tick):
+    """Enter a contact that ends at tick *t* in the statistics, unless nothing was pressed."""
+    at = block(others, j)
+    deepest = memory[at + DEEPEST]
+    if deepest > 0.0:
+        onset, add_static_load = memory[at + ONSET], memory[at + PUSHED]
+        duration, force = (t - onset) * tick, force_of(others.kinds, memory, at + LAW, j, deepest)
+        _write_impact(outputs, accumulators, onset * tick, duration, force, add_static_load, j)
+        accumulators.impacts += 1
+        accumulators.contact_time += duration
+        accumulators.others[j, OTHER_IMPACTS] += 1.0
+        accumulators.others[j, OTHER_PEAK] = max(accumulators.others[j, OTHER_PEAK], force)
+    accumulators.total_impulse += memory[at + PUSHED]
+    accumulators.others[j, OTHER_IMPULSE] += memory[at + PUSHED]
+    memory[at + TOUCHING], memory[at + DEEPEST], memory[at + PUSHED] = 0.0, 0.0, 0.0
+
+
+@inlined
+def _write_impact(outputs, accumulators, onset, duration, force, impulse, j):
+    if outputs is None:
+        return
+    at = accumulators.impacts - outputs.marks[1]
+    if at < outputs.impacts.shape[0]:
+        outputs.impacts[at, 0], outputs.impacts[at, 1] = onset, duration
+        outputs.impacts[at, 2], outputs.impacts[at, 3] = force, impulse
+        outputs.impacts[at, 4] = j + 2
+
+
+@called
+def _turn(memory, others, edge, t, length, tick, accumulators, outputs):
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        depth, rate, depth1, rate1 = (
+            memory[at + DEPTH], memory[at + RATE], memory[at + DEPTH1], memory[at + RATE1]
+        )  # fmt: skip
+        touching = memory[at + TOUCHING] != 0.0
+        if touching and length > 0.0:
+            memory[at + DEEPEST] = update_extrema(
+                memory[at + DEPTH], max(memory[at + DEEPEST], depth1), depth, rate, depth1, rate1, length
+            )[1]
+            memory[at + PUSHED] += memory[at + KEPT]
+        if length > 0.0:
+            memory[at + DEPTH], memory[at + RATE] = depth1, rate1
+        if memory[at + CUT] >= 0.0 and memory[at + CUT] <= edge:
+            memory[at + SAFE] = t
+            if touching:
+                _leave(memory, others, j, accumulators, outputs, t, tick)
+                memory[at + DEPTH] = min(memory[at + DEPTH], 0.0)
+            else:
+                memory[at + TOUCHING], memory[at + ONSET] = 1.0, t
+                memory[at + DEEPEST], memory[at + PUSHED] = 0.0, 0.0
+
+
+@inlined
+def update_further_contacts(memory, others, edge, t, length, tick, accumulators, outputs):
+    """Where they stand at tick *t*, after a step of *length* (s) whose first edge was at tick *edge* of it.
+
+    With a length of 0 nothing has moved: those turn whose gap closes as the step begins.
+    """
+    if others is None:
+        return
+    _turn(memory, others, edge, t, length, tick, accumulators, outputs)
+
+
+@inlined
+def close_further_contacts(memory, others, accumulators, outputs, t, tick):
+    """Enter the contacts that go on at the end of a run."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        if memory[block(others, j) + TOUCHING] != 0.0:
+            _leave(memory, others, j, accumulators, outputs, t, tick)

@@ -1,0 +1,166 @@
+"""The forces of the strikers beside the first one: accelerations that follow from place and time.
+
+Striker j has the contact's row c_j, with the sign of its own side, and pushes the beam with f_j(d_j), where
+
+    d_j = offset_j + motion_j(t) - c_j . q.
+
+A force without loss is a kick like that of the tension, p' += sum_j c_j f_j: it stands in memory beside the first
+striker's, is entered before each kick, and is part of the acceleration that a step keeps for the next.
+
+*others* is an :class:`FurtherContacts` or None, by type: with one striker nothing of this is compiled.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from snapbeam.solver.compilation import called, inlined
+from snapbeam.solver.cpu.dot import dot
+from snapbeam.solver.further_contacts import (
+    DEPTH,
+    FORCE,
+    GROSS,
+    HERE,
+    IMPULSE,
+    LAW,
+    NUMBERS,
+    OFFSET,
+    REST,
+    SIGN,
+    TOUCHING,
+    WORK,
+    count_of,
+    energy_of,
+    force_of,
+    motion_of,
+)
+from snapbeam.solver.simd import WIDTH, broadcast_load, fma, lanes_sum, load, splat
+
+__all__ = [
+    "FurtherContacts",
+    "block",
+    "evaluate_contacts",
+    "mirror_further_contacts",
+    "penetration_of",
+    "struck",
+    "struck_along",
+    "with_further_contact_energy",
+    "with_further_contact_gross_work",
+    "with_further_contact_work",
+]
+
+
+class FurtherContacts(NamedTuple):
+    """Where in memory the strikers beside the first one stand."""
+
+    rows: int
+    """Their contact rows, one after the other."""
+    numbers: int
+    """Their blocks of numbers."""
+    kinds: Any
+    """A value whose type says which laws they touch by."""
+
+
+@inlined
+def block(others, j):
+    """Where the numbers of striker j stand."""
+    return others.numbers + j * NUMBERS
+
+
+@inlined
+def penetration_of(memory, size, others, drive, argument, j, q):
+    """Penetration of striker j, and the velocity of its tip."""
+    at = block(others, j)
+    motion, velocity = motion_of(drive, memory, argument, j, memory[at + SIGN])
+    return memory[at + HERE] + motion - dot(memory, size, others.rows + j * size, q), velocity
+
+
+@called
+def _press(memory, size, others, drive, argument, q, weight, begins):
+    for j in range(count_of(others.kinds)):
+        at, force, velocity = block(others, j), 0.0, 0.0
+        if begins:
+            memory[at + IMPULSE], memory[at + WORK], memory[at + GROSS] = 0.0, 0.0, 0.0
+        if memory[at + TOUCHING] != 0.0:
+            depth, velocity = penetration_of(memory, size, others, drive, argument, j, q)
+            force = force_of(others.kinds, memory, at + LAW, j, depth)
+        memory[at + FORCE] = force
+        memory[at + IMPULSE] += weight * force
+        memory[at + WORK] += weight * force * velocity
+        memory[at + GROSS] += weight * abs(force * velocity)
+
+
+@inlined
+def evaluate_contacts(memory, size, others, drive, argument, q, weight, begins):
+    """Put the forces at a place and an argument of the drive at hand; add up what a kick of *weight* by them does.
+
+    *begins*: with the first kick of a step.
+    """
+    if others is None:
+        return
+    _press(memory, size, others, drive, argument, q, weight, begins)
+
+
+@inlined
+def struck(memory, size, others, row, k):
+    """An acceleration with what the other strikers add."""
+    if others is None:
+        return k
+    for j in range(count_of(others.kinds)):
+        force = broadcast_load(memory, block(others, j) + FORCE)
+        k = fma(force, load(memory, others.rows + j * size + row), k)
+    return k
+
+
+@inlined
+def struck_along(memory, size, others, contact, along):
+    """The same along the first contact's row."""
+    if others is None:
+        return along
+    for j in range(count_of(others.kinds)):
+        total = splat(0.0)
+        for row in range(0, size, WIDTH):
+            total = fma(load(memory, others.rows + j * size + row), load(memory, contact + row), total)
+        along += memory[block(others, j) + FORCE] * lanes_sum(total)
+    return along
+
+
+@inlined
+def mirror_further_contacts(memory, others, well_sign):
+    """Where they are, as seen from the well *home*."""
+    if others is None:
+        return
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        memory[at + HERE] = memory[at + OFFSET] + (1.0 - well_sign) * memory[at + REST]
+
+
+@inlined
+def with_further_contact_work(memory, others, work):
+    """Work of the first striker in a step with that of the others."""
+    if others is None:
+        return work
+    for j in range(count_of(others.kinds)):
+        work += memory[block(others, j) + WORK]
+    return work
+
+
+@inlined
+def with_further_contact_gross_work(memory, others, gross):
+    """The same, every part taken as positive."""
+    if others is None:
+        return gross
+    for j in range(count_of(others.kinds)):
+        gross += memory[block(others, j) + GROSS]
+    return gross
+
+
+@inlined
+def with_further_contact_energy(memory, others, energy):
+    """An energy with what the other contacts store."""
+    if others is None:
+        return energy
+    for j in range(count_of(others.kinds)):
+        at = block(others, j)
+        energy += energy_of(others.kinds, memory, at + LAW, j, memory[at + DEPTH])
+    return energy

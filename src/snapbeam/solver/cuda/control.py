@@ -1,0 +1,338 @@
+"""One step of a run on the device, and what follows it: the decisions of the CPU engine, a thread a mode."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from snapbeam.solver.cuda.layout import device, shared
+from snapbeam.solver.cuda.state import Held, Standing
+from snapbeam.solver.cuda.step import Functions
+from snapbeam.solver.events import (
+    ContactKinematics,
+    accumulate_displacement,
+    accumulate_energy,
+    close_impact,
+    contact_level,
+    count_zero_crossings_in_step,
+    first_contact_onset,
+    flight_level,
+    is_low_energy,
+    refine_onset,
+    safe_interval,
+    ticks_of,
+)
+from snapbeam.solver.excitation import seen_from
+from snapbeam.solver.interpolation import first_downcrossing, turning_point, update_extrema
+from snapbeam.solver.physics import mode_energy, tension_acceleration, tension_energy, tension_factors
+from snapbeam.util.status_codes import RunStatus
+
+__all__ = ["step_function"]
+
+
+_OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
+_DIVERGED, _STEP_LIMIT = int(RunStatus.DIVERGED), int(RunStatus.STEP_LIMIT)
+_TWO_PI = 2.0 * math.pi
+# What a pass through a step is for.
+_WHOLE, _CUT, _DEEPEST = 0, 1, 2
+
+_first_entry, _count_in_step, _entry_again = (
+    shared(first_contact_onset),
+    shared(count_zero_crossings_in_step),
+    shared(refine_onset),
+)
+_finish_impact, _track, _track_energy = (
+    shared(close_impact),
+    shared(accumulate_displacement),
+    shared(accumulate_energy),
+)
+_safe_for, _is_quiet, _ticks_of = shared(safe_interval), shared(is_low_energy), shared(ticks_of)
+_flight_level, _contact_level, _seen_from = shared(flight_level), shared(contact_level), shared(seen_from)
+_first_fall, _turning_point, _widened = (
+    shared(first_downcrossing),
+    shared(turning_point),
+    shared(update_extrema),
+)
+
+
+class Taken(NamedTuple):
+    """A step that was taken: what it gave, where it was cut and how it was looked into."""
+
+    own: Standing
+    seen: ContactKinematics
+    span: int
+    length: float
+    event: bool
+    entered: bool
+    failed: bool
+    deepest: float
+    safe_gap: int
+    safe_center: int
+    pieces: int
+    piece: float
+    impulse: float
+    work: float
+    gross: float
+
+
+def _watching(functions: Functions) -> tuple[Any, Any, Any]:
+    """Device functions of what is watched for: a change of well, how long nothing can happen, what is in a step."""
+    sum_four, tension = functions.sum_four, functions.tension
+    sample_inside_step, flow_into = functions.sample_inside_step, functions.flow_into
+
+    @device
+    def home_again(block, fixed, held):
+        """The other well becomes the origin, if the centre has crossed over; see change_well."""
+        own, well_sign = held.own, held.well_sign
+        if not (fixed.rest_stretch > 0.0 and held.seen.c * (well_sign * fixed.rest_center) < 0.0):
+            return own, well_sign
+        q, well_sign = own.q - well_sign * fixed.shift, -well_sign
+        g, r = well_sign * fixed.g, tension(block, q)
+        gq, qr, _, _ = sum_four(block, g * q, r * q, 0.0, 0.0)
+        along_g, along_r = tension_factors(fixed.gamma, gq, qr)
+        return Standing(q, own.p, tension_acceleration(along_g, along_r, g, r), gq, qr), well_sign
+
+    @device
+    def safe_until(block, fixed, held, own, after):
+        """Until when the gap cannot close and the centre cannot cross, looked at again where it is needed."""
+        safe_gap, safe_center = held.safe_gap, held.safe_center
+        if after > min(safe_gap, safe_center):
+            mode, clock = fixed.mode, fixed.clock
+            oq = abs(mode.omega * own.q) + abs(own.p)
+            gap_bound, gap_push, center_bound, center_push = sum_four(
+                block,
+                abs(mode.contact) * oq,
+                mode.contact * own.k,
+                abs(mode.center) * oq,
+                mode.center * own.k,
+            )
+            if after > safe_gap:
+                safe = _safe_for(-held.seen.d, gap_bound, fixed.tip_speed, gap_push, fixed.step_time)
+                safe_gap = held.t + int(safe / clock.tick)
+            if after > safe_center:
+                safe = _safe_for(abs(held.seen.c), center_bound, 0.0, center_push, fixed.step_time)
+                safe_center = held.t + int(safe / clock.tick)
+        return safe_gap, safe_center
+
+    @device
+    def looked(block, fixed, tip, own, k1, phase, span, length):
+        """Look inside a free step; in how many pieces of which length."""
+        look, pieces, step = fixed.whole_look, fixed.step_pieces, fixed.clock.step
+        if span == 2 * step:
+            pieces *= 2
+        elif span != step:
+            look += 1
+            pieces = max(2, math.ceil(length / fixed.finest_look))
+            flow_into(block, fixed.mode, length / pieces, look)
+        piece = length / pieces
+        sample_inside_step(block, fixed.mode, tip, look, pieces, piece, phase, own.q, own.p, own.k, k1)
+        return pieces, piece
+
+    return home_again, safe_until, looked
+
+
+def _taking(functions: Functions, safe_until: Any, looked: Any) -> Any:
+    """The device function that takes a step and cuts it short."""
+    observe, take_step, prepare = functions.observe, functions.take_step, functions.prepare
+
+    @device
+    def taken(block, fixed, held, own, well_sign, span, slot, phase):
+        """Take a step, cut it short at an event, and look for the deepest point: one text for all three."""
+        clock, seen, touching = fixed.clock, held.seen, held.touching
+        tip = _seen_from(fixed.struck, well_sign, fixed.rest_contact)
+        g, tick = well_sign * fixed.g, clock.tick
+        length = span * tick
+        here, purpose = length, _WHOLE
+        event, entered, failed, deepest = False, False, False, held.deepest
+        pieces, piece = 0, 0.0
+        whole, found = span, touching
+        safe_gap, safe_center = held.safe_gap, held.safe_center
+        own1, seen1, impulse, work, gross = own, seen, 0.0, 0.0, 0.0
+        while True:
+            if slot == fixed.cut_slot:
+                prepare(block, fixed.mode, fixed.struck.drive.omega, here, slot)
+            q2, p2, k2, gq2, qr2, impulse2, work2, gross2 = take_step(
+                block, fixed.mode, g, fixed.gamma, tip, slot, here, phase, touching, own.q, own.p, own.k
+            )
+            about = observe(block, fixed.mode, tip, phase + tip.drive.omega * here, q2, p2)
+            if purpose == _DEEPEST:
+                deepest = max(deepest, about.d)
+                break
+            own1 = Standing(q2, p2, k2, gq2, qr2)
+            seen1 = ContactKinematics(
+                about.w + well_sign * fixed.rest_contact, about.wv, about.d, about.dv,
+                about.c + well_sign * fixed.rest_center, about.cv,
+            )  # fmt: skip
+            impulse, work, gross = impulse2, work2, gross2
+            if purpose == _WHOLE:
+                if not math.isfinite(seen1.d + seen1.dv):
+                    failed = True
+                    break
+                cut = span
+                if touching:
+                    if seen1.d <= 0.0:
+                        event = True
+                        if seen.d > 0.0:
+                            cut = max(1, int(_first_fall(seen.d, seen.dv, seen1.d, seen1.dv, length) * span))
+                else:
+                    after = held.t + span
+                    safe_gap, safe_center = safe_until(block, fixed, held, own, after)
+                    if after > min(safe_gap, safe_center):
+                        pieces, piece = looked(block, fixed, tip, own, k2, phase, span, length)
+                        if after > safe_gap:
+                            entry = _first_entry(block.seen, pieces, piece)
+                            if entry >= 0.0:
+                                event, cut = True, min(span, int(entry / tick))
+                                entered = cut < 1
+                if entered:
+                    break
+                if cut < span:
+                    span, length = cut, cut * tick
+                    here, slot, purpose = length, fixed.cut_slot, _CUT
+                    continue
+            if event and not found:
+                cut, found = (
+                    _entry_again(clock, span, whole, seen1, (clock.step >> clock.finest) * tick),
+                    True,
+                )
+                if cut != span:
+                    span, length = cut, cut * tick
+                    here, slot, purpose = length, fixed.cut_slot, _CUT
+                    continue
+            if touching:
+                deepest = max(deepest, seen1.d)
+                turn = _turning_point(seen.d, seen.dv, seen1.d, seen1.dv, length) if seen.dv > 0.0 else -1.0
+                if turn > 0.0 and (
+                    _widened(seen.d, deepest, seen.d, seen.dv, seen1.d, seen1.dv, length)[1] > deepest
+                ):
+                    here, slot, purpose = turn * length, fixed.cut_slot, _DEEPEST
+                    continue
+            break
+        return Taken(
+            own1, seen1, span, length, event, entered, failed, deepest, safe_gap, safe_center, pieces, piece,
+            impulse, work, gross,
+        )  # fmt: skip
+
+    return taken
+
+
+def _keeping(functions: Functions) -> tuple[Any, Any]:
+    """Device functions of what is kept of a step."""
+    sum_four = functions.sum_four
+
+    @device
+    def keep(block, fixed, held, well_sign, step, counted, accumulators):
+        """Enter a step in the statistics; the first thread keeps the book."""
+        if block.lane == 0:
+            if held.touching:
+                accumulators.impulse += step.impulse
+                accumulators.work += step.work
+                accumulators.gross_work += step.gross
+                accumulators.deepest = step.deepest
+            _track(accumulators, held.seen, step.seen, step.length)
+            if counted:
+                _count_in_step(
+                    accumulators, fixed.clock, held.t, step.length, held.seen, step.seen, block.seen,
+                    well_sign * fixed.rest_center, step.pieces, step.piece,
+                )  # fmt: skip
+
+    @device
+    def weigh(block, fixed, held, step, t, well_sign, touching, released, status, accumulators):
+        """After some steps, or a release, the energy is looked at."""
+        quiet, monitor_energy, own = held.quiet, held.monitor_energy, step.own
+        if released or (held.steps & 7) == 0:
+            energy = mode_energy(fixed.mode.omega, own.q, own.p)
+            linear, high, _, _ = sum_four(block, energy, fixed.mode.high * energy, 0.0, 0.0)
+            if block.lane == 0:
+                _track_energy(accumulators, linear, high, (t - monitor_energy) * fixed.clock.tick)
+            monitor_energy = t
+            if not touching:
+                energy = linear + tension_energy(fixed.gamma, own.gq, own.qr)
+                quiet = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
+                far = well_sign < 0.0 and step.seen.w > fixed.clock.decide_reach and step.seen.c > 0.0
+                if not step.event and far and (held.steps & 15) == 0 and energy < fixed.clock.decide_energy:
+                    status = _EARLY_STOP
+        return quiet, monitor_energy, status
+
+    return keep, weigh
+
+
+def step_function(functions: Functions) -> Any:
+    """The device function that takes a run one step further."""
+    home_again, safe_until, looked = _watching(functions)
+    taken = _taking(functions, safe_until, looked)
+    keep, weigh = _keeping(functions)
+    synchronise = functions.synchronise
+
+    @device
+    def further(block, fixed, held, accumulators):
+        """The run after one more step."""
+        clock = fixed.clock
+        own, well_sign = home_again(block, fixed, held)
+        steps = held.steps + 1
+        level = _flight_level(clock, held.quiet, 2.0 * own.gq + own.qr, fixed.rest_stretch)
+        if held.touching:
+            elapsed = (held.t - held.onset) * clock.tick
+            level = max(level, _contact_level(clock, elapsed, held.seen.d, held.seen.dv))
+        span, slot = _ticks_of(clock, level), level + 1
+        if held.t + span > clock.end:
+            span, slot = clock.end - held.t, fixed.cut_slot
+        phase = fixed.phase + _TWO_PI * ((held.t % clock.period) / clock.period)
+        step = taken(block, fixed, held, own, well_sign, span, slot, phase)
+        if step.failed or step.entered:
+            status = _DIVERGED if step.failed else _STEP_LIMIT if steps >= clock.max_steps else _RUNNING
+            onset = held.t if step.entered else held.onset
+            if block.lane == 0 and step.entered:
+                accumulators.touching, accumulators.onset = 1, held.t
+            return Held(
+                held.t, well_sign, own, held.seen, held.touching or step.entered, held.quiet, step.safe_gap,
+                step.safe_center, onset, held.deepest, held.monitor_energy, steps, status,
+            )  # fmt: skip
+        counted = held.touching or held.t + step.span > step.safe_center
+        keep(block, fixed, held, well_sign, step, counted, accumulators)
+        t, seen = held.t + step.span, step.seen
+        status = _RUNNING if t < clock.end else _OK
+        touching, onset, deepest = held.touching != step.event, held.onset, step.deepest
+        safe_gap, safe_center = step.safe_gap, step.safe_center
+        released = step.event and held.touching
+        if step.event:
+            safe_gap, safe_center = t, t
+            if held.touching:
+                if block.lane == 0:
+                    _finish_impact(accumulators, None, 0, fixed.struck.law, t, clock.tick)
+                deepest = 0.0
+                seen = ContactKinematics(seen.w, seen.wv, min(seen.d, 0.0), seen.dv, seen.c, seen.cv)
+            else:
+                onset = t
+                if block.lane == 0:
+                    accumulators.touching, accumulators.onset = 1, t
+        counting = Held(
+            held.t, held.well_sign, held.own, held.seen, held.touching, held.quiet, held.safe_gap, held.safe_center,
+            held.onset, held.deepest, held.monitor_energy, steps, held.status,
+        )  # fmt: skip
+        quiet, monitor_energy, status = weigh(
+            block, fixed, counting, step, t, well_sign, touching, released, status, accumulators
+        )
+        if counted and clock.decide_crossings >= 0:
+            synchronise()
+            if accumulators.zero_crossings_last_quarter > clock.decide_crossings:
+                status = _EARLY_STOP
+        if status == _RUNNING and steps >= clock.max_steps:
+            status = _STEP_LIMIT
+        return Held(
+            t,
+            well_sign,
+            step.own,
+            seen,
+            touching,
+            quiet,
+            safe_gap,
+            safe_center,
+            onset,
+            deepest,
+            monitor_energy,
+            steps,
+            status,
+        )
+
+    return further

@@ -1,0 +1,246 @@
+"""A run of the CUDA engine: what stays the same in it, where it stands, how it begins, is laid down and ends."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from snapbeam.solver.contact_force import contact_energy
+from snapbeam.solver.cuda.layout import device, shared
+from snapbeam.solver.cuda.step import Functions, Mode
+from snapbeam.solver.events import (
+    PIECES,
+    Clock,
+    ContactKinematics,
+    begin_statistics,
+    clock_of,
+    close_impact,
+    is_low_energy,
+)
+from snapbeam.solver.excitation import Tip, numbers_of, seen_from
+from snapbeam.solver.physics import mode_energy, tension_acceleration, tension_energy, tension_factors
+from snapbeam.util.status_codes import RunStatus
+
+__all__ = ["Fixed", "Held", "Standing", "run_functions"]
+
+
+_OK, _EARLY_STOP, _RUNNING = int(RunStatus.OK), int(RunStatus.EARLY_STOP), int(RunStatus.INTERRUPTED)
+_TWO_PI = 2.0 * math.pi
+
+_finish_impact, _open_book = shared(close_impact), shared(begin_statistics)
+_clock_of, _seen_from, _is_quiet = shared(clock_of), shared(seen_from), shared(is_low_energy)
+
+
+class Fixed(NamedTuple):
+    """What stays the same in a run."""
+
+    struck: Tip
+    clock: Clock
+    phase: float
+    rest_contact: float
+    rest_center: float
+    tip_speed: float
+    finest_look: float
+    step_pieces: int
+    step_time: float
+    mode: Mode
+    g: float
+    """Of this thread's mode, in the first well."""
+    shift: float
+    gamma: float
+    rest_stretch: float
+    cut_slot: int
+    whole_look: int
+
+
+class Standing(NamedTuple):
+    """What belongs to a thread's mode, and the tension's sums."""
+
+    q: float
+    p: float
+    k: float
+    gq: float
+    qr: float
+
+
+class Held(NamedTuple):
+    """Where a run stands."""
+
+    t: int
+    well_sign: float
+    own: Standing
+    seen: ContactKinematics
+    touching: bool
+    quiet: bool
+    safe_gap: int
+    safe_center: int
+    onset: int
+    deepest: float
+    monitor_energy: int
+    steps: int
+    status: int
+
+
+def run_functions(functions: Functions, threads: int, finest: int) -> tuple[Any, Any, Any, Any, Any]:
+    """Device functions: fixed_of, begin, take_up, lay_down, finish."""
+    begin, finish = _ends(functions)
+    restore_state, lay_down = _pauses()
+
+    return _fixing(functions, threads, finest), begin, restore_state, lay_down, finish
+
+
+def _fixing(functions: Functions, threads: int, finest: int) -> Any:
+    """The device function of what stays the same in a run."""
+    prepare, flow_into, distinct = functions.prepare, functions.flow_into, functions.distinct
+
+    @device
+    def fixed_of(block, structure, kernel_input, i, fresh):
+        """What stays the same in run *i*; its prepared steps, if it is *fresh*."""
+        lane, record = block.lane, kernel_input.runs[i]
+        mode = Mode(
+            structure[0, lane], structure[1, lane], structure[2, lane], structure[3, lane],
+            structure[5, lane], kernel_input.contact_rows[record.contact_row, lane], structure[7, lane],
+        )  # fmt: skip
+        struck = Tip(
+            record.offset,
+            numbers_of(kernel_input.law, kernel_input.law_numbers, i),
+            numbers_of(kernel_input.drive, kernel_input.drive_numbers, i),
+        )
+        clock = _clock_of(record, kernel_input.max_steps)
+        step_time = clock.step * clock.tick
+        fastest = struck.drive.omega
+        for j in range(threads):
+            fastest = max(fastest, structure[0, j])
+        finest_look = _TWO_PI / (PIECES * fastest)
+        step_pieces = max(4, math.ceil(step_time / finest_look))
+        whole_look = (finest + 3) * distinct
+        if fresh:
+            for level in range(clock.finest + 2):
+                prepare(block, mode, struck.drive.omega, 2.0 * step_time / (1 << level), level)
+            flow_into(block, mode, step_time / step_pieces, whole_look)
+        return Fixed(
+            struck, clock, record.phase, record.rest_contact, record.rest_center, record.tip_speed,
+            finest_look, step_pieces, step_time, mode, structure[4, lane], structure[6, lane],
+            kernel_input.gamma, kernel_input.stretch, finest + 2, whole_look,
+        )  # fmt: skip
+
+    return fixed_of
+
+
+def _ends(functions: Functions) -> tuple[Any, Any]:
+    """Device functions: how a run begins, and how it ends."""
+    sum_one, sum_four, tension = functions.sum_one, functions.sum_four, functions.tension
+    observe = functions.observe
+
+    @device
+    def tensioned(block, fixed, well_sign, q, p):
+        """This thread's part of a state, with the tension's sums."""
+        g = well_sign * fixed.g
+        r = tension(block, q)
+        gq, qr, _, _ = sum_four(block, g * q, r * q, 0.0, 0.0)
+        along_g, along_r = tension_factors(fixed.gamma, gq, qr)
+        return Standing(q, p, tension_acceleration(along_g, along_r, g, r), gq, qr)
+
+    @device
+    def begin(block, fixed, kernel_input, i, accumulators):
+        lane, record = block.lane, kernel_input.runs[i]
+        q, p = kernel_input.starts[record.start_row, 0, lane], kernel_input.starts[record.start_row, 1, lane]
+        well_sign = record.well_sign
+        own = tensioned(block, fixed, well_sign, q, p)
+        tip = _seen_from(fixed.struck, well_sign, fixed.rest_contact)
+        about = observe(block, fixed.mode, tip, fixed.phase, q, p)
+        seen = ContactKinematics(
+            about.w + well_sign * fixed.rest_contact, about.wv, about.d, about.dv,
+            about.c + well_sign * fixed.rest_center, about.cv,
+        )  # fmt: skip
+        energy = sum_one(block, mode_energy(fixed.mode.omega, q, p)) + tension_energy(
+            fixed.gamma, own.gq, own.qr
+        )
+        quiet = _is_quiet(energy, fixed.gamma, fixed.rest_stretch)
+        touching = seen.d > 0.0 or (seen.d == 0.0 and seen.dv > 0.0)
+        if lane == 0:
+            accumulators.status, accumulators.touching, accumulators.onset = _RUNNING, int(touching), 0
+            _open_book(
+                accumulators,
+                seen.c,
+                seen,
+                fixed.struck.law,
+                energy + contact_energy(fixed.struck.law, seen.d),
+            )
+        return Held(0, well_sign, own, seen, touching, quiet, 0, 0, 0, max(seen.d, 0.0), 0, 0, _RUNNING)
+
+    @device
+    def finish(block, fixed, held, accumulators):
+        linear = sum_one(block, mode_energy(fixed.mode.omega, held.own.q, held.own.p))
+        if block.lane == 0:
+            clock, law = fixed.clock, fixed.struck.law
+            if held.touching:
+                _finish_impact(accumulators, None, 0, law, held.t, clock.tick)
+            if held.status == _EARLY_STOP:
+                accumulators.early_stop_time = held.t * clock.tick
+            accumulators.energy = (
+                linear
+                + tension_energy(fixed.gamma, held.own.gq, held.own.qr)
+                + contact_energy(law, held.seen.d)
+            )
+            accumulators.displacement, accumulators.center = held.seen.w, held.seen.c
+            accumulators.time, accumulators.status, accumulators.steps = held.t, held.status, held.steps
+
+    return begin, finish
+
+
+def _pauses() -> tuple[Any, Any]:
+    """Device functions: a run is taken up where it stood, and laid down."""
+
+    @device
+    def restore_state(block, index, kernel_output, accumulators):
+        """Where a run stood when it was laid down."""
+        lane, marks, reals, modes = block.lane, kernel_output.marks, kernel_output.reals, kernel_output.modes
+        own = Standing(
+            modes[index, 0, lane],
+            modes[index, 1, lane],
+            modes[index, 2, lane],
+            reals[index, 6],
+            reals[index, 7],
+        )
+        seen = ContactKinematics(
+            reals[index, 0],
+            reals[index, 1],
+            reals[index, 2],
+            reals[index, 3],
+            reals[index, 4],
+            reals[index, 5],
+        )
+        return Held(
+            accumulators.time, float(marks[index, 2]), own, seen, accumulators.touching != 0, marks[index, 3] != 0,
+            marks[index, 0], marks[index, 1], accumulators.onset, reals[index, 8], marks[index, 4], accumulators.steps, _RUNNING,
+        )  # fmt: skip
+
+    @device
+    def lay_down(block, index, kernel_output, accumulators, held):
+        lane = block.lane
+        own, seen = held.own, held.seen
+        (
+            kernel_output.modes[index, 0, lane],
+            kernel_output.modes[index, 1, lane],
+            kernel_output.modes[index, 2, lane],
+        ) = (
+            own.q,
+            own.p,
+            own.k,
+        )
+        if lane == 0:
+            marks, reals = kernel_output.marks, kernel_output.reals
+            marks[index, 0], marks[index, 1], marks[index, 2] = (
+                held.safe_gap,
+                held.safe_center,
+                int(held.well_sign),
+            )
+            marks[index, 3], marks[index, 4] = int(held.quiet), held.monitor_energy
+            reals[index, 0], reals[index, 1], reals[index, 2] = seen.w, seen.wv, seen.d
+            reals[index, 3], reals[index, 4], reals[index, 5] = seen.dv, seen.c, seen.cv
+            reals[index, 6], reals[index, 7], reals[index, 8] = own.gq, own.qr, held.deepest
+            accumulators.time, accumulators.status, accumulators.steps = held.t, held.status, held.steps
+            accumulators.touching, accumulators.onset = int(held.touching), held.onset
+
+    return restore_state, lay_down

@@ -1,0 +1,160 @@
+"""What an engine is asked for: many runs of one structure, in no engine's layout."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.drive.base import Drive, Scale
+from snapbeam.model.harvester import Harvester
+from snapbeam.solver.structure import Structure
+
+__all__ = ["RUN", "CircuitCoupling", "Ensemble", "FurtherContactTable"]
+
+
+_Array = NDArray[np.float64]
+_Integers = NDArray[np.int64]
+
+
+class CircuitCoupling(NamedTuple):
+    """A harvester's circuit, for every run, arrays of shape (runs,)."""
+
+    rate: _Array
+    """Of loss, 1/s; without inertia what the coordinate is of the coupling's velocity."""
+    share: _Array
+    """Of the loss, that ends in the load."""
+    volts: _Array
+    """Across the load, V, per unit of the circuit's coordinate."""
+
+
+@dataclass(frozen=True, eq=False)
+class FurtherContactTable:
+    """The strikers beside the first one of every run."""
+
+    laws: tuple[type[ContactLaw], ...]
+    numbers: _Array
+    """Where each is and what it touches by, shape (runs, strikers, 32), in the order of the engine's blocks."""
+    places: _Integers
+    """Which row each has, shape (runs, strikers)."""
+    rows: _Array
+    """Contact rows, each with the sign of its own side, shape (rows, N)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """Runs of one structure under one law of contact and one kind of drive, ready for any engine."""
+
+    structure: Structure
+    scale: Scale
+    order: int
+    """Of the composition."""
+    law: type[ContactLaw]
+    drive: type[Drive]
+    runs: NDArray[Any]
+    """Records of :data:`~snapbeam.solver.ensemble.RUN`, shape (runs,)."""
+    law_numbers: _Array
+    """Numbers of the law of each run, shape (runs, numbers)."""
+    drive_numbers: _Array
+    """Numbers of the drive likewise."""
+    samples: _Array
+    """What the drive looks up."""
+    location: _Array
+    """x_s of each run."""
+    highest: _Array
+    """Highest position that the tip of each run ever has, m; -inf without one."""
+    contact_rows: _Array
+    """V^T phi of every location, shape (locations, N), seen from the striker's side."""
+    starts: _Array
+    """q and p of every start, shape (starts, 2, N)."""
+    max_steps: int
+    high_omega: float
+    """Angular frequency above which a mode counts as high, rad/s."""
+    cycles: float
+    """Cycles of excitation of each run."""
+    tapped: CircuitCoupling | None = None
+    harvester: Harvester | None = None
+    others: FurtherContactTable | None = None
+
+    @property
+    def forced(self) -> bool:
+        """Whether a base moves or the axial load changes."""
+        return any(part in ("base", "load") for part, _ in self.drive.parts)
+
+    @property
+    def size(self) -> int:
+        """Number of runs."""
+        return int(self.runs.size)
+
+    @property
+    def first_side(self) -> _Integers:
+        """-1 for a run that starts in the well away from which the striker pushes, +1 for the other one."""
+        moved = np.array([float(start[0] @ self.structure.center) for start in self.starts])
+        center = self.runs["home"] * self.runs["rest_center"] + moved[self.runs["start_row"]]
+        if self.structure.uneven is not None:
+            center = center - self.structure.uneven.level
+        side: _Integers = np.where(center > 0.0, 1, -1)
+        return side
+
+    @property
+    def work(self) -> _Array:
+        """Expected work of each run in flight steps, shape (runs,)."""
+        work: _Array = self.runs["end"] / self.runs["step"]
+        return work
+
+    @property
+    def step_times(self) -> _Array:
+        """Flight step of each run, s."""
+        times: _Array = self.runs["step"] * self.runs["tick"]
+        return times
+
+    @property
+    def finest(self) -> int:
+        """Most halvings of the flight step that any run takes."""
+        return int(self.runs["finest"].max())
+
+    @property
+    def fastest(self) -> float:
+        """Greatest angular frequency of a mode or a drive, rad/s."""
+        names = self.drive.number_names
+        rate = names.index("fastest") if "fastest" in names else 0
+        return max(float(self.structure.omega.max()), float(self.drive_numbers[:, rate].max()))
+
+
+# ----------------------------------------------------------------------------------------------------
+# What describes one run of an ensemble to an engine: a record by name, SI units, seen from the striker's side.
+
+
+_REALS = (
+    "offset",  # penetration of the tip at mid-stroke into the beam at rest
+    "tip_speed",  # greatest speed of the tip, ever
+    "phase",  # argument of the drive at the start, rad
+    "rest_contact",  # displacement of the contact point and of the centre in the well that q is counted from
+    "rest_center",
+    "tick",  # s
+    "decide_energy",  # energy above the well below which a beam in the far well stays there; -inf: never decide
+    "decide_reach",  # highest future position of the tip, or 0 if that is higher
+    "contact_time",  # s since the present contact began; negative: apart; NaN: the penetration decides
+    "lowest",  # height of a flight that is too low to be seen, m
+    "circuit_rate",  # of a harvester's circuit, 1/s
+    "home",  # +1 if q and p are counted from the first well, -1 from the other
+)
+_INTEGERS = (
+    "step",  # ticks of a flight step
+    "period",  # ticks in which the drive's argument makes one turn
+    "landing",  # ticks from one state that is handed out to the next; the whole run if none is
+    "end",
+    "last_quarter",
+    "decide_crossings",  # crossings in the last quarter beyond which it is continuous; -1: never decide
+    "coarsest",  # halvings of the flight step that make the longest contact step
+    "finest",  # and the shortest
+    "contact_row",
+    "start_row",
+)
+
+RUN: np.dtype[Any] = np.dtype(
+    [(name, np.float64) for name in _REALS] + [(name, np.int64) for name in _INTEGERS], align=True
+)

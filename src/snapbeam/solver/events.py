@@ -1,0 +1,296 @@
+"""What is decided between steps, and kept of them: scalar functions that every engine's march is made of."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from snapbeam.solver.compilation import compiled, inlined
+from snapbeam.solver.contact_force import mark_of, peak_force
+from snapbeam.solver.interpolation import count_zero_crossings, first_upcrossing, sign_of, update_extrema
+from snapbeam.solver.simd import select_less
+
+__all__ = [
+    "GRADING",
+    "PIECES",
+    "RELEASE",
+    "STRETCHED",
+    "TRUST",
+    "Clock",
+    "ContactKinematics",
+    "accumulate_displacement",
+    "accumulate_energy",
+    "accumulate_open_contact",
+    "begin_statistics",
+    "clock_of",
+    "close_impact",
+    "contact_level",
+    "count_zero_crossings_in_step",
+    "first_contact_onset",
+    "flight_level",
+    "is_low_energy",
+    "low_energy_limit",
+    "refine_onset",
+    "safe_interval",
+    "ticks_of",
+]
+
+
+class Clock(NamedTuple):
+    """Time in ticks, the steps that are allowed, and when a run may end early."""
+
+    tick: float
+    """Seconds."""
+    step: int
+    """Flight step."""
+    period: int
+    """Of the drive's argument."""
+    landing: int
+    """From one state that is handed out to the next."""
+    end: int
+    last_quarter: int
+    coarsest: int
+    """Halvings of the flight step that make the longest contact step."""
+    finest: int
+    """Halvings of the flight step that make the shortest contact step."""
+    max_steps: int
+    decide_energy: float
+    """Energy above the well below which a beam in the far well stays there; -inf: never decide."""
+    decide_reach: float
+    """Highest future position of the tip, or 0 if that is higher."""
+    decide_crossings: int
+    """Crossings in the last quarter beyond which the response is continuous; -1: never decide."""
+
+
+class ContactKinematics(NamedTuple):
+    """What is seen of a run at an instant, from the striker's side."""
+
+    w: float
+    """Displacement of the beam at the striker, m, and its rate."""
+    wv: float
+    d: float
+    """Penetration, and its rate."""
+    dv: float
+    c: float
+    """Displacement of the centre, and its rate."""
+    cv: float
+
+
+# How contact steps are graded: a step is at most this share of the time since the onset, and of the time to
+# the release at the present rate.
+GRADING = 0.5
+RELEASE = 0.5
+# Safety of the bound on the speed of a signal, and for how many steps it is trusted.
+_MARGIN = 1.25
+TRUST = 8
+# Flight steps are halved where the squared slopes differ from those of the well by more than this many times
+# the well's own, and again at every doubling.
+STRETCHED = 4.0
+# Below this share of the energy of the barrier, free flight takes steps of twice the length: what the steps
+# must resolve is how far the tension swings, and that goes with the root of the energy.
+_QUIET = 0.2
+# Pieces per period of the fastest mode when a step is looked into.
+PIECES = 5.0
+
+
+@inlined
+def clock_of(run, max_steps):
+    """The clock of a run, from its record."""
+    return Clock(
+        run.tick,
+        run.step,
+        run.period,
+        run.landing,
+        run.end,
+        run.last_quarter,
+        run.coarsest,
+        run.finest,
+        max_steps,
+        run.decide_energy,
+        run.decide_reach,
+        run.decide_crossings,
+    )
+
+
+@compiled
+def begin_statistics(accumulators, center, seen, law, energy):
+    """Begin a run's statistics with what is seen of it at the start.
+
+    *center* is where the centre is from the height that divides the wells.
+    """
+    accumulators.side = sign_of(center, 0)
+    accumulators.min_displacement, accumulators.max_displacement = seen.w, seen.w
+    accumulators.min_center, accumulators.max_center = seen.c, seen.c
+    accumulators.deepest = mark_of(law, seen.d, seen.dv)
+    accumulators.first_energy = energy
+
+
+@compiled
+def close_impact(accumulators, impacts, before, law, end, tick):
+    """Enter the contact that ends at tick *end* in the statistics, unless nothing was pressed.
+
+    *impacts* is a table that begins after *before* impacts, or None.
+    """
+    deepest = accumulators.deepest
+    if deepest > 0.0:
+        duration = (end - accumulators.onset) * tick
+        force = peak_force(law, deepest)
+        if impacts is not None:
+            at = accumulators.impacts - before
+            if at < impacts.shape[0]:
+                impacts[at, 0] = accumulators.onset * tick
+                impacts[at, 1] = duration
+                impacts[at, 2] = force
+                impacts[at, 3] = accumulators.impulse
+        accumulators.impacts += 1
+        # of a contact that began before the run, what falls into it
+        accumulators.contact_time += duration if accumulators.onset >= 0 else end * tick
+        accumulators.peak_force = max(accumulators.peak_force, force)
+    accumulators.total_impulse += accumulators.impulse
+    accumulators.touching = 0
+    accumulators.deepest = 0.0
+    accumulators.impulse = 0.0
+
+
+@compiled
+def accumulate_open_contact(accumulators, law, end, tick):
+    """Enter what a contact gave so far, of a run that is to go on from tick *end*."""
+    accumulators.contact_time += (end - max(accumulators.onset, 0)) * tick
+    accumulators.total_impulse += accumulators.impulse
+    accumulators.peak_force = max(accumulators.peak_force, peak_force(law, accumulators.deepest))
+
+
+@compiled
+def safe_interval(distance, bound, tip_speed, acceleration, step):
+    """For how long a signal at *distance* from zero cannot reach it, at most a few steps."""
+    horizon = TRUST * step
+    speed = _MARGIN * bound + tip_speed + abs(acceleration) * horizon
+    return select_less(distance, speed * horizon, distance / speed, horizon)
+
+
+@compiled
+def contact_level(clock, elapsed, d, dv):
+    """Halvings of the flight step for a step in contact: graded from the onset and towards the release."""
+    want = GRADING * elapsed
+    if dv < 0.0:
+        want = min(want, -RELEASE * d / dv)
+    level = clock.coarsest
+    while level < clock.finest and (clock.step >> level) * clock.tick > want:
+        level += 1
+    return level
+
+
+@compiled
+def is_low_energy(energy, gamma, stretch_at_rest):
+    """Whether a beam of this energy above the well stays far below the barrier, gamma s^2 / 4 for squared slopes s.
+
+    Without impact and damping the energy is constant, so that the length of the steps is.
+    """
+    return energy < low_energy_limit(gamma, stretch_at_rest)
+
+
+@inlined
+def low_energy_limit(gamma, stretch_at_rest):
+    """The energy below which a beam is quiet."""
+    return _QUIET * 0.25 * gamma * stretch_at_rest * stretch_at_rest
+
+
+@compiled
+def ticks_of(clock, level):
+    """Length of the step of a level, in ticks: halvings of the flight step, or -1 for twice its length."""
+    return clock.step << 1 if level < 0 else clock.step >> level
+
+
+@compiled
+def flight_level(clock, quiet, stretch, stretch_at_rest):
+    """Halvings of the flight step for a beam stretched far beyond its wells; -1 if it is quiet."""
+    if quiet:
+        return -1
+    level = 0
+    reach = STRETCHED * stretch_at_rest
+    while level < clock.finest and stretch_at_rest > 0.0 and abs(stretch) > reach:
+        reach *= 2.0
+        level += 1
+    return level
+
+
+@compiled
+def first_contact_onset(looked, pieces, piece):
+    """When the penetration first becomes positive inside a step that was looked into; -1 if it does not."""
+    for i in range(pieces):
+        rise = first_upcrossing(looked[i, 0], looked[i, 1], looked[i + 1, 0], looked[i + 1, 1], piece)
+        if rise >= 0.0:
+            return (i + rise) * piece
+    return -1.0
+
+
+@compiled
+def refine_onset(clock, cut, whole, seen, least):
+    """Where a step of *whole* ticks is to be cut that was cut at *cut*, where the gap has not just closed.
+
+    What was seen inside the step was seen by linear modes under a tension that changes evenly; a step that ends there
+    knows better.  *least*, a time, is as near as counts.
+    """
+    if seen.dv > 0.0:
+        late = seen.d / seen.dv
+        if abs(late) > least:
+            return min(max(1, cut - round(late / clock.tick)), whole)
+    return cut
+
+
+@compiled
+def count_zero_crossings_in_step(
+    accumulators, clock, start, length, seen, seen1, looked, rest, pieces, piece
+):
+    """Count zero crossings of the centre in a step, through what was seen when it was looked into."""
+    left, left_rate, begun = seen.c, seen.cv, 0.0
+    i = 1
+    while True:
+        if i < pieces and i * piece < length:
+            right, right_rate, ended = rest + looked[i, 2], looked[i, 3], i * piece
+        else:
+            right, right_rate, ended = seen1.c, seen1.cv, length
+        found, last, side = count_zero_crossings(
+            accumulators.side, left, left_rate, right, right_rate, ended - begun
+        )
+        accumulators.side = side
+        if found > 0:
+            when = start * clock.tick + begun + last * (ended - begun)
+            accumulators.zero_crossings += found
+            accumulators.last_zero_crossing = when
+            if when > clock.last_quarter * clock.tick:
+                accumulators.zero_crossings_last_quarter += found
+        if ended >= length:
+            return
+        left, left_rate, begun = right, right_rate, ended
+        i += 1
+
+
+@compiled
+def accumulate_displacement(accumulators, seen, seen1, length):
+    """Widen the extremes of the beam at the striker and at the centre by a step, and add to their mean squares."""
+    accumulators.min_displacement, accumulators.max_displacement = update_extrema(
+        accumulators.min_displacement,
+        accumulators.max_displacement,
+        seen.w,
+        seen.wv,
+        seen1.w,
+        seen1.wv,
+        length,
+    )
+    accumulators.min_center, accumulators.max_center = update_extrema(
+        accumulators.min_center, accumulators.max_center, seen.c, seen.cv, seen1.c, seen1.cv, length
+    )
+    accumulators.peak_velocity = max(accumulators.peak_velocity, abs(seen1.wv))
+    accumulators.peak_midspan_velocity = max(accumulators.peak_midspan_velocity, abs(seen1.cv))
+    half = 0.5 * length
+    accumulators.square_displacement += half * (seen.w * seen.w + seen1.w * seen1.w)
+    accumulators.square_center += half * (seen.c * seen.c + seen1.c * seen1.c)
+    accumulators.square_velocity += half * (seen.wv * seen.wv + seen1.wv * seen1.wv)
+    accumulators.square_midspan_velocity += half * (seen.cv * seen.cv + seen1.cv * seen1.cv)
+
+
+@compiled
+def accumulate_energy(accumulators, whole, high, span):
+    """Add to the energy of the modes over time, all of them and those above a frequency."""
+    accumulators.energy_time += whole * span
+    accumulators.high_energy_time += high * span

@@ -1,0 +1,367 @@
+"""The striker's tip as kernels see it: where it is, how it moves, and the law by which it touches."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic, overload
+
+from snapbeam.solver.compilation import INLINE, inlined, overloaded
+from snapbeam.solver.contact_force import scalar_function
+from snapbeam.solver.physics import shaker_motion, sincos
+
+__all__ = [
+    "Tip",
+    "base_acceleration",
+    "drive_rate",
+    "joined_motion",
+    "kind_acceleration",
+    "kind_motion",
+    "load_change",
+    "numbers_of",
+    "part_motion",
+    "seen_from",
+    "tip_acceleration",
+    "tip_motion",
+    "turned_motion",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Motions of a tip, a base and an axial load that are marched as one drive: each by its own kind, from one argument.
+
+
+_TWO_PI = 2.0 * math.pi
+
+
+@inlined
+def _harmonic_motion(numbers, memory, argument):
+    sine, cosine = sincos(argument)
+    return numbers.amplitude * sine, numbers.amplitude * numbers.omega * cosine
+
+
+@inlined
+def _harmonic_acceleration(numbers, memory, argument):
+    sine, _ = sincos(argument)
+    return -numbers.omega * numbers.omega * numbers.amplitude * sine
+
+
+@inlined
+def _no_motion(drive, memory, argument):
+    return 0.0, 0.0
+
+
+@inlined
+def _nothing(drive, memory, argument):
+    return 0.0
+
+
+def _reader(part: str, kind: Any, alone: bool) -> Any:
+    """A function that takes the numbers of a part, and its argument, out of those of all."""
+    names = ", ".join(f"drive.{part}_{name}" for name in kind.number_names)
+    lines = ["def read(drive, argument):"]
+    if alone:
+        lines.append("    at = argument")
+    else:
+        lines.append(f"    at = argument / drive.omega * drive.{part}_omega + drive.{part}_phase")
+        if kind.harmonic:
+            lines.append("    at = at - two_pi * floor(at / two_pi)")
+    lines.append(f"    return Numbers({names}), at")
+    made: dict[str, Any] = {"Numbers": kind.numbers_type(), "two_pi": _TWO_PI, "floor": math.floor}
+    exec("\n".join(lines), made)
+    return inlined(made["read"])
+
+
+def _of_kind(kind: Any, what: str) -> Any:
+    """The motion or the acceleration of a kind of drive, as a function of its numbers, memory and its argument."""
+    if kind.terms:
+        return _summed(kind, what, len(kind.terms))
+    if kind.harmonic:
+        return _harmonic_motion if what == "motion" else _harmonic_acceleration
+    return scalar_function(kind, what)
+
+
+def _term_reader(kind: Any, i: int) -> Any:
+    """A function that takes the numbers of term i, and its argument, out of those of a sum."""
+    names = ", ".join(f"drive.t{i}_{name}" for name in kind.number_names)
+    lines = ["def read(drive, argument):"]
+    lines.append(f"    at = argument / drive.omega * drive.t{i}_omega + drive.t{i}_phase")
+    if kind.harmonic:
+        lines.append("    at = at - two_pi * floor(at / two_pi)")
+    lines.append(f"    return Numbers({names}), at, drive.t{i}_start")
+    made: dict[str, Any] = {"Numbers": kind.numbers_type(), "two_pi": _TWO_PI, "floor": math.floor}
+    exec("\n".join(lines), made)
+    return inlined(made["read"])
+
+
+def _summed(kind: Any, what: str, count: int) -> Any:
+    """The motion or the acceleration of the first *count* terms of a sum."""
+    term = kind.terms[count - 1]
+    read, own = _term_reader(term, count), _of_kind(term, what)
+    if what == "motion":
+
+        @inlined
+        def moves(drive, memory, argument):
+            numbers, at, start = read(drive, argument)
+            w, speed = own(numbers, memory, at)
+            return w - start, speed
+
+        if count == 1:
+            return moves
+        others = _summed(kind, what, count - 1)
+
+        @inlined
+        def together(drive, memory, argument):
+            one, other = moves(drive, memory, argument), others(drive, memory, argument)
+            return one[0] + other[0], one[1] + other[1]
+
+        return together
+
+    @inlined
+    def hastens(drive, memory, argument):
+        numbers, at, _ = read(drive, argument)
+        return own(numbers, memory, at)
+
+    if count == 1:
+        return hastens
+    rest = _summed(kind, what, count - 1)
+
+    @inlined
+    def in_all(drive, memory, argument):
+        return hastens(drive, memory, argument) + rest(drive, memory, argument)
+
+    return in_all
+
+
+def kind_motion(kind: Any) -> Any:
+    """The motion of a kind of drive that is no sine: displacement (m) and velocity (m/s)."""
+    return _of_kind(kind, "motion")
+
+
+def kind_acceleration(kind: Any) -> Any:
+    """Its acceleration, m/s^2."""
+    return _of_kind(kind, "acceleration")
+
+
+def _of_part(owner: Any, part: str, what: str) -> Any:
+    """The motion or the acceleration of a part, as a function of the numbers of all; nothing if it does not move."""
+    kinds = dict(owner.parts)
+    if part not in kinds:
+        return _no_motion if what == "motion" else _nothing
+    kind = kinds[part]
+    read = _reader(part, kind, owner.alone)
+    own = _of_kind(kind, what)
+
+    @inlined
+    def of_part(drive, memory, argument):
+        numbers, at = read(drive, argument)
+        return own(numbers, memory, at)
+
+    return of_part
+
+
+def part_motion(owner: Any, part: str) -> Any:
+    """A function of the numbers of all parts, memory and the argument: displacement (m) and velocity of one part."""
+    return _of_part(owner, part, "motion")
+
+
+def joined_motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+    """Displacement of the tip from its mid-position, m, and its velocity, m/s, in the frame of the ends."""
+    owner = type(drive).owner
+    kinds = dict(owner.parts)
+    moved, speed = 0.0, 0.0
+    for part, share in (("tip", 1.0), ("base", getattr(drive, "base_follow", 0.0))):
+        if part not in kinds:
+            continue
+        numbers, at = _reader(part, kinds[part], owner.alone).py_func(drive, argument)
+        if kinds[part].harmonic:
+            w = numbers.amplitude * math.sin(at), numbers.amplitude * numbers.omega * math.cos(at)
+        else:
+            w = kinds[part].motion(numbers, memory, at)
+        moved, speed = moved + share * w[0], speed + share * w[1]
+    return moved, speed
+
+
+@overload(joined_motion, jit_options=INLINE)
+def _joined_motion(drive, memory, argument):
+    owner = drive.instance_class.owner
+    tip, base = _of_part(owner, "tip", "motion"), _of_part(owner, "base", "motion")
+    if "base_follow" not in drive.fields:
+        return lambda drive, memory, argument: tip(drive, memory, argument)
+
+    def both(drive, memory, argument):
+        moved, speed = tip(drive, memory, argument)
+        if drive.base_follow != 0.0:
+            y, rate = base(drive, memory, argument)
+            moved, speed = moved + drive.base_follow * y, speed + drive.base_follow * rate
+        return moved, speed
+
+    return both
+
+
+def base_acceleration(drive: Any, memory: Any, argument: float) -> float:
+    """Acceleration of the base in space, m/s^2, positive upwards."""
+    raise TypeError("base_acceleration runs in compiled code only")
+
+
+@overload(base_acceleration, jit_options=INLINE)
+def _base_acceleration(drive, memory, argument):
+    owner = drive.instance_class.owner
+    if "base_sign" not in drive.fields:
+        return lambda drive, memory, argument: 0.0
+    own = _of_part(owner, "base", "acceleration")
+    return lambda drive, memory, argument: drive.base_sign * own(drive, memory, argument)
+
+
+def load_change(drive: Any, memory: Any, argument: float) -> float:
+    """Axial load beyond the one that the beam was reduced under, N."""
+    raise TypeError("load_change runs in compiled code only")
+
+
+@overload(load_change, jit_options=INLINE)
+def _load_change(drive, memory, argument):
+    owner = drive.instance_class.owner
+    if not any(part == "load" for part, _ in owner.parts):
+        return lambda drive, memory, argument: 0.0
+    own = _of_part(owner, "load", "motion")
+    return lambda drive, memory, argument: own(drive, memory, argument)[0]
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+class Tip(NamedTuple):
+    """A tip, seen from the side it pushes from: ``penetration = offset + motion - row . q``.
+
+    The contact's row carries the sign of the side.
+    """
+
+    offset: float
+    """Penetration of the tip at mid-stroke into the beam at rest."""
+    law: Any
+    """Numbers of the law of contact, a named tuple whose type says which law it is."""
+    drive: Any
+    """Numbers of the drive likewise; ``drive.omega`` is the rate of its argument, rad/s."""
+
+
+@inlined
+def seen_from(tip, well_sign, rest):
+    """The tip as seen from the well *home*: +1 the one that rest is measured in, -1 the other."""
+    return Tip(tip.offset + (1.0 - well_sign) * rest, tip.law, tip.drive)
+
+
+def tip_motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
+    """Displacement of the tip from its mid-position, m, and its velocity, m/s."""
+    if type(drive).owner.harmonic:
+        sine, cosine = sincos.py_func(argument)
+        motion: tuple[float, float] = shaker_motion.py_func(drive.amplitude, drive.omega, sine, cosine)
+        return motion
+    owner: Any = type(drive).owner
+    if owner.parts:
+        return joined_motion(drive, memory, argument)
+    moved: tuple[float, float] = owner.motion(drive, memory, argument)
+    return moved
+
+
+@overloaded(tip_motion)
+def _tip_motion(drive, memory, argument):
+    owner = drive.instance_class.owner
+    if owner.harmonic:
+
+        def harmonic(drive, memory, argument):
+            sine, cosine = sincos(argument)
+            return shaker_motion(drive.amplitude, drive.omega, sine, cosine)
+
+        return harmonic
+    if owner.parts:
+        return lambda drive, memory, argument: joined_motion(drive, memory, argument)
+    motion = kind_motion(owner)
+    return lambda drive, memory, argument: motion(drive, memory, argument)
+
+
+def tip_acceleration(drive: Any, memory: Any, argument: float) -> float:
+    """Acceleration of the tip, m/s^2."""
+    if type(drive).owner.harmonic:
+        sine, _ = sincos.py_func(argument)
+        return float(-drive.omega * drive.omega * drive.amplitude * sine)
+    owner: Any = type(drive).owner
+    return float(owner.acceleration(drive, memory, argument))
+
+
+@overloaded(tip_acceleration)
+def _tip_acceleration(drive, memory, argument):
+    owner = drive.instance_class.owner
+    if owner.harmonic:
+
+        def harmonic(drive, memory, argument):
+            sine, _ = sincos(argument)
+            return -drive.omega * drive.omega * drive.amplitude * sine
+
+        return harmonic
+    if owner.parts:  # under Newton's law alone, which is refused beside what else moves
+        return lambda drive, memory, argument: 0.0
+    acceleration = kind_acceleration(owner)
+    return lambda drive, memory, argument: acceleration(drive, memory, argument)
+
+
+def turned_motion(
+    drive: Any, memory: Any, argument: float, sine: float, cosine: float
+) -> tuple[float, float]:
+    """As :func:`tip_motion`, for a caller that knows the sine and cosine of the argument, or else the argument."""
+    if type(drive).owner.harmonic:
+        motion: tuple[float, float] = shaker_motion.py_func(drive.amplitude, drive.omega, sine, cosine)
+        return motion
+    return tip_motion(drive, memory, argument)
+
+
+@overloaded(turned_motion)
+def _turned_motion(drive, memory, argument, sine, cosine):
+    if drive.instance_class.owner.harmonic:
+        return lambda drive, memory, argument, sine, cosine: shaker_motion(
+            drive.amplitude, drive.omega, sine, cosine
+        )
+    if drive.instance_class.owner.parts:
+        return lambda drive, memory, argument, sine, cosine: joined_motion(drive, memory, argument)
+    motion = kind_motion(drive.instance_class.owner)
+    return lambda drive, memory, argument, sine, cosine: motion(drive, memory, argument)
+
+
+def drive_rate(drive: Any) -> float:
+    """Greatest angular frequency of a drive's motion, rad/s."""
+    return float(drive.fastest if "fastest" in drive._fields else drive.omega)
+
+
+@overloaded(drive_rate)
+def _drive_rate(drive):
+    if "fastest" in drive.fields:
+        return lambda drive: drive.fastest
+    return lambda drive: drive.omega
+
+
+def numbers_of(template: Any, table: Any, row: int) -> Any:
+    """The numbers in a row of a table as the named tuple that *template* is one of."""
+    return type(template)(*(float(value) for value in table[row]))
+
+
+@intrinsic
+def _read_numbers(typingctx: Any, template: Any, table: Any, row: Any) -> Any:
+    count = len(template)
+
+    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        array = context.make_array(signature.args[1])(context, builder, args[1])
+        width = builder.extract_value(array.strides, 0)
+        start = builder.ptrtoint(array.data, width.type)
+        start = builder.add(start, builder.mul(args[2], width))
+        pointer = builder.inttoptr(start, ir.DoubleType().as_pointer())
+        values = [builder.load(builder.gep(pointer, [ir.Constant(width.type, j)])) for j in range(count)]
+        return context.make_tuple(builder, signature.return_type, values)
+
+    return template(template, table, types.intp), codegen
+
+
+@overloaded(numbers_of)
+def _numbers_of(template, table, row):
+    return lambda template, table, row: _read_numbers(template, table, row)

@@ -1,0 +1,187 @@
+"""The strikers beside the first one, as kernels see them: which laws they touch by, and as which drives they move.
+
+Their numbers stand in memory, a block each; which functions belong to them follows from the type of *kinds*.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba.extending import overload
+
+from snapbeam.model.contact.base import LAWS, ContactLaw
+from snapbeam.model.drive.combined import MOST_STRIKERS
+from snapbeam.model.quantity import numbers_type
+from snapbeam.solver.compilation import INLINE_HERE, inlined
+from snapbeam.solver.contact_force import contact_energy, contact_force
+from snapbeam.solver.excitation import part_motion
+
+__all__ = ["Several", "count_of", "energy_of", "force_of", "motion_of", "several"]
+
+
+_SEPARATOR = "__"
+NUMBERS = 32
+"""Of a striker in memory, a block of whole registers."""
+# given
+OFFSET, REST, SIGN, SPEED = 0, 1, 2, 3
+# as they stand
+HERE, TOUCHING, ONSET, SAFE, DEPTH, RATE, DEEPEST, PUSHED = 4, 5, 6, 7, 8, 9, 10, 11
+# of the step at hand
+DEPTH1, RATE1, CUT, FORCE, IMPULSE, WORK, GROSS, KEPT, WORKED = 12, 13, 14, 15, 16, 17, 18, 19, 20
+LAW = 24
+"""The law's numbers follow from there on."""
+
+
+class Several:
+    """What the strikers beside the first one touch by; subclasses are made by :func:`several`, one for each mixture."""
+
+    laws: tuple[type[ContactLaw], ...] = ()
+
+    @classmethod
+    def numbers_type(cls) -> Any:
+        """A named tuple of nothing, whose type tells a kernel the mixture."""
+        return numbers_type(cls, ())
+
+
+def several(laws: tuple[type[ContactLaw], ...]) -> type[Several]:
+    """The class of a mixture of laws, one for each striker beside the first."""
+    for law in laws:
+        if LAWS.get(law.name) is not law:
+            raise TypeError(f"{law.__name__}: is registered under no name")
+    name = _SEPARATOR.join(["Several", *(law.name for law in laws)])
+    if name not in globals():
+        body = {"__module__": __name__, "__qualname__": name, "__doc__": "Laws by name.", "laws": laws}
+        globals()[name] = type(name, (Several,), body)
+    found: type[Several] = globals()[name]
+    return found
+
+
+def __getattr__(name: str) -> type[Several]:
+    """A mixture by its name, as another process knows it."""
+    first, *words = name.split(_SEPARATOR)
+    if first != "Several" or not words or not all(word in LAWS for word in words):
+        raise AttributeError(name)
+    return several(tuple(LAWS[word] for word in words))
+
+
+def _law_reader(law: Any) -> Any:
+    """A function that makes the numbers of a law of those that stand in memory."""
+    count = len(law.numbers_type()._fields)
+    numbers = ", ".join(f"memory[at + {i}]" for i in range(count))
+    made: dict[str, Any] = {"Numbers": law.numbers_type()}
+    exec(f"def read(memory, at):\n    return Numbers({numbers})", made)
+    return inlined(made["read"])
+
+
+def _by_law(laws: tuple[Any, ...], function: Any) -> Any:
+    """*function* of the numbers of striker j and a penetration; the striker is chosen as the march goes."""
+    read, rest = _law_reader(laws[0]), _by_law(laws[1:], function) if len(laws) > 1 else None
+
+    @inlined
+    def own(memory, at, j, penetration):
+        return function(read(memory, at), penetration)
+
+    if rest is None:
+        return own
+
+    @inlined
+    def chosen(memory, at, j, penetration):
+        if j == 0:
+            return function(read(memory, at), penetration)
+        return rest(memory, at, j - 1, penetration)
+
+    return chosen
+
+
+def count_of(kinds: Any) -> int:
+    """How many strikers there are beside the first."""
+    return len(type(kinds).owner.laws)
+
+
+@overload(count_of, jit_options=INLINE_HERE)
+def _count_of(kinds):
+    count = len(kinds.instance_class.owner.laws)
+    return lambda kinds: count
+
+
+def force_of(kinds: Any, memory: Any, at: int, j: int, penetration: float) -> float:
+    """Force of striker *j* beside the first, N, its law's numbers standing from *at* on; none when apart."""
+    raise TypeError("force_of runs in compiled code only")
+
+
+@overload(force_of, jit_options=INLINE_HERE)
+def _force_of(kinds, memory, at, j, penetration):
+    chosen = _by_law(kinds.instance_class.owner.laws, contact_force)
+    return lambda kinds, memory, at, j, penetration: chosen(memory, at, j, penetration)
+
+
+def energy_of(kinds: Any, memory: Any, at: int, j: int, penetration: float) -> float:
+    """Energy that its contact stores, J."""
+    raise TypeError("energy_of runs in compiled code only")
+
+
+@overload(energy_of, jit_options=INLINE_HERE)
+def _energy_of(kinds, memory, at, j, penetration):
+    chosen = _by_law(kinds.instance_class.owner.laws, contact_energy)
+    return lambda kinds, memory, at, j, penetration: chosen(memory, at, j, penetration)
+
+
+def _by_part(owner: Any, numbers: tuple[int, ...]) -> Any:
+    """The motion of striker j, of those that move."""
+    own = part_motion(owner, f"tip{numbers[0]}")
+    first, rest = numbers[0] - 1, _by_part(owner, numbers[1:]) if len(numbers) > 1 else None
+
+    @inlined
+    def alone(drive, memory, argument, j):
+        if j == first:
+            return own(drive, memory, argument)
+        return 0.0, 0.0
+
+    if rest is None:
+        return alone
+
+    @inlined
+    def chosen(drive, memory, argument, j):
+        if j == first:
+            return own(drive, memory, argument)
+        return rest(drive, memory, argument, j)
+
+    return chosen
+
+
+def motion_of(drive: Any, memory: Any, argument: float, j: int, sign: float) -> tuple[float, float]:
+    """Displacement (m) and velocity (m/s) of striker *j* beside the first, in the frame of the ends.
+
+    *sign* is +1 if it strikes from the same side as the first.
+    """
+    raise TypeError("motion_of runs in compiled code only")
+
+
+@overload(motion_of, jit_options=INLINE_HERE)
+def _motion_of(drive, memory, argument, j, sign):
+    owner = drive.instance_class.owner
+    moving = dict(owner.parts)
+    numbers = tuple(i for i in range(1, MOST_STRIKERS) if f"tip{i}" in moving)
+    base = part_motion(owner, "base")
+    if numbers:
+        own = _by_part(owner, numbers)
+    if "base_follow" not in drive.fields:
+        if not numbers:
+            return lambda drive, memory, argument, j, sign: (0.0, 0.0)
+        return lambda drive, memory, argument, j, sign: own(drive, memory, argument, j)
+
+    def with_base(drive, memory, argument, j, sign):
+        y, rate = base(drive, memory, argument)
+        share = sign * drive.base_follow
+        return share * y, share * rate
+
+    if not numbers:
+        return with_base
+
+    def both(drive, memory, argument, j, sign):
+        moved, speed = own(drive, memory, argument, j)
+        y, rate = base(drive, memory, argument)
+        share = sign * drive.base_follow
+        return moved + share * y, speed + share * rate
+
+    return both

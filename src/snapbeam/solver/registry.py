@@ -1,0 +1,131 @@
+"""The engines by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from importlib.util import find_spec
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.drive.base import Drive
+from snapbeam.model.drive.sine import Sine
+from snapbeam.model.integration import ENGINES
+from snapbeam.solver.cpu import driver as cpu
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.solver.statistics import Landings, Recorded
+from snapbeam.util.validation import InputError, choice
+
+__all__ = ["Engine", "resolve"]
+
+
+_FEWEST_RUNS = 2000
+"""A device marches one run slower than a core does, but over a thousand at a time: fewer do not fill it."""
+_FEWEST_CYCLES = 2_000_000
+"""Cycles of all runs, more than a minute of a core's work: with fewer, compiling the kernel costs more."""
+
+Progress = Callable[[int, int], object]
+
+
+class Engine(Protocol):
+    """What every engine can do, or refuses by name."""
+
+    def run_ensemble(
+        self, ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
+    ) -> NDArray[Any]:
+        """March every run of an ensemble; a book a run."""
+        ...
+
+    def integrate_to_landing(
+        self, ensemble: Ensemble, threads: int | None = None, progress: Progress | None = None
+    ) -> Landings:
+        """As :meth:`run_ensemble`, and the states at every landing."""
+        ...
+
+    def integrate_tangents(
+        self,
+        ensemble: Ensemble,
+        tangents: NDArray[np.float64],
+        threads: int | None = None,
+        progress: Progress | None = None,
+    ) -> tuple[Landings, NDArray[np.float64]]:
+        """As :meth:`integrate_to_landing`, with small changes of the states carried along."""
+        ...
+
+    def record(
+        self,
+        ensemble: Ensemble,
+        times: NDArray[np.float64],
+        in_contact: bool,
+        progress: Callable[[float], object] | None = None,
+    ) -> Iterator[Recorded]:
+        """March one run and give what it wrote down, in pieces."""
+        ...
+
+
+def resolve(
+    name: str,
+    *,
+    runs: int = 1,
+    cycles: float = 1,
+    modes: int = 1,
+    law: type[ContactLaw] | None = None,
+    drive: type[Drive] = Sine,
+    body: bool = False,
+    uneven: bool = False,
+    around: bool = False,
+    several: bool = False,
+) -> tuple[str, Engine]:
+    """The engine that *name* stands for, and its own name.
+
+    ``"auto"`` is the CUDA engine where a device can be used, what is studied is something for it and the work pays
+    for it, else the CPU's: at least 2000 runs and two million cycles in all, at most 128 modes.
+
+    Parameters
+    ----------
+    name : {"auto", "cpu", "cuda"}
+    runs : int
+        How many there are to march.
+    cycles : float
+        Of each.
+    modes : int
+        Modes of the model.
+    law, drive : type
+        Of contact, and of the striker.
+    body : bool
+        Whether the striker is a body with a mass.
+    uneven : bool
+        Whether the wells are unequal.
+    around : bool
+        Whether a base moves, the axial load changes, or a harvester taps the beam.
+    several : bool
+        Whether several strikers strike.
+
+    Raises
+    ------
+    InputError
+        For another name, or for ``"cuda"`` without a device: the message says what is missing.
+    """
+    choice("engine", name, ENGINES)
+    pays = runs >= _FEWEST_RUNS and runs * cycles >= _FEWEST_CYCLES
+    if name == "cuda" or (name == "auto" and pays and find_spec("numba_cuda")):
+        from snapbeam.solver.cuda import driver as cuda
+
+        reason = cuda.refusal(modes, law, drive)
+        if body:
+            reason = "a striker with a mass is marched by the CPU engine alone"
+        if uneven:
+            reason = "a beam with unequal wells is marched by the CPU engine alone"
+        if around:
+            reason = (
+                "a moving base, a changing axial load and a harvester are marched by the CPU engine alone"
+            )
+        if several:
+            reason = "several strikers are marched by the CPU engine alone"
+        if reason is None and (name == "cuda" or not cuda.simulated()):
+            return "cuda", cuda
+        if name == "cuda":
+            raise InputError(f"engine = 'cuda': {reason}; use engine='cpu' or 'auto'")
+    return "cpu", cpu

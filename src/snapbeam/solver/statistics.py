@@ -1,0 +1,628 @@
+"""The table of outcomes: what kernels keep of a run, and what follows from it.
+
+Kernels write :data:`ACCUMULATORS`, one record a run; maps, runs and :class:`~snapbeam.RunSummary` hold :data:`STATISTICS`.
+A new statistic is a row: either a formula of what is kept already, or, with ``update``, a scalar function
+that kernels call after every step.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.drive.combined import MOST_STRIKERS
+from snapbeam.model.early_termination import crossing_energy, decidable_energy, passed_heights
+from snapbeam.solver.ensemble import Ensemble
+from snapbeam.util.status_codes import ResponseClass, RunStatus, class_of
+from snapbeam.util.validation import InputError, NamedTable
+
+__all__ = [
+    "ACCUMULATORS",
+    "OTHER_IMPACTS",
+    "OTHER_IMPULSE",
+    "OTHER_PEAK",
+    "OTHER_WORK",
+    "STATISTICS",
+    "Landings",
+    "Last",
+    "Passed",
+    "Reading",
+    "Recorded",
+    "Statistic",
+    "accumulators_dtype",
+    "empty_accumulators",
+    "of_one_named",
+    "register",
+    "rows_for",
+    "statistics_of",
+    "unregister",
+    "updated",
+]
+
+
+Values = NDArray[Any]
+
+
+class Passed(NamedTuple):
+    """A step that was taken, as statistics see it; SI units, seen from the striker's side."""
+
+    time: float
+    """At its beginning, s."""
+    length: float
+    displacement: tuple[float, float]
+    """Of the beam at the striker's location, at the two ends of the step."""
+    velocity: tuple[float, float]
+    midspan_displacement: tuple[float, float]
+    midspan_velocity: tuple[float, float]
+    penetration: tuple[float, float]
+    touching: bool
+
+
+# What every kernel keeps: name, kind, value at the start.
+_KEPT: tuple[tuple[str, type, float], ...] = (
+    ("status", np.int64, int(RunStatus.NOT_RUN)),
+    ("time", np.int64, 0),  # ticks marched
+    ("touching", np.int64, 0),
+    ("onset", np.int64, 0),  # tick at which the present contact began
+    ("side", np.int64, 0),  # sign of the centre displacement, -1 in the well the run began in
+    ("zero_crossings", np.int64, 0),
+    ("zero_crossings_last_quarter", np.int64, 0),
+    ("impacts", np.int64, 0),
+    ("steps", np.int64, 0),
+    ("samples", np.int64, 0),
+    ("last_zero_crossing", np.float64, math.nan),
+    ("min_displacement", np.float64, 0.0),
+    ("max_displacement", np.float64, 0.0),
+    ("min_center", np.float64, 0.0),
+    ("max_center", np.float64, 0.0),
+    ("peak_velocity", np.float64, 0.0),
+    ("peak_midspan_velocity", np.float64, 0.0),
+    ("square_displacement", np.float64, 0.0),  # integrals over time
+    ("square_center", np.float64, 0.0),
+    ("square_velocity", np.float64, 0.0),
+    ("square_midspan_velocity", np.float64, 0.0),
+    ("energy_time", np.float64, 0.0),  # integral of the modal energy, sampled
+    ("high_energy_time", np.float64, 0.0),  # of the modes above a frequency
+    ("peak_force", np.float64, 0.0),
+    ("contact_time", np.float64, 0.0),
+    ("total_impulse", np.float64, 0.0),
+    ("work", np.float64, 0.0),
+    ("gross_work", np.float64, 0.0),
+    ("dissipated", np.float64, 0.0),  # integrated, where a ledger is kept
+    ("lost", np.float64, 0.0),  # in contact
+    ("base_work", np.float64, 0.0),  # of a moving base, on the beam in its frame
+    ("circuit_energy", np.float64, 0.0),  # lost in a harvester's circuit, load included
+    ("peak_circuit", np.float64, 0.0),  # greatest voltage or current, as the circuit's coordinate
+    ("load_work", np.float64, 0.0),  # of what an axial load has beyond its mean
+    ("first_energy", np.float64, 0.0),
+    ("energy", np.float64, 0.0),  # at the end, contact included
+    ("displacement", np.float64, 0.0),  # of contact point and centre, at the end
+    ("center", np.float64, 0.0),
+    ("deepest", np.float64, 0.0),  # greatest penetration of the present contact
+    ("impulse", np.float64, 0.0),  # of the present contact
+    ("early_stop_time", np.float64, math.nan),
+)
+
+
+OTHER_IMPACTS, OTHER_PEAK, OTHER_IMPULSE, OTHER_WORK = range(4)
+"""What is kept of each striker beside the first."""
+
+
+@dataclass(frozen=True)
+class Statistic:
+    """One row of the table.
+
+    Attributes
+    ----------
+    name : str
+        Variable of a map, and attribute of an :class:`~snapbeam.RunSummary`.
+    dtype : str
+    unit : str
+        As UDUNITS knows it; ``"1"`` for displacements over b and velocities over b omega_1.
+    long_name : str
+    value : callable
+        From a :class:`~snapbeam.solver.statistics.Reading` of many runs to an array of shape (runs,).  With *update*:
+        from the reading and the array of what *update* left.
+    update : callable, optional
+        ``update(held, step) -> held``, a scalar function of numbers that kernels compile; *step* is a
+        :class:`Passed`.
+    start : float
+        What *update* begins with.
+    """
+
+    name: str
+    dtype: str
+    unit: str
+    long_name: str
+    value: Callable[..., Values]
+    update: Callable[[float, Any], float] | None = None
+    start: float = 0.0
+
+
+def _plain(column: str) -> Callable[[Reading], Values]:
+    return lambda reading: reading.accumulators[column]
+
+
+def _seen(column: str, factor: Callable[[Reading], float] = lambda _: 1.0) -> Callable[[Reading], Values]:
+    return lambda reading: reading.seen(column) * factor(reading)
+
+
+def _low_high(low: str, high: str, greatest: bool) -> Callable[[Reading], Values]:
+    """Least or greatest displacement over b, in the signs of space."""
+
+    def value(reading: Reading) -> Values:
+        upward = reading.sign > 0.0
+        column = high if greatest == upward else low
+        return reading.sign * reading.seen(column) / reading.length + 0.0
+
+    return value
+
+
+def _peak(low: str, high: str) -> Callable[[Reading], Values]:
+    return lambda reading: np.maximum(np.abs(reading.seen(low)), np.abs(reading.seen(high))) / reading.length
+
+
+def _rms(column: str, per_speed: bool) -> Callable[[Reading], Values]:
+    def value(reading: Reading) -> Values:
+        with np.errstate(invalid="ignore", divide="ignore"):
+            mean = np.where(reading.duration > 0.0, reading.seen(column) / reading.duration, np.nan)
+        return np.asarray(np.sqrt(mean) / (reading.speed if per_speed else reading.length))
+
+    return value
+
+
+def _response(reading: Reading) -> Values:
+    accumulators = reading.accumulators
+    kinds = class_of(
+        accumulators["zero_crossings"],
+        accumulators["zero_crossings_last_quarter"],
+        reading.cycles,
+        -reading.first_side * accumulators["side"],
+    )
+    return np.where(reading.good, kinds, ResponseClass.UNKNOWN)
+
+
+def _contact_share(reading: Reading) -> Values:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = np.where(
+            reading.duration > 0.0, reading.accumulators["contact_time"] / reading.duration, np.nan
+        )
+    return np.where(reading.good, share, np.nan)
+
+
+def _high_share(reading: Reading) -> Values:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        share = reading.seen("high_energy_time") / reading.seen("energy_time")
+    return np.where(reading.seen("energy_time") > 0.0, share, np.where(reading.good, 0.0, np.nan))
+
+
+def _dissipated(reading: Reading) -> Values:
+    given = reading.seen("work") + reading.seen("base_work") + reading.seen("load_work")
+    return given - (reading.seen("energy") - reading.seen("first_energy")) - _harvested(reading)
+
+
+def _harvested(reading: Reading) -> Values:
+    tapped = reading.ensemble.tapped
+    return reading.seen("circuit_energy") * (0.0 if tapped is None else tapped.share)
+
+
+def _harvested_power(reading: Reading) -> Values:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(reading.duration > 0.0, _harvested(reading) / reading.duration, np.nan)
+
+
+def _harvested_per_cycle(reading: Reading) -> Values:
+    runs = reading.ensemble.runs
+    with np.errstate(invalid="ignore", divide="ignore"):
+        done = reading.cycles * reading.duration / (runs["end"] * runs["tick"])
+        return np.where(done > 0.0, _harvested(reading) / done, np.nan)
+
+
+def _peak_voltage(reading: Reading) -> Values:
+    tapped = reading.ensemble.tapped
+    return reading.seen("peak_circuit") * (0.0 if tapped is None else np.abs(tapped.volts))
+
+
+def _mean_power(reading: Reading) -> Values:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(reading.duration > 0.0, reading.seen("work") / reading.duration, np.nan)
+
+
+_ROWS = (
+    Statistic("response_class", "int8", "1", "response class", _response),
+    Statistic("status", "int8", "1", "status of the run", lambda reading: reading.status),
+    Statistic("zero_crossings", "int32", "1", "zero crossings of the centre displacement", _plain("zero_crossings")),
+    Statistic(
+        "zero_crossings_last_quarter", "int32", "1", "zero crossings in the last quarter", _plain("zero_crossings_last_quarter")
+    ),
+    Statistic("last_zero_crossing", "float64", "s", "time of the last zero crossing", _plain("last_zero_crossing")),
+    Statistic(
+        "final_well", "int8", "1", "sign of the centre displacement at the end",
+        lambda reading: reading.sign * reading.accumulators["side"],
+    ),
+    Statistic("final_well_proven", "bool", "1", "whether the run provably ends in its last well", lambda r: r.final),
+    Statistic(
+        "min_displacement", "float64", "1", "least beam displacement at the striker, over b",
+        _low_high("min_displacement", "max_displacement", greatest=False),
+    ),
+    Statistic(
+        "max_displacement", "float64", "1", "greatest beam displacement at the striker, over b",
+        _low_high("min_displacement", "max_displacement", greatest=True),
+    ),
+    Statistic(
+        "min_midspan_displacement", "float64", "1", "least centre displacement, over b",
+        _low_high("min_center", "max_center", greatest=False),
+    ),
+    Statistic(
+        "max_midspan_displacement", "float64", "1", "greatest centre displacement, over b",
+        _low_high("min_center", "max_center", greatest=True),
+    ),
+    Statistic("peak_force", "float64", "N", "peak contact force", lambda reading: reading.peak_force),
+    Statistic("impacts", "int32", "1", "impacts", _plain("impacts")),
+    Statistic("contact_time_fraction", "float64", "1", "share of time in contact", _contact_share),
+    Statistic("early_stop_time", "float64", "s", "time at which the class became certain", _plain("early_stop_time")),
+    Statistic(
+        "peak_displacement", "float64", "1", "greatest distance of the contact point from the straight beam, over b",
+        _peak("min_displacement", "max_displacement"),
+    ),
+    Statistic(
+        "peak_midspan_displacement", "float64", "1", "greatest distance of the centre from the straight beam, over b",
+        _peak("min_center", "max_center"),
+    ),
+    Statistic(
+        "peak_velocity", "float64", "1", "greatest speed of the contact point at the end of a step, over b omega_1",
+        _seen("peak_velocity", lambda reading: 1.0 / reading.speed),
+    ),
+    Statistic(
+        "peak_midspan_velocity", "float64", "1", "greatest speed of the centre at the end of a step, over b omega_1",
+        _seen("peak_midspan_velocity", lambda reading: 1.0 / reading.speed),
+    ),
+    Statistic(
+        "rms_displacement", "float64", "1", "root mean square displacement of the contact point, over b",
+        _rms("square_displacement", per_speed=False),
+    ),
+    Statistic(
+        "rms_midspan_displacement", "float64", "1", "root mean square displacement of the centre, over b",
+        _rms("square_center", per_speed=False),
+    ),
+    Statistic(
+        "rms_velocity", "float64", "1", "root mean square velocity of the contact point, over b omega_1",
+        _rms("square_velocity", per_speed=True),
+    ),
+    Statistic(
+        "rms_midspan_velocity", "float64", "1", "root mean square velocity of the centre, over b omega_1",
+        _rms("square_midspan_velocity", per_speed=True),
+    ),
+    Statistic("impulse", "float64", "N s", "impulse on the beam, all impacts", _seen("total_impulse")),
+    Statistic("striker_work", "float64", "J", "work done by the striker", _seen("work")),
+    Statistic(
+        "gross_work", "float64", "J", "work done by the striker, the base and the axial load, taken as positive",
+        _seen("gross_work"),
+    ),
+    Statistic("mean_power", "float64", "W", "work done by the striker over the time of the run", _mean_power),
+    Statistic(
+        "energy_dissipated", "float64", "J", "energy dissipated: all work less what the beam gained",
+        _dissipated,
+    ),
+    Statistic("energy_lost_contact", "float64", "J", "energy lost in contact", _seen("lost")),
+    Statistic(
+        "high_frequency_energy_fraction", "float64", "1", "share of the modal energy above a multiple of omega_1, over time",
+        _high_share,
+    ),
+    Statistic("base_work", "float64", "J", "work done by the base, in its frame", _seen("base_work")),
+    Statistic("load_work", "float64", "J", "work done by the change of the axial load", _seen("load_work")),
+    Statistic("energy_harvested", "float64", "J", "energy that ended in the harvester's load", _harvested),
+    Statistic(
+        "harvested_power", "float64", "W", "energy in the harvester's load over the time of the run", _harvested_power
+    ),
+    Statistic(
+        "harvested_per_cycle", "float64", "J", "energy in the harvester's load over the cycles of the run",
+        _harvested_per_cycle,
+    ),
+    Statistic("peak_voltage", "float64", "V", "greatest voltage across the load at the end of a step", _peak_voltage),
+)  # fmt: skip
+
+
+def _of_one_striker(name: str) -> Statistic | None:
+    pass  # import-removed
+
+    return of_one_named(name)
+
+
+STATISTICS: dict[str, Statistic] = NamedTable(_of_one_striker, ((row.name, row) for row in _ROWS))
+"""Variables of a map and attributes of an outcome, by name; ``peak_force_striker_2`` is found too, not listed."""
+
+
+def updated() -> tuple[Statistic, ...]:
+    """The statistics that kernels update after every step."""
+    return tuple(row for row in STATISTICS.values() if row.update is not None)
+
+
+def register(statistic: Statistic) -> None:
+    """Add a statistic to the table; every run and map from now on has it.
+
+    Raises
+    ------
+    InputError
+        If the name is taken or cannot name a variable.
+    """
+    if not statistic.name.isidentifier():
+        raise InputError(f"statistic {statistic.name!r}: must be a name, such as 'rms_force'")
+    if statistic.name in STATISTICS:
+        raise InputError(f"statistic {statistic.name!r}: there is one of that name")
+    STATISTICS[statistic.name] = statistic
+
+
+def unregister(name: str) -> None:
+    """Take a registered statistic out of the table again.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name, or it is one of the package's own.
+    """
+    if name not in list(STATISTICS) or STATISTICS[name] in _ROWS:
+        raise InputError(f"statistic {name!r}: was not registered")
+    del STATISTICS[name]
+
+
+def accumulators_dtype(others: int = 0) -> np.dtype[Any]:
+    """One record of what kernels keep of a run, with *others* strikers beside the first."""
+    # first, so that Numba does not take the record for one of the kind without
+    fields: list[Any] = [("others", np.float64, (others, OTHER_WORK + 1))] if others else []
+    fields += [(name, kind) for name, kind, _ in _KEPT]
+    fields += [(f"own_{row.name}", np.float64) for row in updated()]
+    return np.dtype(fields, align=True)
+
+
+ACCUMULATORS = accumulators_dtype()
+"""Of the package's own statistics."""
+
+
+def empty_accumulators(runs: int, others: int = 0) -> Any:
+    """Books of runs that have not begun, with *others* strikers beside the first."""
+    accumulators_of_runs = np.zeros(runs, dtype=accumulators_dtype(others))
+    for name, _, start in _KEPT:
+        accumulators_of_runs[name] = start
+    for row in updated():
+        accumulators_of_runs[f"own_{row.name}"] = row.start
+    return accumulators_of_runs
+
+
+# ----------------------------------------------------------------------------------------------------
+# Statistics of each of several strikers: rows beside the table's, whose names bear the striker's number.
+
+
+_EACH = {
+    "impacts": (OTHER_IMPACTS, "impacts"),
+    "peak_force": (OTHER_PEAK, "peak contact force"),
+    "impulse": (OTHER_IMPULSE, "impulse on the beam, all impacts"),
+    "striker_work": (OTHER_WORK, "work done"),
+}
+"""What each of several has: where the others' is kept, and words."""
+_NUMBERS = {str(number) for number in range(1, MOST_STRIKERS + 1)}
+
+
+def rows_for(strikers: int) -> dict[str, Statistic]:
+    """The rows of a system with so many strikers: the table's, and if there are several those of each of them."""
+    rows = [_of_one(name, number + 1) for number in range(strikers if strikers > 1 else 0) for name in _EACH]
+    return STATISTICS | {row.name: row for row in rows}
+
+
+def of_one_named(name: str) -> Statistic | None:
+    """The row of one of several strikers by its name; None if there is no such row."""
+    whole, _, number = name.rpartition("_striker_")
+    if whole not in _EACH or number not in _NUMBERS:
+        return None
+    return _of_one(whole, int(number))
+
+
+def _of_one(name: str, number: int) -> Statistic:
+    """Of one striker, the first being 1."""
+    whole, (column, words) = STATISTICS[name], _EACH[name]
+    words = f"{words}, striker {number}"
+    return Statistic(
+        f"{name}_striker_{number}",
+        whole.dtype,
+        whole.unit,
+        words,
+        lambda reading: reading.one(column, number),
+    )
+
+
+# ----------------------------------------------------------------------------------------------------
+# What engines answer: the books of many runs, read as statistics in the units and signs of a map.
+
+
+_MADE = 0.01
+"""Of the gross work: energy out of nothing from which a run is not believed."""
+_ROUNDED = 1e-6
+"""Of the energies themselves, the same."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The books of an ensemble, and what it takes to read them."""
+
+    ensemble: Ensemble
+    accumulators: NDArray[Any]
+    cycles: float
+
+    @property
+    def sign(self) -> float:
+        """+1 for a striker below, -1 for one above."""
+        return self.ensemble.structure.sign
+
+    @property
+    def length(self) -> float:
+        """What displacements are normalised by, m."""
+        return self.ensemble.scale.length
+
+    @property
+    def speed(self) -> float:
+        """What velocities are normalised by, m/s."""
+        return self.ensemble.scale.length * self.ensemble.scale.omega
+
+    @property
+    def first_side(self) -> NDArray[np.int64]:
+        """Side of the centre that each run begins on."""
+        return self.ensemble.first_side
+
+    @cached_property
+    def status(self) -> NDArray[np.int64]:
+        """How each run ended; what ended with more energy than it was given is unbalanced.
+
+        Damping, and a contact with losses, only take energy.
+        """
+        accumulators, status = self.accumulators, self.accumulators["status"]
+        done = (status == RunStatus.OK) | (status == RunStatus.EARLY_STOP)
+        with np.errstate(invalid="ignore"):  # runs that failed have no numbers
+            given = accumulators["work"] + accumulators["base_work"] + accumulators["load_work"]
+            made = accumulators["energy"] - accumulators["first_energy"] - given
+        allowed = _MADE * accumulators["gross_work"]
+        allowed = allowed + _ROUNDED * (np.abs(accumulators["energy"]) + np.abs(accumulators["first_energy"]))
+        return np.where(done & (made > allowed), RunStatus.ENERGY_ERROR, status)
+
+    @cached_property
+    def good(self) -> NDArray[np.bool_]:
+        """Runs whose class is known."""
+        status = self.status
+        return np.asarray((status == RunStatus.OK) | (status == RunStatus.EARLY_STOP))
+
+    @cached_property
+    def duration(self) -> NDArray[np.float64]:
+        """Time marched, s."""
+        return np.asarray(self.accumulators["time"] * self.ensemble.runs["tick"])
+
+    def seen(self, column: str) -> NDArray[np.float64]:
+        """A column, NaN where the run failed."""
+        return np.where(self.good, self.accumulators[column], np.nan)
+
+    @property
+    def others(self) -> NDArray[np.float64]:
+        """What is kept of each striker beside the first, shape (runs, strikers, kinds)."""
+        if self.ensemble.others is None:
+            return np.zeros((self.accumulators.size, 0, 4))
+        return np.asarray(self.accumulators["others"])
+
+    def one(self, column: int, number: int) -> NDArray[np.float64]:
+        """A column of one of several strikers, the first being 1: its own is what the others leave of the whole."""
+        others = self.others[:, :, column]
+        if number > 1:
+            found = others[:, number - 2]
+        elif column == OTHER_PEAK:
+            found = self.accumulators["peak_force"]
+        else:
+            whole = {OTHER_IMPACTS: "impacts", OTHER_IMPULSE: "total_impulse", OTHER_WORK: "work"}[column]
+            found = self.accumulators[whole] - others.sum(axis=1)
+        return np.asarray(found if column == OTHER_IMPACTS else np.where(self.good, found, np.nan))
+
+    @property
+    def peak_force(self) -> NDArray[np.float64]:
+        """Of the law's force, the greatest of any striker; NaN where an impact lasts no time."""
+        force = self.seen("peak_force")
+        if self.ensemble.others is not None:
+            return np.maximum(force, self.others[:, :, OTHER_PEAK].max(axis=1))
+        if self.ensemble.law.impulsive:
+            return np.where((force == 0.0) & (self.accumulators["impacts"] > 0), np.nan, force)
+        return force
+
+    @cached_property
+    def final(self) -> NDArray[np.bool_]:
+        """Runs that will provably stay in the well they ended in.
+
+        Untouched, the beam only loses energy: with less than it takes to come back to the highest position the tip
+        will ever have, or to pass the saddle, it never does.  Nothing is said of a well that the tip is in.
+        """
+        accumulators, ensemble = self.accumulators, self.ensemble
+        model = ensemble.structure.model
+        found = np.zeros(accumulators.size, dtype=bool)
+        if not model.is_bistable:
+            return found
+        settled = self.good & (accumulators["energy"] < crossing_energy(model) - model.well_energy)
+        if not (ensemble.highest > -np.inf).any():
+            return np.asarray(settled)
+        reach, level = np.maximum(ensemble.highest, 0.0), 0.0
+        if ensemble.structure.uneven is not None:
+            level = ensemble.structure.uneven.level
+            reach = passed_heights(model, ensemble.location, ensemble.highest)
+        away = settled & (accumulators["side"] > 0) & (accumulators["displacement"] > reach)
+        away &= accumulators["center"] > level
+        which = np.flatnonzero(away)
+        if which.size:
+            bound = decidable_energy(model, ensemble.location[which], ensemble.highest[which])
+            found[which] = accumulators["energy"][which] < bound
+        return found
+
+
+def statistics_of(
+    ensemble: Ensemble, accumulators_of_runs: NDArray[Any], cycles: float | None = None
+) -> dict[str, NDArray[Any]]:
+    """What an engine found, in the units and signs of a map; arrays of shape (runs,) by name.
+
+    *cycles* is how long the runs lasted, if not as the ensemble says.
+    """
+    reading = Reading(ensemble, accumulators_of_runs, ensemble.cycles if cycles is None else cycles)
+    found = {}
+    strikers = 1 if ensemble.others is None else 1 + len(ensemble.others.laws)
+    for name, row in rows_for(strikers).items():
+        values = (
+            row.value(reading)
+            if row.update is None
+            else row.value(reading, accumulators_of_runs[f"own_{name}"])
+        )
+        found[name] = np.asarray(values).astype(row.dtype)
+    return found
+
+
+# ----------------------------------------------------------------------------------------------------
+# What engines hand over beside books: states at landings, and pieces of a recorded run.
+
+
+_Array = NDArray[np.float64]
+
+
+class Landings(NamedTuple):
+    """States of many runs at every landing."""
+
+    accumulators_of_runs: NDArray[Any]
+    q: _Array
+    """Linear modes about the well at hand, shape (runs, landings, N)."""
+    p: _Array
+    well_sign: NDArray[np.int64]
+    """That well: +1 the first, -1 the other, shape (runs, landings)."""
+    contact_ticks: NDArray[np.int64]
+    """Ticks since the present contact began, -1 where tip and beam are apart."""
+
+
+class Last(NamedTuple):
+    """Where a recorded run stands at its end."""
+
+    q: _Array
+    """Linear modes about the well at hand, shape (N,)."""
+    p: _Array
+    well_sign: int
+    contact_ticks: int
+
+
+class Recorded(NamedTuple):
+    """A piece of a recorded run."""
+
+    times: _Array
+    """When each sample was taken, s, shape (samples,)."""
+    q: _Array
+    """Linear modes about the first well, shape (samples, N)."""
+    p: _Array
+    values: _Array
+    """Penetration, contact force, beam energy, contact energy, work, dissipation, loss in contact; (samples, 7)."""
+    impacts: _Array
+    """Onset, duration, peak force and impulse of each impact that ended, shape (impacts, 4)."""
+    accumulators_of_runs: NDArray[Any]
+    """The run's book as it is at the end of the piece, shape (1,)."""
+    last: Last

@@ -1,0 +1,489 @@
+"""How finely to step: the default from the model and the contact, and what a user asks for instead."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.contact.base import ContactLaw
+from snapbeam.model.drive.base import HORIZON
+from snapbeam.model.drive.recorded_motion import RecordedMotion
+from snapbeam.model.integration import ACCURACIES, Integration
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.model.system import System
+from snapbeam.solver.compilation import kernel
+from snapbeam.solver.splitting import COMPOSITIONS
+from snapbeam.solver.structure import Structure, structure_of
+from snapbeam.util.validation import InputError, choice, positive
+
+__all__ = [
+    "SUBDIVISION",
+    "Clocked",
+    "Plan",
+    "choose_base_step",
+    "clocked",
+    "flight_step",
+    "most_steps",
+    "require_resolved",
+    "seconds_of",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Steps in free flight, measured on the structure itself.
+#
+# How long a step may be follows from how the tension detunes the modes, from which of them come in step with the kicks,
+# and from how much energy there is; no formula holds from one mode to a hundred and from shallow beams to deep ones.  So
+# it is tried: the structure is struck at one point in its well, gently and hard, and marched for two periods of its first
+# mode with steps of many lengths.  What differs from the finest of them by less than a limit serves, where the error is
+# counted in the relative change of velocity at the start that would have done as much.
+
+
+_Array = NDArray[np.float64]
+
+_FEWEST = 30.0
+"""Flight steps in a period of the first mode, at least."""
+_MOST = 2.0**17
+_PER_OCTAVE = 10
+_MARGIN = 1
+"""So many of the numbers that are tried must serve below and above the one that is taken: steps are made shorter to fit
+the cycle, and modes that come in step with the kicks spoil single lengths."""
+_FINER = 2.0
+"""Steps of sixth order that all others are compared with, over the shortest of them."""
+_STARTS = ((0.15, 1.0 / 60.0, 2.0, 0.3), (10.0, 1.0 / 160.0, 1.0, 1.0))
+"""Of each blow its energy over the barrier's, how long it lasts in periods of the first mode, the length of the steps
+that follow it over the flight step, and the error allowed over the limit: a beam that rings in its well, where steps
+are twice as long, and one that has been struck hard."""
+_STRUCK = 0.46
+"""Where, over the length of the beam: no mode has a node there that its neighbours do not have near it."""
+_PERIODS = 2.0
+_MOST_SLOPE = 1e5
+_NEIGHBOUR = 1e-9
+"""Relative difference of the velocities of a neighbour, by which a start's own sensitivity is measured."""
+_PLACES = (0.1, 0.2, 0.3, 0.4, 0.5)
+_MOST_MODES = 48
+"""Lowest modes that take part: the tension hardly couples the others, and the step found is the same."""
+_KEPT: OrderedDict[tuple[str, int, float], float] = OrderedDict()
+_MOST_KEPT = 4096
+
+
+def flight_step(model: ReducedModel, order: int, limit: float) -> float:
+    """The longest step in free flight, s, that serves a structure.
+
+    Parameters
+    ----------
+    model : ReducedModel
+    order : int
+        Of the composition.
+    limit : float
+        Greatest error of a displacement, over the buckling level, after two periods of the first mode; where the
+        start is sensitive, that many times the displacement's relative slope along the velocity at the start.
+    """
+    period = 1.0 / model.reference_frequency
+    if model.nonlinear_stiffness == 0.0 or not model.tension_matrix.any():
+        return period / _FEWEST  # nothing but linear modes, whose flow is exact
+    structure = structure_of(model, "below")
+    key = (structure.hash, order, limit)
+    if key not in _KEPT:
+        _KEPT[key] = period / _Bench(structure, order).fewest(limit)
+        if structure.uneven is not None:
+            _KEPT[key] = min(_KEPT[key], period / _Bench(structure, order, far=True).fewest(limit))
+        while len(_KEPT) > _MOST_KEPT:
+            _KEPT.popitem(last=False)
+    return _KEPT[key]
+
+
+class _Bench:
+    """The structure, let go."""
+
+    def __init__(self, structure: Structure, order: int, far: bool = False) -> None:
+        model = structure.model
+        self.structure = structure
+        self.order = order
+        self.period = 1.0 / model.reference_frequency
+        length = model.length_scale or 1.0
+        shapes = [model.shape_at(x) for x in _PLACES] if model.beam is not None else [model.midspan_shape]
+        if model.contact_shape is not None:
+            shapes.append(model.contact_shape)
+        kernel_output = slice(0, _MOST_MODES)
+        self.omega, self.damping = (
+            structure.omega[kernel_output],
+            (structure.damping_ratio * structure.omega)[kernel_output],
+        )
+        self.columns = np.array(structure.coupling[kernel_output, kernel_output].T, order="C")
+        self.well = structure.well[kernel_output]
+        self.rest = self.force = np.zeros(self.omega.size)
+        if (
+            far and structure.uneven is not None
+        ):  # about the mirror image of the first well, at rest in the second
+            self.well = -self.well
+            self.rest, self.force = (
+                structure.uneven.second[kernel_output],
+                structure.uneven.force[kernel_output],
+            )
+        self.rows = (np.array(shapes) @ model.linear_modes)[:, kernel_output] / length
+        if model.beam is not None:
+            struck = model.shape_at(_STRUCK)
+        else:
+            struck = model.midspan_shape if model.contact_shape is None else model.contact_shape
+        blow = (struck @ model.linear_modes)[kernel_output]
+        if not blow.any():
+            blow = np.ones(self.omega.size)
+        if structure.uneven is not None and model.landscape is not None:
+            barrier = model.saddle_energy - model.landscape.deepest.energy
+        elif model.is_bistable:
+            straight, well = np.zeros(model.modes), structure.equilibrium
+            barrier = float(model.potential_energy(straight) - model.potential_energy(well))
+        else:
+            barrier = 0.5 * (2.0 * math.pi * model.reference_frequency / np.abs(self.rows[:, 0]).max()) ** 2
+        self.starts = []
+        for energy, duration, *_ in _STARTS:
+            # the spectrum of a pulse falls off beyond the inverse of what it lasts
+            velocity = blow / (1.0 + (self.omega * duration * self.period / math.pi) ** 2)
+            self.starts.append(velocity * math.sqrt(2.0 * energy * barrier / (velocity @ velocity)))
+
+    def ends(self, velocity: _Array, counts: _Array, order: int) -> _Array:
+        """Displacements at the end, with each number of steps, over the length that normalises.
+
+        Shape (counts, places).
+        """
+        composition, damping = COMPOSITIONS[order], self.damping
+        steps = _PERIODS * self.period / counts
+        time = np.multiply.outer(steps, composition.flow)[:, :, None]
+        # the flow of q' = p, p' = -omega^2 q - 2 zeta omega p, whichever way the mode is damped
+        root = np.sqrt((self.omega**2 - damping**2).astype(np.complex128))
+        sine = np.where(root == 0.0, time, np.sin(root * time) / np.where(root == 0.0, 1.0, root)).real
+        cosine, decay = np.cos(root * time).real, np.exp(-damping * time)
+        flows = np.stack(
+            [
+                decay * (cosine + damping * sine),
+                decay * sine,
+                -decay * self.omega**2 * sine,
+                decay * (cosine - damping * sine),
+            ],
+            axis=2,
+        )
+        kicks = np.multiply.outer(steps, composition.kick)
+        out, work = np.empty((counts.size, self.omega.size)), np.empty((3, self.omega.size))
+        whole, gamma = counts.astype(np.int64), self.structure.nonlinear_stiffness
+        kernel(_march, ())(
+            whole,
+            flows,
+            kicks,
+            self.columns,
+            self.well,
+            gamma,
+            np.stack((self.rest, velocity, self.force)),
+            work,
+            out,
+        )
+        return out @ self.rows.T
+
+    def fewest(self, limit: float) -> float:
+        """Fewest flight steps per period that serve, and still do with a few more of them."""
+        lowest = _FEWEST
+        while lowest < _MOST:
+            counts = lowest * 2.0 ** (np.arange(_PER_OCTAVE + 2 * _MARGIN + 1) / _PER_OCTAVE)
+            serves = self._errors(counts) <= limit
+            for first in range(_PER_OCTAVE + 1):
+                if serves[first : first + 2 * _MARGIN + 1].all():
+                    return float(counts[first + _MARGIN])
+            lowest *= 2.0
+        return float(counts[-1])
+
+    def _errors(self, counts: _Array) -> _Array:
+        """Greatest error of each number of flight steps, over what each start is allowed."""
+        worst = np.zeros(counts.size)
+        for velocity, (_, _, longer, share) in zip(self.starts, _STARTS, strict=True):
+            own = np.ceil(_PERIODS * counts / longer)
+            finest = np.ceil(_FINER * own[-1:])
+            with np.errstate(all="ignore"):
+                best = self.ends(velocity, finest, 6)
+                beside = self.ends((1.0 + _NEIGHBOUR) * velocity, finest, 6)
+                slope = min(max(1.0, float(np.abs(beside - best).max()) / _NEIGHBOUR), _MOST_SLOPE)
+                difference = np.abs(self.ends(velocity, own, self.order) - best).max(axis=1) / (share * slope)
+            worst = np.maximum(worst, np.where(np.isfinite(difference), difference, np.inf))
+        return worst
+
+
+def _march(counts, flows, kicks, columns, well, gamma, start, work, out):
+    # r = G q column by column: every sum keeps its order, and nothing waits for the sum before
+    modes = well.size
+    last = kicks.shape[1] - 1
+    q, p, r = work[0], work[1], work[2]
+    for run in range(counts.size):
+        for i in range(modes):
+            q[i], p[i] = start[0, i], start[1, i]
+        for step in range(counts[run]):
+            for stage in range(last + 1):
+                weight = kicks[run, stage]
+                if stage == last and step < counts[run] - 1:
+                    weight += kicks[run, 0]
+                if stage > 0 or step == 0:
+                    along_well, along = 0.0, 0.0
+                    for i in range(modes):
+                        r[i] = 0.0
+                    for j in range(modes):
+                        along_mode = q[j]
+                        for i in range(modes):
+                            r[i] += columns[j, i] * along_mode
+                    for i in range(modes):
+                        along += r[i] * q[i]
+                        along_well += well[i] * q[i]
+                    toward, back = -gamma * along * weight, -gamma * (2.0 * along_well + along) * weight
+                    for i in range(modes):
+                        p[i] += toward * well[i] + back * r[i]
+                        p[i] += weight * start[2, i]
+                if stage < last:
+                    for i in range(modes):
+                        turned = flows[run, stage, 0, i] * q[i] + flows[run, stage, 1, i] * p[i]
+                        p[i] = flows[run, stage, 2, i] * q[i] + flows[run, stage, 3, i] * p[i]
+                        q[i] = turned
+        for i in range(modes):
+            out[run, i] = q[i]
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+# Free flight: the error allowed a step, as it is measured on the structure, by level of accuracy.
+_LIMIT = {"standard": 2.5e-7, "reference": 2e-11}
+_LIMIT_OF_HITS = {"standard": 1e-9, "reference": 1e-13}
+"""Where impacts last no time: no contact steps share the error, and there is one mode only."""
+_ORDER = {"standard": 4, "reference": 6}
+_FREE_TURN = 4.0
+"""Of the fastest mode in a flight step of level "reference", rad."""
+_MOST_DECAY = 1.8
+"""Of the mode that decays fastest, in a flight step."""
+# Contact: longest step over the time of an impact at the speed 0.2 b omega_1, by level, and how many
+# halvings below it the shortest step is, by order.
+_CONTACT_SHARE = {"standard": 1.0 / 8.0, "reference": 1.0 / 32.0}
+_CONTACT_SPEED = 0.2
+_HALVINGS = {4: 4, 6: 10}
+_MOST_HALVINGS = {"standard": 5, "reference": 7}
+_CONTACT_TURN = math.pi
+"""Of the fastest mode in the longest contact step, rad: the contact moves every mode, and beyond half a turn
+its kicks come in step with the fastest ones."""
+
+
+class Plan(NamedTuple):
+    """Order of the composition and lengths of its steps."""
+
+    order: int
+    step: float
+    """Flight step, s."""
+    coarsest: int
+    """Halvings of the flight step that make the longest contact step."""
+    finest: int
+    """Halvings of the flight step that make the shortest contact step."""
+
+
+def choose_base_step(
+    model: ReducedModel,
+    contact: ContactLaw | None,
+    *,
+    step: float | None = None,
+    accuracy: str = "standard",
+) -> Plan:
+    """The steps of a run: short enough in flight, as measured on the model itself, and for an impact.
+
+    Parameters
+    ----------
+    model, contact
+        What is struck, and how.  Where does not matter: the steps suit the lightest point of the beam, so
+        that every run of a map is stepped alike.
+    step : float, optional
+        Flight step in seconds, instead of the default; contact steps scale with it.
+    accuracy : {"standard", "reference"}
+        ``"standard"``: order 4, and errors of about a thousandth of the buckling level where a run is well conditioned.
+        ``"reference"``: order 6, and errors a hundred thousand times smaller.
+    """
+    choice("accuracy", accuracy, ACCURACIES)
+    order = _ORDER[accuracy]
+    fastest = float(model.omega.max())
+    limits = _LIMIT_OF_HITS if contact is not None and contact.impulsive else _LIMIT
+    flight = flight_step(model, order, limits[accuracy])
+    if accuracy == "reference" and fastest * flight > _FREE_TURN:
+        flight = _FREE_TURN / fastest
+    decay = float((model.damping_ratio * model.omega).max())
+    if decay * flight > _MOST_DECAY:
+        flight = _MOST_DECAY / decay
+    impact = flight
+    duration = 0.0
+    if contact is not None and not contact.impulsive:
+        mass = model.lightest_contact_mass
+        speed = _CONTACT_SPEED * (model.length_scale or 1.0) * 2.0 * math.pi * model.reference_frequency
+        duration = contact.time_scale(mass, speed)
+    if duration > 0.0:
+        impact = _CONTACT_SHARE[accuracy] * duration
+        flight = min(flight, impact * 2 ** _MOST_HALVINGS[accuracy])
+        if fastest > 0.0:
+            impact = min(impact, _CONTACT_TURN / fastest)
+    coarsest = max(0, math.ceil(math.log2(flight / impact)))
+    if step is not None:
+        flight = positive("step", step, "s")
+    return Plan(order, flight, coarsest, coarsest + _HALVINGS[order])
+
+
+# ----------------------------------------------------------------------------------------------------
+# The clock of a run: time in ticks, so that halved steps and located events are whole numbers.
+
+
+SUBDIVISION = 1 << 20
+"""Ticks of a flight step."""
+_MOST_TICKS = 2.0**61
+_HOUR = 3600.0
+_STEP_COST, _MODE_COST = 0.5e-6, 0.07e-6
+"""Seconds of one core for a step, and more of it for each mode."""
+_FEWEST_CLOCK = 4.0
+"""Flight steps, at least, in a cycle of excitation and in a period of the first mode, of a step that was asked for."""
+
+
+class Clocked(NamedTuple):
+    """How long runs last."""
+
+    cycles: float
+
+
+def clocked(
+    table: NDArray[Any],
+    system: System,
+    integration: Integration,
+    cycle: _Array,
+    plans: list[Plan],
+    periods: float | None,
+) -> Clocked:
+    """Enter the ticks of every run in the table of runs.
+
+    *cycle* holds the seconds of one cycle of excitation of each run.
+
+    Raises
+    ------
+    InputError
+        If a run has more steps than can be counted in ticks, or a record ends before it.
+    """
+    require_resolved(system, integration, cycle)
+    lengths = np.array([plan.step for plan in plans])
+    drive = system.primary_excitation[1] if system.primary_excitation is not None else None
+    repeats = drive is None or (drive.is_periodic and len(system.moving) < 2)
+    table["step"] = SUBDIVISION
+    table["coarsest"] = [plan.coarsest for plan in plans]
+    table["finest"] = [plan.finest for plan in plans]
+    if isinstance(drive, RecordedMotion):
+        turn = np.full(table.size, drive.duration)
+        left = 1.0 - table["phase"] / (2.0 * math.pi)
+        kernel_input = _asked_cycles(drive, integration, periods, float(left.min()))
+        steps = _whole_steps(turn, lengths, 1.0)
+        table["period"] = steps * SUBDIVISION
+        table["tick"] = turn / table["period"]
+        held = drive.duration * drive.frequency
+        table["landing"] = np.rint(table["period"] / held)
+        share = kernel_input / drive.frequency / drive.duration
+        table["end"] = np.rint(
+            share * table["period"] if periods is None else kernel_input * table["landing"]
+        )
+        table["end"] = np.minimum(table["end"], np.rint(left * table["period"]))
+        cycles = float(table["end"][0] * table["tick"][0] * drive.frequency)
+    else:
+        cycles = float(integration.cycles_or_default if periods is None else periods)
+        steps = _whole_steps(cycle, lengths, cycles)
+        table["period"] = steps * SUBDIVISION
+        table["tick"] = cycle / table["period"]
+        table["end"] = table["period"] * int(cycles)
+        if not cycles.is_integer():
+            table["end"] = np.rint(table["period"] * cycles).astype(np.int64)
+        table["landing"] = table["period"]
+        if not repeats:
+            _whole_steps(cycle, lengths, float(HORIZON))  # refused if that cannot be counted
+            table["period"] *= HORIZON
+    require_affordable(integration, system.model.modes, lengths, table["end"] / SUBDIVISION)
+    if periods is None:
+        table["landing"] = table["end"]
+    table["last_quarter"] = table["end"] // 4 * 3
+    return Clocked(cycles)
+
+
+def _asked_cycles(
+    drive: RecordedMotion, integration: Integration, periods: float | None, left: float
+) -> float:
+    """Cycles to march, of a record of which a share *left* is still to come."""
+    held = drive.duration * drive.frequency * left
+    kernel_input = integration.cycles if periods is None else periods
+    if kernel_input is None and held > 0.0:
+        return held
+    if kernel_input is None or kernel_input > held + 1e-6:  # states stand on ticks
+        of = "of" if left == 1.0 else "that are left of"
+        raise InputError(
+            f"cycles = {kernel_input}: must be at most the {max(held, 0.0):.1f} cycles {of} the recorded drive"
+        )
+    return min(float(kernel_input), held)
+
+
+def require_resolved(system: System, integration: Integration, cycle: _Array) -> None:
+    """Refuse a step that was asked for and does not resolve a *cycle* (s) of excitation or the first mode's period.
+
+    Raises
+    ------
+    InputError
+    """
+    if integration.step is None:
+        return
+    shortest, first = float(cycle.min()), 1.0 / system.model.reference_frequency
+    for length, words in ((shortest, "a cycle of excitation"), (first, "a period of the first mode")):
+        if integration.step * _FEWEST_CLOCK > length * (1.0 + 1e-12):
+            raise InputError(
+                f"step = {integration.step:g} s: does not resolve {words} of {length:.4g} s; must be at most "
+                f"{length / _FEWEST_CLOCK:.4g} s, a quarter of it"
+            )
+
+
+def seconds_of(steps: float, modes: int) -> float:
+    """What so many steps take on one core, s, to a factor of two or three."""
+    return steps * (_STEP_COST + _MODE_COST * modes)
+
+
+def most_steps(integration: Integration, modes: int) -> int:
+    """Steps that one run may take: those that were asked for, or what one core does in an hour."""
+    if integration.max_steps is not None:
+        return integration.max_steps
+    return int(_HOUR / seconds_of(1.0, modes))
+
+
+def require_affordable(integration: Integration, modes: int, lengths: _Array, steps: _Array) -> None:
+    """Refuse runs that take more steps than they may, before they begin; *lengths* of the steps in s.
+
+    Raises
+    ------
+    InputError
+    """
+    most, longest = most_steps(integration, modes), int(np.argmax(steps))
+    if steps[longest] > most:
+        allowed = "an hour's" if integration.max_steps is None else "max_steps"
+        spent = _words(seconds_of(float(steps[longest]), modes))
+        raise InputError(
+            f"a run of {steps[longest]:.3g} steps of {lengths[longest]:.3g} s, some {spent} on one core: must be at "
+            f"most {most:.3g} steps ({allowed}); ask for fewer cycles or longer steps, or for a larger max_steps"
+        )
+
+
+def _words(seconds: float) -> str:
+    for size, unit in ((86400.0 * 365.25, "years"), (86400.0, "days"), (3600.0, "hours"), (60.0, "minutes")):
+        if seconds >= size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.2g} seconds"
+
+
+def _whole_steps(period: _Array, step: _Array, cycles: float) -> NDArray[np.int64]:
+    """Flight steps in each period, the step made a little shorter to fit."""
+    steps = np.ceil(period / step * (1.0 - 1e-12))
+    most = float(steps.max()) * max(cycles, 1.0)
+    if not most <= _MOST_TICKS / SUBDIVISION:
+        raise InputError(
+            f"step = {float(step.min()):g} s with cycles = {cycles:g} of up to {float(period.max()):g} s: makes "
+            f"{most:.2g} steps, must be at most {_MOST_TICKS / SUBDIVISION:.2g}"
+        )
+    return np.asarray(steps.astype(np.int64))

@@ -1,0 +1,282 @@
+"""A structure as engines see it: modal numbers about a well, in no layout and without time."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.base_excitation import BaseExcitation, rigid_mass
+from snapbeam.model.harvester import Harvester
+from snapbeam.model.reduced_model import ReducedModel
+from snapbeam.model.striker import Striker
+
+__all__ = ["Structure", "Uneven", "structure_of"]
+
+
+_Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Uneven:
+    """What unequal wells add: about the mirror image of the first well the beam is the same, but for a constant force.
+
+    With B the side force and a the first well, K0 a + gamma (a . a) a = B.  At alpha = -a + V q the same linear modes
+    and the same tension terms, g negated, hold exactly, and 2 V^T B is left over: the origin of q on the far side is
+    -a, near the second well, wherever that is.
+    """
+
+    force: _Array
+    """2 V^T B, shape (N,), on the far side."""
+    lift: float
+    """Potential energy of -a above that of a, 2 B . a, J."""
+    second: _Array
+    """The second well about -a, as q."""
+    depth: float
+    """Potential energy of the second well above the first, J."""
+    level: float
+    """Displacement of the centre that divides the wells, m."""
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Linear modes about the well that a striker pushes away from, and the tension that couples them.
+
+    Everything is seen from the striker's side: a structure that is struck from above is the mirror image of the one
+    that is struck from below.  Arrays have shape (N,) unless said otherwise.
+    """
+
+    omega: _Array
+    """Natural frequencies, rad/s."""
+    damping_ratio: _Array
+    coupling: _Array
+    """G = V^T V, shape (N, N), exactly 0 between modes that the tension does not couple."""
+    nonlinear_stiffness: float
+    """gamma, Eq. (15)."""
+    well: _Array
+    """g = V^T alpha_eq."""
+    center: _Array
+    """V^T phi(1/2)."""
+    shift: _Array
+    """From this well to its mirror image, as q: the other well, where the two are equal."""
+    stretch: float
+    """Squared slopes in the well, alpha_eq . alpha_eq; 0 if there is one well only."""
+    center_rest: float
+    """Displacement of the centre in the well, m."""
+    sign: float
+    """+1 seen from below, -1 from above."""
+    equilibrium: _Array
+    """alpha in the well, as it is in space."""
+    model: ReducedModel
+    uneven: Uneven | None = None
+    """Of unequal wells."""
+    add_base_acceleration: _Array | None = None
+    """Of a base that moves: what an upward acceleration of it does to p, -V^T rho S integral(phi)."""
+    tapped: _Array | None = None
+    """Of a harvester: its coupling, scaled so that half the square of the circuit's coordinate is its energy."""
+    circuit: bool = False
+    """Whether the circuit's coordinate is the velocity of a mode of its own, the last one."""
+    body_mass: float | None = None
+    """Of a striker that is a body, whose own mode is then the last one; kg."""
+
+    def rests(self, shapes: _Array) -> _Array:
+        """Displacement at rest of points with these *shapes*, m: each by itself, so that none depends on the others."""
+        return np.array([(shape[None, :] @ self.equilibrium)[0] for shape in shapes])
+
+    def row(self, shape: _Array) -> _Array:
+        """V^T shape, seen from the striker's side."""
+        row: _Array = self.sign * (self.model.linear_modes.T @ shape)
+        if self.body_mass is not None:
+            row = np.append(row, -1.0 / math.sqrt(self.body_mass))
+        return np.append(row, 0.0) if self.circuit else row
+
+    def row_of_beam(self, row: _Array) -> _Array:
+        """A contact row without the part of the striker's own mode: the beam's displacement at that location."""
+        if self.body_mass is None:
+            return row
+        beam = row.copy()
+        beam[self.equilibrium.size] = 0.0
+        return beam
+
+    def high_modes(self, omega: float) -> NDArray[np.bool_]:
+        """Which modes are vibration modes of the beam above an angular frequency, rad/s; shape (N,)."""
+        return (self.omega > omega) & (np.arange(self.omega.size) < self.equilibrium.size)
+
+    def body_of(self, values: _Array) -> _Array:
+        """The striker's own part of q or p of shape (..., N), in space and SI units; NaN if it is no body."""
+        if self.body_mass is None:
+            return np.full(values.shape[:-1], np.nan)
+        own: _Array = self.sign * values[..., self.equilibrium.size] / math.sqrt(self.body_mass)
+        return own
+
+    def circuit_of(self, p: _Array) -> _Array:
+        """The circuit's coordinate in p of shape (..., N): its own, or none."""
+        found: _Array = p[..., -1] if self.circuit else np.full(p.shape[:-1], np.nan)
+        return found
+
+    def to_modal(
+        self,
+        alpha: _Array,
+        velocity: _Array,
+        shift: float = np.nan,
+        rate: float = np.nan,
+        circuit: float = np.nan,
+    ) -> tuple[_Array, _Array]:
+        """Amplitudes of shape (N,) and their velocities as q and p about the well, and those of the striker's body.
+
+        *circuit* is the coordinate of a harvester's circuit.
+        """
+        back = self.model.linear_modes.T @ self.model.mass
+        q, p = back @ (alpha - self.equilibrium), back @ velocity
+        if self.body_mass is not None:
+            scale = self.sign * math.sqrt(self.body_mass)
+            own = [0.0 if np.isnan(value) else scale * float(value) for value in (shift, rate)]
+            q, p = np.append(q, own[0]), np.append(p, own[1])
+        if self.circuit:
+            q, p = np.append(q, 0.0), np.append(p, 0.0 if np.isnan(circuit) else circuit)
+        return q, p
+
+    def amplitudes(self, q: _Array) -> _Array:
+        """alpha of q of shape (..., N) about the well."""
+        alpha: _Array = self.equilibrium + q[..., : self.equilibrium.size] @ self.model.linear_modes.T
+        return alpha
+
+    def velocities(self, p: _Array) -> _Array:
+        """Velocities of alpha, of p of shape (..., N)."""
+        velocity: _Array = p[..., : self.equilibrium.size] @ self.model.linear_modes.T
+        return velocity
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of its numbers, which linear algebra may round otherwise on another type of processor."""
+        digest = hashlib.sha256()
+        for part in (self.omega, self.damping_ratio, self.coupling, self.well, self.center, self.equilibrium):
+            digest.update(np.ascontiguousarray(part).tobytes())
+        digest.update(np.array([self.nonlinear_stiffness, self.sign]).tobytes())
+        if self.uneven is not None:
+            digest.update(np.ascontiguousarray(self.uneven.force).tobytes())
+        if self.tapped is not None:
+            digest.update(np.ascontiguousarray(self.tapped).tobytes())
+        if self.add_base_acceleration is not None:
+            digest.update(np.ascontiguousarray(self.add_base_acceleration).tobytes())
+        if self.body_mass is not None:
+            digest.update(np.array([self.body_mass]).tobytes())
+        return digest.hexdigest()
+
+
+def structure_of(
+    model: ReducedModel,
+    side: str,
+    striker: Striker | None = None,
+    base: BaseExcitation | None = None,
+    harvester: Harvester | None = None,
+) -> Structure:
+    """The structure of a reduced model, about the well that a striker from *side* pushes away from.
+
+    A striker that is a body of mass m_s on a spring k_s is one more linear mode, q_s = sqrt(m_s) times its displacement
+    beyond the motion that its drive gives it: no tension, contact row -1/sqrt(m_s).
+    """
+    sign = 1.0 if side == "below" else -1.0
+    model = model if sign > 0.0 else model.mirrored
+    equilibrium = sign * model.well_amplitude
+    modes = model.linear_modes
+    struck = Structure(
+        omega=model.omega,
+        damping_ratio=model.damping_ratio,
+        coupling=model.tension_matrix,
+        nonlinear_stiffness=float(model.nonlinear_stiffness),
+        well=modes.T @ equilibrium,
+        center=sign * (modes.T @ model.midspan_shape),
+        shift=-2.0 * (modes.T @ model.mass @ equilibrium),
+        stretch=float(equilibrium @ equilibrium),
+        center_rest=sign * float(model.midspan_shape @ equilibrium),
+        sign=sign,
+        equilibrium=equilibrium,
+        model=model,
+        uneven=_uneven(model, sign),
+        add_base_acceleration=None if base is None else -(modes.T @ rigid_mass(model)),
+    )
+    if striker is not None and striker.mass is not None:
+        struck = _with_body(struck, striker, integrate_sticking_run=base is not None and base.striker_on_base)
+    return struck if harvester is None else _with_circuit(struck, harvester)
+
+
+def _uneven(model: ReducedModel, sign: float) -> Uneven | None:
+    """What unequal wells add, of a model that is seen from the striker's side."""
+    if model.landscape is None or model.transverse_force is None or not model.is_bistable:
+        return None
+    lower, upper = model.landscape.lower, model.landscape.upper
+    away = upper.amplitude + lower.amplitude
+    return Uneven(
+        force=sign * 2.0 * (model.linear_modes.T @ model.transverse_force),
+        lift=2.0 * float(model.transverse_force @ lower.amplitude),
+        second=sign * (model.linear_modes.T @ (model.mass @ away)),
+        depth=upper.energy - lower.energy,
+        level=model.dividing_height,
+    )
+
+
+def _with_body(structure: Structure, striker: Striker, integrate_sticking_run: bool = False) -> Structure:
+    """The structure with the mode of a striker that is a body, which a base shakes too if it carries it."""
+    assert striker.mass is not None
+    own = -structure.sign * math.sqrt(striker.mass) if integrate_sticking_run else 0.0
+    count = structure.omega.size + 1
+    coupling = np.zeros((count, count))
+    coupling[:-1, :-1] = structure.coupling
+    return dataclasses.replace(
+        structure,
+        omega=np.append(structure.omega, math.sqrt(striker.suspension_stiffness / striker.mass)),
+        damping_ratio=np.append(structure.damping_ratio, striker.damping_ratio),
+        coupling=coupling,
+        well=np.append(structure.well, 0.0),
+        center=np.append(structure.center, 0.0),
+        shift=np.append(structure.shift, 0.0),
+        uneven=None if structure.uneven is None else _with_rest(structure.uneven),
+        add_base_acceleration=None
+        if structure.add_base_acceleration is None
+        else np.append(structure.add_base_acceleration, own),
+        body_mass=striker.mass,
+    )
+
+
+def _with_circuit(structure: Structure, harvester: Harvester) -> Structure:
+    """The structure with a harvester, and with the mode of its circuit if that has inertia.
+
+    That mode has no frequency, no tension and no row: its velocity is the circuit's coordinate.
+    """
+    modes = structure.model.linear_modes.shape[1]
+    coupling = np.zeros(structure.omega.size)
+    coupling[:modes] = structure.model.linear_modes.T @ harvester.row(structure.model)
+    if harvester.inertia == 0.0:
+        return dataclasses.replace(structure, tapped=coupling)
+    coupling = coupling / math.sqrt(harvester.inertia)
+    count = structure.omega.size + 1
+    tension = np.zeros((count, count))
+    tension[:-1, :-1] = structure.coupling
+    longer: dict[str, Any] = {name: np.append(getattr(structure, name), 0.0) for name in _ROWS}
+    return dataclasses.replace(
+        structure,
+        **longer,
+        coupling=tension,
+        uneven=None if structure.uneven is None else _with_rest(structure.uneven),
+        add_base_acceleration=None
+        if structure.add_base_acceleration is None
+        else np.append(structure.add_base_acceleration, 0.0),
+        tapped=np.append(coupling, 0.0),
+        circuit=True,
+    )
+
+
+_ROWS = ("omega", "damping_ratio", "well", "center", "shift")
+
+
+def _with_rest(uneven: Uneven) -> Uneven:
+    return dataclasses.replace(
+        uneven, force=np.append(uneven.force, 0.0), second=np.append(uneven.second, 0.0)
+    )

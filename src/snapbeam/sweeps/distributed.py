@@ -1,0 +1,492 @@
+"""Who computes the tasks: this process, or the workers of a cluster, whose deaths are survived."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+import tomllib
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
+from dataclasses import astuple, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from snapbeam._version import __version__
+from snapbeam.solver.cpu.driver import usable_cores
+from snapbeam.sweeps.checkpoint.records import CheckpointError
+from snapbeam.sweeps.points import Columns
+from snapbeam.sweeps.tasks import Maker, PointWork, ResultTable, Stage, this_maker
+from snapbeam.util.provenance import code_hash
+from snapbeam.util.validation import InputError, integer, shown
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+__all__ = [
+    "ATTEMPTS",
+    "Cluster",
+    "ClusterWorkers",
+    "Crew",
+    "Failure",
+    "HereWorkers",
+    "TaskResult",
+    "Workers",
+    "open_client",
+    "parse_cluster",
+    "slurm_arguments",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# The workers of a cluster as they come and go: told, counted, and put back where they are this process's own.
+
+
+_MOST_LOST = 12
+"""Workers, for each that is there, that may go without any task finished."""
+_PATIENCE = 20.0
+"""Seconds that a worker of this machine may be missing before another is started; twice as many each time."""
+_MOST_MENDED = 5
+
+
+class Crew:
+    """Who is there.
+
+    Tells when that changes between nobody and somebody, gives up when too many went without a result, and starts
+    workers of this machine anew that their keeper has lost, as it does one that is killed while it starts.
+    """
+
+    def __init__(self, client: Client, note: Callable[[str], object]) -> None:
+        self.note = note
+        self.succeeded = False
+        self._cluster = getattr(client, "cluster", None)
+        self._known: set[str] | None = None
+        self._lost: set[str] = set()
+        self._whole_at = time.monotonic()
+        self._mended = 0
+
+    def finished(self) -> None:
+        """A task was finished."""
+        self.succeeded = True
+        self._lost.clear()
+        self._mended = 0
+
+    def now(self, there: Mapping[str, int]) -> None:
+        """Look at who is there.
+
+        Raises
+        ------
+        CheckpointError
+            If workers come and go and never finish anything, or none can be started.
+        """
+        before, self._known = self._known, set(there)
+        if before is None or bool(before) != bool(there):
+            self.note("waiting for workers" if not there else f"workers: {len(there)}")
+        self._lost |= (before or set()) - self._known
+        if len(self._lost) > _MOST_LOST * max(1, len(there)):
+            raise CheckpointError(
+                f"the workers cannot compute this map: {len(self._lost)} of them came and went and no task was "
+                "finished; they may have too little memory for one: give them more, or smaller tasks (chunk)"
+            )
+        self._mend()
+
+    def _mend(self) -> None:
+        """Start workers of this machine that have been missing for long."""
+        cluster = self._cluster
+        if cluster is None or type(cluster).__name__ != "LocalCluster":
+            return
+        assert self._known is not None
+        now = time.monotonic()
+        if len(self._known) >= len(cluster.worker_spec):
+            self._whole_at = now
+        elif now - self._whole_at > _PATIENCE * 2**self._mended:
+            if self._mended >= _MOST_MENDED and not self._known:
+                raise CheckpointError("the workers cannot compute this map: none of them can be started")
+            self._mended, self._whole_at = min(self._mended + 1, _MOST_MENDED), now
+            self.note("starting workers anew")
+            cluster.sync(_replace, cluster, self._known)
+            cluster.scale(len(cluster.worker_spec))
+
+
+async def _replace(cluster: Any, there: set[str]) -> None:
+    """Forget the keepers whose workers are not there."""
+    for name, nanny in list(cluster.workers.items()):
+        if nanny.worker_address not in there:
+            del cluster.workers[name]
+            closing = asyncio.ensure_future(_close(nanny))
+            _closing.add(closing)
+            closing.add_done_callback(_closing.discard)
+
+
+_closing: set[Any] = set()
+
+
+async def _close(nanny: Any) -> None:
+    with suppress(Exception):
+        await nanny.close(timeout=5)
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+ATTEMPTS = 3
+"""Times that a task may kill its worker, or raise in it, before it is given up."""
+_POLL = 0.5
+_DELIVERY_POLL = 2.0
+_RECONNECT = 30.0
+_GONE = (OSError, TimeoutError, asyncio.TimeoutError, CancelledError, asyncio.CancelledError, RuntimeError)
+"""What calls to a scheduler that is not there any more raise."""
+
+
+class TaskResult(NamedTuple):
+    """Results of a task, and what computed them; the maker of this process if none is given."""
+
+    columns: ResultTable
+    maker: Maker | None = None
+
+
+class Failure(NamedTuple):
+    """Why a task was given up."""
+
+    reason: str
+
+
+class Workers(Protocol):
+    """Computes tasks of a stage and gives each with what came of it, in any order."""
+
+    def run(
+        self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
+    ) -> Iterator[tuple[int, TaskResult | Failure]]: ...
+
+
+@dataclass(frozen=True)
+class HereWorkers:
+    """This process, with all its threads on one task after another."""
+
+    threads: int | None = None
+
+    def run(
+        self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
+    ) -> Iterator[tuple[int, TaskResult | Failure]]:
+        """Compute the tasks in order; *progress* gets the points done of the present one."""
+        for task in tasks:
+            columns = work.compute(stage.columns(task), self.threads, lambda done, _: progress(done))
+            yield task, TaskResult(columns)
+
+
+def compute_task(work: PointWork, points: Columns, threads: int, version: str, code: str) -> tuple[Any, ...]:
+    """What a worker of a cluster does: one task, with all its threads, if its code is that of who asks."""
+    maker = this_maker(work.setup.system)
+    if (maker.version, maker.code) != (version, code):
+        return None, None, astuple(maker)
+    columns = work.compute(points, threads)
+    return columns.integers, columns.numbers, astuple(maker)
+
+
+@dataclass(frozen=True)
+class ClusterWorkers:
+    """Workers of a Dask cluster.
+
+    Each worker has one task at a time, so the death of a worker is the doing of a known task, and each
+    task uses all the threads its worker was given.  Results come back to this process, the only one that
+    writes.  Nothing is waited for without end but workers that have yet to come.
+    """
+
+    client: Client
+    note: Callable[[str], object] = print
+    delivery: float = 60.0
+    """Seconds that a living worker has to hand over the results of a finished task."""
+
+    def run(
+        self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
+    ) -> Iterator[tuple[int, TaskResult | Failure]]:
+        """Compute the tasks as workers come and go."""
+        maker = this_maker(work.setup.system)
+        queue = deque(tasks)
+        flying: dict[Future, tuple[int, str]] = {}
+        trouble: Counter[int] = Counter()
+        crew = Crew(self.client, self.note)
+        try:
+            while queue or flying:
+                there = self._workers()
+                with _answered():
+                    crew.now(there)
+                idle = there.keys() - {address for _, address in flying.values()}
+                for address in sorted(idle)[: len(queue)]:
+                    task = queue.popleft()
+                    with _answered():
+                        future = self.client.submit(
+                            compute_task, work, stage.columns(task), there[address], maker.version, maker.code,
+                            workers=[address], allow_other_workers=False, pure=False, retries=0,
+                        )  # fmt: skip
+                    flying[future] = task, address
+                for future, task, address in self._settled(flying, there):
+                    del flying[future]
+                    with _answered():
+                        outcome = self._outcome(future, address)
+                    future.release()
+                    if isinstance(outcome, TaskResult):
+                        crew.finished()
+                        yield task, outcome
+                        continue
+                    trouble[task] += 1
+                    if trouble[task] < ATTEMPTS:
+                        queue.append(task)
+                        continue
+                    if not crew.succeeded and outcome.reason.startswith("raised"):
+                        raise CheckpointError(f"the workers cannot compute this map: a task {outcome.reason}")
+                    yield task, Failure(f"{outcome.reason}, {ATTEMPTS} times")
+        finally:
+            if flying:
+                with suppress(*_GONE):
+                    self.client.cancel(list(flying), force=True)
+
+    def _workers(self) -> dict[str, int]:
+        until = time.monotonic() + _RECONNECT
+        while self.client.status == "connecting" and time.monotonic() < until:
+            time.sleep(_POLL)
+        if self.client.status != "running":
+            raise _gone(f"the connection is {self.client.status}")
+        with _answered():
+            return dict(self.client.nthreads())
+
+    def _settled(self, flying: dict[Future, tuple[int, str]], there: dict[str, int]) -> list[Any]:
+        """Futures that ended, or whose worker is gone, after waiting a moment for one to."""
+        from distributed import wait
+
+        if not flying:
+            time.sleep(_POLL)
+            return []
+        with self.client.as_current(), suppress(*_GONE):
+            wait(list(flying), timeout=_POLL, return_when="FIRST_COMPLETED")
+        if self.client.status != "running":
+            return []
+        return [(f, task, at) for f, (task, at) in flying.items() if f.done() or at not in there]
+
+    def _outcome(self, future: Future, address: str) -> TaskResult | Failure:
+        """What came of a task that ended; one whose results do not come is as one that killed its worker."""
+        from distributed import KilledWorker
+
+        if not future.done():
+            return self._dropped(future, "killed its worker")
+        if future.status == "finished":
+            return self._delivered(future, address)
+        if future.status == "cancelled":
+            return Failure("was cancelled") if address in self._workers() else Failure("killed its worker")
+        error = future.exception(timeout=self.delivery)
+        if isinstance(error, KilledWorker):
+            return Failure("killed its worker")
+        return Failure(f"raised {type(error).__name__}: {error}")
+
+    def _delivered(self, future: Future, address: str) -> TaskResult | Failure:
+        """The results of a finished task, as long as the worker that holds them lives.
+
+        When it dies before it handed them over, the scheduler would compute them again on the same worker, which
+        never comes back; so the task is dropped and handed out anew.
+        """
+        from distributed import KilledWorker
+
+        until = time.monotonic() + self.delivery
+        while True:
+            try:
+                integers, numbers, by = future.result(timeout=min(_DELIVERY_POLL, self.delivery))
+                break
+            except TimeoutError:
+                if address not in self._workers():
+                    return self._dropped(future, "lost its worker before its results came")
+                if time.monotonic() > until:
+                    return self._dropped(future, f"gave no results within {self.delivery:g} s")
+            except (KilledWorker, CancelledError, asyncio.CancelledError):
+                return self._dropped(future, "lost its worker before its results came")
+        maker = Maker(*by)
+        if integers is None:
+            raise CheckpointError(
+                f"a worker runs snapbeam {maker.version} with code {maker.code}, this is {__version__} with code "
+                f"{code_hash()}: install the same in both places"
+            )
+        return TaskResult(ResultTable(integers, numbers), maker)
+
+    def _dropped(self, future: Future, reason: str) -> Failure:
+        with suppress(*_GONE):
+            future.cancel(force=True)
+        return Failure(reason)
+
+
+def _gone(why: object) -> CheckpointError:
+    return CheckpointError(
+        f"the scheduler does not answer any more ({why}); no finished task is lost: give the same command again"
+    )
+
+
+@contextmanager
+def _answered() -> Iterator[None]:
+    """Turn what is raised about a scheduler that is gone into words."""
+    try:
+        yield
+    except CheckpointError:
+        raise
+    except _GONE as error:
+        raise _gone(str(error) or type(error).__name__) from error
+
+
+# ----------------------------------------------------------------------------------------------------
+# Where the workers of a map come from: processes here, a scheduler that runs already, or a SLURM queue.
+
+
+_FORMS = "local:N, tcp://host:port, tls://host:port or a TOML file such as slurm.toml"
+_LOOPBACK = "127.0.0.1"
+_SLURM: dict[str, type] = {
+    "account": str,
+    "cores": int,
+    "interface": str,
+    "jobs": int,
+    "memory": str,
+    "prologue": list,
+    "queue": str,
+    "walltime": str,
+}
+_NEEDED = ("cores", "interface", "memory")
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """A cluster as it was asked for, checked."""
+
+    kind: str
+    """``"local"``, ``"address"`` or ``"slurm"``."""
+    workers: int = 0
+    address: str = ""
+    slurm: dict[str, Any] = field(default_factory=dict)
+
+
+def parse_cluster(text: str) -> Cluster:
+    """Read what was given as cluster.
+
+    Parameters
+    ----------
+    text : str
+        ``"local:4"`` for four processes here, ``"tcp://host:8786"`` or ``"tls://host:8786"`` for a scheduler
+        that runs already, or the path of a TOML file with a section ``[slurm]``.
+
+    Raises
+    ------
+    InputError
+        If it is none of these; of a file, with the key that is wrong.
+    """
+    if not isinstance(text, str) or not text:
+        raise InputError(f"cluster = {shown(text)}: must be {_FORMS}")
+    kind, colon, rest = text.partition(":")
+    if kind == "local" and colon:
+        if not rest.isdecimal():
+            raise InputError(f"cluster = {shown(text)}: the workers must be a whole number, as in local:4")
+        return Cluster("local", workers=integer("cluster workers", int(rest), 1, 4096))
+    if text.startswith(("tcp://", "tls://")):
+        return Cluster("address", address=text)
+    if text.endswith(".toml"):
+        return Cluster("slurm", slurm=_read_slurm(Path(text)))
+    raise InputError(f"cluster = {shown(text)}: must be {_FORMS}")
+
+
+def _read_slurm(path: Path) -> dict[str, Any]:
+    try:
+        sections = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"cluster = {str(path)!r}: cannot be read, {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"cluster = {str(path)!r}: is no TOML, {error}") from error
+    given = sections.pop("slurm", None)
+    if sections or not isinstance(given, dict):
+        raise InputError(f"cluster = {str(path)!r}: must hold one section, [slurm]")
+    for name, value in given.items():
+        if name not in _SLURM:
+            raise InputError(f"{path.name}: [slurm] {name}: unknown key; must be one of {', '.join(_SLURM)}")
+        if not isinstance(value, _SLURM[name]) or isinstance(value, bool):
+            raise InputError(
+                f"{path.name}: [slurm] {name} = {shown(value)}: must be of type {_SLURM[name].__name__}"
+            )
+    for name in _NEEDED:
+        if name not in given:
+            raise InputError(
+                f"{path.name}: [slurm] {name} is missing"
+                + (": the network that the workers reach the scheduler by" if name == "interface" else "")
+            )
+    for name in ("cores", "jobs"):
+        if name in given:
+            integer(f"{path.name}: [slurm] {name}", given[name], 1, 100_000)
+    return given
+
+
+@contextmanager
+def open_client(cluster: Cluster) -> Iterator[Client]:
+    """Start or join a cluster; what was started here ends with the block."""
+    try:
+        import dask
+        from distributed import Client
+    except ImportError as error:
+        raise InputError("dask is needed for --cluster: install snapbeam[cluster]") from error
+    if cluster.kind == "address":
+        try:
+            client = Client(cluster.address, timeout="30s", set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise CheckpointError(
+                f"cluster = {shown(cluster.address)}: no scheduler answers there ({error})"
+            ) from error
+        try:
+            yield client
+        finally:
+            with suppress(Exception):  # a scheduler that is gone cannot be taken leave of
+                client.close(timeout=5)
+        return
+    with dask.config.set({"distributed.comm.timeouts.connect": "60s"}):
+        made = _local(cluster.workers) if cluster.kind == "local" else _slurm(cluster.slurm)
+        with made, Client(made, set_as_default=False) as client:
+            yield client
+
+
+def _local(workers: int) -> Any:
+    from distributed import LocalCluster
+
+    return LocalCluster(
+        n_workers=workers,
+        threads_per_worker=max(1, usable_cores() // workers),
+        processes=True,
+        host=_LOOPBACK,
+        dashboard_address=f"{_LOOPBACK}:0",
+        worker_dashboard_address=f"{_LOOPBACK}:0",
+        memory_limit=0,
+        silence_logs=50,
+        env=_one_thread_each(),
+    )
+
+
+def _one_thread_each() -> dict[str, str]:
+    """Settings that keep a linear algebra library from starting threads beside the engine's."""
+    return {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
+
+
+def _slurm(settings: dict[str, Any]) -> Any:
+    """One worker process a job, with all its cores; the scheduler listens on the interface that was named."""
+    try:
+        from dask_jobqueue import SLURMCluster
+    except ImportError as error:
+        raise InputError("dask-jobqueue is needed for a SLURM cluster: install dask-jobqueue") from error
+    made = SLURMCluster(**slurm_arguments(settings))
+    made.scale(jobs=settings.get("jobs", 1))
+    return made
+
+
+def slurm_arguments(settings: dict[str, Any]) -> dict[str, Any]:
+    """What a job of a SLURM queue is asked for, in the words of dask-jobqueue."""
+    exports = [f"export {name}={value}" for name, value in _one_thread_each().items()]
+    return {
+        "queue": settings.get("queue"),
+        "account": settings.get("account"),
+        "cores": settings["cores"],
+        "processes": 1,
+        "memory": settings["memory"],
+        "walltime": settings.get("walltime"),
+        "interface": settings["interface"],
+        "job_script_prologue": [*map(str, settings.get("prologue", [])), *exports],
+        "scheduler_options": {"interface": settings["interface"], "dashboard_address": f"{_LOOPBACK}:0"},
+    }

@@ -1,1 +1,0 @@
-"""Results on disk while they are computed: whole, checked, resumable."""

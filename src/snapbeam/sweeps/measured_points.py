@@ -1,0 +1,183 @@
+"""Measured responses to lay over a map, from a CSV table."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError, file_path, positive
+
+__all__ = ["MeasuredPoints", "read_measured_points"]
+
+
+_Array = NDArray[np.float64]
+
+# One of each pair is wanted; the last column of all may be left out.
+_FREQUENCY = ("frequency_ratio", "frequency_hz")
+_VELOCITY = ("velocity_amplitude", "velocity_m_s")
+_COLUMNS = (*_FREQUENCY, *_VELOCITY, "location", "response_class")
+# What a table of tests says beside; read over here.
+_BESIDE = (
+    "test", "recording", "vibrometer", "frequency_se_hz", "velocity_se_m_s", "zero_crossings", "cycles", "snr_db",
+    "measured_share", "delay_s", "polarity", "gain", "status", "diagnostics", "comment",
+)  # fmt: skip
+
+_CLASSES = {kind.label: kind for kind in ResponseClass}
+_CLASSES |= {kind.label.replace("interwell ", "").replace(" interwell", ""): kind for kind in ResponseClass}
+_CLASSES |= {str(kind.value): kind for kind in ResponseClass}
+
+
+@dataclass(frozen=True)
+class MeasuredPoints:
+    """Measured responses, in the coordinates of a map.
+
+    Attributes
+    ----------
+    frequency_ratio, velocity_amplitude, location : array of shape (points,)
+        Omega, V and x_s; the location is NaN where the table does not give it.
+    response_class : int8 array of shape (points,)
+        :class:`~snapbeam.ResponseClass` of each.
+    """
+
+    frequency_ratio: _Array
+    velocity_amplitude: _Array
+    location: _Array
+    response_class: NDArray[np.int8]
+
+    def __len__(self) -> int:
+        return len(self.response_class)
+
+
+def read_measured_points(
+    path: str | os.PathLike[str],
+    *,
+    reference_frequency: float | None = None,
+    buckling_level: float | None = None,
+) -> MeasuredPoints:
+    """Read measured responses from a CSV file with a header.
+
+    Columns: ``frequency_ratio`` or ``frequency_hz``; ``velocity_amplitude`` (V) or ``velocity_m_s`` (the
+    amplitude in m/s); ``location`` (x_s, may be left out); ``response_class``, one of intrawell, transient 1,
+    transient 2, continuous, unknown, or the number of the class; and those beside which
+    ``snapbeam process-tests`` writes.  Cells are separated by commas, semicolons or tabs; with the latter two the
+    decimal sign may be a comma.  Lines that start with ``#`` are comments.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    reference_frequency : float, optional
+        First natural frequency, Hz, wanted for ``frequency_hz`` and ``velocity_m_s``.
+    buckling_level : float, optional
+        Buckling level b, m, wanted for ``velocity_m_s``: V = velocity / (2 pi b f_1).
+
+    Raises
+    ------
+    InputError
+        Names the file, the line and the column of what cannot be used.
+    """
+    file = file_path("path", path)
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"dots = {str(path)!r}: cannot be read, {reason}") from error
+    first = next(
+        (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
+    )
+    mark = next((one for one in (";", "\t") if one in first), ",")
+    rows = [
+        (number, [cell.strip() for cell in cells])
+        for number, cells in enumerate(csv.reader(text.splitlines(), delimiter=mark), start=1)
+        if any(cell.strip() for cell in cells) and not cells[0].lstrip().startswith("#")
+    ]
+    if not rows:
+        raise InputError(f"{file.name}: is empty; its first line must name the columns")
+    header = [name.lower() for name in rows[0][1]]
+    _check_header(file.name, header)
+    frequency_scale, velocity_scale = 1.0, 1.0
+    if "frequency_hz" in header:
+        frequency_scale = 1.0 / _wanted(
+            file.name, "frequency_hz", "reference_frequency", reference_frequency, "Hz"
+        )
+    if "velocity_m_s" in header:
+        freq = _wanted(file.name, "velocity_m_s", "reference_frequency", reference_frequency, "Hz")
+        level = _wanted(file.name, "velocity_m_s", "buckling_level", buckling_level, "m")
+        velocity_scale = 1.0 / (2.0 * math.pi * freq * level)
+    frequency = header.index(next(name for name in _FREQUENCY if name in header))
+    velocity = header.index(next(name for name in _VELOCITY if name in header))
+    place = header.index("location") if "location" in header else None
+    points, kinds = [], []
+    for number, raw in rows[1:]:
+        cells = raw if mark == "," else [_pointed(cell) for cell in raw]
+        if len(cells) != len(header):
+            raise InputError(
+                f"{file.name}, line {number}: has {len(cells)} cells, the header names {len(header)}"
+            )
+        status = cells[header.index("status")] if "status" in header else "measured"
+        if status != "measured":
+            continue  # a test that gave no number is a row of words
+        location = math.nan
+        if place is not None and cells[place]:
+            location = _number(file.name, number, "location", cells[place], 1.0)
+        points.append(
+            (
+                frequency_scale * _number(file.name, number, header[frequency], cells[frequency]),
+                velocity_scale * _number(file.name, number, header[velocity], cells[velocity]),
+                location,
+            )
+        )
+        kinds.append(_kind(file.name, number, cells[header.index("response_class")]))
+    columns = np.array(points, dtype=np.float64).reshape(-1, 3).T
+    return MeasuredPoints(columns[0], columns[1], columns[2], np.array(kinds, dtype=np.int8))
+
+
+def _check_header(name: str, header: list[str]) -> None:
+    for column in header:
+        if column not in (*_COLUMNS, *_BESIDE):
+            raise InputError(f"{name}: unknown column {column!r}; must be among {', '.join(_COLUMNS)}")
+        if header.count(column) > 1:
+            raise InputError(f"{name}: column {column!r} stands there twice")
+    for pair in (_FREQUENCY, _VELOCITY, ("response_class",)):
+        found = [column for column in pair if column in header]
+        if len(found) != 1:
+            raise InputError(f"{name}: must have one column {' or '.join(pair)}, not {found}")
+
+
+def _wanted(name: str, column: str, parameter: str, value: float | None, unit: str) -> float:
+    if value is None:
+        raise InputError(f"{name}: column {column!r} needs {parameter}, in {unit}, to be normalised with")
+    return positive(parameter, value, unit)
+
+
+def _number(name: str, line: int, column: str, cell: str, below: float = math.inf) -> float:
+    allowed = "a number greater than 0" + ("" if below == math.inf else f" and less than {below:g}")
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < below:
+        raise InputError(f"{name}, line {line}, column {column!r}: {cell!r} must be {allowed}")
+    return value
+
+
+def _pointed(cell: str) -> str:
+    """A cell with its decimal comma, if it is a number with one, made a point."""
+    return cell.replace(",", ".") if re.fullmatch(r"[-+]?\d+,\d+([eE][-+]?\d+)?", cell) else cell
+
+
+def _kind(name: str, line: int, cell: str) -> ResponseClass:
+    word = " ".join(
+        cell.lower().replace("_", " ").replace("-", " -" if cell.startswith("-") else " ").split()
+    )
+    if word not in _CLASSES:
+        known = ", ".join(dict.fromkeys(kind.label for kind in ResponseClass))
+        raise InputError(f"{name}, line {line}, column 'response': {cell!r} must be one of {known}")
+    return _CLASSES[word]

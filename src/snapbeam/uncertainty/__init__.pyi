@@ -1,0 +1,31 @@
+"""Public names; each is loaded when it is first used."""
+
+from .cost import CostEstimate as CostEstimate
+from .cost import estimate_cost as estimate_cost
+from .differential_evolution import DifferentialEvolution as DifferentialEvolution
+from .distributions import LogNormal as LogNormal
+from .distributions import Normal as Normal
+from .distributions import ParameterUncertainty as ParameterUncertainty
+from .distributions import UniformRange as UniformRange
+from .distributions import UniformTolerance as UniformTolerance
+from .measured_classes import score_measurements as score_measurements
+from .optimization import Constraint as Constraint
+from .optimization import Objective as Objective
+from .optimization import OptimizerSettings as OptimizerSettings
+from .optimization import design_problem as design_problem
+from .optimization import optimize_design as optimize_design
+from .posterior import Posterior as Posterior
+from .posterior import Waveform as Waveform
+from .posterior import class_likelihood as class_likelihood
+from .posterior import estimate_posterior as estimate_posterior
+from .probability import SamplingPlan as SamplingPlan
+from .probability import probability_map as probability_map
+from .quantiles import QuantileSearchSettings as QuantileSearchSettings
+from .quantiles import quantile_threshold as quantile_threshold
+from .sensitivity_analysis import LifetimeQoI as LifetimeQoI
+from .sensitivity_analysis import NotchQoI as NotchQoI
+from .sensitivity_analysis import StatisticQoI as StatisticQoI
+from .sensitivity_analysis import ThresholdQoI as ThresholdQoI
+from .sensitivity_analysis import sensitivity as sensitivity
+from .sensitivity_analysis import sobol_indices as sobol_indices
+from .sensitivity_analysis import sobol_indices_from_samples as sobol_indices_from_samples

@@ -1,0 +1,245 @@
+"""What a question costs before it is asked: runs, time on this machine, memory and disk."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.model.integration import Integration
+from snapbeam.sweeps.points import Columns, PointList, points_of
+from snapbeam.sweeps.sweep import sweep
+from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, trials_of, wilson
+from snapbeam.uncertainty.optimization import OptimizerSettings, optimize_design
+from snapbeam.uncertainty.probability import SamplingPlan, allocation_of, probability_map
+from snapbeam.uncertainty.quantiles import QuantileSearchSettings, quantile_threshold
+from snapbeam.util.validation import InputError, checked, positive
+
+__all__ = ["LONG", "CostEstimate", "estimate_cost"]
+
+
+LONG = 600.0
+"""Seconds from which a computation counts as long."""
+_RUN_BYTES = 700
+"""Memory of a run until its round is done."""
+_KEPT_BYTES = 320
+"""Disk of a run in a store."""
+_GOLDEN = 0.6180339887498949
+_BATCH = 32
+Point = Callable[[NDArray[np.float64]], Columns]
+
+
+@dataclass(frozen=True)
+class CostEstimate:
+    """What a question will take.
+
+    Attributes
+    ----------
+    runs, max_runs : int
+        Runs, as far as a trial can tell, and at most.
+    seconds : float
+        Of this machine, with the threads asked for; kernels that must be compiled are not counted.
+    memory, disk : float
+        Bytes, the second in a store.
+    trial_runs : int
+        Runs that this was told from.
+    """
+
+    runs: int
+    max_runs: int
+    seconds: float
+    memory: float
+    disk: float
+    trial_runs: int
+
+    @property
+    def is_long(self) -> bool:
+        """Whether it takes more than ten minutes."""
+        return self.seconds > LONG
+
+    def __str__(self) -> str:
+        hours, rest = divmod(round(self.seconds), 3600)
+        text = f"{hours} h {rest // 60} min" if hours else f"{rest // 60} min {rest % 60} s"
+        most = "" if self.max_runs == self.runs else f" (at most {self.max_runs})"
+        return (
+            f"about {self.runs} runs{most}, {text} on this machine, {self.memory / 2**20:.0f} MiB of memory, "
+            f"{self.disk / 2**20:.1f} MiB in a store; told from {self.trial_runs} runs"
+        )
+
+
+@checked
+def estimate_cost(
+    question: Callable[..., Any], *arguments: Any, trial: float = 10.0, **options: Any
+) -> CostEstimate:
+    """What a question costs, from a trial of some seconds with runs scattered over it.
+
+    Parameters
+    ----------
+    question : callable
+        :func:`snapbeam.sweep`, :func:`snapbeam.uncertainty.probability_map`, :func:`snapbeam.uncertainty.quantile_threshold` or
+        :func:`snapbeam.uncertainty.optimize_design`.
+    *arguments, **options
+        As it would be called with; nothing is written to its store.
+    trial : float
+        Seconds that the trial may take, after compilation.
+
+    Raises
+    ------
+    InputError
+        For a question that has no plan, and for bad input of the question.
+
+    Examples
+    --------
+    >>> print(sb.uncertainty.estimate_cost(sb.uncertainty.probability_map, system, axes, spread))  # doctest: +SKIP
+    """
+    positive("trial", trial, "s")
+    if question is sweep:
+        return _of_sweep(trial, *arguments, **options)
+    if question is probability_map:
+        return _of_probability(trial, *arguments, **options)
+    if question is quantile_threshold:
+        return _of_threshold(trial, *arguments, **options)
+    if question is optimize_design:
+        return _of_design(trial, *arguments, **options)
+    raise InputError("question: must be sweep, probability_map, quantile_threshold or optimize_design")
+
+
+def _of_sweep(
+    trial: float, system: Any, axes: Any, integration: Integration | None = None, **options: Any
+) -> CostEstimate:
+    points = points_of(axes)
+    repeats = options.get("replicas") or 0
+    each = 1 + int(getattr(repeats, "count", repeats))
+    early = bool(integration is not None and integration.early_termination)
+    trials = trials_of(system, None, integration, early=early)
+    made, seconds, _ = _trial(trials, lambda u: points.take((u * points.size).astype(np.int64)), trial)
+    return _cost(points.size * each, points.size * each, seconds / made, made)
+
+
+def _of_probability(
+    trial: float, system: Any, axes: Any, spread: Any = None, runs: Any = None, **options: Any
+) -> CostEstimate:
+    allocation = allocation_of(runs)
+    trials = trials_of(system, spread, options.get("integration"))
+    points = points_of(axes)
+    where: list[NDArray[np.int64]] = []
+
+    def point(ranks: NDArray[np.float64]) -> Columns:
+        where.append((ranks * points.size).astype(np.int64))
+        return points.take(where[-1])
+
+    made, seconds, found = _trial(trials, point, trial)
+    happened = np.asarray(OUTCOMES[allocation.outcome].happened(found))
+    expected = _expected(allocation, np.concatenate(where), happened, points.size)
+    most = points.size * (allocation.initial_runs if allocation.half_width is None else allocation.max_runs)
+    if allocation.half_width is not None:
+        most = min(most, points.size * _needed(0.5, allocation))
+    if allocation.total_runs is not None:
+        expected, most = min(expected, allocation.total_runs), min(most, allocation.total_runs)
+    return _cost(expected, most, seconds / made, made)
+
+
+def _needed(share: float, allocation: SamplingPlan) -> int:
+    """Runs after which a probability is known as narrowly as asked."""
+    assert allocation.half_width is not None
+    n = allocation.initial_runs
+    while n < allocation.max_runs:
+        _, low, high = wilson(share * n, n, allocation.confidence)
+        if 0.5 * float(high - low) <= allocation.half_width:
+            break
+        n = int(n * 1.05) + 1
+    return min(n, allocation.max_runs)
+
+
+def _expected(
+    allocation: SamplingPlan, where: NDArray[np.int64], happened: NDArray[np.bool_], points: int
+) -> int:
+    """Runs of a map, from few runs at few points: those with both outcomes need more."""
+    if allocation.half_width is None:
+        return points * allocation.initial_runs
+    sure, unsure = _needed(0.01, allocation), _needed(0.3, allocation)
+    mixed = []
+    for one in np.unique(where):
+        hits = happened[where == one]
+        if hits.size > 1:
+            mixed.append(0.0 < hits.mean() < 1.0)
+    share = float(np.mean(mixed)) if mixed else 1.0
+    return round(points * ((1.0 - share) * sure + share * unsure))
+
+
+def _of_threshold(
+    trial: float, system: Any, along: str, between: Any, over: Any = None, spread: Any = None, how: Any = None,
+    **options: Any,
+) -> CostEstimate:  # fmt: skip
+    how = QuantileSearchSettings() if how is None else how
+    trials = trials_of(system, spread, options.get("integration"))
+    points = points_of(over) if over else None
+    low, high = between
+
+    def point(ranks: NDArray[np.float64]) -> Columns:
+        own = {} if points is None else points.take((ranks * points.size).astype(np.int64))
+        return own | points_of_along(along, low + (high - low) * np.modf(ranks * 7919.0)[0])
+
+    made, seconds, _ = _trial(trials, point, trial)
+    total = how.runs * (1 if points is None else points.size)
+    return _cost(total, total, seconds / made, made)
+
+
+def points_of_along(along: str, values: NDArray[np.float64]) -> Columns:
+    """The column of a parameter."""
+    import xarray as xr
+
+    found = points_of(xr.Dataset({along: ("point", values)}))
+    assert isinstance(found, PointList)
+    return found.columns
+
+
+def _of_design(
+    trial: float, system: Any, variables: Any, goals: Any, limits: Any, spread: Any, effort: Any = None,
+    **options: Any,
+) -> CostEstimate:  # fmt: skip
+    from snapbeam.uncertainty.optimization import design_problem
+
+    effort = OptimizerSettings() if effort is None else effort
+    problem = design_problem(
+        system, variables, goals, limits, spread, samples=effort.draws, integration=options.get("integration")
+    )
+    bounds = np.array(list(problem.bounds.values()))
+
+    def point(ranks: NDArray[np.float64]) -> Columns:
+        spread_out = np.modf(ranks[:, None] * (1.0 + 7919.0 * np.arange(len(bounds))))[0]
+        table = bounds[:, 0] + (bounds[:, 1] - bounds[:, 0]) * spread_out
+        return {name: table[:, j] for j, name in enumerate(problem.bounds)}
+
+    made, seconds, _ = _trial(problem.trials, point, trial)
+    # of designs far from the limits only a quarter of the runs is made
+    expected = round(effort.most_runs * 0.6)
+    return _cost(expected, effort.most_runs, seconds / made, made)
+
+
+def _trial(trials: Trials, point: Point, limit: float) -> tuple[int, float, dict[str, NDArray[Any]]]:
+    """Runs in growing batches until the time is spent; the first batch, in which kernels are made, is not timed."""
+    size, begun, made, spent = _BATCH, 0, 0, 0.0
+    parts: list[dict[str, NDArray[Any]]] = []
+    while spent < limit:
+        numbers = np.arange(begun, begun + size)
+        ranks = np.modf((numbers // 4) * _GOLDEN)[0]  # four draws a point
+        clock = time.perf_counter()
+        parts.append(trials.statistics(point(ranks), numbers))
+        clock = time.perf_counter() - clock
+        begun += size
+        if len(parts) > 1:
+            made, spent = made + size, spent + clock
+            if clock < 0.25 * limit:
+                size *= 2
+            if spent + clock > 1.5 * limit:
+                break
+    return made, spent, {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _cost(runs: int, most: int, each: float, made: int) -> CostEstimate:
+    return CostEstimate(runs, most, runs * each, runs * float(_RUN_BYTES), runs * float(_KEPT_BYTES), made)

@@ -1,0 +1,402 @@
+"""How a parameter differs from its nominal value: tolerances as distributions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import ndtr
+
+from snapbeam.model.parameters import lookup
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    checked,
+    choice,
+    finite,
+    finite_array,
+    flag,
+    integer,
+    nonnegative,
+    positive,
+    shown,
+)
+
+__all__ = [
+    "KINDS",
+    "Distribution",
+    "Empirical",
+    "LogNormal",
+    "Normal",
+    "ParameterUncertainty",
+    "UniformRange",
+    "UniformTolerance",
+    "spread_from_mapping",
+]
+
+
+_Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """What a parameter is drawn from, given its nominal value."""
+
+    kind: ClassVar[str] = ""
+
+    def at(self, nominal: _Array, normal: _Array) -> _Array:
+        """Values that have the rank Phi(*normal*), of the broadcast shape."""
+        raise NotImplementedError
+
+    def describe(self) -> dict[str, Any]:
+        """Its kind and its numbers, plain."""
+        return {"type": self.kind, **self.__dict__}
+
+
+@dataclass(frozen=True)
+class Normal(Distribution):
+    """Normally distributed about the nominal value.
+
+    Parameters
+    ----------
+    standard_deviation : float
+        In the unit of the parameter, or as a share of the nominal value.
+    relative : bool
+        Whether it is a share.
+    """
+
+    standard_deviation: float
+    relative: bool = False
+    kind: ClassVar[str] = "normal"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self, "standard_deviation", positive("standard_deviation", self.standard_deviation)
+        )
+        flag("relative", self.relative)
+
+    def at(self, nominal: _Array, normal: _Array) -> _Array:
+        """Nominal value plus the standard deviation times *normal*."""
+        size = self.standard_deviation * np.abs(nominal) if self.relative else self.standard_deviation
+        return np.asarray(nominal + size * normal)
+
+
+@dataclass(frozen=True)
+class UniformTolerance(Distribution):
+    """Uniformly distributed within a half width of the nominal value, as a drawing's tolerance +- is.
+
+    Parameters
+    ----------
+    half_width : float
+        In the unit of the parameter, or as a share of the nominal value.
+    relative : bool
+        Whether it is a share.
+    """
+
+    half_width: float
+    relative: bool = False
+    kind: ClassVar[str] = "uniform"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "half_width", positive("half_width", self.half_width))
+        flag("relative", self.relative)
+
+    def at(self, nominal: _Array, normal: _Array) -> _Array:
+        """Nominal value plus the half width times 2 Phi(*normal*) - 1."""
+        size = self.half_width * np.abs(nominal) if self.relative else self.half_width
+        return np.asarray(nominal + size * (2.0 * ndtr(normal) - 1.0))
+
+
+@dataclass(frozen=True)
+class LogNormal(Distribution):
+    """The nominal value times exp(sigma z), z standard normal: for what is positive and known to a factor.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard deviation of the logarithm.
+    """
+
+    sigma: float
+    kind: ClassVar[str] = "lognormal"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sigma", positive("sigma", self.sigma))
+
+    def at(self, nominal: _Array, normal: _Array) -> _Array:
+        """Nominal value, which is the median, times the factor."""
+        return np.asarray(nominal * np.exp(self.sigma * normal))
+
+
+@dataclass(frozen=True)
+class UniformRange(Distribution):
+    """Uniformly distributed between two values, whatever the nominal value: a phase that nobody sets.
+
+    Parameters
+    ----------
+    low, high : float
+        In the unit of the parameter.
+    """
+
+    low: float
+    high: float
+    kind: ClassVar[str] = "between"
+
+    def __post_init__(self) -> None:
+        for name in ("low", "high"):
+            object.__setattr__(self, name, finite(name, getattr(self, name)))
+        if not self.low < self.high:
+            raise InputError(f"low = {self.low:g}, high = {self.high:g}: low must be less than high")
+
+    def at(self, nominal: _Array, normal: _Array) -> _Array:
+        """Between the two by the rank."""
+        return np.asarray(self.low + (self.high - self.low) * ndtr(normal) + 0.0 * nominal)
+
+
+@dataclass(frozen=True)
+class Empirical(Distribution):
+    """As something was seen to be distributed, whatever the nominal value.
+
+    Parameters
+    ----------
+    quantiles : tuple of float
+        At evenly spaced ranks from 0 to 1, at least two, not falling.
+    """
+
+    quantiles: tuple[float, ...]
+    kind: ClassVar[str] = "empirical"
+
+    def __post_init__(self) -> None:
+        table = finite_array("quantiles", self.quantiles, 1)
+        if table.size < 2 or (np.diff(table) < 0.0).any():
+            raise InputError("quantiles: must be at least two that do not fall")
+        object.__setattr__(self, "quantiles", tuple(table.tolist()))
+
+    def at(self, nominal: _Array, normal: _Array) -> _Array:
+        """Between the quantiles by the rank."""
+        ranks = np.linspace(0.0, 1.0, len(self.quantiles))
+        return np.asarray(np.interp(ndtr(normal), ranks, self.quantiles) + 0.0 * nominal)
+
+
+KINDS: dict[str, type[Distribution]] = {
+    each.kind: each for each in (Normal, UniformTolerance, LogNormal, UniformRange)
+}
+"""Distributions by the names that files use."""
+
+
+# ----------------------------------------------------------------------------------------------------
+# What is not known exactly of a system, as distributions of any parameters, and its numbered draws.
+
+
+HELD = ("physical", "ratios")
+_OWN = ("displacement", "phase", "hold_fixed", "seed", "correlation")
+_PHASE = UniformRange(math.pi, 2.0 * math.pi)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ParameterUncertainty:
+    """How systems that are built, driven and started alike differ from each other.
+
+    Draw number s comes from the seed and s alone (Philox with the key (seed, s)): it is the same at every point, in
+    every order, on any number of threads or workers.
+
+    Parameters
+    ----------
+    of : mapping of str to Distribution
+        Distributions by the names of parameters, as :func:`snapbeam.sweep` takes them: :class:`Normal`,
+        :class:`Uniform`, :class:`LogNormal`, about the value of the system or of the point, or :class:`Between`.
+    correlation : array_like of shape (parameters, parameters), optional
+        Correlations of the normal scores behind the distributions (a Gaussian copula), in the order of *of*.
+    displacement : float
+        Root mean square of a faint ringing at the start, of all modes with equal mean energy, at the centre, m; a beam
+        that would be pressed by the tip at rest begins on the other side of its rest instead.
+    phase : bool
+        Whether the drive begins at any phase of the half of its cycle in which the tip is drawn back.
+    hold_fixed : {"physical", "ratios"}
+        What a beam that differs from the nominal one is struck with.  ``"physical"``: the same frequency in Hz,
+        velocity in m/s and location in m, so that Omega, V and x_s change with the beam's own frequency, buckling level
+        and length.  ``"ratios"``: the same Omega, V and x_s.
+    seed : int
+
+    Raises
+    ------
+    InputError
+        For unknown names, what cannot be drawn, and correlations that are none.
+
+    Notes
+    -----
+    With a phase or a ringing start the tip's mid-position is fixed in space, as everywhere in dynamics.
+    """
+
+    of: Mapping[str, Distribution] = field(default_factory=dict)
+    correlation: ArrayLike | None = None
+    displacement: float = 0.0
+    phase: bool = False
+    hold_fixed: str = "physical"
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.of, Mapping):
+            raise InputTypeError(f"of = {shown(self.of)}: must map parameters to distributions")
+        of: dict[str, Distribution] = {}
+        for name, each in self.of.items():
+            row = lookup(name)
+            if not isinstance(each, Distribution) or type(each) is Distribution:
+                raise InputTypeError(
+                    f"{name} = {shown(each)}: must be a distribution, such as sb.uncertainty.Normal(0.01, relative=True)"
+                )
+            if row.quantity.kind is not float or row.section == "run":
+                raise InputError(f"{name}: cannot be drawn; must be a real number of the system")
+            if row.name in of:
+                raise InputError(f"{name}: stands twice in the spread")
+            of[row.name] = each
+        nonnegative("displacement", self.displacement, "m")
+        integer("seed", self.seed, 0, 2**63 - 1)
+        choice("hold_fixed", self.hold_fixed, HELD)
+        if flag("phase", self.phase):
+            if "drive.phase" in of:
+                raise InputError("phase = True with drive.phase: give one of the two")
+            of["drive.phase"] = _PHASE
+        object.__setattr__(self, "of", of)
+        if self.correlation is not None:
+            object.__setattr__(self, "correlation", self._correlations(self.correlation))
+
+    def _correlations(self, given: ArrayLike) -> _Array:
+        matrix = finite_array("correlation", given, 2)
+        drawn = len(self.of) - bool(self.phase)
+        if matrix.shape != (drawn, drawn):
+            raise InputError(f"correlation of shape {matrix.shape}: must have the shape ({drawn}, {drawn})")
+        if not np.allclose(matrix, matrix.T) or not np.allclose(np.diag(matrix), 1.0):
+            raise InputError("correlation: must be symmetric, with ones on its diagonal")
+        if np.linalg.eigvalsh(matrix)[0] < -1e-10:
+            raise InputError("correlation: must be positive semidefinite")
+        return matrix
+
+    @classmethod
+    @checked
+    def from_calibration(cls, calibration: Any, **more: Any) -> ParameterUncertainty:
+        """The spread that a calibration leaves: its standard errors and their correlation, damping and contact too.
+
+        Raises
+        ------
+        InputError
+            If the data left a fitted parameter undetermined: its spread is not known.
+        """
+        if calibration.undetermined:
+            raise InputError(
+                f"calibration: {', '.join(calibration.undetermined)} not determined by the data, so no spread is known"
+            )
+        of: dict[str, Distribution] = {
+            f"beam.{name}": Normal(error) for name, error in calibration.standard_errors.items()
+        }
+        matrix = np.eye(len(of) + 2)
+        matrix[: len(of), : len(of)] = calibration.correlation
+        beside = (
+            ("model.damping_ratio", calibration.damping_ratio_se),
+            ("contact.stiffness", calibration.contact_stiffness_se),
+        )
+        of |= {name: Normal(error) for name, error in beside if error}
+        return cls(of=of, correlation=matrix[: len(of), : len(of)], **more)
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """What is drawn, by dotted name."""
+        return tuple(self.of)
+
+    @property
+    def structural(self) -> tuple[str, ...]:
+        """What is drawn and makes another structure."""
+        return tuple(name for name in self.of if not lookup(name).is_run)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether all draws are alike."""
+        return not self.of and self.displacement == 0.0
+
+    @property
+    def moves_start(self) -> bool:
+        """Whether runs begin in another state or phase, so that the tip must be held in space."""
+        return self.displacement > 0.0 or "drive.phase" in self.of
+
+    def normals(self, numbers: NDArray[np.int64]) -> _Array:
+        """Standard normal scores of the draws of the given numbers, of shape (draws, parameters)."""
+        which, back = np.unique(numbers, return_inverse=True)
+        names = sorted(self.of)
+        scores = np.empty((which.size, len(names)))
+        for row, number in zip(scores, which.tolist(), strict=True):
+            row[:] = np.random.Generator(np.random.Philox(key=[self.seed, number])).standard_normal(
+                len(names)
+            )
+        # a parameter's own scores hang on its rank among the names alone, not on the order in which they were given
+        scores = scores[:, [names.index(name) for name in self.of]]
+        if self.correlation is not None:
+            matrix = np.asarray(self.correlation)
+            value, vector = np.linalg.eigh(matrix)
+            root = vector @ np.diag(np.sqrt(np.maximum(value, 0.0))) @ vector.T
+            scores[:, : len(matrix)] = scores[:, : len(matrix)] @ root
+        return np.asarray(scores[back])
+
+    def describe(self) -> dict[str, Any]:
+        """What tells this spread from another one, plain."""
+        found: dict[str, Any] = {name: each.describe() for name, each in self.of.items()}
+        own = {"displacement": self.displacement, "hold_fixed": self.hold_fixed, "seed": self.seed}
+        if self.correlation is not None:
+            own["correlation"] = np.asarray(self.correlation).tolist()
+        return found | own
+
+
+def spread_from_mapping(given: Mapping[str, Any], name: str = "spread") -> ParameterUncertainty:
+    """The spread that a section of a parameter file describes.
+
+    Each parameter stands with a table that names one distribution: ``{normal = 0.02, relative = true}``,
+    ``{uniform = 1e-5}``, ``{lognormal = 0.3}`` or ``{between = [3.14, 6.28]}``; beside them stand ``displacement``,
+    ``phase``, ``hold_fixed`` and ``seed``.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(given, Mapping):
+        raise InputTypeError(f"{name} = {shown(given)}: must be a table")
+    of: dict[str, Distribution] = {}
+    for key, table in _flat(given).items():
+        if not isinstance(table, Mapping):
+            raise InputError(f"{name}.{key} = {shown(table)}: must be a table, such as {{normal = 0.01}}")
+        of[key] = _distribution(f"{name}.{key}", table)
+    return ParameterUncertainty(of=of, **{key: given[key] for key in _OWN if key in given})
+
+
+def _flat(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Tables by dotted name, whether a file writes ``"beam.thickness"`` or ``beam.thickness``."""
+    found: dict[str, Any] = {}
+    for key, table in given.items():
+        if key in _OWN:
+            continue
+        if isinstance(table, Mapping) and not set(table) & set(KINDS):
+            found |= {f"{key}.{inner}": each for inner, each in table.items()}
+        else:
+            found[str(key)] = table
+    return found
+
+
+def _distribution(name: str, table: Mapping[str, Any]) -> Distribution:
+    kinds = [key for key in table if key in KINDS]
+    others = [key for key in table if key not in KINDS and key != "relative"]
+    if len(kinds) != 1 or others:
+        raise InputError(
+            f"{name} = {shown(dict(table))}: must name one of {', '.join(KINDS)}, and may say relative"
+        )
+    value = table[kinds[0]]
+    more = {key: table[key] for key in table if key == "relative"}
+    if kinds[0] == "between":
+        if more or not isinstance(value, (list, tuple)) or len(value) != 2:
+            raise InputError(f"{name}.between = {shown(value)}: must be two numbers [low, high] alone")
+        return UniformRange(*value)
+    if kinds[0] == "lognormal" and more:
+        raise InputError(f"{name}: a lognormal is relative by itself; leave relative out")
+    kind: Any = KINDS[kinds[0]]
+    return kind(value, **more)

@@ -1,0 +1,150 @@
+"""Measured responses judged by how likely a probability map makes them, instead of right or wrong."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from snapbeam.simulation.save import code_flags
+from snapbeam.uncertainty.monte_carlo import interval_of
+from snapbeam.util.status_codes import ResponseClass
+from snapbeam.util.validation import InputError, InputTypeError, checked, integer
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from snapbeam.sweeps.measured_points import MeasuredPoints
+
+__all__ = ["class_counts", "score_measurements"]
+
+
+_KINDS = (
+    ResponseClass.INTRAWELL,
+    ResponseClass.TRANSIENT_1,
+    ResponseClass.TRANSIENT_2,
+    ResponseClass.CONTINUOUS,
+)
+_PRIOR = 0.5
+"""Of each class, added to its runs (Jeffreys): a class that no run had is unlikely, not impossible."""
+_COORDINATES = ("frequency_ratio", "velocity_amplitude", "location")
+
+
+def class_counts(dataset: xr.Dataset) -> NDArray[np.int64]:
+    """Runs of each response class at every point of a probability map, of shape (points..., 4)."""
+    if "hits" not in dataset or "outcome" not in dataset["hits"].dims:
+        raise InputError("dataset: is no probability map")
+    hits = dataset["hits"].transpose(..., "outcome")
+    of = {str(name): hits.sel(outcome=name).values for name in hits["outcome"].values}
+    intrawell = dataset["runs"].transpose(*hits.dims[:-1]).values - of["snap"]
+    return np.stack(
+        [intrawell, of["first_well"] - intrawell, of["other_well"], of["continuous"]], axis=-1
+    ).astype(np.int64)
+
+
+@checked
+def score_measurements(
+    dataset: xr.Dataset, measurements: MeasuredPoints, *, samples: int = 10_000, seed: int = 0
+) -> xr.Dataset:
+    """How likely a probability map makes measured responses, one by one and all together.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of :func:`snapbeam.uncertainty.probability_map` over frequency ratio, velocity amplitude and location, or some of them, as
+        a grid; a dot belongs to the nearest point, and must lie within half a spacing of the grid.
+    measurements : Dots
+        As :func:`snapbeam.sweeps.measured_points.read_measured_points` reads them; dots of unknown class are left out.
+    samples : int
+        Sets of responses drawn from the map, with which the measured ones are compared.
+    seed : int
+
+    Returns
+    -------
+    xarray.Dataset
+        Along ``dot``: ``response``, ``probability`` of that class with its 95 % limits, ``most_likely`` class and its
+        probability ``best``.  In the attributes: ``log_likelihood`` of all dots; ``log_likelihood_low``,
+        ``log_likelihood_mean`` and ``log_likelihood_high`` (the 95 % range) of dots drawn from the map itself;
+        ``p_value``, the share of those that are no likelier than the measured ones; ``agree``, dots of the most likely
+        class, with ``agree_expected``, as many as a right map lets expect.
+
+    Raises
+    ------
+    InputError
+        If the dataset is no such map, no dot has a class, or a dot lies outside.
+    """
+    import xarray as xr
+
+    if not hasattr(measurements, "response_class") or not hasattr(measurements, "frequency_ratio"):
+        raise InputTypeError("dots: must be Dots, as read_measured_points reads them")
+    integer("samples", samples, 100, 10**7)
+    integer("seed", seed, 0, 2**63 - 1)
+    counts = class_counts(dataset)
+    known = np.isin(measurements.response_class, _KINDS)
+    if not known.any():
+        raise InputError("dots: none has a known class")
+    at = _nearest(dataset, measurements, known)
+    mine = counts[at]
+    total = mine.sum(axis=-1)
+    share = (mine + _PRIOR) / (total + _PRIOR * len(_KINDS))[:, None]
+    kind = np.searchsorted(_KINDS, measurements.response_class[known])
+    rows = np.arange(kind.size)
+    _, low, high = interval_of(mine[rows, kind], total, method="jeffreys")
+    generator = np.random.Generator(np.random.Philox(key=[seed, 0]))
+    ranks = generator.random((samples, kind.size))
+    drawn = (ranks[..., None] > np.cumsum(share, axis=-1)[None, :, :-1]).sum(axis=-1)
+    logs = np.log(share)
+    likelihood = logs[rows[None, :], drawn].sum(axis=1)
+    measured = float(logs[rows, kind].sum())
+    limits = np.quantile(likelihood, [0.025, 0.975])
+    best = share.argmax(axis=-1)
+    labels = {"units": "1"}
+    flags = code_flags(ResponseClass)
+    return xr.Dataset(
+        {
+            "response_class": ("dot", measurements.response_class[known], labels | {"long_name": "measured response class"} | flags),
+            "probability": ("dot", share[rows, kind], labels | {"long_name": "probability of that class"}),
+            "probability_low": ("dot", low, labels | {"long_name": "its lower limit"}),
+            "probability_high": ("dot", high, labels | {"long_name": "its upper limit"}),
+            "most_likely": (
+                "dot", np.array(_KINDS, dtype=np.int8)[best], labels | {"long_name": "most likely class"} | flags
+            ),
+            "best": ("dot", share[rows, best], labels | {"long_name": "its probability"}),
+        },
+        {name: ("dot", getattr(measurements, name)[known]) for name in _COORDINATES},
+        {
+            "title": "measured responses under a probability map",
+            "log_likelihood": measured,
+            "log_likelihood_low": float(limits[0]),
+            "log_likelihood_mean": float(likelihood.mean()),
+            "log_likelihood_high": float(limits[1]),
+            "p_value": float(((likelihood <= measured).sum() + 1) / (samples + 1)),
+            "agree": int((best == kind).sum()),
+            "agree_expected": float(share[rows, best].sum()),
+            "measurements": int(kind.size),
+        },
+    )  # fmt: skip
+
+
+def _nearest(
+    dataset: xr.Dataset, dots: MeasuredPoints, known: NDArray[np.bool_]
+) -> tuple[NDArray[np.int64], ...]:
+    """The point of the grid that each dot belongs to."""
+    dims = [str(name) for name in dataset["runs"].dims]
+    found = []
+    for name in dims:
+        if name not in _COORDINATES:
+            raise InputError(f"dataset over {name}: dots say nothing of it; choose one of its points")
+        axis, values = dataset[name].values, getattr(dots, name)[known]
+        if np.isnan(values).any():
+            raise InputError(f"dots: {name} is not given for all of them, but is an axis of the map")
+        index = np.abs(values[:, None] - axis[None, :]).argmin(axis=1)
+        spacing = np.gradient(axis) if axis.size > 1 else np.array([np.inf])
+        away = np.abs(values - axis[index]) > 0.5001 * np.abs(spacing[index])
+        if away.any():
+            raise InputError(
+                f"dots: {name} = {values[away][0]:g} lies outside the map, {axis[0]:g} to {axis[-1]:g}"
+            )
+        found.append(index)
+    return tuple(found)

@@ -1,0 +1,212 @@
+"""What a laboratory measures of its beam, and how it is written down: the input of a calibration."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from snapbeam.util.validation import InputError, InputTypeError, choice, file_path, positive, shown
+
+__all__ = ["HERTZ_TIME", "ContactTest", "Measurements", "load_measurements"]
+
+
+HERTZ_TIME = 2.943275  # contact time over d/v for a force k d^1.5: 2 int_0^1 dx/sqrt(1 - x^2.5)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactTest:
+    """One collision of the shaker's tip: closing speed, and two of duration, peak force, effective mass.
+
+    For a force k d^1.5 between two bodies of effective mass m that close at v (Hertz): greatest penetration
+    d = (5 m v^2/(4 k))^0.4, peak force k d^1.5, duration 2.943 d/v.  The bodies are rigid but for the
+    contact: a test on a block or a heavy clamp, not on the limp beam.
+
+    Parameters
+    ----------
+    closing_speed : float
+        m/s.
+    duration : float, optional
+        s.
+    peak_force : float, optional
+        N.
+    effective_mass : float, optional
+        1/(1/m_1 + 1/m_2), kg.
+    relative_error : float
+        Standard error of each of the two as a share of it.
+    """
+
+    closing_speed: float
+    duration: float | None = None
+    peak_force: float | None = None
+    effective_mass: float | None = None
+    relative_error: float = 0.05
+
+    def __post_init__(self) -> None:
+        positive("closing_speed", self.closing_speed, "m/s")
+        positive("relative_error", self.relative_error)
+        names = ("duration", "peak_force", "effective_mass")
+        given = [name for name in names if getattr(self, name) is not None]
+        for name in given:
+            positive(name, getattr(self, name))
+        if len(given) != 2:
+            raise InputError(
+                f"contact test with {', '.join(given) or 'nothing'}: must have two of {', '.join(names)}"
+            )
+
+    def stiffness(self) -> tuple[float, float]:
+        """Contact stiffness [N/m^1.5] and its standard error."""
+        v, t, f, m = self.closing_speed, self.duration, self.peak_force, self.effective_mass
+        if t is not None:
+            depth = t * v / HERTZ_TIME
+            if f is not None:
+                stiffness, power = f / depth**1.5, math.hypot(1.0, 1.5)
+            else:
+                assert m is not None
+                stiffness, power = 1.25 * m * v * v / depth**2.5, math.hypot(1.0, 2.5)
+        else:
+            assert f is not None and m is not None
+            depth = 1.25 * m * v * v / f
+            stiffness, power = f / depth**1.5, math.hypot(2.5, 1.5)
+        return stiffness, stiffness * power * self.relative_error
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measurements:
+    """What was measured of one beam.
+
+    Frequencies stand in the order of the modes.  A standard error may be one number or one for each; where
+    none is given, half a percent is assumed and said.
+
+    Parameters
+    ----------
+    straight_frequencies : sequence of float
+        Natural frequencies without axial load, Hz.
+    lower_well_frequencies, upper_well_frequencies : sequence of float
+        Natural frequencies about either well, Hz.
+    straight_frequencies_se, lower_well_frequencies_se, upper_well_frequencies_se : float or sequence of float, optional
+        Their standard errors, Hz.
+    lower_well_shape, upper_well_shape : sequence of str, optional
+        "symmetric" or "antisymmetric" for each frequency about a well.  Where given, frequencies are matched
+        to the model's modes of that shape in their order; else to all modes in their order, which at a
+        buckling level of some 6 radii of gyration changes.
+    damping_ratio : sequence of float
+        From free decays.
+    damping_ratio_se : float or sequence of float, optional
+    thickness, buckling_level : float, optional
+        As measured with a gauge, m: compared with the result, not fitted to.
+    contact : sequence of ContactTest
+    """
+
+    straight_frequencies: Sequence[float] = ()
+    straight_frequencies_se: float | Sequence[float] | None = None
+    lower_well_frequencies: Sequence[float] = ()
+    lower_well_frequencies_se: float | Sequence[float] | None = None
+    upper_well_frequencies: Sequence[float] = ()
+    upper_well_frequencies_se: float | Sequence[float] | None = None
+    lower_well_shape: Sequence[str] = ()
+    upper_well_shape: Sequence[str] = ()
+    damping_ratio: Sequence[float] = ()
+    damping_ratio_se: float | Sequence[float] | None = None
+    thickness: float | None = None
+    buckling_level: float | None = None
+    contact: Sequence[ContactTest] = ()
+
+    def __post_init__(self) -> None:
+        for name in (
+            "straight_frequencies",
+            "lower_well_frequencies",
+            "upper_well_frequencies",
+            "damping_ratio",
+        ):
+            values = _numbers(name, getattr(self, name))
+            object.__setattr__(self, name, values)
+            errors = getattr(self, f"{name}_se")
+            if errors is not None:
+                listed = [errors] * len(values) if isinstance(errors, (int, float)) else errors
+                checked = _numbers(f"{name}_se", listed)
+                if len(checked) != len(values):
+                    raise InputError(f"{name}_se: {len(checked)} value(s), {name} has {len(values)}")
+                object.__setattr__(self, f"{name}_se", checked)
+            if "freq" in name and any(b <= a for a, b in itertools.pairwise(values)):
+                raise InputError(f"{name} = {list(values)}: must increase, one frequency a mode")
+        for name in ("lower_well", "upper_well"):
+            shapes = getattr(self, f"{name}_shape")
+            if not isinstance(shapes, (list, tuple)):
+                raise InputTypeError(
+                    f"{name}_shape = {shown(shapes)}: must be a list of words, one for each frequency"
+                )
+            object.__setattr__(self, f"{name}_shape", tuple(shapes))
+            for i, shape in enumerate(shapes):
+                choice(f"{name}_shape[{i}]", shape, ("symmetric", "antisymmetric"))
+            if shapes and len(shapes) != len(getattr(self, f"{name}_frequencies")):
+                raise InputError(
+                    f"{name}_shape: {len(shapes)} word(s), {name}_frequencies has {len(getattr(self, f'{name}_frequencies'))}"
+                )
+        if any(ratio >= 1.0 for ratio in self.damping_ratio):
+            raise InputError(f"damping_ratio = {list(self.damping_ratio)}: must lie in (0, 1)")
+        for name in ("thickness", "buckling_level"):
+            if getattr(self, name) is not None:
+                positive(name, getattr(self, name), "m")
+
+
+def _numbers(name: str, values: Any) -> tuple[float, ...]:
+    if isinstance(values, (int, float)) and not isinstance(values, bool):
+        values = (values,)
+    if isinstance(values, (str, bytes, Mapping)) or not isinstance(values, Iterable):
+        raise InputTypeError(f"{name} = {shown(values)}: must be a list of numbers")
+    try:
+        given = tuple(values)
+    except TypeError:
+        raise InputTypeError(f"{name} = {shown(values)}: must be a list of numbers") from None
+    return tuple(positive(f"{name}[{i}]", value) for i, value in enumerate(given))
+
+
+def load_measurements(path: str | os.PathLike[str]) -> tuple[Measurements, dict[str, Any]]:
+    """Read measurements from a TOML file.
+
+    The section ``[measured]`` has the names of :class:`Measurements`; each ``[[measured.contact]]`` is a
+    :class:`ContactTest`.  A section ``[beam]`` as in a parameter file may give what is known of the beam.
+
+    Returns
+    -------
+    (Measurements, dict)
+        The dictionary holds the other sections.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or holds an unknown or unusable entry; the message names file and entry.
+    """
+    source = file_path("path", path)
+    try:
+        sections = tomllib.loads(source.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"{source}: cannot be read, {error.strerror or error}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{source}: is no TOML, {error}") from error
+    measured = sections.pop("measured", None)
+    if not isinstance(measured, dict):
+        raise InputError(f"{source}: has no section [measured]")
+    known = [field.name for field in fields(Measurements)]
+    for name in measured:
+        if name not in known:
+            raise InputError(f"{source}: [measured] {name}: unknown; must be among {', '.join(known)}")
+    try:
+        tests = measured.pop("contact", [])
+        if not isinstance(tests, list) or not all(isinstance(test, dict) for test in tests):
+            raise InputError("contact: must be a list of tables [[measured.contact]]")
+        names = [field.name for field in fields(ContactTest)]
+        for test in tests:
+            if set(test) - set(names) or "closing_speed" not in test:
+                raise InputError(
+                    f"contact = {test}: must have closing_speed and two of {', '.join(names[1:4])}"
+                )
+        contact = tuple(ContactTest(**test) for test in tests)
+        return Measurements(**measured, contact=contact), sections
+    except InputError as error:
+        raise InputError(f"{source}: [measured] {error}") from error

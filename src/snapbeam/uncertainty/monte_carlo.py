@@ -1,0 +1,434 @@
+"""Runs of drawn systems: points and numbers of draws in, statistics out; kept, resumed and spread like a sweep."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from snapbeam.dynamics.flow import InitialConditions, held_in_space
+from snapbeam.dynamics.lifetimes import proportion as jeffreys
+from snapbeam.model.integration import Integration
+from snapbeam.model.parameter_axes import PHYSICAL, unit_of
+from snapbeam.model.parameters import lookup
+from snapbeam.model.state import amplitude_scale
+from snapbeam.model.system import System
+from snapbeam.solver.statistics import STATISTICS, rows_for
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, compute_table
+from snapbeam.sweeps.points import Columns, PointList
+from snapbeam.sweeps.setup import Progress, SweepSetup, sweep_setup
+from snapbeam.sweeps.tasks import PointWork
+from snapbeam.uncertainty.distributions import ParameterUncertainty
+from snapbeam.util.diagnostics import DiagnosticWarning
+from snapbeam.util.status_codes import ResponseClass, RunStatus
+from snapbeam.util.validation import InputError, InputTypeError, choice, shown, within
+
+__all__ = [
+    "INTERVALS",
+    "OUTCOMES",
+    "Event",
+    "Trials",
+    "interval_of",
+    "reached",
+    "require_held",
+    "trials_of",
+    "wilson",
+]
+
+
+_Numbers = NDArray[np.int64]
+
+
+_Made = dict[tuple[Any, ...], System]
+_KEPT = 4096
+"""Systems that are kept at most."""
+
+
+def _made(made: _Made, system: System, changes: dict[str, Any]) -> System:
+    """A neighbour of a system, made once."""
+    key = tuple(sorted(changes.items()))
+    if key not in made:
+        if len(made) >= _KEPT:
+            made.clear()
+        made[key] = system.replace(**changes)
+    return made[key]
+
+
+@dataclass(frozen=True, eq=False)
+class _DrawnSetup(SweepSetup):
+    """Runs of which many share a structure that was made before."""
+
+    made: _Made = field(default_factory=dict)
+
+    def neighbour(self, changes: dict[str, Any]) -> tuple[System, Integration]:
+        """As of any sweep."""
+        if any(name.startswith("run.") for name in changes):
+            return super().neighbour(changes)
+        return _made(self.made, self.system, changes), self.integration
+
+
+@dataclass
+class Trials:
+    """Draws of a system, run where they are asked for.
+
+    What a run gives hangs on its point and the number of its draw alone.  Rounds are kept in a folder each of the
+    store, in the order in which they are asked for: a question that asks the same again reads them instead.
+    """
+
+    system: System
+    """With its tip held in space if starts differ."""
+    integration: Integration
+    spread: ParameterUncertainty
+    keeping: CheckpointOptions = field(default_factory=CheckpointOptions)
+    cluster: str | None = None
+    runs: int = 0
+    """Runs asked for so far."""
+    rounds: int = 0
+    made: dict[tuple[Any, ...], System] = field(default_factory=dict, repr=False)
+    """Systems of the structures that were drawn so far."""
+
+    def columns(
+        self, points: Columns, numbers: _Numbers, scores: NDArray[np.float64] | None = None
+    ) -> Columns:
+        """The parameters of the draws: those of the points, and those that are drawn about them.
+
+        Parameters
+        ----------
+        points : dict of str to array of shape (runs,)
+            Nominal values by dotted name.
+        numbers : int array of shape (runs,)
+            Which draw each is.
+        scores : array of shape (runs, parameters), optional
+            Standard normal scores of the parameters, in place of those of the draws; the start is that of the draw.
+        """
+        spread, found = self.spread, dict(points)
+        if scores is None:
+            scores = spread.normals(numbers)
+        for j, (name, each) in enumerate(spread.of.items()):
+            nominal = points[name] if name in points else np.full(numbers.size, self._nominal(name))
+            found[name] = each.at(nominal, scores[:, j])
+            _require_allowed(name, found[name])
+        if spread.hold_fixed == "physical" and spread.structural:
+            self._hold(points, found, numbers.size)
+        if spread.displacement > 0.0:
+            found |= self._ringing(found, numbers)
+        return found
+
+    def statistics(
+        self,
+        points: Columns,
+        numbers: _Numbers,
+        progress: Progress | None = None,
+        scores: NDArray[np.float64] | None = None,
+    ) -> dict[str, NDArray[Any]]:
+        """Run the draws and return every statistic of the table, arrays of shape (runs,)."""
+        columns = self.columns(points, numbers, scores)
+        if not columns:  # nothing is drawn and nothing varies: the system as it stands
+            columns = {name: np.full(numbers.size, self._nominal(name)) for name in self._any_parameter()}
+        return self.of_columns(columns, progress)
+
+    def _any_parameter(self) -> tuple[str, ...]:
+        return ("striker.location",)
+
+    def of_columns(self, columns: Columns, progress: Progress | None = None) -> dict[str, NDArray[Any]]:
+        """Run points as they are, without a draw."""
+        setup = self._setup(columns)
+        keeping = self.keeping
+        if keeping.path is not None:
+            keeping = replace(keeping, path=_folder(Path(keeping.path)) / f"round_{self.rounds:04d}")
+        work = PointWork(setup)
+        table, _ = compute_table(work, keeping, cluster=self.cluster, progress=progress)
+        self.rounds += 1
+        self.runs += setup.points.size
+        return {name: work.values(name, table) for name in (*work.integers, *work.numbers)}
+
+    def _setup(self, columns: Columns) -> SweepSetup:
+        """The runs as a sweep; every structure among them is made before any run, and once."""
+        structural = [name for name in columns if not lookup(name).is_run]
+        first = {name: values[:1] for name, values in columns.items()} if structural else columns
+        with warnings.catch_warnings():
+            if self.rounds:  # what is doubtful of the system was told in the first round
+                warnings.simplefilter("ignore", DiagnosticWarning)
+            setup = sweep_setup(self.system, PointList(first), self.integration)
+        if not structural:
+            return setup
+        for _ in self._structures(columns, next(iter(columns.values())).size):
+            pass
+        return _DrawnSetup(setup.system, setup.integration, PointList(columns), self.made)
+
+    def _nominal(self, name: str) -> float:
+        value = self.system.parameters.get(name)
+        if value is None or np.ndim(value) != 0:
+            raise InputError(f"{name}: has no single value in this system to be drawn about")
+        return float(value)
+
+    def _hold(self, points: Columns, found: Columns, size: int) -> None:
+        """Keep Hz, m/s and m where the beam differs from the one that the ratios were given for."""
+        names = [physical for physical in PHYSICAL if self._is_held(PHYSICAL[physical].parameter)]
+        nominal, drawn = self._units(points, names, size), self._units(found, names, size)
+        for j, physical in enumerate(names):
+            ratio = PHYSICAL[physical].parameter
+            value = found[ratio] if ratio in found else np.full(size, self._nominal(ratio))
+            found[ratio] = value * (nominal[:, j] / drawn[:, j])
+            _require_allowed(ratio, found[ratio])
+
+    def _is_held(self, ratio: str) -> bool:
+        if ratio == "striker.location":
+            return "beam.length" in self.spread.of and self.system.striker is not None
+        return ratio in self.system.parameters
+
+    def in_hz(self, points: Columns) -> Columns:
+        """Points whose Omega and V are those of the nominal system, in the ratios of their own structure."""
+        size = next(iter(points.values())).size
+        names = ["drive.frequency_hz", "drive.velocity_m_s"]
+        nominal, own = self._units({}, names, size), self._units(points, names, size)
+        found = dict(points)
+        for j, ratio in enumerate(("drive.frequency_ratio", "drive.velocity_amplitude")):
+            found[ratio] = points[ratio] * (nominal[:, j] / own[:, j])
+        return found
+
+    def cycles(self, columns: Columns) -> NDArray[np.float64]:
+        """Seconds of a cycle of every run of a sine."""
+        size = next(iter(columns.values())).size
+        ratio = columns.get("drive.frequency_ratio")
+        if ratio is None:
+            ratio = np.full(size, self._nominal("drive.frequency_ratio"))
+        return np.asarray(1.0 / (ratio * self._units(columns, ["drive.frequency_hz"], size)[:, 0]))
+
+    def _units(self, columns: Columns, names: list[str], size: int) -> NDArray[np.float64]:
+        """What a ratio of 1 is in physical units, for every run, of shape (runs, names)."""
+        units = np.empty((size, len(names)))
+        for system, which in self._structures(columns, size):
+            units[which] = [unit_of(system, name) for name in names]
+        return units
+
+    def _structures(self, columns: Columns, size: int) -> Iterator[tuple[System, list[int]]]:
+        """The structures among runs, and which runs have each."""
+        names = [name for name in columns if not lookup(name).is_run and not name.startswith("run.")]
+        if not names:
+            yield self.system, list(range(size))
+            return
+        keys: dict[tuple[Any, ...], list[int]] = {}
+        for i, key in enumerate(zip(*(columns[name].tolist() for name in names), strict=True)):
+            keys.setdefault(key, []).append(i)
+        for key, which in keys.items():
+            yield _made(self.made, self.system, dict(zip(names, key, strict=True))), which
+
+    def _ringing(self, columns: Columns, numbers: _Numbers) -> Columns:
+        """The start of every draw, as columns; one that would press the tip is turned about, so that it leaves it."""
+        given = [name for name in columns if name.startswith("start.")]
+        if given:
+            raise InputError(
+                f"{given[0]}: starts of a spread with a displacement are drawn; leave one of the two out"
+            )
+        striker, size = self.system.striker, numbers.size
+        assert striker is not None
+        modes = self.system.model.modes
+        location = columns.get("striker.location", np.full(size, striker.location))
+        table = np.empty((size, 2, modes))
+        starts = InitialConditions(count=1, displacement=self.spread.displacement, seed=self.spread.seed)
+        for system, which in self._structures(columns, size):
+            scale = amplitude_scale(system.model)
+            speed = scale * 2.0 * np.pi * system.model.reference_frequency
+            runs: dict[int, list[int]] = {}
+            for i in which:
+                runs.setdefault(int(numbers[i]), []).append(i)
+            for number, alike in runs.items():
+                state = starts.state(system, number, location=location[alike])
+                table[alike] = np.stack((state.amplitude / scale, state.velocity / speed), axis=1)
+        return {
+            f"start.{what}[{mode + 1}]": table[:, k, mode]
+            for k, what in enumerate(("amplitude", "velocity"))
+            for mode in range(modes)
+        }
+
+
+def _folder(path: Path) -> Path:
+    """The folder of a store of rounds, made where it is not there.
+
+    Raises
+    ------
+    InputError
+        If it cannot be one, or holds a sweep.
+    """
+    if path.exists() and not path.is_dir():
+        raise InputError(f"store = {str(path)!r}: is a file; must be a folder")
+    if not path.absolute().parent.is_dir():
+        raise InputError(f"store = {str(path)!r}: {str(path.absolute().parent)!r} is not an existing folder")
+    if (path / "map.json").exists():
+        raise InputError(f"store = {str(path)!r}: holds a sweep; give another folder")
+    path.mkdir(exist_ok=True)
+    return path
+
+
+def _require_allowed(name: str, values: NDArray[np.float64]) -> None:
+    """Refuse draws that no system can have, with the advice to draw from something else."""
+    for value in (values.min(), values.max()):
+        try:
+            lookup(name).quantity.check(name, float(value))
+        except InputError as error:
+            raise InputError(
+                f"{error}; a draw of the spread is out of range: make it narrower, or draw from a LogNormal or Between"
+            ) from None
+
+
+def trials_of(
+    system: System,
+    spread: ParameterUncertainty | None,
+    integration: Integration | None,
+    *,
+    store: str | os.PathLike[str] | CheckpointOptions | None = None,
+    cluster: str | None = None,
+    early: bool = True,
+) -> Trials:
+    """Check what is drawn of a system.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(system, System):
+        raise InputTypeError(f"system = {shown(system)}: must be a System")
+    if system.striker is None:
+        raise InputError("striker = None: what nothing strikes has no outcome to ask for")
+    spread = ParameterUncertainty() if spread is None else spread
+    if not isinstance(spread, ParameterUncertainty):
+        raise InputTypeError(f"spread = {shown(spread)}: must be a Spread")
+    integration = Integration() if integration is None else integration
+    if not isinstance(integration, Integration):
+        raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
+    if (
+        spread.hold_fixed == "physical"
+        and spread.structural
+        and system.striker.drive.name not in ("sine", "fixed")
+    ):
+        raise InputError(
+            f"held = 'physical' with a drive of kind {system.striker.drive.name!r}: only a sine's frequency and "
+            "velocity are held in Hz and m/s; give held = 'ratios'"
+        )
+    keeping = store if isinstance(store, CheckpointOptions) else CheckpointOptions(store)
+    if spread.moves_start and "striker.gap" not in spread.of:
+        if system.parameters.get("striker.gap") is None:
+            system = held_in_space(system)
+    return Trials(system, integration.replace(early_termination=early), spread, keeping, cluster)
+
+
+Ask = Callable[[_Numbers, _Numbers], dict[str, NDArray[Any]]]
+"""Given points and draws, by number, the statistics of their runs."""
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a run may come to, read from its class: outcomes that have a probability.
+
+
+Statistics = dict[str, NDArray[Any]]
+_REACHED = (int(RunStatus.OK), int(RunStatus.EARLY_STOP))
+_FIRST = (ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_1)
+
+
+class Event(NamedTuple):
+    """Something that a run does or does not."""
+
+    words: str
+    happened: Callable[[Statistics], NDArray[np.bool_]]
+
+
+OUTCOMES: dict[str, Event] = {
+    "snap": Event("the beam snaps through at least once", lambda found: found["response_class"] > 0),
+    "continuous": Event(
+        "the beam snaps on at the end", lambda found: found["response_class"] == ResponseClass.CONTINUOUS
+    ),
+    "first_well": Event(
+        "the beam ends about the well it began in", lambda found: np.isin(found["response_class"], _FIRST)
+    ),
+    "other_well": Event(
+        "the beam ends about the other well",
+        lambda found: found["response_class"] == ResponseClass.TRANSIENT_2,
+    ),
+}
+"""Outcomes that every probability map has.  The last three exclude each other and one of them happens."""
+
+
+def reached(found: Statistics) -> NDArray[np.bool_]:
+    """Whether runs came to an end that says their class."""
+    return np.isin(found["status"], _REACHED)
+
+
+def require_held(names: Iterable[str], system: System) -> None:
+    """Refuse statistics that runs of a system do not have: those of one of several strikers, if it is not there.
+
+    Raises
+    ------
+    InputError
+    """
+    strikers = 0 if system.striker is None else 1 + len(system.further_contacts)
+    held = rows_for(strikers)
+    for name in names:
+        if name in STATISTICS and name not in held:
+            raise InputError(
+                f"{name}: the system has {strikers} striker{'s' * (strikers != 1)}; each has its own "
+                "statistics where there are several"
+            )
+
+
+# ----------------------------------------------------------------------------------------------------
+# A probability from counts, with its interval.
+
+
+_Array = NDArray[np.float64]
+INTERVALS = ("wilson", "jeffreys")
+
+
+def wilson(hits: ArrayLike, runs: ArrayLike, confidence: float = 0.95) -> tuple[_Array, _Array, _Array]:
+    """A probability from counts, with Wilson's score interval (J. Am. Stat. Assoc. 22 (1927) 209).
+
+    With z the normal quantile of (1 + confidence)/2, the limits solve |h/n - p| = z sqrt(p(1 - p)/n).
+
+    Returns
+    -------
+    share, low, high : arrays
+        NaN, 0 and 1 where there are no runs.
+    """
+    good, total = np.broadcast_arrays(np.asarray(hits, dtype=np.float64), np.asarray(runs, dtype=np.float64))
+    if (good < 0).any() or (good > total).any():
+        raise InputError("hits: must be between 0 and the number of runs")
+    z = float(special.ndtri(0.5 * (1.0 + within("confidence", confidence, 0.0, 1.0))))
+    n = np.maximum(total, 1.0)
+    share = good / n
+    middle = (good + 0.5 * z * z) / (n + z * z)
+    half = z * np.sqrt(share * (1.0 - share) * n + 0.25 * z * z) / (n + z * z)
+    # at no and at all hits a limit is 0 and 1, to the last digit
+    low = np.where((good == 0) | (total == 0), 0.0, middle - half)
+    high = np.where((good == total) | (total == 0), 1.0, middle + half)
+    return np.where(total > 0, share, np.nan), low, high
+
+
+def interval_of(
+    hits: ArrayLike,
+    runs: ArrayLike,
+    failed: ArrayLike = 0,
+    *,
+    confidence: float = 0.95,
+    method: str = "wilson",
+) -> tuple[_Array, _Array, _Array]:
+    """A probability with its interval; runs that failed may have been hits or not, and widen it both ways.
+
+    Returns
+    -------
+    share, low, high : arrays
+    """
+    choice("interval", method, INTERVALS)
+    of = wilson if method == "wilson" else jeffreys
+    share = of(hits, runs, confidence)[0]
+    lost = np.asarray(failed)
+    total = np.asarray(runs) + lost
+    low = of(hits, total, confidence)[1]
+    high = of(np.asarray(hits) + lost, total, confidence)[2]
+    return share, low, high

@@ -1,0 +1,869 @@
+"""The best design under limits that hold with a stated probability, sought on common draws and judged on fresh ones."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+from snapbeam.model.integration import Integration
+from snapbeam.model.parameters import lookup
+from snapbeam.model.system import System
+from snapbeam.solver.statistics import STATISTICS
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions
+from snapbeam.sweeps.points import Columns
+from snapbeam.uncertainty.differential_evolution import DifferentialEvolution, front_of
+from snapbeam.uncertainty.distributions import ParameterUncertainty
+from snapbeam.uncertainty.monte_carlo import (
+    OUTCOMES,
+    Trials,
+    interval_of,
+    reached,
+    require_held,
+    trials_of,
+    wilson,
+)
+from snapbeam.util.diagnostics import counting
+from snapbeam.util.provenance import canonical_json
+from snapbeam.util.validation import (
+    InputError,
+    InputTypeError,
+    checked,
+    finite,
+    finite_array,
+    instance,
+    integer,
+    positive,
+    shown,
+    within,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "OWN",
+    "Constraint",
+    "DesignProblem",
+    "Estimate",
+    "Objective",
+    "OptimizerSettings",
+    "QuantityOfInterest",
+    "Worth",
+    "design_problem",
+    "optimize_design",
+    "quantity_of",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# What a design is judged by: quantities of its runs or of itself, goals to make small, limits to keep.
+
+
+Values = dict[str, NDArray[Any]]
+
+
+class QuantityOfInterest(NamedTuple):
+    """Something with a number for every run, or for every design."""
+
+    name: str
+    unit: str
+    words: str
+    kind: str
+    """``"outcome"`` and ``"run"``: of a run; ``"design"``: of the nominal design alone."""
+    of: Callable[[System, Values], NDArray[Any]]
+    """From the nominal system and columns, parameters of designs or statistics of runs, to numbers."""
+
+
+def _own(name: str, values: Values, system: System) -> _Array:
+    value = values.get(name)
+    return np.asarray(system.parameters[name] if value is None else value, dtype=np.float64)
+
+
+def _speed(system: System, values: Values) -> _Array:
+    return _own("drive.velocity_amplitude", values, system) * system.scale.length * system.scale.omega
+
+
+def _stroke(system: System, values: Values) -> _Array:
+    return np.asarray(
+        _own("drive.velocity_amplitude", values, system)
+        * system.scale.length
+        / _own("drive.frequency_ratio", values, system)
+    )
+
+
+def _acceleration(system: System, values: Values) -> _Array:
+    omega = _own("drive.frequency_ratio", values, system) * system.scale.omega
+    return np.asarray(_speed(system, values) * omega)
+
+
+def _settled(_: System, values: Values) -> _Array:
+    """Cycles to the last crossing; those of runs that do not end in a well are infinite."""
+    found = np.nan_to_num(values["last_zero_crossing"], nan=0.0) / values[CYCLE]
+    return np.where(OUTCOMES["continuous"].happened(values), np.inf, found)
+
+
+CYCLE = "cycle"
+"""Seconds of a cycle, beside the statistics of a run."""
+
+
+OWN: dict[str, QuantityOfInterest] = {
+    row.name: row
+    for row in (
+        QuantityOfInterest("speed", "m/s", "velocity amplitude of the tip", "design", _speed),
+        QuantityOfInterest("stroke", "m", "displacement amplitude of the tip", "design", _stroke),
+        QuantityOfInterest(
+            "acceleration", "m/s^2", "acceleration amplitude of the tip", "design", _acceleration
+        ),
+        QuantityOfInterest("cycles_to_settle", "1", "cycles to the last snap", "run", _settled),
+    )
+}
+"""Quantities beside statistics, outcomes and parameters; the first three are of a sine."""
+
+
+def quantity_of(name: str) -> QuantityOfInterest:
+    """A quantity by name: an outcome, a statistic, one of :data:`OWN`, or a parameter of the design.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if instance("quantity", name, str, "a name") in OWN:
+        return OWN[name]
+    if name in OUTCOMES:
+        event = OUTCOMES[name]
+        return QuantityOfInterest(name, "1", event.words, "outcome", lambda _, found: event.happened(found))
+    if name in STATISTICS:
+        row = STATISTICS[name]
+        if row.dtype not in ("float64", "int32"):
+            raise InputError(f"{name}: is no number that could be small or large")
+        return QuantityOfInterest(
+            name, row.unit, row.long_name, "run", lambda _, found: found[name].astype(np.float64)
+        )
+    try:
+        parameter = lookup(name)
+    except InputError:
+        known = ", ".join((*OWN, *OUTCOMES))
+        raise InputError(f"{name}: no quantity; must be one of {known}, a statistic or a parameter") from None
+    full = parameter.name
+    return QuantityOfInterest(
+        full, parameter.quantity.unit, parameter.quantity.long_name, "design", lambda s, v: _own(full, v, s)
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Objective:
+    """Something to make small, or large.
+
+    Parameters
+    ----------
+    quantity : str
+        An outcome (its probability), a statistic of the runs, of one of several strikers too, as
+        ``"peak_force_striker_2"``, a parameter, ``"speed"``, ``"stroke"``, ``"acceleration"`` or
+        ``"cycles_to_settle"``.
+    quantile : float, optional
+        Of a statistic, in (0, 1): what is exceeded by no more than the rest of the runs; its mean by default.
+    maximize : bool
+        Whether it is to be large.
+    """
+
+    quantity: str
+    quantile: float | None = None
+    maximize: bool = False
+
+    def __post_init__(self) -> None:
+        kind = quantity_of(self.quantity).kind
+        if self.quantile is not None:
+            within("quantile", self.quantile, 0.0, 1.0)
+            if kind != "run":
+                raise InputError(
+                    f"quantile = {self.quantile:g} of {self.quantity}: only statistics of runs have quantiles"
+                )
+
+    @property
+    def _quantity(self) -> QuantityOfInterest:
+        """What it is of."""
+        return quantity_of(self.quantity)
+
+    @property
+    def label(self) -> str:
+        """Its name in datasets."""
+        name = self.quantity.replace(".", "_")
+        return name if self.quantile is None else f"{name}_q{100.0 * self.quantile:g}".replace(".", "_")
+
+    @property
+    def words(self) -> str:
+        """What is made small or large."""
+        quantity = self._quantity
+        if quantity.kind == "outcome":
+            return f"probability that {quantity.words}"
+        if self.quantile is not None:
+            share = "median" if self.quantile == 0.5 else f"{self.quantile:g} quantile"
+            return f"{share} of the {quantity.words}"
+        return quantity.words if quantity.kind == "design" else f"mean {quantity.words}"
+
+    def estimate(self, values: NDArray[Any], failed: int, confidence: float) -> tuple[float, float, float]:
+        """Value and interval from runs that came to an end.
+
+        Of an outcome Wilson's interval, of a mean Student's, of a quantile that of order statistics.
+        """
+        n = values.size
+        if self._quantity.kind == "outcome":
+            found = interval_of(int(values.sum()), n, failed, confidence=confidence)
+            return float(found[0]), float(found[1]), float(found[2])
+        if n < 2 or failed:  # a run that failed might have been anything
+            middle = float(np.mean(values)) if n else float("nan")
+            return middle, -np.inf, np.inf
+        if self.quantile is None:
+            if not np.isfinite(values).all():
+                return np.inf, -np.inf, np.inf
+            reach = float(stats.t.ppf(0.5 * (1.0 + confidence), n - 1) * values.std(ddof=1) / np.sqrt(n))
+            middle = float(values.mean())
+            return middle, middle - reach, middle + reach
+        return _quantile(np.sort(values), self.quantile, confidence)
+
+
+def _quantile(ordered: _Array, share: float, confidence: float) -> tuple[float, float, float]:
+    """A quantile with the interval between order statistics, infinite where there are too few runs."""
+    n = ordered.size
+    middle = float(ordered[min(int(np.ceil(share * n)) - 1, n - 1)])
+    low, high = stats.binom.ppf([0.5 * (1.0 - confidence), 0.5 * (1.0 + confidence)], n, share)
+    below = float(ordered[int(low) - 1]) if low >= 1 else -np.inf
+    above = float(ordered[int(high)]) if high < n else np.inf
+    return middle, below, above
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constraint:
+    """Something to keep.
+
+    Parameters
+    ----------
+    quantity : str
+        As of a :class:`Goal`.
+    lower, upper : float, optional
+        One of them at least.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
+    probability : float
+        Of a statistic of runs: share of all systems that must keep it, in (0, 1).
+    """
+
+    quantity: str
+    lower: float | None = None
+    upper: float | None = None
+    probability: float = 0.95
+
+    def __post_init__(self) -> None:
+        kind = quantity_of(self.quantity).kind
+        if self.lower is None and self.upper is None:
+            raise InputError(f"limit of {self.quantity}: must have at_least or at_most")
+        for name in ("lower", "upper"):
+            if getattr(self, name) is not None:
+                finite(name, getattr(self, name))
+        within("probability", self.probability, 0.0, 1.0)
+        if kind == "outcome":
+            if self.upper is not None or self.lower is None:
+                raise InputError(f"limit of {self.quantity}: give the probability it must have at_least")
+            within("lower", self.lower, 0.0, 1.0)
+        elif self.lower is not None and self.upper is not None and self.lower > self.upper:
+            raise InputError(f"limit of {self.quantity}: lower = {self.lower:g} is more than at_most")
+
+    @property
+    def _quantity(self) -> QuantityOfInterest:
+        """What it is of."""
+        return quantity_of(self.quantity)
+
+    @property
+    def label(self) -> str:
+        """Its name in datasets."""
+        return self.quantity.replace(".", "_")
+
+    @property
+    def required(self) -> float:
+        """Share of the runs that must keep it."""
+        return float(self.lower) if self._quantity.kind == "outcome" else self.probability  # type: ignore[arg-type]
+
+    def kept(self, values: NDArray[Any]) -> NDArray[np.bool_]:
+        """Which runs keep it."""
+        if self._quantity.kind == "outcome":
+            return np.asarray(values, dtype=bool)
+        low = -np.inf if self.lower is None else self.lower
+        high = np.inf if self.upper is None else self.upper
+        return np.asarray((values >= low) & (values <= high))
+
+    def excess(self, values: _Array) -> _Array:
+        """By how much designs break it, over its size; 0 where they keep it."""
+        size = positive("size", max(abs(self.lower or 0.0), abs(self.upper or 0.0), 1e-300))
+        low = -np.inf if self.lower is None else self.lower
+        high = np.inf if self.upper is None else self.upper
+        return np.asarray(np.maximum(np.maximum(low - values, values - high), 0.0) / size)
+
+
+def require_kinds(goals: Any, limits: Any) -> tuple[tuple[Objective, ...], tuple[Constraint, ...]]:
+    """Goals and limits as tuples.
+
+    Raises
+    ------
+    InputError
+    """
+    listed = (goals,) if isinstance(goals, (str, Objective)) else tuple(goals)
+    made = tuple(Objective(quantity=each) if isinstance(each, str) else each for each in listed)
+    kept = (limits,) if isinstance(limits, Constraint) else tuple(limits)
+    for each in made:
+        if not isinstance(each, Objective):
+            raise InputError(f"goals: {shown(each)} must be a Goal, or the name of a quantity")
+    for each in kept:
+        if not isinstance(each, Constraint):
+            raise InputError(f"limits: {shown(each)} must be a Limit")
+    if not 1 <= len(made) <= 3:
+        raise InputError(f"goals: {len(made)} of them; must be one to three")
+    labels = [each.label for each in made]
+    if len(set(labels)) < len(labels):
+        raise InputError(f"goals {labels}: must differ from each other")
+    return made, kept
+
+
+# ----------------------------------------------------------------------------------------------------
+# A design problem: what may be chosen, what is to be small, what must hold; anything that optimises can drive it.
+
+
+_SURE = 0.99
+"""Of the interval by which a design is dropped after a quarter of its runs."""
+
+
+class Worth(NamedTuple):
+    """What some designs are worth, by the runs that were made of them."""
+
+    goals: _Array
+    """Of shape (designs, goals), to be made small: a goal that is to be large is negated; infinite where not known."""
+    violation: _Array
+    """Of shape (designs,): 0 where every limit is kept by the share of the runs that it asks for, and a margin."""
+    runs: NDArray[np.int64]
+
+
+class Estimate(NamedTuple):
+    """What one design is worth on fresh draws, with intervals."""
+
+    goals: _Array
+    """Value, lower and upper limit, of shape (goals, 3), in their own signs."""
+    limits: _Array
+    """Share of the runs that keep each limit with its interval, of shape (limits, 3)."""
+    runs: int
+    failed: int
+
+
+@dataclass
+class DesignProblem:
+    """Variables with bounds, goals and limits, judged by numbered draws of a system.
+
+    Made by :func:`snapbeam.uncertainty.design_problem`; ``evaluate`` is all that an optimiser needs.
+    """
+
+    trials: Trials
+    bounds: dict[str, tuple[float, float]]
+    """By dotted name."""
+    goals: tuple[Objective, ...]
+    limits: tuple[Constraint, ...]
+    draws: int = 64
+    """Runs of a design while it is sought, the same draws for every one."""
+    margin: float = 0.5
+    """Share of the misses that a limit allows which is not used up while designs are sought."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Variables by dotted name."""
+        return tuple(self.bounds)
+
+    def evaluate(self, designs: ArrayLike) -> Worth:
+        """What designs are worth on the common draws 0, 1, ..., the same for each.
+
+        A design that breaks a limit by what it is itself is not run.  Of the others a quarter of the runs is made
+        first, and the rest of those that may still keep every limit.
+
+        Parameters
+        ----------
+        designs : array_like of shape (designs, variables)
+            In the order of :attr:`names`.
+        """
+        x = finite_array("designs", designs, 2)
+        if x.shape[1] != len(self.bounds):
+            raise InputError(f"designs of shape {x.shape}: must have {len(self.bounds)} variables")
+        table = np.array(list(self.bounds.values()))
+        if (x < table[:, 0] - 1e-12).any() or (x > table[:, 1] + 1e-12).any():
+            raise InputError("designs: must lie within their bounds")
+        goals = np.full((len(x), len(self.goals)), np.inf)
+        violation = self._own_excess(x)
+        runs = np.zeros(len(x), dtype=np.int64)
+        alive = np.flatnonzero(violation == 0.0)
+        if not self._needs_runs:
+            goals[alive] = self._own_goals(x[alive])
+            return Worth(goals, violation, runs)
+        first = max(4, self.draws // 4)
+        parts: dict[int, list[dict[str, NDArray[Any]]]] = {int(i): [] for i in alive}
+        for begin, end in ((0, first), (first, self.draws)):
+            if not alive.size or end <= begin:
+                break
+            for i, found in zip(alive.tolist(), self.runs_of(x[alive], np.arange(begin, end)), strict=True):
+                parts[i].append(found)
+                runs[i] = end
+            joined = {i: _joined(parts[i]) for i in alive.tolist()}
+            last = end == self.draws
+            for i in alive.tolist():
+                if last or self._missing(joined[i], hopeful=True) > 0.0:
+                    violation[i] = self._missing(joined[i])
+            if last:
+                for i in alive[violation[alive] == 0.0].tolist():
+                    goals[i] = self._goals_of(x[i : i + 1], joined[i])
+            alive = alive[violation[alive] == 0.0]
+        return Worth(goals, violation, runs)
+
+    def estimate(self, design: ArrayLike, numbers: NDArray[np.int64], confidence: float = 0.95) -> Estimate:
+        """What one design is worth on the draws of the given numbers, with intervals."""
+        x = finite_array("design", design, 1)[None]
+        found = self.runs_of(x, numbers)[0]
+        good = reached(found)
+        failed = int((~good).sum())
+        goals = np.empty((len(self.goals), 3))
+        for row, goal in zip(goals, self.goals, strict=True):
+            if goal._quantity.kind == "design":
+                row[:] = self._own(goal, x)[0]
+            else:
+                values = goal._quantity.of(self.trials.system, found)[good]
+                row[:] = goal.estimate(values, failed, confidence)
+        limits = np.ones((len(self.limits), 3))
+        for row, limit in zip(limits, self.limits, strict=True):
+            if limit._quantity.kind == "design":
+                row[:] = float(limit.excess(self._own(limit, x))[0] == 0.0)
+                continue
+            kept = limit.kept(limit._quantity.of(self.trials.system, found)) & good
+            row[0] = kept.sum() / max(int(good.sum()), 1)
+            row[1] = float(wilson(int(kept.sum()), good.size, confidence)[1])
+            row[2] = float(wilson(int(kept.sum()) + failed, good.size, confidence)[2])
+        return Estimate(goals, limits, int(good.size), failed)
+
+    def runs_of(self, x: _Array, numbers: NDArray[np.int64]) -> list[dict[str, NDArray[Any]]]:
+        """Statistics and columns of the runs of designs, each on the same draws."""
+        each = np.repeat(np.arange(len(x)), numbers.size)
+        points: Columns = {name: x[each, j] for j, name in enumerate(self.bounds)}
+        columns = self.trials.columns(points, np.tile(numbers, len(x)))
+        found = self.trials.of_columns(columns)
+        fixed = {
+            name: np.full(each.size, value)
+            for name, value in self.trials.system.parameters.items()
+            if isinstance(value, float)
+        }
+        whole = fixed | columns | found
+        if "cycles_to_settle" in {
+            *(goal.quantity for goal in self.goals),
+            *(limit.quantity for limit in self.limits),
+        }:
+            whole[CYCLE] = self.trials.cycles(columns)
+        return [{name: values[each == i] for name, values in whole.items()} for i in range(len(x))]
+
+    @property
+    def _needs_runs(self) -> bool:
+        kinds = {
+            *(goal._quantity.kind for goal in self.goals),
+            *(limit._quantity.kind for limit in self.limits),
+        }
+        return kinds != {"design"}
+
+    def _own(self, of: Objective | Constraint, x: _Array) -> _Array:
+        """A quantity of designs themselves, in units of the nominal system of each."""
+        values = np.empty(len(x))
+        structural = [name for name in self.bounds if not lookup(name).is_run]
+        for i, row in enumerate(x):
+            point = dict(zip(self.bounds, row.tolist(), strict=True))
+            changes = {name: point[name] for name in structural}
+            system = self.trials.system.replace(**changes) if changes else self.trials.system
+            plain = {name: np.array([value]) for name, value in point.items()}
+            values[i] = float(np.ravel(of._quantity.of(system, plain))[0])
+        return values
+
+    def _own_excess(self, x: _Array) -> _Array:
+        own = [limit for limit in self.limits if limit._quantity.kind == "design"]
+        found = np.zeros(len(x))
+        for limit in own:
+            found += limit.excess(self._own(limit, x))
+        # beyond what any share of runs can break: such a design is never run
+        return np.where(found > 0.0, found + len(self.limits), 0.0)
+
+    def _own_goals(self, x: _Array) -> _Array:
+        return np.stack([self._sign(goal) * self._own(goal, x) for goal in self.goals], axis=1)
+
+    @staticmethod
+    def _sign(goal: Objective) -> float:
+        return -1.0 if goal.maximize else 1.0
+
+    def _goals_of(self, x: _Array, found: dict[str, NDArray[Any]]) -> _Array:
+        good = reached(found)
+        values = []
+        for goal in self.goals:
+            if goal._quantity.kind == "design":
+                values.append(float(self._own(goal, x)[0]))
+            else:
+                runs = goal._quantity.of(self.trials.system, found)[good]
+                values.append(goal.estimate(runs, 0, 0.95)[0] if runs.size else np.inf)
+        signed = np.array([self._sign(goal) * value for goal, value in zip(self.goals, values, strict=True)])
+        return np.where(np.isfinite(signed), signed, np.inf)
+
+    def _missing(self, found: dict[str, NDArray[Any]], *, hopeful: bool = False) -> float:
+        """By how much the shares of runs that keep the limits are too small; failed runs keep none.
+
+        *hopeful*: by how much they are too small even if they are as great as the runs let hope, without a margin.
+        """
+        good = reached(found)
+        total = 0.0
+        for limit in self.limits:
+            if limit._quantity.kind == "design":
+                continue
+            kept = limit.kept(limit._quantity.of(self.trials.system, found)) & good
+            share = float(kept.mean())
+            wanted = limit.required + self.margin * (1.0 - limit.required)
+            if hopeful:
+                share, wanted = float(wilson(int(kept.sum()), kept.size, _SURE)[2]), limit.required
+            total += max(0.0, wanted - share)
+        return total
+
+
+def _joined(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def problem_of(
+    trials: Trials, variables: Any, goals: Any, limits: Any, draws: int, margin: float = 0.5
+) -> DesignProblem:
+    """Check what may be chosen and what is asked of it.
+
+    Raises
+    ------
+    InputError
+    """
+    if not isinstance(variables, Mapping) or not variables:
+        raise InputTypeError(
+            f"variables = {shown(variables)}: must map at least one parameter to (low, high)"
+        )
+    bounds: dict[str, tuple[float, float]] = {}
+    for name, pair in variables.items():
+        row = lookup(str(name))
+        if row.quantity.kind is not float or row.section == "run":
+            raise InputError(f"{name}: cannot be chosen; must be a real number of the system")
+        try:
+            low, high = (float(row.quantity.check(str(name), each)) for each in pair)
+        except (TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputTypeError(f"{name} = {shown(pair)}: must be two numbers (low, high)") from None
+        if not low < high:
+            raise InputError(f"{name} = ({low:g}, {high:g}): low must be less than high")
+        if row.name in bounds:
+            raise InputError(f"{name}: stands twice among the variables")
+        bounds[row.name] = (low, high)
+    made, kept = require_kinds(goals, limits)
+    require_held([*(goal.quantity for goal in made), *(limit.quantity for limit in kept)], trials.system)
+    integer("draws", draws, 8, 10**6)
+    if trials.spread.is_empty:
+        raise InputError("spread: nothing differs, so no probability can be promised; give tolerances")
+    return DesignProblem(trials, bounds, made, kept, draws, margin)
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_Array = NDArray[np.float64]
+CHECK, REPORT = 10**9, 2 * 10**9
+"""First numbers of the draws by which candidates are chosen, and of those by which the chosen are reported."""
+HOLDS = ("fails", "undecided", "holds")
+
+
+@dataclass(frozen=True, kw_only=True)
+class OptimizerSettings:
+    """How long a design is sought.
+
+    Parameters
+    ----------
+    generations : int
+        Including the first.
+    population : int
+        Designs of a generation, at least 6.
+    samples : int
+        Runs of a design while it is sought, at least 8.
+    validation_samples : int
+        Runs on fresh draws of a design that is checked, and again of one that is reported.
+    candidates : int
+        Designs that are checked at most, the best first, until one holds.
+    confidence : float
+    seed : int
+    """
+
+    generations: int = 30
+    population: int = 24
+    samples: int = 64
+    validation_samples: int = 400
+    candidates: int = 8
+    confidence: float = 0.95
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        integer("generations", self.generations, 1, 10**6)
+        integer("population", self.population, 6, 10**5)
+        integer("samples", self.samples, 8, 10**6)
+        integer("validation_samples", self.validation_samples, 20, 10**7)
+        integer("candidates", self.candidates, 1, 10**4)
+        within("confidence", self.confidence, 0.0, 1.0)
+        integer("seed", self.seed, 0, 2**63 - 1)
+
+    @property
+    def max_runs(self) -> int:
+        """Runs that a design takes at most, of one goal."""
+        return (
+            self.generations * self.population * self.samples
+            + (self.candidates + 1) * self.validation_samples
+        )
+
+
+@checked
+def design_problem(
+    system: System,
+    variables: Mapping[str, tuple[float, float]],
+    objectives: Any,
+    constraints: Any,
+    uncertainty: ParameterUncertainty,
+    *,
+    samples: int = 64,
+    integration: Integration | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
+) -> DesignProblem:
+    """A design problem for an optimiser of one's own, such as pymoo's, Optuna's or Ax's; as of :func:`design`.
+
+    Returns
+    -------
+    DesignProblem
+        Its ``evaluate(designs)`` gives goals and violations of rows of designs, on the same draws each time; its
+        ``estimate(design, numbers)`` intervals on draws of any numbers.
+
+    Raises
+    ------
+    InputError
+        For variables, goals and limits that cannot be, and a spread in which nothing differs.
+    """
+    trials = trials_of(
+        system, uncertainty, integration, store=checkpoint, early=_early(objectives, constraints)
+    )
+    return problem_of(trials, variables, objectives, constraints, samples)
+
+
+@checked
+def optimize_design(
+    system: System,
+    variables: Mapping[str, tuple[float, float]],
+    objectives: Any,
+    constraints: Any,
+    uncertainty: ParameterUncertainty,
+    settings: OptimizerSettings | None = None,
+    *,
+    integration: Integration | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
+    progress: Callable[[int, int], object] | bool | None = None,
+) -> xr.Dataset:
+    """Where and how to strike so that limits hold with a stated probability and goals are least.
+
+    Designs are sought by generalised differential evolution on common draws.  The best are checked on fresh draws
+    until one holds its limits for certain, and what is found is reported from draws that neither saw: the reported
+    intervals owe nothing to the search.
+
+    Parameters
+    ----------
+    system : System
+        The nominal one.
+    variables : mapping of str to (low, high)
+        Real parameters that may be chosen.
+    objectives : Goal or str, or a list of up to three
+        What to make small; of several the Pareto front is sought.
+    constraints : Limit, or a list of them
+    uncertainty : Spread
+        What differs between systems that are built and driven alike.
+    settings : Effort, optional
+    integration : Integration, optional
+    checkpoint : path or Keeping, optional
+        Folder that keeps the runs; one that exists is resumed.
+    progress : callable, optional
+        Called as ``progress(done, total)`` with generations; True writes a line to standard error.
+
+    Returns
+    -------
+    xarray.Dataset
+        Along ``design``, one, or a front by its first goal: a variable a parameter; ``goal_...`` with ``_low`` and
+        ``_high`` and, as the search saw it, ``_sought``; ``kept_...``, the share of systems that keep a limit, with
+        ``_low`` and ``_high``, beside ``required_...``; ``holds``: whether every lower limit is as great as
+        required, some upper one is less, or neither is known.  Along ``tried``: every design that was looked at,
+        its goals and ``violation``.
+
+    Raises
+    ------
+    InputError
+        For bad input, and if no design that was tried keeps the limits.
+
+    Examples
+    --------
+    >>> ds = sb.uncertainty.optimize_design(  # doctest: +SKIP
+    ...     system,
+    ...     {"location": (0.2, 0.5), "frequency_ratio": (0.5, 2.0), "velocity_amplitude": (0.05, 0.5)},
+    ...     "peak_force",
+    ...     [sb.uncertainty.Constraint(of="other_well", at_least=0.95), sb.uncertainty.Constraint(of="stroke", at_most=1e-3)],
+    ...     spread,
+    ... )
+    """
+    settings = OptimizerSettings() if settings is None else settings
+    if not isinstance(settings, OptimizerSettings):
+        raise InputTypeError(f"effort = {shown(settings)}: must be an Effort")
+    problem = design_problem(
+        system,
+        variables,
+        objectives,
+        constraints,
+        uncertainty,
+        samples=settings.samples,
+        integration=integration,
+        checkpoint=checkpoint,
+    )
+    report = counting(progress, "design", "generations")
+    search = DifferentialEvolution(list(problem.bounds.values()), settings.population, settings.seed)
+    tried: list[tuple[_Array, _Array, _Array]] = []
+    for generation in range(settings.generations):
+        asked = search.ask()
+        worth = problem.evaluate(asked)
+        tried.append((asked, worth.goals, worth.violation))
+        search.tell(worth.goals, worth.violation)
+        if report is not None:
+            report(generation + 1, settings.generations)
+    x, goal_values, violation = (np.concatenate(parts) for parts in zip(*tried, strict=True))
+    chosen = _chosen(problem, settings, x, goal_values, violation)
+    found = [_fresh(problem, settings, x[i], REPORT) for i in chosen]
+    return _dataset(problem, settings, (x, goal_values, violation), chosen, found)
+
+
+def _early(goals: Any, limits: Any) -> bool:
+    """Whether runs may end once their class is certain: not where a statistic of theirs is asked for."""
+    listed = [*([goals] if isinstance(goals, (str, Objective)) else goals)]
+    listed += [limits] if isinstance(limits, Constraint) else list(limits)
+    made = [Objective(quantity=each) if isinstance(each, str) else each for each in listed]
+    return all(getattr(each, "quantity", None) is not None and each._quantity.kind != "run" for each in made)
+
+
+def _fresh(problem: DesignProblem, effort: OptimizerSettings, x: _Array, begin: int) -> Estimate:
+    return problem.estimate(x, np.arange(begin, begin + effort.validation_samples), effort.confidence)
+
+
+def _chosen(
+    problem: DesignProblem, effort: OptimizerSettings, x: _Array, goals: _Array, violation: _Array
+) -> list[int]:
+    """Designs to be reported: the best that holds on fresh draws, or the front."""
+    good = np.flatnonzero(violation == 0.0)
+    if not good.size:
+        best = int(np.argmin(violation))
+        where = ", ".join(f"{name} = {value:.4g}" for name, value in zip(problem.names, x[best], strict=True))
+        raise InputError(
+            f"limits: no design of {len(x)} that were tried keeps them; {where} breaks them least.  Widen the bounds, "
+            "loosen a limit or give more generations"
+        )
+    if len(problem.goals) > 1:
+        front = good[front_of(goals[good])]
+        _, unique = np.unique(goals[front], axis=0, return_index=True)
+        return front[np.sort(unique)][np.argsort(goals[front[np.sort(unique)], 0], kind="stable")].tolist()
+    order = good[np.argsort(goals[good, 0], kind="stable")]
+    ranked: list[int] = []
+    for i in order.tolist():  # a population that has converged holds the same design many times over
+        if not any(np.allclose(x[i], x[j], rtol=1e-3, atol=0.0) for j in ranked[-20:]):
+            ranked.append(i)
+    # ever further down the list, where designs cost more and promise more
+    steps = np.unique(np.geomspace(1, len(ranked), min(effort.candidates, len(ranked))).astype(np.int64)) - 1
+    ranked = [ranked[k] for k in steps.tolist()]
+    seen: list[tuple[float, int]] = []
+    for i in ranked:
+        state, short = _holds(problem, _fresh(problem, effort, x[i], CHECK))
+        if state == 2:
+            return [i]
+        seen.append((short, i))
+    return [min(seen)[1]]
+
+
+def _holds(problem: DesignProblem, found: Estimate) -> tuple[int, float]:
+    """Whether limits hold for certain (2), fail for certain (0) or neither (1), and by how much they may lack."""
+    required = np.array([limit.required for limit in problem.limits])
+    own = np.array([limit._quantity.kind == "design" for limit in problem.limits], dtype=bool)
+    wanted = np.where(own, 1.0, required)
+    short = float(np.maximum(wanted - found.limits[:, 1], 0.0).sum()) if required.size else 0.0
+    if short == 0.0:
+        return 2, 0.0
+    return (0 if (found.limits[:, 2] < wanted).any() else 1), short
+
+
+def _dataset(
+    problem: DesignProblem,
+    effort: OptimizerSettings,
+    tried: tuple[_Array, _Array, _Array],
+    chosen: list[int],
+    found: list[Estimate],
+) -> xr.Dataset:
+    import xarray as xr
+
+    trials = problem.trials
+    attrs: dict[str, Any] = {
+        "title": "designs of a struck bistable beam", "system": trials.system.hash,
+        "uncertainty": canonical_json(trials.spread.describe()), "samples": effort.samples, "validation_samples": effort.validation_samples,
+        "generations": effort.generations, "population": effort.population, "confidence": effort.confidence,
+        "seed": effort.seed, "spread_seed": trials.spread.seed, "runs_made": trials.runs,
+        "cycles": trials.integration.cycles_or_default, "modes": trials.system.model.modes,
+    }  # fmt: skip
+    attrs |= {f"fixed_{lookup(name).short}": value for name, value in trials.system.parameters.items()
+              if isinstance(value, (int, float)) and name not in problem.bounds}  # fmt: skip
+    dataset = xr.Dataset(attrs=attrs)
+    x, goals, violation = tried
+    for j, name in enumerate(problem.names):
+        row = lookup(name)
+        labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": name}
+        dataset[row.short] = (("design",), x[chosen, j], labels)
+        dataset[f"tried_{row.short}"] = (("tried",), x[:, j], labels)
+    for k, goal in enumerate(problem.goals):
+        sign = -1.0 if goal.maximize else 1.0
+        own = {"units": goal._quantity.unit, "long_name": goal.words}
+        for end, values in zip(
+            ("", "_low", "_high"), np.array([each.goals[k] for each in found]).T, strict=True
+        ):
+            dataset[f"goal_{goal.label}{end}"] = (("design",), values, own)
+        dataset[f"goal_{goal.label}_sought"] = (("design",), sign * goals[chosen, k], own)
+        seen = np.where(np.isfinite(goals[:, k]), sign * goals[:, k], np.nan)
+        dataset[f"tried_goal_{goal.label}"] = (("tried",), seen, own)
+    for k, limit in enumerate(problem.limits):
+        own = {"units": "1", "long_name": f"share of systems that keep the limit of {limit.quantity}"}
+        own |= {
+            name: value for name in ("at_least", "at_most") if (value := getattr(limit, name)) is not None
+        }
+        for end, values in zip(
+            ("", "_low", "_high"), np.array([each.limits[k] for each in found]).T, strict=True
+        ):
+            dataset[f"kept_{limit.label}{end}"] = (("design",), values, own)
+        required = 1.0 if limit._quantity.kind == "design" else limit.required
+        dataset[f"required_{limit.label}"] = (
+            (),
+            required,
+            {"units": "1", "long_name": "share that is required"},
+        )
+    states = np.array([_holds(problem, each)[0] for each in found], dtype=np.int8)
+    flags = {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(HOLDS)}
+    dataset["holds"] = (("design",), states, {"units": "1", "long_name": "whether the limits hold"} | flags)
+    failed = np.array([each.failed for each in found])
+    dataset["runs_failed"] = (
+        ("design",),
+        failed,
+        {"units": "1", "long_name": "runs that failed; they keep no limit"},
+    )
+    labels = {"units": "1", "long_name": "by how much the limits are broken; 0 where they are kept"}
+    dataset["violation"] = (("tried",), violation, labels)
+    return dataset

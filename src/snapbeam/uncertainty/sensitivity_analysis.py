@@ -1,0 +1,671 @@
+"""Which parameter moves an answer most, and per its real tolerance."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special, stats
+
+from snapbeam.dynamics.flow import InitialConditions
+from snapbeam.dynamics.lifetimes import LifetimeSettings, lifetime_map
+from snapbeam.model.integration import Integration
+from snapbeam.model.parameters import lookup
+from snapbeam.model.system import System
+from snapbeam.solver.statistics import STATISTICS, of_one_named
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions
+from snapbeam.sweeps.points import PointList
+from snapbeam.uncertainty.distributions import ParameterUncertainty
+from snapbeam.uncertainty.monte_carlo import OUTCOMES, Trials, reached, require_held, trials_of
+from snapbeam.util.provenance import canonical_json
+from snapbeam.util.validation import InputError, axis, checked, choice, finite_array, integer, shown, within
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+__all__ = [
+    "METHODS",
+    "Answer",
+    "Indices",
+    "LifetimeQoI",
+    "NotchQoI",
+    "Sobol",
+    "StatisticQoI",
+    "ThresholdQoI",
+    "answer_of",
+    "sensitivity",
+    "sobol_indices",
+    "sobol_indices_from_samples",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Which of some inputs moves an output most, from any sample of both.
+
+
+_GROUPS = 20
+
+
+class Indices(NamedTuple):
+    """Sensitivity indices with their intervals, arrays of shape (inputs,)."""
+
+    estimate: _Array
+    low: _Array
+    high: _Array
+
+
+@checked
+def sobol_indices_from_samples(
+    inputs: ArrayLike, output: ArrayLike, *, confidence: float = 0.95, bins: int | None = None, seed: int = 0
+) -> Indices:
+    """First-order indices Var(E[y | x_j])/Var(y) of a sample, however it was drawn, of correlated inputs too.
+
+    Inputs are cut into bins of equal numbers of runs; the index is the variance of the means of the bins over that of
+    the output, less what chance alone makes of it: Kelley's epsilon squared (Plischke, Borgonovo and Smith, Eur. J.
+    Oper. Res. 226 (2013) 536, on estimates from bins).  The interval is that of a jackknife over twenty groups of runs.
+
+    Parameters
+    ----------
+    inputs : array_like of shape (runs, inputs)
+    output : array_like of shape (runs,)
+    confidence : float
+    bins : int, optional
+        By default one for forty runs, 5 to 100: what varies within a bin is lost to the index.
+    seed : int
+        Chooses the groups.
+
+    Returns
+    -------
+    Indices
+        Of inputs that matter little, the estimate may be less than 0 by chance.
+
+    Raises
+    ------
+    InputError
+        For fewer than 200 runs, or an output that does not vary.
+    """
+    x, y = finite_array("inputs", inputs, 2), finite_array("output", output, 1)
+    if x.shape[0] != y.size:
+        raise InputError(f"inputs of shape {x.shape} with output of shape {y.shape}: must have as many runs")
+    if y.size < 200:
+        raise InputError(f"output of {y.size} runs: must be at least 200 to be cut into bins")
+    if not y.std() > 0.0:
+        raise InputError("output: does not vary, so nothing moves it")
+    within("confidence", confidence, 0.0, 1.0)
+    count = int(np.clip(y.size // 40, 5, 100)) if bins is None else integer("bins", bins, 2, y.size // 10)
+    generator = np.random.Generator(np.random.Philox(key=[integer("seed", seed, 0, 2**63 - 1), 0]))
+    group = generator.permutation(y.size) % _GROUPS
+    binned = np.array([_bins(column, count) for column in x.T])
+    whole = _all(binned, y, count)
+    left = np.array([_all(binned[:, group != g], y[group != g], count) for g in range(_GROUPS)])
+    pseudo = _GROUPS * whole - (_GROUPS - 1) * left
+    error = pseudo.std(axis=0, ddof=1) / np.sqrt(_GROUPS)
+    reach = float(stats.t.ppf(0.5 * (1.0 + confidence), _GROUPS - 1)) * error
+    return Indices(whole, whole - reach, whole + reach)
+
+
+def _bins(x: _Array, count: int) -> NDArray[np.int64]:
+    """The bin of each run: bins of equal numbers, in the order of an input."""
+    found = np.empty(x.size, dtype=np.int64)
+    found[np.argsort(x, kind="stable")] = np.arange(x.size) * count // x.size
+    return found
+
+
+def _all(binned: NDArray[np.int64], y: _Array, count: int) -> _Array:
+    return np.array([_epsilon(row, y, count) for row in binned])
+
+
+def _epsilon(binned: NDArray[np.int64], y: _Array, count: int) -> float:
+    size = np.bincount(binned, minlength=count)
+    middle = y - y.mean()
+    means = np.bincount(binned, weights=middle, minlength=count) / size
+    total = float(np.sum(middle**2))
+    between = float(np.sum(size * means**2))
+    within_bins = (total - between) / (y.size - count)
+    return (between - (count - 1) * within_bins) / total
+
+
+# ----------------------------------------------------------------------------------------------------
+# Sobol's indices of independent inputs, with intervals from sequences scrambled anew.
+
+
+class Sobol(NamedTuple):
+    """Indices of the first order and in total."""
+
+    first: Indices
+    total: Indices
+    runs: int
+
+
+@checked
+def sobol_indices(
+    function: Callable[[_Array], _Array],
+    inputs: int,
+    samples: int = 64,
+    *,
+    replicates: int = 16,
+    confidence: float = 0.95,
+    seed: int = 0,
+) -> Sobol:
+    """Sobol's indices by Saltelli's estimator (``scipy.stats.sobol_indices``), over scrambled Sobol sequences.
+
+    A sequence is so even that resampling its points says too much of the error; *replicates* sequences, each scrambled
+    by itself, are independent, and their scatter is the error (Owen's scrambling; Student's interval of their mean).
+
+    Parameters
+    ----------
+    function : callable
+        From ranks in (0, 1) of shape (inputs, points) to numbers of shape (points,); called once.
+    inputs : int
+    samples : int
+        Points of a sequence, a power of 2; *replicates* times *samples* times (*inputs* + 2) points in all.
+    replicates : int
+        At least 4.
+    confidence : float
+    seed : int
+
+    Raises
+    ------
+    InputError
+        For bad input, or a function that does not vary.
+    """
+    integer("inputs", inputs, 1, 1000)
+    integer("replicates", replicates, 4, 10_000)
+    within("confidence", confidence, 0.0, 1.0)
+    integer("seed", seed, 0, 2**63 - 1)
+    if integer("samples", samples, 2, 2**24) & (samples - 1):
+        raise InputError(f"size = {samples}: must be a power of 2")
+    blocks = np.concatenate([_matrices(inputs, samples, seed, r) for r in range(replicates)], axis=1)
+    values = np.asarray(function(blocks), dtype=np.float64)
+    table = values.reshape(replicates, inputs + 2, samples)
+    if not np.isfinite(table).all():
+        raise InputError("function: gave numbers that are not finite")
+    if not (table[:, :2].reshape(replicates, -1).std(axis=1) > 0.0).all():
+        raise InputError("function: does not vary over the inputs, so there is nothing to share out")
+    found = [
+        stats.sobol_indices(func={"f_A": row[None, 0], "f_B": row[None, 1], "f_AB": row[2:, None]}, n=samples)
+        for row in table
+    ]
+    first = np.array([np.ravel(each.first_order) for each in found])
+    total = np.array([np.ravel(each.total_order) for each in found])
+    return Sobol(_mean(first, confidence), _mean(total, confidence), values.size)
+
+
+def _matrices(inputs: int, size: int, seed: int, number: int) -> _Array:
+    """The points of one sequence: A, B and, for each input, A with that of B in its place; (inputs, points)."""
+    generator = np.random.default_rng(np.random.SeedSequence([seed, number]))
+    points = stats.qmc.Sobol(2 * inputs, scramble=True, seed=generator).random(size).T
+    points = np.clip(points, 1e-12, 1.0 - 1e-12)
+    a, b = points[:inputs], points[inputs:]
+    mixed = []
+    for j in range(inputs):
+        one = a.copy()
+        one[j] = b[j]
+        mixed.append(one)
+    return np.concatenate([a, b, *mixed], axis=1)
+
+
+def _mean(table: _Array, confidence: float) -> Indices:
+    count = len(table)
+    middle = table.mean(axis=0)
+    reach = (
+        float(stats.t.ppf(0.5 * (1.0 + confidence), count - 1)) * table.std(axis=0, ddof=1) / np.sqrt(count)
+    )
+    return Indices(middle, middle - reach, middle + reach)
+
+
+# ----------------------------------------------------------------------------------------------------
+# What is asked of a system as one number: a statistic, a threshold, the notch of the threshold, a lifetime.
+
+
+_Numbers = NDArray[np.int64]
+
+
+class Answer(Protocol):
+    """One number of every draw."""
+
+    @property
+    def unit(self) -> str: ...
+
+    @property
+    def words(self) -> str: ...
+
+    def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
+        """The numbers of draws with the given scores and starts; NaN where there is none."""
+        ...
+
+
+@dataclass(frozen=True)
+class StatisticQoI:
+    """A statistic of the run of each draw, such as ``peak_force``.
+
+    Parameters
+    ----------
+    name : str
+        Of :data:`snapbeam.STATISTICS`, of one of several strikers, such as ``"peak_force_striker_2"``, or an outcome
+        such as ``"snap"``: 1 where it happens, else 0.
+    """
+
+    name: str
+
+    def __post_init__(self) -> None:
+        known = [name for name, row in STATISTICS.items() if row.dtype in ("float64", "int32")]
+        if not isinstance(self.name, str) or of_one_named(self.name) is None:
+            choice("statistic", self.name, (*known, *OUTCOMES))
+
+    @property
+    def unit(self) -> str:
+        """Of the statistic."""
+        return STATISTICS[self.name].unit if self.name in STATISTICS else "1"
+
+    @property
+    def words(self) -> str:
+        """What it is."""
+        return STATISTICS[self.name].long_name if self.name in STATISTICS else OUTCOMES[self.name].words
+
+    def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
+        """One run a draw."""
+        require_held([self.name], trials.system)
+        found = trials.statistics({}, numbers, scores=scores)
+        values = found[self.name] if self.name in STATISTICS else OUTCOMES[self.name].happened(found)
+        return np.where(reached(found), values.astype(np.float64), np.nan)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThresholdQoI:
+    """The least value of a parameter at which a draw snaps, on a row of values and then by halving.
+
+    Parameters
+    ----------
+    parameter : str
+        Parameter to raise, such as ``"velocity_amplitude"``.
+    bounds : tuple of two floats
+    values : int
+        Values tried first, evenly spaced: a window of snapping narrower than their spacing may be missed.
+    halvings : int
+        Of the step below the lowest that snaps.
+    at : mapping of str to float, optional
+        Other parameters, as they are meant to be.
+    """
+
+    parameter: str = "velocity_amplitude"
+    bounds: tuple[float, float] = (0.005, 0.65)
+    values: int = 25
+    halvings: int = 8
+    at: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        row = lookup(self.parameter)
+        if not row.is_run or row.quantity.kind is not float:
+            raise InputError(
+                f"along = {shown(self.parameter)}: must be a number that may differ between runs"
+            )
+        axis("bounds", self.bounds, -np.inf, np.inf)
+        integer("values", self.values, 2, 100_000)
+        integer("halvings", self.halvings, 0, 40)
+
+    @property
+    def unit(self) -> str:
+        """Of the parameter."""
+        return lookup(self.parameter).quantity.unit
+
+    @property
+    def words(self) -> str:
+        """What it is."""
+        return f"least {lookup(self.parameter).quantity.long_name} that snaps"
+
+    @property
+    def error(self) -> float:
+        """Half of the last step."""
+        return (self.bounds[1] - self.bounds[0]) / (self.values - 1) / 2.0 ** (self.halvings + 1)
+
+    def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
+        """All draws at once: every value, then as many rounds as there are halvings."""
+        row, size = lookup(self.parameter).name, numbers.size
+        tried = np.linspace(*self.bounds, self.values)
+        each = np.repeat(np.arange(size), tried.size)
+        snaps = self._snaps(trials, scores[each], numbers[each], row, np.tile(tried, size))
+        table = snaps.reshape(size, tried.size)
+        first = np.where(table.any(axis=1), table.argmax(axis=1), tried.size)
+        known = (first > 0) & (first < tried.size)
+        low, high = tried[np.clip(first - 1, 0, None)], tried[np.clip(first, None, tried.size - 1)]
+        for _ in range(self.halvings):
+            middle = 0.5 * (low + high)
+            up = self._snaps(trials, scores, numbers, row, middle)
+            low, high = np.where(up, low, middle), np.where(up, middle, high)
+        return np.where(known, 0.5 * (low + high), np.nan)
+
+    def _snaps(
+        self, trials: Trials, scores: _Array, numbers: _Numbers, row: str, values: _Array
+    ) -> NDArray[np.bool_]:
+        points = {lookup(name).name: np.full(values.size, float(value)) for name, value in self.at.items()}
+        found = trials.statistics(points | {row: values}, numbers, scores=scores)
+        return np.asarray(found["response_class"] > 0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NotchQoI:
+    """Where the threshold is lowest along a parameter, or how low it is there.
+
+    Parameters
+    ----------
+    parameter : str
+        Parameter along which thresholds are compared, such as ``"frequency_ratio"``.
+    values : array_like
+        Its values, strictly increasing, at least 3; the place is that of the parabola through the lowest three.
+    threshold : ThresholdQoI
+    depth : bool
+        Whether the threshold there is meant, and not the place.
+    """
+
+    parameter: str = "frequency_ratio"
+    values: ArrayLike = tuple(np.linspace(1.0, 1.8, 9).tolist())
+    threshold: ThresholdQoI = field(default_factory=ThresholdQoI)
+    depth: bool = False
+
+    def __post_init__(self) -> None:
+        row = lookup(self.parameter)
+        if axis(self.parameter, self.values, row.quantity.low, row.quantity.high).size < 3:
+            raise InputError(f"values = {shown(self.values)}: must be at least 3")
+
+    @property
+    def unit(self) -> str:
+        """Of what it is along, or of the threshold."""
+        return self.threshold.unit if self.depth else lookup(self.parameter).quantity.unit
+
+    @property
+    def words(self) -> str:
+        """What it is."""
+        place = lookup(self.parameter).quantity.long_name
+        return f"lowest threshold over {place}" if self.depth else f"{place} at which the threshold is lowest"
+
+    def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
+        """A threshold at every value."""
+        x = np.asarray(self.values, dtype=np.float64)
+        table = np.stack([self._threshold(float(value), trials, scores, numbers) for value in x], axis=1)
+        found = np.full(numbers.size, np.nan)
+        for i, row in enumerate(table):
+            known = np.isfinite(row)
+            if not known.any():
+                continue
+            at = int(np.nanargmin(row))
+            if not 0 < at < x.size - 1 or not known[at - 1 : at + 2].all():
+                continue  # at an end, or beside what is not known: the notch may lie elsewhere
+            place, lowest = _vertex(x[at - 1 : at + 2], row[at - 1 : at + 2])
+            found[i] = lowest if self.depth else place
+        return found
+
+    def _threshold(self, value: float, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
+        own = self.threshold
+        there = ThresholdQoI(
+            parameter=own.parameter, bounds=own.bounds, values=own.values, halvings=own.halvings,
+            at={**own.at, self.parameter: value},
+        )  # fmt: skip
+        return there.of(trials, scores, numbers)
+
+
+def _vertex(x: _Array, y: _Array) -> tuple[float, float]:
+    """Place and height of the lowest point of the parabola through three points of which the middle is lowest."""
+    a, b, c = np.polyfit(x - x[1], y, 2)
+    if not a > 0.0:
+        return float(x[1]), float(y[1])
+    place = float(np.clip(-0.5 * b / a, x[0] - x[1], x[2] - x[1]))
+    return float(x[1] + place), float(a * place**2 + b * place + c)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LifetimeQoI:
+    """How long snapping lasts, from many starts of each draw, in cycles.
+
+    Parameters
+    ----------
+    initial_conditions : Starts
+        The same for every draw.
+    settings : Survival, optional
+    """
+
+    initial_conditions: InitialConditions = field(default_factory=lambda: InitialConditions(count=16))
+    settings: LifetimeSettings = field(default_factory=LifetimeSettings)
+
+    @property
+    def unit(self) -> str:
+        """Cycles."""
+        return "1"
+
+    @property
+    def words(self) -> str:
+        """What it is."""
+        return "lifetime of snapping, in cycles"
+
+    def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
+        """A lifetime map over the draws."""
+        columns = trials.columns({}, numbers, scores)
+        if any(name.startswith("start.") for name in columns):
+            raise InputError(
+                "displacement: lifetimes have the starts of LifetimeQoI; leave it out of the spread"
+            )
+        found = lifetime_map(
+            trials.system,
+            _listed(columns),
+            trials.integration,
+            initial_conditions=self.initial_conditions,
+            settings=self.settings,
+        )
+        trials.runs += numbers.size * self.initial_conditions.count
+        return np.asarray(found["lifetime"].values, dtype=np.float64)
+
+
+def _listed(columns: dict[str, Any]) -> PointList:
+    return PointList(columns)
+
+
+def answer_of(given: Answer | str) -> Answer:
+    """An answer, or that of a statistic by its name.
+
+    Raises
+    ------
+    InputError
+    """
+    if isinstance(given, str):
+        return StatisticQoI(given)
+    if not hasattr(given, "of") or not hasattr(given, "unit"):
+        raise InputError(
+            f"answer = {shown(given)}: must be the name of a statistic, a ThresholdQoI, a NotchQoI or a LifetimeQoI"
+        )
+    return given
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+_Array = NDArray[np.float64]
+METHODS = ("local", "sobol", "given_data")
+_DEFAULT = {"local": 16, "sobol": 32, "given_data": 1000}
+_REPLICATES = 16
+PARAMETER = "parameter"
+
+
+@checked
+def sensitivity(
+    system: System,
+    quantity: Answer | str,
+    uncertainty: ParameterUncertainty,
+    method: str = "local",
+    *,
+    samples: int | None = None,
+    confidence: float = 0.95,
+    integration: Integration | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
+) -> xr.Dataset:
+    """Which parameter of a spread moves an answer most, with intervals.
+
+    Parameters
+    ----------
+    system : System
+        The nominal one.
+    quantity : str or ThresholdQoI or NotchQoI or LifetimeQoI
+        What is asked: a statistic by its name, such as ``"peak_force"``, an outcome, or one of these.
+    uncertainty : Spread
+        What differs, at least one parameter.
+    method : {"local", "sobol", "given_data"}
+        ``"local"``: half the difference of the answers with a parameter one standard normal score up and down, the
+        others and the start as in *samples* draws (common random numbers).  ``"sobol"``: indices of the first order and
+        in total over sixteen scrambled sequences of *samples* points, all from one start.  ``"given_data"``: indices of
+        the first order from *samples* plain draws, which may be correlated.
+    samples : int, optional
+        16, 32 and 1000 by default.
+    confidence : float
+    integration : Integration, optional
+    checkpoint : path or Keeping, optional
+        Folder that keeps the runs of all answers but lifetimes; one that exists is resumed.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``parameter``, with ``unit``: locally ``effect`` (of +1 standard score), ``derivative`` (per unit of the
+        parameter) and ``answer_minus`` and ``answer_plus``, the first two with limits; else ``first_order``, and
+        ``total_order`` of Sobol's, with limits.  The answer's mean and standard deviation are attributes.
+
+    Raises
+    ------
+    InputError
+        For bad input, an answer that is not there for some draws, such as a threshold out of range, correlated
+        parameters with Sobol's indices, and an answer that does not vary.
+    """
+    choice("method", method, METHODS)
+    within("confidence", confidence, 0.0, 1.0)
+    asked = answer_of(quantity)
+    trials = trials_of(
+        system, uncertainty, integration, store=checkpoint, early=not isinstance(quantity, str)
+    )
+    names = trials.spread.parameters
+    if not names:
+        raise InputError("spread: draws no parameter, so there is nothing to compare")
+    count = integer("samples", _DEFAULT[method] if samples is None else samples, 2, 2**24)
+    if trials.spread.correlation is not None and method == "sobol":
+        raise InputError(
+            "correlation with method = 'sobol': its indices are of independent parameters; use 'given_data'"
+        )
+    made = {"local": _local, "sobol": _sobol, "given_data": _given_data}[method]
+    table, values = made(trials, asked, count, confidence)
+    return _dataset(trials, asked, method, count, confidence, table, values)
+
+
+def _ask(trials: Trials, answer: Answer, scores: _Array, numbers: NDArray[np.int64]) -> _Array:
+    values = answer.of(trials, scores, numbers)
+    lost = ~np.isfinite(values)
+    if lost.any():
+        raise InputError(
+            f"answer: {answer.words} is not there for {int(lost.sum())} of {values.size} draws; give it a wider range, "
+            "or a spread in which every system has it"
+        )
+    return values
+
+
+def _local(trials: Trials, answer: Answer, count: int, confidence: float) -> tuple[dict[str, _Array], _Array]:
+    spread = trials.spread
+    inputs = len(spread.of)
+    numbers = np.arange(count)
+    base = spread.normals(numbers)
+    stack = []
+    for j in range(inputs):
+        for score in (-1.0, 1.0):
+            moved = base.copy()
+            moved[:, j] = score
+            stack.append(moved)
+    values = _ask(trials, answer, np.concatenate(stack), np.tile(numbers, 2 * inputs))
+    both = values.reshape(inputs, 2, count)
+    half = 0.5 * (both[:, 1] - both[:, 0])
+    width = np.array([_width(trials, name) for name in spread.of])
+    table = {"answer_minus": both[:, 0].mean(axis=1), "answer_plus": both[:, 1].mean(axis=1)}
+    table |= _limits("effect", half, confidence) | {"step": width}
+    table |= _limits("derivative", half / width[:, None], confidence)
+    return table, values
+
+
+def _width(trials: Trials, name: str) -> float:
+    """Half of what a parameter differs by between the scores -1 and +1."""
+    nominal = np.full(2, trials.system.parameters.get(name, 0.0) or 0.0, dtype=np.float64)
+    return 0.5 * float(np.ptp(trials.spread.of[name].at(nominal, np.array([-1.0, 1.0]))))
+
+
+def _limits(name: str, pairs: _Array, confidence: float) -> dict[str, _Array]:
+    count = pairs.shape[1]
+    middle = pairs.mean(axis=1)
+    reach = stats.t.ppf(0.5 * (1.0 + confidence), count - 1) * pairs.std(axis=1, ddof=1) / np.sqrt(count)
+    return {name: middle, f"{name}_low": middle - reach, f"{name}_high": middle + reach}
+
+
+def _sobol(trials: Trials, answer: Answer, count: int, confidence: float) -> tuple[dict[str, _Array], _Array]:
+    kept: list[_Array] = []
+
+    def function(ranks: _Array) -> _Array:
+        values = _ask(trials, answer, special.ndtri(ranks).T, np.zeros(ranks.shape[1], dtype=np.int64))
+        kept.append(values)
+        return values
+
+    found = sobol_indices(
+        function, len(trials.spread.of), count, replicates=_REPLICATES, confidence=confidence, seed=trials.spread.seed
+    )  # fmt: skip
+    table: dict[str, _Array] = {}
+    for name, indices in (("first_order", found.first), ("total_order", found.total)):
+        table |= {name: indices.estimate, f"{name}_low": indices.low, f"{name}_high": indices.high}
+    return table, kept[0]
+
+
+def _given_data(
+    trials: Trials, answer: Answer, count: int, confidence: float
+) -> tuple[dict[str, _Array], _Array]:
+    numbers = np.arange(count)
+    scores = trials.spread.normals(numbers)
+    values = _ask(trials, answer, scores, numbers)
+    found = sobol_indices_from_samples(scores, values, confidence=confidence, seed=trials.spread.seed)
+    return {
+        "first_order": found.estimate,
+        "first_order_low": found.low,
+        "first_order_high": found.high,
+    }, values
+
+
+_WORDS = {
+    "effect": "change of the answer for +1 standard score",
+    "derivative": "change of the answer for a unit of the parameter",
+    "answer_minus": "mean answer at the score -1",
+    "answer_plus": "mean answer at the score +1",
+    "step": "half of what the parameter differs by between the scores -1 and +1, in its unit",
+    "first_order": "share of the variance of the answer that the parameter makes by itself",
+    "total_order": "share of the variance of the answer that the parameter has a part in",
+}
+
+
+def _dataset(
+    trials: Trials,
+    answer: Answer,
+    method: str,
+    count: int,
+    confidence: float,
+    table: dict[str, _Array],
+    values: _Array,
+) -> xr.Dataset:
+    import xarray as xr
+
+    names = list(trials.spread.of)
+    attrs: dict[str, Any] = {
+        "title": "sensitivity of a struck bistable beam", "method": method, "samples": count, "runs_made": trials.runs,
+        "confidence": confidence, "quantity": answer.words, "answer_units": answer.unit,
+        "answer_mean": float(values.mean()), "answer_sd": float(values.std(ddof=1)),
+        "uncertainty": canonical_json(trials.spread.describe()), "system": trials.system.hash, "seed": trials.spread.seed,
+    }  # fmt: skip
+    dataset = xr.Dataset(attrs=attrs)
+    dataset[PARAMETER] = ((PARAMETER,), names, {"long_name": "parameter"})
+    dataset["unit"] = ((PARAMETER,), [lookup(name).quantity.unit for name in names])
+    for name, array in table.items():
+        plain, _, end = name.rpartition("_") if name.endswith(("_low", "_high")) else (name, "", "")
+        text = {"low": "lower limit: ", "high": "upper limit: "}.get(end, "") + _WORDS[plain]
+        unit = answer.unit if plain in ("effect", "answer_minus", "answer_plus") else "1"
+        dataset[name] = ((PARAMETER,), array, {"units": unit, "long_name": text})
+    return dataset

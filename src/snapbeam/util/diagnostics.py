@@ -1,0 +1,235 @@
+"""Diagnostics: what is doubtful about an input or a result, as data; and the ways they are told, kept and refused."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import time
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+from snapbeam.util.validation import InputError, InputTypeError, choice, shown
+
+__all__ = [
+    "Diagnostic",
+    "DiagnosticError",
+    "DiagnosticWarning",
+    "Severity",
+    "counting",
+    "diagnostics_of",
+    "doubtful",
+    "from_json",
+    "refuse",
+    "sharing",
+    "tell",
+    "to_json",
+]
+
+
+class DiagnosticWarning(UserWarning):
+    """Something that can be computed but is probably not what was meant."""
+
+
+class Severity(StrEnum):
+    """How much a diagnostic takes from a result.
+
+    INFO: worth knowing, the numbers stand.  WARNING: the numbers may not be what was meant, or be off by more than
+    their standard errors, which were widened where that could be told.  ERROR: the numbers contradict something
+    known and cannot be right as they are.
+    """
+
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """One thing that is doubtful: what the numbers of an input or a result do not say by themselves.
+
+    Attributes
+    ----------
+    code : str
+        Short name, stable over versions, such as ``"first-mode-antisymmetric"`` or ``"camera.gamma"``, by which
+        programs tell diagnostics apart.
+    message : str
+        What was found and what to do about it.
+    numbers : mapping of str to float
+        The figures behind the words, by name.
+    severity : Severity
+        How much it takes from the result; its name does, too.
+    """
+
+    code: str
+    message: str
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    severity: Severity = Severity.WARNING
+
+    def __post_init__(self) -> None:
+        words = tuple(str(each.value) for each in Severity)
+        choice("severity", self.severity, words)
+        object.__setattr__(self, "severity", Severity(self.severity))
+
+    @property
+    def is_warning(self) -> bool:
+        """Whether the result should not be used without a look: all but notes."""
+        return self.severity is not Severity.INFO
+
+    def plain(self) -> dict[str, Any]:
+        """The diagnostic as plain words and numbers; what is not finite becomes None."""
+        numbers = {
+            name: float(value) if math.isfinite(value) else None for name, value in self.numbers.items()
+        }
+        return {
+            "code": self.code,
+            "severity": self.severity.value,
+            "message": self.message,
+            "numbers": numbers,
+        }
+
+    def __str__(self) -> str:
+        return f"{self.severity.value} [{self.code}]: {self.message}"
+
+
+class DiagnosticError(InputError):
+    """A measurement refused because of its diagnostics, which are in ``diagnostics``."""
+
+    def __init__(self, message: str, diagnostics: tuple[Diagnostic, ...]) -> None:
+        super().__init__(message)
+        self.diagnostics = diagnostics
+
+
+def doubtful(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    """The diagnostics that take something from the result: all but notes."""
+    return tuple(one for one in diagnostics if one.is_warning)
+
+
+def refuse(diagnostics: Iterable[Diagnostic], what: str) -> None:
+    """Raise if any diagnostic is more than a note.
+
+    Raises
+    ------
+    DiagnosticError
+        With the words of every such diagnostic; *what* names the measurement.
+    """
+    found = doubtful(diagnostics)
+    if found:
+        told = "; ".join(f"[{one.code}] {one.message}" for one in found)
+        raise DiagnosticError(f"{what}: refused as implausible: {told}", found)
+
+
+def to_json(diagnostics: Iterable[Diagnostic]) -> str:
+    """Diagnostics as text for an attribute of a file."""
+    return json.dumps([one.plain() for one in diagnostics], ensure_ascii=False)
+
+
+def from_json(text: str) -> tuple[Diagnostic, ...]:
+    """Diagnostics from what :func:`to_json` wrote."""
+    return tuple(
+        Diagnostic(
+            str(one["code"]),
+            str(one["message"]),
+            {name: math.nan if value is None else float(value) for name, value in one["numbers"].items()},
+            Severity(one["severity"]),
+        )
+        for one in json.loads(text)
+    )
+
+
+def diagnostics_of(result: Any) -> tuple[Diagnostic, ...]:
+    """The diagnostics of a result: of a measurement, or of a dataset or its file's attributes; none if it has none."""
+    own = getattr(result, "diagnostics", None)
+    if isinstance(own, tuple):
+        return own
+    attrs = getattr(result, "attrs", result if isinstance(result, Mapping) else {})
+    text = attrs.get("diagnostics")
+    return from_json(text) if isinstance(text, str) else ()
+
+
+_told: set[tuple[str, str]] = set()
+_PACKAGE = __name__.partition(".")[0]
+
+
+def tell(diagnostics: Iterable[Diagnostic]) -> None:
+    """Warn of each diagnostic, once a process for the same words, where the package was called from."""
+    for diagnostic in diagnostics:
+        if (diagnostic.code, diagnostic.message) not in _told:
+            _told.add((diagnostic.code, diagnostic.message))
+            warnings.warn(diagnostic.message, DiagnosticWarning, stacklevel=_outside())
+
+
+def _outside() -> int:
+    """Level of the stack, as :func:`tell` counts it, of the first caller that is not the package itself."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == _PACKAGE:
+        frame, level = frame.f_back, level + 1
+    return level
+
+
+# ----------------------------------------------------------------------------------------------------
+# Progress in a script or a notebook: one line that is written over.
+
+
+_INTERVAL = 0.2
+_Counts = Callable[[int, int], object]
+_Shares = Callable[[float], object]
+
+
+class _Line:
+    """What is said, at most five times a second, on standard error."""
+
+    def __init__(self, what: str) -> None:
+        self.what = what
+        self.start = self.last = time.monotonic()
+        self.begun: float | None = None
+        self.ended = False
+
+    def say(self, share: float, words: str) -> None:
+        now = time.monotonic()
+        self.begun = now if self.begun is None else self.begun  # what was compiled before is not counted
+        if self.ended or (now - self.last < _INTERVAL and share < 1.0):
+            return
+        self.ended = share >= 1.0
+        self.last = now
+        spent = now - self.begun
+        left = f", {spent * (1.0 - share) / share:.0f} s left" if 0.0 < share < 1.0 and spent > 1.0 else ""
+        end = "\n" if share >= 1.0 else ""
+        sys.stderr.write(f"\r{self.what}: {words}{left}      {end}")
+        sys.stderr.flush()
+
+
+def counting(progress: _Counts | bool | None, what: str, noun: str = "points") -> _Counts | None:
+    """What a computation reports ``(done, total)`` to; True stands for a line on standard error.
+
+    Raises
+    ------
+    InputTypeError
+        If *progress* can be called no more than it is True, False or None.
+    """
+    if progress is None or progress is False:
+        return None
+    if progress is True:
+        line = _Line(what)
+        return lambda done, total: line.say(done / max(total, 1), f"{done} of {total} {noun}")
+    if not callable(progress):
+        raise InputTypeError(
+            f"progress = {shown(progress)}: must be True or callable, as progress(done, total)"
+        )
+    return progress
+
+
+def sharing(progress: _Shares | bool | None, what: str) -> _Shares | None:
+    """As :func:`counting`, of what is reported as a share."""
+    if progress is None or progress is False:
+        return None
+    if progress is True:
+        line = _Line(what)
+        return lambda share: line.say(share, f"{100.0 * share:.0f} %")
+    if not callable(progress):
+        raise InputTypeError(f"progress = {shown(progress)}: must be True or callable, as progress(share)")
+    own: _Shares = progress
+    return own

@@ -1,0 +1,29 @@
+"""How results show themselves: pictures and tables, looked up by name when somebody asks for one.
+
+Nothing of a drawing library is loaded before, and no room below the figures knows one.
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Sequence
+from importlib import import_module
+from typing import Any
+
+__all__ = ["html_table", "plotter"]
+
+
+def plotter(name: str) -> Any:
+    """A function of :mod:`snapbeam.plot`."""
+    return getattr(import_module("snapbeam.plot"), name)
+
+
+def html_table(title: str, rows: Iterable[Sequence[object]]) -> str:
+    """A table as notebooks show it."""
+    lines = [
+        "<tr>"
+        + "".join(f"<td style='text-align:left'>{html.escape(str(cell))}</td>" for cell in row)
+        + "</tr>"
+        for row in rows
+    ]
+    return f"<div><strong>{html.escape(title)}</strong><table>{''.join(lines)}</table></div>"

@@ -1,0 +1,270 @@
+"""Files that are either whole or not there: checked before the work, renamed into place after it."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import platform
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from snapbeam._version import __version__
+from snapbeam.util.validation import InputError, file_path
+
+__all__ = [
+    "MADE_BY",
+    "VERSION",
+    "NoRoomError",
+    "atomic_path",
+    "check_writable",
+    "foreign_files_kept",
+    "is_ours",
+    "lives",
+    "refuse_foreign",
+]
+
+
+# ----------------------------------------------------------------------------------------------------
+# Which files that exist may be replaced: in Python every one, on the command line those that snapbeam wrote.
+#
+# Files carry a mark: NetCDF and JSON files the version as an attribute, pictures and animations a line in what they say
+# of themselves.  Text that a person edits, such as a parameter file, carries none and is never replaced unasked.
+
+
+VERSION = "snapbeam_version"
+"""Name of the attribute of NetCDF files and of the key of JSON files."""
+MADE_BY = f"made by snapbeam {__version__}"
+"""What pictures and animations say of themselves."""
+_MARK = b"made by snapbeam "
+_LOOKED_AT = 1 << 16  # bytes, at each end
+
+
+@dataclass(frozen=True)
+class _Guard:
+    """The files that a command names, and those of them that it may write to."""
+
+    named: tuple[Path, ...]
+    allowed: set[Path] = field(default_factory=set)
+
+
+_GUARD: ContextVar[_Guard | None] = ContextVar("guard", default=None)
+
+
+@contextmanager
+def foreign_files_kept(named: Sequence[Path] = ()) -> Iterator[None]:
+    """In the block, refuse to replace files that snapbeam did not write, and those that are read too.
+
+    Parameters
+    ----------
+    named : sequence of path
+        Every file that a command names: one that stands there twice is read as well as written.
+    """
+    token = _GUARD.set(_Guard(tuple(path.resolve() for path in named)))
+    try:
+        yield
+    finally:
+        _GUARD.reset(token)
+
+
+def refuse_foreign(target: Path, name: str, begin: str = "") -> None:
+    """Refuse a file to be written if a guard is up and it would replace what is not snapbeam's.
+
+    What was allowed once stays so: a file that appears while a result is computed does not cost the result.
+
+    Raises
+    ------
+    InputError
+        If *target* exists and snapbeam did not write it, or it is named twice.
+    """
+    guard = _GUARD.get()
+    if guard is None or (there := target.resolve()) in guard.allowed:
+        return
+    if guard.named.count(there) > 1:
+        raise InputError(
+            f"{name} = {str(target)!r}: is named twice, as what is read and what is written; give another name, or "
+            "--force"
+        )
+    if target.exists() and not is_ours(target, begin):
+        raise InputError(
+            f"{name} = {str(target)!r}: exists and does not say that snapbeam made it; give another name, or --force "
+            "to replace it"
+        )
+    guard.allowed.add(there)
+
+
+def is_ours(path: str | os.PathLike[str], begin: str = "") -> bool:
+    """Whether a file says that snapbeam made it; an empty one may be anybody's.
+
+    Parameters
+    ----------
+    path : path
+    begin : str
+        What text of this kind begins with, such as the names of the columns of a table.
+    """
+    path = Path(path)
+    if not path.is_file():
+        return False
+    if not path.stat().st_size:
+        return True
+    with suppress(OSError, ValueError):
+        if path.suffix.lower() == ".nc":
+            return _attribute(path)
+        if path.suffix.lower() == ".json":
+            found = json.loads(path.read_text(encoding="utf-8"))
+            return isinstance(found, dict) and VERSION in found
+        with path.open("rb") as file:
+            head = file.read(_LOOKED_AT)
+            if begin:
+                return head.startswith(begin.encode())
+            file.seek(-min(_LOOKED_AT, path.stat().st_size), os.SEEK_END)
+            pictures = (".png", ".pdf", ".svg", ".gif", ".mp4", ".mov", ".avi")
+            return path.suffix.lower() in pictures and _MARK in head + b"\0" + file.read()
+    return False
+
+
+def _attribute(path: Path) -> bool:
+    """Whether the root of a NetCDF file has the attribute; False of what is no such file."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        return VERSION in file.attrs
+
+
+# ----------------------------------------------------------------------------------------------------
+
+
+def check_writable(
+    path: str | os.PathLike[str],
+    name: str = "output",
+    suffixes: tuple[str, ...] = (),
+    begin: str = "",
+    *,
+    appended: bool = False,
+) -> Path:
+    """Return *path* if a file can be written there; refuse it, before any work, if not.
+
+    Parameters
+    ----------
+    path : path
+        The file to be written.  One that exists will be replaced; a command of the command line replaces only
+        what snapbeam wrote (:mod:`snapbeam.util.files`).
+    name : str
+        The parameter to name in a refusal.
+    suffixes : tuple of str
+        The allowed ends of the name, such as ``(".nc",)``; any if empty.
+    begin : str
+        What text of this kind begins with, by which a file that snapbeam wrote is known.
+    appended : bool
+        Whether what is there stays, as in a log: then anybody's file will do.
+
+    Raises
+    ------
+    InputError
+        If the folder is missing or cannot be written to, *path* is a folder, its suffix is not allowed, or a
+        command would replace what is not snapbeam's.
+    """
+    target = file_path(name, path)
+    if suffixes and target.suffix.lower() not in suffixes:
+        raise InputError(f"{name} = {str(path)!r}: must end in {' or '.join(suffixes)}")
+    if target.is_dir():
+        raise InputError(f"{name} = {str(path)!r}: must be a file, not a folder")
+    folder = target.parent
+    if not folder.is_dir():
+        raise InputError(
+            f"{name} = {str(path)!r}: cannot be written, {str(folder)!r} is not an existing folder"
+        )
+    try:
+        with tempfile.NamedTemporaryFile(dir=folder, prefix=f".{target.name}."):
+            pass
+        if target.exists():
+            with target.open("ab"):
+                pass
+    except OSError as error:
+        raise InputError(f"{name} = {str(path)!r}: cannot be written, {error.strerror or error}") from error
+    if not appended:
+        refuse_foreign(target, name, begin)
+    return target
+
+
+class NoRoomError(OSError):
+    """A file that could not be written since the disk is full: the message says how much room is needed."""
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """Give a temporary path beside *path* to write to, and rename it to *path* if all went well.
+
+    If the block raises, an interrupt included, the temporary file is removed and *path* is left as it was.  What a
+    process that was killed left of its own is removed by the next that writes there.
+
+    Examples
+    --------
+    >>> with atomic_path("system.toml") as temporary:  # doctest: +SKIP
+    ...     temporary.write_text(text)
+    """
+    target = Path(path)
+    _sweep(target)
+    try:
+        handle, name = tempfile.mkstemp(
+            dir=target.parent, prefix=f".{target.stem}.{_HERE}-{os.getpid()}-", suffix=target.suffix
+        )
+    except OSError as error:
+        raise _said(error, target) from error
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        mask = os.umask(0)
+        os.umask(mask)
+        temporary.chmod(0o666 & ~mask)
+        os.replace(temporary, target)
+    except BaseException as error:
+        temporary.unlink(missing_ok=True)
+        if isinstance(error, OSError) and not isinstance(error, NoRoomError):
+            raise _said(error, target) from error
+        raise
+
+
+_HERE = hashlib.sha256(platform.node().encode()).hexdigest()[:6]
+"""A mark of this machine: the numbers of its processes mean nothing on another that shares the disk."""
+
+
+def _sweep(target: Path) -> None:
+    """Remove what killed processes of this machine left beside *target*."""
+    if os.name == "nt":
+        return
+    begin = f".{target.stem}.{_HERE}-"
+    with suppress(OSError), os.scandir(target.parent) as entries:
+        for entry in entries:
+            if entry.name.startswith(begin) and entry.name.endswith(target.suffix):
+                number = entry.name[len(begin) :].partition("-")[0]
+                if number.isdecimal() and not lives(int(number)):
+                    os.unlink(entry.path)
+
+
+def lives(process: int) -> bool:
+    """Whether a process of this machine is there."""
+    if os.name == "nt":
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def _said(error: OSError, target: Path) -> OSError:
+    """The error of a full disk in words; any other as it is."""
+    if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+        return error
+    return NoRoomError(
+        f"{str(target)!r}: cannot be written, {error.strerror}: make room and give the same command again"
+    )

@@ -1,0 +1,230 @@
+"""NetCDF files that are written whole or not at all, whatever becomes of the disk.
+
+The HDF5 library cannot be stopped while it writes: a disk that fills ends in a file that it cannot close, and may take
+the process with it.  So it writes to a stream that does not fail.  What the disk has no room for is held in memory;
+once the library is done, the file is put where there is room, and the error says where, and how much was needed.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from snapbeam._version import __version__
+from snapbeam.util.files import VERSION, NoRoomError, atomic_path, check_writable
+from snapbeam.util.validation import InputError, file_path, instance, mapping
+
+if TYPE_CHECKING:
+    import h5netcdf
+    import xarray as xr
+
+__all__ = ["hdf5_stream", "netcdf_file", "read_netcdf", "write_netcdf"]
+
+
+def read_netcdf(
+    path: str | os.PathLike[str], name: str = "path", group: str | None = None, *, lazily: bool = False
+) -> xr.Dataset:
+    """Read the dataset in a NetCDF file, or in a group of it, into memory unless *lazily*.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is none of NetCDF, or is damaged; *name* is that of the parameter.
+    """
+    import xarray as xr
+
+    if not file_path(name, path).is_file():
+        raise InputError(f"{name} = {str(path)!r}: no such file")
+    read = xr.open_dataset if lazily else xr.load_dataset
+    try:
+        return read(path, engine="h5netcdf", group=group)
+    except MemoryError:
+        raise
+    except Exception as error:  # of damaged bytes the libraries make errors of every kind
+        said = str(error).strip().split("\n")[0][:200]
+        raise InputError(
+            f"{name} = {str(path)!r}: is no NetCDF file of results, or is damaged ({said or type(error).__name__})"
+        ) from error
+
+
+def write_netcdf(
+    data: xr.Dataset | Mapping[str | None, xr.Dataset],
+    path: str | os.PathLike[str],
+    encoding: Mapping[str | None, Mapping[Any, Any]] | None = None,
+) -> None:
+    """Write a dataset, or one for each group, to a NetCDF file, whole or not at all.
+
+    A root without the attribute ``snapbeam_version`` gets it, by which the file is known.
+
+    Parameters
+    ----------
+    data : xarray.Dataset or mapping of str to xarray.Dataset
+        Groups by name; None is the root, and comes first.
+    path : path
+    encoding : mapping of str to mapping, optional
+        For each group, that of its variables, as xarray takes it.
+
+    Raises
+    ------
+    InputError
+        If *data* are no datasets, or nothing can be written to *path*, which ends in ``.nc``.
+    NoRoomError
+        If there is no room for the file; it says how much is needed, and where the file is kept instead.
+    """
+    import xarray as xr
+    from xarray.backends import H5NetCDFStore
+
+    target = check_writable(path, "path", (".nc",))
+    groups = {None: data} if isinstance(data, xr.Dataset) else mapping("data", data)
+    for name, dataset in groups.items():
+        instance(f"data[{name!r}]", dataset, xr.Dataset, "an xarray.Dataset")
+    with netcdf_file(target) as file:
+        for name, dataset in groups.items():
+            group = None if name is None else file.create_group(name)
+            store = H5NetCDFStore(file if group is None else group)
+            dataset.dump_to_store(store, encoding=dict((encoding or {}).get(name, {})))
+
+
+@contextmanager
+def netcdf_file(path: str | os.PathLike[str]) -> Iterator[h5netcdf.File]:
+    """Give a NetCDF file to write to, which is put at *path* if all went well; errors as of :func:`write_netcdf`."""
+    import h5netcdf
+
+    with atomic_path(path) as temporary, hdf5_stream(temporary, Path(path)) as stream:
+        with h5netcdf.File(stream, "w", invalid_netcdf=False) as file:
+            yield file
+            if VERSION not in file.attrs:
+                file.attrs[VERSION] = __version__
+
+
+@contextmanager
+def hdf5_stream(path: Path, target: Path | None = None) -> Iterator[io.RawIOBase]:
+    """Give a stream that h5py can write to, and have what it wrote in the file *path*.
+
+    *target* is the name to tell in errors, those of :func:`write_netcdf`.
+    """
+    with _Stream(path) as stream:
+        yield stream
+        stream.settle()
+    if stream.trouble is not None:
+        raise _kept_elsewhere(target or path, stream)
+
+
+def _kept_elsewhere(target: Path, stream: _Stream) -> NoRoomError:
+    """Save what did not fit where there is room, if there is; the error to raise."""
+    size = len(stream.held.getbuffer())
+    free = _free(target.parent)
+    there = f", {free / 1e6:.3g} MB are free" if free is not None else ""
+    words = (
+        f"{str(target)!r}: cannot be written, {stream.trouble.strerror or stream.trouble}; "  # type: ignore[union-attr]
+        f"it needs {max(size, 1000) / 1e6:.3g} MB{there}"
+    )
+    try:
+        handle, name = tempfile.mkstemp(prefix=f"{target.stem}.", suffix=target.suffix)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(stream.held.getbuffer())
+                file.flush()
+                os.fsync(file.fileno())
+        except BaseException:
+            os.unlink(name)
+            raise
+    except OSError:
+        return NoRoomError(f"{words}: make room and give the same command again")
+    return NoRoomError(f"{words}; it was written to {name!r} instead")
+
+
+def _free(folder: Path) -> int | None:
+    try:
+        return shutil.disk_usage(folder).free
+    except OSError:
+        return None
+
+
+class _Stream(io.RawIOBase):
+    """A file on disk that goes on in memory once the disk fails."""
+
+    def __init__(self, path: Path) -> None:
+        self._file: Any = path.open("w+b", buffering=0)
+        self.held = io.BytesIO()
+        """The file, once the disk has failed."""
+        self.trouble: OSError | None = None
+
+    @property
+    def _at(self) -> Any:
+        return self._file if self.trouble is None else self.held
+
+    def write(self, data: Any) -> int:
+        view = memoryview(data).cast("B")
+        start, done = self.tell(), 0
+        while self.trouble is None and done < len(view):
+            try:
+                done += self._file.write(view[done:])
+            except OSError as error:
+                self._give_up(error, start + done)
+        if done < len(view):
+            self.held.write(view[done:])
+        return len(view)
+
+    def _give_up(self, error: OSError, at: int) -> None:
+        """Take what is on the disk into memory, and leave the disk alone."""
+        self._file.seek(0)
+        self.held.write(self._file.read())
+        self.held.seek(at)
+        self.trouble = error
+        self._file.truncate(0)
+
+    def settle(self) -> None:
+        """Have all of it on the disk, as far as it went there."""
+        if self.trouble is None:
+            try:
+                os.fsync(self._file.fileno())
+            except OSError as error:
+                if error.errno not in (errno.EINVAL, errno.ENOTSUP):
+                    self._give_up(error, 0)
+
+    def readinto(self, buffer: Any) -> int:
+        return int(self._at.readinto(buffer))
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        return int(self._at.seek(offset, whence))
+
+    def tell(self) -> int:
+        return int(self._at.tell())
+
+    def truncate(self, size: int | None = None) -> int:
+        if self.trouble is None:
+            try:
+                return int(self._file.truncate(size))
+            except OSError as error:
+                self._give_up(error, self._file.tell())
+        asked = self.held.tell() if size is None else size
+        end = len(self.held.getbuffer())
+        if asked > end:
+            at = self.held.tell()
+            self.held.seek(end)
+            self.held.write(bytes(asked - end))
+            self.held.seek(at)
+            return asked
+        return self.held.truncate(asked)
+
+    def readable(self) -> bool:
+        return True
+
+    def writable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def close(self) -> None:
+        if not self.closed:
+            self._file.close()
+        super().close()

@@ -1,0 +1,44 @@
+"""Numbers with the prefixes of the SI that suit them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+__all__ = ["prefixed", "scale_of"]
+
+
+_PREFIXES = ("y", "z", "a", "f", "p", "n", "µ", "m", "", "k", "M", "G", "T", "P", "E", "Z", "Y")
+
+
+def prefixed(value: float, unit: str, digits: int = 3) -> str:
+    """A number with a prefix of the SI: ``16.1 cm`` is not one, ``161 mm`` is.
+
+    Parameters
+    ----------
+    value
+        In the unit.
+    unit
+        Without a prefix, such as ``"m"``.
+    digits
+        Significant ones; the number is rounded to them before its prefix is chosen.
+    """
+    if value == 0.0 or not np.isfinite(value):
+        return f"{value:g} {unit}"
+    step = _step(float(f"{value:.{digits - 1}e}"))
+    return f"{value / 1000.0**step:.{digits}g} {_PREFIXES[step + 8]}{unit}"
+
+
+def scale_of(values: Any, unit: str) -> tuple[float, str]:
+    """What to divide numbers by so that their axis is short, and the unit that makes; ``(1e-3, "mN")``."""
+    most = float(np.nanmax(np.abs(np.asarray(values, dtype=float)))) if np.size(values) else 0.0
+    if most == 0.0 or not np.isfinite(most):
+        return 1.0, unit
+    step = _step(most)
+    return 1000.0**step, f"{_PREFIXES[step + 8]}{unit}"
+
+
+def _step(value: float) -> int:
+    """Thousands in a number, as far as there are prefixes."""
+    return max(-8, min(8, int(np.floor(np.log10(abs(value)) / 3.0 + 1e-12))))

@@ -1,0 +1,430 @@
+"""Checks of user input: one way in, one kind of refusal.
+
+Every function here takes the name of a parameter and the value that was given, returns the
+value as a plain Python or NumPy number, or raises :class:`InputError` with the name, the value and
+what is allowed.  Nothing is clipped or converted silently.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import json
+import math
+import os
+import types
+import typing
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from importlib import import_module
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "InputError",
+    "InputTypeError",
+    "NamedTable",
+    "axis",
+    "callback",
+    "checked",
+    "choice",
+    "file_path",
+    "finite",
+    "finite_array",
+    "flag",
+    "instance",
+    "integer",
+    "mapping",
+    "nonnegative",
+    "parsed_json",
+    "positive",
+    "shown",
+    "within",
+]
+
+
+class InputError(ValueError):
+    """A parameter that cannot be used: the message names it, its value and what is allowed."""
+
+
+class InputTypeError(InputError, TypeError):
+    """A parameter of a kind that cannot be used, such as text where a number belongs."""
+
+
+_LONGEST = 300
+_LONGEST_PATH = 4000
+_NO_NUMBERS = (bool, np.bool_, np.timedelta64)
+"""Kinds that count as numbers in Python or NumPy and are none here."""
+
+
+def _refuse(name: str, value: Any, allowed: str) -> InputError:
+    return InputError(f"{name} = {shown(value)}: must be {allowed}")
+
+
+def shown(value: Any) -> str:
+    """*value* as a message shows it: its representation, if it has one, and no more than a line of it."""
+    try:
+        text = repr(value)
+    except Exception:  # an integer of thousands of digits, an object that cannot describe itself
+        return f"<{type(value).__name__}>"
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 4]} ..."
+
+
+def _require_plain(name: str, value: Any) -> None:
+    """Refuse numbers that carry more than numbers, which would be lost: a mask, a unit."""
+    if isinstance(value, np.ma.MaskedArray) or value is np.ma.masked:
+        raise InputTypeError(
+            f"{name}: must be plain numbers, not a masked array, whose hidden values would be used"
+        )
+    if type(value).__module__.partition(".")[0] != "xarray" and any(
+        hasattr(value, attribute) for attribute in ("units", "unit", "dimensionality")
+    ):
+        raise InputTypeError(f"{name} = {shown(value)}: must be plain numbers, without a unit of their own")
+
+
+def _number(name: str, value: Any, allowed: str) -> float:
+    _require_plain(name, value)
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value.item()
+    if isinstance(value, _NO_NUMBERS) or not isinstance(value, Real):
+        raise InputTypeError(f"{name} = {shown(value)}: must be {allowed}, not {type(value).__name__}")
+    try:
+        return float(value)
+    except (OverflowError, ValueError, TypeError, ArithmeticError):
+        raise _refuse(name, value, allowed) from None
+
+
+def finite(name: str, value: Any, allowed: str = "a finite number") -> float:
+    """Return *value* as a float; refuse NaN, infinity and whatever is no real number."""
+    number = _number(name, value, allowed)
+    if not math.isfinite(number):
+        raise _refuse(name, value, allowed)
+    return number
+
+
+def positive(name: str, value: Any, unit: str = "") -> float:
+    """Return *value* as a float; refuse what is not finite and greater than zero."""
+    allowed = f"a finite number greater than 0{' ' + unit if unit else ''}"
+    number = finite(name, value, allowed)
+    if not number > 0.0:
+        raise _refuse(name, value, allowed)
+    return number
+
+
+def nonnegative(name: str, value: Any, unit: str = "") -> float:
+    """Return *value* as a float; refuse what is not finite or less than zero."""
+    allowed = f"a finite number of at least 0{' ' + unit if unit else ''}"
+    number = finite(name, value, allowed)
+    if number < 0.0:
+        raise _refuse(name, value, allowed)
+    return number
+
+
+def within(
+    name: str, value: Any, low: float, high: float, *, closed: str = "neither", unit: str = ""
+) -> float:
+    """Return *value* as a float inside an interval.
+
+    ``closed`` is ``"neither"``, ``"left"``, ``"right"`` or ``"both"``.
+    """
+    left = closed in ("left", "both")
+    right = closed in ("right", "both")
+    interval = f"{'[' if left else '('}{low:g}, {high:g}{']' if right else ')'}"
+    allowed = f"a number in {interval}{' ' + unit if unit else ''}"
+    number = finite(name, value, allowed)
+    above = number >= low if left else number > low
+    below = number <= high if right else number < high
+    if not (above and below):
+        raise _refuse(name, value, allowed)
+    return number
+
+
+def integer(name: str, value: Any, low: int, high: int | None = None) -> int:
+    """Return *value* as an int between *low* and *high*, both included."""
+    allowed = f"an integer of at least {low}" if high is None else f"an integer in [{low}, {high}]"
+    _require_plain(name, value)
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value.item()
+    if isinstance(value, _NO_NUMBERS):
+        raise InputTypeError(f"{name} = {shown(value)}: must be {allowed}, not {type(value).__name__}")
+    if isinstance(value, Integral):
+        number = int(value)
+    elif isinstance(value, Real):
+        real = finite(name, value, allowed)
+        if not real.is_integer():
+            raise _refuse(name, value, allowed)
+        number = int(real)
+    else:
+        raise InputTypeError(f"{name} = {shown(value)}: must be {allowed}, not {type(value).__name__}")
+    if number < low or (high is not None and number > high):
+        raise _refuse(name, value, allowed)
+    return number
+
+
+def flag(name: str, value: Any) -> bool:
+    """Return *value* if it is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputTypeError(f"{name} = {shown(value)}: must be True or False, not {type(value).__name__}")
+    return bool(value)
+
+
+def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:
+    """Return *value* if it is one of the words *allowed*."""
+    words = ", ".join(repr(word) for word in allowed)
+    if not isinstance(value, str):
+        raise InputTypeError(f"{name} = {shown(value)}: must be one of {words}, not {type(value).__name__}")
+    if value not in allowed:
+        raise InputError(f"{name} = {shown(value)}: must be one of {words}")
+    return value
+
+
+def finite_array(name: str, value: Any, ndim: int | None = None) -> NDArray[np.float64]:
+    """Return *value* as a float64 array; refuse text, NaN, infinity and a wrong number of dimensions."""
+    _require_plain(name, value)
+    try:
+        raw = np.asarray(value)
+    except ValueError:
+        raise InputError(f"{name}: must be an array of numbers, not a list of unequal lengths") from None
+    except Exception as error:
+        raise InputTypeError(f"{name} = {shown(value)}: must be an array of numbers ({error})") from None
+    if raw.dtype.kind not in "iuf":
+        raise InputTypeError(f"{name} = {shown(value)}: must be an array of numbers, not of {raw.dtype}")
+    array = np.array(raw, dtype=np.float64)
+    if ndim is not None and array.ndim != ndim:
+        raise InputError(f"{name} of shape {array.shape}: must have {ndim} dimension(s)")
+    bad = ~np.isfinite(array)
+    if bad.any():
+        first = tuple(int(i) for i in np.argwhere(bad)[0])
+        raise InputError(f"{name}{list(first)} = {array[first]!r}: must be finite")
+    return array
+
+
+def axis(name: str, value: Any, low: float, high: float, *, closed: str = "neither") -> NDArray[np.float64]:
+    """Return *value* as a strictly increasing 1-D axis whose points all lie in the interval."""
+    array = finite_array(name, value)
+    if array.ndim != 1:
+        raise InputError(f"{name} of shape {array.shape}: must be a number or a one-dimensional array")
+    if array.size == 0:
+        raise InputError(f"{name} = []: must hold at least one point")
+    for point in (array.min(), array.max()):
+        within(name, float(point), low, high, closed=closed)
+    steps = np.diff(array)
+    if (steps <= 0.0).any():
+        at = int(np.argmax(steps <= 0.0))
+        raise InputError(
+            f"{name}[{at}] = {array[at]:g}, {name}[{at + 1}] = {array[at + 1]:g}: must be strictly increasing"
+        )
+    return array
+
+
+def file_path(name: str, value: Any) -> Path:
+    """Return *value* as a path; refuse what is none, such as a number, which would name a stream of the process."""
+    if not isinstance(value, (str, os.PathLike)) or "\0" in str(value):
+        raise InputTypeError(f"{name} = {shown(value)}: must be a path")
+    path = Path(value)
+    if len(os.fsencode(path)) > _LONGEST_PATH or any(len(os.fsencode(part)) > 255 for part in path.parts):
+        raise InputError(f"{name} = {shown(str(value))}: must be a path of names up to 255 bytes")
+    return path
+
+
+def mapping(name: str, value: Any) -> Mapping[Any, Any]:
+    """Return *value* if it is a mapping, such as a dictionary."""
+    if not isinstance(value, Mapping):
+        raise InputTypeError(f"{name} = {shown(value)}: must be a mapping, not {type(value).__name__}")
+    return value
+
+
+def parsed_json(text: Any, name: str) -> dict[str, Any]:
+    """The object that a JSON text holds; refused, by the name of where it stands, if it is damaged."""
+    try:
+        found = json.loads(text)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"{name}: its description is damaged ({error})") from None
+    if not isinstance(found, dict):
+        raise InputError(f"{name}: its description is damaged")
+    return found
+
+
+def callback(name: str, value: Any) -> Any:
+    """Return *value* if it is None or can be called."""
+    if value is not None and not callable(value):
+        raise InputTypeError(f"{name} = {shown(value)}: must be callable")
+    return value
+
+
+def instance(name: str, value: Any, kind: type, words: str) -> Any:
+    """Return *value* if it is of a kind, which *words* describe."""
+    if not isinstance(value, kind):
+        raise InputTypeError(f"{name} = {shown(value)}: must be {words}, not {type(value).__name__}")
+    return value
+
+
+# ----------------------------------------------------------------------------------------------------
+# The kinds of arguments at a public function's door, read off its annotations.
+
+
+_F = TypeVar("_F", bound=Callable[..., Any])
+_ABSTRACT = {Sequence: "a sequence", Mapping: "a mapping", Iterable: "a sequence", Callable: "callable"}
+_LIBRARIES = {"xr": "xarray", "np": "numpy", "pd": "pandas"}
+_NAMESPACES = ("snapbeam", "snapbeam.dynamics", "snapbeam.model", "snapbeam.uncertainty")
+
+
+class _Names(dict[str, Any]):
+    """Names of annotations that a module imports for its type checks alone: xarray's and snapbeam's own."""
+
+    def __init__(self, package: str) -> None:
+        super().__init__()
+        self._namespaces = dict.fromkeys((package, *_NAMESPACES))
+
+    def __missing__(self, name: str) -> Any:
+        if name in _LIBRARIES:
+            return import_module(_LIBRARIES[name])
+        for namespace in map(import_module, self._namespaces):
+            if name in getattr(namespace, "__all__", ()):
+                return getattr(namespace, name)
+        raise KeyError(name)
+
+
+def _kinds(function: Callable[..., Any]) -> dict[str, Any]:
+    """What each parameter may be, as far as its annotation can be read."""
+    found = {}
+    package = ".".join(function.__module__.split(".")[:2])
+    for each in inspect.signature(function).parameters.values():
+        if each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD) or each.annotation is each.empty:
+            continue
+        annotation = each.annotation
+        if isinstance(annotation, str):
+            holder = type(each.name, (), {"__annotations__": {each.name: annotation}})
+            try:
+                annotation = typing.get_type_hints(holder, function.__globals__, _Names(package))[each.name]
+            except Exception:
+                continue
+        found[each.name] = annotation
+    return found
+
+
+def _members(annotation: Any) -> list[Any]:
+    if typing.get_origin(annotation) in (typing.Union, types.UnionType):
+        return [each for part in typing.get_args(annotation) for each in _members(part)]
+    return [annotation]
+
+
+def _suits(value: Any, kind: Any) -> bool:
+    """If *value* may be of a kind; whatever cannot be told is left to the function."""
+    origin = typing.get_origin(kind) or kind
+    if kind is Any or kind is object:
+        return True
+    if kind is None or kind is type(None):
+        return value is None
+    if origin is typing.Literal:
+        return True  # the function names the words that it takes
+    if kind is float or kind is int:
+        return isinstance(value, Real) or (isinstance(value, np.ndarray) and value.ndim == 0)
+    if origin in (tuple, list):
+        origin = Sequence
+    if origin in (Sequence, Iterable):
+        if isinstance(value, np.ndarray):
+            return value.ndim > 0
+        return isinstance(value, origin) and not isinstance(value, (str, bytes))
+    if origin is np.ndarray:
+        return True  # checked, with its numbers, where it is used
+    if not isinstance(origin, type) or getattr(origin, "_is_protocol", False):
+        return origin is not Callable or callable(value)
+    return isinstance(value, origin)
+
+
+def _words(kinds: list[Any]) -> str:
+    names = []
+    for kind in kinds:
+        origin = typing.get_origin(kind) or kind
+        if kind is None or kind is type(None):
+            names.append("None")
+        elif origin is tuple and typing.get_args(kind) == (float, float):
+            names.append("two numbers")
+        elif origin in (tuple, list):
+            names.append("a sequence")
+        elif origin in _ABSTRACT:
+            names.append(_ABSTRACT[origin])
+        elif kind in (float, int):
+            names.append("a number")
+        elif kind is str:
+            names.append("text")
+        else:
+            names.append(getattr(origin, "__name__", str(origin)))
+    return " or ".join(dict.fromkeys(names))
+
+
+def checked(function: _F) -> _F:
+    """Refuse arguments of another kind than *function*'s annotations say, before it begins.
+
+    What is a number, a flag, a dataset, a system or a sequence is decided here; which numbers and words are allowed is
+    the function's to say.
+
+    Raises
+    ------
+    InputTypeError
+        By the function that comes of it: the parameter, its value and what it must be.
+    """
+    signature = inspect.signature(function)
+    known: dict[str, list[Any]] = {}
+
+    @functools.wraps(function)
+    def door(*args: Any, **named: Any) -> Any:
+        if not known:
+            known.update({name: _members(kind) for name, kind in _kinds(function).items()})
+        try:
+            given = signature.bind(*args, **named).arguments
+        except TypeError:
+            return function(*args, **named)  # which says so in Python's words
+        for name, value in given.items():
+            kinds = known.get(name)
+            if kinds is None:
+                continue
+            if bool in kinds and len(kinds) == 1:
+                flag(name, value)
+            elif not any(_suits(value, kind) for kind in kinds):
+                raise InputTypeError(
+                    f"{name} = {shown(value)}: must be {_words(kinds)}, not {type(value).__name__}"
+                )
+        return function(*args, **named)
+
+    return typing.cast(_F, door)
+
+
+# ----------------------------------------------------------------------------------------------------
+# Things by name, some of which are made when they are first asked for.
+
+
+Kind = TypeVar("Kind")
+
+
+class NamedTable(dict[str, Kind]):
+    """A list of things by name that knows more names than it lists, as ``sine+burst`` or ``impacts_striker_2``.
+
+    Parameters
+    ----------
+    find : callable
+        What has a name that is not listed, or None if there is no such thing.
+    listed : pairs, optional
+        Of name and thing.
+    """
+
+    def __init__(self, find: Callable[[str], Kind | None], listed: Iterable[tuple[str, Kind]] = ()) -> None:
+        super().__init__(listed)
+        self._find = find
+
+    def __missing__(self, name: str) -> Kind:
+        found = self._find(name) if isinstance(name, str) else None
+        if found is None:
+            raise KeyError(name)
+        return found
+
+    def __contains__(self, name: object) -> bool:
+        return super().__contains__(name) or (isinstance(name, str) and self._find(name) is not None)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        """As of any mapping."""
+        return self[name] if name in self else default
