@@ -41,7 +41,7 @@ def test_captions(run):
 
 @pytest.mark.parametrize("kind", ["run", "modal_amplitudes", "energies", "spectrum", "phase_portrait"])
 def test_every_plotter_takes_axes_and_returns_them(run, kind):
-    plotter = getattr(figures, f"plot_{kind}")
+    plotter = getattr(plots, f"plot_{kind}")
     assert isinstance(plotter(run), Axes)
     ax = plt.figure().add_subplot()
     assert plotter(run.dataset, ax=ax) is ax and ax.has_data() and ax.get_xlabel() and ax.get_ylabel()
@@ -66,12 +66,12 @@ def test_spectrum_of_a_sine():
         {"displacement": ("time", 0.3 * np.sin(2 * np.pi * 3.0 * cycle), attrs)},
         {"time": ("time", cycle * 0.01, {"units": "s"}), "cycle": ("time", cycle, {"units": "1"})},
     )
-    line = plot.plot_spectrum(run, variable="displacement").lines[0]
+    line = plots.plot_spectrum(run, variable="displacement").lines[0]
     at = int(np.argmax(line.get_ydata()))
     assert line.get_xdata()[at] == pytest.approx(3.0, abs=0.03)
     assert line.get_ydata()[at] == pytest.approx(0.3, rel=0.02)
     with pytest.raises(InputError, match="at least 16 samples"):
-        plot.plot_spectrum(run, variable="displacement", window=(0.0, 0.01))
+        plots.plot_spectrum(run, variable="displacement", window=(0.0, 0.01))
 
 
 def test_statistics_of_a_map(synthetic_map):
@@ -80,20 +80,20 @@ def test_statistics_of_a_map(synthetic_map):
         dims=synthetic_map.response.dims, attrs={"units": "N", "long_name": "peak contact force"},
     )  # fmt: skip
     ds = synthetic_map.assign(peak_force=force)
-    ax = plot.plot_statistic(ds, "peak_force")
+    ax = plots.plot_statistic(ds, "peak_force")
     mesh = ax.collections[0]
     assert mesh.norm.vmin == pytest.approx(1e-2) and mesh.norm.vmax == pytest.approx(100.0), (
         "mN, by powers of ten"
     )
     assert "(mN)" in ax.figure.axes[1].get_ylabel()
-    line = plot.plot_statistic(ds.isel(frequency_ratio=3), "peak_force", ax=plt.figure().add_subplot())
+    line = plots.plot_statistic(ds.isel(frequency_ratio=3), "peak_force", ax=plt.figure().add_subplot())
     assert line.lines[0].get_ydata().size == ds.sizes["velocity_amplitude"]
     with pytest.raises(InputError, match="nosuch"):
-        plot.plot_statistic(ds, "nosuch")
+        plots.plot_statistic(ds, "nosuch")
 
 
 def test_a_map_over_one_axis(synthetic_map):
-    ax = plot.plot_response_map(synthetic_map.isel(frequency_ratio=3))
+    ax = plots.plot_response_map(synthetic_map.isel(frequency_ratio=3))
     assert ax.get_xlabel() == "Velocity amplitude $V$" and "Centre displacement" in ax.get_ylabel()
     with pytest.raises(InputError, match="are drawn over two axes"):
-        plot.plot_response_map(synthetic_map.isel(frequency_ratio=3), threshold_line=True)
+        plots.plot_response_map(synthetic_map.isel(frequency_ratio=3), threshold_line=True)
