@@ -434,7 +434,7 @@ ANALYSES: dict[str, Callable[[], xr.Dataset]] = {
     "impacts of a run": lambda: a_run().impacts,
     "run with everything": lambda: sb.simulate(WORLDS["a bit of all"].system(), SHORT).dataset,
     "run with two strikers, impacts": lambda: sb.simulate(WORLDS["two strikers"].system(), SHORT).impacts,
-    "conditioning": lambda: sb.perturbation_growth(small_system(3), 4),
+    "conditioning": lambda: sb.perturbation_growth(small_system(3), sb.Integration(cycles=4)),
     "sweep": lambda: sb.sweep(small_system(3), PLANE, SHORT),
     "sweep with two strikers": lambda: sb.sweep(
         WORLDS["two strikers"].system(), {"velocity_amplitude": [0.1, 0.2]}, SHORT

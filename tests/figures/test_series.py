@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam import paper, plot as plots
 from snapbeam.plot.style import caption
 from snapbeam.util.validation import InputError
 
