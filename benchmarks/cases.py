@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.simulation.dataset import joined
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.cpu import driver as cpu_engine
@@ -42,7 +42,9 @@ _SAMPLES_PER_CYCLE = 20
 @cache
 def model_of(modes: int) -> sb.ReducedModel:
     """The paper's beam, reduced."""
-    return sb.ReducedModel.from_beam(paper.BEAM, modes=modes, damping_ratio=paper.DAMPING_RATIO)
+    return sb.ReducedModel.from_beam(
+        default_values.BEAM, modes=modes, damping_ratio=default_values.DAMPING_RATIO
+    )
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Case:
     modes: int
     frequency_ratio: float
     velocity_amplitude: float
-    location: float = paper.LOCATION
+    location: float = default_values.LOCATION
 
     @property
     def label(self) -> str:

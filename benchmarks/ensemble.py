@@ -11,7 +11,7 @@ import snapbeam as sb
 from benchmarks.cases import CONTACT, model_of
 from benchmarks.report import save, table
 from benchmarks.timing import measure
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.cpu import driver as cpu_engine
 from snapbeam.solver.ensemble import Ensemble
@@ -28,12 +28,12 @@ def sample(size: int) -> dict[str, np.ndarray]:
     return {
         "frequency_ratio": random.uniform(0.1, 4.0, size),
         "velocity_amplitude": random.uniform(0.0, 0.65, size),
-        "location": np.full(size, paper.LOCATION),
+        "location": np.full(size, default_values.LOCATION),
     }
 
 
 def ensemble_of(
-    modes: int, points: dict[str, np.ndarray], early: bool, cycles: int = paper.CYCLES
+    modes: int, points: dict[str, np.ndarray], early: bool, cycles: int = default_values.CYCLES
 ) -> Ensemble:
     """The runs of *points* at level standard."""
     system = sb.System(model_of(modes), CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))
@@ -51,7 +51,7 @@ def run(folder: Path, quick: bool) -> None:
     for modes, size in ((32, 24 if quick else 400), (1, 200 if quick else 2000)):
         for early in (False, True):
             records.append(_throughput(modes, size, early, 1 if quick else 3))
-    data: dict[str, Any] = {"seed": _SEED, "cycles": paper.CYCLES, "records": records}
+    data: dict[str, Any] = {"seed": _SEED, "cycles": default_values.CYCLES, "records": records}
     rows = [
         [
             r["modes"],

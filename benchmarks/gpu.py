@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.cpu import driver as cpu_engine
 from snapbeam.solver.cuda import driver as cuda_engine
@@ -48,7 +48,7 @@ FP64_LANES = {(6, 0): 32, (7, 0): 32, (8, 0): 32, (9, 0): 64, (10, 0): 64}
 
 def model_of(modes: int) -> sb.ReducedModel:
     """The paper's beam."""
-    return sb.ReducedModel.from_beam(paper.BEAM, modes=modes, damping_ratio=0.005)
+    return sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=0.005)
 
 
 def ensemble_of(

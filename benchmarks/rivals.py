@@ -19,7 +19,7 @@ from benchmarks.ensemble import ensemble_of, sample
 from benchmarks.peers import PEERS, Method, methods
 from benchmarks.report import save, table
 from benchmarks.timing import Timing, measure
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.cpu import driver as cpu_engine
 
 __all__ = ["chosen_points", "run"]
@@ -29,7 +29,7 @@ LIMIT = 1e-3
 WELL = 1e-10
 """Response to a relative change of V by 1e-13 up to which a point is well-conditioned."""
 _CANDIDATES = 400
-_MODES = paper.MODES
+_MODES = default_values.MODES
 
 
 def chosen_points(count: int, cycles: int) -> tuple[dict[str, np.ndarray], np.ndarray]:
@@ -44,7 +44,7 @@ def chosen_points(count: int, cycles: int) -> tuple[dict[str, np.ndarray], np.nd
 
 def run(folder: Path, quick: bool) -> None:
     """Measure and write ``rivals``."""
-    count, cycles, repeats = (3, 4, 1) if quick else (12, paper.CYCLES, 3)
+    count, cycles, repeats = (3, 4, 1) if quick else (12, default_values.CYCLES, 3)
     points, share = chosen_points(count, cycles)
     cases = [
         Case(_MODES, float(omega), float(speed))

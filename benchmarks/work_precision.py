@@ -12,7 +12,7 @@ from benchmarks.charts import work_precision_chart
 from benchmarks.peers import PEERS, methods
 from benchmarks.report import save, table
 from benchmarks.timing import measure
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.cpu import driver as cpu_engine
 
 __all__ = ["LIMIT", "run"]
@@ -27,7 +27,7 @@ def run(folder: Path, quick: bool, peers: Sequence[str] = PEERS) -> None:
     records: list[dict[str, Any]] = []
     conditioning = {}
     for point in POINTS:
-        case = Case(paper.MODES, *point)
+        case = Case(default_values.MODES, *point)
         conditioning[case.label] = {"conditioning": case.conditioning, "check": _check(case)}
         records += _snapbeam(case, quick)
     for peer in peers:
@@ -36,8 +36,8 @@ def run(folder: Path, quick: bool, peers: Sequence[str] = PEERS) -> None:
             print(found, flush=True)
             continue
         for point in POINTS:
-            records += _peer(Case(paper.MODES, *point), found, quick)
-    data = {"modes": paper.MODES, "cycles": _CYCLES, "points": conditioning, "records": records}
+            records += _peer(Case(default_values.MODES, *point), found, quick)
+    data = {"modes": default_values.MODES, "cycles": _CYCLES, "points": conditioning, "records": records}
     save(folder, "work_precision", quick, data, _tables(records, conditioning))
     work_precision_chart(data, folder / "work_precision.png")
 

@@ -11,7 +11,7 @@ import numpy as np
 import snapbeam as sb
 from benchmarks.report import save, table
 from benchmarks.timing import measure
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.cpu import driver as cpu_engine
 from snapbeam.solver.ensemble import Ensemble
@@ -28,19 +28,21 @@ COIL = sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resis
 Parts = Mapping[str, Any]
 
 
-def _model(beam: sb.Beam = paper.BEAM, imperfection: sb.Imperfection | None = None) -> sb.ReducedModel:
+def _model(
+    beam: sb.Beam = default_values.BEAM, imperfection: sb.Imperfection | None = None
+) -> sb.ReducedModel:
     return sb.ReducedModel.from_beam(beam, modes=_MODES, imperfection=imperfection)
 
 
 def _system(parts: Parts) -> sb.System:
     """The paper's, but for what is given."""
     own = dict(parts)
-    model = _model(own.pop("beam", paper.BEAM), own.pop("imperfection", None))
+    model = _model(own.pop("beam", default_values.BEAM), own.pop("imperfection", None))
     drive, given = own.pop("drive", SINE), own.pop("striker", {})
     several = [given] if isinstance(given, dict) else given
     strikers: Any = [sb.Striker(**({"drive": drive} | each)) for each in several]
     return sb.System(
-        model, own.pop("contact", paper.CONTACT), strikers if strikers[1:] else strikers[0], **own
+        model, own.pop("contact", default_values.CONTACT), strikers if strikers[1:] else strikers[0], **own
     )
 
 
@@ -58,7 +60,7 @@ WORLDS: dict[str, Parts] = {
     "a body of 20 g": {"striker": {"mass": 0.02, "spring": 700.0, "damper": 0.7}},
     "a stop above, too": {"striker": [{}, {"drive": sb.FixedStop(), "location": 0.3, "side": "above", "gap": 4e-5}]},
     "unequal wells": {"imperfection": sb.Imperfection(midspan_amplitude=4e-6)},
-    "other ends": {"beam": paper.BEAM.replace(boundary=sb.BoundaryConditions(left_rotational_stiffness=40.0, right_rotational_stiffness=40.0))},
+    "other ends": {"beam": default_values.BEAM.replace(boundary=sb.BoundaryConditions(left_rotational_stiffness=40.0, right_rotational_stiffness=40.0))},
     "a moving base": {
         "base": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1))
     },

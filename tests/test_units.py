@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.parameter_axes import PHYSICAL
 from snapbeam.model.parameters import parameters
 from snapbeam.simulation.dataset import SCHEMA
@@ -66,8 +66,8 @@ def check(dataset: xr.Dataset) -> int:
 
 
 SYSTEM = sb.System(
-    sb.ReducedModel.from_beam(paper.BEAM, modes=2),
-    paper.CONTACT,
+    sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
+    default_values.CONTACT,
     sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
 )
 ASKED = sb.Integration(cycles=2)
@@ -93,8 +93,8 @@ def test_runs(tmp_path) -> None:
 def test_a_run_of_several_strikers(tmp_path) -> None:
     """What is told of each striker has units too, as it stands and as it comes back from the file."""
     stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=2e-5)
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
-    run = sb.simulate(sb.System(model, paper.CONTACT, [SYSTEM.striker, stop]), ASKED)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
+    run = sb.simulate(sb.System(model, default_values.CONTACT, [SYSTEM.striker, stop]), ASKED)
     told = {"striker", "striker_displacements", "striker_penetrations", "striker_forces"}
     assert told <= set(run.dataset.variables)
     assert check(run.dataset) == len(SCHEMA) - len(OF_OTHERS - told)

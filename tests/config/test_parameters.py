@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.axial_load import LOADS
 from snapbeam.model.contact.base import LAWS
 from snapbeam.model.drive.base import DRIVES
@@ -66,8 +66,8 @@ def test_every_argument_of_a_model_of_a_beam_is_in_it() -> None:
 
 def test_a_system_has_no_parameter_beside_it() -> None:
     system = sb.System(
-        sb.ReducedModel.from_beam(paper.BEAM, modes=2),
-        paper.CONTACT,
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
+        default_values.CONTACT,
         sb.Striker(drive=sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.1), gap=1e-4),
     )
     words = {"contact.type", "drive.type"}
@@ -212,8 +212,8 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
             (each for each in row.kinds if each in ("hertz", "sine")), row.kinds[0] if row.kinds else ""
         )
         system = sb.System(
-            sb.ReducedModel.from_beam(paper.BEAM, modes=1),
-            laws.get(kind, paper.CONTACT),
+            sb.ReducedModel.from_beam(default_values.BEAM, modes=1),
+            laws.get(kind, default_values.CONTACT),
             sb.Striker(drive=drives.get(kind, sb.Sine(**pair))),
             **({row.section: around[row.section](kind)} if row.section in around else {}),
         )

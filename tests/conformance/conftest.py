@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.integration import ENGINES
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.ensemble import Ensemble
@@ -54,11 +54,11 @@ class March:
     def __call__(
         self,
         model: sb.ReducedModel,
-        contact: sb.ContactLaw | None = paper.CONTACT,
+        contact: sb.ContactLaw | None = default_values.CONTACT,
         *,
         frequency_ratio: ArrayLike = 1.0,
         velocity_amplitude: ArrayLike = 0.0,
-        location: ArrayLike = paper.LOCATION,
+        location: ArrayLike = default_values.LOCATION,
         side: str = "below",
         drive: sb.Drive | None = None,
         start: sb.State | None = None,
@@ -101,7 +101,9 @@ def march(request: pytest.FixtureRequest) -> March:
 def model_of():
     """The paper's beam on N modes, by N and damping ratio."""
     return cache(
-        lambda modes, damping_ratio=0.005: sb.ReducedModel.from_beam(paper.BEAM, modes, damping_ratio)
+        lambda modes, damping_ratio=0.005: sb.ReducedModel.from_beam(
+            default_values.BEAM, modes, damping_ratio
+        )
     )
 
 
@@ -132,13 +134,13 @@ class Kind:
 
 
 KINDS = {
-    "hertz": Kind(8, paper.CONTACT),
+    "hertz": Kind(8, default_values.CONTACT),
     "restitution": Kind(1, sb.Restitution(0.6)),
     "plastic": Kind(1, sb.Restitution(0.0)),
     "hunt-crossley": Kind(8, sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)),
     "kelvin-voigt": Kind(3, sb.KelvinVoigt(2e6, 20.0)),
     "power": Kind(3, sb.PowerLaw.from_stiffness(4e11, 2.0)),
-    "recorded": Kind(4, paper.CONTACT, recorded=True),
+    "recorded": Kind(4, default_values.CONTACT, recorded=True),
     "recorded restitution": Kind(1, sb.Restitution(0.8), recorded=True),
 }
 """Every law of contact and every drive there is: what is asked of one is asked of all."""
@@ -165,7 +167,7 @@ def draw():
         return {
             "frequency_ratio": rng.uniform(0.3, 4.0, count),
             "velocity_amplitude": rng.uniform(0.01, 0.65, count),
-            "location": rng.choice([0.25, 0.35, 0.42, paper.LOCATION, 0.5, 0.6], count),
+            "location": rng.choice([0.25, 0.35, 0.42, default_values.LOCATION, 0.5, 0.6], count),
         }
 
     return columns

@@ -15,7 +15,7 @@ from unittest import mock
 import numpy as np
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 MODES = (1, 5, 20, 32)
 EACH = {"plain": 35, "early": 15, "above": 5, "reference": 5, "recorded": 5}
@@ -118,8 +118,8 @@ def answer(case: dict[str, Any]) -> sb.Run:
 
 def answer_with_own_steps(case: dict[str, Any]) -> sb.Run:
     """The run of a case, with the steps of the package."""
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=case["modes"])
-    contact: Any = paper.CONTACT
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=case["modes"])
+    contact: Any = default_values.CONTACT
     drive: Any = sb.Shaker(
         frequency_ratio=case["frequency_ratio"],
         velocity_amplitude=case["velocity_amplitude"],
@@ -163,7 +163,7 @@ NAMES = (
 def main(path: str) -> None:
     """Write the answers."""
     runs = [numbers(answer(case)) for case in cases()]
-    hashes = {str(n): model_hash(sb.ReducedModel.from_beam(paper.BEAM, modes=n)) for n in MODES}
+    hashes = {str(n): model_hash(sb.ReducedModel.from_beam(default_values.BEAM, modes=n)) for n in MODES}
     with open(path, "w", encoding="utf-8") as stream:
         json.dump({"models": hashes, "runs": runs}, stream, indent=None, separators=(",", ":"))
         stream.write("\n")

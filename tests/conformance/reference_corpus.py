@@ -47,7 +47,7 @@ from numpy.typing import NDArray
 from worlds import WORLDS, World
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 DATA = Path(__file__).parent / "data" / "reference_corpus.npz"
 ACCURACY = {"order 4": "map", "order 6": "reference"}
@@ -387,8 +387,8 @@ def state_cases() -> Iterator[Case]:
 def small_system(modes: int = 1, damping_ratio: float = 0.005, **drive: float) -> sb.System:
     """The paper's beam with few modes."""
     sine = sb.Sine(**({"frequency_ratio": 1.21, "velocity_amplitude": 0.18} | drive))
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes, damping_ratio=damping_ratio)
-    return sb.System(model, paper.CONTACT, sb.Striker(drive=sine))
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=damping_ratio)
+    return sb.System(model, default_values.CONTACT, sb.Striker(drive=sine))
 
 
 PLANE = {"frequency_ratio": [0.8, 1.4], "velocity_amplitude": [0.06, 0.15, 0.3]}

@@ -13,7 +13,7 @@ import pytest
 from oracle import PaperBeam, Solution
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 # modes, (Omega, V), cycles, error of w in b measured at the default step
 CASES = [
@@ -53,12 +53,12 @@ def solved(modes: int, ratio: float, velocity: float, cycles: int) -> Solution:
 def test_trajectory(modes, pair, cycles, measured) -> None:
     """The displacements at the shaker and at the centre, and every impact, at the default step."""
     truth = solved(modes, *pair, cycles)
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1])
     # the two ends of the run differ by rounding
     times = truth.time * (1.0 - 1e-13)
     run = sb.simulate(
-        sb.System(model, paper.CONTACT, shaker), sb.Integration(cycles=cycles), sample_times=times
+        sb.System(model, default_values.CONTACT, shaker), sb.Integration(cycles=cycles), sample_times=times
     )
     bound = min(1e-3, 3.0 * measured)
     np.testing.assert_allclose(run.dataset.displacement_at_striker, truth.displacement, rtol=0.0, atol=bound)
@@ -78,11 +78,11 @@ def test_trajectory(modes, pair, cycles, measured) -> None:
 def test_reference_accuracy(modes, pair, cycles, measured) -> None:
     """Order 6 and short steps are closer by more than a hundred."""
     truth = solved(modes, *pair, cycles)
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1])
     times = truth.time * (1.0 - 1e-13)
     run = sb.simulate(
-        sb.System(model, paper.CONTACT, shaker),
+        sb.System(model, default_values.CONTACT, shaker),
         sb.Integration(cycles=cycles, accuracy="reference"),
         sample_times=times,
     )

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from world_oracle import Tip, differences, follow, missing
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 RATIO, VELOCITY = 1.21, 0.18
 
@@ -50,7 +50,7 @@ def test_against_an_independent_solution(name: str, modes: int) -> None:
     times = np.linspace(0.0, 2.0 * math.pi * cycles / omega, 801) * (1.0 - 1e-13)
     tip = Tip(lambda t, _: (stroke * math.sin(omega * t), stroke * omega * math.cos(omega * t)), force)
     truth = follow(beam, tip, times)
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     shaker = sb.Shaker(frequency_ratio=RATIO, velocity_amplitude=VELOCITY)
     for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(

@@ -19,7 +19,7 @@ import pytest
 from oracle import PaperBeam
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 DATA = Path(__file__).parent / "data"
 STORED: dict[str, Any] = json.loads((DATA / "frozen_0_1.json").read_text(encoding="utf-8"))
@@ -37,7 +37,7 @@ def as_number(value: Any) -> float:
 @cache
 def same_model(modes: int) -> bool:
     """Whether linear algebra rounds here as it did where the numbers were written down."""
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     return frozen.model_hash(model) == STORED["models"][str(modes)]
 
 

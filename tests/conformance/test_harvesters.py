@@ -11,7 +11,7 @@ from oracle import LENGTH, LEVEL, PaperBeam
 from test_moving_base import ledger, model
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.util.validation import InputError
 
 THETA, CAPACITANCE = 4e-3, 60e-9
@@ -126,7 +126,9 @@ def test_struck_with_a_nearly_open_circuit(modes, ratio, velocity, resistance, c
     layers = sb.PiezoelectricHarvester(
         moment_per_volt=THETA, capacitance=CAPACITANCE, resistance=resistance, patch_start=0.0, patch_end=0.25
     )
-    system = sb.System(model(modes), paper.CONTACT, sb.Striker(drive=drive, gap=gap), harvester=layers)
+    system = sb.System(
+        model(modes), default_values.CONTACT, sb.Striker(drive=drive, gap=gap), harvester=layers
+    )
     for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         assert run.summary.impacts > 2
@@ -141,10 +143,10 @@ def test_a_layer_that_does_not_couple_changes_nothing() -> None:
     """theta to 0: the struck beam without a harvester, to the error of the level."""
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
     steps = sb.Integration(cycles=1, accuracy="reference")
-    bare = sb.simulate(sb.System(model(3), paper.CONTACT, shaker), steps).final_state.amplitude
+    bare = sb.simulate(sb.System(model(3), default_values.CONTACT, shaker), steps).final_state.amplitude
     errors = []
     for coupling in (1e-4, 1e-5, 0.0):
-        system = sb.System(model(3), paper.CONTACT, shaker, harvester=PIEZO.__class__(
+        system = sb.System(model(3), default_values.CONTACT, shaker, harvester=PIEZO.__class__(
             moment_per_volt=coupling, capacitance=CAPACITANCE, resistance=2e4))  # fmt: skip
         errors.append(np.abs(sb.simulate(system, steps).final_state.amplitude - bare).max() / abs(bare[0]))
     assert errors[0] > 30.0 * errors[1]
@@ -168,7 +170,7 @@ def test_sweep_of_the_load() -> None:
     pull = float((beam.linear_modes.T @ rigid_mass(beam))[0])
     omega, zeta = float(beam.omega[0]), float(beam.damping_ratio[0])
     at = ratio * omega
-    hardest = strength * paper.BEAM.buckling_level * omega**2
+    hardest = strength * default_values.BEAM.buckling_level * omega**2
     voltage = []
     for load in loads:
         circuit = -1j * at * theta / (1j * at * CAPACITANCE + 1.0 / load)
@@ -188,8 +190,10 @@ def test_refusals() -> None:
     with pytest.raises(InputError, match=r"use a HertzContact"):
         sb.System(model(1), sb.HuntCrossley(4e8, 1.0), shaker, harvester=PIEZO)
     with pytest.raises(InputError, match="tangent with a harvester"):
-        sb.advance(sb.System(model(1), paper.CONTACT, shaker, harvester=PIEZO), tangent=np.zeros((1, 2, 1)))
-    system = sb.System(model(1), paper.CONTACT, shaker, harvester=PIEZO)
+        sb.advance(
+            sb.System(model(1), default_values.CONTACT, shaker, harvester=PIEZO), tangent=np.zeros((1, 2, 1))
+        )
+    system = sb.System(model(1), default_values.CONTACT, shaker, harvester=PIEZO)
     assert sb.System.from_mapping(system.to_mapping()) == system
     assert system.replace(**{"harvester.resistance": 5e3}).get("harvester.resistance") == 5e3
 
@@ -198,7 +202,7 @@ def test_layers_by_their_material() -> None:
     """Two faces in series have the moment of one and half its capacitance, in parallel twice both."""
     parts = {
         "stress_constant": -16.6, "permittivity": 25.55e-9, "layer_thickness": 0.2e-3, "layer_width": 15e-3,
-        "beam": paper.BEAM, "resistance": 1e4,
+        "beam": default_values.BEAM, "resistance": 1e4,
     }  # fmt: skip
     series, parallel = (
         sb.PiezoelectricHarvester.from_material(wiring=wiring, **parts) for wiring in ("series", "parallel")

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
 
@@ -24,10 +24,10 @@ def thrown(stiffness: float = 0.0) -> ReducedModel:
 def test_free_mass(march, speed) -> None:
     """Duration 2.94328 d_max/v, peak force kc d_max^1.5, unit restitution, no work by a shaker at rest."""
     end = march(thrown(), start=State(amplitude=np.zeros(1), velocity=np.array([-speed])))
-    depth = paper.CONTACT.max_penetration(MASS, speed)
+    depth = default_values.CONTACT.max_penetration(MASS, speed)
     assert end.accumulators_of_runs["impacts"][0] == 1
     assert end.accumulators_of_runs["contact_time"][0] == pytest.approx(2.94328 * depth / speed, rel=2e-4)
-    peak = paper.CONTACT.stiffness * depth**1.5
+    peak = default_values.CONTACT.stiffness * depth**1.5
     assert end.accumulators_of_runs["peak_force"][0] == pytest.approx(peak, rel=5e-4)
     restitution = math.sqrt(end.accumulators_of_runs["energy"][0] / (0.5 * MASS * speed**2))
     assert restitution == pytest.approx(1.0, abs=2e-4)
@@ -39,14 +39,14 @@ def test_reference_accuracy(march) -> None:
     end = march(
         thrown(), start=State(amplitude=np.zeros(1), velocity=np.array([-SPEED])), accuracy="reference"
     )
-    duration = paper.CONTACT.impact_duration(MASS, SPEED)
+    duration = default_values.CONTACT.impact_duration(MASS, SPEED)
     assert end.accumulators_of_runs["contact_time"][0] == pytest.approx(duration, rel=1e-6)
     assert end.accumulators_of_runs["energy"][0] == pytest.approx(0.5 * MASS * SPEED**2, rel=1e-6)
 
 
 def test_order_in_contact(march) -> None:
     """The d^1.5 edge holds any fixed order to about 2.5; here the mean over five halvings."""
-    duration = paper.CONTACT.impact_duration(MASS, SPEED)
+    duration = default_values.CONTACT.impact_duration(MASS, SPEED)
     steps = duration * 2.0 ** np.arange(3, -3, -1)
     errors = []
     for step in steps:
@@ -64,7 +64,7 @@ def test_onset_is_located(march) -> None:
     end = march(thrown(MASS * omega**2), start=start, frequency_ratio=1.0, cycles=1)
     # half a period of flight, the impact, and of the second flight what is left of the cycle
     half = math.pi / omega
-    duration = paper.CONTACT.impact_duration(MASS, SPEED)
+    duration = default_values.CONTACT.impact_duration(MASS, SPEED)
     assert end.accumulators_of_runs["impacts"][0] == 1
     assert end.accumulators_of_runs["contact_time"][0] == pytest.approx(duration, rel=1e-3)
     assert duration < 0.1 * half

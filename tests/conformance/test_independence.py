@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.reduced_model import ReducedModel
 from snapbeam.model.state import State
 from snapbeam.util.status_codes import RunStatus
@@ -58,7 +58,7 @@ def test_runs_of_different_contact_are_what_they_are_alone(march, model_of) -> N
     shaker = sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.25)
     kernel_input = sb.Integration(cycles=3)
     whole = make_ensemble(
-        sb.System(model_of(2), paper.CONTACT, shaker), kernel_input, {"contact.stiffness": stiffness}
+        sb.System(model_of(2), default_values.CONTACT, shaker), kernel_input, {"contact.stiffness": stiffness}
     )
     accumulators_of_runs = march.engine.run_ensemble(whole, None, None)
     assert len(set(accumulators_of_runs["steps"].tolist())) == 3

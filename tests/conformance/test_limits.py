@@ -7,7 +7,7 @@ import pytest
 from oracle import LEVEL
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.drive.base import Scale
 from snapbeam.solver.excitation import tip_motion
 
@@ -16,9 +16,9 @@ SHAKER = sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.15)
 
 def end(striker: sb.Striker | None = None, modes: int = 3, **parts) -> np.ndarray:
     """Amplitudes after one cycle at level reference, over the first one at rest."""
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     striker = sb.Striker(drive=SHAKER) if striker is None else striker
-    system = sb.System(model, parts.pop("contact", paper.CONTACT), striker, **parts)
+    system = sb.System(model, parts.pop("contact", default_values.CONTACT), striker, **parts)
     run = sb.simulate(system, sb.Integration(cycles=1, accuracy="reference"))
     return np.asarray(run.final_state.amplitude / abs(model.well_amplitude[0]))
 

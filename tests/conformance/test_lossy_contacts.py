@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from world_oracle import Tip, follow
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.contact_force import lossy_kick
 from snapbeam.solver.registry import resolve
 from snapbeam.solver.splitting import COMPOSITIONS, GENERAL
@@ -61,7 +61,7 @@ def test_restitution_of_a_free_mass(name, e) -> None:
 
 def test_no_loss_is_hertz() -> None:
     """chi -> 0: Hertz's law, but for the rounding of its kicks."""
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1)
     runs = [
         sb.simulate(sb.System(model, law, shaker), sb.Integration(cycles=1, accuracy="reference"))
@@ -109,7 +109,7 @@ def test_trajectory(name, modes, cycles, at_map, at_reference) -> None:
         edge(law),
     )
     truth = follow(beam, tip, times)
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
     for accuracy, measured in (("map", at_map), ("reference", at_reference)):
         run = sb.simulate(
@@ -169,7 +169,7 @@ def test_refusals() -> None:
         InputError, match="'hunt_crossley', which loses energy, is marched by the CPU engine alone"
     ):
         resolve("cuda", law=type(law))
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=2)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
     system = sb.System(model, law, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1))
     with pytest.raises(
         InputError, match="the tangent flow is known for laws whose force depends on the penetration alone"

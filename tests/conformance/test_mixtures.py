@@ -17,7 +17,7 @@ from oracle import LEVEL
 from test_timed_drives import smooth
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 Rng = np.random.Generator
 Motion = Callable[[float], tuple[float, float, float]]
@@ -120,7 +120,7 @@ def mixture(seed: int, modes: int) -> Mixture:
             "uniform_load": rng.uniform(-0.03, 0.03), "gravity": rng.uniform(0.0, 0.02),
         }  # fmt: skip
         words.append("unequal wells")
-    structure = paper.BEAM.replace(
+    structure = default_values.BEAM.replace(
         boundary=sb.BoundaryConditions(
             left_rotational_stiffness=ends[0],
             right_rotational_stiffness=ends[1],

@@ -10,7 +10,7 @@ from around_oracle import Surroundings, live
 from oracle import LEVEL, LOCATION, PaperBeam
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.registry import resolve
 from snapbeam.util.validation import InputError
 
@@ -18,7 +18,7 @@ SLOW = pytest.mark.slow
 
 
 def model(modes: int) -> sb.ReducedModel:
-    return sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+    return sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
 
 
 def ledger(run: sb.Run) -> float:
@@ -54,7 +54,7 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
     own = {"base": sb.BaseExcitation(motion=motion, striker_on_base=stop != "in space")}
     if stop != "none":
         own |= {
-            "contact": paper.CONTACT,
+            "contact": default_values.CONTACT,
             "striker": sb.Striker(drive=sb.FixedStop(), gap=gap, location=LOCATION),
         }
     system = sb.System(model(modes), **own)
@@ -77,7 +77,7 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
 def test_mirrored_and_going_on() -> None:
     """The mirrored system's mirrored run, and three periods in one go and one by one, bit for bit."""
     motion = sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.3)
-    parts = {"contact": paper.CONTACT}
+    parts = {"contact": default_values.CONTACT}
 
     def system(side: str, direction: str) -> sb.System:
         striker = sb.Striker(drive=sb.FixedStop(), gap=0.05 * LEVEL, side=side)
@@ -162,7 +162,7 @@ def test_refusals_and_the_way_there_and_back() -> None:
         sb.System(plain, base_excitation=base)
     with pytest.raises(InputError, match="marched by the CPU engine alone"):
         resolve("cuda", around=True)
-    system = sb.System(model(2), paper.CONTACT, striker, base_excitation=base)
+    system = sb.System(model(2), default_values.CONTACT, striker, base_excitation=base)
     assert sb.System.from_mapping(system.to_mapping()) == system
     changed = system.replace(
         **{"base_excitation.acceleration_amplitude": 0.3, "base_excitation.direction": "down"}

@@ -11,7 +11,7 @@ from sprung_beam import BENDING, SprungBeam
 from world_oracle import Tip, follow
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 HERTZ, UNIT = 4e8, BENDING / 0.161
 SLOW = pytest.mark.slow
@@ -24,7 +24,7 @@ ENDS = {
 
 
 def model_of(modes: int, left: float | None, right: float | None, axial: float | None = None):
-    beam = paper.BEAM.replace(
+    beam = default_values.BEAM.replace(
         boundary=sb.BoundaryConditions(
             left_rotational_stiffness=left, right_rotational_stiffness=right, axial_support_stiffness=axial
         )
@@ -34,7 +34,7 @@ def model_of(modes: int, left: float | None, right: float | None, axial: float |
 
 def struck(model: sb.ReducedModel, velocity: float = 0.3) -> sb.System:
     drive = sb.Sine(frequency_ratio=1.21, velocity_amplitude=velocity)
-    return sb.System(model, paper.CONTACT, sb.Striker(drive=drive, location=LOCATION))
+    return sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION))
 
 
 @pytest.mark.parametrize("ends", ENDS.values(), ids=ENDS)
@@ -77,7 +77,7 @@ def end_of(model: sb.ReducedModel) -> np.ndarray:
 
 
 def test_stiff_springs_recede_to_clamps() -> None:
-    clamped = end_of(sb.ReducedModel.from_beam(paper.BEAM, modes=3))
+    clamped = end_of(sb.ReducedModel.from_beam(default_values.BEAM, modes=3))
     errors = [np.abs(end_of(model_of(3, k * UNIT, k * UNIT)) - clamped).max() for k in (1e4, 1e6, 1e8)]
     assert errors[0] > 30.0 * errors[1] > 900.0 * errors[2]
     assert errors[2] < 1e-6
@@ -91,7 +91,7 @@ def test_soft_springs_recede_to_hinges() -> None:
 
 
 def test_firm_supports_recede_to_rigid_ones() -> None:
-    rigid = end_of(sb.ReducedModel.from_beam(paper.BEAM, modes=3))
+    rigid = end_of(sb.ReducedModel.from_beam(default_values.BEAM, modes=3))
     errors = [np.abs(end_of(model_of(3, None, None, k)) - rigid).max() for k in (1e10, 1e12, 1e14)]
     assert errors[0] > 30.0 * errors[1] > 900.0 * errors[2]
     assert errors[2] < 1e-4
@@ -107,7 +107,7 @@ def test_no_equilibrium_is_missed(seed) -> None:
     beam = SprungBeam(modes, left, right)
     force, at = rng.uniform(-0.01, 0.01), rng.uniform(0.2, 0.8)
     model = sb.ReducedModel.from_beam(
-        paper.BEAM.replace(
+        default_values.BEAM.replace(
             boundary=sb.BoundaryConditions(left_rotational_stiffness=left, right_rotational_stiffness=right)
         ),
         modes=modes,

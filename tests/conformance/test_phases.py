@@ -12,12 +12,12 @@ from mixed_oracle import Around, MixedBeam, Tip, solve
 from oracle import LEVEL, LOCATION, PaperBeam
 
 import snapbeam as sb
-from snapbeam import paper
 from snapbeam.dynamics.flow import Stroboscope
+from snapbeam.model import default_values
 
 SLOW = pytest.mark.slow
 PERIODS = 3
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=2)
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
 RATIO, VELOCITY, HARDEST = 1.2, 0.15, 0.2
 PHASES = {"striker": 0.7, "base": -0.9, "load": 1.3}
 QUICK = (("base",), ("load",), ("striker", "base"))
@@ -37,7 +37,7 @@ def system_of(names: tuple[str, ...], **phases: float) -> sb.System:
     at, parts = PHASES | phases, {}
     if "striker" in names:
         drive = sb.Sine(frequency_ratio=RATIO, velocity_amplitude=VELOCITY, phase=at["striker"])
-        parts |= {"contact": paper.CONTACT, "striker": sb.Striker(drive=drive, location=LOCATION)}
+        parts |= {"contact": default_values.CONTACT, "striker": sb.Striker(drive=drive, location=LOCATION)}
     if "base" in names:
         motion = sb.AccelerationSine(frequency_ratio=RATIO, acceleration_amplitude=HARDEST, phase=at["base"])
         parts["base"] = sb.BaseExcitation(motion=motion)

@@ -13,7 +13,7 @@ from test_timed_drives import smooth
 from world_oracle import Tip, differences, follow, missing
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.cpu.terms.discontinuities import Jump, jumps_of
 
 HERTZ = 4e8
@@ -157,8 +157,8 @@ def test_against_an_independent_solution(name, modes) -> None:
     times = np.linspace(0.0, cycles * case.cycle, 801) * (1.0 - 1e-6)
     tip = Tip(lambda t, _: case.motion(t), lambda d, _: HERTZ * d**1.5, breaks=case.breaks)
     truth = follow(beam, tip, times)
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
-    system = sb.System(model, paper.CONTACT, sb.Striker(drive=case.drive))
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
+    system = sb.System(model, default_values.CONTACT, sb.Striker(drive=case.drive))
     for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         data = run.dataset
@@ -180,8 +180,10 @@ ENDS = {
 def test_a_shock_that_ends_in_touch(name) -> None:
     """Its velocity jumps while it presses: no step goes across, or the ledger would miss a hundredth of its work."""
     drive, cycles = ENDS[name]
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
-    run = sb.simulate(sb.System(model, paper.CONTACT, sb.Striker(drive=drive)), sb.Integration(cycles=cycles))
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
+    run = sb.simulate(
+        sb.System(model, default_values.CONTACT, sb.Striker(drive=drive)), sb.Integration(cycles=cycles)
+    )
     data = run.dataset
     ends = (
         drive.parts_of_sum[1] if isinstance(drive, sb.SumDrive) else drive
@@ -197,15 +199,15 @@ def test_a_shock_that_ends_in_touch(name) -> None:
 @pytest.mark.parametrize("name", ["one of two", "under a base"])
 def test_a_shock_beside_other_motions_ends_with_a_step(name) -> None:
     """Whatever else moves, its time is its own."""
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     sine = sb.Sine(frequency_ratio=1.2, velocity_amplitude=0.2, phase=0.3)
     shock = sb.HalfSine(displacement_amplitude=0.3, duration=0.7)
     if name == "one of two":
         strikers = [sb.Striker(drive=sine), sb.Striker(drive=shock, location=0.3)]
-        system = sb.System(model, [paper.CONTACT, paper.CONTACT], strikers)
+        system = sb.System(model, [default_values.CONTACT, default_values.CONTACT], strikers)
     else:
         base = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.2))
-        system = sb.System(model, paper.CONTACT, sb.Striker(drive=shock), base_excitation=base)
+        system = sb.System(model, default_values.CONTACT, sb.Striker(drive=shock), base_excitation=base)
     data = sb.simulate(system, sb.Integration(cycles=2)).dataset
     near = np.abs(data.time.values - 0.7 / model.reference_frequency)
     assert near.min() < 1e-8

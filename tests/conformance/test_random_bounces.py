@@ -14,9 +14,9 @@ import pytest
 from bouncing import Bouncer
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, 1, damping_ratio=0.005)
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, 1, damping_ratio=0.005)
 LIMIT = {"standard": 1e-6, "reference": 1e-9}
 CARRIED = {"standard": 2e-8, "reference": 1e-11}
 """What a level is allowed as a relative change of the drive, where a run is sensitive."""

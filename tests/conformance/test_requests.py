@@ -14,7 +14,7 @@ import pytest
 from bouncing import Bouncer
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.step_size import choose_base_step
 
 FINER = 16.0
@@ -40,8 +40,8 @@ def request_of(rng: np.random.Generator) -> KernelOutput:
     newton = bool(rng.uniform() < 0.3)
     modes = 1 if newton else int(rng.choice([1, 2, 3, 5, 8]))
     coefficient = float(rng.choice([0.0, 0.3, 0.7, 1.0, rng.uniform()]))
-    contact = sb.Restitution(coefficient) if newton else paper.CONTACT
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes, damping_ratio=0.005)
+    contact = sb.Restitution(coefficient) if newton else default_values.CONTACT
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio=0.005)
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, location=location)
     system = sb.System(model, contact=contact, striker=shaker)
     end = cycles / (ratio * model.reference_frequency)

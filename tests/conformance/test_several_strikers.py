@@ -11,14 +11,14 @@ from oracle import CONTACT_STIFFNESS, LEVEL, PaperBeam
 from several_oracle import Tip, apply_impact_law
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 FIRST = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.12)
 GAP = 0.1 * LEVEL
 
 
 def model(modes: int) -> sb.ReducedModel:
-    return sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+    return sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
 
 
 def stop(location: float = 0.3, side: str = "above", gap: float = GAP) -> sb.Striker:
@@ -51,7 +51,7 @@ def test_against_an_independent_solution(case: str, modes: int, cycles: int) -> 
     """Displacements, tips and the force of each: 1e-3 b at level *map*, 1e-7 b at level *reference*; the ledger."""
     tips = [Tip(sine(modes, 1.21, 0.12)), Tip(still, 0.3, -1.0, GAP)]
     strikers: list[sb.Shaker | sb.Striker] = [FIRST, stop()]
-    laws: list[sb.ContactLaw] = [paper.CONTACT, paper.CONTACT]
+    laws: list[sb.ContactLaw] = [default_values.CONTACT, default_values.CONTACT]
     if case != "stop":
         tips[1] = Tip(sine(modes, 2.0, 0.05), 0.3, -1.0, GAP)
         strikers[1] = sb.Striker(
@@ -88,8 +88,8 @@ def test_against_an_independent_solution(case: str, modes: int, cycles: int) -> 
 @pytest.mark.parametrize("early", [False, True])
 def test_one_of_two_out_of_reach_is_none(early: bool) -> None:
     """Bit for bit the run with one striker, if the other stands still and far away; no run is decided early."""
-    one = sb.System(model(3), paper.CONTACT, FIRST)
-    two = sb.System(model(3), paper.CONTACT, [FIRST, stop(gap=20.0 * LEVEL)])
+    one = sb.System(model(3), default_values.CONTACT, FIRST)
+    two = sb.System(model(3), default_values.CONTACT, [FIRST, stop(gap=20.0 * LEVEL)])
     how = sb.Integration(cycles=20)
     alone, beside = sb.simulate(one, how), sb.simulate(two, how.replace(early_termination=early))
     for name in alone.dataset.data_vars:
@@ -110,7 +110,7 @@ def test_one_of_two_out_of_reach_is_none(early: bool) -> None:
 
 def test_mirrored() -> None:
     """The mirrored system's mirrored run, bit for bit."""
-    below = sb.System(model(3), paper.CONTACT, [FIRST, stop()])
+    below = sb.System(model(3), default_values.CONTACT, [FIRST, stop()])
     above = below.replace(**{"striker.side": "above", "striker_2.side": "below"})
     how = sb.Integration(cycles=5)
     one, other = sb.simulate(below, how), sb.simulate(above, how)
@@ -132,9 +132,9 @@ def test_two_of_half_the_stiffness_are_one() -> None:
     """Two strikers at one place that move alike share the force of one."""
     half = sb.HertzContact(0.5 * CONTACT_STIFFNESS)
     how = sb.Integration(cycles=2, accuracy="reference")
-    one = sb.System(model(3), paper.CONTACT, [FIRST, stop()])
+    one = sb.System(model(3), default_values.CONTACT, [FIRST, stop()])
     tip = sb.Striker(drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.12), gap=0.0)
-    two = sb.System(model(3), [half, half, paper.CONTACT], [FIRST, tip, stop()])
+    two = sb.System(model(3), [half, half, default_values.CONTACT], [FIRST, tip, stop()])
     times = np.linspace(0.0, 2.0, 301) / (1.21 * model(3).reference_frequency) * (1.0 - 1e-12)
     found, expected = sb.simulate(two, how, sample_times=times), sb.simulate(one, how, sample_times=times)
     np.testing.assert_allclose(
@@ -151,7 +151,7 @@ def test_two_of_half_the_stiffness_are_one() -> None:
 @pytest.mark.slow
 def test_order() -> None:
     """Half the step, impacts of both on the way: order 3.8 measured; a finer one is as good as the reference."""
-    system = sb.System(model(1), paper.CONTACT, [FIRST, stop()])
+    system = sb.System(model(1), default_values.CONTACT, [FIRST, stop()])
     times = np.linspace(0.0, 2.0, 101) / (1.21 * model(1).reference_frequency) * (1.0 - 1e-12)
     exact = sb.simulate(
         system, sb.Integration(cycles=2, accuracy="reference"), sample_times=times
@@ -165,7 +165,7 @@ def test_order() -> None:
 
 def test_swept_by_dotted_names(tmp_path) -> None:
     """A map over the place and the gap of the second striker has the runs of its points; its store is read again."""
-    system = sb.System(model(3), paper.CONTACT, [FIRST, stop()])
+    system = sb.System(model(3), default_values.CONTACT, [FIRST, stop()])
     axes = {"striker_2.location": [0.3, 0.6], "striker_2.gap": [0.1 * LEVEL, 0.3 * LEVEL]}
     swept = sb.sweep(
         system, axes, sb.Integration(cycles=5), checkpoint=sb.CheckpointOptions(tmp_path / "store")
@@ -191,7 +191,7 @@ def test_swept_by_dotted_names(tmp_path) -> None:
 
 def test_statistics_of_each(tmp_path) -> None:
     """Against the list of impacts and the samples of the run; together they are the whole; one striker has none."""
-    system = sb.System(model(3), paper.CONTACT, [FIRST, stop()])
+    system = sb.System(model(3), default_values.CONTACT, [FIRST, stop()])
     run = sb.simulate(system, sb.Integration(cycles=5))
     found, listed = run.summary, run.impacts
     assert found.impacts_striker_1 > 0 and found.impacts_striker_2 > 0
@@ -207,7 +207,9 @@ def test_statistics_of_each(tmp_path) -> None:
     assert found.shaker_work_striker_1 == pytest.approx(found.striker_work, rel=1e-12)
     assert not any(
         "_striker_" in name
-        for name in sb.simulate(sb.System(model(3), paper.CONTACT, FIRST), sb.Integration(cycles=2)).summary
+        for name in sb.simulate(
+            sb.System(model(3), default_values.CONTACT, FIRST), sb.Integration(cycles=2)
+        ).summary
     )
 
 
@@ -217,7 +219,7 @@ def test_work_of_each() -> None:
     second = sb.Striker(
         drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.05), location=0.3, side="above", gap=GAP
     )
-    system = sb.System(model(1), paper.CONTACT, [FIRST, second])
+    system = sb.System(model(1), default_values.CONTACT, [FIRST, second])
     length = model(1).length_scale
     end = 3.0 / (1.21 * model(1).reference_frequency)
     times = np.linspace(0.0, end, 60_001) * (1.0 - 1e-13)
@@ -234,14 +236,14 @@ def test_refusals() -> None:
     with pytest.raises(sb.InputError, match="Newton's law"):
         sb.System(model(1), sb.Restitution(0.5), [FIRST, stop()])
     with pytest.raises(sb.InputError, match="contact_2"):
-        sb.System(model(1), [paper.CONTACT, sb.HuntCrossley(4e8, 1.0)], [FIRST, stop()])
+        sb.System(model(1), [default_values.CONTACT, sb.HuntCrossley(4e8, 1.0)], [FIRST, stop()])
     with pytest.raises(sb.InputError, match=r"striker_2\.mass"):
-        sb.System(model(1), paper.CONTACT, [FIRST, dataclasses.replace(stop(), mass=1e-3)])
+        sb.System(model(1), default_values.CONTACT, [FIRST, dataclasses.replace(stop(), mass=1e-3)])
     with pytest.raises(sb.InputError, match="one law for all, or one each"):
-        sb.System(model(1), [paper.CONTACT] * 3, [FIRST, stop()])
+        sb.System(model(1), [default_values.CONTACT] * 3, [FIRST, stop()])
     with pytest.raises(sb.InputError, match="at most 4"):
-        sb.System(model(1), paper.CONTACT, [FIRST, *[stop()] * 4])
-    two = sb.System(model(1), paper.CONTACT, [FIRST, stop()])
+        sb.System(model(1), default_values.CONTACT, [FIRST, *[stop()] * 4])
+    two = sb.System(model(1), default_values.CONTACT, [FIRST, stop()])
     with pytest.raises(sb.InputError, match="several strikers"):
         sb.advance(two)
     with pytest.raises(sb.InputError, match="several strikers"):

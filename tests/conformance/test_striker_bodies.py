@@ -10,7 +10,7 @@ from oracle import LEVEL, PaperBeam
 from world_oracle import Tip, follow
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.registry import resolve
 from snapbeam.util.validation import InputError
 
@@ -26,7 +26,9 @@ def ledger(run: sb.Run) -> np.ndarray:
 def compare(modes, striker, tip, period, cycles, at_map, at_reference) -> sb.Run:
     times = np.linspace(0.0, cycles * period, 1201) * (1.0 - 1e-13)
     truth = follow(PaperBeam(modes), tip, times)
-    system = sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=modes), paper.CONTACT, striker)
+    system = sb.System(
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=modes), default_values.CONTACT, striker
+    )
     for accuracy, bound in (("map", at_map), ("reference", at_reference)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
         np.testing.assert_allclose(
@@ -110,7 +112,7 @@ def test_sphere_meets_a_free_mass() -> None:
         )
         striker = sb.Striker(drive=sb.ConstantVelocity(speed=0.3), mass=mass, gap=0.1 * LEVEL)
         run = sb.simulate(
-            sb.System(model, paper.CONTACT, striker, sb.State(amplitude=[0.0])),
+            sb.System(model, default_values.CONTACT, striker, sb.State(amplitude=[0.0])),
             sb.Integration(cycles=1, accuracy="reference"),
         )
         v = 0.3 * LEVEL * 2.0 * math.pi * 80.0
@@ -121,11 +123,11 @@ def test_sphere_meets_a_free_mass() -> None:
 
 
 def test_heavy_body_is_the_shaker() -> None:
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.15)
 
     def end(**more):
-        system = sb.System(model, paper.CONTACT, sb.Striker(drive=drive, **more))
+        system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, **more))
         return sb.simulate(system, sb.Integration(cycles=1, accuracy="reference")).final_state.amplitude
 
     shaker, scale = end(), abs(model.well_amplitude[0])
@@ -135,11 +137,11 @@ def test_heavy_body_is_the_shaker() -> None:
 
 
 def test_going_on_and_mirror() -> None:
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     body = {"mass": 0.01, "spring": 300.0, "damper": 0.4}
     drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.25)
     below, above = (
-        sb.System(model, paper.CONTACT, sb.Striker(drive=drive, side=side, **body))
+        sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, side=side, **body))
         for side in ("below", "above")
     )
     once, mirrored = sb.advance(below, periods=3), sb.advance(above, periods=3)
@@ -166,7 +168,7 @@ def test_going_on_and_mirror() -> None:
 
 
 def test_early_decision_is_off_and_refusals() -> None:
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
     drive = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.25)
     with pytest.raises(InputError, match=r"must be less than .* critical for its mass"):
         sb.Striker(drive=drive, mass=0.1, suspension_stiffness=10.0, suspension_damping=100.0)
@@ -176,7 +178,7 @@ def test_early_decision_is_off_and_refusals() -> None:
         sb.System(model, sb.Restitution(0.5), sb.Striker(drive=drive, mass=0.1))
     with pytest.raises(InputError, match="a striker with a mass is marched by the CPU engine alone"):
         resolve("cuda", body=True)
-    system = sb.System(model, paper.CONTACT, sb.Striker(drive=drive, mass=0.1))
+    system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, mass=0.1))
     with pytest.raises(InputError, match="leave the mass out"):
         sb.advance(system, tangent=np.zeros((1, 2, 1)))
     assert sb.System.from_mapping(system.to_mapping()) == system

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 GAP, CHANGE = 20e-6, 1e-6
 BASE = sb.BaseExcitation(
@@ -35,8 +35,8 @@ def test_tangents_are_the_derivatives(world: str, modes: int) -> None:
     The determinant is that of damping, exp(-2 T sum zeta omega), at every level, since kicks are shears.
     """
     around, drive, ratio = WORLDS[world]
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
-    system = sb.System(model, paper.CONTACT, sb.Striker(drive=drive, gap=GAP), **around)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
+    system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, gap=GAP), **around)
     well, omega = model.wells[0], float(model.omega[0])
     size = float(np.abs(well).max())
     rng, apply_contact_loss = np.random.default_rng(3), 1.0 / np.arange(1, modes + 1) ** 2

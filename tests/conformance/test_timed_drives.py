@@ -10,7 +10,7 @@ from oracle import LEVEL, PaperBeam
 from world_oracle import Tip, follow
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 HERTZ = 4e8
 
@@ -62,7 +62,9 @@ def test_burst(modes, at_map, at_reference) -> None:
         retraction=retreat,
     )
     system = sb.System(
-        sb.ReducedModel.from_beam(paper.BEAM, modes=modes), paper.CONTACT, sb.Striker(drive=drive)
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=modes),
+        default_values.CONTACT,
+        sb.Striker(drive=drive),
     )
     for accuracy, bound in (("map", at_map), ("reference", at_reference)):
         run = sb.simulate(system, sb.Integration(cycles=cycles, accuracy=accuracy), sample_times=times)
@@ -90,7 +92,11 @@ def test_going_on_is_going_on() -> None:
         ramp_up_cycles=0.5,
         ramp_down_cycles=0.5,
     )
-    system = sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=3), paper.CONTACT, sb.Striker(drive=drive))
+    system = sb.System(
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=3),
+        default_values.CONTACT,
+        sb.Striker(drive=drive),
+    )
     once = sb.advance(system, periods=3)
     step = sb.advance(system, sb.advance(system, sb.advance(system)))
     np.testing.assert_allclose(step.amplitude, once.amplitude, rtol=0.0, atol=1e-9 * abs(once.amplitude[0]))
@@ -101,12 +107,12 @@ def test_going_on_is_going_on() -> None:
 
 @pytest.mark.slow
 def test_one_tone_alone_is_the_sine() -> None:
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     two = sb.TwoTone(frequency_ratio=1.3, velocity_amplitude=0.2, second_ratio=2.0, second_amplitude=0.0)
     one = sb.Sine(frequency_ratio=1.3, velocity_amplitude=0.2)
     ends = [
         sb.simulate(
-            sb.System(model, paper.CONTACT, sb.Striker(drive=drive)), sb.Integration(cycles=2)
+            sb.System(model, default_values.CONTACT, sb.Striker(drive=drive)), sb.Integration(cycles=2)
         ).final_state
         for drive in (two, one)
     ]
@@ -117,10 +123,10 @@ def test_one_tone_alone_is_the_sine() -> None:
 
 def test_other_amplitudes_and_a_stop() -> None:
     """Sines by displacement or acceleration are the sine, to the bit where their numbers are; a stop is V = 0."""
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
 
     def end(drive):
-        system = sb.System(model, paper.CONTACT, sb.Striker(drive=drive))
+        system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive))
         return sb.simulate(system, sb.Integration(cycles=1)).final_state.amplitude
 
     sine = end(sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.25))

@@ -12,7 +12,7 @@ from uneven_beam import UnevenBeam
 from world_oracle import Tip, follow
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.registry import resolve
 from snapbeam.util.status_codes import RunStatus
@@ -35,12 +35,12 @@ def imperfection(
 
 
 def model_of(modes: int, **given: float) -> sb.ReducedModel:
-    return sb.ReducedModel.from_beam(paper.BEAM, modes=modes, imperfection=imperfection(**given))
+    return sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, imperfection=imperfection(**given))
 
 
 def add_base_acceleration(model: sb.ReducedModel, ratio: float, velocity: float, **more) -> sb.System:
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
-    return sb.System(model, paper.CONTACT, sb.Striker(drive=drive, location=LOCATION, **more))
+    return sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION, **more))
 
 
 @pytest.mark.slow
@@ -116,7 +116,7 @@ def test_no_equilibrium_is_missed(seed) -> None:
 
 
 def test_nothing_is_bit_for_bit_the_perfect_beam() -> None:
-    perfect = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+    perfect = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
     system = add_base_acceleration(model_of(3), 1.21, 0.2)
     assert system == add_base_acceleration(perfect, 1.21, 0.2)
     assert system.model.imperfection is None
@@ -150,7 +150,9 @@ def test_mirror_image() -> None:
     """The mirrored system's mirrored run, to the last bit."""
     given = {"rise": 9e-6, "skew": 4e-6, "force": 0.03, "at": 0.3}
     model = model_of(3, **given)
-    mirrored = sb.ReducedModel.from_beam(paper.BEAM, modes=3, imperfection=model.imperfection.mirrored)
+    mirrored = sb.ReducedModel.from_beam(
+        default_values.BEAM, modes=3, imperfection=model.imperfection.mirrored
+    )
     np.testing.assert_array_equal(mirrored.wells[::-1], -model.wells)
     for velocity in (0.1, 0.2, 0.35):
         below = sb.advance(add_base_acceleration(model, 1.3, velocity), periods=5)
@@ -163,13 +165,13 @@ def test_mirror_image() -> None:
 def test_a_run_knows_nothing_of_the_others_of_its_batch() -> None:
     """Where the tip is at rest, to the last bit, whichever other places are asked for with it."""
     model = sb.ReducedModel.from_beam(
-        paper.BEAM,
+        default_values.BEAM,
         modes=3,
         imperfection=sb.Imperfection(
             midspan_amplitude=4e-6, antisymmetric_amplitude=3e-6, point_load=0.01, uniform_load=0.02
         ),
     )
-    system = sb.System(model, paper.CONTACT, sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.2))
+    system = sb.System(model, default_values.CONTACT, sb.Shaker(frequency_ratio=1.3, velocity_amplitude=0.2))
     places = np.linspace(0.15, 0.85, 41)
     together = make_ensemble(system, sb.Integration(), {"striker.location": places})
     for i, place in enumerate(places):

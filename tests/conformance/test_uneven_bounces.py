@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from uneven_beam import UnevenBeam
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 RISE, RATIO, VELOCITY, KEEPS, CYCLES = 3e-6, 1.21, 0.25, 0.8, 6
 
@@ -66,7 +66,7 @@ def deepest_omega(beam) -> float:
 def test_against_an_event_driven_solution() -> None:
     """1e-3 b at level *map*, 1e-7 b at level *reference*, crossings to the other well on the way."""
     model = sb.ReducedModel.from_beam(
-        paper.BEAM, modes=1, imperfection=sb.Imperfection(midspan_amplitude=RISE)
+        default_values.BEAM, modes=1, imperfection=sb.Imperfection(midspan_amplitude=RISE)
     )
     striker = sb.Shaker(frequency_ratio=RATIO, velocity_amplitude=VELOCITY)
     system = sb.System(model, sb.Restitution(KEEPS), striker)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from oracle import LEVEL
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 SINE = {"drive.frequency_ratio": (0.3, 3.5), "drive.velocity_amplitude": (0.02, 0.6)}
 PLACE = {"striker.location": (0.15, 0.85)}
@@ -28,7 +28,7 @@ class World:
 
     parts: Callable[[sb.ReducedModel], dict[str, object]]
     varied: dict[str, tuple[float, float]]
-    beam: sb.Beam = paper.BEAM
+    beam: sb.Beam = default_values.BEAM
     imperfection: sb.Imperfection | None = None
     modes: int = 3
     fewest: int = 1
@@ -83,7 +83,7 @@ def mirror_image(system: sb.System) -> sb.System:
     return sb.System(model, system.contact, striker, **more)  # type: ignore[arg-type]
 
 
-def struck(drive: sb.Drive, contact: sb.ContactLaw = paper.CONTACT, **striker: object):
+def struck(drive: sb.Drive, contact: sb.ContactLaw = default_values.CONTACT, **striker: object):
     return lambda model: {"contact": contact, "striker": sb.Striker(drive=drive, **striker)}
 
 
@@ -95,7 +95,7 @@ def on_a_base(motion: sb.Drive, **more: object):
     """A stop beside a beam that is shaken."""
     stop = sb.Striker(drive=sb.FixedStop(), gap=0.05 * LEVEL)
     return lambda model: {
-        "contact": paper.CONTACT,
+        "contact": default_values.CONTACT,
         "striker": stop,
         "base": sb.BaseExcitation(motion=motion, **more),
     }
@@ -118,12 +118,12 @@ def record(model: sb.ReducedModel) -> dict[str, object]:
         sampling_frequency=rate,
         frequency=frequency,
     )
-    return {"contact": paper.CONTACT, "striker": sb.Striker(drive=drive)}
+    return {"contact": default_values.CONTACT, "striker": sb.Striker(drive=drive)}
 
 
 def loaded(motion: sb.LoadMotion):
     return lambda model: {
-        "contact": paper.CONTACT,
+        "contact": default_values.CONTACT,
         "striker": sb.Striker(drive=sine()),
         "axial": sb.AxialLoadModulation(motion=motion),
     }
@@ -131,7 +131,7 @@ def loaded(motion: sb.LoadMotion):
 
 def harvested(harvester: sb.Harvester):
     return lambda model: {
-        "contact": paper.CONTACT,
+        "contact": default_values.CONTACT,
         "striker": sb.Striker(drive=sine()),
         "harvester": harvester,
     }
@@ -148,7 +148,7 @@ BURST = sb.Burst(
 CHIRP = sb.Chirp(start_ratio=0.8, stop_ratio=2.0, velocity_amplitude=0.25, sweep_cycles=8.0)
 NOISE = sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.2, seed=3, ramp_up_cycles=1.0)
 TWO = sb.TwoTone(frequency_ratio=1.2, velocity_amplitude=0.2, second_ratio=2.4, second_amplitude=0.1)
-SPRUNG = paper.BEAM.replace(
+SPRUNG = default_values.BEAM.replace(
     boundary=sb.BoundaryConditions(
         left_rotational_stiffness=40.0, right_rotational_stiffness=5.0, axial_support_stiffness=2e7
     )
@@ -222,7 +222,7 @@ WORLDS: dict[str, World] = {
     ),
     "two strikers": World(
         lambda model: {
-            "contact": [paper.CONTACT, sb.PowerLaw.from_stiffness(4e11, 2.0)],
+            "contact": [default_values.CONTACT, sb.PowerLaw.from_stiffness(4e11, 2.0)],
             "striker": [
                 sb.Striker(drive=sine()),
                 sb.Striker(drive=sb.DisplacementSine(frequency_ratio=2.6, displacement_amplitude=0.05), location=0.3,
@@ -238,7 +238,7 @@ WORLDS: dict[str, World] = {
     "a given load": World(
         struck(sine()),
         SINE | PLACE,
-        beam=paper.BEAM.replace(axial_load=1.5 * paper.BEAM.critical_load),
+        beam=default_values.BEAM.replace(axial_load=1.5 * default_values.BEAM.critical_load),
         reference_frequency=80.0,
         own_kernel=False,
     ),
@@ -274,7 +274,7 @@ WORLDS: dict[str, World] = {
     ),
     "a bit of all": World(
         lambda model: {
-            "contact": paper.CONTACT,
+            "contact": default_values.CONTACT,
             "striker": sb.Striker(drive=sine(), mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=1e-5),
             "base": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1)),
             "axial": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0)),

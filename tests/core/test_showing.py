@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.util.diagnostics import counting, sharing
 
 
 @pytest.fixture(scope="module")
 def system():
     striker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
-    return sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=1), paper.CONTACT, striker)
+    return sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes=1), default_values.CONTACT, striker)
 
 
 def test_short_words_and_tables(system):

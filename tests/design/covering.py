@@ -155,11 +155,13 @@ def waveforms(trials: int = TRIALS) -> Counted:
     """
     from test_waveforms import PRIOR, found, measured, nominal_system
 
-    from snapbeam import paper
+    from snapbeam.model import default_values
 
     nominal, draw, held = nominal_system(), np.random.default_rng(17), []
     known = np.array(list(PRIOR.values()))
-    start = np.array([paper.BEAM.thickness, paper.BEAM.buckling_level, paper.CONTACT.stiffness])
+    start = np.array(
+        [default_values.BEAM.thickness, default_values.BEAM.buckling_level, default_values.CONTACT.stiffness]
+    )
     for trial in range(trials):
         logs = known * draw.standard_normal(3)
         said = found(measured(nominal, logs, draw), trial)

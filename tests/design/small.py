@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 
 def small_system(modes: int = 1, **shaker: float) -> sb.System:
     """The paper's beam with few modes."""
     drive = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18} | shaker
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes, damping_ratio=paper.DAMPING_RATIO)
-    return sb.System(model, paper.CONTACT, sb.Shaker(**drive).striker())
+    model = sb.ReducedModel.from_beam(
+        default_values.BEAM, modes=modes, damping_ratio=default_values.DAMPING_RATIO
+    )
+    return sb.System(model, default_values.CONTACT, sb.Shaker(**drive).striker())

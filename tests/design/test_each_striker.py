@@ -7,10 +7,10 @@ import pytest
 from small import small_system
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.util.validation import InputError
 
-GAP = 0.1 * paper.BEAM.buckling_level
+GAP = 0.1 * default_values.BEAM.buckling_level
 SPREAD = sb.uncertainty.ParameterUncertainty(
     of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)}
 )
@@ -21,7 +21,7 @@ def between_two() -> sb.System:
     """The paper's beam under a stop."""
     one = small_system(3)
     stop = sb.Striker(drive=sb.FixedStop(), location=0.5, side="above", gap=GAP)
-    return sb.System(one.model, paper.CONTACT, [one.striker, stop])
+    return sb.System(one.model, default_values.CONTACT, [one.striker, stop])
 
 
 def test_a_statistic_of_one() -> None:

@@ -8,8 +8,8 @@ import pytest
 from small import small_system
 
 import snapbeam as sb
-from snapbeam import paper
 from snapbeam.lab.calibration import calibrate
+from snapbeam.model import default_values
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.uncertainty.measurements import ContactTest, Measurements
 from snapbeam.util.validation import InputError
@@ -33,14 +33,14 @@ def measured_of(beam, modes: int = 2, error: float = 0.003, draw=None) -> Measur
 
 def test_it_is_that_of_the_linear_fit() -> None:
     """Small errors: medians and widths agree with those of least squares."""
-    measured = measured_of(paper.BEAM)
-    found = sb.uncertainty.estimate_posterior(measured, paper.BEAM, PRIOR, modes=2, samples=400)
-    fit = calibrate(measured, paper.BEAM, modes=2)
+    measured = measured_of(default_values.BEAM)
+    found = sb.uncertainty.estimate_posterior(measured, default_values.BEAM, PRIOR, modes=2, samples=400)
+    fit = calibrate(measured, default_values.BEAM, modes=2)
     assert found.effective_sample_size > 200.0 and not found.is_doubtful
     for name in PRIOR:
         middle, low, high = found.interval()[f"beam.{name}"]
-        assert middle == pytest.approx(getattr(paper.BEAM, name), rel=2e-3)
-        assert low < getattr(paper.BEAM, name) < high
+        assert middle == pytest.approx(getattr(default_values.BEAM, name), rel=2e-3)
+        assert low < getattr(default_values.BEAM, name) < high
         assert high - low == pytest.approx(3.92 * fit.standard_errors[name], rel=0.25)
     damping = found.interval()["model.damping_ratio"]
     assert damping[1] < 0.005 < damping[2]
@@ -51,7 +51,7 @@ def test_what_the_data_do_not_say_stays_as_it_was() -> None:
     """Density and modulus come in as a ratio: their product is as uncertain as before."""
     prior = {"young_modulus": 0.05, "density": 0.05}
     found = sb.uncertainty.estimate_posterior(
-        measured_of(paper.BEAM), paper.BEAM, prior, modes=2, samples=500
+        measured_of(default_values.BEAM), default_values.BEAM, prior, modes=2, samples=500
     ).resampled(500)
     ratio = np.log(found.values[:, 0] / found.values[:, 1])
     product = np.log(found.values[:, 0] * found.values[:, 1])
@@ -68,7 +68,7 @@ def test_intervals_cover() -> None:
 @pytest.mark.slow
 def test_what_follows_is_drawn_from_it() -> None:
     found = sb.uncertainty.estimate_posterior(
-        measured_of(paper.BEAM, error=0.02), paper.BEAM, PRIOR, modes=2, samples=400
+        measured_of(default_values.BEAM, error=0.02), default_values.BEAM, PRIOR, modes=2, samples=400
     )
     spread = found.spread(of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)})
     scores = spread.normals(np.arange(2000))
@@ -85,7 +85,7 @@ def test_what_follows_is_drawn_from_it() -> None:
 
 def test_classes_weigh_samples() -> None:
     """A dot that snapped speaks for the beam that snaps there."""
-    values = np.array([[0.8], [1.25]]) * paper.BEAM.buckling_level
+    values = np.array([[0.8], [1.25]]) * default_values.BEAM.buckling_level
     found = sb.uncertainty.Posterior(("beam.buckling_level",), values, np.array([0.5, 0.5]))
     system = small_system(frequency_ratio=0.02, location=0.4)
     limit = float(sb.model.quasi_static_threshold(0.4, 0.02))
@@ -106,10 +106,12 @@ def test_classes_weigh_samples() -> None:
 
 
 def test_refusals() -> None:
-    measured = measured_of(paper.BEAM)
+    measured = measured_of(default_values.BEAM)
     with pytest.raises(InputError, match="must be one of"):
-        sb.uncertainty.estimate_posterior(measured, paper.BEAM, {"width": 0.1})
+        sb.uncertainty.estimate_posterior(measured, default_values.BEAM, {"width": 0.1})
     with pytest.raises(InputError, match="prior"):
-        sb.uncertainty.estimate_posterior(measured, paper.BEAM, {})
+        sb.uncertainty.estimate_posterior(measured, default_values.BEAM, {})
     with pytest.raises(InputError, match="straight_frequencies_se"):
-        sb.uncertainty.estimate_posterior(Measurements(straight_frequencies=[30.0]), paper.BEAM, PRIOR)
+        sb.uncertainty.estimate_posterior(
+            Measurements(straight_frequencies=[30.0]), default_values.BEAM, PRIOR
+        )

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.parameter_axes import unit_of
 from snapbeam.util.validation import InputError, InputTypeError
 
@@ -16,9 +16,9 @@ CYCLES, ERROR = 4, 5e-6
 
 
 def nominal_system(modes: int = 1, velocity: float = 0.12) -> sb.System:
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes, damping_ratio=0.005)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio=0.005)
     shaker = sb.Shaker(frequency_ratio=1.4, velocity_amplitude=velocity, location=0.3)
-    return sb.System(model, paper.CONTACT, shaker)
+    return sb.System(model, default_values.CONTACT, shaker)
 
 
 def measured(nominal: sb.System, logs: np.ndarray, draw: np.random.Generator) -> sb.uncertainty.Waveform:
@@ -26,9 +26,9 @@ def measured(nominal: sb.System, logs: np.ndarray, draw: np.random.Generator) ->
     h, b, k = np.exp(logs)
     other = nominal.replace(
         **{
-            "beam.thickness": h * paper.BEAM.thickness,
-            "beam.buckling_level": b * paper.BEAM.buckling_level,
-            "contact.stiffness": k * paper.CONTACT.stiffness,
+            "beam.thickness": h * default_values.BEAM.thickness,
+            "beam.buckling_level": b * default_values.BEAM.buckling_level,
+            "contact.stiffness": k * default_values.CONTACT.stiffness,
         }
     )
     drive = {}
@@ -47,7 +47,7 @@ def measured(nominal: sb.System, logs: np.ndarray, draw: np.random.Generator) ->
 
 def found(waveform: sb.uncertainty.Waveform, seed: int = 0) -> sb.uncertainty.Posterior:
     return sb.uncertainty.estimate_posterior(
-        None, paper.BEAM, PRIOR, waveforms=waveform, samples=200, seed=seed
+        None, default_values.BEAM, PRIOR, waveforms=waveform, samples=200, seed=seed
     )
 
 
@@ -57,7 +57,11 @@ def test_the_beam_and_the_contact_are_found() -> None:
     said = found(measured(nominal, logs, draw))
     assert said.effective_sample_size > 100.0
     assert said.parameters == ("beam.thickness", "beam.buckling_level", "contact.stiffness")
-    truth = np.exp(logs) * [paper.BEAM.thickness, paper.BEAM.buckling_level, paper.CONTACT.stiffness]
+    truth = np.exp(logs) * [
+        default_values.BEAM.thickness,
+        default_values.BEAM.buckling_level,
+        default_values.CONTACT.stiffness,
+    ]
     for (middle, low, high), value, known in zip(
         said.interval(0.99).values(), truth, PRIOR.values(), strict=True
     ):
@@ -116,12 +120,14 @@ def test_refusals() -> None:
             sb.uncertainty.Waveform(**{**given, **change})
     waveform = sb.uncertainty.Waveform(**given)
     with pytest.raises(InputError, match="measured = None: give measurements, waveforms, or both"):
-        sb.uncertainty.estimate_posterior(None, paper.BEAM, PRIOR)
+        sb.uncertainty.estimate_posterior(None, default_values.BEAM, PRIOR)
     with pytest.raises(InputTypeError, match="waveforms = 3"):
-        sb.uncertainty.estimate_posterior(None, paper.BEAM, PRIOR, waveforms=3)
+        sb.uncertainty.estimate_posterior(None, default_values.BEAM, PRIOR, waveforms=3)
     with pytest.raises(InputError, match="contact_stiffness must be one of"):
         from test_posterior import measured_of
 
-        sb.uncertainty.estimate_posterior(measured_of(paper.BEAM), paper.BEAM, PRIOR)
+        sb.uncertainty.estimate_posterior(measured_of(default_values.BEAM), default_values.BEAM, PRIOR)
     with pytest.raises(InputError, match="contact_stiffness is measured by itself"):
-        sb.uncertainty.estimate_posterior(measured_of(paper.BEAM), paper.BEAM, PRIOR, waveforms=waveform)
+        sb.uncertainty.estimate_posterior(
+            measured_of(default_values.BEAM), default_values.BEAM, PRIOR, waveforms=waveform
+        )

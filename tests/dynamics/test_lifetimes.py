@@ -7,8 +7,8 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
-from snapbeam import paper
 from snapbeam.dynamics.lifetimes import refit
+from snapbeam.model import default_values
 from snapbeam.model.state import rest_state
 
 MEASURED = {(1.21, 0.25): 32.0, (1.625, 0.3): 46.0, (2.5, 0.55): 89.0, (3.5, 0.6): 99.0}
@@ -17,7 +17,7 @@ MEASURED = {(1.21, 0.25): 32.0, (1.625, 0.3): 46.0, (2.5, 0.55): 89.0, (3.5, 0.6
 
 def system_of(modes: int, ratio: float = 1.625, velocity: float = 0.3) -> sb.System:
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
-    return sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes), paper.CONTACT, shaker)
+    return sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes), default_values.CONTACT, shaker)
 
 
 AXES = {"frequency_ratio": [1.2, 1.625], "velocity_amplitude": [0.01, 0.2, 0.3]}
@@ -150,7 +150,9 @@ def test_refusals(given, words: str) -> None:
 
 def test_a_free_beam_is_refused() -> None:
     with pytest.raises(sb.InputError, match="striker = None"):
-        sb.dynamics.lifetime_map(sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), paper.CONTACT))
+        sb.dynamics.lifetime_map(
+            sb.System(sb.ReducedModel.from_beam(default_values.BEAM, 1), default_values.CONTACT)
+        )
 
 
 def test_no_start_presses_the_tip() -> None:

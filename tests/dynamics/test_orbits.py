@@ -9,12 +9,14 @@ import pytest
 from doubles import henon, logistic
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 
 def system_of(modes: int, ratio: float, velocity: float, damping: float = 0.005) -> sb.System:
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes, damping_ratio=damping)
-    return sb.System(model, paper.CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity))
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio=damping)
+    return sb.System(
+        model, default_values.CONTACT, sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity)
+    )
 
 
 def oscillator(ratio: float, restitution: float, amplitude: float = 1.0) -> sb.System:
@@ -120,7 +122,7 @@ def test_coarse_derivatives_are_told(monkeypatch) -> None:
 def test_what_does_not_converge_says_why() -> None:
     with pytest.raises(sb.dynamics.OrbitNotFoundError, match="try another period"):
         sb.dynamics.periodic_orbit(logistic(3.9), [0.3], 7, iterations=2)
-    free = sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), paper.CONTACT)
+    free = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, 1), default_values.CONTACT)
     with pytest.raises(sb.InputError, match="striker = None"):
         sb.dynamics.periodic_orbit(free)
     with pytest.raises(sb.InputError, match="guess of 3 numbers"):

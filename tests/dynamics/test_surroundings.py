@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
 from snapbeam.dynamics.flow import Stroboscope
+from snapbeam.model import default_values
 
 DAMPING = 0.02
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=DAMPING)
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2, damping_ratio=DAMPING)
 STRIKER = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1)
 BASE = sb.BaseExcitation(
     motion=sb.AccelerationSine(frequency_ratio=1.2, acceleration_amplitude=0.2, phase=0.7)
@@ -22,8 +22,8 @@ SHAKEN = {
     "base": sb.System(MODEL, base_excitation=BASE),
     "load": sb.System(MODEL, axial_load=LOAD),
     "both": sb.System(MODEL, base_excitation=BASE, axial_load=LOAD),
-    "struck": sb.System(MODEL, contact=paper.CONTACT, striker=STRIKER, base_excitation=BASE),
-    "struck under a load": sb.System(MODEL, contact=paper.CONTACT, striker=STRIKER, axial_load=LOAD),
+    "struck": sb.System(MODEL, contact=default_values.CONTACT, striker=STRIKER, base_excitation=BASE),
+    "struck under a load": sb.System(MODEL, contact=default_values.CONTACT, striker=STRIKER, axial_load=LOAD),
 }
 
 
@@ -88,7 +88,7 @@ def test_what_does_not_repeat_is_refused(system, words):
 def test_a_start_with_a_tip_of_its_own_keeps_all_parts():
     """Holding the tip where the start says takes nothing else away: the base goes on moving, the load changing."""
     start = sb.State(amplitude=MODEL.well_amplitude, striker_position=-1.2 * MODEL.length_scale)
-    system = sb.System(MODEL, paper.CONTACT, STRIKER, start, base_excitation=BASE, axial_load=LOAD)
+    system = sb.System(MODEL, default_values.CONTACT, STRIKER, start, base_excitation=BASE, axial_load=LOAD)
     held = Stroboscope(system).system
     assert held.base_excitation == BASE and held.axial_load == LOAD
     assert np.isnan(held.initial_state.striker_position) and held.get("striker.gap") > 0.0
@@ -97,7 +97,7 @@ def test_a_start_with_a_tip_of_its_own_keeps_all_parts():
 def test_several_strikers_are_refused_by_name():
     """What is possible with them is said."""
     stop = sb.Striker(drive=sb.FixedStop(), location=0.3, side="above", gap=5e-5)
-    system = sb.System(MODEL, paper.CONTACT, [STRIKER, stop])
+    system = sb.System(MODEL, default_values.CONTACT, [STRIKER, stop])
     for ask in (Stroboscope, sb.dynamics.lyapunov_spectrum, sb.dynamics.find_attractors, sb.advance):
         with pytest.raises(sb.InputError, match="of several strikers ask for whole runs"):
             ask(system)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.structure import structure_of
 from snapbeam.util.validation import InputError
 
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=5)
-SYSTEM = sb.System(MODEL, paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=5)
+SYSTEM = sb.System(MODEL, default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))
 
 
 @pytest.mark.parametrize("side", ["below", "above"])
@@ -47,7 +47,7 @@ def test_structure_is_the_model_about_its_well(side: str) -> None:
 def test_structures_are_told_apart_by_their_numbers() -> None:
     hashes = {
         structure_of(model, side).hash
-        for model in (MODEL, sb.ReducedModel.from_beam(paper.BEAM, 5, damping_ratio=0.01))
+        for model in (MODEL, sb.ReducedModel.from_beam(default_values.BEAM, 5, damping_ratio=0.01))
         for side in ("below", "above")
     }
     assert len(hashes) == 4
@@ -75,14 +75,14 @@ def test_the_tip_touches_unless_a_gap_is_given() -> None:
         return float(make_ensemble(SYSTEM.replace(**changes), sb.Integration(cycles=1)).runs["offset"][0])
 
     assert offset() == 0.0
-    stroke = 0.18 / 1.21 * paper.BEAM.buckling_level
+    stroke = 0.18 / 1.21 * default_values.BEAM.buckling_level
     assert offset(**{"drive.phase": 0.5}) == pytest.approx(-stroke * math.sin(0.5), rel=1e-12)
     assert offset(**{"striker.gap": 1e-4}) == -1e-4
     assert offset(**{"striker.gap": -1e-5}) == 1e-5
     for side, sign in (("below", 1.0), ("above", -1.0)):
         given = {"striker.side": side}
         struck = SYSTEM.replace(**given)
-        rest = sign * float(MODEL.shape_at(paper.LOCATION) @ MODEL.well_amplitude)
+        rest = sign * float(MODEL.shape_at(default_values.LOCATION) @ MODEL.well_amplitude)
         placed = struck.replace(**{"initial_state.striker_position": rest - sign * 2e-5})
         found = make_ensemble(placed, sb.Integration(cycles=1)).runs["offset"][0]
         assert found == pytest.approx(-2e-5, rel=1e-9), side

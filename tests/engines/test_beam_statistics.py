@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.state import rest_state
 from snapbeam.solver.statistics import Statistic, register, withdraw
 from snapbeam.sweeps.replicates import Replicates, perturbed_start
 
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
 MASS = 0.02
 SUSPENDED = sb.Striker(
     drive=sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.2),
@@ -49,7 +49,7 @@ def assert_of_beam(run: sb.Run) -> None:
 
 @pytest.mark.parametrize("name", ["suspended", pytest.param("two strikers", marks=pytest.mark.slow)])
 def test_statistics_are_those_of_the_recorded_beam(name) -> None:
-    run = recorded(sb.System(MODEL, paper.CONTACT, STRUCK[name]), sb.Integration(cycles=6))
+    run = recorded(sb.System(MODEL, default_values.CONTACT, STRUCK[name]), sb.Integration(cycles=6))
     assert run.outcome.impacts > 1
     assert_of_beam(run)
 
@@ -63,7 +63,7 @@ def test_a_sphere_that_flies_away_leaves_no_trace_in_the_statistics() -> None:
     register(own)
     try:
         how = sb.Integration(cycles=6, high_frequency_ratio=2.0)
-        run = recorded(sb.System(MODEL, paper.CONTACT, SPHERE), how)
+        run = recorded(sb.System(MODEL, default_values.CONTACT, SPHERE), how)
     finally:
         withdraw("own_peak")
     assert float(run.end.striker_rate) < -0.1, "it flies away"
@@ -96,7 +96,7 @@ def test_energy_in_a_circuit_is_not_in_the_modes() -> None:
 
 def test_replicates_keep_the_state_of_the_striker() -> None:
     start = sb.State(amplitude=MODEL.equilibrium, striker_shift=-1e-4, striker_rate=0.03)
-    system = sb.System(MODEL, paper.CONTACT, SUSPENDED, start)
+    system = sb.System(MODEL, default_values.CONTACT, SUSPENDED, start)
     begun = perturbed_start(system, Replicates(2), 1)
     assert float(begun.striker_shift) == -1e-4 and float(begun.striker_rate) == 0.03
     assert (begun.amplitude != start.amplitude).all()

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.contact.base import LAWS
 from snapbeam.model.parameters import lookup, parameters
 from snapbeam.solver.statistics import STATISTICS, unregister
@@ -143,7 +143,7 @@ def test_a_beam_struck_by_a_spring(own, tmp_path) -> None:
     """The ledger closes, classes are decided early, and a system with the law is saved and read back."""
     law, *_ = own
     system = sb.System(
-        sb.ReducedModel.from_beam(paper.BEAM, modes=4, damping_ratio=0.0), law(2e6),
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=4, damping_ratio=0.0), law(2e6),
         sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.05),
     )  # fmt: skip
     axes = {"contact.stiffness": [5e5, 2e6], "velocity_amplitude": [0.02, 0.3, 0.5]}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.statistics import (
     ACCUMULATORS,
     STATISTICS,
@@ -20,13 +20,13 @@ from snapbeam.solver.statistics import (
 )
 from snapbeam.util.validation import InputError
 
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=8)
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=8)
 
 
 def run_of(pair: tuple[float, float], cycles: int, side: str = "below") -> tuple[sb.Run, sb.Run]:
     """A run, and the same one sampled densely and evenly."""
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1], location=0.4, side=side)
-    system, kernel_input = sb.System(MODEL, paper.CONTACT, shaker), sb.Integration(cycles=cycles)
+    system, kernel_input = sb.System(MODEL, default_values.CONTACT, shaker), sb.Integration(cycles=cycles)
     end = cycles / (pair[0] * MODEL.reference_frequency)
     return sb.simulate(system, kernel_input), sb.simulate(
         system, kernel_input, sample_times=np.linspace(0.0, end, 60_001)
@@ -118,7 +118,9 @@ def test_share_of_the_energy_in_high_modes() -> None:
 
 
 def test_a_map_has_the_statistics_of_its_runs() -> None:
-    system = sb.System(MODEL, paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18))
+    system = sb.System(
+        MODEL, default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
+    )
     kernel_input = sb.Integration(cycles=4)
     ds = sb.sweep(system, {"velocity_amplitude": [0.18, 0.3]}, kernel_input)
     assert set(STATISTICS) == set(ds.data_vars)
@@ -158,7 +160,7 @@ def test_a_formula_of_what_is_kept_costs_no_compilation() -> None:
         "mean_force", "float64", "N", "mean contact force over the time of the run",
         lambda reading: reading.seen("total_impulse") / reading.duration,
     )  # fmt: skip
-    system = sb.System(MODEL, paper.CONTACT, sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.02))
+    system = sb.System(MODEL, default_values.CONTACT, sb.Shaker(frequency_ratio=1.4, velocity_amplitude=0.02))
     register(row)
     try:
         run = sb.simulate(system, sb.Integration(cycles=4))

@@ -8,34 +8,34 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.step_size import choose_base_step
 
 
 @pytest.mark.parametrize("modes", [1, 2, 5, 16, 32, 48, 64, 128])
 @pytest.mark.parametrize("accuracy", ["map", "reference"])
 def test_steps_in_contact_resolve_the_impact_and_the_fastest_mode(modes: int, accuracy: str) -> None:
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes)
-    plan = choose_base_step(model, paper.CONTACT, accuracy=accuracy)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes)
+    plan = choose_base_step(model, default_values.CONTACT, accuracy=accuracy)
     longest = plan.step / 2**plan.coarsest
     assert longest * model.omega.max() <= math.pi
     if accuracy == "reference":
         assert plan.step * model.omega.max() <= 4.0
     speed = 0.2 * model.length_scale * 2.0 * math.pi * model.reference_frequency
     mass = min(model.contact_mass(x) for x in np.linspace(0.02, 0.5, 25))
-    assert longest <= paper.CONTACT.impact_duration(mass, speed) / 6.0 * (1.0 + 1e-12)
+    assert longest <= default_values.CONTACT.impact_duration(mass, speed) / 6.0 * (1.0 + 1e-12)
     assert plan.finest > plan.coarsest
 
 
 @pytest.mark.parametrize("modes", [64, 128])
 def test_many_modes_are_as_good_as_few(modes: int) -> None:
     """A snap-through within five cycles; with steps that the impact alone decides, 128 modes are off by 3e-2."""
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes)
     shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
     times = np.linspace(0.0, 5.0 / (1.21 * model.reference_frequency), 101)[1:] * (1.0 - 1e-12)
     fine, coarse = (
         sb.simulate(
-            sb.System(model, paper.CONTACT, shaker),
+            sb.System(model, default_values.CONTACT, shaker),
             sb.Integration(cycles=5, accuracy=level),
             sample_times=times,
         ).dataset.displacement_at_striker

@@ -6,16 +6,16 @@ import matplotlib.pyplot as plt
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.plot.schematic import plot_system
 from snapbeam.util.validation import InputError
 
-LEVEL = paper.BEAM.buckling_level
+LEVEL = default_values.BEAM.buckling_level
 
 
 @pytest.fixture
 def model():
-    return sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+    return sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
 
 
 def words(figure) -> str:
@@ -34,14 +34,14 @@ def test_says_what_signs_do_not(model) -> None:
     assert "gap 0.1 $b$" in said
     assert "= 20 g" in said
     pressed = sb.Striker(drive=sb.FixedStop(), gap=-0.2 * LEVEL)
-    assert "preload 0.2 $b$" in words(plot_system(sb.System(model, paper.CONTACT, pressed)))
+    assert "preload 0.2 $b$" in words(plot_system(sb.System(model, default_values.CONTACT, pressed)))
 
 
 def test_beam_and_tip_are_where_they_are(model) -> None:
     striker = sb.Striker(
         drive=sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=0.5 * LEVEL, side="above", location=0.5
     )
-    figure = plot_system(sb.System(model, paper.CONTACT, striker))
+    figure = plot_system(sb.System(model, default_values.CONTACT, striker))
     solid = next(line for line in figure.axes[0].lines if line.get_linewidth() == 1.8)
     assert solid.get_ydata().max() == pytest.approx(1.0, abs=1e-3)
     tip = next(patch for patch in figure.axes[0].patches if hasattr(patch, "radius"))
@@ -64,12 +64,12 @@ def test_free_beam_and_refusal(model) -> None:
 
 def test_unequal_wells_and_what_makes_them(model) -> None:
     uneven = sb.ReducedModel.from_beam(
-        paper.BEAM,
+        default_values.BEAM,
         modes=3,
         imperfection=sb.Imperfection(midspan_amplitude=1.5e-5, point_load=-0.02, point_location=0.3),
     )
     figure = plot_system(
-        sb.System(uneven, paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))
+        sb.System(uneven, default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2))
     )
     solid, dashed = (
         next(line for line in figure.axes[0].lines if line.get_linewidth() == width) for width in (1.8, 0.8)

@@ -9,7 +9,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 import snapbeam as sb
-from snapbeam import paper, plot as plots
+from snapbeam import plot as plots
+from snapbeam.model import default_values
 from snapbeam.plot.style import caption
 from snapbeam.util.validation import InputError
 
@@ -23,8 +24,8 @@ def _close():
 @pytest.fixture(scope="module")
 def run():
     system = sb.System(
-        sb.ReducedModel.from_beam(paper.BEAM, modes=3),
-        contact=paper.CONTACT,
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=3),
+        contact=default_values.CONTACT,
         striker=sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
     )
     return sb.simulate(system, sb.Integration(cycles=12))

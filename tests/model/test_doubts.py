@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.util import diagnostics
 
 SHAKER = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1)
@@ -19,10 +19,10 @@ def nothing_told(monkeypatch):
     monkeypatch.setattr(diagnostics, "_told", set())
 
 
-def system(beam: sb.Beam = paper.BEAM, modes: int = 1, **drive) -> sb.System:
+def system(beam: sb.Beam = default_values.BEAM, modes: int = 1, **drive) -> sb.System:
     model = sb.ReducedModel.from_beam(beam, modes)
     given = {"frequency_ratio": 1.2, "velocity_amplitude": 0.1} | drive
-    return sb.System(model, paper.CONTACT, sb.Shaker(**given))
+    return sb.System(model, default_values.CONTACT, sb.Shaker(**given))
 
 
 def codes(of: sb.System) -> list[str]:
@@ -31,7 +31,7 @@ def codes(of: sb.System) -> list[str]:
 
 def deep(level: float) -> sb.Beam:
     """Buckled by *level* radii of gyration."""
-    return paper.BEAM.replace(buckling_level=level * paper.BEAM.radius_of_gyration)
+    return default_values.BEAM.replace(buckling_level=level * default_values.BEAM.radius_of_gyration)
 
 
 def test_the_papers_own_system_is_beyond_doubt() -> None:
@@ -54,7 +54,8 @@ def test_beams(changes, code: str, words: str) -> None:
     import re
 
     found = {
-        diagnostic.code: diagnostic for diagnostic in system(paper.BEAM.replace(**changes)).diagnostics()
+        diagnostic.code: diagnostic
+        for diagnostic in system(default_values.BEAM.replace(**changes)).diagnostics()
     }
     assert re.search(words, found[code].message), found[code].message
 
@@ -94,7 +95,7 @@ def told(call) -> list[str]:
 
 
 def test_told_once_and_where_the_caller_stands() -> None:
-    odd = system(paper.BEAM.replace(density=7.8))
+    odd = system(default_values.BEAM.replace(density=7.8))
     asked = sb.Integration(cycles=1)
 
     def run() -> None:
@@ -116,6 +117,6 @@ def test_axes_are_doubted_too() -> None:
     asked = sb.Integration(cycles=1)
     said = told(lambda: sb.sweep(system(), {"frequency_ratio": [50.0, 100.0]}, asked))
     assert len(said) == 2 and all("is it given in Hz?" in each for each in said)
-    levels = paper.BEAM.radius_of_gyration * np.array([3.0, 6.3])
+    levels = default_values.BEAM.radius_of_gyration * np.array([3.0, 6.3])
     said = told(lambda: sb.sweep(system(modes=2), {"beam.buckling_level": levels}, asked))
     assert len(said) == 1 and "antisymmetric" in said[0]

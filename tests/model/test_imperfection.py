@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.buckling_modes import BucklingModes
 from snapbeam.model.early_termination import crossing_energy
 from snapbeam.model.equilibria import equilibria_of, least_energy_through
@@ -14,12 +14,12 @@ from snapbeam.model.imperfection_identification import identify_imperfection
 from snapbeam.model.parameter_file import config_from_mapping
 from snapbeam.util.validation import InputError
 
-LENGTH = paper.BEAM.length
-LEVEL = paper.BEAM.buckling_level
+LENGTH = default_values.BEAM.length
+LEVEL = default_values.BEAM.buckling_level
 
 
 def model_of(modes: int = 4, **given) -> sb.ReducedModel:
-    return sb.ReducedModel.from_beam(paper.BEAM, modes=modes, imperfection=sb.Imperfection(**given))
+    return sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, imperfection=sb.Imperfection(**given))
 
 
 def test_shapes_are_what_they_say() -> None:
@@ -56,11 +56,13 @@ def test_loads_are_what_they_say() -> None:
     nodes, weights = np.polynomial.legendre.leggauss(100)
     areas = modes.shape(0.5 * LENGTH * (1.0 + nodes)) @ (0.5 * LENGTH * weights)
     np.testing.assert_allclose(modes.integral, areas, rtol=0.0, atol=1e-14 * areas.max())
-    uniform = sb.Imperfection(uniform_load=0.3).transverse_load(modes, paper.BEAM)
+    uniform = sb.Imperfection(uniform_load=0.3).transverse_load(modes, default_values.BEAM)
     np.testing.assert_allclose(uniform, 0.3 * areas, rtol=0.0, atol=1e-13 * areas.max())
-    weight = sb.Imperfection(gravity=9.81).transverse_load(modes, paper.BEAM)
-    np.testing.assert_allclose(weight, -9.81 * paper.BEAM.mass_per_length / 0.3 * uniform, rtol=1e-14)
-    point = sb.Imperfection(point_load=0.2, point_location=0.3).transverse_load(modes, paper.BEAM)
+    weight = sb.Imperfection(gravity=9.81).transverse_load(modes, default_values.BEAM)
+    np.testing.assert_allclose(
+        weight, -9.81 * default_values.BEAM.mass_per_length / 0.3 * uniform, rtol=1e-14
+    )
+    point = sb.Imperfection(point_load=0.2, point_location=0.3).transverse_load(modes, default_values.BEAM)
     np.testing.assert_allclose(point, 0.2 * modes.shape(0.3 * LENGTH), rtol=1e-14)
     # a load upward lifts both wells, one downward lowers them
     assert (
@@ -84,7 +86,7 @@ def test_gone_past_a_fold() -> None:
     assert not past.is_bistable
     assert len(past.equilibria) == 1
     np.testing.assert_array_equal(past.wells[0], past.wells[1])
-    system = sb.System(past, paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))
+    system = sb.System(past, default_values.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1))
     assert "monostable" in [each.code for each in system.diagnostics()]
     with pytest.raises(InputError, match="this imperfection leaves one"):
         past.saddle_energy  # noqa: B018
@@ -151,7 +153,7 @@ def test_bound_behind_early_decision(modes) -> None:
     # without a side force it is that of equal wells
     from snapbeam.model.early_termination import least_energy_at
 
-    plain = sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
+    plain = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     none = least_energy_through(
         plain.stiffness,
         plain.nonlinear_stiffness,
@@ -165,23 +167,25 @@ def test_bound_behind_early_decision(modes) -> None:
 def test_measured_wells_are_explained() -> None:
     """The paper's own beam: 81.3 and 80.5 Hz."""
     for kind in ("rise", "point_load", "uniform_load"):
-        model = identify_imperfection(paper.BEAM, 81.3, 80.5, kind)
+        model = identify_imperfection(default_values.BEAM, 81.3, 80.5, kind)
         np.testing.assert_allclose(model.well_frequencies[:, 0], [81.3, 80.5], rtol=1e-6)
         assert model.beam.buckling_level == pytest.approx(0.331e-3, abs=1e-6)
-        mirrored = identify_imperfection(paper.BEAM, 80.5, 81.3, kind)
+        mirrored = identify_imperfection(default_values.BEAM, 80.5, 81.3, kind)
         assert getattr(mirrored.imperfection, kind) == pytest.approx(
             -getattr(model.imperfection, kind), rel=1e-5
         )
-    assert identify_imperfection(paper.BEAM, 81.3, 80.5).imperfection.midspan_amplitude == pytest.approx(
-        -1.17e-6, abs=0.01e-6
-    )
+    assert identify_imperfection(
+        default_values.BEAM, 81.3, 80.5
+    ).imperfection.midspan_amplitude == pytest.approx(-1.17e-6, abs=0.01e-6)
     with pytest.raises(InputError, match="no load of this beam"):
-        identify_imperfection(paper.BEAM, 400.0, 20.0)
+        identify_imperfection(default_values.BEAM, 400.0, 20.0)
 
 
 def test_by_dotted_name_and_in_files(tmp_path) -> None:
     system = sb.System(
-        model_of(rise=1e-5, skew=2e-6), paper.CONTACT, sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1)
+        model_of(rise=1e-5, skew=2e-6),
+        default_values.CONTACT,
+        sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1),
     )
     assert system.get("imperfection.midspan_amplitude") == 1e-5
     other = system.replace(**{"imperfection.point_load": 0.01, "beam.thickness": 4.2e-4, "model.modes": 5})
@@ -221,7 +225,7 @@ def test_by_dotted_name_and_in_files(tmp_path) -> None:
 
 def test_swept_by_name() -> None:
     system = sb.System(
-        sb.ReducedModel.from_beam(paper.BEAM, modes=2), paper.CONTACT,
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=2), default_values.CONTACT,
         sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2),
     )  # fmt: skip
     axes = {"imperfection.midspan_amplitude": [-1e-5, 0.0, 1e-5], "velocity_amplitude": [0.1, 0.3]}

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.state import amplitude_scale, rest_state, started
 from snapbeam.util.validation import InputError, InputTypeError
 
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
 BELOW, ABOVE = (
     sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1, side=side).striker() for side in ("below", "above")
 )
@@ -104,7 +104,9 @@ def test_amplitudes_are_counted_in_that_of_the_well() -> None:
     assert float(state.striker_position) == 2e-4
     # the centre of the upper well: amplitude[1] = 1 is b up
     up = started(MODEL, BELOW, None, {"amplitude[1]": 1.0})
-    assert float(MODEL.midspan_shape @ up.amplitude) == pytest.approx(paper.BEAM.buckling_level, rel=1e-12)
+    assert float(MODEL.midspan_shape @ up.amplitude) == pytest.approx(
+        default_values.BEAM.buckling_level, rel=1e-12
+    )
     # of a structure with one well: what moves the centre by the length scale
     spring = sb.ReducedModel.from_matrices([[1.0]], [1.0], contact_shape=[2.0], length_scale=3.0)
     assert amplitude_scale(spring) == 1.5

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.contact.stress import bending_stress, hertz_stress
 from snapbeam.util.validation import InputError
 
@@ -40,8 +40,8 @@ def test_pressure_carries_the_force() -> None:
 
 def test_bending_of_the_well() -> None:
     """w = -(b/2)(1 - cos 2 pi x/L): E h/2 times b/2 (2 pi/L)^2."""
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=5)
-    beam = paper.BEAM
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=5)
+    beam = default_values.BEAM
     expected = (
         0.25 * beam.young_modulus * beam.thickness * beam.buckling_level * (2.0 * math.pi / beam.length) ** 2
     )

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.util.validation import InputError, InputTypeError
 
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=3)
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
 SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
-PLAIN = sb.System(MODEL, paper.CONTACT, SHAKER)
+PLAIN = sb.System(MODEL, default_values.CONTACT, SHAKER)
 
 
 def record(samples: int = 400, last: float = 0.0) -> sb.Striker:
@@ -58,11 +58,15 @@ SYSTEMS = {
     "gap": PLAIN.replace(**{"striker.gap": -1e-4, "drive.phase": 1.0}),
     "load": PLAIN.replace(**{"beam.axial_load": 36.0}),
     "damping by mode": sb.System(
-        sb.ReducedModel.from_beam(paper.BEAM, modes=2, damping_ratio=[0.01, 0.02], reference_frequency=80.0),
-        paper.CONTACT,
+        sb.ReducedModel.from_beam(
+            default_values.BEAM, modes=2, damping_ratio=[0.01, 0.02], reference_frequency=80.0
+        ),
+        default_values.CONTACT,
         SHAKER,
     ),
-    "restitution": sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=1), sb.Restitution(0.6), SHAKER),
+    "restitution": sb.System(
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=1), sb.Restitution(0.6), SHAKER
+    ),
 }
 
 
@@ -302,9 +306,9 @@ def test_hash_is_the_same_tomorrow() -> None:
 
 def test_replace_keeps_everything_else() -> None:
     changed = PLAIN.replace(**{"beam.thickness": 5e-4, "striker.location": 0.3})
-    assert changed.model.beam == dataclasses.replace(paper.BEAM, thickness=5e-4)
-    assert changed.model.beam.buckling_level == paper.BEAM.buckling_level
-    assert changed.model.beam.axial_load > paper.BEAM.axial_load
+    assert changed.model.beam == dataclasses.replace(default_values.BEAM, thickness=5e-4)
+    assert changed.model.beam.buckling_level == default_values.BEAM.buckling_level
+    assert changed.model.beam.axial_load > default_values.BEAM.axial_load
     assert changed.striker == dataclasses.replace(PLAIN.striker, location=0.3)
     assert changed.contact is PLAIN.contact
     assert changed.model.modes == 3
@@ -313,7 +317,7 @@ def test_replace_keeps_everything_else() -> None:
 
 
 def test_whole_parts() -> None:
-    assert PLAIN.replace(beam=paper.BEAM.replace(width=0.02)).get("beam.width") == 0.02
+    assert PLAIN.replace(beam=default_values.BEAM.replace(width=0.02)).get("beam.width") == 0.02
     assert (
         PLAIN.replace(drive=sb.Sine(frequency_ratio=2.0, velocity_amplitude=0.1)).get("drive.frequency_ratio")
         == 2.0
@@ -321,7 +325,7 @@ def test_whole_parts() -> None:
     assert PLAIN.replace(striker=None, contact=None, start=start()).striker is None
     shaken = PLAIN.replace(striker=sb.Shaker(frequency_ratio=3.0, velocity_amplitude=0.1, location=0.2))
     assert (shaken.get("drive.frequency_ratio"), shaken.get("striker.location")) == (3.0, 0.2)
-    both = PLAIN.replace(model=sb.ReducedModel.from_beam(paper.BEAM, 2), **{"beam.width": 0.02})
+    both = PLAIN.replace(model=sb.ReducedModel.from_beam(default_values.BEAM, 2), **{"beam.width": 0.02})
     assert (both.model.modes, both.get("beam.width")) == (2, 0.02)
 
 
@@ -372,7 +376,7 @@ def test_another_number_of_modes_keeps_the_start() -> None:
             {"initial_state.amplitude[9]": 1.0},
             r"start\.amplitude\[9\]: mode = 9: must be an integer in \[1, 3\]",
         ),
-        ({"beam": paper.STRAIGHT_BEAM}, "a run needs a buckled beam: axial_load = 0 N must exceed"),
+        ({"beam": default_values.STRAIGHT_BEAM}, "a run needs a buckled beam: axial_load = 0 N must exceed"),
         ({"beam.buckling_level": 1e-3, "beam.axial_load": 30.0}, "give exactly one of the two"),
         ({"model.modes": 0}, r"modes = 0: must be an integer in \[1, 256\]"),
         ({"striker.location": 1.0}, r"location = 1.0: must be a number in \(0, 1\)"),
@@ -403,7 +407,7 @@ def test_refusals_name_what_is_not_there() -> None:
     with pytest.raises(InputError, match="beam: this model was given by matrices, it has no beam"):
         SYSTEMS["matrices"].replace(**{"beam.length": 0.2})
     with pytest.raises(InputTypeError):
-        sb.System(MODEL, paper.CONTACT, "shaker")  # type: ignore[arg-type]
+        sb.System(MODEL, default_values.CONTACT, "shaker")  # type: ignore[arg-type]
     with pytest.raises(dataclasses.FrozenInstanceError):
         PLAIN.contact = sb.HertzContact(1.0)  # type: ignore[misc]
 
@@ -419,5 +423,5 @@ def test_described() -> None:
 
 
 def test_scale() -> None:
-    assert PLAIN.scale.length == paper.BEAM.buckling_level
+    assert PLAIN.scale.length == default_values.BEAM.buckling_level
     assert PLAIN.scale.omega == pytest.approx(2.0 * np.pi * MODEL.reference_frequency)

@@ -21,8 +21,8 @@ EXTRAS = ("lab", "video", "cluster", "explorer", "cuda")
 """What users install; the others are for working on snapbeam."""
 
 _SYSTEM = (
-    "import snapbeam as sb; from snapbeam import paper; "
-    "system = sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=1), paper.CONTACT, "
+    "import snapbeam as sb; from snapbeam.model import default_values; "
+    "system = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes=1), default_values.CONTACT, "
     "sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2)); "
 )
 _CORE = (

@@ -34,7 +34,7 @@ import numpy as np
 import xarray as xr
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.util.files import NoRoomError
 from snapbeam.util.validation import InputError
 
@@ -45,9 +45,9 @@ _NOT_WALKED = ("cli", "explorer", "__main__", "paper")
 """Commands are taken from the program itself; a server and the making of the paper take as long as they should."""
 _LONG_COMMANDS = ("paper", "explore")
 
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
 SHAKER = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3)
-SYSTEM = sb.System(MODEL, paper.CONTACT, SHAKER)
+SYSTEM = sb.System(MODEL, default_values.CONTACT, SHAKER)
 SHORT = sb.Integration(cycles=1)
 DATASET = xr.Dataset({"a": ("x", [1.0, 2.0])})
 
@@ -74,7 +74,7 @@ HOSTILE: list[Any] = [
     np.array([np.nan, 1.0]), np.zeros((2, 2)), np.zeros((2, 3, 4)), np.array([1j]), np.array(["a"]),
     np.array([True, False]), np.ma.array([0.1, 0.2], mask=[True, False]), np.ma.masked,
     np.array([10**400], dtype=object),
-    xr.DataArray([1.0, 2.0]), DATASET, MODEL, SYSTEM, SHAKER, paper.BEAM, paper.CONTACT, SHORT, lambda *a: None,
+    xr.DataArray([1.0, 2.0]), DATASET, MODEL, SYSTEM, SHAKER, default_values.BEAM, default_values.CONTACT, SHORT, lambda *a: None,
     enum.Enum("E", "A").A, range(3), iter([1]), Path("nowhere/x.nc"), "x.nc", "x.toml", Ellipsis, int, np,
 ]  # fmt: skip
 WORDS = [
@@ -87,8 +87,8 @@ WORDS = [
 def _valid(name: str, draw: random.Random) -> Any:
     """An argument that suits a parameter of such a name, or one that does not."""
     pool = {
-        "model": MODEL, "contact": paper.CONTACT, "striker": SHAKER, "shaker": SHAKER, "system": SYSTEM,
-        "integration": SHORT, "beam": paper.BEAM, "modes": 1, "cycles": 1, "periods": 1.0, "count": 2,
+        "model": MODEL, "contact": default_values.CONTACT, "striker": SHAKER, "shaker": SHAKER, "system": SYSTEM,
+        "integration": SHORT, "beam": default_values.BEAM, "modes": 1, "cycles": 1, "periods": 1.0, "count": 2,
         "axes": {"drive.velocity_amplitude": [0.1, 0.2]}, "frequency_ratio": [0.8, 1.0],
         "velocity_amplitude": [0.1, 0.2], "location": 0.4, "length": 0.161, "thickness": 0.4e-3, "width": 15e-3,
         "density": 7800.0, "young_modulus": 200e9, "buckling_level": 0.335e-3, "stiffness": 4e8, "mass": [[1.0]],
@@ -137,7 +137,7 @@ def public() -> dict[str, Any]:
                     method = inspect.getattr_static(value, own)
                     if not own.startswith("_") and isinstance(method, classmethod):
                         found[f"{where}.{name}.{own}"] = getattr(value, own)
-    for instance in (SYSTEM, MODEL, paper.BEAM, paper.CONTACT, SHORT):
+    for instance in (SYSTEM, MODEL, default_values.BEAM, default_values.CONTACT, SHORT):
         for own in dir(type(instance)):
             if not own.startswith("_") and inspect.isfunction(inspect.getattr_static(type(instance), own)):
                 found[f"{type(instance).__name__.lower()}.{own}"] = getattr(instance, own)

@@ -12,20 +12,20 @@ import xarray as xr
 from typer.testing import CliRunner
 
 import snapbeam as sb
-from snapbeam import paper
 from snapbeam.cli.app import app
 from snapbeam.lab.signal_formats import header_values, split_unit
+from snapbeam.model import default_values
 from snapbeam.util.netcdf import read_netcdf
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("written")
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=1)
-    system = sb.System(model, paper.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1))
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
+    system = sb.System(model, default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1))
     sb.simulate(system, sb.Integration(cycles=2)).save(folder / "run.nc")
     sb.response_map(
-        model, paper.CONTACT, frequency_ratio=[1.0, 1.5], velocity_amplitude=[0.1, 0.2], cycles=5
+        model, default_values.CONTACT, frequency_ratio=[1.0, 1.5], velocity_amplitude=[0.1, 0.2], cycles=5
     ).to_netcdf(folder / "map.nc", engine="h5netcdf")
     return folder
 

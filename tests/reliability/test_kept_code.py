@@ -13,8 +13,8 @@ from snapbeam.solver.compilation import private_folder
 RUN = """
 import snapbeam as sb
 import snapbeam.lab.synthetic.exposure
-from snapbeam import paper
-system = sb.System(sb.ReducedModel.from_beam(paper.BEAM, modes=1), contact=paper.CONTACT,
+from snapbeam.model import default_values
+system = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes=1), contact=default_values.CONTACT,
                    striker=sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))
 run = sb.simulate(system, sb.Integration(cycles=1))
 print(run.outcome.status.name, float(run.dataset.displacement_at_striker[-1]).hex())

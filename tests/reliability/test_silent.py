@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.reduced_model import rank_one_eigenpairs
 from snapbeam.util.validation import InputError, InputTypeError, finite, finite_array, integer
 
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=2)
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
 
 
 class Metre(float):
@@ -30,7 +30,7 @@ HIDDEN = np.ma.array([0.1, 99.0], mask=[False, True])
         (lambda: finite_array("axis", HIDDEN), "masked array"),
         (lambda: finite("length", np.ma.masked), "masked array"),
         (lambda: finite("length", Metre(3.0)), "without a unit of their own"),
-        (lambda: sb.Beam(**{**vars_of(paper.BEAM), "length": Metre(3.0)}), "length.*without a unit"),
+        (lambda: sb.Beam(**{**vars_of(default_values.BEAM), "length": Metre(3.0)}), "length.*without a unit"),
         (lambda: sb.classify([1, np.nan], 0, 4, 1), r"crossings\[1\] = .*must be finite"),
         (lambda: sb.classify([1j], 0, 4, 1), "zero_crossings"),
         (lambda: sb.classify([True], [False], 4, 1), "zero_crossings"),

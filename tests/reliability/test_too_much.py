@@ -13,17 +13,19 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.step_size import most_steps, seconds_of
 from snapbeam.sweeps.points import points_of
 from snapbeam.util.validation import InputError
 
-MODEL = sb.ReducedModel.from_beam(paper.BEAM, modes=2)
+MODEL = sb.ReducedModel.from_beam(default_values.BEAM, modes=2)
 
 
 def system(frequency_ratio=1.0, modes=2):
-    model = MODEL if modes == 2 else sb.ReducedModel.from_beam(paper.BEAM, modes=modes)
-    return sb.System(model, paper.CONTACT, sb.Shaker(frequency_ratio=frequency_ratio, velocity_amplitude=0.3))
+    model = MODEL if modes == 2 else sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
+    return sb.System(
+        model, default_values.CONTACT, sb.Shaker(frequency_ratio=frequency_ratio, velocity_amplitude=0.3)
+    )
 
 
 def quick(function, *arguments, **options):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.step_size import choose_base_step
 from snapbeam.util.validation import InputError, InputTypeError
 
@@ -21,8 +21,8 @@ REFERENCE = sb.Integration(accuracy="reference")
 @cache
 def system_of(modes: int, ratio: float = 1.21, velocity: float = 0.18, side: str = "below") -> sb.System:
     return sb.System(
-        sb.ReducedModel.from_beam(paper.BEAM, modes),
-        paper.CONTACT,
+        sb.ReducedModel.from_beam(default_values.BEAM, modes),
+        default_values.CONTACT,
         sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, side=side),
     )
 
@@ -70,11 +70,15 @@ SYSTEMS = {
     "above": system_of(8, 1.3, 0.3, "above"),
     "many modes": system_of(32, 3.0, 0.5),
     "undriven": sb.System(
-        sb.ReducedModel.from_beam(paper.BEAM, 3),
+        sb.ReducedModel.from_beam(default_values.BEAM, 3),
         initial_state=sb.State(amplitude=[1e-3, 2e-4, 1e-5], velocity=[0.1, 0.0, 0.0]),
     ),
-    "elastic": sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), sb.Restitution(0.9), system_of(1).striker),
-    "plastic": sb.System(sb.ReducedModel.from_beam(paper.BEAM, 1), sb.Restitution(0.0), system_of(1).striker),
+    "elastic": sb.System(
+        sb.ReducedModel.from_beam(default_values.BEAM, 1), sb.Restitution(0.9), system_of(1).striker
+    ),
+    "plastic": sb.System(
+        sb.ReducedModel.from_beam(default_values.BEAM, 1), sb.Restitution(0.0), system_of(1).striker
+    ),
 }
 
 
@@ -296,8 +300,8 @@ def record(model: sb.ReducedModel) -> sb.Striker:
 
 @pytest.mark.slow
 def test_a_record_goes_on_where_it_was_and_ends() -> None:
-    model = sb.ReducedModel.from_beam(paper.BEAM, 4)
-    system = sb.System(model, paper.CONTACT, record(model))
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 4)
+    system = sb.System(model, default_values.CONTACT, record(model))
     held = system.striker.drive.duration * 100.0
     whole, half = sb.advance(system, periods=8), sb.advance(system, periods=5)
     assert float(half.phase) == pytest.approx(2.0 * math.pi * 5.0 / held, rel=1e-7)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.cpu.driver import run_ensemble
 from snapbeam.solver.statistics import statistics_of
 from snapbeam.util.diagnostics import DiagnosticWarning
 
 VIOLENT = sb.System(
-    sb.ReducedModel.from_beam(paper.BEAM, 1),
-    contact=paper.CONTACT,
+    sb.ReducedModel.from_beam(default_values.BEAM, 1),
+    contact=default_values.CONTACT,
     striker=sb.Shaker(frequency_ratio=6.8, velocity_amplitude=30.0),
 )
 
@@ -58,7 +58,7 @@ def test_energy_out_of_nothing_is_no_result() -> None:
 
 
 def test_free_vibration_is_balanced() -> None:
-    model = sb.ReducedModel.from_beam(paper.BEAM, 4)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, 4)
     start = (0.9 * np.asarray(model.well_amplitude), np.zeros(4))
     run = sb.simulate(
         sb.System(model, initial_state=sb.State(amplitude=start[0], velocity=start[1])),

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.cpu import driver
 
 SYSTEM = sb.System(
-    sb.ReducedModel.from_beam(paper.BEAM, modes=2),
-    paper.CONTACT,
+    sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
+    default_values.CONTACT,
     sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02),
 )
 
@@ -66,9 +66,9 @@ def test_progress(monkeypatch) -> None:
 
 PROGRAM = """
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 system = sb.System(
-    sb.ReducedModel.from_beam(paper.BEAM, modes=32), paper.CONTACT,
+    sb.ReducedModel.from_beam(default_values.BEAM, modes=32), default_values.CONTACT,
     sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.02),
 )
 sb.simulate(system, sb.Integration(cycles=1), sample_times=[0.0])

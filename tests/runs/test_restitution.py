@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
 
 @pytest.fixture(scope="module")
 def one_mode():
-    return sb.ReducedModel.from_beam(paper.BEAM, modes=1)
+    return sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
 
 
 def ledger(run):
@@ -142,14 +142,15 @@ def test_a_map_takes_the_law(one_mode):
 
 
 def test_many_modes_are_refused_and_the_reason_is_true():
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=8)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=8)
     shaker = sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1)
     with pytest.raises(sb.InputError, match=r"modes = 8.*one mode.*falls to zero"):
         sb.simulate(sb.System(model, sb.Restitution(0.5), shaker), sb.Integration(cycles=1))
-    beam = paper.BEAM
+    beam = default_values.BEAM
     total = beam.mass_per_length * beam.length
     masses = {
-        n: sb.ReducedModel.from_beam(beam, modes=n).contact_mass(paper.LOCATION) for n in (1, 16, 64, 256)
+        n: sb.ReducedModel.from_beam(beam, modes=n).contact_mass(default_values.LOCATION)
+        for n in (1, 16, 64, 256)
     }
     assert masses[1] > masses[16] > masses[64] > masses[256]
     assert masses[256] * 256 == pytest.approx(total, rel=0.1)  # falls like rho S L / N

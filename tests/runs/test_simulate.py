@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.model.early_termination import decidable_energy
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.util.status_codes import ResponseClass, RunStatus
@@ -21,14 +21,14 @@ ELSEWHERE = [(1.21, 0.18), (1.625, 0.3), (3.0, 0.5), (0.5, 0.4)]
 
 @cache
 def model_of(modes: int, damping_ratio: float = 0.005) -> sb.ReducedModel:
-    return sb.ReducedModel.from_beam(paper.BEAM, modes, damping_ratio)
+    return sb.ReducedModel.from_beam(default_values.BEAM, modes, damping_ratio)
 
 
 def simulate(modes: int, ratio: float, velocity: float, cycles: int, **options: Any) -> sb.Run:
     drive = {name: options.pop(name) for name in ("location", "side") if name in options}
     shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=velocity, **drive)
     sample_times, start = options.pop("sample_times", None), options.pop("start", None)
-    system = sb.System(model_of(modes), paper.CONTACT, shaker, start)
+    system = sb.System(model_of(modes), default_values.CONTACT, shaker, start)
     return sb.simulate(system, sb.Integration(cycles=cycles, **options), sample_times=sample_times)
 
 
@@ -58,9 +58,11 @@ def test_dataset() -> None:
     assert float(data.time[-1]) == pytest.approx(4.0 * period, rel=1e-14)
     np.testing.assert_allclose(data.cycle, data.time / period, rtol=1e-13)
 
-    model, scale = model_of(3), paper.BEAM.buckling_level
+    model, scale = model_of(3), default_values.BEAM.buckling_level
     alpha = data.modal_amplitude.values
-    np.testing.assert_allclose(data.displacement, alpha @ model.shape_at(paper.LOCATION) / scale, atol=1e-14)
+    np.testing.assert_allclose(
+        data.displacement, alpha @ model.shape_at(default_values.LOCATION) / scale, atol=1e-14
+    )
     np.testing.assert_allclose(data.midspan_displacement, alpha @ model.midspan_shape / scale, atol=1e-14)
     np.testing.assert_array_equal(alpha[0], model.well_amplitude)
     stroke = 0.18 / 1.21
@@ -280,10 +282,10 @@ def test_response_agrees_with_the_dataset(modes: int, pair: tuple[float, float],
     assert response.status == RunStatus.OK
     assert math.isnan(response.early_stop_time)
     # final is what the energy proves: in the far well, out of the tip's reach, with too little to come back to it
-    model, scale = model_of(modes), paper.BEAM.buckling_level
+    model, scale = model_of(modes), default_values.BEAM.buckling_level
     energy = float(shown.energy_beam[-1] + shown.energy_contact[-1])
     highest = float(shown.displacement[0]) * scale + pair[1] / pair[0] * scale
-    bound = float(decidable_energy(model, np.array([paper.LOCATION]), np.array([highest]))[0])
+    bound = float(decidable_energy(model, np.array([default_values.LOCATION]), np.array([highest]))[0])
     out_of_reach = float(shown.displacement[-1]) * scale > max(highest, 0.0)
     assert response.final_well_proven == (signs[-1] > 0 and out_of_reach and energy < bound)
 
@@ -330,7 +332,9 @@ def test_nothing_is_final_of_a_beam_that_is_still_struck() -> None:
     for velocity in np.linspace(0.05, 0.4, 36):
         shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=float(velocity))
         short, long = (
-            sb.simulate(sb.System(model, paper.CONTACT, shaker), sb.Integration(cycles=n), sample_times=[0.0])
+            sb.simulate(
+                sb.System(model, default_values.CONTACT, shaker), sb.Integration(cycles=n), sample_times=[0.0]
+            )
             for n in (10, 200)
         )
         if short.summary.final_well < 0:

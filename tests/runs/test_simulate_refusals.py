@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
-BUCKLED = sb.ReducedModel.from_beam(paper.BEAM, 2)
-STRAIGHT = sb.ReducedModel.from_beam(paper.STRAIGHT_BEAM, 2)
+BUCKLED = sb.ReducedModel.from_beam(default_values.BEAM, 2)
+STRAIGHT = sb.ReducedModel.from_beam(default_values.STRAIGHT_BEAM, 2)
 SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
 
 
@@ -23,7 +23,7 @@ SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
             sb.InputError,
             r"needs a buckled beam: axial_load = 0 N must exceed .* 24.3685 N",
         ),
-        ({"model": paper.BEAM}, sb.InputTypeError, r"model = Beam\(.*: must be a ReducedModel"),
+        ({"model": default_values.BEAM}, sb.InputTypeError, r"model = Beam\(.*: must be a ReducedModel"),
         (
             {"striker": 1.21},
             sb.InputTypeError,
@@ -66,7 +66,7 @@ def test_refusals(changes: dict[str, Any], error: type[Exception], message: str)
     given: dict[str, Any] = {
         "model": BUCKLED,
         "striker": SHAKER,
-        "contact": paper.CONTACT,
+        "contact": default_values.CONTACT,
         "cycles": 1,
         **changes,
     }
@@ -76,7 +76,7 @@ def test_refusals(changes: dict[str, Any], error: type[Exception], message: str)
         sb.simulate(sb.System(**system), sb.Integration(**given), sample_times=times)
 
 
-SYSTEM = sb.System(BUCKLED, paper.CONTACT, SHAKER)
+SYSTEM = sb.System(BUCKLED, default_values.CONTACT, SHAKER)
 
 
 @pytest.mark.parametrize(

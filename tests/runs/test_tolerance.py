@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.simulation.dataset import joined
 from snapbeam.simulation.tolerance import PERTURBATION, _perturbed
 from snapbeam.solver.assemble import make_ensemble, plans_of
@@ -21,7 +21,7 @@ CYCLES = 4
 
 
 def model_of(modes: int) -> sb.ReducedModel:
-    return sb.ReducedModel.from_beam(paper.BEAM, modes=modes, damping_ratio=0.005)
+    return sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=0.005)
 
 
 def shaker_at(omega: float, speed: float, **given) -> sb.Shaker:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.statistics import STATISTICS
 
 RATIO, VELOCITY, LOCATION = [0.8, 1.21, 1.6], [0.05, 0.18, 0.3, 0.5], [0.35, 0.5]
@@ -18,12 +18,12 @@ RATIO, VELOCITY, LOCATION = [0.8, 1.21, 1.6], [0.05, 0.18, 0.3, 0.5], [0.35, 0.5
 
 @cache
 def model_of(modes: int) -> sb.ReducedModel:
-    return sb.ReducedModel.from_beam(paper.BEAM, modes)
+    return sb.ReducedModel.from_beam(default_values.BEAM, modes)
 
 
 def make(modes: int = 1, **changes: Any):
     given: dict[str, Any] = {"frequency_ratio": RATIO, "velocity_amplitude": VELOCITY, "cycles": 6}
-    return sb.response_map(model_of(modes), paper.CONTACT, **(given | changes))
+    return sb.response_map(model_of(modes), default_values.CONTACT, **(given | changes))
 
 
 def assert_equal(one, other) -> None:
@@ -75,7 +75,7 @@ def test_every_point_is_its_run(modes: int) -> None:
         for j in (0, 2):
             shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=VELOCITY[j])
             response = sb.simulate(
-                sb.System(model_of(modes), paper.CONTACT, shaker), sb.Integration(cycles=4)
+                sb.System(model_of(modes), default_values.CONTACT, shaker), sb.Integration(cycles=4)
             ).summary
             point = {name: ds[name].values[i, j].item() for name in STATISTICS}
             np.testing.assert_equal(point, dict(response))
@@ -200,8 +200,10 @@ def test_refusals(changes: dict[str, Any], error: type[Exception], message: str)
 def test_refuses_what_is_no_system() -> None:
     axes = {"frequency_ratio": 1.0, "velocity_amplitude": 0.1, "cycles": 1}
     with pytest.raises(sb.InputError, match="needs a buckled beam: axial_load = 0 N must exceed"):
-        sb.response_map(sb.ReducedModel.from_beam(paper.STRAIGHT_BEAM, 2), paper.CONTACT, **axes)
+        sb.response_map(
+            sb.ReducedModel.from_beam(default_values.STRAIGHT_BEAM, 2), default_values.CONTACT, **axes
+        )
     with pytest.raises(sb.InputError, match="contact = None: must be a law of contact, such as HertzContact"):
         sb.response_map(model_of(1), None, **axes)  # type: ignore[arg-type]
     with pytest.raises(sb.InputTypeError, match="model = 'beam': must be a ReducedModel"):
-        sb.response_map("beam", paper.CONTACT, **axes)  # type: ignore[arg-type]
+        sb.response_map("beam", default_values.CONTACT, **axes)  # type: ignore[arg-type]

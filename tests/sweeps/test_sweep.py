@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.plot.map import plot_response_map
 from snapbeam.plot.style import save_figure
 from snapbeam.solver.statistics import STATISTICS
@@ -29,8 +29,8 @@ AXES = {
 @pytest.fixture(scope="module")
 def system() -> sb.System:
     return sb.System(
-        sb.ReducedModel.from_beam(paper.BEAM, modes=2),
-        paper.CONTACT,
+        sb.ReducedModel.from_beam(default_values.BEAM, modes=2),
+        default_values.CONTACT,
         sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3),
     )
 

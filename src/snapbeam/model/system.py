@@ -125,10 +125,10 @@ class System:
     Examples
     --------
     >>> import snapbeam as sb
-    >>> from snapbeam import paper
+    >>> from snapbeam.model import default_values
     >>> system = sb.System(
-    ...     sb.ReducedModel.from_beam(paper.BEAM, modes=8),
-    ...     contact=paper.CONTACT,
+    ...     sb.ReducedModel.from_beam(default_values.BEAM, modes=8),
+    ...     contact=default_values.CONTACT,
     ...     striker=sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
     ... )
     >>> thicker = system.replace(**{"beam.thickness": 5e-4, "striker.location": 0.3})

@@ -10,7 +10,7 @@ import pytest
 from cuda_simulator import Job, march_in_simulator
 
 import snapbeam as sb
-from snapbeam.model import default_values as paper
+from snapbeam.model import default_values
 from snapbeam.solver import registry as engines
 from snapbeam.solver.assemble import make_ensemble
 from snapbeam.solver.cpu import driver as cpu_engine
@@ -29,7 +29,7 @@ CONTACT = sb.HertzContact(stiffness=4e8)
 
 def ensemble_of(modes, ratio, velocity, cycles, accuracy="standard", location=1 / 2.1, **options) -> Ensemble:
     """Runs of the paper's beam, for a whole number of cycles or a part of one."""
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes=modes, damping_ratio=0.005)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, damping_ratio=0.005)
     ratio, velocity = np.atleast_1d(ratio).astype(float), np.atleast_1d(velocity).astype(float)
     system = sb.System(
         model, CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0, location=location)

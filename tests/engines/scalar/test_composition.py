@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 from snapbeam.solver.splitting import COMPOSITIONS, COUPLED, TURNS, slot_length
 
 
@@ -46,7 +46,7 @@ def state_after(model: sb.ReducedModel, accuracy: str, steps: int) -> np.ndarray
 )
 @pytest.mark.parametrize(("accuracy", "order"), [("map", 4), ("reference", 6)])
 def test_measured_order_in_free_flight(modes: int, steps: tuple[int, ...], accuracy: str, order: int) -> None:
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes)
     truth = state_after(model, "reference", 8 * max(steps))
     errors = [np.abs(state_after(model, accuracy, count) - truth).max() for count in steps]
     slope = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
@@ -60,11 +60,11 @@ def test_measured_order_with_contact(modes: int, pair: tuple[float, float]) -> N
     """The mean over four halvings of the default step; measured 2.4 to 3.1.  The d^1.5 edge allows no more
     than about 2.5 in the end.
     """
-    model = sb.ReducedModel.from_beam(paper.BEAM, modes)
+    model = sb.ReducedModel.from_beam(default_values.BEAM, modes)
     shaker = sb.Shaker(frequency_ratio=pair[0], velocity_amplitude=pair[1])
     end = 2.0 / (pair[0] * model.reference_frequency)
     times = np.linspace(0.0, end, 401)[1:] * (1.0 - 1e-12)
-    system = sb.System(model, paper.CONTACT, shaker)
+    system = sb.System(model, default_values.CONTACT, shaker)
 
     def run(**options: Any) -> Any:
         return sb.simulate(system, sb.Integration(cycles=2, **options), sample_times=times).dataset

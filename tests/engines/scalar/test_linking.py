@@ -14,11 +14,11 @@ from snapbeam.solver.statistics import Statistic, register, unregister
 PROGRAM = """
 import json, sys
 import snapbeam as sb
-from snapbeam import paper
+from snapbeam.model import default_values
 
-model = sb.ReducedModel.from_beam(paper.BEAM, modes=1, damping_ratio=0.001)
+model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1, damping_ratio=0.001)
 shaker = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.3)
-laws = {"hertz": paper.CONTACT, "plastic": sb.Restitution(0.0), "elastic": sb.Restitution(0.9)}
+laws = {"hertz": default_values.CONTACT, "plastic": sb.Restitution(0.0), "elastic": sb.Restitution(0.9)}
 found = {}
 for name in sys.argv[1:]:
     system, asked = sb.System(model, laws[name], shaker), sb.Integration(cycles=3)
