@@ -89,7 +89,8 @@ class Branch:
 
     def to_dataset(self) -> xr.Dataset:
         """The branch labelled: over ``orbit`` the parameter, the state, the multipliers, stability, impacts and
-        the centre's displacement, that at every ``return`` too; over ``event`` what happens where."""
+        the centre's displacement, that at every ``return`` too; over ``event`` what happens where.
+        """
         import xarray as xr
 
         from snapbeam.model.parameters import lookup

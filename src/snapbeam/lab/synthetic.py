@@ -459,7 +459,8 @@ FRAME_LISTS = ("glare_frames", "blurred_frames", "repeated_frames", "blank_frame
 @dataclass(frozen=True)
 class Fixture:
     """A bar that crosses the picture and never moves: ``row`` of its middle in the turned picture and
-    ``thickness`` [px], grey ``level`` from 0 to 1."""
+    ``thickness`` [px], grey ``level`` from 0 to 1.
+    """
 
     row: float
     thickness: float

@@ -100,7 +100,7 @@ def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[tuple[
 def _amplitude(
     kappa: _Array, force: _Array, gamma: float, origin: int, shift: float, rises: bool
 ) -> tuple[_Array, int]:
-    """alpha at s = s_origin + shift, the pole of mode *origin*, or 0 for -1; and how unstable it is."""
+    """Alpha at s = s_origin + shift, the pole of mode *origin*, or 0 for -1; and how unstable it is."""
     alpha = np.zeros_like(force)
     pushed, gap = force != 0.0, _gap(kappa, gamma, origin, shift)
     alpha[pushed] = (force / gap)[pushed]
@@ -182,7 +182,8 @@ def _bracketed(
 
 def _distance(function: Callable[[float], float], reach: float, pole: bool) -> float:
     """The root in (0, *reach*] of a function that is negative near 0 and positive at *reach*, by its logarithm if
-    0 is a pole of it."""
+    0 is a pole of it.
+    """
     from scipy.optimize import brentq
 
     if not function(reach) > 0.0:

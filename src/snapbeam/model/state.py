@@ -236,7 +236,8 @@ START_NAME = re.compile(r"(amplitude|velocity)\[([1-9][0-9]{0,3})\]")
 
 def amplitude_scale(model: ReducedModel) -> float:
     """What amplitudes of a start are counted in, m^0.5: the first amplitude in a well, or, of a structure
-    with one well, what moves the centre by the length scale."""
+    with one well, what moves the centre by the length scale.
+    """
     well = float(np.sqrt(model.well_amplitude @ model.well_amplitude))
     if well > 0.0:
         return well

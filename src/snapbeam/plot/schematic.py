@@ -418,7 +418,8 @@ def _damper(ax: Axes, x: float, one: float, other: float) -> None:
 
 def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
     """Displacement of the tip from its mid-position over the first cycles, as long as nothing touches it, of the base,
-    or the change of the axial load."""
+    or the change of the axial load.
+    """
     scale = system.scale
     columns = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
     period = float(drive.cycle(columns, scale)[0])

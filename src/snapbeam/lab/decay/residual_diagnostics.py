@@ -120,7 +120,8 @@ def _halves(
     cycles: Cycles, mode: ModeEstimate, start: float, soften: bool
 ) -> tuple[tuple[float, float], tuple[float, float]]:
     """By how much the rate of decay [1/s] and the angular frequency [rad/s] of the two halves of a decay differ,
-    each with its standard error, after what the fit says of them is taken out."""
+    each with its standard error, after what the fit says of them is taken out.
+    """
     t = cycles.time - start
     if t.size < 12:
         return (0.0, math.inf), (0.0, math.inf)

@@ -410,7 +410,8 @@ class EdgeShape:
 @dataclass(frozen=True)
 class NoiseShape:
     """Correlation of a pixel's noise ``in_time`` with that of the next frame, ``along`` the beam with that of the next
-    pixel, and ``across`` it; 0 where it is a sensor's own, or too little to tell."""
+    pixel, and ``across`` it; 0 where it is a sensor's own, or too little to tell.
+    """
 
     in_time: float
     along: float
@@ -435,7 +436,8 @@ class NoiseShape:
 @dataclass(frozen=True)
 class Fields:
     """Odd and even rows of a picture that lie ``apart`` by a share of the step from frame to frame, and the ``shift``
-    [px] of every other frame; 0 where there is none."""
+    [px] of every other frame; 0 where there is none.
+    """
 
     apart: float
     shift: float

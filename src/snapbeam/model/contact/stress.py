@@ -114,7 +114,6 @@ def bending_stress(model: Any, amplitude: ArrayLike, count: int = 201) -> _Array
 
     The stress of the shape itself is meant, that of a beam made straight; the axial stress is not in it.
     """
-
     if not hasattr(model, "beam"):
         raise InputTypeError(f"model = {shown(model)}: must be a ReducedModel")
     beam = model.beam

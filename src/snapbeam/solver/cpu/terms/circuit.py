@@ -199,7 +199,7 @@ def kick_source(circuit, step):
 
 @inlined
 def _state(memory, size, circuit, own, p):
-    """y of p."""
+    """Y of p."""
     if own is not None:
         return memory[p + own]
     along = splat(0.0)
