@@ -77,7 +77,7 @@ class BaseExcitation:
 
 
 def rigid_mass(model: ReducedModel) -> NDArray[np.float64]:
-    """Rho S integral(phi_i), kg m^-0.5, shape (N,): what an acceleration of the frame acts on.
+    """rho S integral(phi_i), kg m^-0.5, shape (N,): what an acceleration of the frame acts on.
 
     Raises
     ------

@@ -100,7 +100,7 @@ def equilibria_of(stiffness: _Array, gamma: float, force: _Array) -> list[tuple[
 def _amplitude(
     kappa: _Array, force: _Array, gamma: float, origin: int, shift: float, rises: bool
 ) -> tuple[_Array, int]:
-    """Alpha at s = s_origin + shift, the pole of mode *origin*, or 0 for -1; and how unstable it is."""
+    """alpha at s = s_origin + shift, the pole of mode *origin*, or 0 for -1; and how unstable it is."""
     alpha = np.zeros_like(force)
     pushed, gap = force != 0.0, _gap(kappa, gamma, origin, shift)
     alpha[pushed] = (force / gap)[pushed]

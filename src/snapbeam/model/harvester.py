@@ -47,7 +47,7 @@ class Harvester:
             HARVESTERS[cls.name] = cls
 
     def row(self, model: ReducedModel) -> _Array:
-        """Theta of every buckling mode, shape (N,)."""
+        """theta of every buckling mode, shape (N,)."""
         raise NotImplementedError
 
     @property
@@ -61,7 +61,7 @@ class Harvester:
         return 1.0 / math.sqrt(self.inertia) if self.inertia > 0.0 else 1.0
 
     def loss(self, resistance: _Array) -> _Array:
-        """Rho of load resistances."""
+        """rho of load resistances."""
         raise NotImplementedError
 
     def share(self, resistance: _Array) -> _Array:

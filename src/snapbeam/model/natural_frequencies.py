@@ -133,7 +133,7 @@ def _balance_of(beam: Beam) -> Callable[[float], float]:
 
 
 def _mean_slope(modes: object, length: float) -> float:
-    """Phi' less what of it solves phi''' + k^2 phi' = 0: the slope of the straight part."""
+    """phi' less what of it solves phi''' + k^2 phi' = 0: the slope of the straight part."""
     parts = getattr(modes, "_parts", None)
     return 0.0 if parts is None else float(parts[1, 0]) / length
 
@@ -230,7 +230,7 @@ def _root(function: Callable[[float], float], low: float, high: float) -> float:
 
 
 def _antisymmetric(p: float, count: int) -> list[float]:
-    """Omega of the antisymmetric motions; the m-th has theta in (m pi, (m + 1/2) pi)."""
+    """omega of the antisymmetric motions; the m-th has theta in (m pi, (m + 1/2) pi)."""
     start = 0.5 * math.sqrt(max(p, 0.0))
     omega = []
     for m in range(1, count + 1):
@@ -246,7 +246,7 @@ def _antisymmetric(p: float, count: int) -> list[float]:
 
 
 def _symmetric(p: float, count: int) -> list[float]:
-    """Eta of the symmetric motions without buckling; the m-th has theta in ((m - 1/2) pi, m pi)."""
+    """eta of the symmetric motions without buckling; the m-th has theta in ((m - 1/2) pi, m pi)."""
     start = 0.5 * math.sqrt(max(p, 0.0))
     roots = []
     for m in range(1, count + 1):
@@ -261,7 +261,7 @@ def _symmetric(p: float, count: int) -> list[float]:
 
 
 def _symmetric_buckled(sigma: float, count: int) -> list[float]:
-    """Omega of the symmetric motions of the buckled beam; the m-th lies between neighbouring poles.
+    """omega of the symmetric motions of the buckled beam; the m-th lies between neighbouring poles.
 
     With t = tanh(s2/2), theta = pi + eta, D = s1 sin(eta) + s2 t cos(eta) (whose zeros are the poles) and
     B = 2 t sin(eta) (s1/s2 + s2/s1), omega^2 R = B/D - 1/2.

@@ -536,7 +536,7 @@ def _places(structure: Structure, table: NDArray[Any], location: _Array) -> _Pla
 
 
 def _starts(structure: Structure, table: NDArray[Any], state: State, unit: float) -> _Array:
-    """Q and p of every start; which start and home each run has is entered in the table."""
+    """q and p of every start; which start and home each run has is entered in the table."""
     flat, modal = state.flat(), state.flat().modal
     count = flat.batch[0]
     table["start_row"] = np.arange(table.size) if count > 1 else 0

@@ -143,7 +143,7 @@ class Structure:
         return q, p
 
     def amplitudes(self, q: _Array) -> _Array:
-        """Alpha of q of shape (..., N) about the well."""
+        """alpha of q of shape (..., N) about the well."""
         alpha: _Array = self.equilibrium + q[..., : self.equilibrium.size] @ self.model.linear_modes.T
         return alpha
 

@@ -40,7 +40,7 @@ class HertzContact(ContactLaw):
 
     @staticmethod
     def force(law: Any, penetration: float) -> float:
-        """F = k_c d^(3/2) (Eq. 17)."""
+        """f = k_c d^(3/2) (Eq. 17)."""
         return law.stiffness * penetration * math.sqrt(penetration)
 
     @staticmethod

@@ -66,12 +66,12 @@ class KelvinVoigt(ContactLaw):
 
     @staticmethod
     def energy(law: Any, penetration: float) -> float:
-        """K d^2 / 2."""
+        """k d^2 / 2."""
         return 0.5 * law.linear_stiffness * penetration * penetration
 
     @staticmethod
     def slope(law: Any, penetration: float) -> float:
-        """K."""
+        """k."""
         return law.linear_stiffness
 
     @classmethod
@@ -110,7 +110,7 @@ class KelvinVoigt(ContactLaw):
 
 
 def _restitution(zeta: float) -> float:
-    """E of a damping ratio: exp(-2 zeta theta / sin theta) with cos theta = zeta."""
+    """e of a damping ratio: exp(-2 zeta theta / sin theta) with cos theta = zeta."""
     if abs(zeta - 1.0) < 1e-7:
         return math.exp(-2.0 * zeta * (1.0 - (zeta - 1.0) / 3.0))
     if zeta < 1.0:

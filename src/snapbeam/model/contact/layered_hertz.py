@@ -62,7 +62,7 @@ class LayeredHertz(ContactLaw):
 
     @staticmethod
     def energy(law: Any, penetration: float) -> float:
-        """F (2 d_c/5 + d_l/3)."""
+        """f (2 d_c/5 + d_l/3)."""
         k_l, c = law.layer_stiffness, math.pow(law.layer_stiffness / law.stiffness, 2.0 / 3.0)
         s = min(math.pow(penetration, 1.0 / 3.0), math.pow(penetration / c, 0.25))
         for _ in range(7):

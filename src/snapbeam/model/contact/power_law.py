@@ -48,13 +48,13 @@ class PowerLaw(ContactLaw):
 
     @staticmethod
     def energy(law: Any, penetration: float) -> float:
-        """F d/(p + 1)."""
+        """f d/(p + 1)."""
         force = law.force_at_1um * math.pow(1e6 * penetration, law.exponent)
         return force * penetration / (law.exponent + 1.0)
 
     @staticmethod
     def slope(law: Any, penetration: float) -> float:
-        """F p/d."""
+        """f p/d."""
         power = math.pow(1e6 * penetration, law.exponent - 1.0)
         return 1e6 * law.force_at_1um * law.exponent * power
 

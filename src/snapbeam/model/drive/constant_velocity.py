@@ -56,7 +56,7 @@ class ConstantVelocity(Timed):
 
     @staticmethod
     def motion(drive: Any, memory: Any, argument: float) -> tuple[float, float]:
-        """V t and v."""
+        """v t and v."""
         return drive.speed * (argument / drive.omega), drive.speed
 
     @staticmethod

@@ -99,7 +99,7 @@ def _close_rows(memory, g, q, r, row, product, total_g, total_r):
 
 @inlined
 def tension_rows(memory, blocks, layout, q, r):
-    """R = G q; returns g.q and q.r.
+    """r = G q; returns g.q and q.r.
 
     *blocks* holds, for each block, its first row, the row after its last, and its columns.
     """
@@ -216,7 +216,7 @@ def tension_rows_twice(memory, blocks, layout_a, q_a, r_a, layout_b, q_b, r_b):
 
 @inlined
 def acceleration_rows(memory, layout, along_g, along_r, r, k):
-    """K = the modal acceleration by the change of tension, and by the side force where q has another origin."""
+    """k = the modal acceleration by the change of tension, and by the side force where q has another origin."""
     for row in range(0, layout.size, WIDTH):
         g_row = load(memory, layout.g + row)
         tension = tension_acceleration(along_g, along_r, g_row, load(memory, r + row))

@@ -199,7 +199,7 @@ def kick_source(circuit, step):
 
 @inlined
 def _state(memory, size, circuit, own, p):
-    """Y of p."""
+    """y of p."""
     if own is not None:
         return memory[p + own]
     along = splat(0.0)
