@@ -1,4 +1,4 @@
-"""The command line as a person meets it: help, refusals, results, interrupts."""
+"""The command line: help, errors, results, interrupts."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ REFUSALS = [
     (("map", "-o", "map.txt"), "must end in .nc"),
     (("map", "--plot", "map.gif"), "must end in .png or .pdf or .svg"),
     (("map", "--plot", "map.png", "--location", "0.2:0.5:3"), "drawn over two axes, not 3"),
-    (("map", "--measurements", "none.csv"), "dots = 'none.csv': cannot be read"),
+    (("map", "--measurements", "none.csv"), "none.csv': cannot be read"),
     (("map", "--config", "none.toml"), "cannot be read, No such file"),
     (("map", "--axial-load", "1.0"), "axial_load"),
     (("simulate", "--window", "3"), "window = '3': must be first:last"),
@@ -126,7 +126,7 @@ def test_map_writes_what_it_says(cli, tmp_path):
     again = cli("plot", "map.nc", "-o", "map.pdf", "--quasi-static-line")
     assert again.exit_code == 0 and (tmp_path / "map.pdf").read_bytes().startswith(b"%PDF")
     refused = cli("plot", "map.nc", "-o", "b.png", "--location", "0.3")
-    assert refused.exit_code == 2 and "location: is no axis of this map" in refused.stderr
+    assert refused.exit_code == 2 and "location: is not an axis of this map" in refused.stderr
 
 
 def test_file_and_options_together(cli, tmp_path):

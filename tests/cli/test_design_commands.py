@@ -19,7 +19,7 @@ frequency_ratio = 0.02
 location = 0.3
 [integration]
 cycles = 1
-[spread]
+[uncertainty]
 "drive.velocity_amplitude" = {normal = 0.02, relative = true}
 """
 PROBABILITY = """
@@ -27,14 +27,14 @@ PROBABILITY = """
 "drive.velocity_amplitude" = [0.01, 0.0131, 0.016]
 [probability]
 half_width = 0.2
-first = 16
+initial_runs = 16
 """
 DESIGN = """
 [design]
-goals = "drive.velocity_amplitude"
+objectives = "drive.velocity_amplitude"
 variables = {"drive.velocity_amplitude" = [0.005, 0.03]}
-limits = [{of = "snap", at_least = 0.8}]
-effort = {generations = 6, population = 6, draws = 16, fresh = 60}
+constraints = [{quantity = "snap", lower = 0.8}]
+settings = {generations = 6, population = 6, samples = 16, validation_samples = 60}
 """
 
 
@@ -75,18 +75,18 @@ def test_design(tmp_path) -> None:
         assert 0.012 < float(dataset["velocity_amplitude"][0]) < 0.0145
     assert "limits on fresh draws: " in result.output and picture.stat().st_size > 5_000
     found = json.loads(told.read_text(encoding="utf-8"))
-    assert found["plan"]["runs"] > 0 and found["designs"]["kept_snap"]
+    assert found["estimated_cost"]["runs"] > 0 and found["designs"]["kept_snap"]
 
 
 @pytest.mark.parametrize(
     ("command", "text", "words"),
     [
-        ("probability", PROBABILITY, "no [spread]"),
+        ("probability", PROBABILITY, "no section [uncertainty]"),
         ("probability", SYSTEM + "[probability]\nhalf = 0.1\n", "half"),
         ("probability", SYSTEM + "[probability]\nhalf_width = 0.9\n", "half_width"),
-        ("design", SYSTEM, "goals"),
-        ("design", SYSTEM + '[design]\ngoals = "speed"\n', "variables"),
-        ("design", SYSTEM + DESIGN.replace("at_least", "least"), "least"),
+        ("design", SYSTEM, "objectives"),
+        ("design", SYSTEM + '[design]\nobjectives = "speed"\n', "variables"),
+        ("design", SYSTEM + DESIGN.replace("lower", "least"), "least"),
         ("design", "not toml", "TOML"),
     ],
 )

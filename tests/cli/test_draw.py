@@ -1,4 +1,4 @@
-"""``snapbeam schematic``, and other worlds from the command line."""
+"""``snapbeam schematic``, and extended models in a parameter file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def run(*arguments: object):
 def test_draws_what_was_asked_for(tmp_path) -> None:
     picture = tmp_path / "system.png"
     answer = run(
-        "draw", "-o", picture, "--modes", 3, "--hunt-crossley-restitution", 0.6, "--hunt-crossley-speed", 0.05,
+        "schematic", "-o", picture, "--modes", 3, "--hunt-crossley-restitution", 0.6, "--hunt-crossley-speed", 0.05,
         "--striker-mass", 0.02, "--striker-suspension-stiffness", 700, "--striker-suspension-damping", 0.7,
     )  # fmt: skip
     assert answer.exit_code == 0, answer.output
@@ -32,11 +32,11 @@ def test_refused_by_name(tmp_path) -> None:
     assert "give its mass" in " ".join(answer.output.split())
 
 
-def test_worlds_in_a_parameter_file(tmp_path) -> None:
+def test_extended_models_in_a_parameter_file(tmp_path) -> None:
     file = tmp_path / "world.toml"
     file.write_text(
-        '[contact]\nlaw = "kelvin_voigt"\nspring = 2e6\ndamper = 20.0\n[drive]\nkind = "burst"\n'
-        "frequency_ratio = 1.2\nvelocity_amplitude = 0.2\nlength = 5.0\n[striker]\nmass = 0.02\n",
+        '[contact]\ntype = "kelvin_voigt"\nlinear_stiffness = 2e6\nlinear_damping = 20.0\n[drive]\ntype = "burst"\n'
+        "frequency_ratio = 1.2\nvelocity_amplitude = 0.2\nduration_cycles = 5.0\n[striker]\nmass = 0.02\n",
         encoding="utf-8",
     )
     system = load_config(file).system
@@ -48,7 +48,7 @@ def test_worlds_in_a_parameter_file(tmp_path) -> None:
     assert lossy.contact.stiffness == 4e8
     for wrong, words in (
         ({"restitution": 0.5}, "restitution and speed belong together"),
-        ({"restitution": 0.5, "speed": 0.05, "loss": 1.0}, "give no other"),
+        ({"restitution": 0.5, "speed": 0.05, "damping_factor": 1.0}, "give no other"),
     ):
         with pytest.raises(InputError, match=words):
             config_from_mapping({"contact": wrong})

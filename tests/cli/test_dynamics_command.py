@@ -10,11 +10,11 @@ from snapbeam.cli.app import app
 
 BEAM = ["--modes", "1", "--damping-ratio", "0.05", "--frequency-ratio", "1.6", "--velocity-amplitude", "0.03"]
 CASES = {
-    "lifetimes": (["--starts", "4", "--cycles", "120", "--settling-cycles", "20"], "lifetime"),
-    "diagram": (["--values", "0.02:0.04:3", "--leave", "40", "--keep", "8"], "midspan_displacement"),
+    "lifetimes": (["--initial-conditions", "4", "--cycles", "120", "--settling-cycles", "20"], "lifetime"),
+    "diagram": (["--values", "0.02:0.04:3", "--transient", "40", "--periods", "8"], "midspan_displacement"),
     "exponents": (["--periods", "40", "--transient", "10"], "exponent"),
     "section": (["--at", "impact", "--periods", "20"], "drive_phase"),
-    "branch": (["--between", "0.02:0.05", "--most", "6"], "multiplier_real"),
+    "branch": (["--bounds", "0.02:0.05", "--max-points", "6"], "multiplier_real"),
     "basins": (["--amplitudes=-1.4:1.4:6", "--velocities=-0.6:0.6:5", "--states", "12"], "basin"),
     "edge": (["--periods", "25", "--horizon", "30"], "orbit_state"),
 }
@@ -35,7 +35,7 @@ def test_verbs_write_files_and_pictures(verb: str, tmp_path) -> None:
 
 def test_bad_input_is_refused_first(tmp_path) -> None:
     runner = CliRunner()
-    result = runner.invoke(app, ["dynamics", "branch", *BEAM, "--between", "0.05:0.02"])
+    result = runner.invoke(app, ["dynamics", "branch", *BEAM, "--bounds", "0.05:0.02"])
     assert result.exit_code != 0
     result = runner.invoke(app, ["dynamics", "diagram", *BEAM, "-o", str(tmp_path / "none" / "d.nc")])
     assert result.exit_code != 0

@@ -11,7 +11,7 @@ from snapbeam.cli.app import app
 @pytest.fixture
 def cli(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    return lambda *args: CliRunner().invoke(app, ("paper", *args), catch_exceptions=False)
+    return lambda *args: CliRunner().invoke(app, ("reproduce", *args), catch_exceptions=False)
 
 
 def test_a_figure_with_its_data(cli, tmp_path):

@@ -1,4 +1,4 @@
-"""The program: its commands, its version and how it ends."""
+"""The program ``snapbeam`` with its commands."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from snapbeam.parts import PARTS, installed_parts
 __all__ = ["app", "main"]
 
 
-# Module and function of each command; a command is loaded when it is used.
+# Module and function of each command.
 _COMMANDS = {
     "simulate": "snapbeam.cli.simulate:simulate",
     "map": "snapbeam.cli.map:compute_map",
@@ -31,7 +31,7 @@ _COMMANDS = {
 
 
 class _Commands(MutableMapping[str, Any]):
-    """Commands by name: those of the core, then those of the optional parts; each is loaded when it is used."""
+    """Commands by name, first of the core, then of the optional parts; each is imported on first use."""
 
     def __init__(self) -> None:
         self._core: dict[str, Any] = dict(_COMMANDS)

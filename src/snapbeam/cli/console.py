@@ -1,4 +1,4 @@
-"""What a person sees while and after something is computed."""
+"""Output of the commands: messages, progress, JSON, result files and figures."""
 
 from __future__ import annotations
 
@@ -36,12 +36,10 @@ __all__ = [
     "FAILED",
     "INTERRUPTED",
     "REFUSED",
-    "answer",
-    "answer_now",
+    "add_json",
     "check_pictures",
-    "compiling_told",
-    "counted",
-    "door",
+    "cli_command",
+    "count_text",
     "draw_dynamics",
     "draw_map",
     "draw_run",
@@ -55,7 +53,9 @@ __all__ = [
     "pace",
     "progress",
     "read_overlay",
+    "show_compilation",
     "write_json",
+    "write_json_now",
     "write_map",
 ]
 
@@ -69,8 +69,8 @@ _R = TypeVar("_R")
 
 
 @dataclass
-class _Asked:
-    """How a command is to speak, and what it has found so far."""
+class _OutputOptions:
+    """Output options of the running command, and its results so far."""
 
     quiet: bool = False
     json: Path | None = None
@@ -78,54 +78,54 @@ class _Asked:
 
     @property
     def silent(self) -> bool:
-        """Whether standard output is not for words."""
+        """Whether nothing but JSON may go to standard output."""
         return self.quiet or self.json == Path("-")
 
 
-_ASKED: ContextVar[_Asked] = ContextVar("asked", default=_Asked())  # noqa: B039  a default that is never changed
+_OUTPUT_OPTIONS: ContextVar[_OutputOptions] = ContextVar("asked", default=_OutputOptions())  # noqa: B039  a default that is never changed
 
 _JSON = Annotated[
     Path | None,
     typer.Option(
-        "--json", help="JSON file of what was found to write; - for standard output, in place of the words.",
+        "--json", help="JSON file to write the results to; - writes them to standard output instead of text.",
         rich_help_panel="Output", metavar="FILE",
     ),
 ]  # fmt: skip
 _QUIET = Annotated[
     bool,
-    typer.Option("--quiet", "-q", help="Say nothing but what went wrong.", rich_help_panel="Output"),
+    typer.Option("--quiet", "-q", help="Print errors only.", rich_help_panel="Output"),
 ]
 _FORCE = Annotated[
     bool,
     typer.Option(
-        "--force", help="Replace files that snapbeam did not write, or that are read too.", rich_help_panel="Output"
+        "--force", help="Overwrite files that snapbeam did not write, and input files.", rich_help_panel="Output"
     ),
 ]  # fmt: skip
 
 
 def out() -> Console:
-    """Return the console of results, standard output; one that nobody hears if words were not asked for."""
-    silent = _ASKED.get().silent
+    """Return the console of results: standard output, or a console that discards text with --quiet or --json -."""
+    silent = _OUTPUT_OPTIONS.get().silent
     return Console(highlight=False, soft_wrap=True, file=io.StringIO() if silent else None)
 
 
-def answer(**found: Any) -> None:
-    """Say what a command found as plain values, for ``--json``."""
-    _ASKED.get().found.update(found)
+def add_json(**found: Any) -> None:
+    """Add results of a command as plain values for ``--json``."""
+    _OUTPUT_OPTIONS.get().found.update(found)
 
 
-def answer_now(**found: Any) -> None:
-    """As :func:`answer`, and write it at once: what goes on until it is stopped does not wait to be asked."""
-    asked = _ASKED.get()
+def write_json_now(**found: Any) -> None:
+    """Add results and write the JSON now, for a command that runs until it is stopped."""
+    asked = _OUTPUT_OPTIONS.get()
     if asked.json is not None:
         write_json(asked.json, asked.found | found)
         asked.found.clear()
 
 
 def write_json(path: Path, found: Mapping[str, Any]) -> None:
-    """Write plain numbers and words to a JSON file, whole or not at all, or, for ``-``, to standard output.
+    """Write plain values to a JSON file (atomically) or, for ``-``, to standard output.
 
-    What is not finite becomes null.  The version that wrote it comes first.
+    Values that are not finite become null.  The first entry is the version of snapbeam.
     """
     from snapbeam.util.files import atomic_path, check_writable
 
@@ -163,17 +163,17 @@ def errors() -> Console:
 
 
 def notes() -> Console:
-    """Return the console of what is said on the way: standard error, or nobody."""
+    """Return the console of notes: standard error, or a console that discards text with --quiet."""
     return Console(
-        stderr=True, highlight=False, soft_wrap=True, file=io.StringIO() if _ASKED.get().quiet else None
+        stderr=True, highlight=False, soft_wrap=True, file=io.StringIO() if _OUTPUT_OPTIONS.get().quiet else None
     )
 
 
-def door(command: Callable[_P, _R]) -> Callable[_P, _R]:
-    """End a command that cannot go on with one clear line, and with the exit status that says why.
+def cli_command(command: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Report errors of a command in one line and exit with the matching status.
 
-    Every command gets ``--quiet`` and ``--force``, and ``--json`` if it has none of its own: what it
-    :func:`answer`\\ s.
+    The decorator adds ``--quiet`` and ``--force``, and ``--json`` if the command does not define it.  The JSON file
+    contains the values that the command passes to :func:`add_json`.
     """
     signature = inspect.signature(command, eval_str=True)
     own = next((name for name, each in signature.parameters.items() if "--json" in _flags(each)), None)
@@ -183,8 +183,8 @@ def door(command: Callable[_P, _R]) -> Callable[_P, _R]:
         named = _named(kwargs.values())
         kept = nullcontext() if kwargs.pop("force", False) else foreign_files_kept(named)
         quiet, path = bool(kwargs.pop("quiet", False)), kwargs.get(own) if own else kwargs.pop("json", None)
-        asked = _Asked(quiet, path if isinstance(path, Path) else None)
-        token = _ASKED.set(asked)
+        asked = _OutputOptions(quiet, path if isinstance(path, Path) else None)
+        token = _OUTPUT_OPTIONS.set(asked)
         try:
             with warnings.catch_warnings(), kept:
                 warnings.showwarning = _show_warning  # type: ignore[assignment]
@@ -209,7 +209,7 @@ def door(command: Callable[_P, _R]) -> Callable[_P, _R]:
             errors().print("interrupted; no file was left half written")
             raise typer.Exit(INTERRUPTED) from None
         finally:
-            _ASKED.reset(token)
+            _OUTPUT_OPTIONS.reset(token)
 
     more = [
         inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
@@ -224,13 +224,13 @@ def door(command: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 def _named(values: Iterable[Any]) -> list[Path]:
-    """The files among what a command was given."""
+    """The paths among the arguments of a command."""
     listed = [each for value in values for each in (value if isinstance(value, (list, tuple)) else [value])]
     return [each for each in listed if isinstance(each, Path)]
 
 
 def _flags(parameter: inspect.Parameter) -> tuple[str, ...]:
-    """The names that a parameter has on the command line, where they were given."""
+    """Option names of a parameter, where they are explicit."""
     options = getattr(parameter.annotation, "__metadata__", ())
     # typer takes the first name for a default until it makes the command
     named = (
@@ -244,7 +244,7 @@ def _show_warning(message: Warning | str, category: type[Warning], *_: object) -
 
 
 def duration(seconds: float) -> str:
-    """Return seconds in words: ``4.2 s``, ``3 min 20 s``, ``2 h 5 min``."""
+    """Return seconds as text: ``4.2 s``, ``3 min 20 s``, ``2 h 5 min``."""
     if seconds < 10.0:
         return f"{seconds:.1f} s"
     whole = round(seconds)
@@ -275,17 +275,17 @@ class _RateColumn(ProgressColumn):
 
 
 def pace(done: int, total: int, elapsed: float, what: str = "points", found: int = 0) -> str:
-    """Return points, or whatever else is counted, per second and the time left, in words.
+    """Return the rate and the remaining time as text.
 
-    Of those *done*, *found* were there before the time began.
+    *found* of the *done* points existed before the clock started.
     """
     rate = (done - found) / max(elapsed, 1e-9)
     left = f", {duration((total - done) / rate)} left" if found < done < total else ""
     return f"{rate:.3g} {what}/s{left}"
 
 
-def counted(count: int, what: str = "points") -> str:
-    """A number of things, in words: ``1 point``, ``256 points``."""
+def count_text(count: int, what: str = "points") -> str:
+    """A number of things as text: ``1 point``, ``256 points``."""
     return f"{count} {what.removesuffix('s') if count == 1 else what}"
 
 
@@ -293,18 +293,18 @@ def counted(count: int, what: str = "points") -> str:
 def progress(
     total: int | None, task: str = "map", what: str = "points"
 ) -> Iterator[Callable[[int, int], None]]:
-    """Give a function of (points done, points in all) that shows how far it is, how fast, and what is left.
+    """Give a function of (done, total) that shows progress, rate and remaining time.
 
-    *total* is None where it is not known before, *task* names the work, *what* is counted.  A bar on a terminal;
-    elsewhere a line for each tenth of the work.  What was done before the first call is not counted, nor its time, in
-    which an engine may be compiled.
+    *total* is None if it is not known in advance, *task* names the work, *what* names the counted things.  A terminal
+    shows a bar; other outputs get a line for each tenth of the work.  The rate leaves out the results that existed
+    before the first call, and the time before it, in which a kernel may be compiled.
     """
     console = errors()
-    if _ASKED.get().quiet:
+    if _OUTPUT_OPTIONS.get().quiet:
         yield lambda done, all_of_them: None
     elif console.is_terminal:
         columns = (TextColumn(task), BarColumn(), MofNCompleteColumn(), _RateColumn(what))
-        with Progress(*columns, console=console, transient=True) as bar, compiling_told(bar.console):
+        with Progress(*columns, console=console, transient=True) as bar, show_compilation(bar.console):
             shown = bar.add_task(task, total=total, start=False)
 
             def update(done: int, all_of_them: int) -> None:
@@ -315,14 +315,14 @@ def progress(
 
             yield update
     else:
-        with compiling_told(console):
+        with show_compilation(console):
             yield _Lines(console, total, what)
 
 
 @contextmanager
-def compiling_told(console: Console) -> Iterator[None]:
-    """Show what the engines log, which is when they are compiled."""
-    if _ASKED.get().quiet:
+def show_compilation(console: Console) -> Iterator[None]:
+    """Show the messages that the solver logs when it compiles a kernel."""
+    if _OUTPUT_OPTIONS.get().quiet:
         yield
         return
     log = logging.getLogger("snapbeam")
@@ -354,12 +354,12 @@ class _Lines:
         self.start: float | None = None
         self.found = self.tenths = 0
         if total is not None:
-            self.console.print(f"{counted(total, what)} to compute")
+            self.console.print(f"{count_text(total, what)} to compute")
 
     def __call__(self, done: int, total: int) -> None:
         if total != self.total:
             begun = self.total is not None
-            self.console.print(f"{counted(total, self.what)} {'in all now' if begun else 'to compute'}")
+            self.console.print(f"{count_text(total, self.what)} {'in all now' if begun else 'to compute'}")
             self.total, self.tenths = total, 10 * done // total if begun and total else 0
         if self.start is None:
             self.start, self.found = time.monotonic(), done
@@ -367,25 +367,25 @@ class _Lines:
         if tenths <= self.tenths:
             return
         self.tenths = tenths
-        text = f"{done} of {counted(total, self.what)}"
+        text = f"{done} of {count_text(total, self.what)}"
         if done > self.found:
             text += f", {pace(done, total, time.monotonic() - self.start, self.what, self.found)}"
         self.console.print(text)
 
 
 # ----------------------------------------------------------------------------------------------------
-# Results as files and pictures: what commands read, write and draw.
+# Result files and figures.
 
 
 def open_result(file: Path) -> xr.Dataset:
-    """Return the dataset in a file, read into memory; refuse what is no NetCDF file of results."""
+    """Return the dataset of a result file, read into memory."""
     from snapbeam.util.netcdf import read_netcdf
 
     return read_netcdf(file, "file")
 
 
 def check_pictures(*pictures: tuple[str, Path | None]) -> None:
-    """Refuse, before any work, pictures that cannot be written."""
+    """Raise an error, before any computation, if a figure file cannot be written."""
     from snapbeam.util.files import check_writable
 
     for name, path in pictures:
@@ -395,17 +395,17 @@ def check_pictures(*pictures: tuple[str, Path | None]) -> None:
             check_writable(path, name, FIGURE_SUFFIXES)
 
 
-def read_overlay(dots: Path | None, reference_frequency: float | None, buckling_level: float | None) -> Any:
+def read_overlay(measurements: Path | None, reference_frequency: float | None, buckling_level: float | None) -> Any:
     """Return the measured points of a CSV file, normalised, or None."""
-    if dots is None:
+    if measurements is None:
         return None
     from snapbeam.sweeps.measured_points import read_measured_points
 
-    return read_measured_points(dots, reference_frequency=reference_frequency, buckling_level=buckling_level)
+    return read_measured_points(measurements, reference_frequency=reference_frequency, buckling_level=buckling_level)
 
 
 def write_map(dataset: xr.Dataset, path: Path) -> Path:
-    """Write a dataset to a NetCDF file, whole or not at all."""
+    """Write a dataset to a NetCDF file (atomically)."""
     from snapbeam.util.netcdf import write_netcdf
 
     write_netcdf(dataset, path)
@@ -418,14 +418,14 @@ def _save(drawn: Any, path: Path) -> Path:
     return save_figure(drawn, path)
 
 
-def draw_map(dataset: xr.Dataset, path: Path, overlay: Any, threshold_line: bool) -> Path:
+def draw_map(dataset: xr.Dataset, path: Path, overlay: Any, quasi_static_line: bool) -> Path:
     """Draw a map to a picture file."""
     import matplotlib
 
     matplotlib.use("Agg")
     from snapbeam.plot.map import plot_response_map
 
-    return _save(plot_response_map(dataset, dots=overlay, threshold_line=threshold_line), path)
+    return _save(plot_response_map(dataset, dots=overlay, threshold_line=quasi_static_line), path)
 
 
 def draw_threshold(dataset: xr.Dataset, path: Path) -> Path:

@@ -1,4 +1,4 @@
-"""``snapbeam dynamics``: lifetimes, bifurcation diagrams, exponents, sections, orbits and basins of a struck beam."""
+"""``snapbeam dynamics``: lifetimes, bifurcation diagrams, Lyapunov exponents, sections, orbits, basins, edge states."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import answer, door, duration, file_line, out, progress
+from snapbeam.cli.console import add_json, cli_command, duration, file_line, out, progress
 from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
@@ -29,7 +29,7 @@ __all__ = ["dynamics"]
 
 
 dynamics = typer.Typer(
-    help="What holds beyond a class: lifetimes, attractors, basins, exponents, orbits and their branches.",
+    help="Nonlinear dynamics: lifetimes, diagrams, exponents, sections, branches, basins and edge states.",
     no_args_is_help=True,
     rich_markup_mode="markdown",
 )
@@ -37,16 +37,15 @@ _ALL = (*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN)
 _AXES = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location", "model.modes")
 _OWN = "Question"
 _FEW = 4000
-"""Numbers of a variable, at most, that are told as plain ones."""
+"""Maximum size of a variable in the JSON output."""
 Output = Annotated[
     Path,
     typer.Option("--output", "-o", help="NetCDF file to write.", rich_help_panel="Output", metavar="FILE"),
 ]
-Along = Annotated[
-    str, typer.Option(help="Parameter that is varied (velocity_amplitude).", rich_help_panel=_OWN)
-]
+Parameter = Annotated[str, typer.Option(help="Parameter to vary (velocity_amplitude).", rich_help_panel=_OWN)]
 Values = Annotated[
-    str, typer.Option(help="Its values, start:stop:count.", rich_help_panel=_OWN, metavar="VALUES")
+    str,
+    typer.Option(help="Values of the parameter, start:stop:count.", rich_help_panel=_OWN, metavar="VALUES"),
 ]
 
 
@@ -66,28 +65,30 @@ def _finish(dataset: xr.Dataset, output: Path, plot: Path | None, picture: str, 
     if plot is not None:
         files.append(draw_dynamics(dataset, plot, picture))
     small = {str(name): each.values for name, each in dataset.data_vars.items() if each.size <= _FEW}
-    answer(found=small, words=lines, files=files)
+    add_json(results=small, summary=lines, files=files)
     out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
 
 
 @dynamics.command("lifetimes")
-@door
+@cli_command
 @with_parameters(*_ALL, axes=_AXES)
 def lifetimes(
     given: Any,
-    starts: Annotated[int | None, opt.count_option("Starts of every point (32).", _OWN)] = None,
-    seed: Annotated[int | None, opt.count_option("Chooses the starts (0).", _OWN)] = None,
-    phase: Annotated[
-        bool, typer.Option("--phase", help="Start at any phase of the drive.", rich_help_panel=_OWN)
-    ] = False,
-    quiet_cycles: Annotated[
-        float | None,
-        opt.number_option("Cycles without a crossing after which snapping has ended (50).", _OWN),
+    initial_conditions: Annotated[
+        int | None, opt.count_option("Number of initial conditions at each point (32).", _OWN)
     ] = None,
-    store: Annotated[
+    seed: Annotated[int | None, opt.count_option("Seed of the initial conditions (0).", _OWN)] = None,
+    phase: Annotated[
+        bool, typer.Option("--phase", help="Sample the initial phase of the drive too.", rich_help_panel=_OWN)
+    ] = False,
+    settling_cycles: Annotated[
+        float | None,
+        opt.number_option("Cycles without a zero crossing after which a run counts as settled (50).", _OWN),
+    ] = None,
+    checkpoint: Annotated[
         Path | None,
         typer.Option(
-            help="Folder that keeps the runs; one that exists is resumed.",
+            help="Checkpoint folder; an existing one is resumed.",
             rich_help_panel="Output",
             metavar="DIR",
         ),
@@ -96,25 +97,29 @@ def lifetimes(
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
-    """How long snapping lasts and how it ends, from many starts at every point, with confidence intervals.
+    """Compute the lifetime of snap-through motion and its final well, with confidence intervals.
+
+    snapbeam integrates many initial conditions at each point.
 
     Example: snapbeam dynamics lifetimes --modes 8 --frequency-ratio 1.625 --velocity-amplitude 0.2:0.5:16
-    --starts 100 -o lifetimes.nc --plot lifetimes.png
+    --initial-conditions 100 -o lifetimes.nc --plot lifetimes.png
     """
     from snapbeam.dynamics.flow import InitialConditions
     from snapbeam.dynamics.lifetimes import LifetimeSettings, lifetime_map
 
     settings = configured(given)
     _checked(output, plot)
-    chosen = InitialConditions(
-        count=32 if starts is None else starts, phase=phase, seed=0 if seed is None else seed
+    sampled = InitialConditions(
+        count=32 if initial_conditions is None else initial_conditions,
+        phase=phase,
+        seed=0 if seed is None else seed,
     )
     begun = time.monotonic()
     cycles = settings.integration.cycles if given.get("integration.cycles") is not None else 1000
     with progress(None, "lifetimes", "points") as report:
         dataset = lifetime_map(
             settings.system, settings.axes() or None, settings.integration.replace(cycles=cycles, threads=threads),
-            initial_conditions=chosen, settings=LifetimeSettings(settling_cycles=50.0 if quiet_cycles is None else quiet_cycles), checkpoint=store,
+            initial_conditions=sampled, settings=LifetimeSettings(settling_cycles=50.0 if settling_cycles is None else settling_cycles), checkpoint=checkpoint,
             progress=report,
         )  # fmt: skip
     runs = int(dataset["last_snap"].size)
@@ -136,22 +141,25 @@ def lifetimes(
 
 
 @dynamics.command("diagram")
-@door
+@cli_command
 @with_parameters(*_ALL)
 def diagram(
     given: Any,
-    along: Along = "velocity_amplitude",
+    parameter: Parameter = "velocity_amplitude",
     values: Values = "0.01:0.6:200",
-    starts: Annotated[
-        int | None, opt.count_option("Starts of every value beside the sweeps (0).", _OWN)
+    initial_conditions: Annotated[
+        int | None,
+        opt.count_option("Number of initial conditions at each value, in addition to the sweeps (0).", _OWN),
     ] = None,
-    keep: Annotated[int | None, opt.count_option("Periods to keep at every value (32).", _OWN)] = None,
-    leave: Annotated[int | None, opt.count_option("Periods to leave out before them (100).", _OWN)] = None,
+    periods: Annotated[int | None, opt.count_option("Periods to record at each value (32).", _OWN)] = None,
+    transient: Annotated[
+        int | None, opt.count_option("Transient periods to discard at each value (100).", _OWN)
+    ] = None,
     output: Output = Path("diagram.nc"),
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
-    """A bifurcation diagram, swept up and down with the state carried on.
+    """Compute a bifurcation diagram with an upward and a downward sweep; each value starts from the last state.
 
     Example: snapbeam dynamics diagram --modes 8 --frequency-ratio 1.4 --values 0.01:0.3:400 --plot diagram.png
     """
@@ -160,12 +168,12 @@ def diagram(
 
     settings = configured(given)
     _checked(output, plot)
-    points = np.atleast_1d(parse_axis(along, values))
+    points = np.atleast_1d(parse_axis(parameter, values))
     begun = time.monotonic()
     with progress(None, "diagram", "values") as report:
         dataset = bifurcation_diagram(
-            settings.system, along, points, settings.integration.replace(threads=threads), initial_conditions=starts or 0,
-            periods=(100 if leave is None else leave, 32 if keep is None else keep), progress=report,
+            settings.system, parameter, points, settings.integration.replace(threads=threads), initial_conditions=initial_conditions or 0,
+            periods=(100 if transient is None else transient, 32 if periods is None else periods), progress=report,
         )  # fmt: skip
     lines = [f"{points.size} values in {duration(time.monotonic() - begun)}"]
     for sweep in dataset["sweep"].values[:2]:
@@ -178,18 +186,20 @@ def diagram(
 
 
 @dynamics.command("exponents")
-@door
+@cli_command
 @with_parameters(*_ALL, axes=_AXES[:3])
 def exponents(
     given: Any,
-    k: Annotated[int | None, opt.count_option("Exponents, from the largest on (1).", _OWN)] = None,
-    periods: Annotated[int | None, opt.count_option("Periods to go over (500).", _OWN)] = None,
-    transient: Annotated[int | None, opt.count_option("Periods before them (100).", _OWN)] = None,
+    k: Annotated[
+        int | None, opt.count_option("Number of Lyapunov exponents, largest first (1).", _OWN)
+    ] = None,
+    periods: Annotated[int | None, opt.count_option("Periods to average over (500).", _OWN)] = None,
+    transient: Annotated[int | None, opt.count_option("Transient periods to discard (100).", _OWN)] = None,
     output: Output = Path("exponents.nc"),
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
-    """Lyapunov exponents by the tangent flow, or a map of the largest one.
+    """Compute Lyapunov exponents by the tangent flow, or a map of the largest exponent.
 
     Example: snapbeam dynamics exponents --modes 8 --frequency-ratio 1.4 --velocity-amplitude 0.01 --k 4
     """
@@ -213,19 +223,19 @@ def exponents(
 
 
 @dynamics.command("section")
-@door
+@cli_command
 @with_parameters(*_ALL)
 def section(
     given: Any,
     at: Annotated[
-        str, typer.Option(help="stroboscopic or impact.", rich_help_panel=_OWN, metavar="KIND")
+        str, typer.Option(help="Section: stroboscopic or impact.", rich_help_panel=_OWN, metavar="KIND")
     ] = "stroboscopic",
-    periods: Annotated[int | None, opt.count_option("Periods to look at (1000).", _OWN)] = None,
-    transient: Annotated[int | None, opt.count_option("Periods before them (100).", _OWN)] = None,
+    periods: Annotated[int | None, opt.count_option("Periods to record (1000).", _OWN)] = None,
+    transient: Annotated[int | None, opt.count_option("Transient periods to discard (100).", _OWN)] = None,
     output: Output = Path("section.nc"),
     plot: opt.Plot = None,
 ) -> None:
-    """A Poincare section: a run once a period, or at the onset of every impact.
+    """Compute a Poincare section: one state per period, or one at the onset of each impact.
 
     Example: snapbeam dynamics section --modes 1 --frequency-ratio 1.625 --velocity-amplitude 0.3 --plot section.png
     """
@@ -241,28 +251,30 @@ def section(
 
 
 @dynamics.command("branch")
-@door
+@cli_command
 @with_parameters(*_ALL)
 def branch(
     given: Any,
-    along: Along = "velocity_amplitude",
-    between: Annotated[
-        str, typer.Option(help="Least and greatest value, low:high.", rich_help_panel=_OWN)
+    parameter: Parameter = "velocity_amplitude",
+    bounds: Annotated[
+        str, typer.Option(help="Bounds of the parameter, low:high.", rich_help_panel=_OWN)
     ] = "0.005:0.3",
-    direction: Annotated[str, typer.Option(help="up or down, at first.", rich_help_panel=_OWN)] = "up",
+    direction: Annotated[
+        str, typer.Option(help="Initial direction: up or down.", rich_help_panel=_OWN)
+    ] = "up",
     period: Annotated[
-        int | None, opt.count_option("Periods of the drive after which it closes (1).", _OWN)
+        int | None, opt.count_option("Period of the orbit in periods of the drive (1).", _OWN)
     ] = None,
     transient: Annotated[
-        int | None, opt.count_option("Periods to march before the search (500).", _OWN)
+        int | None, opt.count_option("Transient periods to integrate before the search (500).", _OWN)
     ] = None,
-    most: Annotated[int | None, opt.count_option("Orbits at most (500).", _OWN)] = None,
+    max_points: Annotated[int | None, opt.count_option("Maximum number of orbits (500).", _OWN)] = None,
     output: Output = Path("branch.nc"),
     plot: opt.Plot = None,
 ) -> None:
-    """A periodic orbit, and its branch along a parameter with folds, flips and grazing located.
+    """Compute a periodic orbit and continue it along a parameter; folds, flips and grazing are located.
 
-    Example: snapbeam dynamics branch --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --between 0.005:0.3
+    Example: snapbeam dynamics branch --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --bounds 0.005:0.3
     """
     from snapbeam.cli.parameter_options import parse_window
     from snapbeam.dynamics.branches import continuation
@@ -270,20 +282,22 @@ def branch(
 
     settings = configured(given)
     _checked(output, plot)
-    limits = parse_window(between)
+    limits = parse_window(bounds)
     assert limits is not None
     begun = time.monotonic()
-    how = None if given.get("integration.accuracy") is None else settings.integration
+    options = None if given.get("integration.accuracy") is None else settings.integration
     try:
         orbit = periodic_orbit(
             settings.system, period=1 if period is None else period, transient=500 if transient is None else transient,
-            integration=how,
+            integration=options,
         )  # fmt: skip
     except OrbitNotFoundError as error:
         from snapbeam.util.validation import InputError
 
         raise InputError(f"no orbit of period {1 if period is None else period}: {error}") from None
-    found = continuation(orbit, along, limits, direction=direction, max_points=500 if most is None else most)
+    found = continuation(
+        orbit, parameter, limits, direction=direction, max_points=500 if max_points is None else max_points
+    )
     lines = [
         f"{found!r} in {duration(time.monotonic() - begun)}",
         *(f"{event!r}" for event in found.special_points),
@@ -292,7 +306,7 @@ def branch(
 
 
 @dynamics.command("basins")
-@door
+@cli_command
 @with_parameters(*_ALL)
 def basins(
     given: Any,
@@ -303,16 +317,16 @@ def basins(
         str, typer.Option(help="velocity[1]: start:stop:count.", rich_help_panel=_OWN)
     ] = "-1:1:200",
     periods: Annotated[
-        int | None, opt.count_option("Periods after which a state is undecided (200).", _OWN)
+        int | None, opt.count_option("Periods after which a state counts as undecided (200).", _OWN)
     ] = None,
     states: Annotated[
-        int | None, opt.count_option("States that attractors are sought from (200).", _OWN)
+        int | None, opt.count_option("Initial states of the search for attractors (200).", _OWN)
     ] = None,
     output: Output = Path("basins.nc"),
     plot: opt.Plot = None,
     threads: opt.Threads = None,
 ) -> None:
-    """Attractors, certified, and their basins on the plane of the first amplitude and its velocity.
+    """Find and verify attractors; compute their basins over the first modal amplitude and its velocity.
 
     Example: snapbeam dynamics basins --modes 1 --frequency-ratio 1.6 --velocity-amplitude 0.03 --plot basins.png
     """
@@ -324,7 +338,7 @@ def basins(
     settings = configured(given)
     _checked(output, plot)
     begun = time.monotonic()
-    plane = {
+    grid = {
         "amplitude[1]": parse_axis("amplitudes", amplitudes),
         "velocity[1]": parse_axis("velocities", velocities),
     }
@@ -334,7 +348,7 @@ def basins(
         integration=settings.integration.replace(threads=threads),
     )
     with progress(None, "basins", "periods") as report:
-        dataset = basins_of(found, plane, periods=200 if periods is None else periods, progress=report)
+        dataset = basins_of(found, grid, periods=200 if periods is None else periods, progress=report)
     lines = [f"{len(found.attractors)} attractors in {duration(time.monotonic() - begun)}"]
     for number, each in enumerate(found.attractors):
         share = 100.0 * float((dataset["basin"] == number).mean())
@@ -349,26 +363,26 @@ def basins(
 
 
 @dynamics.command("edge")
-@door
+@cli_command
 @with_parameters(*_ALL)
 def edge(
     given: Any,
-    kick: Annotated[
+    initial_velocity: Annotated[
         float | None,
         opt.number_option(
-            "Velocity of the first mode, over omega_1 times the well's amplitude, that makes the beam snap from its "
-            "start (doubled from 0.1 until it does).",
+            "Initial velocity of the first mode, divided by omega_1 times the amplitude of the well, that makes the beam "
+            "snap through (doubled from 0.1 until it does).",
             _OWN,
         ),
     ] = None,
-    periods: Annotated[int | None, opt.count_option("Periods to follow the border for (60).", _OWN)] = None,
+    periods: Annotated[int | None, opt.count_option("Periods to track the edge for (60).", _OWN)] = None,
     horizon: Annotated[
-        int | None, opt.count_option("Periods after which snapping or not is told (40).", _OWN)
+        int | None, opt.count_option("Periods after which a run is classified as snapping or not (40).", _OWN)
     ] = None,
     output: Output = Path("edge.nc"),
     plot: opt.Plot = None,
 ) -> None:
-    """The motion on the border between snapping and not, and the unstable orbit that it settles on.
+    """Track the edge between snapping and non-snapping motion, and find the unstable orbit on it.
 
     Example: snapbeam dynamics edge --modes 1 --damping-ratio 0.05 --frequency-ratio 1.6 --velocity-amplitude 0.03
     --plot edge.png
@@ -386,9 +400,12 @@ def edge(
     )
     begun = time.monotonic()
     found = edge_tracking(
-        flow, *kicked(flow, kick, ahead), periods=60 if periods is None else periods, horizon=ahead
+        flow,
+        *kicked(flow, initial_velocity, ahead),
+        periods=60 if periods is None else periods,
+        horizon=ahead,
     )
     lines = [f"{found!r}".strip("<>") + f", in {duration(time.monotonic() - begun)}"]
     if found.orbit is None:
-        lines.append("it settles on no orbit within these periods: follow it for longer (--periods)")
+        lines.append("the edge state does not converge to an orbit within these periods; increase --periods")
     _finish(found.to_dataset(), output, plot, "edge", lines)

@@ -7,32 +7,36 @@ from typing import Annotated, Any
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import answer, door, out
-from snapbeam.cli.parameter_options import BEAM, ENDS, IMPERFECTION, MODEL, configured, with_parameters
+from snapbeam.cli.console import add_json, cli_command, out
+from snapbeam.cli.parameter_options import BEAM, BOUNDARY, IMPERFECTION, MODEL, configured, with_parameters
 
 __all__ = ["equilibria"]
 
 
-@door
-@with_parameters(*BEAM, *ENDS, *IMPERFECTION, *MODEL)
+@cli_command
+@with_parameters(*BEAM, *BOUNDARY, *IMPERFECTION, *MODEL)
 def equilibria(
     given: Any,
-    lower_frequencies: Annotated[
-        float | None, opt.number_option("First frequency measured about the lower well, Hz.", "Fit")
+    lower_frequency: Annotated[
+        float | None,
+        opt.number_option("First frequency measured about the lower well, Hz.", "Identification"),
     ] = None,
-    upper_frequencies: Annotated[
-        float | None, opt.number_option("First frequency measured about the upper well, Hz.", "Fit")
+    upper_frequency: Annotated[
+        float | None,
+        opt.number_option("First frequency measured about the upper well, Hz.", "Identification"),
     ] = None,
-    fit: Annotated[
+    identify: Annotated[
         str,
         typer.Option(
-            help="What makes them unequal: rise, point_load or uniform_load.", rich_help_panel="Fit"
+            "--identify-imperfection",
+            help="Imperfection to identify from them: midspan_amplitude, point_load or uniform_load.",
+            rich_help_panel="Identification",
         ),
-    ] = "rise",
+    ] = "midspan_amplitude",
 ) -> None:
     """Print every equilibrium with its stability, the frequencies about the wells, and the barriers.
 
-    With the two frequencies, the buckling level and the imperfection that explain them are found first.
+    If you give both measured frequencies, the command first identifies the buckling level and the imperfection.
     """
     from rich.table import Table
 
@@ -41,19 +45,19 @@ def equilibria(
 
     model = configured(given).model
     assert model.beam is not None
-    if (lower_frequencies is None) != (upper_frequencies is None):
-        raise InputError("lower_frequencies, upper_frequencies: give both, or neither")
+    if (lower_frequency is None) != (upper_frequency is None):
+        raise InputError("lower_frequency, upper_frequency: give both, or neither")
     console = out()
-    if lower_frequencies is not None and upper_frequencies is not None:
+    if lower_frequency is not None and upper_frequency is not None:
         model = identify_imperfection(
-            model.beam, lower_frequencies, upper_frequencies, fit, model.modes, model.imperfection
+            model.beam, lower_frequency, upper_frequency, identify, model.modes, model.imperfection
         )
         assert model.beam is not None
         assert model.imperfection is not None
-        unit = {"rise": "m", "point_load": "N", "uniform_load": "N/m"}[fit]
+        unit = {"midspan_amplitude": "m", "point_load": "N", "uniform_load": "N/m"}[identify]
         console.print(
-            f"buckling_level = {model.beam.buckling_level:.6g} m, imperfection {fit} = "
-            f"{getattr(model.imperfection, fit):.6g} {unit}"
+            f"buckling_level = {model.beam.buckling_level:.6g} m, imperfection {identify} = "
+            f"{getattr(model.imperfection, identify):.6g} {unit}"
         )
     beam = model.beam
     assert beam is not None
@@ -75,7 +79,7 @@ def equilibria(
     else:
         barriers = []
         console.print(f"monostable: {', '.join(f'{each:.3f}' for each in freq[0])} Hz")
-    answer(
+    add_json(
         bistable=model.is_bistable,
         buckling_level=beam.buckling_level,
         imperfection={} if model.imperfection is None else {

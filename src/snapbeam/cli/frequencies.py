@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import answer, door, out
-from snapbeam.cli.parameter_options import BEAM, ENDS, MODEL, configured, with_parameters
+from snapbeam.cli.console import add_json, cli_command, out
+from snapbeam.cli.parameter_options import BEAM, BOUNDARY, MODEL, configured, with_parameters
 
 __all__ = ["frequencies"]
 
 
-@door
-@with_parameters(*BEAM, *ENDS, *MODEL)
+@cli_command
+@with_parameters(*BEAM, *BOUNDARY, *MODEL)
 def frequencies(
     given: Any,
     count: Annotated[int, opt.count_option("How many to print (10).", "Output")] = 10,
@@ -36,7 +36,7 @@ def frequencies(
     exact = exact_natural_frequencies(beam, count=count)
     straight = exact_natural_frequencies(beam.replace(axial_load=0.0), count=count)
     state = f"buckled by b = {prefixed(beam.buckling_level, 'm', 4)}" if beam.is_buckled else "not buckled"
-    answer(
+    add_json(
         axial_load=beam.axial_load, critical_load=beam.critical_load, buckling_level=beam.buckling_level,
         modes=model.modes, reduced=reduced[:count], exact=exact, without_load=straight,
     )  # fmt: skip

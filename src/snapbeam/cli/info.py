@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from snapbeam.cli.console import answer, door, out
+from snapbeam.cli.console import add_json, cli_command, out
 
 __all__ = ["info"]
 
 
-@door
+@cli_command
 def info(
     file: Annotated[Path, typer.Argument(help="NetCDF file written by snapbeam.", metavar="FILE")],
 ) -> None:
@@ -21,7 +21,7 @@ def info(
     from snapbeam.cli.summary import class_table, parameter_table, status_lines
 
     dataset = open_result(file)
-    answer(
+    add_json(
         sizes=dict(dataset.sizes), attributes=dict(dataset.attrs),
         variables={str(name): dict(each.attrs) for name, each in dataset.variables.items()},
     )  # fmt: skip

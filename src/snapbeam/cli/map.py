@@ -10,7 +10,7 @@ import typer
 
 from snapbeam.cli import parameter_options as long
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import FAILED, answer, door, out
+from snapbeam.cli.console import FAILED, add_json, cli_command, out
 from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
@@ -31,9 +31,9 @@ _AXES = (
 )  # fmt: skip
 
 
-@door
+@cli_command
 @with_parameters(*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN, axes=_AXES)
-@long.with_keeping
+@long.with_checkpoint
 def compute_map(
     given: Any,
     keeping: Any,
@@ -44,8 +44,8 @@ def compute_map(
         ),
     ] = Path("map.nc"),
     plot: opt.Plot = None,
-    dots: opt.Dots = None,
-    threshold_line: opt.ThresholdLine = False,
+    measurements: opt.Measurements = None,
+    quasi_static_line: opt.QuasiStaticLine = False,
     threads: opt.Threads = None,
 ) -> None:
     """Compute the map of response types and say what it shows.
@@ -70,7 +70,7 @@ def compute_map(
     system.model.require_bistable("a map")
     beam = system.model.beam
     overlay = read_overlay(
-        dots, system.model.reference_frequency, None if beam is None else beam.buckling_level
+        measurements, system.model.reference_frequency, None if beam is None else beam.buckling_level
     )
 
     from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, SweepReport, compute_sweep
@@ -81,19 +81,19 @@ def compute_map(
     total = setup.points.size
     start = time.monotonic()
     tally = SweepReport()
-    with long.report(total, keeping["log"], keeping["store"]) as say:
+    with long.report(total, keeping["log"], keeping["checkpoint"]) as say:
         kept = CheckpointOptions(
-            keeping["store"], keeping["verify"], keeping["chunk"], long.kept_config(settings, keeping),
+            keeping["checkpoint"], keeping["check_checkpoint"], keeping["points_per_task"], long.kept_config(settings, keeping),
             say.note, tally,
         )  # fmt: skip
         dataset = compute_sweep(
             setup, kept, output=output if long.is_long(keeping) and not kept.check_checkpoint else None,
             progress=say.progress, **asked,
         )  # fmt: skip
-        lines = long.tally_lines(tally, keeping["store"], time.monotonic() - start)
+        lines = long.tally_lines(tally, keeping["checkpoint"], time.monotonic() - start)
         for line in lines:
             say.log(line)
-    if keeping["verify"]:
+    if keeping["check_checkpoint"]:
         out().print(*lines, sep="\n", markup=False)
         raise typer.Exit(FAILED if tally.failed else 0)
     elapsed = time.monotonic() - start
@@ -103,8 +103,8 @@ def compute_map(
         write_map(dataset, output)
     files = [output]
     if plot is not None:
-        files.append(draw_map(dataset, plot, overlay, threshold_line))
-    answer(**map_facts(dataset), seconds=elapsed, files=files)
+        files.append(draw_map(dataset, plot, overlay, quasi_static_line))
+    add_json(**map_facts(dataset), seconds=elapsed, files=files)
     out().print(map_summary(dataset, files, None if long.is_long(keeping) else elapsed))
     out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")
     if tally.failed:
@@ -122,7 +122,7 @@ def _axes_of(settings: Any, given: Any) -> dict[str, Any]:
 
     named: dict[str, Any] = settings.axes()
     order = ("model.modes", "drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
-    if any(text for text in given.get("axis") or ()) or any(name not in order for name in named):
+    if any(text for text in given.get("sweep") or ()) or any(name not in order for name in named):
         return named
     drive = settings.section("drive")
     axes = dict(named)

@@ -14,7 +14,7 @@ import numpy as np
 import typer
 from rich.markup import escape
 
-from snapbeam.cli.console import answer, duration, notes, out, pace, progress
+from snapbeam.cli.console import add_json, duration, notes, out, pace, progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BEAM",
+    "BOUNDARY",
     "CONTACT",
     "DRIVE",
-    "ENDS",
     "IMPERFECTION",
     "MODEL",
     "RUN",
@@ -44,14 +44,14 @@ __all__ = [
     "resumed",
     "sweep_options",
     "tally_lines",
-    "with_keeping",
+    "with_checkpoint",
     "with_parameters",
 ]
 
 
 BEAM = ("beam.length", "beam.thickness", "beam.width", "beam.density", "beam.young_modulus", "beam.buckling_level",
         "beam.axial_load")  # fmt: skip
-ENDS = (
+BOUNDARY = (
     "boundary.left_rotational_stiffness",
     "boundary.right_rotational_stiffness",
     "boundary.axial_support_stiffness",
@@ -81,13 +81,13 @@ RUN = (
 
 _PANELS = {
     "beam": "Beam (default: the paper's)",
-    "ends": "Ends (default: clamped)",
+    "boundary": "Boundary conditions (default: clamped)",
     "imperfection": "Imperfection (default: none)",
     "model": "Reduced model and contact",
     "contact": "Reduced model and contact",
     "striker": "Striker and drive",
     "drive": "Striker and drive",
-    "run": "Integration",
+    "integration": "Integration",
 }
 # Option where it is not the parameter's own name, and words that the table does not have.
 _OPTIONS = {
@@ -157,7 +157,7 @@ def with_parameters(
             given = {full: arguments.pop(key) for key, (full, _) in added.items()}
             given |= {
                 key: arguments.pop(key)
-                for key in ("config", "set_", "axis", "from_", "point", "print_config")
+                for key in ("config", "set_", "sweep", "from_", "point", "print_config")
                 if key in arguments
             }
             return function(given=given, **arguments)
@@ -211,14 +211,14 @@ def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
         "print_config": (False, Annotated[bool, shown]),
     }
     if with_axes:
-        axis = typer.Option(
+        sweep = typer.Option(
             "--sweep",
             help="Sweep any parameter: beam.thickness=3e-4:5e-4:20, model.modes=1,8; again for another axis. Without "
             "one, the map is over frequency ratio and velocity amplitude.",
             metavar="NAME=VALUES",
             rich_help_panel="Axes",
         )
-        found["axis"] = (None, Annotated[list[str] | None, axis])
+        found["sweep"] = (None, Annotated[list[str] | None, sweep])
     return found
 
 
@@ -258,7 +258,7 @@ _UPRIGHT = re.compile(r"\\mathrm\{([^}]*)\}")
 
 
 def _symbol(symbol: str) -> str:
-    """A symbol of a formula as a terminal shows it: ``x_\\mathrm{s}`` is x_s."""
+    """A LaTeX symbol as plain text, without braces and commands."""
     plain = _UPRIGHT.sub(r"\1", symbol).replace("\\", "").replace("{", "").replace("}", "")
     return f" ({plain})" if plain else ""
 
@@ -293,8 +293,6 @@ def configured(
 
     config = load_config(given["config"]) if given.get("config") is not None else Config()
     if given.get("from_") is not None:
-        pass  # import-removed
-
         if given.get("config") is not None:
             raise InputError("from, config: give one of the two")
         config = config_of_file(given["from_"], given.get("point"))
@@ -310,27 +308,27 @@ def configured(
             sections.setdefault(section, {})[field] = _value(name, value)
     for text in given.get("set_") or ():
         name, value = _assignment(text, "set")
-        full = name if "." in name and name.partition(".")[2] in ("type", "type") else lookup(name).name
+        full = name if "." in name and name.partition(".")[2] == "type" else lookup(name).name
         section, _, field = full.partition(".")
         sections.setdefault(section, {})[field] = _value(full, value)
-    for text in given.get("axis") or ():
-        name, value = _assignment(text, "axis")
+    for text in given.get("sweep") or ():
+        name, value = _assignment(text, "sweep")
         if name in axes:
-            raise InputError(f"axis {name}: is given twice")
+            raise InputError(f"sweep = {text!r}: {name} is given twice; give each axis once")
         axes[name] = value
     single = {f"{section}.{field}" for section, values in sections.items() for field in values}
     for name in axes:
         for same in sorted(same_axis(name) & single):
             raise InputError(f"{same}: is given as a single value and as an axis")
     if axes:
-        sections["axes"] = sections.get("axes", {}) | axes
+        sections["sweep"] = sections.get("sweep", {}) | axes
     config = override(config, sections)
     if given.get("print_config"):
         from snapbeam.model.parameter_file import config_text
 
         printed = config.whole(None if axes_of is None else axes_of(config, given))
         out().print(config_text(printed), markup=False, end="")
-        answer(**printed.to_mapping())
+        add_json(**printed.to_mapping())
         raise typer.Exit
     if config.defaulted:
         whole = config.whole().to_mapping()
@@ -386,7 +384,7 @@ def _value(name: str, value: Any) -> Any:
             return {"true": True, "false": False}[value.lower()]
         if kind is int:
             return int(value)
-        if kind is float and (row is not None or name in PHYSICAL or name.startswith("start.")):
+        if kind is float and (row is not None or name in PHYSICAL or name.startswith("initial_state.")):
             return parse_number(value)
     except (ValueError, KeyError, typer.BadParameter):
         words = {bool: "true or false", int: "a whole number"}.get(kind, "a number")
@@ -418,16 +416,16 @@ Plot = Annotated[
         "--plot", help="Picture to write: .png, .pdf or .svg.", rich_help_panel=_OUTPUT, metavar="FILE"
     ),
 ]
-Dots = Annotated[
+Measurements = Annotated[
     Path | None,
     typer.Option(
         help="CSV of measured responses to lay over the picture: columns frequency_ratio or frequency_hz, "
-        "velocity_amplitude or velocity_m_s, location (optional), response.",
+        "velocity_amplitude or velocity_m_s, location (optional), response_class.",
         rich_help_panel=_OUTPUT,
         metavar="FILE",
     ),
 ]
-ThresholdLine = Annotated[
+QuasiStaticLine = Annotated[
     bool,
     typer.Option(
         "--quasi-static-line", help="Draw the quasi-static threshold V_QS1 (Eq. 21).", rich_help_panel=_OUTPUT
@@ -460,7 +458,7 @@ def parse_window(text: str | None) -> tuple[float, float] | None:
 
 _LONG = "Long maps"
 
-StoreOption = Annotated[
+CheckpointOption = Annotated[
     Path | None,
     typer.Option(
         "--checkpoint",
@@ -469,7 +467,7 @@ StoreOption = Annotated[
         metavar="DIR",
     ),
 ]
-Verify = Annotated[
+CheckCheckpoint = Annotated[
     bool,
     typer.Option(
         "--check-checkpoint",
@@ -486,44 +484,46 @@ ClusterOption = Annotated[
         metavar="WHERE",
     ),
 ]
-Refine = Annotated[
+RefineLevels = Annotated[
     int | None,
     count_option("Times to halve the spacing of the axes where neighbours differ in class.", _LONG),
 ]
 Replicates = Annotated[
     int | None, count_option("Repeats of each run with a slightly different start.", _LONG)
 ]
-ReplicaSize = Annotated[
+PerturbationRms = Annotated[
     float | None,
     number_option("Rms change of the centre's start, m (3.5e-6, a camera's pixel).", _LONG),
 ]
-HalveStep = Annotated[
+CheckHalfStep = Annotated[
     bool,
     typer.Option(
         "--check-half-step", help="One repeat more with the time step halved.", rich_help_panel=_LONG
     ),
 ]
-Chunk = Annotated[int | None, count_option("Points of a task; follows from the map by default.", _LONG)]
+PointsPerTask = Annotated[
+    int | None, count_option("Points of a task; follows from the map by default.", _LONG)
+]
 Log = Annotated[
     Path | None,
     typer.Option("--log", help="Text file to append the progress to.", rich_help_panel=_LONG, metavar="FILE"),
 ]
 
-_KEPT = {"refine": int, "replicas": int, "perturbation_rms": float, "check_half_step": bool}
+_STORED = {"refine_levels": int, "replicates": int, "perturbation_rms": float, "check_half_step": bool}
 _OPTIONS_LONG: dict[str, tuple[Any, Any]] = {
-    "store": (None, StoreOption),
-    "verify": (False, Verify),
+    "checkpoint": (None, CheckpointOption),
+    "check_checkpoint": (False, CheckCheckpoint),
     "cluster": (None, ClusterOption),
-    "refine": (None, Refine),
-    "replicas": (None, Replicates),
-    "perturbation_rms": (None, ReplicaSize),
-    "check_half_step": (False, HalveStep),
-    "chunk": (None, Chunk),
+    "refine_levels": (None, RefineLevels),
+    "replicates": (None, Replicates),
+    "perturbation_rms": (None, PerturbationRms),
+    "check_half_step": (False, CheckHalfStep),
+    "points_per_task": (None, PointsPerTask),
     "log": (None, Log),
 }
 
 
-def with_keeping(function: Callable[..., Any]) -> Callable[..., Any]:
+def with_checkpoint(function: Callable[..., Any]) -> Callable[..., Any]:
     """Give a command the options of sweeps that take long; it gets them as a mapping ``keeping``."""
     own = {
         name: parameter
@@ -560,11 +560,15 @@ def sweep_options(keeping: Mapping[str, Any]) -> dict[str, Any]:
     from snapbeam.util.validation import integer
 
     repeats = None
-    count = 0 if keeping["replicas"] is None else integer("replicas", keeping["replicas"], 0, 10_000)
+    count = 0 if keeping["replicates"] is None else integer("replicates", keeping["replicates"], 0, 10_000)
     if count or keeping["check_half_step"]:
         size = MEASURING_ERROR if keeping["perturbation_rms"] is None else keeping["perturbation_rms"]
         repeats = Replicates(count, size, bool(keeping["check_half_step"]))
-    return {"cluster": keeping["cluster"], "refine_levels": keeping["refine"] or 0, "replicas": repeats}
+    return {
+        "cluster": keeping["cluster"],
+        "refine_levels": keeping["refine_levels"] or 0,
+        "replicas": repeats,
+    }
 
 
 def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config) -> Config:
@@ -577,15 +581,15 @@ def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config)
     from snapbeam.sweeps.checkpoint.store import read_stored_config
     from snapbeam.util.validation import InputError
 
-    if keeping["store"] is None:
+    if keeping["checkpoint"] is None:
         return settings
-    kept = read_stored_config(keeping["store"])
+    kept = read_stored_config(keeping["checkpoint"])
     if kept is None:
         return settings
     options = kept.get("options", {})
     if not isinstance(kept.get("parameters"), dict) or not isinstance(options, dict):
         raise InputError(f"store = {str(keeping['store'])!r}: keeps no parameters that can be read")
-    for name, kind in _KEPT.items():
+    for name, kind in _STORED.items():
         if not keeping[name] and isinstance(options.get(name), kind):
             keeping[name] = options[name]
     own = config_from_mapping(kept["parameters"], source=f"{keeping['store'].name}/map.json")
@@ -596,7 +600,7 @@ def kept_config(settings: Config, keeping: Mapping[str, Any]) -> dict[str, Any]:
     """What a store keeps so that it can be resumed by its name alone."""
     import numpy as np
 
-    options = {name: keeping[name] for name in _KEPT if keeping[name]}
+    options = {name: keeping[name] for name in _STORED if keeping[name]}
     plain = {
         section: {
             name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in values.items()
@@ -724,10 +728,10 @@ def config_of_file(path: Path, point: str | None) -> Config:
         ).items()
         if value is not None and name != "engine"
     }
-    start = sections.pop("start", None)
+    start = sections.pop("initial_state", None)
     if start is not None:
         raise InputError(f"from = {str(path)!r}: begins in a state of its own; use it from Python")
-    sections["run"] = run
+    sections["integration"] = run
     for name, value in _at_point(dataset, point, path).items():
         section, _, field = name.partition(".")
         sections.setdefault(section, {})[field] = value

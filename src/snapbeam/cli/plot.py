@@ -1,4 +1,4 @@
-"""``snapbeam plot``: the picture of a map or a run that has been computed."""
+"""``snapbeam plot``: plot a stored map or run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import answer, door, file_line, out
+from snapbeam.cli.console import add_json, cli_command, file_line, out
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,7 +19,7 @@ __all__ = ["plot"]
 _SLICE = "One point of an axis, the nearest there is"
 
 
-@door
+@cli_command
 def plot(
     file: Annotated[Path, typer.Argument(help="NetCDF file of a map or a run.", metavar="FILE")],
     output: Annotated[
@@ -36,11 +36,11 @@ def plot(
             metavar="NAME=VALUE",
         ),
     ] = None,
-    dots: opt.Dots = None,
-    threshold_line: opt.ThresholdLine = False,
+    measurements: opt.Measurements = None,
+    quasi_static_line: opt.QuasiStaticLine = False,
     window: opt.Window = None,
 ) -> None:
-    """Draw a map or a run again: other format, measured dots, one slice of a map of three axes."""
+    """Plot a stored map or run: in another format, with measured responses, or a slice of a map of three axes."""
     from snapbeam.cli.console import (
         check_pictures,
         draw_map,
@@ -64,9 +64,11 @@ def plot(
         }
         dataset = _sliced(dataset, wanted, at or [])
         attrs = dataset.attrs
-        overlay = read_overlay(dots, attrs.get("reference_frequency"), attrs.get("beam_buckling_level"))
-        draw_map(dataset, output, overlay, threshold_line)
-    answer(files=[output])
+        overlay = read_overlay(
+            measurements, attrs.get("reference_frequency"), attrs.get("beam_buckling_level")
+        )
+        draw_map(dataset, output, overlay, quasi_static_line)
+    add_json(files=[output])
     out().print(f"Written: {file_line(output)}")
 
 
@@ -85,6 +87,6 @@ def _sliced(dataset: xr.Dataset, wanted: dict[str, float | None], at: list[str])
     for name in chosen:
         if name not in dataset.dims:
             raise InputError(
-                f"{name}: is no axis of this map, whose axes are {', '.join(map(str, dataset.dims))}"
+                f"{name}: is not an axis of this map; available axes: {', '.join(map(str, dataset.dims))}"
             )
     return dataset.sel(chosen, method="nearest") if chosen else dataset

@@ -7,12 +7,12 @@ from typing import Annotated, Any
 
 import typer
 
-from snapbeam.cli.console import answer, door, file_line, out
+from snapbeam.cli.console import add_json, cli_command, file_line, out
 from snapbeam.cli.parameter_options import (
     BEAM,
+    BOUNDARY,
     CONTACT,
     DRIVE,
-    ENDS,
     IMPERFECTION,
     MODEL,
     STRIKER,
@@ -23,15 +23,15 @@ from snapbeam.cli.parameter_options import (
 __all__ = ["schematic"]
 
 
-@door
-@with_parameters(*BEAM, *ENDS, *IMPERFECTION, *MODEL, *CONTACT, *STRIKER, *DRIVE)
+@cli_command
+@with_parameters(*BEAM, *BOUNDARY, *IMPERFECTION, *MODEL, *CONTACT, *STRIKER, *DRIVE)
 def schematic(
     given: Any,
     output: Annotated[
         Path, typer.Option("--output", "-o", help="Picture to write: .png, .pdf or .svg.", metavar="FILE")
     ],
 ) -> None:
-    """Draw what is studied: beam and wells, what strikes it, how it is held, and how it moves."""
+    """Draw a schematic of the system: beam, wells, boundary conditions, strikers and excitation."""
     from snapbeam.cli.console import check_pictures
 
     check_pictures(("output", output))
@@ -40,7 +40,7 @@ def schematic(
 
     system = configured(given).system
     save_figure(plot_system(system), output)
-    answer(system=system.hash, files=[output])
+    add_json(system=system.hash, files=[output])
     console = out()
     console.print(system.describe())
     console.print(f"Written: {file_line(output)}")

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import FAILED, answer, compiling_told, door, duration, errors, file_line, out
+from snapbeam.cli.console import (
+    FAILED,
+    add_json,
+    cli_command,
+    duration,
+    errors,
+    file_line,
+    out,
+    show_compilation,
+)
 from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
@@ -27,11 +36,11 @@ if TYPE_CHECKING:
 __all__ = ["simulate"]
 
 
-@door
+@cli_command
 @with_parameters(*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN, "integration.tolerance")
 def simulate(
     given: Any,
-    drive: Annotated[
+    recorded_drive: Annotated[
         Path | None,
         typer.Option(
             help="Recorded drive in place of the sinusoidal one: the file that snapbeam vibrometer "
@@ -97,7 +106,7 @@ def simulate(
         )
 
     system, integration = settings.system, settings.integration
-    if drive is not None:
+    if recorded_drive is not None:
         named = [
             name for name in ("frequency_ratio", "velocity_amplitude") if given[f"drive.{name}"] is not None
         ]
@@ -105,14 +114,14 @@ def simulate(
             raise sb.InputError(f"{', '.join(named)}: must be left out with a recorded drive")
         assert system.striker is not None
         recorded = sb.Striker(
-            drive=sb.RecordedMotion.from_dataset(_recorded(drive)),
+            drive=sb.RecordedMotion.from_dataset(_recorded(recorded_drive)),
             location=system.striker.location,
             side=system.striker.side,
         )
         system = system.replace(striker=recorded)
     start = time.monotonic()
     run = None
-    with compiling_told(errors()), _share_done() as progress:
+    with show_compilation(errors()), _share_done() as progress:
         times = _even(system, integration, samples)
         if stream and output is not None:
             outcome = sb.simulate_to_file(
@@ -132,7 +141,7 @@ def simulate(
     if run is not None and animate is not None:
         console.print(f"Written: {file_line(_animated(run.dataset, animate, part))}")
     files = [path for path in (output, plot, animate) if path is not None]
-    answer(outcome=outcome, seconds=time.monotonic() - start, system=system.hash, files=files)
+    add_json(outcome=outcome, seconds=time.monotonic() - start, system=system.hash, files=files)
     if outcome.status not in (sb.RunStatus.OK, sb.RunStatus.EARLY_STOP):
         raise typer.Exit(FAILED)
 
@@ -147,7 +156,7 @@ def _even(system: Any, integration: Any, samples: int | None) -> Any:
     from snapbeam.util.validation import integer
 
     integer("samples", samples, 1, 100_000)
-    drive = system.leads[1]
+    drive = system.primary_excitation[1]
     cycles = integration.cycles_or_default
     if integration.cycles is None and hasattr(drive, "frequency"):
         cycles = int(round(drive.duration * drive.frequency, 9))

@@ -1,4 +1,4 @@
-"""``snapbeam threshold``: the smallest velocity amplitude, or whatever else, that makes the beam snap through."""
+"""``snapbeam threshold``: the lowest value of a parameter that makes the beam snap through."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import answer, door, duration, file_line, out, progress
+from snapbeam.cli.console import add_json, cli_command, duration, file_line, out, progress
 from snapbeam.cli.parameter_options import (
     BEAM,
     CONTACT,
@@ -38,11 +38,11 @@ _AXES = (
 _VALUES = "0.005:0.64:128"
 
 
-@door
+@cli_command
 @with_parameters(*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN, axes=_AXES)
 def threshold(
     given: Any,
-    along: Annotated[
+    parameter: Annotated[
         str, typer.Option(help="Parameter to raise (velocity_amplitude).", rich_help_panel="Threshold")
     ] = "velocity_amplitude",
     output: Annotated[
@@ -66,11 +66,11 @@ def threshold(
     from snapbeam.model.parameters import lookup
     from snapbeam.util.files import check_writable
 
-    settings = configured(given, lambda config, _: _axes_of(config, along))
+    settings = configured(given, lambda config, _: _axes_of(config, parameter))
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
-    name = lookup(along).name
-    axes = _axes_of(settings, along)
+    name = lookup(parameter).name
+    axes = _axes_of(settings, parameter)
     values = axes.pop(name)
 
     from snapbeam.sweeps.threshold import threshold as find
@@ -89,8 +89,8 @@ def threshold(
     names = (
         "lower_threshold", "upper_threshold", "lower_threshold_min", "upper_threshold_max", "failed_runs",
     )  # fmt: skip
-    answer(
-        along=dataset.attrs["along"],
+    add_json(
+        parameter=dataset.attrs["parameter"],
         axes={str(each): dataset[each].values for each in dataset["lower_threshold"].dims},
         **{each: dataset[each].values for each in names},
         outcome=np.array(_kinds(dataset))[dataset["outcome"].values],
@@ -99,18 +99,20 @@ def threshold(
     out().print(*_summary(dataset, elapsed), *(f"Written: {file_line(path)}" for path in files), sep="\n")
 
 
-def _axes_of(settings: Config, along: str) -> dict[str, Any]:
+def _axes_of(settings: Config, parameter: str) -> dict[str, Any]:
     """The axes of a search, those of the structure first, and the values to choose from."""
     from snapbeam.model.parameter_axes import parse_axis
     from snapbeam.model.parameters import lookup
     from snapbeam.util.validation import InputError
 
     axes: dict[str, Any] = settings.axes()
-    name = lookup(along).name
+    name = lookup(parameter).name
     values = axes.pop(name, None)
     if values is None:
         if name != "drive.velocity_amplitude":
-            raise InputError(f"{along}: give the values to choose from, as --sweep {along}=start:stop:count")
+            raise InputError(
+                f"{parameter}: give the values to choose from, as --sweep {parameter}=start:stop:count"
+            )
         values = np.atleast_1d(parse_axis("velocity_amplitude", _VALUES))
     if not [each for each in axes if each != "model.modes"]:
         axes["drive.frequency_ratio"] = np.atleast_1d(parse_axis("frequency_ratio", "0.1:4:64"))
@@ -119,12 +121,12 @@ def _axes_of(settings: Config, along: str) -> dict[str, Any]:
 
 def _summary(dataset: xr.Dataset, elapsed: float) -> list[str]:
     lines = [f"{dataset.attrs['runs']} runs in {duration(elapsed)}"]
-    along = dataset.attrs["along"]
+    parameter = dataset.attrs["parameter"]
     first = dataset["lower_threshold"]
     across = str(first.dims[-1])
     for at in np.ndindex(first.shape[:-1]):
         chosen = dict(zip(map(str, first.dims[:-1]), at, strict=True))
-        lines += _curve(dataset.isel(chosen), along, across, chosen)
+        lines += _curve(dataset.isel(chosen), parameter, across, chosen)
     return lines + status_lines(dataset)
 
 
@@ -133,7 +135,7 @@ def _kinds(dataset: xr.Dataset) -> list[str]:
     return str(dataset["outcome"].attrs["flag_meanings"]).split()
 
 
-def _curve(curve: xr.Dataset, along: str, across: str, chosen: dict[str, int]) -> list[str]:
+def _curve(curve: xr.Dataset, parameter: str, across: str, chosen: dict[str, int]) -> list[str]:
     """Return the lines that describe one curve."""
     first, always = curve["lower_threshold"], curve["upper_threshold"]
     named = [coordinate_text(name, curve[name].item()) for name in chosen]
@@ -145,17 +147,17 @@ def _curve(curve: xr.Dataset, along: str, across: str, chosen: dict[str, int]) -
     else:
         at = first.isel({across: int(np.nanargmin(first.values))})
         line = (
-            f"{head}lowest threshold {coordinate_text(along, float(at))} "
+            f"{head}lowest threshold {coordinate_text(parameter, float(at))} "
             f"at {coordinate_text(across, at[across].item())}"
         )
         width = always - first
         if bool(width.notnull().any()):
             of = f" over {int(width.notnull().sum())} points" if bool(width.isnull().any()) else ""
-            step = float(np.max(np.diff(curve[along].values)))
+            step = float(np.max(np.diff(curve[parameter].values)))
             line += f"; band {float(width.mean()):.2g} wide on average{of}, in steps of {step:.2g}"
     lines = [line]
     for kind, text in (
-        ("no_interwell_in_range", f"no interwell response in range: extend the values of {along}"),
+        ("no_interwell_in_range", f"no interwell response in range: extend the values of {parameter}"),
         ("undecided", "undecided: no run is interwell, but runs failed"),
         ("not_searched", "not searched: no run has a response class"),
     ):
@@ -169,7 +171,7 @@ def _curve(curve: xr.Dataset, along: str, across: str, chosen: dict[str, int]) -
     if bool(lower.any()):
         lowest = float(curve["lower_threshold_min"].where(lower).min())
         lines.append(
-            f"  failed runs leave the threshold open, down to {coordinate_text(along, lowest)}, "
+            f"  failed runs leave the threshold open, down to {coordinate_text(parameter, lowest)}, "
             f"at {int(lower.sum())} of {first.size} points"
         )
     higher = always.notnull() & ~(curve["upper_threshold_max"] == always)

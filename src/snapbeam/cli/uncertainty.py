@@ -1,4 +1,4 @@
-"""What the files of these commands hold: a system as any parameter file, its spread, and what is asked of it."""
+"""``snapbeam probability`` and ``snapbeam design``: response probabilities and robust designs under uncertainty."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import answer, door, duration, file_line, notes, out, progress
+from snapbeam.cli.console import add_json, cli_command, duration, file_line, notes, out, progress
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from snapbeam.uncertainty.distributions import ParameterUncertainty
 
 __all__ = [
+    "Checkpoint",
+    "EstimateCost",
     "File",
     "Output",
-    "PlanOnly",
-    "Store",
     "Yes",
     "agreed",
     "design",
@@ -35,27 +35,28 @@ __all__ = [
 
 
 File = Annotated[
-    Path, typer.Argument(help="TOML file of the system, its spread and the question.", metavar="FILE")
+    Path,
+    typer.Argument(
+        help="TOML parameter file with [uncertainty] and the section of the command.", metavar="FILE"
+    ),
 ]
-Store = Annotated[
+Checkpoint = Annotated[
     Path | None,
     typer.Option(
-        help="Folder that keeps the runs; one that exists is resumed.",
+        help="Checkpoint folder; an existing one is resumed.",
         rich_help_panel="Output",
         metavar="DIR",
     ),
 ]
 Yes = Annotated[
     bool,
-    typer.Option(
-        "--yes", "-y", help="Compute without being asked, however long it takes.", rich_help_panel="Cost"
-    ),
+    typer.Option("--yes", "-y", help="Compute without asking for confirmation.", rich_help_panel="Cost"),
 ]
-PlanOnly = Annotated[
+EstimateCost = Annotated[
     bool,
     typer.Option(
         "--estimate-cost",
-        help="Say what it costs, from a trial of ten seconds, and stop.",
+        help="Print the estimated cost, from a trial of ten seconds, and stop.",
         rich_help_panel="Cost",
     ),
 ]
@@ -65,12 +66,12 @@ Output = typer.Option(
 
 
 def read(file: Path, section: str) -> tuple[Config, ParameterUncertainty, dict[str, Any]]:
-    """The system, its spread and the section of the question.
+    """The system, its parameter uncertainty and the section of the command.
 
     Raises
     ------
     InputError
-        If the file cannot be read, has no spread or no such section, or holds what nothing knows.
+        If the file cannot be read, has no section [uncertainty], or has an unknown section or name.
     """
     from snapbeam.model.parameter_file import config_from_mapping
     from snapbeam.uncertainty.distributions import spread_from_mapping
@@ -80,21 +81,21 @@ def read(file: Path, section: str) -> tuple[Config, ParameterUncertainty, dict[s
         sections = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"file = {str(file)!r}: cannot be read as TOML, {error}") from None
-    if "spread" not in sections:
+    if "uncertainty" not in sections:
         raise InputError(
-            f"{file.name}: has no [spread], which says what differs; without one use snapbeam map"
+            f"{file.name}: has no section [uncertainty]; add one, or use snapbeam map for a system without uncertainty"
         )
-    spread = spread_from_mapping(sections.pop("spread"))
+    uncertainty = spread_from_mapping(sections.pop("uncertainty"), "uncertainty")
     question = sections.pop(section, {})
     for other in ("probability", "design"):
         sections.pop(other, None)
     if not isinstance(question, dict):
         raise InputError(f"{file.name}: [{section}] must be a section")
-    return config_from_mapping(sections, file.name), spread, question
+    return config_from_mapping(sections, file.name), uncertainty, question
 
 
 def taken(kind: Any, table: dict[str, Any], where: str) -> Any:
-    """A frozen value from a table; names that it does not have are refused."""
+    """An instance of a dataclass from a table of its fields; unknown names raise an error."""
     import dataclasses
 
     from snapbeam.util.validation import InputError
@@ -110,14 +111,14 @@ def taken(kind: Any, table: dict[str, Any], where: str) -> Any:
 
 
 def agreed(cost: CostEstimate, yes: bool, stop: bool) -> bool:
-    """Tell what a computation costs, and ask where it is long and somebody is there to answer."""
+    """Print the estimated cost; on a terminal, ask for confirmation of a long computation."""
     import sys
 
     notes().print(f"{cost}", markup=False)
-    answer(
-        plan={
+    add_json(
+        estimated_cost={
             "runs": cost.runs,
-            "runs_most": cost.max_runs,
+            "max_runs": cost.max_runs,
             "seconds": cost.seconds,
             "disk_bytes": cost.disk,
         }
@@ -130,7 +131,7 @@ def agreed(cost: CostEstimate, yes: bool, stop: bool) -> bool:
 
 
 def finish(dataset: xr.Dataset, output: Path, plot: Path | None, drawn: Any, lines: list[str]) -> None:
-    """Write the results, draw them, and say what they are."""
+    """Write and plot the results and print a summary."""
     from snapbeam.cli.console import write_map
 
     files = [write_map(dataset, output)]
@@ -141,50 +142,50 @@ def finish(dataset: xr.Dataset, output: Path, plot: Path | None, drawn: Any, lin
         from snapbeam.plot.style import save_figure
 
         files.append(save_figure(drawn(dataset), plot))
-    answer(words=lines, files=files)
+    add_json(summary=lines, files=files)
     out().print(*lines, *(f"Written: {file_line(path)}" for path in files), sep="\n")
 
 
 # ----------------------------------------------------------------------------------------------------
-# ``snapbeam design``: the best place, frequency and amplitude under limits that hold with a stated probability.
+# ``snapbeam design``: optimal location, frequency and amplitude under chance constraints.
 
 
-@door
+@cli_command
 def design(
     file: File,
     output: Annotated[Path, Output] = Path("design.nc"),
     plot: opt.Plot = None,
-    store: Store = None,
-    plan: PlanOnly = False,
+    checkpoint: Checkpoint = None,
+    estimate_cost: EstimateCost = False,
     yes: Yes = False,
     threads: opt.Threads = None,
 ) -> None:
-    """Find where and how to strike so that limits hold with a stated probability and goals are least.
+    """Optimise the excitation under constraints that hold with a stated probability.
 
-    The file has [spread] beside the sections of any parameter file, and in [design] the goals, with
-    [design.variables] (name = [low, high]), [[design.limits]] and [design.effort].
+    The TOML file has the sections of a parameter file, [uncertainty], and [design] with the objectives,
+    [design.variables] (name = [low, high]), [[design.constraints]] and [design.settings].
 
-    Example: snapbeam design switch.toml -o design.nc --plot design.png --checkpoint design.store
+    Example: snapbeam design switch.toml -o design.nc --plot design.png --checkpoint design.checkpoint
     """
     from snapbeam.cli.console import check_pictures
     from snapbeam.plot.uncertainty import plot_designs
-    from snapbeam.uncertainty.cost import estimate_cost as plan_of
+    from snapbeam.uncertainty.cost import estimate_cost as cost_of
     from snapbeam.uncertainty.optimization import optimize_design
     from snapbeam.util.files import check_writable
 
-    settings, spread, asked = read(file, "design")
+    settings, uncertainty, asked = read(file, "design")
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
-    variables, goals, limits, effort = _question(asked)
+    variables, objectives, constraints, optimizer = _question(asked)
     how = settings.integration.replace(threads=threads)
-    arguments = (settings.system, variables, goals, limits, spread, effort)
-    cost = plan_of(optimize_design, *arguments, integration=how, trial=10.0 if plan else 2.0)
-    if not agreed(cost, yes, plan):
+    arguments = (settings.system, variables, objectives, constraints, uncertainty, optimizer)
+    cost = cost_of(optimize_design, *arguments, integration=how, trial=10.0 if estimate_cost else 2.0)
+    if not agreed(cost, yes, estimate_cost):
         return
     begun = time.monotonic()
     with progress(None, "design", "generations") as report:
-        dataset = optimize_design(*arguments, integration=how, checkpoint=store, progress=report)
-    answer(
+        dataset = optimize_design(*arguments, integration=how, checkpoint=checkpoint, progress=report)
+    add_json(
         designs={
             str(name): each.values for name, each in dataset.data_vars.items() if "tried" not in each.dims
         }
@@ -193,28 +194,29 @@ def design(
 
 
 def _question(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any]:
-    """Variables, goals, limits and effort of the section."""
+    """Variables, objectives, constraints and settings of the section."""
     from snapbeam.uncertainty.optimization import Constraint, Objective, OptimizerSettings
     from snapbeam.util.validation import InputError
 
-    known = ("goals", "variables", "limits", "effort")
+    known = ("objectives", "variables", "constraints", "settings")
     for name in asked:
         if name not in known:
             raise InputError(f"design.{name}: unknown; must be one of {', '.join(known)}")
-    for name in ("goals", "variables"):
+    for name in ("objectives", "variables"):
         if not asked.get(name):
             raise InputError(f"design.{name}: is needed")
-    listed = asked["goals"] if isinstance(asked["goals"], list) else [asked["goals"]]
-    goals = [
-        Objective(quantity=each) if isinstance(each, str) else taken(Objective, each, "design.goals")
+    given = asked["objectives"]
+    listed = given if isinstance(given, list) else [given]
+    objectives = [
+        Objective(quantity=each) if isinstance(each, str) else taken(Objective, each, "design.objectives")
         for each in listed
     ]
-    limits = [taken(Constraint, each, "design.limits") for each in asked.get("limits", [])]
+    constraints = [taken(Constraint, each, "design.constraints") for each in asked.get("constraints", [])]
     return (
         asked["variables"],
-        goals,
-        limits,
-        taken(OptimizerSettings, asked.get("effort", {}), "design.effort"),
+        objectives,
+        constraints,
+        taken(OptimizerSettings, asked.get("settings", {}), "design.settings"),
     )
 
 
@@ -243,52 +245,58 @@ def _lines(dataset: xr.Dataset, elapsed: float) -> list[str]:
 
 
 # ----------------------------------------------------------------------------------------------------
-# ``snapbeam probability``: how likely each outcome is, over any parameters, under tolerances.
+# ``snapbeam probability``: probability of each outcome over any parameters.
 
 
-@door
+@cli_command
 def probability(
     file: File,
     output: Annotated[Path, Output] = Path("probability.nc"),
     plot: opt.Plot = None,
-    store: Store = None,
-    plan: PlanOnly = False,
+    checkpoint: Checkpoint = None,
+    estimate_cost: EstimateCost = False,
     yes: Yes = False,
     threads: opt.Threads = None,
 ) -> None:
-    """Map how likely a struck beam snaps and where it ends, when systems, drives and starts differ by their tolerances.
+    """Map the probability of snap-through and of each final well under parameter uncertainty.
 
-    The file has [spread] beside the sections of any parameter file, the axes in [sweep], and in [probability] how
-    narrow the intervals are to be.
+    The TOML file has the sections of a parameter file, [uncertainty], the axes in [sweep], and the sampling plan in
+    [probability].
 
     Example: snapbeam probability switch.toml -o probability.nc --plot probability.png
     """
     from snapbeam.cli.console import check_pictures
     from snapbeam.model.parameter_file import DEFAULT_AXES
     from snapbeam.plot.uncertainty import plot_probability
-    from snapbeam.uncertainty.cost import estimate_cost as plan_of
+    from snapbeam.uncertainty.cost import estimate_cost as cost_of
     from snapbeam.uncertainty.probability import SamplingPlan, probability_map
     from snapbeam.util.files import check_writable
 
-    settings, spread, asked = read(file, "probability")
+    settings, uncertainty, asked = read(file, "probability")
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
     runs: Any = asked["runs"] if set(asked) == {"runs"} else taken(SamplingPlan, asked, "probability")
     axes = settings.axes(DEFAULT_AXES)
     how = settings.integration.replace(threads=threads)
-    cost = plan_of(
-        probability_map, settings.system, axes, spread, runs, integration=how, trial=10.0 if plan else 2.0
+    cost = cost_of(
+        probability_map,
+        settings.system,
+        axes,
+        uncertainty,
+        runs,
+        integration=how,
+        trial=10.0 if estimate_cost else 2.0,
     )
-    if not agreed(cost, yes, plan):
+    if not agreed(cost, yes, estimate_cost):
         return
     begun = time.monotonic()
     with progress(None, "probability map", "runs") as report:
         dataset = probability_map(
-            settings.system, axes, spread, runs, integration=how, checkpoint=store, progress=report
+            settings.system, axes, uncertainty, runs, integration=how, checkpoint=checkpoint, progress=report
         )
     small = {name: dataset[name].values for name in ("probability", "probability_low", "probability_high", "runs")
              if dataset[name].size <= 4000}  # fmt: skip
-    answer(found=small)
+    add_json(results=small)
     outcome = str(dataset.attrs["watched_outcome"])
     finish(
         dataset,
@@ -306,12 +314,12 @@ def _lines_probability(dataset: xr.Dataset, elapsed: float) -> list[str]:
         one = dataset.sel(outcome=name)
         sure = int((one["probability_low"] > 0.95).sum())
         never = int((one["probability_high"] < 0.05).sum())
-        lines.append(f"{name}: above 0.95 for certain at {sure} points, below 0.05 at {never}")
+        lines.append(f"{name}: lower limit above 0.95 at {sure} points, upper limit below 0.05 at {never}")
     if not bool(dataset["reached"].all()):
-        lines.append(f"not as narrow as asked at {int((~dataset['reached']).sum())} points")
+        lines.append(f"interval wider than requested at {int((~dataset['reached']).sum())} points")
     failed = int(dataset["runs_failed"].sum())
     return (
-        [*lines, f"{failed} runs failed; the intervals hold for whatever they might have done"]
+        [*lines, f"{failed} runs failed; the intervals include every possible outcome of these runs"]
         if failed
         else lines
     )

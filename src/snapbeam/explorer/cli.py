@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from snapbeam.cli.console import answer_now, door, out
+from snapbeam.cli.console import cli_command, out, write_json_now
 
 __all__ = ["explore"]
 
@@ -16,7 +16,7 @@ COMMANDS = {"explore": "snapbeam.explorer.cli:explore"}
 """Module and function of each command, by name."""
 
 
-@door
+@cli_command
 def explore(
     file: Annotated[
         Path | None,
@@ -62,7 +62,7 @@ def explore(
         system, integration = settings.system, settings.integration
 
     def ready(url: str) -> None:
-        answer_now(url=url)
+        write_json_now(url=url)
         out().print(f"Explorer at {url}", markup=False)
         out().print("Press Ctrl+C to stop it.", markup=False)
         if browser:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import answer, door, duration, file_line, notes, out
+from snapbeam.cli.console import add_json, cli_command, duration, file_line, notes, out
 
 __all__ = ["reproduce"]
 
@@ -18,7 +18,7 @@ COMMANDS = {"reproduce": "snapbeam.paper.cli:reproduce"}
 """Module and function of each command, by name."""
 
 
-@door
+@cli_command
 def reproduce(
     figure: Annotated[
         str,
@@ -54,7 +54,7 @@ def reproduce(
             "says which.",
         ),
     ] = False,
-    dots: opt.Dots = None,
+    measurements: opt.Measurements = None,
     measured: Annotated[
         list[Path] | None,
         typer.Option(help="NetCDF file of a measured run, three times, for fig4.", metavar="FILE"),
@@ -81,13 +81,13 @@ def reproduce(
     size = "full" if full else "quick"
     results = Results(size, read=data, write=output if full else None, progress=_Tell())
     names = [name for name in FIGURES if figure in (name, "all")]
-    _check_measured(figure, names, dots, measured)
+    _check_measured(figure, names, measurements, measured)
     _check_targets(output, names, claims=figure in ("claims", "all"))
     written: list[Path] = []
     for name in names:
         start = time.monotonic()
         given: dict[str, Any] = (
-            {"dots": dots} if dots is not None and name in ("fig6", "fig7", "fig8") else {}
+            {"dots": measurements} if measurements is not None and name in ("fig6", "fig7", "fig8") else {}
         )
         if measured and name == "fig4":
             given["measured"] = [str(file) for file in measured]
@@ -103,15 +103,15 @@ def reproduce(
         else:
             rows, files = write_claims(output, results)
         written += files
-        answer(claims=summary(rows))
+        add_json(claims=summary(rows))
         out().print(f"claims ({'stored' if stored else size}): {summary(rows)}")
         for file in files:
             out().print(f"  {file_line(file)}")
 
-    answer(figure=figure, size=size, files=written)
+    add_json(figure=figure, size=size, files=written)
 
 
-def _check_measured(figure: str, names: list[str], dots: Path | None, measured: list[Path] | None) -> None:
+def _check_measured(figure: str, names: list[str], measurements: Path | None, measured: list[Path] | None) -> None:
     """Refuse, before anything is computed, measured responses and runs that cannot be shown."""
     from snapbeam.cli.console import read_overlay
     from snapbeam.model.default_values import BEAM
@@ -119,10 +119,10 @@ def _check_measured(figure: str, names: list[str], dots: Path | None, measured: 
     from snapbeam.paper.system import paper_model
     from snapbeam.util.validation import InputError
 
-    if dots is not None:
+    if measurements is not None:
         if not {"fig6", "fig7", "fig8"} & set(names):
-            raise InputError(f"dots: {figure} shows no measured responses; fig6, fig7 and fig8 do")
-        read_overlay(dots, paper_model(1).reference_frequency, BEAM.buckling_level)
+            raise InputError(f"measurements: {figure} shows no measured responses; fig6, fig7 and fig8 do")
+        read_overlay(measurements, paper_model(1).reference_frequency, BEAM.buckling_level)
     if measured:
         if "fig4" not in names:
             raise InputError(f"measured: {figure} shows no measured run; fig4 does")

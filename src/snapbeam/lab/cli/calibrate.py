@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import door, file_line, out
+from snapbeam.cli.console import cli_command, file_line, out
 from snapbeam.cli.parameter_options import configured
 from snapbeam.lab.cli import options as lab
 
@@ -116,7 +116,7 @@ Output = Annotated[
 # ----------------------------------------------------------------------------------------------------
 
 
-@door
+@cli_command
 def calibrate(
     measurements: Measurements = None,
     straight: Straight = None,

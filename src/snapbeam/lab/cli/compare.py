@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import door, file_line, open_result, out
+from snapbeam.cli.console import cli_command, file_line, open_result, out
 from snapbeam.lab.cli import options as lab
 from snapbeam.util.status_codes import ResponseClass
 
@@ -24,7 +24,7 @@ __all__ = ["compare"]
 _RUN = "Measured run"
 
 
-@door
+@cli_command
 def compare(
     measured: Annotated[
         Path,

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import door, file_line, out
+from snapbeam.cli.console import cli_command, file_line, out
 from snapbeam.lab.cli import options as lab
 
 __all__ = [
@@ -78,7 +78,7 @@ Stabilisation = Annotated[
 # ----------------------------------------------------------------------------------------------------
 
 
-@door
+@cli_command
 def fit_decay(
     signal: lab.SignalFile,
     modes: Modes = 1,

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import FAILED, answer, door, file_line, out
+from snapbeam.cli.console import FAILED, add_json, cli_command, file_line, out
 from snapbeam.lab.cli import options as lab
 
 __all__ = ["process_tests"]
@@ -20,7 +20,7 @@ _CAMERA = "Camera"
 _OUTPUT = "Output"
 
 
-@door
+@cli_command
 def process_tests(
     folder: Annotated[
         Path, typer.Argument(help="Folder of recordings and vibrometer files.", metavar="FOLDER")
@@ -113,7 +113,7 @@ def process_tests(
     ]
     if simulated is not None and len(spoiled) < len(results):
         files.append(_on_map(target, simulated))
-    answer(tests=[asdict(result) for result in results], spoiled=len(spoiled), files=files)
+    add_json(tests=[asdict(result) for result in results], spoiled=len(spoiled), files=files)
     for path in files:
         console.print(f"Written: {file_line(path)}")
     if len(spoiled) == len(results):

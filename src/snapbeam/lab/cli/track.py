@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from snapbeam.cli.console import answer, door, duration, file_line, out, progress
+from snapbeam.cli.console import add_json, cli_command, duration, file_line, out, progress
 from snapbeam.lab.cli import options as lab
 
 if TYPE_CHECKING:
@@ -191,7 +191,7 @@ VideoEvery = Annotated[
 # ----------------------------------------------------------------------------------------------------
 
 
-@door
+@cli_command
 def track(
     recording: RecordingFile,
     frame_rate: FrameRate = None,
@@ -291,7 +291,7 @@ def track(
             with progress(len(opened), "video", "frames") as tell:
                 files.append(annotated_video(opened, dataset, video, every=video_every, progress=tell))
     found = diagnostics_of(dataset)
-    answer(
+    add_json(
         quality=tracking_quality(dataset), diagnostics=[asdict(diagnostic) for diagnostic in found],
         seconds=elapsed, files=files,
     )  # fmt: skip

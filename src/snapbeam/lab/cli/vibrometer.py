@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from snapbeam.cli import parameter_options as opt
-from snapbeam.cli.console import door, file_line, out
+from snapbeam.cli.console import cli_command, file_line, out
 from snapbeam.lab.cli import options as lab
 
 __all__ = [
@@ -74,7 +74,7 @@ DriveSamplingFreq = Annotated[
 # ----------------------------------------------------------------------------------------------------
 
 
-@door
+@cli_command
 def vibrometer(
     signal: lab.SignalFile,
     frequency: Frequency = None,
