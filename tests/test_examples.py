@@ -19,6 +19,8 @@ DEAR = {
     "ex23_other_worlds",
     "ex24_dynamics",
     "ex25_design",
+    "ex30_experiment",
+    "ex42_the_paper",
 }
 """Figures of the paper, which tests/paper draws too, and others that take seconds or compile their own kernels."""
 EXAMPLES = sorted((Path(__file__).parent.parent / "examples").glob("ex*.py"))

@@ -51,6 +51,7 @@ def found(waveform: sb.uncertainty.Waveform, seed: int = 0) -> sb.uncertainty.Po
     )
 
 
+@pytest.mark.slow
 def test_the_beam_and_the_contact_are_found() -> None:
     nominal, draw = nominal_system(), np.random.default_rng(3)
     logs = np.array([0.02, -0.015, 0.2])

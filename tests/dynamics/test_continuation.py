@@ -108,6 +108,7 @@ def follow_to_grazing(ratio: float, restitution: float, periods: int, longest: f
     return branch
 
 
+@pytest.mark.slow
 def test_restitution_orbits_are_followed_to_grazing() -> None:
     branch = follow_to_grazing(3.6, 0.8, 2, 0.1)
     assert (

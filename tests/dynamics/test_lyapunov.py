@@ -53,6 +53,7 @@ def test_a_periodic_orbit_has_the_exponents_of_its_multipliers() -> None:
     assert float(ds["exponent"][0, 0]) == pytest.approx(expected, rel=0.1)
 
 
+@pytest.mark.slow
 def test_transients_are_told_from_what_they_settle_on() -> None:
     """A beam that snaps for a while and then rings down: diverging first, contracting afterwards."""
     ds = sb.dynamics.lyapunov_spectrum(system_of(8, 1.625, 0.3), 1, 700, transient=0)

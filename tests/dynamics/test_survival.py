@@ -11,8 +11,16 @@ from snapbeam.util.validation import InputError
 LIFETIME, DELAY = 50.0, 8.0
 
 
-@pytest.mark.parametrize("limit", [np.inf, 200.0, 60.0])
-@pytest.mark.parametrize("runs", [12, 32])
+@pytest.mark.parametrize(
+    ("runs", "limit"),
+    [
+        (12, 60.0),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in ((12, np.inf), (12, 200.0), (32, np.inf), (32, 200.0), (32, 60.0))
+        ),
+    ],
+)
 def test_intervals_cover_as_they_say(runs: int, limit: float) -> None:
     """93 to 97 % of 1500 samples, complete or censored, of an exponential after a delay."""
     draw = np.random.default_rng(7)

@@ -94,6 +94,7 @@ class Served:
             self.process.wait(20)
         if self.process.poll() is None:
             self.process.kill()
+        self.process.wait()
 
 
 @pytest.fixture(scope="session")

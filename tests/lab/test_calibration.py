@@ -51,8 +51,8 @@ def test_the_papers_numbers(tmp_path):
     assert found.values["thickness"] == pytest.approx(0.399e-3, abs=0.0005e-3)
     assert found.values["buckling_level"] == pytest.approx(0.331e-3, abs=0.0005e-3)
     assert 0.0008e-3 < found.standard_errors["buckling_level"] < 0.002e-3
-    assert found.well_frequencies == pytest.approx(80.9, abs=0.02)  # the mean of 81.3 and 80.5 Hz
-    assert found.start_well_frequencies == pytest.approx(81.853, abs=0.001)
+    assert found.well_frequency == pytest.approx(80.9, abs=0.02)  # the mean of 81.3 and 80.5 Hz
+    assert found.start_well_frequency == pytest.approx(81.853, abs=0.001)
     told = "\n".join(found.remarks)
     assert "0.335 mm" in told and "81.85 Hz" in told and "80.90 Hz" in told
     assert "0.44 mm measured (-9.4%)" in told and "0.5 mm measured (-33.8%)" in told
@@ -110,6 +110,7 @@ def test_a_hidden_beam_is_found_exactly_without_noise(thickness, level, length, 
     assert found.scatter == 1.0 and not found.undetermined
 
 
+@pytest.mark.slow
 def test_uncertainties_cover_hidden_beams():
     hidden = BEAM.replace(thickness=0.42e-3, buckling_level=0.4e-3)
     rng = np.random.default_rng(4)
@@ -151,7 +152,7 @@ def test_parameters_that_hardly_part_are_warned_of():
 
 def test_only_a_straight_beam_or_only_wells():
     straight = calibrate(Measurements(straight_frequencies=[80.0, 221.0]), modes=12)
-    assert list(straight.values) == ["thickness"] and straight.well_frequencies is None
+    assert list(straight.values) == ["thickness"] and straight.well_frequency is None
     wells = calibrate(Measurements(lower_well_frequencies=[81.0]), modes=12)
     assert list(wells.values) == ["buckling_level"]
     assert any("nothing is left to check" in text for text in wells.warnings)

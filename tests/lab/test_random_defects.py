@@ -70,13 +70,24 @@ def hold(what, folder, *, good, spoiled, seed=20):
     return found
 
 
-@pytest.mark.parametrize(("what", "good", "spoiled"), [("scene", 1, 3), ("drive", 10, 12), ("decay", 10, 12)])
+@pytest.mark.parametrize(
+    ("what", "good", "spoiled"),
+    [
+        pytest.param("scene", 1, 3, marks=pytest.mark.slow),
+        ("drive", 4, 6),
+        pytest.param("decay", 10, 12, marks=pytest.mark.slow),
+    ],
+)
 def test_a_few(what, good, spoiled, tmp_path):
     hold(what, tmp_path, good=good, spoiled=spoiled)
 
 
 @pytest.mark.parametrize(
-    ("seed", "k", "kind"), [(22, 242, "gamma"), (22, 216, "glare"), (23, 216, "glare"), (24, 286, "glare")]
+    ("seed", "k", "kind"),
+    [
+        (22, 242, "gamma"),
+        *(pytest.param(*case, "glare", marks=pytest.mark.slow) for case in ((22, 216), (23, 216), (24, 286))),
+    ],
 )
 def test_what_went_by_in_silence_once(seed, k, kind, tmp_path):
     """A curve that another one, nearer to 1, undoes nearly as well; glare too faint to show in any one frame."""

@@ -24,6 +24,7 @@ def test_one_slow_tip_crosses_the_centre_line(level, place) -> None:
         assert height == pytest.approx(0.0, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_two_slow_tips_need_not() -> None:
     """A beam buckled far; the mirrored pusher, smaller steps and more modes; the paper's beam has no such pair."""
     model = two_tips.beam_of(two_tips.LEVEL, 8)

@@ -34,6 +34,13 @@ print(twice(21.0), "loaded" if twice.stats.cache_hits else "compiled")
 """A function that compiles in no time, kept as kernels are."""
 
 
+@pytest.fixture(autouse=True)
+def no_folder_given(monkeypatch):
+    """Keep the code beside its source, also where the environment names a folder."""
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.setattr("numba.config.CACHE_DIR", "")
+
+
 @pytest.fixture
 def small(python):
     """Run the small function from a folder of its own, in a fresh process."""

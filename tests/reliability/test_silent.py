@@ -90,6 +90,7 @@ def test_what_is_no_path_closes_no_stream(path, tried):
             load(path)
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning:snapbeam.model.reduced_model")
 def test_a_beam_beyond_all_numbers_ends(tried):
     """What once was an endless loop ends: refused, or finite."""
     tried("beams beyond all numbers", 3)

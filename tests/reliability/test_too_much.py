@@ -77,6 +77,7 @@ def test_the_limit_is_the_users():
     assert run.summary.status == sb.RunStatus.OK
 
 
+@pytest.mark.filterwarnings("ignore:drive.frequency_ratio = 1e.12")
 def test_fast_drives_take_no_memory():
     """What is asked for is a few cycles, however short they are."""
     run = sb.simulate(system(1e12), sb.Integration(cycles=2))
@@ -127,7 +128,8 @@ def test_an_interrupt_ends_a_long_run(command, tmp_path, tried):
     start = time.monotonic()
     process.wait(timeout=30)
     assert time.monotonic() - start < 15
-    said = process.stderr.read()
+    with process.stderr:
+        said = process.stderr.read()
     assert process.returncode == 130 and "Traceback" not in said
     assert os.listdir(tmp_path) == []
     tried("interrupts of long runs")

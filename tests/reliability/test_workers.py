@@ -188,7 +188,7 @@ def test_a_scheduler_that_is_killed(tmp_path, work, monkeypatch, tried):
             within(180, go)
     finally:
         process.kill()
-        process.wait()
+        process.communicate()
     tried("schedulers killed")
     stage = Stage("base", work.setup.points, CHUNK)
     with MapStore(tmp_path / "store", work) as store:

@@ -155,7 +155,7 @@ def test_statistics_of_the_way_add_up() -> None:
 # ---------------------------------------------------------------------- against an uninterrupted run
 
 
-@pytest.mark.parametrize("modes", REGULAR)
+@pytest.mark.parametrize("modes", [pytest.param(n, marks=pytest.mark.slow if n > 1 else ()) for n in REGULAR])
 def test_two_hundred_calls_against_a_run_of_two_hundred_cycles(modes: int) -> None:
     """Energies, crossings and impacts of regular motions agree to the error of the accuracy level.
 

@@ -21,6 +21,7 @@ VIOLENT = sb.System(
 )
 
 
+@pytest.mark.filterwarnings("ignore:drive.velocity_amplitude = 30")
 def test_a_run_with_steps_too_long_for_it_says_so() -> None:
     with pytest.warns(DiagnosticWarning, match="misses its energy ledger by"):
         rough = sb.simulate(VIOLENT, sb.Integration(cycles=20))

@@ -45,7 +45,12 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+QUICK = ("tolerance", "decided", "failed", "no impact ends")
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in CASES]
+)
 def test_round_trip(name: str, tmp_path) -> None:
     system, integration = CASES[name]
     run = sb.simulate(system, integration)

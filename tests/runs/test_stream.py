@@ -12,8 +12,12 @@ from test_save import CASES
 import snapbeam as sb
 from snapbeam.util.validation import InputError, InputTypeError
 
+QUICK = ("recorded", "failed")
 
-@pytest.mark.parametrize("name", CASES)
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in CASES]
+)
 def test_is_what_save_writes(name: str, tmp_path) -> None:
     system, integration = CASES[name]
     outcome = sb.simulate_to_file(system, integration, path=tmp_path / "run.nc")

@@ -45,9 +45,9 @@ def kill_loop(folder, kills, seed):
     assert seen["needed"] <= seen["begun"] <= seen["needed"] + seen["kills"]
 
 
-def test_killed_at_thirty_random_instants(tmp_path):
+def test_killed_at_random_instants(tmp_path):
     """No finished task lost or changed; none computed twice but the one in flight at a kill."""
-    kill_loop(tmp_path, 30, 1)
+    kill_loop(tmp_path, 8, 1)
 
 
 @pytest.mark.slow

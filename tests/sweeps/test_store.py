@@ -227,18 +227,16 @@ with StoreLock(Path(sys.argv[1]) / "lock"):
 
 def test_a_second_writer_is_refused_until_the_first_is_gone(stored, work):
     path, _ = stored
-    process = subprocess.Popen([sys.executable, "-c", HOLDER, str(path)], stdout=subprocess.PIPE, text=True)
-    try:
-        assert process.stdout.readline() == "held\n"
-        with pytest.raises(CheckpointError, match=f"written by another process .process {process.pid}."):
-            MapStore(path, work)
-        process.send_signal(signal.SIGKILL)
-        process.wait()
-        with MapStore(path, work), pytest.raises(CheckpointError, match=f"process {os.getpid()}"):
-            MapStore(path, work)
-    finally:
-        process.kill()
-        process.wait()
+    command = [sys.executable, "-c", HOLDER, str(path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "held\n"
+            with pytest.raises(CheckpointError, match=f"written by another process .process {process.pid}."):
+                MapStore(path, work)
+        finally:
+            process.send_signal(signal.SIGKILL)
+    with MapStore(path, work), pytest.raises(CheckpointError, match=f"process {os.getpid()}"):
+        MapStore(path, work)
     with StoreLock(path / "lock"):
         pass
 

@@ -137,6 +137,7 @@ class TiffSource(FrameSource):
         super().__init__(path)
         import tifffile
 
+        self._file: Any = None
         try:
             self._file = tifffile.TiffFile(path)
             pages = self._file.pages
@@ -162,17 +163,19 @@ class TiffSource(FrameSource):
                 self.diagnostics += (KINDS_RECORDING["lossy"].found(error_px=LOSSY_ERROR),)
                 self.edge_error = LOSSY_ERROR
             self._imagej(self._file.imagej_metadata or {}, first)
-        except InputError:
-            raise
+            self.numbers = np.arange(count)
+            self._full = 0.0
+            if self._dtype.kind == "f":
+                self._full = float_range([self._page(k) for k in {0, count // 2, count - 1}], path)
+                self.max_value = 65535
+            else:
+                self.max_value = int(np.iinfo(self._dtype).max)
         except Exception as error:  # a damaged file makes tifffile raise many kinds
+            if self._file is not None:
+                self.close()
+            if isinstance(error, InputError):
+                raise
             raise InputError(f"{path}: cannot be read as a TIFF file ({error})") from None
-        self.numbers = np.arange(count)
-        self._full = 0.0
-        if self._dtype.kind == "f":
-            self._full = float_range([self._page(k) for k in {0, count // 2, count - 1}], path)
-            self.max_value = 65535
-        else:
-            self.max_value = int(np.iinfo(self._dtype).max)
 
     def _imagej(self, values: dict[str, Any], page: Any) -> None:
         self.metadata = {
