@@ -74,7 +74,7 @@ for well, level in (("lower", 0.3323e-3), ("upper", 0.3289e-3)):
     wells[well] = lab.identify_decay(lab.read_signal(files / f"decay_{well}.csv"))
     mode = wells[well].modes[0]
     print(
-        f"{well} well: {mode.natural_frequencies:.3f} ± {mode.natural_frequencies_se:.3f} Hz "
+        f"{well} well: {mode.natural_frequency:.3f} ± {mode.natural_frequency_se:.3f} Hz "
         f"(truth {model.natural_frequencies[0]:.3f}), damping ratio "
         f"{mode.damping_ratio:.5f} ± {mode.damping_ratio_se:.5f} (truth 0.005)"
     )
@@ -96,8 +96,8 @@ figure = plot_decay(lab.read_signal(files / "decay_upper.csv"), wells["upper"])
 
 measured = lab.Measurements(
     straight_frequencies=(80.0, 221.0),
-    lower_well_frequencies=(round(wells["lower"].natural_frequencies, 2),),
-    upper_well_frequencies=(round(wells["upper"].natural_frequencies, 2),),
+    lower_well_frequencies=(round(wells["lower"].natural_frequency, 2),),
+    upper_well_frequencies=(round(wells["upper"].natural_frequency, 2),),
     damping_ratio=[fit.damping_ratio for fit in wells.values()],
     thickness=0.44e-3,
     buckling_level=0.5e-3,
@@ -295,16 +295,16 @@ for ratio, amplitude in (
         ratio * first,
         cycles=cycles,
     )
-    omega.append(ratio * first / calibration.well_frequencies)
+    omega.append(ratio * first / calibration.well_frequency)
     speed.append(
         amplitude
         * 0.3306e-3
         * first
-        / (calibration.beam.buckling_level * calibration.well_frequencies)
+        / (calibration.beam.buckling_level * calibration.well_frequency)
     )
     classes.append(found.response_class)
 dots = MeasuredPoints(
-    np.array([*omega, drive.steady.frequency / calibration.well_frequencies]),
+    np.array([*omega, drive.steady.frequency / calibration.well_frequency]),
     np.array(
         [
             *speed,
@@ -312,7 +312,7 @@ dots = MeasuredPoints(
             / (
                 2.0
                 * np.pi
-                * calibration.well_frequencies
+                * calibration.well_frequency
                 * calibration.beam.buckling_level
             ),
         ]
@@ -335,7 +335,7 @@ ds = sb.response_map(
     velocity_amplitude=np.linspace(0.05, 0.6, 12),
     location=paper.LOCATION,
     cycles=cycles,
-    reference_frequency=calibration.well_frequencies,
+    reference_frequency=calibration.well_frequency,
 )
 agreement = lab.compare_dots(dots, ds)
 print(

@@ -126,7 +126,7 @@ def decay_signal(rng, kind):
             2.0 * np.pi * other * time
         )
     noise = 10.0 ** (-rng.uniform(18.0, 40.0) / 20.0) / np.sqrt(2.0)
-    truth, options = {"natural_frequencies": freq, "damping_ratio": zeta}, {}
+    truth, options = {"natural_frequency": freq, "damping_ratio": zeta}, {}
     at = int(rng.uniform(0.25, 0.5) * time.size)
     if kind == "close modes":
         other = freq * (1.0 + rng.uniform(0.02, 0.12))

@@ -70,7 +70,7 @@ def test_the_papers_numbers(tmp_path):
     assert "unequal wells" in path.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(("kind", "value"), [("rise", 1.2e-6), ("uniform_load", 11e-3)])
+@pytest.mark.parametrize(("kind", "value"), [("midspan_amplitude", 1.2e-6), ("uniform_load", 11e-3)])
 def test_two_wells_and_soft_ends_go_into_the_file(tmp_path, kind, value):
     """The file's own system has both measured frequencies; what was known of the ends is kept."""
     ends = BoundaryConditions(left_rotational_stiffness=40.0, right_rotational_stiffness=60.0)

@@ -1,4 +1,4 @@
-"""A campaign: a folder of tests to one table, a page of pictures and dots on a map, taken up where it stopped."""
+"""A campaign: a folder of tests to one table, a page of pictures and a comparison with a map, taken up where it stopped."""
 
 import csv
 import os
@@ -108,7 +108,7 @@ def test_twelve_tests_three_of_them_spoiled_interrupted_and_resumed(tmp_path):
         else:
             is_measured(row, truth[name])
     assert "of 9 agree with the map" in done.output
-    for name in ("tests.png", "dots.png"):
+    for name in ("tests.png", "measurements.png"):
         assert (output / name).stat().st_size > 10_000
 
 

@@ -1,4 +1,4 @@
-"""Measured dots on a map, and a measured run beside a simulated one."""
+"""Measured points on a map, and a measured run beside a simulated one."""
 
 from __future__ import annotations
 
@@ -12,11 +12,10 @@ from typer.testing import CliRunner
 
 from snapbeam.lab.cli.calibrate import calibrate
 from snapbeam.lab.cli.compare import compare
-from snapbeam.lab.cli.fit_decay import identify
 from snapbeam.lab.cli.vibrometer import vibrometer
 from snapbeam.lab.compare_maps import compare_measured_points
 from snapbeam.lab.compare_waveforms import compare_waveforms
-from snapbeam.lab.plot.comparison import plot_dot_comparison, plot_waveform_comparison, plot_waveform_overlay
+from snapbeam.lab.plot.comparison import plot_map_comparison, plot_waveform_comparison, plot_waveform_overlay
 from snapbeam.lab.signal_files import write_signal
 from snapbeam.lab.signals import make_signal
 from snapbeam.simulation.dataset import trajectory_dataset
@@ -25,8 +24,8 @@ from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError
 
 
-def dots_of(dataset, count: int = 200, seed: int = 0):
-    """Dots that agree with a map, a little off its points."""
+def points_of(dataset, count: int = 200, seed: int = 0):
+    """Points that agree with a map, a little off its points."""
     rng = np.random.default_rng(seed)
     ratio, velocity = dataset["frequency_ratio"].values, dataset["velocity_amplitude"].values
     i, j = rng.integers(0, ratio.size, count), rng.integers(0, velocity.size, count)
@@ -39,8 +38,8 @@ def dots_of(dataset, count: int = 200, seed: int = 0):
     )
 
 
-def test_dots_from_the_map_agree_with_it(synthetic_map):
-    found = compare_measured_points(dots_of(synthetic_map), synthetic_map)
+def test_points_from_the_map_agree_with_it(synthetic_map):
+    found = compare_measured_points(points_of(synthetic_map), synthetic_map)
     assert found.agreement == 1.0 and found.snap_agreement == 1.0
     assert found.used == 200 - int((found.table["measured"] == -1).sum())
     assert np.trace(found.confusion) == found.used
@@ -50,12 +49,13 @@ def test_dots_from_the_map_agree_with_it(synthetic_map):
 
 
 def test_the_confusion_table_counts_every_swap(synthetic_map):
-    dots = dots_of(synthetic_map)
-    swapped = dots.response_class.copy()
+    points = points_of(synthetic_map)
+    swapped = points.response_class.copy()
     at = np.flatnonzero(swapped == ResponseClass.TRANSIENT_2)[:7]
     swapped[at] = ResponseClass.INTRAWELL
     found = compare_measured_points(
-        MeasuredPoints(dots.frequency_ratio, dots.velocity_amplitude, dots.location, swapped), synthetic_map
+        MeasuredPoints(points.frequency_ratio, points.velocity_amplitude, points.location, swapped),
+        synthetic_map,
     )
     assert found.confusion[ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_2] == 7
     assert found.agreement == pytest.approx(1.0 - 7.0 / found.used)
@@ -63,14 +63,14 @@ def test_the_confusion_table_counts_every_swap(synthetic_map):
     assert (found.table["distance"].values[at] >= 1.0).all()
 
 
-def test_dots_that_do_not_belong_are_left_out_and_said(synthetic_map):
-    dots = MeasuredPoints(
+def test_points_that_do_not_belong_are_left_out_and_said(synthetic_map):
+    points = MeasuredPoints(
         np.array([1.0, 9.0, 1.0, 1.0, 1.0]),
         np.array([0.05, 0.05, 0.9, 0.05, 0.05]),
         np.array([0.476, 0.476, 0.476, 0.3, np.nan]),
         np.array([0, 0, 0, 0, -1], dtype=np.int8),
     )
-    found = compare_measured_points(dots, synthetic_map)
+    found = compare_measured_points(points, synthetic_map)
     assert found.table["used"].values.tolist() == [1, 0, 0, 0, 0]
     assert len(found.notes) == 3 and "2 of 5" in found.notes[0]
     empty = compare_measured_points(
@@ -78,7 +78,7 @@ def test_dots_that_do_not_belong_are_left_out_and_said(synthetic_map):
     )
     assert empty.used == 0 and np.isnan(empty.agreement)
     with pytest.raises(InputError, match="map"):
-        compare_measured_points(dots, synthetic_map.drop_vars("response_class"))
+        compare_measured_points(points, synthetic_map.drop_vars("response_class"))
 
 
 def measured_of(run, freq: float = 100.0, start: float = 0.0123, noise: float = 0.01, rate: float = 1e4):
@@ -88,7 +88,7 @@ def measured_of(run, freq: float = 100.0, start: float = 0.0123, noise: float = 
     rest = np.clip(time - start, 0.0, None)
     values = {
         name: np.interp(rest, run["time"], run[name]) + noise * rng.standard_normal(time.size)
-        for name in ("displacement", "striker_displacement")
+        for name in ("displacement_at_striker", "striker_displacement")
     }
     return trajectory_dataset(time, **values)
 
@@ -113,7 +113,7 @@ def test_dropouts_stay_dropouts(synthetic_run):
     valid = np.ones(seen.sizes["time"], dtype=np.int8)
     valid[300:320] = 0
     seen["valid"] = ("time", valid, {"units": "1"})
-    seen["displacement"].values[300:320] = np.nan
+    seen["displacement_at_striker"].values[300:320] = np.nan
     found = compare_waveforms(seen, synthetic_run, 100.0, start=0.0123)
     hidden = np.isnan(found.waveforms["measured_displacement"].values)
     assert 15 <= hidden.sum() <= 25 and np.isfinite(found.rms_difference)
@@ -139,8 +139,8 @@ def test_runs_that_cannot_be_compared(synthetic_run, change, word):
 def test_pictures(synthetic_map, synthetic_run):
     import matplotlib.pyplot as plt
 
-    dots = dots_of(synthetic_map, 40)
-    figure = plot_dot_comparison(synthetic_map, dots, compare_measured_points(dots, synthetic_map))
+    points = points_of(synthetic_map, 40)
+    figure = plot_map_comparison(synthetic_map, points, compare_measured_points(points, synthetic_map))
     assert "agree" in figure.axes[1].get_title(loc="left")
     runs = plot_waveform_comparison(
         compare_waveforms(measured_of(synthetic_run), synthetic_run, 100.0, start=0.0123), (0.0, 5.0)
@@ -153,7 +153,7 @@ def parting(run, cycle: float, freq: float = 100.0):
     """The run as it is seen if its beam goes another way from a cycle on."""
     seen = run.copy(deep=True)
     late = run["time"].values * freq > cycle
-    seen["displacement"].values[late] += 0.5
+    seen["displacement_at_striker"].values[late] += 0.5
     return seen
 
 
@@ -191,8 +191,8 @@ def test_an_overlay_shows_where_runs_part(synthetic_run):
 @pytest.fixture(scope="module")
 def program():
     app = typer.Typer()
-    for command in (vibrometer, identify, calibrate, compare):
-        app.command(command.__name__)(command)
+    for command in (vibrometer, fit_decay, calibrate, compare):
+        app.command(command.__name__.replace("_", "-"))(command)
 
     def call(*arguments):
         return CliRunner().invoke(app, [str(argument) for argument in arguments])
@@ -217,7 +217,7 @@ def test_commands_of_signals(program, tmp_path):
     assert told.exit_code == 0, told.output
     report = json.loads((tmp_path / "d.json").read_text(encoding="utf-8"))
     for method in ("fit", "hilbert", "log_decrement"):
-        assert report[method]["modes"][0]["natural_frequencies"] == pytest.approx(81.0, rel=5e-4)
+        assert report[method]["modes"][0]["natural_frequency"] == pytest.approx(81.0, rel=5e-4)
     assert program("fit-decay", tmp_path / "none.csv").exit_code == 2
 
 

@@ -84,13 +84,14 @@ def flags():
 
     commands = get_command(app).commands
     asked = (
-        commands[name] for name in ("track", "vibrometer", "identify", "calibrate", "compare", "campaign")
+        commands[name]
+        for name in ("track", "vibrometer", "fit-decay", "calibrate", "compare", "process-tests")
     )
     return {flag for one in asked for option in one.params for flag in (*option.opts, *option.secondary_opts)}
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.code)
-def test_a_finding_names_its_way_out_as_python_and_as_the_command_line_do(kind):
+def test_a_diagnostic_names_its_way_out_as_python_and_as_the_command_line_do(kind):
     named = set(re.findall(r"--[a-z]+(?:-[a-z]+)*", kind.says))
     assert named <= flags(), named - flags()
     for option in kind.options:

@@ -1,10 +1,10 @@
-"""The laboratory's public names are where its own list says."""
+"""Public names of the lab part."""
 
 import pytest
-import snapbeam.core.findings as diagnostics
 
 import snapbeam
 import snapbeam.lab as lab
+from snapbeam.util import diagnostics
 
 
 @pytest.mark.parametrize("name", lab.__all__)
@@ -13,7 +13,7 @@ def test_every_public_name_is_there(name):
     assert name in dir(lab)
 
 
-def test_a_finding_of_the_laboratory_is_a_finding_of_the_package():
+def test_a_diagnostic_of_the_part_is_a_diagnostic_of_the_package():
     assert lab.Diagnostic is diagnostics.Diagnostic is snapbeam.Diagnostic
 
 

@@ -1,6 +1,6 @@
-"""The laboratory: recordings, vibrometer signals, identification, calibration and comparison.
+"""Processing of experiments: recordings, vibrometer signals, free decays, calibration, comparison with simulations.
 
-The public names are loaded when they are first used, so that none of the laboratory's libraries is needed before.
+Each public name is loaded when it is first used, so that no library of this part is needed before.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _HOMES = {
     "calibrate": "calibration",
     "stiffness_from_impacts": "calibration",
     "load_measurements": "calibration",
-    "MeasuredPointsComparison": "compare_maps",
+    "MapComparison": "compare_maps",
     "compare_measured_points": "compare_maps",
     "compare_waveforms": "compare_waveforms",
     "write_photron": "camera",

@@ -328,7 +328,7 @@ class TestResult:
     velocity_se_m_s: float = _NAN
     location: float = _NAN
     response_class: str = ResponseClass.UNKNOWN.label
-    crossings: int = 0
+    zero_crossings: int = 0
     cycles: float = _NAN
     snr_db: float = _NAN
     measured_share: float = _NAN
@@ -340,7 +340,7 @@ class TestResult:
 
     @property
     def doubtful(self) -> bool:
-        """Whether any diagnostic is more than a note."""
+        """Whether any diagnostic is worse than information."""
         return any(severity != Severity.INFO.value for _, severity, _ in self.diagnostics)
 
 
@@ -434,8 +434,8 @@ def _measured(
         velocity_m_s=speed * drive.steady.amplitude,
         velocity_se_m_s=speed * drive.steady.amplitude_se,
         location=float(tracked.attrs["location"]),
-        response=response.response_class.label,
-        crossings=response.zero_crossings,
+        response_class=response.response_class.label,
+        zero_crossings=response.zero_crossings,
         cycles=response.cycles,
         snr_db=drive.steady.sinad,
         measured_share=float(np.mean(valid)),
@@ -537,7 +537,7 @@ def strictly(result: TestResult) -> TestResult:
     """A result that is spoiled if anything makes it doubtful."""
     if result.status != "measured" or not result.doubtful:
         return result
-    words = next(words for _, severity, words in result.diagnostics if severity != "note")
+    words = next(words for _, severity, words in result.diagnostics if severity != "info")
     return dataclasses.replace(result, status="spoiled", reason=words)
 
 

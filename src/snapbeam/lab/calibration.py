@@ -39,11 +39,11 @@ __all__ = [
     "Measurements",
     "Residual",
     "at_least",
+    "boundary_section",
     "calibrate",
     "directions",
     "doubts",
     "either_well",
-    "ends_section",
     "imperfection_section",
     "links",
     "load_measurements",
@@ -51,7 +51,7 @@ __all__ = [
     "remarks",
     "search",
     "sensitivity",
-    "shape_findings",
+    "shape_diagnostics",
     "stiffness_from_impacts",
     "uneven_beam",
     "uneven_words",
@@ -63,7 +63,7 @@ __all__ = [
 # What makes two measured wells unequal.
 
 
-_UNITS = {"rise": "m", "point_load": "N", "uniform_load": "N/m"}
+_UNITS = {"midspan_amplitude": "m", "point_load": "N", "uniform_load": "N/m"}
 
 
 def uneven_beam(beam: Beam, measured: Measurements, kind: str, modes: int) -> ReducedModel:
@@ -107,7 +107,7 @@ def imperfection_section(imperfection: Imperfection | None) -> dict[str, Any]:
     return {name: value for name, value in vars(imperfection).items() if not _same(value, perfect[name])}
 
 
-def ends_section(beam: Beam) -> dict[str, Any]:
+def boundary_section(beam: Beam) -> dict[str, Any]:
     """Ends that are no clamps, as the section of a parameter file."""
     return {name: float(value) for name, value in vars(beam.boundary).items() if value is not None}
 
@@ -190,7 +190,7 @@ def directions(jacobian: _Array) -> _Array:
 _CROSSING = 0.05  # share within which the first two frequencies may be in the other order
 
 
-def shape_findings(beam: Beam, measured: Measurements, modes: int) -> list[Diagnostic]:
+def shape_diagnostics(beam: Beam, measured: Measurements, modes: int) -> list[Diagnostic]:
     """Whether the order of the modes about a well is in doubt where nothing else tells them apart."""
     told = [measured.lower_well_shape, measured.upper_well_shape]
     given = [freq for freq in (measured.lower_well_frequencies, measured.upper_well_frequencies) if freq]
@@ -328,13 +328,13 @@ def remarks(result: Calibration, measured: Measurements) -> list[str]:
     first = [
         values[0] for values in (measured.lower_well_frequencies, measured.upper_well_frequencies) if values
     ]
-    if first and result.well_frequencies is not None:
+    if first and result.well_frequency is not None:
         mean = float(np.mean(first))
         told.append(
-            f"the model's first frequency about either well is {result.well_frequencies:.2f} Hz; measured mean "
+            f"the model's first frequency about either well is {result.well_frequency:.2f} Hz; measured mean "
             f"{mean:.2f} Hz"
         )
-        other = result.start_well_frequencies
+        other = result.start_well_frequency
         if other is not None and abs(other / mean - 1.0) > 0.002:
             told.append(
                 f"the buckling level the fit started from, {result.start.buckling_level * 1e3:.4g} mm "
@@ -348,10 +348,10 @@ def remarks(result: Calibration, measured: Measurements) -> list[str]:
                 f"{name}: {value * 1e3:.4g} mm in the model, {gauge * 1e3:.4g} mm measured "
                 f"({value / gauge - 1.0:+.1%})"
             )
-    if result.gauge_well_frequencies is not None:
+    if result.gauge_well_frequency is not None:
         told.append(
             f"with the measured geometry the model's first frequency about a well would be "
-            f"{result.gauge_well_frequencies:.1f} Hz: the fitted numbers stand for all that the ideal clamped beam "
+            f"{result.gauge_well_frequency:.1f} Hz: the fitted numbers stand for all that the ideal clamped beam "
             "leaves out, and are no gauge readings"
         )
     return told
@@ -427,7 +427,7 @@ class Calibration:
     ``beam`` is the result; ``values`` and ``standard_errors`` hold the fitted parameters by name (SI), in the
     order of ``correlation``; a parameter that the data do not determine has no entry in ``standard_errors``
     and is named in ``undetermined``.  ``scatter`` is the root of chi-square per degree of freedom by which
-    standard errors were raised, 1 if the data agree.  ``well_frequencies``, ``start_well_frequencies``, ``gauge_well_frequencies``
+    standard errors were raised, 1 if the data agree.  ``well_frequency``, ``start_well_frequency``, ``gauge_well_frequency``
     [Hz] are the first frequency about a well of the result, of the beam the fit started from, and of the
     result with the gauge's geometry; ``either_well`` holds the buckling level [m] that each well alone would
     ask for.  ``imperfection``, if one was asked for, gives each well its own first frequency; ``beam`` then has
@@ -448,9 +448,9 @@ class Calibration:
     damping_ratio_se: float | None
     contact_stiffness: float | None
     contact_stiffness_se: float | None
-    well_frequencies: float | None
-    start_well_frequencies: float | None
-    gauge_well_frequencies: float | None
+    well_frequency: float | None
+    start_well_frequency: float | None
+    gauge_well_frequency: float | None
     either_well: tuple[float, ...]
     remarks: tuple[str, ...]
     diagnostics: tuple[Diagnostic, ...]
@@ -472,7 +472,9 @@ class Calibration:
         else:
             beam["axial_load"] = float(self.beam.axial_load)
         sections: dict[str, dict[str, Any]] = {"beam": beam, "model": {"modes": self.modes}}
-        sections |= {"ends": ends_section(self.beam)} if self.beam.boundary != BoundaryConditions() else {}
+        sections |= (
+            {"boundary": boundary_section(self.beam)} if self.beam.boundary != BoundaryConditions() else {}
+        )
         sections |= {"imperfection": imperfection_section(self.imperfection)} if self.imperfection else {}
         if self.damping_ratio is not None:
             sections["model"]["damping_ratio"] = self.damping_ratio
@@ -494,9 +496,9 @@ class Calibration:
             "damping_ratio_se": self.damping_ratio_se,
             "contact_stiffness": self.contact_stiffness,
             "contact_stiffness_se": self.contact_stiffness_se,
-            "well_frequencies": self.well_frequencies,
-            "start_well_frequencies": self.start_well_frequencies,
-            "gauge_well_frequencies": self.gauge_well_frequencies,
+            "well_frequency": self.well_frequency,
+            "start_well_frequency": self.start_well_frequency,
+            "gauge_well_frequency": self.gauge_well_frequency,
             "either_well": list(self.either_well),
             "imperfection": imperfection_section(self.imperfection),
             "remarks": list(self.remarks),
@@ -533,7 +535,7 @@ def calibrate(
         about a well.
     modes : int
         Number of buckling modes of the model, which is that used for maps.
-    imperfection : {"rise", "point_load", "uniform_load"}, optional
+    imperfection : {"midspan_amplitude", "point_load", "uniform_load"}, optional
         What makes the wells unequal, fitted last to the first frequencies about both; the parameter file then has
         a section ``[imperfection]``.  Equal wells by default.
 
@@ -604,16 +606,14 @@ def calibrate(
         damping_ratio_se=damping_se,
         contact_stiffness=contact,
         contact_stiffness_se=contact_se,
-        well_frequencies=_first_frequency(result, count) if wells else None,
-        start_well_frequencies=_first_frequency(beam, count) if wells else None,
-        gauge_well_frequencies=_first_frequency(result.replace(**gauges), count)
-        if wells and gauges
-        else None,
+        well_frequency=_first_frequency(result, count) if wells else None,
+        start_well_frequency=_first_frequency(beam, count) if wells else None,
+        gauge_well_frequency=_first_frequency(result.replace(**gauges), count) if wells and gauges else None,
         either_well=either_well(result, measured, count),
         remarks=(),
         diagnostics=(),
     )
-    diagnostics += shape_findings(result, measured, count) if wells else []
+    diagnostics += shape_diagnostics(result, measured, count) if wells else []
     diagnostics += doubts(answer, measured)
     told = remarks(answer, measured)
     if uneven is not None and imperfection is not None:

@@ -167,7 +167,7 @@ def _region(value: tuple[int, int, int, int] | None, shape: tuple[int, int]) -> 
     return (top, bottom, left, integer("region[3]", value[3], left + 1, shape[1]))
 
 
-def _rate_findings(source: FrameSource, given: float | None) -> tuple[Diagnostic, ...]:
+def _rate_diagnostics(source: FrameSource, given: float | None) -> tuple[Diagnostic, ...]:
     """What to say of a frame rate that was given although the file says something."""
     if given is None:
         return ()
@@ -233,7 +233,7 @@ def open_recording(
                 f"pixel_size (--pixel-size) = {size:g}: a pixel of {size:g} m; must be at most {_LARGEST_PIXEL:g} m, "
                 "in metres, such as 12e-6 for 12 um"
             )
-        diagnostics = (*source.diagnostics, *_rate_findings(source, given))
+        diagnostics = (*source.diagnostics, *_rate_diagnostics(source, given))
         return Recording(path, source, rate, size, _region(region, source.shape), diagnostics)
     except BaseException:
         source.close()
@@ -345,7 +345,6 @@ def pixel_size_from_marks(
         If a mark does not stand out, or the two are the same.
     """
     length = positive("distance", distance, "m")
-    pass  # import-removed
 
     instance("recording", recording, Recording, "a Recording")
     picture = recording.frame(frame).astype(np.float64)

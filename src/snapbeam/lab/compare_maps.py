@@ -1,49 +1,37 @@
-"""Measured responses beside simulated ones: dots on a map."""
+"""Comparison of measured responses with a simulated map."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["DotComparison", "MeasuredPointsComparison", "compare_measured_points"]
+__all__ = ["MapComparison", "compare_measured_points"]
 
 
 _Array = NDArray[np.float64]
 _AXES = ("frequency_ratio", "velocity_amplitude", "location")
-_NEAR = 0.02  # a dot belongs to a map if its fixed coordinate is within this share of the map's
+_NEAR = 0.02  # a measured point belongs to a map if its fixed coordinate is within this share of the map's
 _CLASSES = tuple(kind for kind in ResponseClass if kind is not ResponseClass.UNKNOWN)
 
 
-class MeasuredPointsComparison(Protocol):
-    """Measured responses: arrays of one entry a test, as ``snapbeam.sweeps.measured_points.read_measured_points`` returns them."""
-
-    @property
-    def frequency_ratio(self) -> NDArray[np.float64]: ...
-    @property
-    def velocity_amplitude(self) -> NDArray[np.float64]: ...
-    @property
-    def location(self) -> NDArray[np.float64]: ...
-    @property
-    def response_class(self) -> NDArray[np.int8]: ...
-
-
 @dataclass(frozen=True)
-class DotComparison:
-    """Measured dots against a map.
+class MapComparison:
+    """Measured responses compared with a map.
 
-    ``table`` has one entry a dot: its coordinates, ``measured`` and ``simulated`` class (that of the
+    ``table`` has one entry per measured point: its coordinates, ``measured`` and ``simulated`` class (that of the
     nearest point of the map), ``used`` (1 if it counts) and ``distance``, in steps of the map, to the
-    nearest point that has the measured class (NaN if none has).  ``confusion[i, j]`` counts dots of
+    nearest point that has the measured class (NaN if none has).  ``confusion[i, j]`` counts points of
     measured class i and simulated class j, in the order of ``classes``.
     """
 
@@ -54,12 +42,12 @@ class DotComparison:
 
     @property
     def used(self) -> int:
-        """Dots that count."""
+        """Number of points that count."""
         return int(self.confusion.sum())
 
     @property
     def agreement(self) -> float:
-        """Share of the dots that count whose class is that of the map; NaN if none counts."""
+        """Share of the points that count whose class is that of the map; NaN if none counts."""
         return float(np.trace(self.confusion)) / self.used if self.used else math.nan
 
     @property
@@ -69,7 +57,7 @@ class DotComparison:
 
     @property
     def snap_agreement(self) -> float:
-        """Share of the dots that count for which map and measurement agree whether the beam snaps at all."""
+        """Share of the points that count for which map and measurement agree whether the beam snaps at all."""
         quiet = self.classes.index(ResponseClass.INTRAWELL)
         snaps = np.delete(np.delete(self.confusion, quiet, 0), quiet, 1)
         return float(self.confusion[quiet, quiet] + snaps.sum()) / self.used if self.used else math.nan
@@ -78,7 +66,7 @@ class DotComparison:
         """The comparison as plain numbers and words."""
         low, high = self.agreement_interval
         return {
-            "dots": int(self.table.sizes["dot"]),
+            "points": int(self.table.sizes["point"]),
             "used": self.used,
             "agreement": self.agreement,
             "agreement_low": low,
@@ -100,12 +88,12 @@ def _wilson(successes: int, total: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-def compare_measured_points(dots: MeasuredPointsComparison, dataset: xr.Dataset) -> DotComparison:
+def compare_measured_points(measurements: MeasuredPoints, dataset: xr.Dataset) -> MapComparison:
     """Compare measured responses with a simulated map.
 
     Parameters
     ----------
-    dots : MeasuredDots
+    measurements : MeasuredPoints
     dataset : xarray.Dataset
         A map: ``response_class`` over some of frequency_ratio, velocity_amplitude and location; the others are
         scalar coordinates or attributes.
@@ -113,23 +101,23 @@ def compare_measured_points(dots: MeasuredPointsComparison, dataset: xr.Dataset)
     Raises
     ------
     InputError
-        If the dataset is no map.
+        If the dataset is not a map.
 
     Notes
     -----
-    A dot does not count if it lies more than half a step outside the map, was measured at another value of a
+    A point does not count if it lies more than half a step outside the map, was measured at another value of a
     coordinate that the map holds fixed (by more than 2 %), or has no class on either side.
     """
     import xarray as xr
 
     if not isinstance(dataset, xr.Dataset) or "response_class" not in dataset:
-        raise InputError("dataset: must be a map with the variable response")
+        raise InputError("dataset: must be a map with the variable response_class")
     response = dataset["response_class"]
     dims = [str(name) for name in response.dims]
     if not dims or any(name not in _AXES for name in dims):
-        raise InputError(f"response with dimensions {dims}: must be among {', '.join(_AXES)}")
-    where = {name: np.asarray(getattr(dots, name), dtype=np.float64) for name in _AXES}
-    measured = np.asarray(dots.response_class, dtype=np.int8)
+        raise InputError(f"response_class with dimensions {dims}: must be among {', '.join(_AXES)}")
+    where = {name: np.asarray(getattr(measurements, name), dtype=np.float64) for name in _AXES}
+    measured = np.asarray(measurements.response_class, dtype=np.int8)
     count = measured.size
     inside, belongs = np.ones(count, dtype=bool), np.ones(count, dtype=bool)
     place: dict[str, _Array] = {}
@@ -146,7 +134,7 @@ def compare_measured_points(dots: MeasuredPointsComparison, dataset: xr.Dataset)
     index = {
         name: np.clip(np.nan_to_num(np.round(p)), 0, dataset.sizes[name] - 1) for name, p in place.items()
     }
-    pick = {name: xr.DataArray(i.astype(np.int64), dims="dot") for name, i in index.items()}
+    pick = {name: xr.DataArray(i.astype(np.int64), dims="point") for name, i in index.items()}
     simulated = response.isel(pick).values.astype(np.int8)
     known = (measured != ResponseClass.UNKNOWN) & (simulated != ResponseClass.UNKNOWN)
     used = inside & belongs & known
@@ -159,20 +147,20 @@ def compare_measured_points(dots: MeasuredPointsComparison, dataset: xr.Dataset)
         (inside & belongs & ~known, "without a class, measured or simulated"),
     ):
         if mask.any():
-            notes.append(f"{int(mask.sum())} of {count} dots do not count: {text}")
+            notes.append(f"{int(mask.sum())} of {count} measured points do not count: {text}")
     distance = _distance(response.values, dims, place, measured)
-    data: dict[str, Any] = {name: ("dot", where[name]) for name in _AXES}
+    data: dict[str, Any] = {name: ("point", where[name]) for name in _AXES}
     data |= {
-        "measured": ("dot", measured),
-        "simulated": ("dot", np.where(inside & belongs, simulated, ResponseClass.UNKNOWN).astype(np.int8)),
-        "used": ("dot", used.astype(np.int8)),
+        "measured": ("point", measured),
+        "simulated": ("point", np.where(inside & belongs, simulated, ResponseClass.UNKNOWN).astype(np.int8)),
+        "used": ("point", used.astype(np.int8)),
         "distance": (
-            "dot",
+            "point",
             np.where(used, distance, np.nan),
             {"long_name": "steps to the nearest point alike"},
         ),
     }
-    return DotComparison(xr.Dataset(data), confusion, _CLASSES, tuple(notes))
+    return MapComparison(xr.Dataset(data), confusion, _CLASSES, tuple(notes))
 
 
 def _steps(axis: _Array, value: _Array) -> _Array:

@@ -174,7 +174,7 @@ def compare_waveforms(
     spread = float(np.std(one[both])), float(np.std(two[both]))
     same = float(np.corrcoef(one[both], two[both])[0, 1]) if min(spread) > 0.0 else math.nan
     apart = max(_APART, 5.0 * float(measured.attrs.get("displacement_error_b", 0.0)))
-    diagnostics = _findings(
+    diagnostics = _diagnostics(
         columns, grid, shift, seen.amplitude / wanted.amplitude, start is not None or frequency is None
     )
     return WaveformComparison(
@@ -197,7 +197,7 @@ def compare_waveforms(
     )
 
 
-def _findings(
+def _diagnostics(
     columns: dict[str, _Array], grid: _Array, shift: float, ratio: float, started: bool
 ) -> list[Diagnostic]:
     """What the two shakers say of the comparison; *started* says that their first cycle is known."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from snapbeam.util.diagnostics import Diagnostic, Severity
 
 __all__ = [
-    "KINDS",
+    "KINDS_ALIGNMENT",
     "KINDS_CALIBRATION",
     "KINDS_COMPARISON",
     "KINDS_DECAY",
@@ -18,6 +18,9 @@ __all__ = [
     "Kind",
     "table",
 ]
+
+
+INFO, WARNING, ERROR = Severity.INFO, Severity.WARNING, Severity.ERROR
 
 
 @dataclass(frozen=True)
@@ -50,32 +53,30 @@ def table(*kinds: Kind) -> Mapping[str, Kind]:
 # Camera and vibrometer against each other: direction, amplitude, clocks.
 
 
-NOTE, DOUBT, WRONG = Severity.INFO, Severity.WARNING, Severity.ERROR
-
-KINDS = table(
+KINDS_ALIGNMENT = table(
     Kind(
-        "alignment.polarity", NOTE,
+        "alignment.polarity", INFO,
         "the start of the motion in both records",
         "the vibrometer counts as negative what is positive for the camera; a drive made with this alignment is turned "
         "over (polarity, --polarity, says otherwise)",
         ("polarity",),
     ),
     Kind(
-        "alignment.polarity_open", DOUBT,
+        "alignment.polarity_open", WARNING,
         "the start of the motion in both records",
         "whether the vibrometer counts the camera's direction as positive cannot be told, for the start of the motion "
         "is not in both records, or fits both ways; give polarity (--polarity) 1 or -1",
         ("polarity",),
     ),
     Kind(
-        "alignment.cycle_open", DOUBT,
+        "alignment.cycle_open", WARNING,
         "the start of the motion in both records",
         "whole cycles of {period_ms:.5g} ms remain open: the start of the motion is not in both records, or does not "
         "tell them apart; give near (--near), a delay known to half a cycle",
         ("near",),
     ),
     Kind(
-        "alignment.amplitude", DOUBT,
+        "alignment.amplitude", WARNING,
         "the amplitude seen by the camera, against the vibrometer's",
         "the camera sees {gain:.4f} +- {error:.4f} times the vibrometer's amplitude: pixel_size (--pixel-size), "
         "sensitivity (--sensitivity) or the plane of focus is wrong; amplitude_from (--amplitude-from) camera takes "
@@ -83,7 +84,7 @@ KINDS = table(
         ("pixel_size", "sensitivity", "amplitude_from"),
     ),
     Kind(
-        "alignment.clocks", NOTE,
+        "alignment.clocks", INFO,
         "the frequency of the same motion on both clocks",
         "the clocks differ by {difference:.1e}",
     ),
@@ -94,11 +95,9 @@ KINDS = table(
 # A calibrated beam against its data: what they determine, where they contradict each other or the model.
 
 
-NOTE_CALIBRATION, DOUBT_CALIBRATION, WRONG = Severity.INFO, Severity.WARNING, Severity.ERROR
-
 KINDS_CALIBRATION = table(
     Kind(
-        "calibration.antisymmetric", DOUBT_CALIBRATION,
+        "calibration.antisymmetric", WARNING,
         "parity of the model's modes, where the data tell modes apart by their order only",
         "the first frequency about a well of this beam, {frequency:.1f} Hz, belongs to the antisymmetric mode, which "
         "does not depend on the buckling level (above b/r = 6.2, b the buckling level, r the radius of gyration): "
@@ -107,7 +106,7 @@ KINDS_CALIBRATION = table(
         ("lower_well_shape",),
     ),
     Kind(
-        "calibration.crossing", DOUBT_CALIBRATION,
+        "calibration.crossing", WARNING,
         "distance of the model's first symmetric and antisymmetric frequency",
         "the first two frequencies about a well, {symmetric:.1f} Hz symmetric and {antisymmetric:.1f} Hz "
         "antisymmetric, lie so close that their order may be the other one: "
@@ -115,52 +114,52 @@ KINDS_CALIBRATION = table(
         ("lower_well_shape",),
     ),
     Kind(
-        "calibration.undetermined", DOUBT_CALIBRATION,
+        "calibration.undetermined", WARNING,
         "singular values of the sensitivities of all frequencies to all parameters",
         "{told}",
     ),
-    Kind("calibration.linked", DOUBT_CALIBRATION, "correlation of the fitted parameters", "{told}"),
-    Kind("calibration.vague", DOUBT_CALIBRATION, "standard errors of the fitted parameters", "{told}"),
+    Kind("calibration.linked", WARNING, "correlation of the fitted parameters", "{told}"),
+    Kind("calibration.vague", WARNING, "standard errors of the fitted parameters", "{told}"),
     Kind(
-        "calibration.no_check", NOTE_CALIBRATION,
+        "calibration.no_check", INFO,
         "number of data against number of parameters",
         "as many parameters as measured values: nothing is left to check the model with",
     ),
     Kind(
-        "calibration.unequal_wells", NOTE_CALIBRATION,
+        "calibration.unequal_wells", INFO,
         "frequencies of one mode about the two wells",
         "{told}",
     ),
-    Kind("calibration.assumed_errors", NOTE_CALIBRATION, "whether standard errors were given", "{told}"),
+    Kind("calibration.assumed_errors", INFO, "whether standard errors were given", "{told}"),
     Kind(
-        "calibration.outlier", DOUBT_CALIBRATION,
+        "calibration.outlier", WARNING,
         "each measured frequency against the model's, in standard errors",
         "{told}: model {model:.4g} Hz, measured {measured:.4g} Hz, {apart:.1f} standard errors apart",
     ),
     Kind(
-        "calibration.scatter", DOUBT_CALIBRATION,
+        "calibration.scatter", WARNING,
         "chi-square per degree of freedom",
         "the data scatter {scatter:.2f} times as much as their standard errors allow; the uncertainties are raised by "
         "it",
     ),
     Kind(
-        "calibration.damping_differs", NOTE_CALIBRATION,
+        "calibration.damping_differs", INFO,
         "damping ratios of different modes",
         "damping ratios from {low:.4g} to {high:.4g}: the model takes one for every mode",
     ),
     Kind(
-        "contact.exponent", WRONG,
+        "contact.exponent", ERROR,
         "durations of impacts over their closing speed, against the law of Hertz",
         "durations go with the closing speed to the power {exponent:+.2f} +- {error:.2f}, not -0.20: these are no "
         "collisions of two rigid bodies (the beam bends while it is in touch), so they tell no contact stiffness",
     ),
     Kind(
-        "contact.coarse", DOUBT_CALIBRATION,
+        "contact.coarse", WARNING,
         "durations of impacts in frames",
         "the impacts last {frames:.1f} frames only: record faster for a contact stiffness",
     ),
     Kind(
-        "contact.few", DOUBT_CALIBRATION,
+        "contact.few", WARNING,
         "number and spread of the impacts",
         "{count:.0f} impact(s) of speeds within a factor {span:.2f}: the law of Hertz cannot be checked on them",
     ),
@@ -171,11 +170,9 @@ KINDS_CALIBRATION = table(
 # A measured run beside a simulated one: do the two shakers do the same.
 
 
-NOTE_COMPARISON, DOUBT_COMPARISON, WRONG = Severity.INFO, Severity.WARNING, Severity.ERROR
-
 KINDS_COMPARISON = table(
     Kind(
-        "comparison.turned_over", WRONG,
+        "comparison.turned_over", ERROR,
         "the motion of both shakers from the start on, with either sign",
         "the simulated shaker moves down where the measured one moves up (correlation {correlation:.2f} from the start "
         "on): the drive was recorded by a vibrometer that is upside down against the camera; make it again with "
@@ -183,26 +180,26 @@ KINDS_COMPARISON = table(
         ("camera", "polarity"),
     ),
     Kind(
-        "comparison.shifted", DOUBT_COMPARISON,
+        "comparison.shifted", WARNING,
         "the phase of both shakers, where the start of the excitation is known",
         "the shakers are {shift:+.2f} cycles apart counted from the start of each: start (--start) is wrong, or the "
         "drive is of another test; the measured clock was shifted by as much",
         ("start",),
     ),
     Kind(
-        "comparison.no_start", NOTE_COMPARISON,
+        "comparison.no_start", INFO,
         "whether the start of the excitation was given, or seen in the shaker",
         "without start (--start), and with a shaker that moves from the first sample on, it is not known which cycle "
         "is the first: the runs are aligned within a cycle only",
         ("start",),
     ),
     Kind(
-        "comparison.amplitude", DOUBT_COMPARISON,
+        "comparison.amplitude", WARNING,
         "the amplitude of both shakers",
         "the measured shaker moves {ratio:.3f} times as far as the simulated one: another test, or another scale",
     ),
     Kind(
-        "comparison.gaps", NOTE_COMPARISON,
+        "comparison.gaps", INFO,
         "share of the cycles that were measured",
         "{share_percent:.0f} % of the compared cycles were not measured",
     ),
@@ -213,83 +210,81 @@ KINDS_COMPARISON = table(
 # A free decay against itself: was it free, was it whole, does the model say it all.
 
 
-NOTE_DECAY, DOUBT_DECAY, WRONG = Severity.INFO, Severity.WARNING, Severity.ERROR
-
 KINDS_DECAY = table(
     Kind(
-        "decay.release", NOTE_DECAY,
+        "decay.release", INFO,
         "where the motion sets in",
         "the free decay begins at {start:.6g} s; what lies before is left out (start, --start, says otherwise)",
         ("start",),
     ),
     Kind(
-        "decay.clipped", DOUBT_DECAY,
+        "decay.clipped", WARNING,
         "levels hit exactly again and again, or first maxima that do not fall",
         "tops are cut off until {until:.6g} s: the decay is taken from there; choose a larger range",
     ),
     Kind(
-        "decay.clipped_throughout", WRONG,
+        "decay.clipped_throughout", ERROR,
         "levels hit exactly again and again, or first maxima that do not fall",
         "tops are cut off over nearly the whole decay, so that its damping is not in it; choose a larger range",
     ),
     Kind(
-        "decay.disturbed", DOUBT_DECAY,
+        "decay.disturbed", WARNING,
         "amplitude and phase of the mode, cycle by cycle",
         "at {at:.6g} s the motion jumps by {jump_percent:.0f} % of its amplitude: a second hit, or a dropout; only the "
         "decay {told} that is used (start, --start, and stop, --stop, choose)",
         ("start", "stop"),
     ),
     Kind(
-        "decay.drift", NOTE_DECAY,
+        "decay.drift", INFO,
         "the mean over each cycle",
         "the zero drifts by {drift_percent:.0f} % of the amplitude; taken out as a polynomial of degree {degree:.0f}",
     ),
     Kind(
-        "decay.hum", NOTE_DECAY,
+        "decay.hum", INFO,
         "lines that do not decay",
         "a line of {frequency:.3f} Hz with {amplitude_percent:.1f} % of the amplitude does not decay (mains or a "
         "machine); taken out",
     ),
     Kind(
-        "decay.hum_asked", WRONG,
+        "decay.hum_asked", ERROR,
         "lines that do not decay, near a frequency that was asked for",
         "near frequencies (--frequencies) {asked:.5g} Hz there is only a line of {frequency:.4f} Hz that does not "
         "decay",
         ("frequencies",),
     ),
     Kind(
-        "decay.close_modes", NOTE_DECAY,
+        "decay.close_modes", INFO,
         "poles of the matrix pencil, and what one mode leaves",
         "two modes lie close together, {first:.3f} and {second:.3f} Hz: both are fitted (modes, --modes, shows both)",
         ("modes",),
     ),
     Kind(
-        "decay.damping_law", NOTE_DECAY,
+        "decay.damping_law", INFO,
         "the amplitude cycle by cycle, against viscous, dry and quadratic damping",
         "beside viscous damping there is {told} damping, {strength:.2f} +- {error:.1g} times as strong at the start: "
         "the damping ratio is that of the viscous part, of vanishing amplitude",
     ),
     Kind(
-        "decay.misfit", DOUBT_DECAY,
+        "decay.misfit", WARNING,
         "what the fit leaves near the mode, against the noise about it",
         "the fit leaves {ratio:.1f} times as much near the mode as the noise explains ({share_percent:.1f} % of the "
         "amplitude): something else is in the record; standard errors are raised to what parts of the decay differ by",
     ),
     Kind(
-        "decay.parts_differ", DOUBT_DECAY,
+        "decay.parts_differ", WARNING,
         "frequency and damping of the early and the late half of the decay",
         "the early and the late half of the decay differ by {frequency_se:.1f} standard errors in frequency and "
         "{damping_se:.1f} in damping; standard errors are raised by that",
     ),
     Kind(
-        "decay.frequency_drift", DOUBT_DECAY,
+        "decay.frequency_drift", WARNING,
         "the phase cycle by cycle, against the changes that softening makes",
         "the frequency changes by {share_percent:+.2f} % over the decay in a way that its amplitude does not: the "
         "temperature, or a clamp that creeps; the frequency is that of the start, and the change is in its standard "
         "error",
     ),
     Kind(
-        "decay.window", DOUBT_DECAY,
+        "decay.window", WARNING,
         "the noise of the sensor in each eighth of the record, which does not decay",
         "the noise falls with the decay, {factor:.1f} times over the record, as under an exponential window of "
         "{constant:.3g} s: such a window adds {added_percent:.3g} % to the damping ratio, which is in its standard "
@@ -297,41 +292,41 @@ KINDS_DECAY = table(
         ("exponential_window",),
     ),
     Kind(
-        "decay.hardening", DOUBT_DECAY,
+        "decay.hardening", WARNING,
         "the sign of the change of the frequency with amplitude",
         "the frequency rises with amplitude, by {rise_percent:.2g} % at the start ({certain:.0f} standard errors); "
         "about a well a buckled beam softens: the beam is not buckled, or the mode lies above half the sampling "
         "frequency, {half_hz:.5g} Hz, and is seen folded",
     ),
     Kind(
-        "decay.above_band", DOUBT_DECAY,
+        "decay.above_band", WARNING,
         "the frequency of a mode against the sampling frequency",
         "a mode at {frequency:.5g} Hz lies above {limit_hz:.5g} Hz, the sampling frequency over 2.56, where filters "
         "against aliasing still let pass what lies above half of it: it may be {folded:.5g} Hz; record faster",
     ),
     Kind(
-        "decay.short", DOUBT_DECAY,
+        "decay.short", WARNING,
         "the amplitude left at the end",
         "the record ends with {left_percent:.0f} % of the amplitude left: damping is read from little decay",
     ),
     Kind(
-        "decay.large", DOUBT_DECAY,
+        "decay.large", WARNING,
         "change of the frequency with amplitude",
         "the frequency changes by {change_percent:.0f} %: leave out the first cycles with start (--start)",
         ("start",),
     ),
     Kind(
-        "decay.faint", DOUBT_DECAY,
+        "decay.faint", WARNING,
         "the amplitude at the start against the noise",
         "the first mode starts less than 5 times above the noise",
     ),
     Kind(
-        "decay.undamped", DOUBT_DECAY,
+        "decay.undamped", WARNING,
         "the damping ratio against its standard error",
         "the damping ratio is not told from zero",
     ),
     Kind(
-        "decay.off_asked", DOUBT_DECAY,
+        "decay.off_asked", WARNING,
         "the frequency found, against the one asked for",
         "frequencies (--frequencies) {asked:.5g} Hz was asked for, the nearest mode is at {found:.5g} Hz",
         ("frequencies",),
@@ -343,60 +338,58 @@ KINDS_DECAY = table(
 # A recording's file against itself: times that contradict each other, pictures that were not kept as taken.
 
 
-NOTE_RECORDING, DOUBT_RECORDING = Severity.INFO, Severity.WARNING
-
 LOSSY_ERROR = 0.15
 """Standard error [px] of an edge in a video that throws detail away; measured 0.06 to 0.14 px."""
 
 KINDS_RECORDING = table(
     Kind(
-        "recording.rate_dependent", DOUBT_RECORDING,
+        "recording.rate_dependent", WARNING,
         "the compression of a video or of images",
         "the file's compression throws detail away: edges lie 0.06 to 0.14 px off however little they scatter; "
         "standard errors are raised to {error_px:.2f} px; save the recording uncompressed",
     ),
     Kind(
-        "recording.rate_given", NOTE_RECORDING,
+        "recording.rate_given", INFO,
         "the frame rate that was given, against the header's",
         "frame_rate (--frame-rate) = {given:g} Hz is taken, the file says {stated:g} Hz",
         ("frame_rate",),
     ),
     Kind(
-        "recording.contradiction", NOTE_RECORDING,
+        "recording.contradiction", INFO,
         "frames saved, frames recorded and the step between them, against each other",
         "the header contradicts itself about the step between frames; frame_rate (--frame-rate) = {given:g} Hz is "
         "taken as given",
         ("frame_rate",),
     ),
     Kind(
-        "recording.shutter", NOTE_RECORDING,
+        "recording.shutter", INFO,
         "the exposure against the time between frames",
         "a shutter of {stated:g} s cannot be: read as its reciprocal, {exposure_us:.4g} us",
     ),
     Kind(
-        "recording.no_exposure", NOTE_RECORDING,
+        "recording.no_exposure", INFO,
         "the exposure against the time between frames",
         "a shutter of {stated:g} s cannot be within a frame of {frame_us:.4g} us: the exposure is not known",
     ),
     Kind(
-        "recording.two_exposures", NOTE_RECORDING,
+        "recording.two_exposures", INFO,
         "two fields of the exposure, against each other",
         "the header gives exposures of {first_us:.4g} and {second_us:.4g} us; the second is taken",
     ),
     Kind(
-        "recording.curve", DOUBT_RECORDING,
+        "recording.curve", WARNING,
         "the camera's curve and edge enhancement in the header",
         "the camera's settings bend edges (curve of gamma {gamma:g}, edge enhancement {enhance:g}): switch both "
         "off, or undo the curve with gamma (--gamma)",
         ("gamma",),
     ),
     Kind(
-        "recording.colour", NOTE_RECORDING,
+        "recording.colour", INFO,
         "pictures in colour",
         "pictures in {channels:.0f} colours are turned to grey",
     ),
     Kind(
-        "recording.mosaic", DOUBT_RECORDING,
+        "recording.mosaic", WARNING,
         "grey levels of every other pixel, against their neighbours",
         "pixels lie under a mosaic of colour filters (levels {spread_percent:.0f} % apart): each kind is "
         "brought to the same mean, which is right for grey things in white light only",
@@ -408,82 +401,80 @@ KINDS_RECORDING = table(
 # A vibrometer's record against itself and against what was set.
 
 
-NOTE_VIBROMETER, DOUBT_VIBROMETER, WRONG = Severity.INFO, Severity.WARNING, Severity.ERROR
-
 KINDS_VIBROMETER = table(
     Kind(
-        "vibrometer.noisy", DOUBT_VIBROMETER,
+        "vibrometer.noisy", WARNING,
         "the sine against noise and distortion together",
         "sine to noise and distortion {sinad_db:.1f} dB, not above {limit_db:g} dB: noise",
     ),
     Kind(
-        "vibrometer.distorted", DOUBT_VIBROMETER,
+        "vibrometer.distorted", WARNING,
         "the sine against noise and distortion together",
         "sine to noise and distortion {sinad_db:.1f} dB, not above {limit_db:g} dB: distortion",
     ),
     Kind(
-        "vibrometer.dropout", DOUBT_VIBROMETER,
+        "vibrometer.dropout", WARNING,
         "stretches in which the record leaves its steady sine by far more than its noise",
         "{count:.0f} dropout(s) or spike(s), {total_ms:.3g} ms together, the first at {at:.6g} s: left out of the "
         "fit, and bridged by the steady motion in displacement and drive",
     ),
     Kind(
-        "vibrometer.dropout_in_start", WRONG,
+        "vibrometer.dropout_in_start", ERROR,
         "values that stand still, or jump, while the shaker starts",
         "a dropout of {total_ms:.3g} ms in the start-up at {at:.6g} s: what the shaker did there is not known, so no "
         "drive can be made of this record",
     ),
     Kind(
-        "vibrometer.clipped", DOUBT_VIBROMETER,
+        "vibrometer.clipped", WARNING,
         "tops of the mean cycle flatter than a sine's, or levels hit exactly again and again",
         "the tops are cut off over {share_percent:.0f} % of the cycle: the amplitude is taken from the rest of it, "
         "with a wider standard error; choose a larger range on the vibrometer",
     ),
     Kind(
-        "vibrometer.unsteady", DOUBT_VIBROMETER,
+        "vibrometer.unsteady", WARNING,
         "amplitude and phase cycle by cycle after the start-up",
         "the motion does not stay steady (cycles stray by {stray_percent:.1f} %): the standard error of the amplitude "
         "is that of its parts",
     ),
     Kind(
-        "vibrometer.hum", NOTE_VIBROMETER,
+        "vibrometer.hum", INFO,
         "lines that are in the rest before the start as they are in the motion",
         "a line of {frequency:.3f} Hz with {share_percent:.1f} % of the amplitude is there at rest too (mains); taken "
         "out",
     ),
     Kind(
-        "vibrometer.second_line", DOUBT_VIBROMETER,
+        "vibrometer.second_line", WARNING,
         "lines beside the drive and its harmonics that are not in the rest before the start",
         "beside the drive there is a line of {frequency:.4g} Hz with {share_percent:.1f} % of its amplitude: the "
         "shaker moves at two frequencies, or the record holds hum and no rest to tell it by; what it may pull is in "
         "the standard errors",
     ),
     Kind(
-        "vibrometer.interrupted", WRONG,
+        "vibrometer.interrupted", ERROR,
         "motion at the same frequency before or after the longest stretch of it",
         "the motion stops and begins again: {outside_ms:.3g} ms of it lie outside the longest stretch, and are not in "
         "its start-up or its displacement; cut the record, or record again",
     ),
     Kind(
-        "vibrometer.frequency", DOUBT_VIBROMETER,
+        "vibrometer.frequency", WARNING,
         "the frequency found, against the one set",
         "the shaker moves at {found:.6g} Hz, not at the frequency (--frequency) of {stated:g} Hz that was set",
         ("frequency",),
     ),
     Kind(
-        "vibrometer.amplitude", DOUBT_VIBROMETER,
+        "vibrometer.amplitude", WARNING,
         "the amplitude found, against the one set",
         "the amplitude is {found:.5g}, {share_percent:+.1f} % off the amplitude (--amplitude) of {stated:.5g} that was "
         "set: check range and sensitivity (--sensitivity)",
         ("amplitude", "sensitivity"),
     ),
     Kind(
-        "vibrometer.slow_start", NOTE_VIBROMETER,
+        "vibrometer.slow_start", INFO,
         "how well the start of the motion is told",
         "the shaker starts so gently that its start is known to {uncertainty_ms:.2g} ms only",
     ),
     Kind(
-        "vibrometer.no_rest", NOTE_VIBROMETER,
+        "vibrometer.no_rest", INFO,
         "rest before the motion",
         "the record begins in motion: its start-up is not in it",
     ),

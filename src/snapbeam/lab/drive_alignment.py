@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from snapbeam.lab.diagnostics import KINDS
-from snapbeam.lab.diagnostics import KINDS_VIBROMETER as VIBROMETER
+from snapbeam.lab.diagnostics import KINDS_ALIGNMENT, KINDS_VIBROMETER
 from snapbeam.lab.signals import SignalSamples, check_signal
 from snapbeam.lab.sine_fit import SineFit, fit_sine
 from snapbeam.lab.vibrometer import DriveMeasurement, displacement_from_velocity, measure_drive
@@ -150,7 +149,7 @@ def align(
         certain=certain,
         margin=margin,
         period=period,
-        diagnostics=tuple(_findings(told)),
+        diagnostics=tuple(_diagnostics(told)),
     )
 
 
@@ -169,18 +168,18 @@ class _Told:
     clocks_se: float
 
 
-def _findings(told: _Told) -> list[Diagnostic]:
+def _diagnostics(told: _Told) -> list[Diagnostic]:
     found = []
     if not told.given and not told.turned:
-        found.append(KINDS["polarity_open"].found())
+        found.append(KINDS_ALIGNMENT["polarity_open"].found())
     elif told.polarity < 0:
-        found.append(KINDS["polarity"].found())
+        found.append(KINDS_ALIGNMENT["polarity"].found())
     if not told.certain:
-        found.append(KINDS["cycle_open"].found(period_ms=1e3 * told.period))
+        found.append(KINDS_ALIGNMENT["cycle_open"].found(period_ms=1e3 * told.period))
     if abs(told.gain - 1.0) > max(5.0 * told.gain_se, _SAME):
-        found.append(KINDS["amplitude"].found(gain=told.gain, error=told.gain_se))
+        found.append(KINDS_ALIGNMENT["amplitude"].found(gain=told.gain, error=told.gain_se))
     if abs(told.clocks) > 4.0 * told.clocks_se:
-        found.append(KINDS["clocks"].found(difference=told.clocks))
+        found.append(KINDS_ALIGNMENT["clocks"].found(difference=told.clocks))
     return found
 
 
@@ -321,7 +320,7 @@ def recorded_drive(
     drive = measurement or measure_drive(velocity)
     if drive.startup is not None and not drive.has_start:
         words = next(
-            one.message for one in drive.diagnostics if one.code == VIBROMETER["dropout_in_start"].code
+            one.message for one in drive.diagnostics if one.code == KINDS_VIBROMETER["dropout_in_start"].code
         )
         raise InputError(f"velocity: {words}; cut the record after its start-up, or record again")
     scale = _scale(alignment, polarity, amplitude_from)

@@ -68,7 +68,7 @@ Channel = dict[str, Any]
 """One channel in the units of the file: ``data``, ``name``, ``unit_str`` (None where the file states
 none), and ``fs`` [Hz] or ``time`` [s] where it has them."""
 
-RATE_NAMES = ("sampling_frequency", "sampling_frequency", "fs", "sample_rate", "samplerate", "wf_samplerate")
+RATE_NAMES = ("sampling_frequency", "fs", "sample_rate", "samplerate", "wf_samplerate")
 UNIT_NAMES = ("units", "unit", "unit_str", "unit_string", "NI_UnitDescription")
 TIME_NAMES = ("time", "t", "zeit", "temps", "x-axis", "second", "seconds", "x_value")
 

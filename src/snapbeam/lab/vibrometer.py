@@ -727,10 +727,10 @@ def measure_drive(
         startup = _start_up(onset, uncertainty, settled, period, amplitudes, steady.amplitude, tol)
         broken = _broken_start(samples, onset, onset + settled * period, steady, clipping)
     diagnostics = [
-        *_flaw_findings(samples, everywhere, broken, clipping),
+        *_flaw_diagnostics(samples, everywhere, broken, clipping),
         *_doubts(steady, limit, wander, stray, frequency, stated),
-        *_start_findings(startup, period),
-        *_line_findings(lines, steady),
+        *_start_diagnostics(startup, period),
+        *_line_diagnostics(lines, steady),
         *(
             [KINDS_VIBROMETER["interrupted"].found(outside_ms=1e3 * outside)]
             if outside > 3.0 * period
@@ -799,7 +799,7 @@ def _broken_start(
     return [Flaw(flaw.first + first, flaw.last + first) for flaw in found]
 
 
-def _flaw_findings(
+def _flaw_diagnostics(
     samples: SignalSamples, flaws: list[Flaw], broken: list[Flaw], clipping: Clipping
 ) -> list[Diagnostic]:
     told = []
@@ -840,7 +840,7 @@ def _doubts(
     return told
 
 
-def _line_findings(lines: DriveLines, steady: SineFit) -> list[Diagnostic]:
+def _line_diagnostics(lines: DriveLines, steady: SineFit) -> list[Diagnostic]:
     told = []
     for name, some in (("hum", lines.hum), ("second_line", lines.beside)):
         for line in some:
@@ -849,7 +849,7 @@ def _line_findings(lines: DriveLines, steady: SineFit) -> list[Diagnostic]:
     return told
 
 
-def _start_findings(startup: StartUp | None, period: float) -> list[Diagnostic]:
+def _start_diagnostics(startup: StartUp | None, period: float) -> list[Diagnostic]:
     if startup is None:
         return [KINDS_VIBROMETER["no_rest"].found()]
     if startup.onset_uncertainty > 0.05 * period:

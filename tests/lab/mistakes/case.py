@@ -10,20 +10,23 @@ from pathlib import Path
 import numpy as np
 
 from snapbeam import InputError
-from snapbeam.lab import diagnostics as alignment
-from snapbeam.lab import diagnostics as calibration
-from snapbeam.lab import diagnostics as comparison
-from snapbeam.lab import diagnostics as decay
-from snapbeam.lab import diagnostics as recording
-from snapbeam.lab import diagnostics as vibrometer
+from snapbeam.lab import diagnostics as kinds
 from snapbeam.lab.diagnostics import Kind
 from snapbeam.lab.tracking import diagnostics as tracking
 from snapbeam.util.diagnostics import Diagnostic
 
 KINDS: Mapping[str, Kind] = {
     kind.code: kind
-    for module in (alignment, calibration, comparison, decay, recording, tracking, vibrometer)
-    for kind in module.KINDS.values()
+    for table in (
+        kinds.KINDS_ALIGNMENT,
+        kinds.KINDS_CALIBRATION,
+        kinds.KINDS_COMPARISON,
+        kinds.KINDS_DECAY,
+        kinds.KINDS_RECORDING,
+        tracking.KINDS,
+        kinds.KINDS_VIBROMETER,
+    )
+    for kind in table.values()
 }
 
 

@@ -40,7 +40,7 @@ def outcome(signal, freq, zeta, **options):
     fit = identify_decay(signal, **options)
     mode = fit.modes[0]
     ratio = max(
-        off(mode.natural_frequencies, freq, mode.natural_frequencies_se),
+        off(mode.natural_frequency, freq, mode.natural_frequency_se),
         off(mode.damping_ratio, zeta, mode.damping_ratio_se),
     )
     return Outcome(fit.diagnostics, "", ratio)
@@ -54,8 +54,8 @@ def impact(folder):
     assert len(fit.modes) == 4
     ratio = 0.0
     for mode in fit.modes:
-        freq, zeta, *_ = min(modes, key=lambda one: abs(one[0] - mode.natural_frequencies))
-        ratio = max(ratio, off(mode.natural_frequencies, freq, mode.natural_frequencies_se))
+        freq, zeta, *_ = min(modes, key=lambda one: abs(one[0] - mode.natural_frequency))
+        ratio = max(ratio, off(mode.natural_frequency, freq, mode.natural_frequency_se))
         ratio = max(ratio, off(mode.damping_ratio, zeta, mode.damping_ratio_se))
     return Outcome(fit.diagnostics, "", ratio)
 

@@ -97,7 +97,9 @@ def run(rest=0.0):
     shaker = -1.2 + 0.2 * np.sin(2.0 * np.pi * FREQ * since) * (1.0 - 0.4 * np.exp(-since / 0.01))
     beam = -1.0 + 0.3 * np.sin(2.0 * np.pi * FREQ * since) ** 3
     cycle = {} if rest else {"cycle": FREQ * time}
-    return trajectory_dataset(time, attrs={}, displacement=beam, striker_displacement=shaker, **cycle)
+    return trajectory_dataset(
+        time, attrs={}, displacement_at_striker=beam, striker_displacement=shaker, **cycle
+    )
 
 
 def compared_upside_down(folder):

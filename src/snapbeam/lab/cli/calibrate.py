@@ -95,7 +95,7 @@ Fit = Annotated[
 Imperfection = Annotated[
     str | None,
     typer.Option(
-        help="What makes the wells unequal, fitted to the first frequencies about both: rise, point_load or "
+        help="What makes the wells unequal, fitted to the first frequencies about both: midspan_amplitude, point_load or "
         "uniform_load.",
         rich_help_panel=_FIT,
     ),
@@ -217,7 +217,7 @@ def calibrate(
     for text in result.remarks:
         console.print(f"- {text}")
     diagnostics = (*told, *result.diagnostics)
-    lab.tell_findings(console, diagnostics)
+    lab.print_diagnostics(console, diagnostics)
     if strict:
         refuse(diagnostics, "calibration")
     if output is not None:

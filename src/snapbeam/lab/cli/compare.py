@@ -1,4 +1,4 @@
-"""``snapbeam compare``: measured beside simulated, a run or dots on a map."""
+"""``snapbeam compare``: compare a measured run or measured responses with a simulation."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def compare(
         check_writable(report, "json", (".json",))
     dataset = open_result(simulated)
     if measured.suffix.lower() == ".csv":
-        summary, figure = _dots(measured, dataset, plot is not None)
+        summary, figure = _map(measured, dataset, plot is not None)
         diagnostics: tuple[Diagnostic, ...] = ()
     else:
         summary, figure, diagnostics = _run(
@@ -93,24 +93,24 @@ def compare(
         console.print(f"Written: {file_line(report)}")
 
 
-def _dots(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None]:
+def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None]:
     from rich.table import Table
 
     from snapbeam.lab.compare_maps import compare_measured_points
     from snapbeam.sweeps.measured_points import read_measured_points
 
     attrs = dataset.attrs
-    dots = read_measured_points(
+    points = read_measured_points(
         path,
         reference_frequency=attrs.get("reference_frequency"),
         buckling_level=attrs.get("beam_buckling_level"),
     )
-    result = compare_measured_points(dots, dataset)
+    result = compare_measured_points(points, dataset)
     console = out()
     low, high = result.agreement_interval
     if result.used:
         console.print(
-            f"{result.used} of {len(dots)} measured responses count; {100.0 * result.agreement:.0f} % agree "
+            f"{result.used} of {len(points)} measured responses count; {100.0 * result.agreement:.0f} % agree "
             f"with the map (95 %: {100.0 * low:.0f} to {100.0 * high:.0f} %), "
             f"{100.0 * result.snap_agreement:.0f} % on whether the beam snaps through"
         )
@@ -125,9 +125,9 @@ def _dots(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | N
         console.print(f"[yellow]note[/] {note}")
     figure = None
     if draw:
-        from snapbeam.lab.plot.comparison import plot_dot_comparison
+        from snapbeam.lab.plot.comparison import plot_map_comparison
 
-        figure = plot_dot_comparison(dataset, dots, result)
+        figure = plot_map_comparison(dataset, points, result)
     return result.summary(), figure
 
 
@@ -169,7 +169,7 @@ def _run(
     parted = "never" if np.isnan(result.parted) else f"at cycle {result.parted:.2f}"
     console.print(f"  the two part        {parted} (by more than {result.apart:.2g} b)")
     diagnostics = (*diagnostics_of(run), *result.diagnostics)
-    lab.tell_findings(console, diagnostics)
+    lab.print_diagnostics(console, diagnostics)
     summary = {
         "measured_response": seen.response_class.label,
         "measured_crossings": seen.zero_crossings,

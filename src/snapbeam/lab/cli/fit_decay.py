@@ -143,7 +143,7 @@ def fit_decay(
             table.add_row(
                 name if i == 0 else "",
                 str(i + 1),
-                f"{mode.natural_frequencies:.4f} +- {mode.natural_frequencies_se:.4f}",
+                f"{mode.natural_frequency:.4f} +- {mode.natural_frequency_se:.4f}",
                 f"{100 * mode.damping_ratio:.4f} +- {100 * mode.damping_ratio_se:.4f}",
                 f"{mode.amplitude:.4g} {fit.units}",
                 f"{mode.softening * mode.amplitude**2:.4f}" if i == 0 else "",
@@ -158,12 +158,11 @@ def fit_decay(
         second = lab.open_signal(signal, mirror_channel, units, sensitivity, sampling_frequency, columns)
         shapes = mode_shapes(data, second, first)
         told = ", ".join(
-            f"{mode.natural_frequencies:.4g} Hz {kind}"
-            for mode, kind in zip(first.modes, shapes, strict=True)
+            f"{mode.natural_frequency:.4g} Hz {kind}" for mode, kind in zip(first.modes, shapes, strict=True)
         )
         console.print(f"shapes: {told}")
     diagnostics = tuple({one.code: one for fit in fits.values() for one in fit.diagnostics}.values())
-    lab.tell_findings(console, diagnostics)
+    lab.print_diagnostics(console, diagnostics)
     if plot is not None:
         from snapbeam.lab.plot.fit_decay import plot_decay
 

@@ -29,7 +29,7 @@ __all__ = [
     "Units",
     "numbers",
     "open_signal",
-    "tell_findings",
+    "print_diagnostics",
     "whole_numbers",
     "write_json",
 ]
@@ -118,10 +118,10 @@ def open_signal(
     )
 
 
-def tell_findings(console: Console, diagnostics: Iterable[Diagnostic]) -> None:
+def print_diagnostics(console: Console, diagnostics: Iterable[Diagnostic]) -> None:
     """Print diagnostics, the gravest first, each with its code."""
-    order = {"wrong": 0, "doubt": 1, "note": 2}
-    style = {"wrong": "bold red", "doubt": "yellow", "note": "dim"}
+    order = {"error": 0, "warning": 1, "info": 2}
+    style = {"error": "bold red", "warning": "yellow", "info": "dim"}
     for one in sorted(diagnostics, key=lambda diagnostic: order[diagnostic.severity.value]):
         kind = one.severity.value
         console.print(f"[{style[kind]}]{kind}[/] {escape(f'[{one.code}]')} {escape(one.message)}")

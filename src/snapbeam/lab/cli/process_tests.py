@@ -1,4 +1,4 @@
-"""``snapbeam process-tests``: every test of a folder, to one table, thumbnails and dots on a map."""
+"""``snapbeam process-tests``: every test of a folder, to one table, thumbnails and a comparison with a map."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def _tell(done: int, total: int, result: Any) -> None:
     else:
         console.print(f"{head}spoiled: {result.reason}", markup=False)
     for code, severity, words in result.diagnostics:
-        if severity != "note" and words != result.reason:
+        if severity != "info" and words != result.reason:
             console.print(f"    {severity} [{code}] {words}", markup=False)
 
 
@@ -143,17 +143,17 @@ def _on_map(target: Path, simulated: Path) -> Path:
     """The responses on a map; the share that agrees is printed."""
     from snapbeam.cli.console import open_result
     from snapbeam.lab.compare_maps import compare_measured_points
-    from snapbeam.lab.plot.comparison import plot_dot_comparison
+    from snapbeam.lab.plot.comparison import plot_map_comparison
     from snapbeam.plot.style import save_figure
     from snapbeam.sweeps.measured_points import read_measured_points
 
     dataset = open_result(simulated)
-    dots = read_measured_points(
+    points = read_measured_points(
         target / "tests.csv",
         reference_frequency=dataset.attrs.get("reference_frequency"),
         buckling_level=dataset.attrs.get("beam_buckling_level"),
     )
-    result = compare_measured_points(dots, dataset)
+    result = compare_measured_points(points, dataset)
     console = out()
     if result.used:
         low, high = result.agreement_interval
@@ -163,4 +163,4 @@ def _on_map(target: Path, simulated: Path) -> Path:
         )
     for note in result.notes:
         console.print(f"[yellow]note[/] {note}")
-    return save_figure(plot_dot_comparison(dataset, dots, result), target / "dots.png")
+    return save_figure(plot_map_comparison(dataset, points, result), target / "measurements.png")

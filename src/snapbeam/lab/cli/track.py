@@ -297,7 +297,7 @@ def track(
     )  # fmt: skip
     console = out()
     console.print(tracking_report(dataset, diagnostics=False), markup=False)
-    lab.tell_findings(console, found)
+    lab.print_diagnostics(console, found)
     console.print(f"{len(opened) / elapsed:.0f} frames/s, {duration(elapsed)}")
     for path in files:
         console.print(f"wrote {file_line(path)}")

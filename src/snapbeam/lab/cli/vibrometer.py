@@ -149,7 +149,7 @@ def vibrometer(
             "diagnostics": [one.plain() for one in alignment.diagnostics],
         }  # fmt: skip
         console.print(f"  alignment    {alignment.description}")
-    lab.tell_findings(console, diagnostics)
+    lab.print_diagnostics(console, diagnostics)
     if plot is not None:
         from snapbeam.lab.plot.vibrometer import plot_drive
 

@@ -1,1 +1,1 @@
-"""decay"""
+"""Natural frequencies and damping ratios from free decays."""

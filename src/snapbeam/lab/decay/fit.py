@@ -84,9 +84,9 @@ def fit_decay(
     for i, guess in enumerate(guesses):
         parameters.add(
             f"f{i}",
-            guess.natural_frequencies,
-            min=0.5 * guess.natural_frequencies,
-            max=1.5 * guess.natural_frequencies,
+            guess.natural_frequency,
+            min=0.5 * guess.natural_frequency,
+            max=1.5 * guess.natural_frequency,
         )
         parameters.add(f"z{i}", max(guess.damping_ratio, 1e-6), min=1e-9, max=0.5)
         if soften:
@@ -136,8 +136,8 @@ def fit_decay(
         first = math.hypot(solution[1], solution[2])
         modes.append(
             ModeEstimate(
-                natural_frequencies=value[f"f{i}"],
-                natural_frequencies_se=error[f"f{i}"] * stretch,
+                natural_frequency=value[f"f{i}"],
+                natural_frequency_se=error[f"f{i}"] * stretch,
                 damping_ratio=value[f"z{i}"],
                 damping_ratio_se=error[f"z{i}"] * stretch,
                 amplitude=amplitude,
@@ -163,7 +163,7 @@ def explain(samples: SignalSamples, modes: list[ModeEstimate], units: str, softe
     value = {name: mean for name, (mean, _) in law_priors(units).items()}
     for i, mode in enumerate(modes):
         value |= {
-            f"f{i}": mode.natural_frequencies,
+            f"f{i}": mode.natural_frequency,
             f"z{i}": mode.damping_ratio,
             f"s{i}": mode.softening * first,
         }
@@ -172,7 +172,7 @@ def explain(samples: SignalSamples, modes: list[ModeEstimate], units: str, softe
     solution = _solve(design, samples.values)
     rest = samples.values - design @ solution
     free = design.shape[1] + 3 * len(modes)
-    frequencies = [mode.natural_frequencies for mode in modes]
+    frequencies = [mode.natural_frequency for mode in modes]
     lines = [0.0, *frequencies, *(2.0 * f for f in frequencies)]
     near = math.sqrt(white_variance(rest, samples.sampling_frequency, frequencies[-1], lines, free))
     alone = _alone(design, solution, rest, _columns(len(modes), soften))

@@ -18,10 +18,10 @@ from snapbeam.lab.decay.joint_fit import fit_modes, mode_by_cycles
 from snapbeam.lab.decay.model import Cycles, DecayFit, ModeEstimate, backbone, noise_level, regress
 from snapbeam.lab.decay.poles import without_poles
 from snapbeam.lab.decay.residual_diagnostics import (
-    findings_about,
+    diagnostics_about,
     judged,
     misfit_of,
-    sampled_findings,
+    sampled_diagnostics,
     widened,
 )
 from snapbeam.lab.decay.window import find_centres, noise_fall, prepared, undone, unexplained
@@ -116,7 +116,7 @@ def identify_decay(
         told += more
         if diagram is None and unexplained(result.residual, samples.sampling_frequency):
             # other modes are in the record: once more with them known
-            centres = find_centres(decay, 1, [result.modes[0].natural_frequencies])
+            centres = find_centres(decay, 1, [result.modes[0].natural_frequency])
             samples, result, cycles, told, diagram = fit_modes(decay, centres, units, soften, known)
     else:
         samples = without_poles(decay.samples, centres.far, centres.own)
@@ -126,17 +126,17 @@ def identify_decay(
         misfit = misfit._replace(ratio=0.4 * misfit.ratio)
     estimates, doubts = judged(samples, result, cycles, misfit, soften)
     wanted = tuple(estimates[: len(centres.wanted)])
-    doubts += findings_about(samples, wanted, result.noise_near, soften)
-    doubts += sampled_findings(wanted, decay.samples.sampling_frequency)
+    doubts += diagnostics_about(samples, wanted, result.noise_near, soften)
+    doubts += sampled_diagnostics(wanted, decay.samples.sampling_frequency)
     left = SignalSamples(result.residual, samples.time, samples.sampling_frequency)
-    falls = noise_fall(left, wanted[0].natural_frequencies)
+    falls = noise_fall(left, wanted[0].natural_frequency)
     if falls is not None:
-        added = 100.0 * falls.rate / (2.0 * math.pi * wanted[0].natural_frequencies)
+        added = 100.0 * falls.rate / (2.0 * math.pi * wanted[0].natural_frequency)
         doubts.append(
             KINDS_DECAY["window"].found(factor=falls.factor, constant=1.0 / falls.rate, added_percent=added)
         )
     wanted = widened(wanted, decay.drift, falls.rate if falls is not None else 0.0)
-    free = [mode.natural_frequencies for mode in wanted]
+    free = [mode.natural_frequency for mode in wanted]
     lines = [0.0, *free, *(2.0 * f for f in free)]
     near = white_variance(result.residual, samples.sampling_frequency, free[0], lines, 3 * len(free))
     top = noise_level(SignalSamples(result.residual, samples.time, samples.sampling_frequency))
@@ -156,7 +156,7 @@ def identify_decay(
         diagnostics=(*decay.diagnostics, *told, *doubts),
         backbone_amplitude=amplitude,
         backbone_frequency=freq,
-        backbone_frequencies_se=freq_se,
+        backbone_frequency_se=freq_se,
         envelope_time=cycles.time,
         envelope=cycles.amplitude,
     )

@@ -141,7 +141,7 @@ def _group_fit(
     result = fit_decay(samples, guesses, units, soften=soften, known=known)
     alone = _own_cycles(samples, result, cycles)
     law = find_law(
-        alone, start, 2.0 * math.pi * result.modes[0].natural_frequencies * result.modes[0].damping_ratio
+        alone, start, 2.0 * math.pi * result.modes[0].natural_frequency * result.modes[0].damping_ratio
     )
     left = misfit_of(samples, result.residual, result.modes).ratio
     if law is not None:
@@ -151,10 +151,8 @@ def _group_fit(
         better, diagram = _with_close_mode(samples, result, near, units, diagram)
         if better is not None:
             result = better
-            first = better.modes[0].natural_frequencies
-            second = min(
-                (mode.natural_frequencies for mode in better.modes[1:]), key=lambda f: abs(f - first)
-            )
+            first = better.modes[0].natural_frequency
+            second = min((mode.natural_frequency for mode in better.modes[1:]), key=lambda f: abs(f - first))
             told = [KINDS_DECAY["close_modes"].found(first=first, second=second)]
     return result, _own_cycles(samples, result, cycles), told, diagram
 
@@ -163,10 +161,8 @@ def _apart(samples: SignalSamples, pole: Pole, modes: list[ModeEstimate]) -> boo
     """Whether a pole lies so far from all modes that it is none of the poles into which one that softens splits."""
     span = samples.values.size / samples.sampling_frequency
     return all(
-        abs(pole.frequency - mode.natural_frequencies)
-        > max(
-            8.0 / span, 2.0 * mode.damping_ratio * mode.natural_frequencies, 0.06 * mode.natural_frequencies
-        )
+        abs(pole.frequency - mode.natural_frequency)
+        > max(8.0 / span, 2.0 * mode.damping_ratio * mode.natural_frequency, 0.06 * mode.natural_frequency)
         for mode in modes
     )
 
@@ -251,7 +247,7 @@ def _own_cycles(samples: SignalSamples, result: FitResult, otherwise: Cycles) ->
         return otherwise
     try:
         alone = SignalSamples(result.alone, samples.time, samples.sampling_frequency)
-        return hilbert_cycles(alone, first.natural_frequencies, noise_level(samples))
+        return hilbert_cycles(alone, first.natural_frequency, noise_level(samples))
     except InputError:
         return otherwise
 
@@ -264,7 +260,7 @@ def _with_close_mode(
     diagram: Stabilisation | None,
 ) -> tuple[FitResult | None, Stabilisation | None]:
     """The fit with one mode more, close to the first, if the pencil sees one and it explains what is left."""
-    first = result.modes[0].natural_frequencies
+    first = result.modes[0].natural_frequency
     if len(near) < 2:
         poles, fresh = find_poles(samples, noise_level(samples))
         diagram = diagram or fresh
@@ -277,7 +273,7 @@ def _with_close_mode(
         ]
     if len(near) < 2:
         return None, diagram
-    others = [mode for mode in result.modes[1:] if abs(mode.natural_frequencies / first - 1.0) > CLOSE]
+    others = [mode for mode in result.modes[1:] if abs(mode.natural_frequency / first - 1.0) > CLOSE]
     pair = [_of_pole(pole) for pole in near[:2]]
     try:
         better = fit_decay(samples, [pair[0], *others, pair[1]], units, soften=False)

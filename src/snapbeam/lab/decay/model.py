@@ -58,15 +58,15 @@ _Array = NDArray[np.float64]
 class ModeEstimate:
     """One mode of a free decay, as one method sees it.
 
-    ``natural_frequencies`` [Hz] at zero amplitude and ``damping_ratio``, with standard errors; ``amplitude`` at
-    the start of the analysed part, in the unit of the signal; ``softening`` kappa in f = natural_frequencies (1 -
+    ``natural_frequency`` [Hz] at zero amplitude and ``damping_ratio``, with standard errors; ``amplitude`` at
+    the start of the analysed part, in the unit of the signal; ``softening`` kappa in f = natural_frequency (1 -
     kappa a^2), per squared unit of the signal, where a is the amplitude of the first mode.  ``law`` is how it
     is damped, "viscous", "dry" or "quadratic", the latter two beside viscous damping and ``law_strength``
     times as strong at the start; the damping ratio is that of the viscous part.
     """
 
-    natural_frequencies: float
-    natural_frequencies_se: float
+    natural_frequency: float
+    natural_frequency_se: float
     damping_ratio: float
     damping_ratio_se: float
     amplitude: float
@@ -85,7 +85,7 @@ class DecayFit:
     """The modes of a free decay, strongest first, with what is needed to judge and to draw the result.
 
     ``snr`` [dB] is that of the first mode at the start; ``backbone_amplitude`` and ``backbone_frequency`` [Hz],
-    with ``backbone_frequencies_se``, are the amplitude and frequency of the first mode over successive parts of
+    with ``backbone_frequency_se``, are the amplitude and frequency of the first mode over successive parts of
     the decay; ``envelope_time``, ``envelope`` its amplitude cycle by cycle; ``residual_whiteness`` the
     noise near the first mode over the noise elsewhere; ``misfit`` what the fit leaves at the first mode over
     what the noise about it explains, 1 if the model says it all.  ``lines`` are sines that do not decay, taken
@@ -105,7 +105,7 @@ class DecayFit:
     diagnostics: tuple[Diagnostic, ...]
     backbone_amplitude: _Array = field(repr=False)
     backbone_frequency: _Array = field(repr=False)
-    backbone_frequencies_se: _Array = field(repr=False)
+    backbone_frequency_se: _Array = field(repr=False)
     envelope_time: _Array = field(repr=False)
     envelope: _Array = field(repr=False)
 
@@ -115,9 +115,9 @@ class DecayFit:
         return tuple(one.message for one in doubtful(self.diagnostics))
 
     @property
-    def natural_frequencies(self) -> float:
+    def natural_frequency(self) -> float:
         """Natural frequency of the first mode at zero amplitude [Hz]."""
-        return self.modes[0].natural_frequencies
+        return self.modes[0].natural_frequency
 
     @property
     def damping_ratio(self) -> float:
@@ -127,8 +127,8 @@ class DecayFit:
     def summary(self) -> dict[str, Any]:
         """The figures as plain numbers and words, for a table or a JSON file."""
         names = (
-            "natural_frequencies",
-            "natural_frequencies_se",
+            "natural_frequency",
+            "natural_frequency_se",
             "damping_ratio",
             "damping_ratio_se",
             "amplitude",
@@ -272,8 +272,8 @@ def regress(cycles: Cycles, start: float, units: str, method: str, soften: bool 
     if not (omega > 0.0 and math.isfinite(amplitude)):
         raise InputError("signal: the cycles follow no decaying oscillation")
     return ModeEstimate(
-        natural_frequencies=natural / (2.0 * math.pi),
-        natural_frequencies_se=math.sqrt(freq_var) / (2.0 * math.pi),
+        natural_frequency=natural / (2.0 * math.pi),
+        natural_frequency_se=math.sqrt(freq_var) / (2.0 * math.pi),
         damping_ratio=delta / natural,
         damping_ratio_se=math.sqrt(delta_var) / natural,
         amplitude=amplitude,
@@ -486,7 +486,7 @@ def _complex_amplitudes(samples: SignalSamples, fit: DecayFit) -> list[complex]:
     t, y = samples.time[inside] - fit.start, samples.values[inside]
     columns = [np.ones_like(t)]
     for mode in fit.modes:
-        omega = 2.0 * math.pi * mode.natural_frequencies
+        omega = 2.0 * math.pi * mode.natural_frequency
         turn = omega * math.sqrt(1.0 - mode.damping_ratio**2)
         wave = np.exp((-mode.damping_ratio * omega + 1j * turn) * t)
         columns += [wave.real, wave.imag]
@@ -547,8 +547,8 @@ def compare_wells(
     values, errors = [], []
     for name, well, se in (("lower", lower, lower_se), ("upper", upper, upper_se)):
         if isinstance(well, DecayFit):
-            values.append(well.natural_frequencies)
-            errors.append(well.modes[0].natural_frequencies_se)
+            values.append(well.natural_frequency)
+            errors.append(well.modes[0].natural_frequency_se)
         else:
             values.append(positive(name, well, "Hz"))
             errors.append(math.nan if se is None else nonnegative(f"{name}_se", se, "Hz"))

@@ -16,7 +16,7 @@ from snapbeam.lab.diagnostics import KINDS_DECAY
 from snapbeam.lab.signals import SignalSamples
 from snapbeam.util.diagnostics import Diagnostic
 
-__all__ = ["Misfit", "findings_about", "judged", "misfit_of", "sampled_findings", "widened"]
+__all__ = ["Misfit", "diagnostics_about", "judged", "misfit_of", "sampled_diagnostics", "widened"]
 
 
 _Array = NDArray[np.float64]
@@ -43,23 +43,23 @@ def misfit_of(samples: SignalSamples, residual: _Array, modes: list[ModeEstimate
     first = modes[0]
     n = residual.size
     span = n / samples.sampling_frequency
-    rate = first.damping_ratio * 2.0 * math.pi * first.natural_frequencies
+    rate = first.damping_ratio * 2.0 * math.pi * first.natural_frequency
     half = max(5.0 / span, 3.0 * rate / (2.0 * math.pi))
     power = np.abs(np.fft.rfft(residual)) ** 2 / n
     freq = np.fft.rfftfreq(n, 1.0 / samples.sampling_frequency)
-    away = np.abs(freq - first.natural_frequencies)
+    away = np.abs(freq - first.natural_frequency)
     inside = away <= half
     beside = (
         (away > half)
-        & (away < max(12.0 * half, 0.5 * first.natural_frequencies))
-        & (freq > 0.3 * first.natural_frequencies)
+        & (away < max(12.0 * half, 0.5 * first.natural_frequency))
+        & (freq > 0.3 * first.natural_frequency)
     )
     for mode in modes[1:]:
-        own = np.abs(freq - mode.natural_frequencies) < max(
-            5.0 / span, 2.0 * mode.damping_ratio * mode.natural_frequencies
+        own = np.abs(freq - mode.natural_frequency) < max(
+            5.0 / span, 2.0 * mode.damping_ratio * mode.natural_frequency
         )
         beside &= ~own
-    beside &= np.abs(freq - 2.0 * first.natural_frequencies) > half
+    beside &= np.abs(freq - 2.0 * first.natural_frequency) > half
     if beside.sum() < 8 or inside.sum() < 3:
         return Misfit(1.0, 0.0)
     noise = float(np.median(power[beside])) / math.log(2.0)
@@ -80,7 +80,7 @@ def judged(
     told: list[Diagnostic] = []
     first = result.modes[0]
     rates, turns = _halves(cycles, first, float(samples.time[0]), soften)
-    omega = 2.0 * math.pi * first.natural_frequencies
+    omega = 2.0 * math.pi * first.natural_frequency
     damping_apart = abs(rates[0]) / omega
     freq_apart = abs(turns[0]) / (2.0 * math.pi)
     worse_damping, worse_frequency = (
@@ -90,7 +90,7 @@ def judged(
     doubtful = misfit.ratio > _RATIO and misfit.share > _MATTERS
     if doubtful:
         told.append(KINDS_DECAY["misfit"].found(ratio=misfit.ratio, share_percent=100.0 * misfit.share))
-    matters = damping_apart > 0.03 * first.damping_ratio or freq_apart > 3e-4 * first.natural_frequencies
+    matters = damping_apart > 0.03 * first.damping_ratio or freq_apart > 3e-4 * first.natural_frequency
     if max(worse_damping, worse_frequency) > _APART and matters:
         told.append(KINDS_DECAY["parts_differ"].found(frequency_se=worse_frequency, damping_se=worse_damping))
         doubtful = True
@@ -100,15 +100,15 @@ def judged(
     missed = misfit.share * first.damping_ratio
     raised = dataclasses.replace(
         first,
-        natural_frequencies_se=max(
-            first.natural_frequencies_se * grown, freq_apart, missed * first.natural_frequencies
+        natural_frequency_se=max(
+            first.natural_frequency_se * grown, freq_apart, missed * first.natural_frequency
         ),
         damping_ratio_se=max(first.damping_ratio_se * grown, damping_apart, missed),
     )
     others = [
         dataclasses.replace(
             mode,
-            natural_frequencies_se=mode.natural_frequencies_se * grown,
+            natural_frequency_se=mode.natural_frequency_se * grown,
             damping_ratio_se=mode.damping_ratio_se * grown,
         )
         for mode in result.modes[1:]
@@ -125,7 +125,7 @@ def _halves(
     t = cycles.time - start
     if t.size < 12:
         return (0.0, math.inf), (0.0, math.inf)
-    omega = 2.0 * math.pi * mode.natural_frequencies
+    omega = 2.0 * math.pi * mode.natural_frequency
     rate = mode.damping_ratio * omega
     shape = envelope(mode.law, t, rate, mode.law_strength)
     log_rest = np.log(cycles.amplitude) - np.log(shape)
@@ -151,17 +151,17 @@ def _halves(
     return out[0], out[1]
 
 
-def sampled_findings(modes: tuple[ModeEstimate, ...], sampling_frequency: float) -> list[Diagnostic]:
+def sampled_diagnostics(modes: tuple[ModeEstimate, ...], sampling_frequency: float) -> list[Diagnostic]:
     """What is to be said of modes above the band that filters against aliasing keep clean."""
     limit = sampling_frequency / _BAND
     return [
         KINDS_DECAY["above_band"].found(
-            frequency=mode.natural_frequencies,
+            frequency=mode.natural_frequency,
             limit_hz=limit,
-            folded=sampling_frequency - mode.natural_frequencies,
+            folded=sampling_frequency - mode.natural_frequency,
         )
         for mode in modes
-        if mode.natural_frequencies > limit
+        if mode.natural_frequency > limit
     ]
 
 
@@ -173,10 +173,10 @@ def widened(modes: tuple[ModeEstimate, ...], drift: float, added: float) -> tupl
     return tuple(
         dataclasses.replace(
             mode,
-            natural_frequencies_se=math.hypot(mode.natural_frequencies_se, drift * mode.natural_frequencies),
+            natural_frequency_se=math.hypot(mode.natural_frequency_se, drift * mode.natural_frequency),
             damping_ratio_se=math.hypot(
                 mode.damping_ratio_se,
-                added / (2.0 * math.pi * mode.natural_frequencies),
+                added / (2.0 * math.pi * mode.natural_frequency),
                 drift * mode.damping_ratio,
             ),
             softening_se=math.hypot(mode.softening_se, drift / first if mode.softening_se > 0.0 else 0.0),
@@ -185,14 +185,14 @@ def widened(modes: tuple[ModeEstimate, ...], drift: float, added: float) -> tupl
     )
 
 
-def findings_about(
+def diagnostics_about(
     samples: SignalSamples, modes: tuple[ModeEstimate, ...], noise: float, soften: bool
 ) -> list[Diagnostic]:
     """What the numbers of a decay alone make doubtful."""
     told = []
     span = samples.values.size / samples.sampling_frequency
     first = modes[0]
-    left = math.exp(-first.damping_ratio * 2.0 * math.pi * first.natural_frequencies * span)
+    left = math.exp(-first.damping_ratio * 2.0 * math.pi * first.natural_frequency * span)
     if left > 0.7:
         told.append(KINDS_DECAY["short"].found(left_percent=100.0 * left))
     change = abs(first.softening) * first.amplitude**2

@@ -385,7 +385,7 @@ def _decay_rate(samples: SignalSamples, frequency: float) -> float:
         mode = regress(cycles, float(samples.time[0]), "1", "hilbert", soften=False)
     except InputError:
         return 0.0
-    return max(2.0 * math.pi * mode.natural_frequencies * mode.damping_ratio, 0.0)
+    return max(2.0 * math.pi * mode.natural_frequency * mode.damping_ratio, 0.0)
 
 
 def _steady(samples: SignalSamples, frequency: float) -> tuple[SignalSamples, float]:

@@ -1,1 +1,1 @@
-"""plot"""
+"""Figures of the lab part."""

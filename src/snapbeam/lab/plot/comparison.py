@@ -27,25 +27,25 @@ from snapbeam.util.validation import InputError, finite
 if TYPE_CHECKING:
     import xarray as xr
 
-    from snapbeam.lab.compare_maps import DotComparison
+    from snapbeam.lab.compare_maps import MapComparison
     from snapbeam.lab.compare_waveforms import WaveformComparison
 
-__all__ = ["plot_dot_comparison", "plot_waveform_comparison", "plot_waveform_overlay"]
+__all__ = ["plot_map_comparison", "plot_waveform_comparison", "plot_waveform_overlay"]
 
 
 _DRAWN = ("frequency_ratio", "location", "velocity_amplitude")  # across first, then upward
 
 
-def plot_dot_comparison(dataset: xr.Dataset, dots: MeasuredPoints, result: DotComparison) -> Figure:
+def plot_map_comparison(dataset: xr.Dataset, points: MeasuredPoints, result: MapComparison) -> Figure:
     """Draw measured responses on a map, and the table of measured against simulated classes beside it.
 
-    Dots whose class is not that of the map are crossed out.  In the table what agrees is grey, on the diagonal,
+    Points whose class differs from the class of the map are crossed out.  In the table what agrees is grey, on the diagonal,
     and what does not is red and bold, each the darker the greater its share of the measured class is.
     """
     with house_style():
         figure = new_figure("double", 92.0)
         grid = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0))
-        left = plot_response_map(dataset, figure.add_subplot(grid[0]), dots=dots)
+        left = plot_response_map(dataset, figure.add_subplot(grid[0]), dots=points)
         _mark_disagreeing(left, dataset, result)
         ax = figure.add_subplot(grid[1])
         _confusion(ax, result.confusion)
@@ -84,8 +84,8 @@ def _confusion(ax: Axes, counts: NDArray[np.int64]) -> None:
     ax.tick_params(which="minor", length=0)
 
 
-def _mark_disagreeing(ax: Axes, dataset: xr.Dataset, result: DotComparison) -> None:
-    """Cross out the dots that count and whose class is not that of the map."""
+def _mark_disagreeing(ax: Axes, dataset: xr.Dataset, result: MapComparison) -> None:
+    """Cross out the points that count and whose class is not that of the map."""
     table = result.table
     wrong = (table["used"].values == 1) & (table["measured"].values != table["simulated"].values)
     if not wrong.any():

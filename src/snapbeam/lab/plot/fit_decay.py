@@ -49,7 +49,7 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
     time, values = samples.time[part], samples.values[part]
     scale, unit = _SCALE.get(fit.units, (1.0, fit.units))
     mode = fit.modes[0]
-    rate = 2.0 * np.pi * mode.natural_frequencies * mode.damping_ratio
+    rate = 2.0 * np.pi * mode.natural_frequency * mode.damping_ratio
     envelope = mode.amplitude * law_envelope(mode.law, time - fit.start, rate, mode.law_strength)
     middle = float(values.mean())
     told = fit.diagnostics
@@ -74,20 +74,20 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
 
         right = figure.add_subplot(grid[1, 1])
         right.errorbar(
-            scale * fit.backbone_amplitude, fit.backbone_frequency, 2.0 * fit.backbone_frequencies_se,
+            scale * fit.backbone_amplitude, fit.backbone_frequency, 2.0 * fit.backbone_frequency_se,
             fmt="o", color=BEAM_COLOR, markersize=3, linewidth=0.7, capsize=1.5, label="parts of the decay",
         )  # fmt: skip
         a = np.linspace(0.0, 1.05 * float(fit.backbone_amplitude.max()), 200)
-        law = mode.natural_frequencies * (1.0 - mode.softening * a**2)
+        law = mode.natural_frequency * (1.0 - mode.softening * a**2)
         right.plot(scale * a, law, color=SHAKER_COLOR, label=r"$f_0\,(1 - \kappa a^2)$")
         right.errorbar(
-            [0.0], [mode.natural_frequencies], [2.0 * mode.natural_frequencies_se], fmt="s", color=CENTER_COLOR,
+            [0.0], [mode.natural_frequency], [2.0 * mode.natural_frequency_se], fmt="s", color=CENTER_COLOR,
             markeredgecolor=BEAM_COLOR, markersize=4, linewidth=0.9, capsize=2.0, label="zero amplitude",
         )  # fmt: skip
         right.set(xlabel=f"Amplitude ({unit})", ylabel="Frequency (Hz)")
         right.margins(x=0.03)
         right.set_title(
-            f"$f_0$ = {mode.natural_frequencies:.3f} $\\pm$ {mode.natural_frequencies_se:.3f} Hz", loc="left"
+            f"$f_0$ = {mode.natural_frequency:.3f} $\\pm$ {mode.natural_frequency_se:.3f} Hz", loc="left"
         )
         right.legend(loc="best")
         fix_ticks(top, left, right)
@@ -146,13 +146,13 @@ def plot_stabilisation(signal: xr.DataArray, fit: DecayFit) -> Figure:
         )
         for k, mode in enumerate(fit.modes):
             ax.axvline(
-                mode.natural_frequencies,
+                mode.natural_frequency,
                 color=CENTER_COLOR,
                 linewidth=1.2,
                 zorder=0,
                 label="identified" if k == 0 else None,
             )
-        highest = max(mode.natural_frequencies for mode in fit.modes)
+        highest = max(mode.natural_frequency for mode in fit.modes)
         ax.set(
             xlabel="Frequency (Hz)",
             ylabel="Order",

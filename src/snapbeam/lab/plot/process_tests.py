@@ -84,7 +84,7 @@ def _thumbnail(ax: Axes, result: TestResult, path: Path) -> None:
     if np.isfinite(result.frequency_hz):
         title += f": {result.frequency_hz:.4g} Hz, {1e3 * result.velocity_m_s:.3g} mm/s"
     ax.set_title(title, fontsize=6, loc="left")
-    codes = dict.fromkeys(code for code, severity, _ in result.diagnostics if severity != "note")
+    codes = dict.fromkeys(code for code, severity, _ in result.diagnostics if severity != "info")
     if result.status != "measured":
         lines = textwrap.wrap("spoiled: " + result.reason, 44)
         text = "\n".join(

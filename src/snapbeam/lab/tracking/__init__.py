@@ -1,1 +1,1 @@
-"""tracking"""
+"""Tracking of beam and shaker in camera recordings."""

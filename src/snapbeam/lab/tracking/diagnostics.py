@@ -12,41 +12,41 @@ from snapbeam.lab.tracking.settings import BeamView, EdgeShape, Fields, FrameFla
 from snapbeam.lab.tracking.survey import CLIPPED
 from snapbeam.util.diagnostics import Diagnostic, Severity
 
-__all__ = ["KINDS", "SeenMotion", "contact_shift", "never_touching", "rounding_shift", "tracking_findings"]
+__all__ = ["KINDS", "SeenMotion", "contact_shift", "never_touching", "rounding_shift", "tracking_diagnostics"]
 
 
-NOTE, DOUBT, WRONG = Severity.INFO, Severity.WARNING, Severity.ERROR
+INFO, WARNING, ERROR = Severity.INFO, Severity.WARNING, Severity.ERROR
 
 KINDS = table(
     Kind(
-        "camera.no_motion", DOUBT,
+        "camera.no_motion", WARNING,
         "the range of the tracked beam over the recording, against its standard errors",
         "what is tracked never moves by more than {range_px:.2f} px: it may be a clamp or a fixture; look at a "
         "frame (--picture) and narrow region (--region)",
         ("region",),
     ),
     Kind(
-        "camera.fixture", NOTE,
+        "camera.fixture", INFO,
         "bands of light whose edges stand still while another one moves",
         "{count:.0f} bar(s) that never move cross the picture, the first at row {row:.0f} of the turned picture; "
         "left out as no beam",
     ),
     Kind(
-        "camera.thickness", WRONG,
+        "camera.thickness", ERROR,
         "thickness found in the picture, against that measured with a gauge",
         "the beam found is {found_mm:.3f} mm thick, beam_thickness (--beam-thickness) says {known_mm:.3f} mm: "
         "another object (narrow region, --region), or a wrong pixel_size (--pixel-size)",
         ("beam_thickness", "pixel_size", "region"),
     ),
     Kind(
-        "camera.scale", WRONG,
+        "camera.scale", ERROR,
         "thickness of the beam in millimetres, against what a beam can have",
         "at this pixel size the beam is {found_mm:.3g} mm thick; pixel_size (--pixel-size) is in metres, such as "
         "12e-6",
         ("pixel_size",),
     ),
     Kind(
-        "camera.no_rest", WRONG,
+        "camera.no_rest", ERROR,
         "how long the beam stays where it is at the start, against the rest of its motion",
         "the recording begins in motion ({quiet:.0f} quiet frame(s)), so where the beam rests is not known and "
         "all displacements are shifted by up to {shift_mm:.3g} mm, which is in their standard errors; give "
@@ -54,13 +54,13 @@ KINDS = table(
         ("rest_frames",),
     ),
     Kind(
-        "camera.rest_moves", DOUBT,
+        "camera.rest_moves", WARNING,
         "drift of the beam within the frames given as rest",
         "the beam moves by {drift:.0f} standard errors within the rest_frames (--rest-frames) given",
         ("rest_frames",),
     ),
     Kind(
-        "camera.gamma", DOUBT,
+        "camera.gamma", WARNING,
         "asymmetry of the mean edge, finer than a pixel",
         "edges look as if grey levels were light to the power {gamma:.2f} +- {error:.2f}: shaker and beam shift "
         "against each other by {shift_px:.2f} px, which is in the shaker's standard errors; switch the camera's "
@@ -68,53 +68,53 @@ KINDS = table(
         ("gamma",),
     ),
     Kind(
-        "camera.overexposed", DOUBT,
+        "camera.overexposed", WARNING,
         "pixels in the middle of the beam that pile up at the highest grey level",
         "{share_percent:.0f} % of the beam's pixels are saturated: its edges lie up to {shift_px:.2f} px off, "
         "which is in the shaker's standard errors; less light, or a shorter exposure",
     ),
     Kind(
-        "camera.edge_shape", DOUBT,
+        "camera.edge_shape", WARNING,
         "what a blurred step leaves of the mean edge, finer than a pixel",
         "edges are no blurred steps (off by {misfit_percent:.1f} % of the contrast): sharpened, doubled or "
         "structured; switch the camera's edge enhancement off, or choose another contact_column (--contact-column)",
         ("contact_column",),
     ),
     Kind(
-        "camera.averaged", DOUBT,
+        "camera.averaged", WARNING,
         "noise of pixels, against that of the same pixels a frame later",
         "noise of one frame is still there in the next (correlation {correlation:.2f}): frames were averaged, by the "
         "camera's noise reduction or by a program that changed the frame rate; positions lag by about {lag:.1f} "
         "frame(s), which is in their standard errors; keep the frames as they were taken",
     ),
     Kind(
-        "camera.smoothed", DOUBT,
+        "camera.smoothed", WARNING,
         "noise of pixels, against that of their neighbours",
         "noise of neighbouring pixels is alike (correlation {correlation:.2f}): pictures were enlarged, smoothed, "
         "compressed or made of fields, so that edges are known {factor:.1f} times less well than they seem and lie "
         "{made_px:.2f} px off, which is in the standard errors; keep the frames as they were taken",
     ),
     Kind(
-        "camera.interlaced", DOUBT,
+        "camera.interlaced", WARNING,
         "the edge in odd rows of fast frames, against that in even ones",
         "odd and even rows differ by {share:.2f} of the step from frame to frame: interlaced video, whose rows are of "
         "two instants; positions are of an instant up to half a frame off, which is in their standard errors; record "
         "progressive frames, or part the fields into frames of their own",
     ),
     Kind(
-        "camera.fields", DOUBT,
+        "camera.fields", WARNING,
         "each frame against the mean of its neighbours, with turning sign",
         "every other frame is shifted by {shift_px:.2f} px: fields of an interlaced video, made frames by repeating "
         "rows; the shift is in the standard errors; take a program that puts each field's rows where they belong",
     ),
     Kind(
-        "camera.few_levels", DOUBT,
+        "camera.few_levels", WARNING,
         "grey levels between beam and background, and noise that would even out their rounding",
         "the beam stands out by {levels:.1f} grey levels only: rounding moves edges by up to {shift_px:.2f} px, which "
         "is in the standard errors; more light, or more bits",
     ),
     Kind(
-        "camera.sticker_alone", DOUBT,
+        "camera.sticker_alone", WARNING,
         "a band of one height below the beam with nothing beyond it, that never comes near the beam",
         "all that is seen of the shaker is a band {height_px:.0f} px high that never comes nearer to the beam than "
         "{gap_px:.0f} px: taken for a sticker on a dark shaker whose tip touches the beam in the first frames; "
@@ -122,14 +122,14 @@ KINDS = table(
         ("tip_distance", "marker"),
     ),
     Kind(
-        "camera.never_touches", DOUBT,
+        "camera.never_touches", WARNING,
         "the gap between tip and beam over the recording, while the beam moves",
         "the beam moves though what is taken for the tip never comes nearer to it than {gap_px:.1f} px: it may "
         "be a sticker; look at a frame (--picture), give tip_distance (--tip-distance)",
         ("tip_distance",),
     ),
     Kind(
-        "camera.contact_offset", DOUBT,
+        "camera.contact_offset", WARNING,
         "penetration while beam and shaker move together, which is zero",
         "while beam and shaker move together the tip seems to stand {depth_px:+.2f} +- {error_px:.2f} px inside the "
         "beam: their edges are shifted against each other, which is in the shaker's standard errors; look for a "
@@ -137,36 +137,36 @@ KINDS = table(
         ("gamma", "tip_distance"),
     ),
     Kind(
-        "camera.inside", DOUBT,
+        "camera.inside", WARNING,
         "penetration of the tip into the beam, against what contact can give",
         "the tip stands up to {depth_px:.1f} px inside the beam ({frames:.0f} frames): what is "
         "taken for the tip is not, or beam and shaker are lit differently; give tip_distance (--tip-distance)",
         ("tip_distance",),
     ),
     Kind(
-        "camera.jumps", DOUBT,
+        "camera.jumps", WARNING,
         "positions that leave their neighbours for a few frames, as no motion does",
         "{frames:.0f} frame(s) ({share_percent:.1f} %) left out because the position jumps and comes back",
     ),
     Kind(
-        "camera.distorted", DOUBT,
+        "camera.distorted", WARNING,
         "thickness of the beam and shape of its edges in each frame, against the usual ones",
         "{frames:.0f} frame(s) ({share_percent:.1f} %) in which the beam looks thicker or thinner, or its edge is no "
         "step: light or another object lies on it; their standard errors are widened, or they are left out",
     ),
     Kind(
-        "camera.lost", DOUBT,
+        "camera.lost", WARNING,
         "share of the frames with a measurement",
         "only {share_percent:.0f} % of the frames were measured; see the flags for the reasons",
     ),
     Kind(
-        "camera.striker_in_view", NOTE,
+        "camera.striker_in_view", INFO,
         "something beyond the beam in most frames though no shaker is followed",
         "a shaker is in view though shaker=False (--no-shaker): its columns are kept out of the search for the beam",
         ("shaker",),
     ),
     Kind(
-        "camera.drift", NOTE,
+        "camera.drift", INFO,
         "motion of marks that stand still",
         "the camera moves by up to {drift_px:.2f} px against its fixed marks; taken out",
     ),
@@ -196,7 +196,7 @@ class SeenMotion:
     fields: Fields
 
 
-def tracking_findings(
+def tracking_diagnostics(
     scene: Scene, seen: SeenMotion, settings: TrackingSettings, offset_mm: float
 ) -> tuple[Diagnostic, ...]:
     """What a tracked recording says against itself; *offset_mm* is the error of the rest position."""
@@ -308,7 +308,7 @@ def _of_the_frames(rows: TrackedRows) -> list[Diagnostic]:
         frames = rows.flagged(flag)
         if frames:
             share = frames / count
-            severity = DOUBT if share > _RARE else NOTE
+            severity = WARNING if share > _RARE else INFO
             told.append(KINDS[name].found(severity, frames=frames, share_percent=100.0 * share))
     share = float(np.isfinite(rows.row).mean())
     if share < 0.9:

@@ -1,4 +1,4 @@
-"""Diagnostic the beam and the shaker in a sample of frames, before following them."""
+"""Find the beam and the shaker in a sample of frames before they are followed."""
 
 from __future__ import annotations
 
@@ -516,7 +516,7 @@ def otsu(frames: NDArray[np.floating]) -> float:
         import cv2
     except ImportError as error:
         raise InputError(
-            "threshold = None: diagnostic one needs OpenCV (pip install 'snapbeam[lab]'); or give threshold "
+            "threshold = None: an automatic threshold needs OpenCV (pip install 'snapbeam[lab]'); or give threshold "
             "(--threshold)"
         ) from error
     low, high = (float(level) for level in np.percentile(frames[:, ::2, ::2], (0.05, 99.95)))

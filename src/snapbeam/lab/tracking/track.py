@@ -16,7 +16,7 @@ from snapbeam.lab.tracking.diagnostics import (
     contact_shift,
     never_touching,
     rounding_shift,
-    tracking_findings,
+    tracking_diagnostics,
 )
 from snapbeam.lab.tracking.edges import Floats
 from snapbeam.lab.tracking.measure import (
@@ -78,7 +78,7 @@ def tracked_dataset(
     penetration = closing_mm / scale
     touch = touching(penetration, np.hypot(rows.error, rows.shaker_error), rows.row)
     seen = SeenMotion(rows, rest, penetration, touch, scale, drift, fields)
-    diagnostics = (*recording.diagnostics, *tracking_findings(scene, seen, settings, scale * offset))
+    diagnostics = (*recording.diagnostics, *tracking_diagnostics(scene, seen, settings, scale * offset))
     # a shift of the edges by the camera's curve moves the shaker against the beam, not the beam against itself
     placed = scene.placed_error
     bent = math.hypot(2.0 * scene.shape.shift, contact_shift(touch, placed), placed)
@@ -114,7 +114,7 @@ def tracked_dataset(
     }
     if shaker is not None:
         own["shaker_displacement_mm"] = (shaker_mm, "mm", "shaker displacement")
-        own["penetration_mm"] = (closing_mm, "mm", "penetration_normalised")
+        own["penetration_mm"] = (closing_mm, "mm", "penetration")
         own["shaker_stderr_mm"] = (scale * shaker_error, "mm", "standard error of the shaker displacement")
         own["tip_row"] = (tip, "px", "row of the shaker's tip at the contact column")
         own["tip_row_stderr"] = (rows.shaker_error, "px", "noise of the tip's row, standard error")
@@ -235,7 +235,8 @@ def track(
     Returns
     -------
     xarray.Dataset
-        Over ``time`` [s]: ``displacement``, ``striker_displacement``, ``penetration`` in b and, with
+        Over ``time`` [s]: ``displacement_at_striker``, ``striker_displacement``,
+        ``penetration_normalised`` in b and, with
         ``_mm``, in mm; ``displacement_stderr_mm`` and ``shaker_stderr_mm`` from the scatter of the columns,
         the rest position and what the diagnostics widen; ``confidence`` from 0 to 1; ``flags``
         (:class:`FrameFlag`); ``valid``; ``edge_width`` [px]; and, for drawing, ``beam_row``, ``beam_slope``,
