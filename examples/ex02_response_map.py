@@ -30,7 +30,7 @@ ds = sb.sweep(system, axes, sb.Integration(cycles=80))
 # The dashed line is the quasi-static threshold of one mode, :math:`V_\mathrm{QS1} = \Omega \sin^2 \pi x_s`
 # (Eq. 21). At low frequency the border of the intrawell responses follows it; above, impacts need far less.
 
-ax = plot_response_map(ds, threshold_line=True)
+ax = plot_response_map(ds, quasi_static_line=True)
 
 # %%
 # The interwell threshold is one line of xarray:

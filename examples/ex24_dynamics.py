@@ -62,7 +62,7 @@ branches = [
     sb.dynamics.continuation(orbit, *limits, max_step=0.06),
     sb.dynamics.continuation(orbit, *limits, direction="down"),
 ]
-flip = next(event for event in branches[0].special_points if event.kind == "flip")
+flip = next(point for point in branches[0].special_points if point.kind == "flip")
 doubled = sb.dynamics.switch_branch(flip, *limits)
 branches.append(sb.dynamics.continuation(doubled, "velocity_amplitude", (0.02, 0.17)))
 weak = sb.dynamics.periodic_orbit(

@@ -24,7 +24,7 @@ system = sb.System(
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18),
 )
-spread = sb.uncertainty.ParameterUncertainty(
+uncertainty = sb.uncertainty.ParameterUncertainty(
     of={
         "beam.buckling_level": sb.uncertainty.Normal(0.01, relative=True),
         "contact.stiffness": sb.uncertainty.LogNormal(0.2),
@@ -41,7 +41,7 @@ probability = sb.uncertainty.probability_map(
         "frequency_ratio": np.linspace(0.4, 2.4, 17),
         "velocity_amplitude": np.linspace(0.02, 0.24, 17),
     },
-    spread,
+    uncertainty,
     sb.uncertainty.SamplingPlan(half_width=0.12, initial_runs=16, max_runs=60),
     integration=short,
 )
@@ -58,7 +58,7 @@ threshold = sb.uncertainty.quantile_threshold(
     "velocity_amplitude",
     (0.005, 0.3),
     {"frequency_ratio": np.linspace(0.4, 2.4, 9)},
-    spread,
+    uncertainty,
     sb.uncertainty.QuantileSearchSettings(runs=200),
     integration=short,
 )

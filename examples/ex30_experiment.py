@@ -18,7 +18,7 @@ import snapbeam as sb
 import snapbeam.lab as lab
 from snapbeam import paper
 from snapbeam.lab.plot.calibration import plot_calibration
-from snapbeam.lab.plot.comparison import plot_dot_comparison, plot_waveform_comparison
+from snapbeam.lab.plot.comparison import plot_map_comparison, plot_waveform_comparison
 from snapbeam.lab.plot.fit_decay import plot_decay
 from snapbeam.lab.plot.tracking import plot_frame, plot_tracking_quality
 from snapbeam.lab.plot.vibrometer import plot_drive
@@ -337,7 +337,7 @@ ds = sb.response_map(
     cycles=cycles,
     reference_frequency=calibration.well_frequency,
 )
-agreement = lab.compare_dots(dots, ds)
+agreement = lab.compare_measured_points(dots, ds)
 print(
     f"{100 * agreement.agreement:.0f} % of {agreement.used} dots agree; "
     f"on snapping at all, "
@@ -345,7 +345,7 @@ print(
 )
 for note in agreement.notes:
     print("-", note)
-figure = plot_dot_comparison(ds, dots, agreement)
+figure = plot_map_comparison(ds, dots, agreement)
 
 # %%
 # Bench and model share one theory here, so what disagrees is no fault of it: the map is coarse and has fewer modes,

@@ -20,7 +20,7 @@ system = sb.System(
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1).striker(),
 )
-spread = sb.uncertainty.ParameterUncertainty(
+uncertainty = sb.uncertainty.ParameterUncertainty(
     of={
         "velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True),
         "location": sb.uncertainty.Normal(0.005),
@@ -37,7 +37,7 @@ found = sb.uncertainty.optimize_design(
     },
     ["speed", sb.uncertainty.Objective(quantity="peak_force", quantile=0.5)],
     sb.uncertainty.Constraint(quantity="snap", lower=0.95),
-    spread,
+    uncertainty,
     sb.uncertainty.OptimizerSettings(
         generations=8, population=12, samples=40, validation_samples=100
     ),

@@ -16,7 +16,7 @@ system = sb.System(
     paper.CONTACT,
     sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1).striker(),
 )
-spread = sb.uncertainty.ParameterUncertainty(
+uncertainty = sb.uncertainty.ParameterUncertainty(
     of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)},
     displacement=3.5e-6,
     phase=True,
@@ -31,7 +31,7 @@ problem = sb.uncertainty.design_problem(
     variables,
     ["speed", sb.uncertainty.Objective(quantity="peak_force", quantile=0.5)],
     sb.uncertainty.Constraint(quantity="snap", lower=0.95),
-    spread,
+    uncertainty,
     samples=40,
     integration=sb.Integration(cycles=10),
 )
