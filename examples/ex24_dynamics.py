@@ -70,9 +70,9 @@ weak = sb.dynamics.periodic_orbit(
 )
 branches.append(sb.dynamics.continuation(weak, *limits))
 for branch in branches:
-    for event in branch.special_points:
+    for point in branch.special_points:
         print(
-            f"{event.kind:12s} V = {event.value:.6f}, period {branch.orbits[0].period}"
+            f"{point.kind:12s} V = {point.value:.6f}, period {branch.orbits[0].period}"
         )
 plot_diagram(diagram, branches=[branch.to_dataset() for branch in branches])
 
@@ -82,11 +82,11 @@ plot_diagram(diagram, branches=[branch.to_dataset() for branch in branches])
 # States of the mode in the plane of displacement and velocity, from the tip's mid-position on, which stays where it is.
 
 found = sb.dynamics.find_attractors(one, 100)
-plane = {
+grid = {
     "amplitude[1]": np.linspace(-0.98, 2.0, 80),
     "velocity[1]": np.linspace(-1.5, 1.5, 80),
 }
-basins = sb.dynamics.basins_of_attraction(found, plane)
+basins = sb.dynamics.basins_of_attraction(found, grid)
 entropy = sb.dynamics.basin_entropy(basins.basin, 5)
 print(
     f"{len(found.attractors)} attractors, "

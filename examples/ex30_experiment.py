@@ -326,16 +326,24 @@ dots = MeasuredPoints(
 # have the same coordinates only if both are normalised alike: by the first frequency about a well and the buckling
 # level.
 
-ds = sb.response_map(
+calibrated = sb.System(
     sb.ReducedModel.from_beam(
-        calibration.beam, modes=4, damping_ratio=calibration.damping_ratio
+        calibration.beam,
+        modes=4,
+        damping_ratio=calibration.damping_ratio,
+        reference_frequency=calibration.well_frequency,
     ),
     paper.CONTACT,
-    frequency_ratio=np.linspace(0.3, 3.9, 13),
-    velocity_amplitude=np.linspace(0.05, 0.6, 12),
-    location=paper.LOCATION,
-    cycles=cycles,
-    reference_frequency=calibration.well_frequency,
+    sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1),
+)
+ds = sb.sweep(
+    calibrated,
+    {
+        "frequency_ratio": np.linspace(0.3, 3.9, 13),
+        "velocity_amplitude": np.linspace(0.05, 0.6, 12),
+        "location": [paper.LOCATION],
+    },
+    sb.Integration(cycles=cycles),
 )
 agreement = lab.compare_measured_points(dots, ds)
 print(

@@ -37,7 +37,7 @@ print([f"{each:.1f} Hz" for each in found["reduced"]])
 # %%
 # A figure, as a sketch; ``--full`` takes the size of the paper:
 
-print(shell("paper", "figA9", "-o", "OUT"))
+print(shell("reproduce", "figA9", "-o", "OUT"))
 
 # %%
 # The run of Fig. 5, as numbers for a script and as a picture for the eye:
@@ -46,7 +46,7 @@ run = "simulate --frequency-ratio 1.21 --velocity-amplitude 0.18 --cycles 40"
 files_of_it = "-o OUT/run.nc --plot OUT/run.png --window 0:20 --json -"
 found = json.loads(shell(*run.split(), *files_of_it.split()))
 plt.close("all")  # the picture is in its file
-print(found["outcome"]["response_class"], f"{found['outcome']['peak_force']:.2f} N")
+print(found["summary"]["response_class"], f"{found['summary']['peak_force']:.2f} N")
 picture = plt.imread(files / "run.png")
 figure = plt.figure(figsize=(7.5, 7.5 * picture.shape[0] / picture.shape[1]))
 figure.add_axes((0, 0, 1, 1)).imshow(picture)

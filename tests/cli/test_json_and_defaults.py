@@ -84,9 +84,9 @@ def test_every_suggestion_runs_and_is_of_the_same_system(name, tmp_path, monkeyp
             assert float(value) in ds[axis].values, "to the last digit"
             point = point.sel({axis: float(value)})
         point = point.squeeze()
-        assert told["outcome"]["response_class"] == sb.ResponseClass(int(point.response_class)).label
-        assert told["outcome"]["zero_crossings"] == int(point.zero_crossings)
-        assert told["outcome"]["peak_force"] == pytest.approx(float(point.peak_force), rel=1e-6)
+        assert told["summary"]["response_class"] == sb.ResponseClass(int(point.response_class)).label
+        assert told["summary"]["zero_crossings"] == int(point.zero_crossings)
+        assert told["summary"]["peak_force"] == pytest.approx(float(point.peak_force), rel=1e-6)
 
 
 def leaves(group, before=()):
@@ -117,12 +117,12 @@ def test_json_goes_to_standard_output_alone(tmp_path):
     words = ["simulate", *SMALL]
     result = RUNNER.invoke(app, [*words, "--json", "-"])
     found = json.loads(result.stdout)
-    assert found["outcome"]["response_class"] in {kind.label for kind in sb.ResponseClass}
-    assert set(found["outcome"]) == set(sb.STATISTICS)
+    assert found["summary"]["response_class"] in {kind.label for kind in sb.ResponseClass}
+    assert set(found["summary"]) == set(sb.STATISTICS)
     assert RUNNER.invoke(app, [*words, "--quiet"]).output == ""
     said = RUNNER.invoke(app, [*words, "--json", str(tmp_path / "a.json")])
     again = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))
-    assert again["outcome"] == found["outcome"] and "impacts" in said.stdout
+    assert again["summary"] == found["summary"] and "impacts" in said.stdout
     refused = RUNNER.invoke(app, ["simulate", "--cycles", "0", "--json", "-", "--quiet"])
     assert refused.exit_code == 2 and refused.stdout == "" and "cycles = 0" in refused.stderr
 
@@ -156,7 +156,7 @@ def test_printed_config_is_the_same_system(words, tmp_path):
     if words[0] == "simulate":
         direct = json.loads(run(*words, "--cycles", "2", "--json", "-"))
         again = json.loads(run("simulate", "--config", str(file), "--cycles", "2", "--json", "-"))
-        assert again["system"] == direct["system"] and again["outcome"] == direct["outcome"]
+        assert again["system"] == direct["system"] and again["summary"] == direct["summary"]
 
 
 def test_what_the_paper_lent_is_told(tmp_path):
@@ -224,7 +224,7 @@ def test_a_point_of_a_list_is_gone_on_from(tmp_path):
     command = ["simulate", "--from", str(tmp_path / "list.nc"), "--point", near, "--json", "-", "--quiet"]
     done = RUNNER.invoke(app, command)
     assert done.exit_code == 0, done.output
-    told = json.loads(done.stdout)["outcome"]
+    told = json.loads(done.stdout)["summary"]
     assert told["peak_force"] == float(found.peak_force[3]) and told["zero_crossings"] == int(
         found.zero_crossings[3]
     )

@@ -1,4 +1,4 @@
-"""``snapbeam simulate``: one run, recorded, drawn and told."""
+"""``snapbeam simulate``: one run with its time series, figures and summary."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def simulate(
         ),
     ] = False,
 ) -> None:
-    """Compute one run and say how the beam responds.
+    """Compute one run and print its response class and statistics.
 
     Example: snapbeam simulate --frequency-ratio 1.21 --velocity-amplitude 0.18 -o run.nc --plot run.png
     --window 0:20
@@ -124,14 +124,14 @@ def simulate(
     with show_compilation(errors()), _share_done() as progress:
         times = _even(system, integration, samples)
         if stream and output is not None:
-            outcome = sb.simulate_to_file(
+            summary = sb.simulate_to_file(
                 system, integration, path=output, sample_times=times, progress=progress
             )
         else:
             run = sb.simulate(system, integration, sample_times=times, progress=progress)
-            outcome = run.summary
+            summary = run.summary
     console = out()
-    console.print(_told(outcome, time.monotonic() - start))
+    console.print(_summary_text(summary, time.monotonic() - start))
     if output is not None:
         if run is not None:
             run.save(output)
@@ -141,8 +141,8 @@ def simulate(
     if run is not None and animate is not None:
         console.print(f"Written: {file_line(_animated(run.dataset, animate, part))}")
     files = [path for path in (output, plot, animate) if path is not None]
-    add_json(outcome=outcome, seconds=time.monotonic() - start, system=system.hash, files=files)
-    if outcome.status not in (sb.RunStatus.OK, sb.RunStatus.EARLY_STOP):
+    add_json(summary=summary, seconds=time.monotonic() - start, system=system.hash, files=files)
+    if summary.status not in (sb.RunStatus.OK, sb.RunStatus.EARLY_STOP):
         raise typer.Exit(FAILED)
 
 
@@ -206,32 +206,32 @@ def _animated(dataset: xr.Dataset, path: Path, window: tuple[float, float] | Non
     return animate_run(dataset, path, window)
 
 
-def _told(answer: Any, elapsed: float) -> str:
+def _summary_text(summary: Any, elapsed: float) -> str:
     from snapbeam.util.si_prefixes import prefixed
     from snapbeam.util.status_codes import RunStatus
 
-    kind, status = answer.response_class, answer.status
+    kind, status = summary.response_class, summary.status
     if status not in (RunStatus.OK, RunStatus.EARLY_STOP):
         return f"[bold red]failed[/] ({status.name}): {status.advice}"
-    well = "upper" if answer.final_well > 0 else "lower"
-    final = ", and stays there for certain" if answer.final_well_proven else ""
-    crossings = f"{answer.zero_crossings}, {answer.zero_crossings_last_quarter} of them in the last quarter"
-    contact = f"{answer.impacts}, in contact {100.0 * answer.contact_time_fraction:.3g} % of the time"
-    center = f"{answer.min_midspan_displacement:.4g} to {answer.max_midspan_displacement:.4g} b"
+    well = "upper" if summary.final_well > 0 else "lower"
+    final = ", and stays there for certain" if summary.final_well_proven else ""
+    crossings = f"{summary.zero_crossings}, {summary.zero_crossings_last_quarter} of them in the last quarter"
+    contact = f"{summary.impacts}, in contact {100.0 * summary.contact_time_fraction:.3g} % of the time"
+    center = f"{summary.min_midspan_displacement:.4g} to {summary.max_midspan_displacement:.4g} b"
     force = (
-        "no finite force" if answer.peak_force != answer.peak_force else prefixed(answer.peak_force, "N", 4)
+        "no finite force" if summary.peak_force != summary.peak_force else prefixed(summary.peak_force, "N", 4)
     )
-    work, lost = (prefixed(each, "J", 4) for each in (answer.striker_work, answer.energy_dissipated))
+    work, lost = (prefixed(each, "J", 4) for each in (summary.striker_work, summary.energy_dissipated))
     lines = [
         f"[bold]{kind.label}[/] (in {duration(elapsed)}; {status.advice})",
         f"  zero crossings        {crossings}",
         f"  at the end            in the {well} well{final}",
         f"  centre displacement   {center}",
-        f"  at the striker        {answer.min_displacement:.4g} to {answer.max_displacement:.4g} b",
+        f"  at the striker        {summary.min_displacement:.4g} to {summary.max_displacement:.4g} b",
         f"  impacts               {contact}",
         f"  peak contact force    {force}",
         f"  striker's work        {work}, {lost} dissipated",
     ]
-    if answer.zero_crossings:
-        lines.insert(2, f"  last crossing         at {prefixed(answer.last_zero_crossing, 's', 5)}")
+    if summary.zero_crossings:
+        lines.insert(2, f"  last crossing         at {prefixed(summary.last_zero_crossing, 's', 5)}")
     return "\n".join(lines)
