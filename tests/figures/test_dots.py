@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from snapbeam.lab.compare_maps import compare_measured_points
-from snapbeam.lab.plot.comparison import plot_dot_comparison
+from snapbeam.lab.map_comparison import compare_measured_points
+from snapbeam.lab.plot.comparison import plot_map_comparison
 from snapbeam.sweeps.measured_points import MeasuredPoints, read_measured_points
 from snapbeam.util.status_codes import ResponseClass
 from snapbeam.util.validation import InputError
@@ -103,7 +103,7 @@ def test_errors_stand_out_in_the_table_of_classes(synthetic_map):
     )
     dots = MeasuredPoints(ratio, velocity, np.full(300, 1 / 2.1), kinds)
     result = compare_measured_points(dots, synthetic_map)
-    ax = plot_dot_comparison(synthetic_map, dots, result).axes[1]
+    ax = plot_map_comparison(synthetic_map, dots, result).axes[1]
     weights = {(int(t.get_position()[1]), int(t.get_position()[0])): t.get_fontweight() for t in ax.texts}
     images = [image.to_rgba(image.get_array()) for image in ax.images]
     for (row, column), count in np.ndenumerate(result.confusion):

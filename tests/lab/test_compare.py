@@ -12,9 +12,10 @@ from typer.testing import CliRunner
 
 from snapbeam.lab.cli.calibrate import calibrate
 from snapbeam.lab.cli.compare import compare
+from snapbeam.lab.cli.fit_decay import fit_decay
 from snapbeam.lab.cli.vibrometer import vibrometer
-from snapbeam.lab.compare_maps import compare_measured_points
-from snapbeam.lab.compare_waveforms import compare_waveforms
+from snapbeam.lab.map_comparison import compare_measured_points
+from snapbeam.lab.waveform_comparison import compare_waveforms
 from snapbeam.lab.plot.comparison import plot_map_comparison, plot_waveform_comparison, plot_waveform_overlay
 from snapbeam.lab.signal_files import write_signal
 from snapbeam.lab.signals import make_signal

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import snapbeam as sb
-from snapbeam.lab.compare_waveforms import measure_response
+from snapbeam.lab.waveform_comparison import measure_response
 from snapbeam.lab.decay.identify import METHODS, identify_decay
 from snapbeam.lab.decay.model import compare_wells
 from snapbeam.lab.plot.fit_decay import plot_decay

@@ -18,5 +18,5 @@ def test_a_diagnostic_of_the_part_is_a_diagnostic_of_the_package():
 
 
 def test_a_name_that_is_not_there():
-    with pytest.raises(AttributeError, match="vibrometer"):
-        lab.vibrometer  # noqa: B018
+    with pytest.raises(AttributeError, match="vibrometers"):
+        lab.vibrometers  # noqa: B018

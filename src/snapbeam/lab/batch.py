@@ -19,7 +19,7 @@ import numpy as np
 
 from snapbeam._version import __version__
 from snapbeam.lab.camera import open_recording
-from snapbeam.lab.compare_waveforms import LEAST_CYCLES, measure_response
+from snapbeam.lab.waveform_comparison import LEAST_CYCLES, measure_response
 from snapbeam.lab.drive_alignment import Alignment, align
 from snapbeam.lab.image_sources import IMAGE_SUFFIXES, RECORDING_SUFFIXES
 from snapbeam.lab.signal_files import read_signal

@@ -96,7 +96,7 @@ def compare(
 def _map(path: Path, dataset: xr.Dataset, draw: bool) -> tuple[dict, Figure | None]:
     from rich.table import Table
 
-    from snapbeam.lab.compare_maps import compare_measured_points
+    from snapbeam.lab.map_comparison import compare_measured_points
     from snapbeam.sweeps.measured_points import read_measured_points
 
     attrs = dataset.attrs
@@ -146,7 +146,7 @@ def _run(
 ) -> tuple[dict, Figure | None, tuple[Diagnostic, ...]]:
     import numpy as np
 
-    from snapbeam.lab.compare_waveforms import compare_waveforms, measure_response
+    from snapbeam.lab.waveform_comparison import compare_waveforms, measure_response
     from snapbeam.util.diagnostics import diagnostics_of
 
     onsets = None

@@ -142,7 +142,7 @@ def _tell(done: int, total: int, result: Any) -> None:
 def _on_map(target: Path, simulated: Path) -> Path:
     """The responses on a map; the share that agrees is printed."""
     from snapbeam.cli.console import open_result
-    from snapbeam.lab.compare_maps import compare_measured_points
+    from snapbeam.lab.map_comparison import compare_measured_points
     from snapbeam.lab.plot.comparison import plot_map_comparison
     from snapbeam.plot.style import save_figure
     from snapbeam.sweeps.measured_points import read_measured_points

@@ -27,8 +27,8 @@ from snapbeam.util.validation import InputError, finite
 if TYPE_CHECKING:
     import xarray as xr
 
-    from snapbeam.lab.compare_maps import MapComparison
-    from snapbeam.lab.compare_waveforms import WaveformComparison
+    from snapbeam.lab.map_comparison import MapComparison
+    from snapbeam.lab.waveform_comparison import WaveformComparison
 
 __all__ = ["plot_map_comparison", "plot_waveform_comparison", "plot_waveform_overlay"]
 
