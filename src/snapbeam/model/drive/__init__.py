@@ -1,1 +1,14 @@
-"""drive"""
+"""Motions of strikers and bases, one per module; importing the package registers all of them in ``DRIVES``."""
+
+from snapbeam.model.drive import (  # noqa: F401, I001  the order of DRIVES
+    burst,
+    chirp,
+    constant_velocity,
+    half_sine,
+    noise,
+    recorded_motion,
+    sine,
+    fixed_stop,
+    sum,
+    two_tone,
+)
