@@ -1,10 +1,11 @@
-"""Pages that make themselves: the command line, the keys of parameter files, variables and codes.
+"""Generated reference pages: commands, keys of parameter files, variables and codes.
 
-They are read off the program, the table of parameters and the table of statistics, so that they cannot fall behind.
+The text comes from the program itself: its commands, its table of parameters and its table of statistics.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -13,20 +14,22 @@ from typing import Any
 __all__ = ["command_line", "parameter_tables", "setup", "variable_tables", "write_pages"]
 
 _SECTIONS = {
-    "beam": "The beam. Of `buckling_level` and `axial_load` one is given.",
+    "beam": "Geometry and material. Give one of `buckling_level` and `axial_load`.",
     "model": "The reduced model.",
-    "ends": "How the ends of the beam are held; clamped and rigid where nothing is given.",
-    "imperfection": "What makes the wells unequal; a section that is nothing is a perfect beam.",
-    "contact": "The law of contact, by `law`: `hertz` (the default) or `restitution`. Hertz's stiffness may be "
-    "given by the materials in its place: `radius` of the sphere (m), `young_modulus` (Pa) and `poisson_ratio`, two "
-    "numbers each, of sphere and beam.",
-    "striker": "The striker's tip. `location_m` (m) may stand for `location`.",
-    "drive": "How the tip moves, by `kind`: `sine`, or, from Python, `recorded`. `frequency_hz` (Hz) and "
-    "`velocity_m_s` (m/s) may stand for the ratios.",
-    "base": "The motion of what both ends are mounted on, by `kind`; a section that is left out is a base at rest.",
-    "axial": "How the axial load changes, by `kind`: `sine` or `ramp`; a section that is left out is a constant load.",
-    "harvester": "A circuit that taps the beam, by `kind`: `piezo` or `coil`.",
-    "run": "How runs are integrated.",
+    "boundary": "Stiffness of the supports; without this section both ends are clamped.",
+    "imperfection": "Initial deflection and constant transverse loads, which make the wells unequal; without this section the "
+    "beam is perfect.",
+    "contact": "The contact law, selected by `type`: {laws}. You can give materials instead of `stiffness`: `radius` of the "
+    "sphere (m), `young_modulus` (Pa) and `poisson_ratio`, the last two as lists of two numbers, of sphere and beam. You can "
+    "give `restitution` and `speed` (m/s) instead of `damping_factor`.",
+    "striker": "The striker. `location_m` (m) can replace `location`.",
+    "drive": "The motion of the striker, selected by `type`: {drives}. `frequency_hz` (Hz) and `velocity_m_s` (m/s) can "
+    "replace the ratios. A recorded motion is available from Python and with `--recorded-drive` only.",
+    "base_excitation": "The motion of the base, selected by `type` as in `[drive]`; without this section the base is at rest.",
+    "axial_load": "The change of the axial load in time, selected by `type`: {loads}; without this section the load is "
+    "constant.",
+    "harvester": "The circuit of an energy harvester, selected by `type`: {harvesters}.",
+    "integration": "Solver settings.",
 }
 
 
@@ -41,11 +44,28 @@ def _table(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def parameter_tables() -> str:
-    """Every key of a parameter file, section by section, from the table of parameters."""
+    """Return a table of the keys of each section of a parameter file."""
+    from snapbeam.model.axial_load import LOADS
+    from snapbeam.model.contact.base import LAWS
+    from snapbeam.model.drive.base import DRIVES
+    from snapbeam.model.harvester import HARVESTERS
     from snapbeam.model.parameter_file import Config
     from snapbeam.model.parameters import parameters
 
     given = Config().system.parameters
+    types = {
+        "contact": LAWS,
+        "drive": {name: kind for name, kind in DRIVES.items() if name != "sum"},
+        "base_excitation": {
+            name: kind for name, kind in DRIVES.items() if name != "sum" and kind.can_excite_base()
+        },
+        "axial_load": LOADS,
+        "harvester": HARVESTERS,
+    }
+    listed = {
+        "laws": _listed(LAWS), "drives": _listed(types["drive"]), "loads": _listed(LOADS),
+        "harvesters": _listed(HARVESTERS),
+    }  # fmt: skip
     parts = []
     for section, words in _SECTIONS.items():
         rows = []
@@ -60,11 +80,25 @@ def parameter_tables() -> str:
             key = name.partition(".")[2]
             meaning = row.quantity.long_name + (f", {symbol}" if symbol else "")
             meaning += f"; in datasets `{row.short}`" if row.short != key else ""
-            scope = "run" if row.is_run else "structure"
-            rows.append((f"`{key}`", meaning, unit, limits, shown or "–", scope))
-        header = ("key", "meaning", "unit", "allowed", "default", "scope")
-        parts.append(f"## [{section}]\n\n{words}\n\n" + _table(header, rows))
+            owners = ", ".join(
+                f"`{each}`" for each, kind in types.get(section, {}).items() if key in _fields(kind)
+            )
+            level = "run" if row.is_run else "model"
+            rows.append((f"`{key}`", meaning, unit, limits, shown or "–", level, owners))
+        header = ["key", "meaning", "unit", "allowed", "default", "level", "types"]
+        if not any(row[-1] for row in rows):
+            header, rows = header[:-1], [row[:-1] for row in rows]
+        parts.append(f"## [{section}]\n\n{words.format(**listed)}\n\n" + _table(header, rows))
     return "\n".join(parts)
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names)
+
+
+def _fields(kind: Any) -> set[str]:
+    """Names of the fields of a contact law, drive, load or harvester."""
+    return {each.name for each in dataclasses.fields(kind)}
 
 
 def _number(value: Any) -> str:
@@ -74,7 +108,7 @@ def _number(value: Any) -> str:
 
 
 def variable_tables() -> str:
-    """Variables of runs, impacts and maps, and what the codes mean."""
+    """Return tables of the variables of runs, impacts and maps, and of the codes."""
     from snapbeam.simulation.dataset import IMPACT_COLUMNS, SCHEMA
     from snapbeam.solver.statistics import STATISTICS
     from snapbeam.util.status_codes import ResponseClass, RunStatus
@@ -88,44 +122,51 @@ def variable_tables() -> str:
         "## A run\n", _table(("variable", "dimensions", "unit", "meaning"), runs),
         "## Impacts of a run\n", "Dimension `impact`.\n", _table(("variable", "unit", "meaning"), impacts),
         "## Statistics\n",
-        "Variables of maps, and entries of `run.outcome`.\n",
+        "Variables of maps, and attributes of `run.summary`.\n",
         _table(("variable", "kind", "unit", "meaning"), statistics),
         "## Response classes\n", _table(("code", "name", "class"), classes),
-        "## Statuses of runs\n", _table(("code", "name", "what happened, and what to do"), statuses),
+        "## Statuses of runs\n", _table(("code", "name", "meaning and remedy"), statuses),
     ))  # fmt: skip
 
 
 def command_line() -> str:
-    """Every command with every option, as the program itself describes them."""
+    """Return the help of each command and of each of its subcommands."""
     import typer.main
 
     from snapbeam.cli.app import app
 
     group: Any = typer.main.get_command(app)
-    parts = []
-    for name, command in group.commands.items():
-        words = "\n\n".join(_paragraphs(command.help or ""))
-        parts.append(f"## snapbeam {name}\n\n{words}\n")
-        panels: dict[str, list[tuple[str, str]]] = {}
-        for parameter in command.params:
-            if parameter.name == "help":
-                continue
-            panel = getattr(parameter, "rich_help_panel", None) or (
-                "Arguments" if parameter.param_type_name == "argument" else "Options"
-            )
-            flags = ", ".join(f"`{flag}`" for flag in [*parameter.opts, *parameter.secondary_opts])
-            if parameter.param_type_name == "argument":
-                flags = f"`{parameter.metavar or parameter.human_readable_name}`"
-            elif parameter.metavar:
-                flags += f" *{parameter.metavar}*"
-            panels.setdefault(panel, []).append((flags, _options_as_code(parameter.help or "")))
-        for panel, rows in panels.items():
-            parts.append(f"**{panel}**\n\n" + _table(("option", "meaning"), rows))
-    return "\n".join(parts)
+    return "\n".join(
+        part for name, command in group.commands.items() for part in _command(f"snapbeam {name}", command, 2)
+    )
+
+
+def _command(title: str, command: Any, level: int) -> list[str]:
+    """Return the help of a command, its options by panel, and its subcommands."""
+    words = "\n\n".join(_paragraphs(command.help or ""))
+    parts = [f"{'#' * level} {title}\n\n{words}\n"]
+    panels: dict[str, list[tuple[str, str]]] = {}
+    for parameter in command.params:
+        if parameter.name == "help":
+            continue
+        panel = getattr(parameter, "rich_help_panel", None) or (
+            "Arguments" if parameter.param_type_name == "argument" else "Options"
+        )
+        flags = ", ".join(f"`{flag}`" for flag in [*parameter.opts, *parameter.secondary_opts])
+        if parameter.param_type_name == "argument":
+            flags = f"`{parameter.metavar or parameter.human_readable_name}`"
+        elif parameter.metavar:
+            flags += f" *{parameter.metavar}*"
+        panels.setdefault(panel, []).append((flags, _options_as_code(parameter.help or "")))
+    for panel, rows in panels.items():
+        parts.append(f"**{panel}**\n\n" + _table(("option", "meaning"), rows))
+    for name, each in getattr(command, "commands", {}).items():
+        parts += _command(f"{title} {name}", each, level + 1)
+    return parts
 
 
 def _paragraphs(text: str) -> list[str]:
-    """Paragraphs of a command's help; an example is set as a command."""
+    """Return the paragraphs of a help text; an example becomes a code block."""
     found = []
     for part in text.split("\n\n"):
         plain = " ".join(line.strip() for line in part.splitlines())
@@ -137,12 +178,12 @@ def _paragraphs(text: str) -> list[str]:
 
 
 def _options_as_code(text: str) -> str:
-    """Words with options set as code; as words their two hyphens would become a dash."""
+    """Set options as code, so that their two hyphens do not become a dash."""
     return re.sub(r"(?<![\w`-])(--[a-z][\w-]*)", r"`\1`", text)
 
 
 def write_pages(folder: Path) -> None:
-    """Write the generated parts into a folder; a file that has not changed is left alone."""
+    """Write the generated pages into a folder; unchanged files are not rewritten."""
     folder.mkdir(parents=True, exist_ok=True)
     pages = {"parameters": parameter_tables, "variables": variable_tables, "command_line": command_line}
     bench = folder.parent / "images" / "rivals.inc"
