@@ -598,7 +598,7 @@ def _joined_states(states: list[State]) -> State:
     assert first is not None
     parts: dict[str, Any] = {
         name: np.concatenate([getattr(each, name) for each in modals])
-        for name in ("q", "p", "home", "offset")
+        for name in ("q", "p", "well_sign", "offset")
     }
     status = np.concatenate([np.asarray((each.statistics or {})["status"]) for each in states])
     return State(

@@ -336,7 +336,7 @@ class Structure:
     contact_shape: ArrayLike
     midspan_shape: ArrayLike | None
     nonlinear_stiffness: float
-    equilibrium: ArrayLike | None
+    well_amplitude: ArrayLike | None
     length_scale: float
     damping_ratio: ArrayLike
     reference_frequency: float | None
@@ -389,19 +389,19 @@ def checked_structure(given: Structure) -> dict[str, Any]:
         _require_shape("transverse_force", force, (count,), "one number for each coordinate")
         if not force.any():
             force = None
-    if force is not None and given.equilibrium is not None:
+    if force is not None and given.well_amplitude is not None:
         raise InputError(
-            "equilibrium beside transverse_force: leave it out, the equilibria follow from the force"
+            "well_amplitude with transverse_force: leave it out, the equilibria follow from the force"
         )
     if force is None:
-        equilibrium = _equilibrium(given.equilibrium, stiffness, gamma, midspan_shape)
+        equilibrium = _equilibrium(given.well_amplitude, stiffness, gamma, midspan_shape)
     else:
         equilibrium = landscape_of(stiffness, gamma, force, midspan_shape).lower.amplitude
     return {
         "mass": mass,
         "stiffness": stiffness,
         "nonlinear_stiffness": gamma,
-        "equilibrium": equilibrium,
+        "well_amplitude": equilibrium,
         "transverse_force": force,
         "length_scale": positive("length_scale", given.length_scale, "m"),
         "damping_ratio": damping_ratios(given.damping_ratio, count),
@@ -416,11 +416,11 @@ def checked_structure(given: Structure) -> dict[str, Any]:
 def _equilibrium(value: ArrayLike | None, stiffness: _Array, gamma: float, midspan_shape: _Array) -> _Array:
     if value is None:
         return np.zeros(midspan_shape.size)
-    a = finite_array("equilibrium", value)
-    _require_shape("equilibrium", a, midspan_shape.shape, "one number for each coordinate")
+    a = finite_array("well_amplitude", value)
+    _require_shape("well_amplitude", a, midspan_shape.shape, "one number for each coordinate")
     if not a.any():
         return a
-    given = f"equilibrium = {a.tolist()}"
+    given = f"well_amplitude = {a.tolist()}"
     if gamma == 0.0:
         raise InputError(f"{given}: must be zero unless nonlinear_stiffness is greater than 0")
     bent = stiffness * a if stiffness.ndim == 1 else stiffness @ a

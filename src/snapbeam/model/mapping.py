@@ -28,20 +28,20 @@ __all__ = ["SECTIONS", "parts_from_mapping", "parts_to_mapping", "replaced"]
 SECTIONS = (
     "beam",
     "model",
-    "ends",
+    "boundary",
     "imperfection",
     "contact",
     "striker",
     "drive",
-    "base",
-    "axial",
+    "base_excitation",
+    "axial_load",
     "harvester",
-    "start",
+    "initial_state",
 )
 """Sections of a system, in their order."""
 
 _MATRICES = (
-    "mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "equilibrium", "length_scale",
+    "mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "well_amplitude", "length_scale",
 )  # fmt: skip
 _START = (
     "amplitude",
@@ -71,14 +71,14 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         sections["beam"] = {name: float(getattr(beam, name)) for name in names}
         section["modes"] = model.modes
         if not beam.boundary.is_clamped:
-            sections["ends"] = _fields(beam.boundary)
+            sections["boundary"] = _fields(beam.boundary)
         if model.imperfection is not None:
             own = {name: getattr(model.imperfection, name) for name in quantities(Imperfection)}
             sections["imperfection"] = {name: value for name, value in own.items() if value is not None}
     else:
         section |= {name: getattr(model, name) for name in _MATRICES}
         if model.transverse_force is not None:
-            section.pop("equilibrium")  # follows from the force
+            section.pop("well_amplitude")  # follows from the force
             section["transverse_force"] = model.transverse_force
     section["damping_ratio"] = float(damping[0]) if uniform else np.array(damping)
     if model.given_reference_frequency is not None:
@@ -99,16 +99,16 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         sections[f"drive_{number}"] = {"type": each.striker.drive.name} | _fields(each.striker.drive)
     if system.base_excitation is not None:
         own = {name: getattr(system.base_excitation, name) for name in quantities(BaseExcitation)}
-        sections["base"] = (
+        sections["base_excitation"] = (
             {"type": system.base_excitation.motion.name} | own | _fields(system.base_excitation.motion)
         )
     if system.axial_load is not None:
-        sections["axial"] = {"type": system.axial_load.motion.name} | _fields(system.axial_load.motion)
+        sections["axial_load"] = {"type": system.axial_load.motion.name} | _fields(system.axial_load.motion)
     if system.harvester is not None:
         sections["harvester"] = {"type": system.harvester.name} | _fields(system.harvester)
     if start is not None:
         values = {name: getattr(start, name) for name in _START}
-        sections["start"] = {
+        sections["initial_state"] = {
             name: value if np.ndim(value) else float(value)
             for name, value in values.items()
             if not np.isnan(value).all()
@@ -137,20 +137,20 @@ def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, A
         own = dict(sections.get("striker", {}))
         _only(own, "striker", list(quantities(Striker)))
         parts["striker"] = Striker(drive=drive, **own)
-    parts["others"] = _others(sections, parts.get("contact"))
-    if "base" in sections:
-        own = dict(sections["base"])
+    parts["further_contacts"] = _others(sections, parts.get("contact"))
+    if "base_excitation" in sections:
+        own = dict(sections["base_excitation"])
         around = {name: own.pop(name) for name in quantities(BaseExcitation) if name in own}
-        parts["base"] = BaseExcitation(motion=_chosen(own, "base", "type", DRIVES), **around)
-    if "axial" in sections:
-        parts["axial"] = AxialLoadModulation(motion=_chosen(sections["axial"], "axial", "type", LOADS))
+        parts["base_excitation"] = BaseExcitation(motion=_chosen(own, "base_excitation", "type", DRIVES), **around)
+    if "axial_load" in sections:
+        parts["axial_load"] = AxialLoadModulation(motion=_chosen(sections["axial_load"], "axial_load", "type", LOADS))
     if "harvester" in sections:
         parts["harvester"] = _chosen(sections["harvester"], "harvester", "type", HARVESTERS)
-    if "start" in sections:
-        values = dict(sections["start"])
-        _only(values, "start", list(_START))
-        _needed(values, "start", State)
-        parts["start"] = State(**values)
+    if "initial_state" in sections:
+        values = dict(sections["initial_state"])
+        _only(values, "initial_state", list(_START))
+        _needed(values, "initial_state", State)
+        parts["initial_state"] = State(**values)
     return parts
 
 
@@ -181,12 +181,12 @@ def _model(sections: Mapping[str, Mapping[str, Any]]) -> ReducedModel:
         _needed(values, "beam", Beam)
         uneven = dict(sections.get("imperfection", {}))
         _only(uneven, "imperfection", list(quantities(Imperfection)))
-        held = dict(sections.get("ends", {}))
-        _only(held, "ends", list(quantities(BoundaryConditions)))
+        held = dict(sections.get("boundary", {}))
+        _only(held, "boundary", list(quantities(BoundaryConditions)))
         return ReducedModel.from_beam(
             Beam(**values, boundary=BoundaryConditions(**held)), **own, imperfection=Imperfection(**uneven)
         )
-    if "ends" in sections:
+    if "boundary" in sections:
         raise InputError(
             "[boundary]: belong to a beam; a structure given by matrices has them in its matrices"
         )
@@ -249,12 +249,12 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         else:
             whole[section] = value
     found = dict(parts)
-    for name in ("model", "contact", "striker", "base", "axial", "harvester", "start"):
+    for name in ("model", "contact", "striker", "base_excitation", "axial_load", "harvester", "initial_state"):
         if name in whole:
             found[name] = whole[name]
     of_beam = inside.get("beam", {})
-    if "ends" in whole or "ends" in inside:
-        of_beam = of_beam | {"ends": _ends(found["model"], whole, inside.get("ends", {}))}
+    if "boundary" in whole or "boundary" in inside:
+        of_beam = of_beam | {"boundary": _ends(found["model"], whole, inside.get("boundary", {}))}
     found["model"] = _model_replacing(found["model"], whole.get("beam"), of_beam, inside.get("model", {}))
     if "imperfection" in whole or "imperfection" in inside:
         given = whole.get("imperfection", found["model"].imperfection)
@@ -269,17 +269,17 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         found["striker"] = dataclasses.replace(striker, drive=drive)
     if "striker" in inside:
         found["striker"] = _changed(found["striker"], "striker", inside["striker"])
-    found["others"] = _others_replacing(found.get("others", ()), whole, inside)
-    for name in ("base", "axial"):
+    found["further_contacts"] = _others_replacing(found.get("further_contacts", ()), whole, inside)
+    for name in ("base_excitation", "axial_load"):
         if name in inside:
             found[name] = _around(found.get(name), name, inside[name])
     if "harvester" in inside:
         found["harvester"] = _changed(found.get("harvester"), "harvester", inside["harvester"])
-    start, model = found["start"], found["model"]
-    if isinstance(start, State) and "start" not in whole and start.modes != model.modes:
-        found["start"] = start.with_modes(model.modes)
-    if "start" in inside:
-        found["start"] = started(found["model"], found["striker"], found["start"], inside["start"])
+    start, model = found["initial_state"], found["model"]
+    if isinstance(start, State) and "initial_state" not in whole and start.modes != model.modes:
+        found["initial_state"] = start.with_modes(model.modes)
+    if "initial_state" in inside:
+        found["initial_state"] = started(found["model"], found["striker"], found["initial_state"], inside["initial_state"])
     return found
 
 
@@ -339,9 +339,9 @@ def _around(part: Any, section: str, values: Mapping[str, Any]) -> Any:
 def _ends(model: ReducedModel, whole: Mapping[str, Any], values: Mapping[str, Any]) -> Any:
     if model.beam is None:
         raise InputError("ends: this model was given by matrices, it has no beam")
-    ends = whole.get("ends", whole.get("beam", model.beam).ends)
+    ends = whole.get("boundary", whole.get("beam", model.beam).boundary)
     ends = CLAMPED if ends is None else ends
-    return _changed(ends, "ends", values) if values else ends
+    return _changed(ends, "boundary", values) if values else ends
 
 
 def _with_imperfection(
@@ -376,10 +376,10 @@ def _model_replacing(
             "damping_ratio": of_model.get("damping_ratio", model.damping_ratio),
             "reference_frequency": of_model.get("reference_frequency", model.given_reference_frequency),
         }
-        names = ("mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "equilibrium")
+        names = ("mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "well_amplitude")
         rest = {name: getattr(model, name) for name in names}
         if model.transverse_force is not None:
-            rest = {name: value for name, value in rest.items() if name != "equilibrium"}
+            rest = {name: value for name, value in rest.items() if name != "well_amplitude"}
             rest["transverse_force"] = model.transverse_force
         return ReducedModel.from_matrices(**rest, length_scale=model.length_scale or 1.0, **given)
     known = [item.name for item in dataclasses.fields(model.beam) if item.init]

@@ -133,13 +133,13 @@ def contact_rivals() -> list[tuple[set[str], set[str]]]:
 
 
 SECTIONS = (
-    "beam", "model", "ends", "imperfection", "contact", "striker", "drive", "base", "axial", "harvester", "start",
-    "axes", "run",
+    "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "harvester", "initial_state",
+    "sweep", "integration",
 )  # fmt: skip
 _KINDS: dict[str, Mapping[str, type]] = {
     "drive": DRIVES,
-    "base": {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()},
-    "axial": LOADS,
+    "base_excitation": {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()},
+    "axial_load": LOADS,
     "harvester": HARVESTERS,
 }
 """What a section may be of, where its ``type`` says so."""
@@ -158,7 +158,7 @@ def checked_sections(sections: Mapping[str, Any]) -> tuple[dict[str, dict[str, A
     lines: list[str] = []
     found: dict[str, dict[str, Any]] = {}
     for section, name, value, named in _entries(sections, lines):
-        if section != "axes" and name in found.get(section, {}):
+        if section != "sweep" and name in found.get(section, {}):
             message = f"{name}: is given in two sections"
         else:
             message = _checked(section, name, value, found)
@@ -185,7 +185,7 @@ def _entries(sections: Mapping[str, Any], lines: list[str]) -> list[tuple[str, s
                     continue
                 place = _place(section, str(name), value)
                 if section == "map" and name in single:
-                    place = "axes", f"{_OF_MAP[name]}.{name}"  # of the map alone; the other is of single runs
+                    place = "sweep", f"{_OF_MAP[name]}.{name}"  # of the map alone; the other is of single runs
                 found.append((*place, value, section))
     return [(section, name, value, shown) for section, name, value, shown in found]
 
@@ -199,8 +199,8 @@ def _place(section: str, name: str, value: Any) -> tuple[str, str]:
         return ("drive" if name in ("frequency_ratio", "velocity_amplitude") else "striker"), name
     if section == "map":
         single = isinstance(value, (int, float)) and not isinstance(value, bool)
-        return (_OF_MAP[name], name) if single else ("axes", f"{_OF_MAP[name]}.{name}")
-    if section == "run" and name == "reference_frequency":
+        return (_OF_MAP[name], name) if single else ("sweep", f"{_OF_MAP[name]}.{name}")
+    if section == "integration" and name == "reference_frequency":
         return "model", name
     return section, name
 
@@ -220,11 +220,11 @@ def _known(section: str, found: Mapping[str, Mapping[str, Any]]) -> list[str]:
 def _checked(section: str, name: str, value: Any, found: dict[str, dict[str, Any]]) -> str:
     """Enter a value in *found*, or return what is wrong with it."""
     own = found.setdefault(section, {})
-    if section == "axes":
+    if section == "sweep":
         return _checked_axis(name, value, own)
-    if section == "start":
+    if section == "initial_state":
         try:
-            row: Parameter | None = lookup(f"start.{name}")
+            row: Parameter | None = lookup(f"initial_state.{name}")
         except InputError:
             return f"{name}: unknown key; must be amplitude[i], velocity[i] or striker_position"
     else:
@@ -287,7 +287,7 @@ def _is_sum(section: str, value: Any) -> bool:
     """Whether a kind is a sum of drives, such as ``"sine+burst"``, that the section may hold."""
     if not isinstance(value, str) or "+" not in value or value not in DRIVES:
         return False
-    return numbered(section)[0] == "drive" or (section == "base" and DRIVES[value].can_excite_base())
+    return numbered(section)[0] == "drive" or (section == "base_excitation" and DRIVES[value].can_excite_base())
 
 
 def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
@@ -367,11 +367,11 @@ def contradictions(found: Mapping[str, Mapping[str, Any]]) -> list[str]:
             return [f"[{section}] give {ratio} or {name}, not both"]
     beam = found.get("beam", {})
     length = beam.get("length", BEAM.length)
-    axes = found.get("axes", {})
+    axes = found.get("sweep", {})
     for name in ("thickness", "width", "buckling_level"):
         values = [("beam", beam[name])] if name in beam else []
         if f"beam.{name}" in axes:
-            values.append(("axes", parsed_axis(f"beam.{name}", axes[f"beam.{name}"])[-1]))
+            values.append(("sweep", parsed_axis(f"beam.{name}", axes[f"beam.{name}"])[-1]))
         for section, value in values:
             if value >= length:
                 return [
@@ -404,7 +404,7 @@ Sections = Mapping[str, Mapping[str, Any]]
 DEFAULT_DRIVE = {"frequency_ratio": 1.21, "velocity_amplitude": 0.18}
 DEFAULT_AXES = {"drive.frequency_ratio": "0.1:4:64", "drive.velocity_amplitude": "0.01:0.65:40"}
 """Of a map for which no axis is named."""
-_AROUND, _STRIKING = ("base", "axial", "harvester"), ("contact", "striker", "drive")
+_AROUND, _STRIKING = ("base_excitation", "axial_load", "harvester"), ("contact", "striker", "drive")
 # What stands for the same thing in a section: giving one set takes the other away.
 _RIVALS: dict[str, list[tuple[set[str], set[str]]]] = {
     "beam": [({"buckling_level"}, {"axial_load"})],
@@ -435,7 +435,7 @@ class Config:
         """Names of what takes the value of the paper's beam although another beam was spoken of."""
         if not self.section("beam"):
             return ()
-        found, swept = self._defaults(), self.axes() if self.section("axes") else {}
+        found, swept = self._defaults(), self.axes() if self.section("sweep") else {}
         return tuple(
             f"{section}.{name}"
             for section in ("beam", "model", "contact")
@@ -451,27 +451,27 @@ class Config:
         axes : mapping of str to array_like, optional
             The axes by dotted name, in place of those that were given.
         """
-        axes = self.axes() if axes is None and self.section("axes") else dict(axes or {})
+        axes = self.axes() if axes is None and self.section("sweep") else dict(axes or {})
         if self.model.length_scale is None:  # a beam that does not buckle makes no system
             sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
-            sections |= {name: self.section(name) for name in ("ends", "imperfection") if self.section(name)}
+            sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
         else:
             sections = {
                 name: {key: value for key, value in values.items() if f"{name}.{key}" not in axes}
                 for name, values in self.system.to_mapping().items()
             }
-            sections.pop("start", None)
-            if self.section("start"):
-                sections["start"] = self.section("start")
+            sections.pop("initial_state", None)
+            if self.section("initial_state"):
+                sections["initial_state"] = self.section("initial_state")
         own = {name: getattr(self.integration, name) for name in quantities(Integration)}
         if own["cycles"] is None:
             own["cycles"] = CYCLES
-        sections["run"] = {
-            name: value for name, value in own.items() if value is not None and f"run.{name}" not in axes
+        sections["integration"] = {
+            name: value for name, value in own.items() if value is not None and f"integration.{name}" not in axes
         }
         if axes:
             whole_number = {name: lookup(name).quantity.kind is int for name in axes}
-            sections["axes"] = {
+            sections["sweep"] = {
                 name: np.asarray(values, dtype=int if whole_number[name] else None).tolist()
                 for name, values in axes.items()
             }
@@ -512,7 +512,7 @@ class Config:
         sections: dict[str, Any] = {
             name: values | self.section(name) for name, values in self._defaults().items()
         }
-        optional = ("ends", "imperfection", *_AROUND)
+        optional = ("boundary", "imperfection", *_AROUND)
         sections |= {name: self.section(name) for name in optional if self.section(name)}
         sections |= self._further
         if self._is_unstruck:
@@ -554,33 +554,33 @@ class Config:
     @property
     def _is_unstruck(self) -> bool:
         """Whether a base or an axial load moves the beam, and nothing was said of a striker."""
-        moved = self.section("base") or self.section("axial")
+        moved = self.section("base_excitation") or self.section("axial_load")
         return bool(moved) and not any(self.section(name) for name in _STRIKING)
 
     @property
     def _stands_still(self) -> bool:
         """Whether there is a striker beside a base or an axial load, of whose motion nothing was said."""
-        return bool(self.section("base") or self.section("axial")) and not self.section("drive")
+        return bool(self.section("base_excitation") or self.section("axial_load")) and not self.section("drive")
 
     def _started(self, system: System) -> System:
         """The system with the start that was given."""
-        start = self.section("start")
+        start = self.section("initial_state")
         return (
-            system.replace(**{f"start.{name}": value for name, value in start.items()}) if start else system
+            system.replace(**{f"initial_state.{name}": value for name, value in start.items()}) if start else system
         )
 
     @property
     def model(self) -> ReducedModel:
         """The reduced model alone, of a beam that need not be buckled."""
         sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
-        sections |= {name: self.section(name) for name in ("ends", "imperfection") if self.section(name)}
+        sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
         found: ReducedModel = parts_from_mapping(sections)["model"]
         return found
 
     @cached_property
     def integration(self) -> Integration:
         """How runs are integrated."""
-        return Integration(**self.section("run"))
+        return Integration(**self.section("integration"))
 
     def axes(self, default: Mapping[str, str] | None = None) -> dict[str, _Array]:
         """The axes, by dotted name, those in physical units made into ratios; *default* if none is named.
@@ -592,7 +592,7 @@ class Config:
         InputError
             For values in physical units that are out of range.
         """
-        given = self.section("axes") or dict(default or {})
+        given = self.section("sweep") or dict(default or {})
         found: dict[str, Any] = {}
         for name, value in given.items():
             parsed = parsed_axis(name, value)
@@ -607,9 +607,9 @@ class Config:
     def _require_fixed_units(self, axes: Mapping[str, Any]) -> None:
         """Refuse numbers in Hz, m/s or m beside an axis that changes what they are a multiple of."""
         own = [name for name in PHYSICAL if name.partition(".")[2] in self.section(name.partition(".")[0])]
-        for name in [*own, *(name for name in self.section("axes") if name in PHYSICAL)]:
+        for name in [*own, *(name for name in self.section("sweep") if name in PHYSICAL)]:
             for axis, values in axes.items():
-                if axis.partition(".")[0] not in ("beam", "ends", "imperfection", "model"):
+                if axis.partition(".")[0] not in ("beam", "boundary", "imperfection", "model"):
                     continue
                 there = [self.system.replace(**{axis: values[at].item()}) for at in (0, -1)]
                 if any(abs(unit_of(each, name) / unit_of(self.system, name) - 1.0) > 1e-9 for each in there):
@@ -673,7 +673,7 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]]) -> Confi
     for section, values in sections.items():
         own = {name: value for name, value in values.items() if value is not None}
         target = merged.setdefault(section, {})
-        if section == "axes":
+        if section == "sweep":
             for name in own:
                 for same in same_axis(name):
                     target.pop(same, None)
@@ -682,10 +682,10 @@ def override(config: Config, sections: Mapping[str, Mapping[str, Any]]) -> Confi
                 for name in other:
                     target.pop(name, None)
         target |= own
-        if section != "axes":
+        if section != "sweep":
             for name in own:
                 for same in same_axis(f"{section}.{name}"):
-                    merged.get("axes", {}).pop(same, None)
+                    merged.get("sweep", {}).pop(same, None)
     return config_from_mapping(merged)
 
 

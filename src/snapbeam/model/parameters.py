@@ -102,14 +102,14 @@ class Parameter:
 def _rows() -> Iterable[Parameter]:
     own: tuple[tuple[str, type], ...] = (
         ("beam", Beam),
-        ("ends", BoundaryConditions),
+        ("boundary", BoundaryConditions),
         ("imperfection", Imperfection),
         ("striker", Striker),
-        ("run", Integration),
+        ("integration", Integration),
     )
     for section, part in own:
         yield from _of_class(section, part)
-    for row in _of_class("base", BaseExcitation):
+    for row in _of_class("base_excitation", BaseExcitation):
         yield dataclasses.replace(row, short=f"base_{row.short}")
     for name, (item, default) in MODEL_QUANTITIES.items():
         yield Parameter(f"model.{name}", item.short or name, item, default)
@@ -117,8 +117,8 @@ def _rows() -> Iterable[Parameter]:
     several: tuple[tuple[str, Mapping[str, type]], ...] = (
         ("contact", LAWS),
         ("drive", DRIVES),
-        ("base", shaking),
-        ("axial", LOADS),
+        ("base_excitation", shaking),
+        ("axial_load", LOADS),
         ("harvester", HARVESTERS),
     )
     for section, known in several:
@@ -128,7 +128,7 @@ def _rows() -> Iterable[Parameter]:
                 yield dataclasses.replace(row, kinds=(kind_name,))
 
 
-_AROUND = {"base": "the base", "axial": "", "harvester": ""}
+_AROUND = {"base_excitation": "the base", "axial_load": "", "harvester": ""}
 """Sections of what surrounds a beam, whose names in datasets say so, and what words of a drive are said of."""
 
 
@@ -137,7 +137,7 @@ def _around(row: Parameter) -> Parameter:
     section, _, name = row.name.partition(".")
     of = _AROUND[section]
     words = f"{row.quantity.long_name}, of {of}" if of else row.quantity.long_name
-    plain = name if row.short == name or section == "base" else row.short
+    plain = name if row.short == name or section == "base_excitation" else row.short
     plain = plain.removeprefix("load_")
     return dataclasses.replace(
         row, short=f"{section}_{plain}", quantity=dataclasses.replace(row.quantity, long_name=words)
@@ -165,8 +165,8 @@ def _table(registered: tuple[tuple[tuple[str, type], ...], ...]) -> dict[str, Pa
             row = dataclasses.replace(row, kinds=(*table[row.name].kinds, *row.kinds))
         table[row.name] = row
     order = (
-        "beam", "model", "ends", "imperfection", "contact", "striker", "drive", "base", "axial", "harvester", "start",
-        "run",
+        "beam", "model", "boundary", "imperfection", "contact", "striker", "drive", "base_excitation", "axial_load", "harvester", "initial_state",
+        "integration",
     )  # fmt: skip
     return dict(sorted(table.items(), key=lambda item: order.index(item[1].section)))
 
@@ -182,7 +182,7 @@ def row_of(name: str) -> Parameter | None:
     kind, number = numbered(section)
     row = table.get(f"{kind}.{field}")
     found = _OF_TERM.fullmatch(field)
-    if row is None and found is not None and kind in ("drive", "base"):
+    if row is None and found is not None and kind in ("drive", "base_excitation"):
         row = table.get(f"{kind}.{found[1]}")
         if row is not None:
             words = f"{row.quantity.long_name}, of term {found[2]}"
@@ -234,12 +234,12 @@ def lookup(name: str) -> Parameter:
     row = row_of(name)
     if row is not None:
         return row
-    found = START_NAME.fullmatch(name.removeprefix("start."))
+    found = START_NAME.fullmatch(name.removeprefix("initial_state."))
     if found is not None:
         of, mode = found[1], found[2]
         over = "that of the well" if of == "amplitude" else "omega_1 times the amplitude of the well"
         words = f"{of} of buckling mode {mode} at the start, over {over}"
-        return Parameter(f"start.{of}[{mode}]", f"start_{of}_{mode}", ParameterField("1", words, scope=RUN))
+        return Parameter(f"initial_state.{of}[{mode}]", f"start_{of}_{mode}", ParameterField("1", words, scope=RUN))
     if name in ("initial_state.striker_position", "start_striker_position"):
         words = "mid-position of the striker's tip in space"
         return Parameter(

@@ -186,7 +186,7 @@ def linear_modes_of_structure(
     rounding = 8.0 * a.size * np.finfo(np.float64).eps * np.abs(eigenvalue).max()
     if eigenvalue[0] < -rounding:
         raise InputError(
-            f"equilibrium = {a.tolist()}: must be stable, but the tangent stiffness has the negative "
+            f"well_amplitude = {a.tolist()}: must be stable, but the tangent stiffness has the negative "
             f"eigenvalue {eigenvalue[0]:g} 1/s^2 there"
         )
     eigenvalue[np.abs(eigenvalue) <= rounding] = 0.0
@@ -214,7 +214,7 @@ def linear_modes_about(mass: _Array, tangent: _Array, parity: NDArray[np.int_] |
             eigenvalue[index], vectors[block] = scipy.linalg.eigh(tangent[block], mass[block])
     rounding = 8.0 * count * np.finfo(np.float64).eps * np.abs(eigenvalue).max()
     if eigenvalue.min() < -rounding:
-        raise InputError(f"equilibrium: must be stable, but has the eigenvalue {eigenvalue.min():g} 1/s^2")
+        raise InputError(f"well_amplitude: must be stable, but has the eigenvalue {eigenvalue.min():g} 1/s^2")
     eigenvalue[np.abs(eigenvalue) <= rounding] = 0.0
     order = np.argsort(eigenvalue, kind="stable")
     own = parity[order] if parity is not None and apart else np.zeros(count, dtype=np.int_)
@@ -239,7 +239,7 @@ class Wells:
 
     stiffness: _Array
     nonlinear_stiffness: float
-    equilibrium: _Array
+    well_amplitude: _Array
     midspan_shape: _Array
     transverse_force: _Array | None
     imperfection: Imperfection | None
@@ -263,9 +263,9 @@ class Wells:
 
     def _amplitudes(self, name: str, value: ArrayLike) -> _Array:
         array = finite_array(name, value)
-        if array.ndim == 0 or array.shape[-1] != self.equilibrium.size:
+        if array.ndim == 0 or array.shape[-1] != self.well_amplitude.size:
             raise InputError(
-                f"{name} of shape {array.shape}: must have the shape (..., {self.equilibrium.size}), a number a mode"
+                f"{name} of shape {array.shape}: must have the shape (..., {self.well_amplitude.size}), a number a mode"
             )
         return array
 
@@ -289,8 +289,8 @@ class Wells:
     def wells(self) -> _Array:
         """Amplitudes at the two wells, lower first, shape (2, N); twice the same if monostable."""
         if self.landscape is not None:
-            return np.stack((self.equilibrium, self.landscape.upper.amplitude))
-        return np.stack((self.equilibrium, -self.equilibrium))
+            return np.stack((self.well_amplitude, self.landscape.upper.amplitude))
+        return np.stack((self.well_amplitude, -self.well_amplitude))
 
     @cached_property
     def mirrored(self) -> Self:
@@ -300,7 +300,7 @@ class Wells:
         return dataclasses.replace(  # type: ignore[type-var]
             self,
             transverse_force=-self.transverse_force,
-            equilibrium=-self.landscape.upper.amplitude,
+            well_amplitude=-self.landscape.upper.amplitude,
             imperfection=None if self.imperfection is None else self.imperfection.mirrored,
         )
 
@@ -331,14 +331,14 @@ class Wells:
         """Whether the structure has two wells."""
         if self.landscape is not None:
             return self.landscape.is_bistable
-        return bool(np.any(self.equilibrium != 0.0))
+        return bool(np.any(self.well_amplitude != 0.0))
 
     def require_bistable(self, what: str) -> None:
         """Refuse a structure with a single equilibrium, naming *what* needs two wells."""
         if self.is_bistable:
             return
         if self.beam is None:
-            raise InputError(f"{what} needs a bistable structure: give an equilibrium other than zero")
+            raise InputError(f"{what} needs a bistable structure: give a well_amplitude other than zero")
         if self.imperfection is not None:
             raise InputError(
                 f"{what} needs two wells: this imperfection leaves one; a smaller one leaves two, "
@@ -355,7 +355,7 @@ class Wells:
 
         Of unequal wells that of the lower one.
         """
-        return float(self.potential_energy(self.equilibrium))
+        return float(self.potential_energy(self.well_amplitude))
 
     @cached_property
     def saddle_energy(self) -> float:
@@ -561,7 +561,7 @@ class ReducedModel(Wells):
         contact_shape: ArrayLike,
         midspan_shape: ArrayLike | None = None,
         nonlinear_stiffness: float = 0.0,
-        equilibrium: ArrayLike | None = None,
+        well_amplitude: ArrayLike | None = None,
         length_scale: float = 1.0,
         damping_ratio: ArrayLike = 0.0,
         reference_frequency: float | None = None,
@@ -606,7 +606,7 @@ class ReducedModel(Wells):
                 contact_shape=contact_shape,
                 midspan_shape=midspan_shape,
                 nonlinear_stiffness=nonlinear_stiffness,
-                equilibrium=equilibrium,
+                well_amplitude=well_amplitude,
                 length_scale=length_scale,
                 damping_ratio=damping_ratio,
                 reference_frequency=reference_frequency,

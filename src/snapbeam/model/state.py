@@ -231,7 +231,7 @@ def _maybe(name: str, value: ArrayLike, batch: tuple[int, ...]) -> _Array:
 
 
 START_NAME = re.compile(r"(amplitude|velocity)\[([1-9][0-9]{0,3})\]")
-"""Names of the parameters of a start, after ``start.``: ``amplitude[1]``, ``velocity[3]``."""
+"""Names of the parameters of a start, after ``initial_state.``: ``amplitude[1]``, ``velocity[3]``."""
 
 
 def amplitude_scale(model: ReducedModel) -> float:
@@ -247,7 +247,7 @@ def amplitude_scale(model: ReducedModel) -> float:
 def rest_state(model: ReducedModel, striker: Striker | None = None) -> State:
     """At rest in the well that the striker pushes away from, and touched by it."""
     if striker is not None and striker.side == "above":
-        return State(amplitude=-model.mirrored.equilibrium)
+        return State(amplitude=-model.mirrored.well_amplitude)
     return State(amplitude=model.well_amplitude)
 
 
@@ -261,7 +261,7 @@ def started(
     in space, m, ``phase`` that of the drive, rad.  Arrays of one length make a batch.
     """
     state = rest_state(model, striker) if start is None else start
-    columns = {name: finite_array(f"start.{name}", value) for name, value in values.items()}
+    columns = {name: finite_array(f"initial_state.{name}", value) for name, value in values.items()}
     batch = np.broadcast_shapes(state.batch, *(column.shape for column in columns.values()))
     amplitude = np.array(np.broadcast_to(state.amplitude, (*batch, model.modes)))
     velocity = np.array(np.broadcast_to(state.velocity, (*batch, model.modes)))
@@ -271,12 +271,12 @@ def started(
         found = START_NAME.fullmatch(name)
         if found is None and name not in parts:
             raise InputError(
-                f"start.{name}: no parameter of a start; must be amplitude[i], velocity[i], phase or striker_position"
+                f"initial_state.{name}: no parameter of a start; must be amplitude[i], velocity[i], phase or striker_position"
             )
         if found is None:
             parts[name] = column
             continue
-        mode = integer(f"start.{name}: mode", int(found[2]), 1, model.modes) - 1
+        mode = integer(f"initial_state.{name}: mode", int(found[2]), 1, model.modes) - 1
         if found[1] == "amplitude":
             amplitude[..., mode] = column * scale
         else:

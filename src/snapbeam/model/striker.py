@@ -200,7 +200,7 @@ def parted(striker: Any, contact: Any, others: tuple[ContactPair, ...]) -> dict[
         )
     made = [each.striker() if isinstance(each, Shaker) else each for each in striker]
     rest = tuple(ContactPair(*pair) for pair in zip(made[1:], laws[1:], strict=True))
-    return {"striker": made[0], "contact": laws[0], "others": rest}
+    return {"striker": made[0], "contact": laws[0], "further_contacts": rest}
 
 
 def check_others(system: Any) -> None:

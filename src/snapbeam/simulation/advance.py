@@ -207,7 +207,7 @@ def _shaped(
     modal = None
     if all(state.modal is not None for state in found):
         parts: dict[str, Any] = {}
-        for name in ("q", "p", "home", "offset"):
+        for name in ("q", "p", "well_sign", "offset"):
             stacked = np.stack([getattr(state.modal, name) for state in found])
             parts[name] = stacked.reshape((*shape, *stacked.shape[2:]))
         assert found[0].modal is not None

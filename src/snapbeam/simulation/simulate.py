@@ -425,11 +425,11 @@ def simulate(
             run_dataset(ensemble, system, recorded, times, run.period, attrs),
             impact_table(recorded.impacts, attrs),
         ),
-        outcome=outcome,
+        summary=outcome,
         system=system,
         integration=integration,
         accuracy=run.accuracy,
-        end=end_state(ensemble, recorded, outcome),
+        final_state=end_state(ensemble, recorded, outcome),
     )
 
 

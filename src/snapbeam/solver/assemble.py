@@ -111,7 +111,7 @@ def _speed(drive: Drive, columns: Mapping[str, _Array], section: str, system: Sy
     speed = drive.bounds(_own(columns, section, runs), system.scale)[1]
     base = system.base_excitation
     if base is not None and not base.striker_on_base:
-        speed = speed + base.motion.bounds(_own(columns, "base", runs), system.scale)[1]
+        speed = speed + base.motion.bounds(_own(columns, "base_excitation", runs), system.scale)[1]
     return speed
 
 
@@ -185,7 +185,7 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
 
     Nothing is said of how high the tip comes to be used: no such run is decided by it.
     """
-    scale, names = system.scale, {"drive": "tip", "base": "base", "axial": "load"}
+    scale, names = system.scale, {"drive": "tip", "base_excitation": "base", "axial_load": "load"}
     names |= {f"drive_{number}": f"tip{number - 1}" for number in range(2, 2 + len(system.further_contacts))}
     kinds: dict[str, type[Drive]] = {}
     found: dict[str, _Array] = {}
@@ -200,7 +200,7 @@ def _together(system: System, columns: Mapping[str, _Array], runs: int) -> Drive
         if section == "drive":
             speed = speed + drive.bounds(own, scale)[1]
     if system.base_excitation is not None:
-        own, base = _own_driven(columns, "base", runs), system.base_excitation
+        own, base = _own_driven(columns, "base_excitation", runs), system.base_excitation
         sign = 1.0 if base.direction == "up" else -1.0
         side = -1.0 if system.striker is not None and system.striker.side == "above" else 1.0
         follow = 0.0 if base.striker_on_base or system.striker is None else -side * sign
@@ -219,7 +219,7 @@ def fastest_of(system: System, columns: Mapping[str, _Array], runs: int) -> _Arr
     """Greatest angular frequency of the base and of the axial load, rad/s; 0 without them."""
     found = np.zeros(runs)
     for section, drive in system.moving:
-        if section in ("base", "axial"):
+        if section in ("base_excitation", "axial_load"):
             numbers = drive.numbers(_own_driven(columns, section, runs), system.scale)
             found = np.maximum(found, numbers["fastest" if "fastest" in numbers else "omega"])
     return found
@@ -235,7 +235,7 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
     if not alone:
         times = times + begun / float(ensemble.drive_numbers[0, ensemble.drive.number_names.index("omega")])
     for section, drive in system.moving:
-        if section not in ("base", "axial"):
+        if section not in ("base_excitation", "axial_load"):
             continue
         own = {name: np.array([value]) for name, value in drive.values().items()}
         numbers, kind = drive.numbers(own, system.scale), drive.integrated_as or type(drive)
@@ -244,7 +244,7 @@ def motions_of(ensemble: Ensemble, system: System, times: _Array) -> dict[str, t
         pairs = np.array([tip_motion(table, np.empty(0), at) for at in arguments.tolist()]).reshape(-1, 2)
         sign = (
             -1.0
-            if section == "base"
+            if section == "base_excitation"
             and system.base_excitation is not None
             and system.base_excitation.direction == "down"
             else 1.0
@@ -405,7 +405,7 @@ def run_columns(system: System, points: Mapping[str, _Array]) -> dict[str, _Arra
         own |= {f"drive.{name}": value for name, value in system.striker.drive.values().items()}
     if system.harvester is not None:
         own["harvester.resistance"] = float(system.harvester.resistance)
-    for section, around in (("base", system.base_excitation), ("axial", system.axial_load)):
+    for section, around in (("base_excitation", system.base_excitation), ("axial_load", system.axial_load)):
         if around is not None:
             own |= {f"{section}.{name}": value for name, value in around.motion.values().items()}
     columns = {name: np.full(size, value) for name, value in own.items()}
@@ -540,9 +540,9 @@ def _starts(structure: Structure, table: NDArray[Any], state: State, unit: float
     flat, modal = state.flat(), state.flat().modal
     count = flat.batch[0]
     table["start_row"] = np.arange(table.size) if count > 1 else 0
-    table["home"], table["contact_time"] = 1.0, flat.contact_time
+    table["well_sign"], table["contact_time"] = 1.0, flat.contact_time
     if modal is not None and modal.structure == structure.hash:
-        table["home"] = modal.well_sign
+        table["well_sign"] = modal.well_sign
         return np.stack((modal.q, modal.p), axis=1)
     parts = (flat.amplitude, flat.velocity, flat.striker_shift, flat.striker_rate, flat.circuit / unit)
     pairs = [structure.to_modal(*each) for each in zip(*parts, strict=True)]

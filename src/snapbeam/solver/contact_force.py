@@ -120,10 +120,10 @@ def lossy_kick(force, damping, mobility, push, rate, weight):
         v = rate - push * span - mobility * pressed.impulse
         return Loss(pressed.impulse, pressed.lost - force * (v * rest - 0.5 * push * rest * rest))
     # apart; the rate changes by the push alone until the bodies press, if they do
-    detect_contact_event = felt / (damping * push) if damping * push != 0.0 else math.inf
+    meets = felt / (damping * push) if damping * push != 0.0 else math.inf
     span = weight
-    if detect_contact_event / weight >= 0.0 and detect_contact_event / weight < 1.0:
-        span = detect_contact_event
+    if meets / weight >= 0.0 and meets / weight < 1.0:
+        span = meets
     lost = -force * (rate * span - 0.5 * push * span * span)
     rest = weight - span
     if rest == 0.0:
@@ -302,11 +302,11 @@ def zero_force_crossing(law: Any, d0: float, v0: float, d1: float, v1: float, le
 
     Penetration and rate are those at the two ends, the cubic through them is followed.
     """
-    raise TypeError("slack_at runs in compiled code only")
+    raise TypeError("zero_force_crossing runs in compiled code only")
 
 
 @overloaded(zero_force_crossing)
-def _slack_at(law, d0, v0, d1, v1, length):
+def _zero_force_crossing(law, d0, v0, d1, v1, length):
     owner = law.instance_class.owner
     if not owner.rate_dependent:
         return lambda law, d0, v0, d1, v1, length: -1.0

@@ -93,7 +93,7 @@ class Ensemble:
     def first_side(self) -> _Integers:
         """-1 for a run that starts in the well away from which the striker pushes, +1 for the other one."""
         moved = np.array([float(start[0] @ self.structure.center) for start in self.starts])
-        center = self.runs["home"] * self.runs["rest_center"] + moved[self.runs["start_row"]]
+        center = self.runs["well_sign"] * self.runs["rest_center"] + moved[self.runs["start_row"]]
         if self.structure.uneven is not None:
             center = center - self.structure.uneven.level
         side: _Integers = np.where(center > 0.0, 1, -1)
@@ -140,7 +140,7 @@ _REALS = (
     "contact_time",  # s since the present contact began; negative: apart; NaN: the penetration decides
     "lowest",  # height of a flight that is too low to be seen, m
     "circuit_rate",  # of a harvester's circuit, 1/s
-    "home",  # +1 if q and p are counted from the first well, -1 from the other
+    "well_sign",  # +1 if q and p are counted from the first well, -1 from the other
 )
 _INTEGERS = (
     "step",  # ticks of a flight step

@@ -330,7 +330,6 @@ _ROWS = (
 
 
 def _of_one_striker(name: str) -> Statistic | None:
-    pass  # import-removed
 
     return of_one_named(name)
 

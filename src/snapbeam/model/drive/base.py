@@ -138,7 +138,7 @@ class Timed(Drive):
     ``motion`` and ``acceleration``.
     """
 
-    repeats = False
+    is_periodic = False
 
     def shape_numbers(self, columns: Mapping[str, _Array], scale: Scale) -> dict[str, _Array]:
         """The numbers beside ``omega``."""

@@ -104,7 +104,7 @@ class Burst(Timed):
         speed = found["amplitude"] * (found["rate"] + steep / shortest) + found["retraction"] * steep
         return found["amplitude"], speed
 
-    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """That of the sine with the steepest and the sharpest envelope, and that of the retreat."""
         found = self.shape_numbers(columns, scale)
         per, rate = found["rate"] / (2.0 * math.pi), found["rate"]

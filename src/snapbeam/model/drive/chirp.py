@@ -53,7 +53,7 @@ class Chirp(Timed):
     name = "chirp"
     number_names = ("omega", "fastest", "first", "last", "speed", "duration", "logarithmic")
     amplitudes = ("speed",)
-    edges = ("duration",)
+    discontinuities = ("duration",)
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """The first period."""
@@ -80,7 +80,7 @@ class Chirp(Timed):
         relative = np.abs(np.log(found["last"] / found["first"])) / found["duration"]
         return highest, found["speed"] + highest * np.maximum(linear, relative)
 
-    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """That of the fastest sine, with what the change of the frequency adds."""
         found = self.shape_numbers(columns, scale)
         slowest, fastest = np.minimum(found["first"], found["last"]), found["fastest"]

@@ -63,7 +63,7 @@ def _made(name: str, named: list[tuple[str, type[Drive]]]) -> type[Joined]:
         "__doc__": f"Moving: {', '.join(f'the {part} as {kind.name!r}' for part, kind in named)}.",
         "parts": tuple(named),
         "alone": alone,
-        "repeats": alone and named[0][1].is_periodic,
+        "is_periodic": alone and named[0][1].is_periodic,
         "number_names": tuple(numbers),
         "amplitudes": tuple(f"{part}_{each}" for part, kind in named for each in kind.amplitudes),
     }

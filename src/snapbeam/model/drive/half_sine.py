@@ -48,7 +48,7 @@ class HalfSine(Timed):
 
     name = "half_sine"
     number_names = ("omega", "fastest", "amplitude", "duration")
-    edges = ("duration",)
+    discontinuities = ("duration",)
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A period of the first mode."""

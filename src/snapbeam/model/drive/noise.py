@@ -110,7 +110,7 @@ class BandLimitedNoise(Timed):
         highest = found["strength"] * np.sum(1.0 / lowest, axis=0)
         return highest, LINES * found["strength"] + highest * _STEEPEST / found["ramp_up_cycles"]
 
-    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """All sines at their hardest at once, with what the envelope adds."""
         found = self.shape_numbers(columns, scale)
         parts = ((np.arange(LINES) + 1) / LINES)[:, None]

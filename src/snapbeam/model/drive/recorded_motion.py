@@ -86,8 +86,8 @@ class RecordedMotion(Drive):
         if not interval > 0.0 or np.abs(np.diff(time) - interval).max() > 1e-6 * interval:
             raise InputError("time: must be evenly spaced and increasing")
         return cls(
-            displacement=dataset["displacement_at_striker"].values,
-            velocity=dataset["velocity_at_striker"].values,
+            displacement=dataset["displacement"].values,
+            velocity=dataset["velocity"].values,
             sampling_frequency=1.0 / interval,
             frequency=float(dataset.attrs["frequency"]),
         )

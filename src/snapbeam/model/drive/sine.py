@@ -69,7 +69,7 @@ class Sine(Drive):
         numbers = self.numbers(columns, scale)
         return numbers["amplitude"], numbers["amplitude"] * numbers["omega"]
 
-    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """A omega^2."""
         numbers = self.numbers(columns, scale)
         return np.asarray(numbers["amplitude"] * numbers["omega"] ** 2)

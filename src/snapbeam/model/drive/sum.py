@@ -71,7 +71,7 @@ class SumDrive(Timed):
         self.parts_of_sum  # noqa: B018  terms refuse what they are not
 
     @classmethod
-    def shakes(cls) -> bool:
+    def can_excite_base(cls) -> bool:
         """Whether every term has a bounded acceleration."""
         return all(kind.can_excite_base() for kind in cls.terms)
 
@@ -125,7 +125,7 @@ class SumDrive(Timed):
             )
         )
 
-    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """All terms at their hardest at once."""
         return np.asarray(sum(drive.peak_acceleration(own, scale) for _, drive, own in self._each(columns)))
 
@@ -178,7 +178,7 @@ def _made(name: str, kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
         for item in dataclasses.fields(kind):  # type: ignore[arg-type]
             own = item.metadata["quantity"]
             more = dataclasses.replace(
-                own, words=f"{own.words}, of term {i}", short=f"{own.short or item.name}_{i}"
+                own, long_name=f"{own.long_name}, of term {i}", short=f"{own.short or item.name}_{i}"
             )
             made = dataclasses.field(default=item.default, metadata={"quantity": more})
             fields.append((f"{item.name}_{i}", item.type, made))

@@ -94,7 +94,7 @@ class TwoTone(Timed):
         a, b = found["amplitude"], found["second_amplitude"]
         return a + b * (1.0 - np.sin(found["second_phase"])), a * found["rate"] + b * found["second_rate"]
 
-    def hardest(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
+    def peak_acceleration(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:
         """Both at their hardest at once."""
         found = self.shape_numbers(columns, scale)
         first = found["amplitude"] * found["rate"] ** 2

@@ -27,7 +27,7 @@ def accept_any_step(
     outputs: Any,
 ) -> Any:
     """Where a run stands after a step, and the step that was taken; *outputs* are what is recorded, or None."""
-    raise TypeError("after_step runs in compiled code only")
+    raise TypeError("accept_any_step runs in compiled code only")
 
 
 @overload(accept_any_step, jit_options=INLINE_HERE)

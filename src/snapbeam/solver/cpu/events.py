@@ -107,7 +107,7 @@ def locate_peak_force(
 
     Returns that and how many samples there are: a moment inside the step is one where the run is recorded.
     """
-    raise TypeError("hardest_point runs in compiled code only")
+    raise TypeError("locate_peak_force runs in compiled code only")
 
 
 @inlined
@@ -182,7 +182,7 @@ def _greatest_force(
 
 
 @overload(locate_peak_force, jit_options=INLINE_HERE)
-def _hardest_point(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs):
+def _locate_peak_force(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs):
     law = tip.types[tip.fields.index("law")]
     chosen = _greatest_force if law.instance_class.owner.rate_dependent else _deepest_point
 
@@ -342,7 +342,7 @@ def monitor_energy(
 
     *state* is where q and p stand, and g.q and q.Gq.  Returns what is kept in mind, and the status.
     """
-    clock, beat, quiet, last = run.clock, control.beat, control.quiet, control.monitor_energy
+    clock, beat, quiet, last = run.clock, control.beat, control.quiet, control.energy_tick
     released = event and not control.touching
     if released or (beat & 7) == 0:
         q, p, gq, qr = state
@@ -423,7 +423,7 @@ def accept_step(
             now.control.quiet,
             contact_event.safe_gap,
             contact_event.safe_center,
-            now.control.monitor_energy,
+            now.control.energy_tick,
             now.control.beat,
         )
         return IntegratorState(
@@ -494,7 +494,7 @@ def accept_step(
     )
     touching = touching != contact_event.event
     control = StepControl(
-        touching, quiet, safe_gap, safe_center, now.control.monitor_energy, now.control.beat
+        touching, quiet, safe_gap, safe_center, now.control.energy_tick, now.control.beat
     )
     state = step.q1, step.p1, done.gq, done.qr
     control, status = monitor_energy(

@@ -111,7 +111,7 @@ def _beaten(control):
         control.quiet,
         control.safe_gap,
         control.safe_center,
-        control.monitor_energy,
+        control.energy_tick,
         control.beat + 1,
     )
 

@@ -242,7 +242,7 @@ def save_state(now, marks, reals):
     marks[12], marks[13], marks[14], marks[15] = (
         control.safe_gap,
         control.safe_center,
-        control.monitor_energy,
+        control.energy_tick,
         control.beat,
     )
     reals[0], reals[1] = now.well_sign, now.stretch

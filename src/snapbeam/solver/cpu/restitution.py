@@ -149,7 +149,7 @@ def carry(memory, blocks, workspace, run, tip, now, step, scratch, accumulators,
         seen1 = ContactKinematics(
             about.w + rest_contact, about.wv, d, about.dv, about.c + rest_center, about.cv
         )
-    kernel_output = StepControl(touching, control.quiet, t, t, control.monitor_energy, control.beat)
+    kernel_output = StepControl(touching, control.quiet, t, t, control.energy_tick, control.beat)
     state = rows.q, rows.p, gq, qr
     kernel_output, status = monitor_energy(
         memory, layout, run, now, t, state, seen1, kernel_output, released, status, accumulators, kernel_input
@@ -408,7 +408,7 @@ def accept_step_restitution(
         status = _STEP_LIMIT if accumulators.steps >= clock.max_steps else _RUNNING
         away = 0.0 if together else tip.law.coefficient * seen.dv
         wv = seen.wv + seen.dv + away
-        kernel_output = StepControl(together, False, t, t, control.monitor_energy, control.beat)
+        kernel_output = StepControl(together, False, t, t, control.energy_tick, control.beat)
         after = ContactKinematics(seen.w, wv, 0.0, -away, seen.c, memory_rate(memory, layout, p))
         return IntegratorState(
             t, now.well_sign, now.stretch, now.rows, after, kernel_output, now.sample, now.landed, status
@@ -486,7 +486,7 @@ def accept_step_restitution(
         seen1 = ContactKinematics(about.w + rest_contact, about.wv, d, dv, about.c + rest_center, about.cv)
     safe_gap, safe_center = (t, t) if entry >= 0.0 else (contact_event.safe_gap, contact_event.safe_center)
     kernel_output = StepControl(
-        together, control.quiet, safe_gap, safe_center, control.monitor_energy, control.beat
+        together, control.quiet, safe_gap, safe_center, control.energy_tick, control.beat
     )
     state = rows.q, rows.p, gq, qr
     kernel_output, status = monitor_energy(

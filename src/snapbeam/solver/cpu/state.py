@@ -111,7 +111,7 @@ class StepControl(NamedTuple):
     """Until this tick the gap cannot close."""
     safe_center: int
     """Until this tick the centre cannot cross."""
-    weighed: int
+    energy_tick: int
     """Tick at which the energy was last looked at."""
     beat: int
     """Steps since the run began or landed."""

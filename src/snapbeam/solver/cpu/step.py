@@ -105,7 +105,7 @@ def apply_contact_loss(
 
     Of the first kick that acceleration is the row that the last step left.
     """
-    raise TypeError("damped runs in compiled code only")
+    raise TypeError("apply_contact_loss runs in compiled code only")
 
 
 @inlined
@@ -138,7 +138,7 @@ def _damped(memory, layout, tip, step, stage, weight, along_g, along_r, push):
 
 
 @overload(apply_contact_loss, jit_options=INLINE_HERE)
-def _damped_by_law(memory, layout, tip, step, stage, weight, along_g, along_r, push):
+def _apply_contact_loss(memory, layout, tip, step, stage, weight, along_g, along_r, push):
     law = tip.types[tip.fields.index("law")]
     if not law.instance_class.owner.rate_dependent:
         return lambda memory, layout, tip, step, stage, weight, along_g, along_r, push: push

@@ -239,7 +239,7 @@ def _keeping(functions: Functions) -> tuple[Any, Any]:
     @device
     def weigh(block, fixed, held, step, t, well_sign, touching, released, status, accumulators):
         """After some steps, or a release, the energy is looked at."""
-        quiet, monitor_energy, own = held.quiet, held.monitor_energy, step.own
+        quiet, monitor_energy, own = held.quiet, held.energy_tick, step.own
         if released or (held.steps & 7) == 0:
             energy = mode_energy(fixed.mode.omega, own.q, own.p)
             linear, high, _, _ = sum_four(block, energy, fixed.mode.high * energy, 0.0, 0.0)
@@ -286,7 +286,7 @@ def step_function(functions: Functions) -> Any:
                 accumulators.touching, accumulators.onset = 1, held.t
             return Held(
                 held.t, well_sign, own, held.seen, held.touching or step.entered, held.quiet, step.safe_gap,
-                step.safe_center, onset, held.deepest, held.monitor_energy, steps, status,
+                step.safe_center, onset, held.deepest, held.energy_tick, steps, status,
             )  # fmt: skip
         counted = held.touching or held.t + step.span > step.safe_center
         keep(block, fixed, held, well_sign, step, counted, accumulators)
@@ -308,7 +308,7 @@ def step_function(functions: Functions) -> Any:
                     accumulators.touching, accumulators.onset = 1, t
         counting = Held(
             held.t, held.well_sign, held.own, held.seen, held.touching, held.quiet, held.safe_gap, held.safe_center,
-            held.onset, held.deepest, held.monitor_energy, steps, held.status,
+            held.onset, held.deepest, held.energy_tick, steps, held.status,
         )  # fmt: skip
         quiet, monitor_energy, status = weigh(
             block, fixed, counting, step, t, well_sign, touching, released, status, accumulators

@@ -236,7 +236,7 @@ def _pauses() -> tuple[Any, Any]:
                 held.safe_center,
                 int(held.well_sign),
             )
-            marks[index, 3], marks[index, 4] = int(held.quiet), held.monitor_energy
+            marks[index, 3], marks[index, 4] = int(held.quiet), held.energy_tick
             reals[index, 0], reals[index, 1], reals[index, 2] = seen.w, seen.wv, seen.d
             reals[index, 3], reals[index, 4], reals[index, 5] = seen.dv, seen.c, seen.cv
             reals[index, 6], reals[index, 7], reals[index, 8] = own.gq, own.qr, held.deepest

@@ -457,11 +457,11 @@ def _energy_of(m, shape, q, p):
 
 def propagate_free(m: Any, shape: Any, look: int, which: Any, with_center: bool, most: int) -> Any:
     """A free step in pieces, noted from *look* on; returns what the penetration cannot exceed after the start."""
-    raise TypeError("glide runs in compiled code only")
+    raise TypeError("propagate_free runs in compiled code only")
 
 
 @overload(propagate_free, jit_options=INLINE_HERE)
-def _glide_of(m, shape, look, which, with_center, most):
+def _propagate_free_of(m, shape, look, which, with_center, most):
     written = _function("glide", shape.instance_class)
     return lambda m, shape, look, which, with_center, most: written(m, shape, look, which, with_center, most)
 

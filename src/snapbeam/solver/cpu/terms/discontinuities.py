@@ -1,6 +1,6 @@
 """Where the velocity of a drive jumps, as at the end of a shock: no step may go across, or it loses its order.
 
-A drive names the times of its jumps (:attr:`~snapbeam.model.drive.base.Drive.edges`).  Of one that does not, as the
+A drive names the times of its jumps (:attr:`~snapbeam.model.drive.base.Drive.discontinuities`).  Of one that does not, as the
 paper's, nothing of this is compiled.
 """
 
@@ -34,7 +34,7 @@ def jumps_of(kind: Any, prefix: str = "") -> list[Jump]:
     """The times at which the velocity of a drive jumps, as numbers of it, those of its parts and terms included."""
     parts = [(f"{prefix}{part}_", each, kind.alone) for part, each in kind.parts]
     parts += [(f"{prefix}t{i}_", each, False) for i, each in enumerate(kind.terms, 1)]
-    found = [Jump(f"{prefix}{name}", ()) for name in kind.edges]
+    found = [Jump(f"{prefix}{name}", ()) for name in kind.discontinuities]
     for own, each, alone in parts:
         begun = () if alone else ((f"{own}phase", f"{own}omega"),)
         found += [Jump(jump.time, jump.begun + begun) for jump in jumps_of(each, own)]
@@ -100,11 +100,11 @@ def up_to_discontinuity(drive: Any, phase: float, period: int, t: int, limit: in
     t, limit : int
         Ticks.
     """
-    raise TypeError("up_to_edge runs in compiled code only")
+    raise TypeError("up_to_discontinuity runs in compiled code only")
 
 
 @overload(up_to_discontinuity, jit_options=INLINE_HERE)
-def _up_to_edge(drive, phase, period, t, limit):
+def _up_to_discontinuity(drive, phase, period, t, limit):
     jumps = jumps_of(drive.instance_class.owner)
     if not jumps:
         return lambda drive, phase, period, t, limit: limit
