@@ -70,7 +70,7 @@ def test_refusals() -> None:
     with pytest.raises(InputError, match="must be a HarmonicLoad"):
         sb.AxialLoadModulation(motion=sb.Sine(frequency_ratio=1.0, velocity_amplitude=0.1))
     plain = sb.ReducedModel.from_matrices(
-        [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, equilibrium=[-1.0]
+        [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, well_amplitude=[-1.0]
     )
     load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0))
     with pytest.raises(InputError, match="has its load in its stiffness"):

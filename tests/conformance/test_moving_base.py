@@ -156,7 +156,7 @@ def test_refusals_and_the_way_there_and_back() -> None:
     with pytest.raises(InputError, match="use a HertzContact"):
         sb.System(model(1), sb.Restitution(0.5), striker, base_excitation=base)
     plain = sb.ReducedModel.from_matrices(
-        [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, equilibrium=[-1.0]
+        [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, well_amplitude=[-1.0]
     )
     with pytest.raises(InputError, match="given by matrices is not known"):
         sb.System(plain, base_excitation=base)

@@ -256,6 +256,6 @@ def test_refusals() -> None:
             [-1.0],
             contact_shape=[1.0],
             nonlinear_stiffness=1.0,
-            equilibrium=[-1.0],
+            well_amplitude=[-1.0],
             transverse_force=[0.1],
         )

@@ -108,6 +108,6 @@ def test_decidable_energy() -> None:
 
 def test_decides_nothing_for_structures_given_by_matrices() -> None:
     model = ReducedModel.from_matrices(
-        [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, equilibrium=[-1.0]
+        [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, well_amplitude=[-1.0]
     )
     assert decidable_energy(model, np.array([0.5]), np.array([0.0]))[0] == -np.inf

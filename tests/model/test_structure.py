@@ -52,7 +52,7 @@ def test_reproduces_the_beam() -> None:
             contact_shape=turn @ beam.shape_at(LOCATION),
             midspan_shape=turn @ beam.midspan_shape,
             nonlinear_stiffness=beam.nonlinear_stiffness,
-            equilibrium=turn @ beam.well_amplitude,
+            well_amplitude=turn @ beam.well_amplitude,
             length_scale=BEAM.buckling_level,
             damping_ratio=0.005,
         )
@@ -88,7 +88,7 @@ def test_shape_is_the_contact_point_whatever_the_location() -> None:
         ({"mass": [["a", "b"], ["c", "d"]]}, r"mass = .*: must be an array of numbers"),
         ({"stiffness": [[1.0, 0.5], [0.0, 1.0]]}, r"stiffness\[0, 1\] = 0.5, .*: must be symmetric"),
         ({"stiffness": np.eye(3)}, r"stiffness of shape \(3, 3\): must have the shape \(2, 2\)"),
-        ({"stiffness": [1.0, -1.0]}, r"equilibrium = \[0.0, 0.0\]: must be stable, .* eigenvalue -1 1/s"),
+        ({"stiffness": [1.0, -1.0]}, r"well_amplitude = \[0.0, 0.0\]: must be stable, .* eigenvalue -1 1/s"),
         ({"contact_shape": [1.0]}, r"contact_shape of shape \(1,\): must have the shape \(2,\)"),
         ({"contact_shape": [0.0, 0.0]}, r"contact_shape = \[0.0, 0.0\]: must not be all zeros"),
         ({"midspan_shape": [math.inf, 0.0]}, r"midspan_shape\[0\] = .*inf.*: must be finite"),
@@ -96,10 +96,10 @@ def test_shape_is_the_contact_point_whatever_the_location() -> None:
         ({"length_scale": 0.0}, r"length_scale = 0.0: must be .* greater than 0 m"),
         ({"damping_ratio": 1.5}, r"damping_ratio = 1.5: must be a number in \[0, 1\)"),
         ({"reference_frequency": 0.0}, r"reference_frequency = 0.0: must be .* greater than 0 Hz"),
-        ({"equilibrium": [1.0]}, r"equilibrium of shape \(1,\): must have the shape \(2,\)"),
+        ({"well_amplitude": [1.0]}, r"well_amplitude of shape \(1,\): must have the shape \(2,\)"),
         (
-            {"equilibrium": [-1.0, 0.0]},
-            r"equilibrium = \[-1.0, 0.0\]: must be zero unless nonlinear_stiffness",
+            {"well_amplitude": [-1.0, 0.0]},
+            r"well_amplitude = \[-1.0, 0.0\]: must be zero unless nonlinear_stiffness",
         ),
     ],
 )
@@ -118,13 +118,13 @@ def test_refusals(changes: dict[str, Any], message: str) -> None:
 )
 def test_refuses_what_is_no_lower_well(equilibrium: list[float], message: str) -> None:
     bistable = {**TWO, "stiffness": [-4.0, 3.0], "nonlinear_stiffness": 4.0}
-    model = ReducedModel.from_matrices(**bistable, equilibrium=[-1.0, 0.0])
+    model = ReducedModel.from_matrices(**bistable, well_amplitude=[-1.0, 0.0])
     assert model.is_bistable
     assert model.well_energy == pytest.approx(-1.0)
     assert model.saddle_energy == 0.0
     np.testing.assert_allclose(model.omega**2, [7.0, 8.0])
     with pytest.raises(InputError, match=message):
-        ReducedModel.from_matrices(**bistable, equilibrium=equilibrium)
+        ReducedModel.from_matrices(**bistable, well_amplitude=equilibrium)
 
 
 def test_one_well_has_no_barrier() -> None:

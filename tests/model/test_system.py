@@ -42,7 +42,7 @@ BY_MATRICES = sb.ReducedModel.from_matrices(
     [-4.0, 3.0],
     contact_shape=[1.0, 1.0],
     nonlinear_stiffness=4.0,
-    equilibrium=[-1.0, 0.0],
+    well_amplitude=[-1.0, 0.0],
     damping_ratio=[0.01, 0.02],
 )
 SYSTEMS = {

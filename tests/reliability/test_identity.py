@@ -21,7 +21,7 @@ MATRICES = {
     "contact_shape": [1.0, 0.3],
     "midspan_shape": [1.0, 0.0],
     "nonlinear_stiffness": 60.0 / (0.335e-3) ** 2,
-    "equilibrium": [-0.335e-3, 0.0],
+    "well_amplitude": [-0.335e-3, 0.0],
     "length_scale": 0.335e-3,
     "damping_ratio": 0.005,
 }

@@ -141,9 +141,13 @@ def parts_from_mapping(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, A
     if "base_excitation" in sections:
         own = dict(sections["base_excitation"])
         around = {name: own.pop(name) for name in quantities(BaseExcitation) if name in own}
-        parts["base_excitation"] = BaseExcitation(motion=_chosen(own, "base_excitation", "type", DRIVES), **around)
+        parts["base_excitation"] = BaseExcitation(
+            motion=_chosen(own, "base_excitation", "type", DRIVES), **around
+        )
     if "axial_load" in sections:
-        parts["axial_load"] = AxialLoadModulation(motion=_chosen(sections["axial_load"], "axial_load", "type", LOADS))
+        parts["axial_load"] = AxialLoadModulation(
+            motion=_chosen(sections["axial_load"], "axial_load", "type", LOADS)
+        )
     if "harvester" in sections:
         parts["harvester"] = _chosen(sections["harvester"], "harvester", "type", HARVESTERS)
     if "initial_state" in sections:
@@ -249,7 +253,15 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
         else:
             whole[section] = value
     found = dict(parts)
-    for name in ("model", "contact", "striker", "base_excitation", "axial_load", "harvester", "initial_state"):
+    for name in (
+        "model",
+        "contact",
+        "striker",
+        "base_excitation",
+        "axial_load",
+        "harvester",
+        "initial_state",
+    ):
         if name in whole:
             found[name] = whole[name]
     of_beam = inside.get("beam", {})
@@ -279,7 +291,9 @@ def replaced(parts: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, 
     if isinstance(start, State) and "initial_state" not in whole and start.modes != model.modes:
         found["initial_state"] = start.with_modes(model.modes)
     if "initial_state" in inside:
-        found["initial_state"] = started(found["model"], found["striker"], found["initial_state"], inside["initial_state"])
+        found["initial_state"] = started(
+            found["model"], found["striker"], found["initial_state"], inside["initial_state"]
+        )
     return found
 
 
@@ -376,7 +390,14 @@ def _model_replacing(
             "damping_ratio": of_model.get("damping_ratio", model.damping_ratio),
             "reference_frequency": of_model.get("reference_frequency", model.given_reference_frequency),
         }
-        names = ("mass", "stiffness", "contact_shape", "midspan_shape", "nonlinear_stiffness", "well_amplitude")
+        names = (
+            "mass",
+            "stiffness",
+            "contact_shape",
+            "midspan_shape",
+            "nonlinear_stiffness",
+            "well_amplitude",
+        )
         rest = {name: getattr(model, name) for name in names}
         if model.transverse_force is not None:
             rest = {name: value for name, value in rest.items() if name != "well_amplitude"}

@@ -185,7 +185,10 @@ def _entries(sections: Mapping[str, Any], lines: list[str]) -> list[tuple[str, s
                     continue
                 place = _place(section, str(name), value)
                 if section == "map" and name in single:
-                    place = "sweep", f"{_OF_MAP[name]}.{name}"  # of the map alone; the other is of single runs
+                    place = (
+                        "sweep",
+                        f"{_OF_MAP[name]}.{name}",
+                    )  # of the map alone; the other is of single runs
                 found.append((*place, value, section))
     return [(section, name, value, shown) for section, name, value, shown in found]
 
@@ -287,7 +290,9 @@ def _is_sum(section: str, value: Any) -> bool:
     """Whether a kind is a sum of drives, such as ``"sine+burst"``, that the section may hold."""
     if not isinstance(value, str) or "+" not in value or value not in DRIVES:
         return False
-    return numbered(section)[0] == "drive" or (section == "base_excitation" and DRIVES[value].can_excite_base())
+    return numbered(section)[0] == "drive" or (
+        section == "base_excitation" and DRIVES[value].can_excite_base()
+    )
 
 
 def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
@@ -454,7 +459,9 @@ class Config:
         axes = self.axes() if axes is None and self.section("sweep") else dict(axes or {})
         if self.model.length_scale is None:  # a beam that does not buckle makes no system
             sections = {name: self._defaults()[name] | self.section(name) for name in ("beam", "model")}
-            sections |= {name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)}
+            sections |= {
+                name: self.section(name) for name in ("boundary", "imperfection") if self.section(name)
+            }
         else:
             sections = {
                 name: {key: value for key, value in values.items() if f"{name}.{key}" not in axes}
@@ -467,7 +474,9 @@ class Config:
         if own["cycles"] is None:
             own["cycles"] = CYCLES
         sections["integration"] = {
-            name: value for name, value in own.items() if value is not None and f"integration.{name}" not in axes
+            name: value
+            for name, value in own.items()
+            if value is not None and f"integration.{name}" not in axes
         }
         if axes:
             whole_number = {name: lookup(name).quantity.kind is int for name in axes}
@@ -560,13 +569,17 @@ class Config:
     @property
     def _stands_still(self) -> bool:
         """Whether there is a striker beside a base or an axial load, of whose motion nothing was said."""
-        return bool(self.section("base_excitation") or self.section("axial_load")) and not self.section("drive")
+        return bool(self.section("base_excitation") or self.section("axial_load")) and not self.section(
+            "drive"
+        )
 
     def _started(self, system: System) -> System:
         """The system with the start that was given."""
         start = self.section("initial_state")
         return (
-            system.replace(**{f"initial_state.{name}": value for name, value in start.items()}) if start else system
+            system.replace(**{f"initial_state.{name}": value for name, value in start.items()})
+            if start
+            else system
         )
 
     @property

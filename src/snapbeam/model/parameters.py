@@ -239,7 +239,9 @@ def lookup(name: str) -> Parameter:
         of, mode = found[1], found[2]
         over = "that of the well" if of == "amplitude" else "omega_1 times the amplitude of the well"
         words = f"{of} of buckling mode {mode} at the start, over {over}"
-        return Parameter(f"initial_state.{of}[{mode}]", f"start_{of}_{mode}", ParameterField("1", words, scope=RUN))
+        return Parameter(
+            f"initial_state.{of}[{mode}]", f"start_{of}_{mode}", ParameterField("1", words, scope=RUN)
+        )
     if name in ("initial_state.striker_position", "start_striker_position"):
         words = "mid-position of the striker's tip in space"
         return Parameter(

@@ -182,7 +182,9 @@ def _greatest_force(
 
 
 @overload(locate_peak_force, jit_options=INLINE_HERE)
-def _locate_peak_force(memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs):
+def _locate_peak_force(
+    memory, blocks, layout, stages, run, tip, now, step, seen1, sample, accumulators, outputs
+):
     law = tip.types[tip.fields.index("law")]
     chosen = _greatest_force if law.instance_class.owner.rate_dependent else _deepest_point
 
@@ -493,9 +495,7 @@ def accept_step(
         memory, layout.others, contact_event.cut, t, step.length, tick, accumulators, outputs
     )
     touching = touching != contact_event.event
-    control = StepControl(
-        touching, quiet, safe_gap, safe_center, now.control.energy_tick, now.control.beat
-    )
+    control = StepControl(touching, quiet, safe_gap, safe_center, now.control.energy_tick, now.control.beat)
     state = step.q1, step.p1, done.gq, done.qr
     control, status = monitor_energy(
         memory,
