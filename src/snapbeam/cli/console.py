@@ -165,7 +165,10 @@ def errors() -> Console:
 def notes() -> Console:
     """Return the console of notes: standard error, or a console that discards text with --quiet."""
     return Console(
-        stderr=True, highlight=False, soft_wrap=True, file=io.StringIO() if _OUTPUT_OPTIONS.get().quiet else None
+        stderr=True,
+        highlight=False,
+        soft_wrap=True,
+        file=io.StringIO() if _OUTPUT_OPTIONS.get().quiet else None,
     )
 
 
@@ -395,13 +398,17 @@ def check_pictures(*pictures: tuple[str, Path | None]) -> None:
             check_writable(path, name, FIGURE_SUFFIXES)
 
 
-def read_overlay(measurements: Path | None, reference_frequency: float | None, buckling_level: float | None) -> Any:
+def read_overlay(
+    measurements: Path | None, reference_frequency: float | None, buckling_level: float | None
+) -> Any:
     """Return the measured points of a CSV file, normalised, or None."""
     if measurements is None:
         return None
     from snapbeam.sweeps.measured_points import read_measured_points
 
-    return read_measured_points(measurements, reference_frequency=reference_frequency, buckling_level=buckling_level)
+    return read_measured_points(
+        measurements, reference_frequency=reference_frequency, buckling_level=buckling_level
+    )
 
 
 def write_map(dataset: xr.Dataset, path: Path) -> Path:

@@ -219,7 +219,9 @@ def _summary_text(summary: Any, elapsed: float) -> str:
     contact = f"{summary.impacts}, in contact {100.0 * summary.contact_time_fraction:.3g} % of the time"
     center = f"{summary.min_midspan_displacement:.4g} to {summary.max_midspan_displacement:.4g} b"
     force = (
-        "no finite force" if summary.peak_force != summary.peak_force else prefixed(summary.peak_force, "N", 4)
+        "no finite force"
+        if summary.peak_force != summary.peak_force
+        else prefixed(summary.peak_force, "N", 4)
     )
     work, lost = (prefixed(each, "J", 4) for each in (summary.striker_work, summary.energy_dissipated))
     lines = [

@@ -76,7 +76,7 @@ def basins_of_attraction(
     """
     if not isinstance(attractors, Attractors):
         raise InputTypeError(
-            f"found = {shown(attractors)}: must be Attractors, as sb.dynamics.find_attractors gives"
+            f"attractors = {shown(attractors)}: must be Attractors, as sb.dynamics.find_attractors gives"
         )
     flow = attractors.flow
     total, step = integer("periods", periods, 1, 10**6), integer("every", every, 1, 10**4)

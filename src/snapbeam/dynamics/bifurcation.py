@@ -55,7 +55,7 @@ def bifurcation_diagram(
         Strictly increasing.
     integration : Integration, optional
     sweeps : sequence of {"up", "down"}
-    initial_conditions : Starts or int
+    initial_conditions : InitialConditions or int
         Starts of every value beside the sweeps; none by default.
     periods : pair of int
         Periods to leave out at each value, and to keep.

@@ -408,7 +408,7 @@ def continuation(
 
     Parameters
     ----------
-    orbit : Orbit
+    orbit : PeriodicOrbit
         Of :func:`periodic_orbit`, or of a branch.
     name : str
         Parameter, by dotted name or the name in datasets.
@@ -528,7 +528,7 @@ def switch_branch(
 
     Parameters
     ----------
-    special_point : Event
+    special_point : SpecialPoint
     name, between
         As of :func:`continuation`.
     size : float
@@ -547,7 +547,7 @@ def switch_branch(
         If there is none at that distance; try another.
     """
     if not isinstance(special_point, SpecialPoint) or special_point.kind not in ("flip", "branch point"):
-        raise InputError(f"event = {shown(special_point)}: must be a flip or a branch point")
+        raise InputError(f"special_point = {shown(special_point)}: must be a flip or a branch point")
     low, high = _limits(bounds)
     orbit, span = special_point.orbit, high - low
     doubled = special_point.kind == "flip"

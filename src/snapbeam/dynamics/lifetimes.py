@@ -81,7 +81,9 @@ class LifetimeSettings:
         if self.delay is not None:
             nonnegative("delay", self.delay, "cycles")
         if not nonnegative("settling_cycles", self.settling_cycles, "cycles") > 0.0:
-            raise InputError(f"quiet = {shown(self.settling_cycles)}: must be greater than 0 cycles")
+            raise InputError(
+                f"settling_cycles = {shown(self.settling_cycles)}: must be greater than 0 cycles"
+            )
         within("confidence", self.confidence, 0.0, 1.0)
 
 
@@ -376,9 +378,9 @@ def lifetime_map(
         As of :func:`snapbeam.sweep`; one point, the system as it stands, by default.
     integration : Integration, optional
         1000 cycles by default.  Runs end early once they provably snap no more, whatever it says.
-    initial_conditions : Starts or int
+    initial_conditions : InitialConditions or int
         Starts of each point, the same for all of them.
-    settings : Survival, optional
+    settings : LifetimeSettings, optional
         Delay, quiet cycles and confidence.
     after : array_like of int, optional
         Cycles n for the probability that a run still snaps then; an eighth, a quarter and a half of the cycles, and
@@ -420,7 +422,7 @@ def lifetime_map(
         raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
     settings = LifetimeSettings() if settings is None else settings
     if not isinstance(settings, LifetimeSettings):
-        raise InputTypeError(f"survival = {shown(settings)}: must be a Survival")
+        raise InputTypeError(f"settings = {shown(settings)}: must be a LifetimeSettings")
     cycles = CYCLES if integration.cycles is None else integration.cycles
     kernel_input = _after(after, cycles, settings)
     integration = integration.replace(cycles=cycles, early_termination=True)
@@ -501,7 +503,7 @@ def refit(
     ----------
     dataset : xarray.Dataset
         Of :func:`lifetime_map`.
-    settings : Survival, optional
+    settings : LifetimeSettings, optional
     after : array_like of int, optional
         As of :func:`lifetime_map`; those of the dataset by default.
 

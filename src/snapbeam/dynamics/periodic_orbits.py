@@ -451,7 +451,7 @@ class PeriodicOrbit:
     def __repr__(self) -> str:
         kind = "stable" if self.is_stable else f"unstable ({self.unstable})"
         size = abs(self.multipliers[0])
-        return f"<Orbit of period {self.period}: {kind}, largest multiplier {size:.6g}>"
+        return f"<PeriodicOrbit of period {self.period}: {kind}, largest multiplier {size:.6g}>"
 
 
 @checked
@@ -475,7 +475,7 @@ def periodic_orbit(
     Parameters
     ----------
     system : System, or a Flow
-    guess : State, array_like of shape (d,) or Orbit, optional
+    guess : State, array_like of shape (d,) or PeriodicOrbit, optional
         A state near the orbit, at the phase; the system's start by default.
     period : int
         Periods of the drive after which it closes, m.
@@ -489,7 +489,7 @@ def periodic_orbit(
     tolerance : float
         Greatest coordinate that may remain, in units of the well's amplitude and of omega_1 times it.
     iterations : int
-    deflate : sequence of Orbit
+    deflate : sequence of PeriodicOrbit
         Orbits that are known and are not to be found again.
 
     Returns

@@ -528,8 +528,6 @@ def opened(what: Any, *, system: System | None = None, integration: Integration 
         except (OSError, ValueError) as error:  # a name that no file can have
             raise InputError(f"file: is no path ({error})") from None
         if folder:
-            pass  # import-removed
-
             return StoreSource(path)
         if not path.exists():
             raise InputError(f"map = {str(path)!r}: there is no such file or store")

@@ -267,7 +267,6 @@ def explore(what: Any = None, *, integration: Integration | None = None, height:
     if not isinstance(integration, (Integration, type(None))):
         raise InputTypeError(f"integration is a {type(integration).__name__}: must be an Integration or None")
     shared = _shared(what, None, integration)
-    pass  # import-removed
 
     ready = threading.Event()
     held: dict[str, Any] = {}
@@ -324,7 +323,6 @@ def serve(
 
     matplotlib.use("Agg")  # pictures are drawn beside the page, for files alone
     shared = _shared(what, system, integration)
-    pass  # import-removed
 
     server, url, _ = make_server(shared, address, port, allow_remote=allow_remote, token=token)
     server.start()

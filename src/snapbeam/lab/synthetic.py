@@ -919,8 +919,12 @@ def render_run(
         seed=seed,
         **options,
     )
-    for name in ("displacement_at_striker", "striker_displacement", "penetration_normalised"):
-        values = recording.truth[f"{name}_mm"]
+    for name, measured in (
+        ("displacement_at_striker", "displacement_mm"),
+        ("striker_displacement", "shaker_displacement_mm"),
+        ("penetration_normalised", "penetration_mm"),
+    ):
+        values = recording.truth[measured]
         recording.truth[name] = ("time", values.values / (scale * 1e3), {**values.attrs, "units": "1"})
     recording.truth.attrs["buckling_level"] = scale
     return recording

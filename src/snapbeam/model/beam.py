@@ -51,7 +51,7 @@ class Beam:
     axial_load : float
         Axial load P, N, compression positive.  Below the critical load the beam is straight; a
         negative load is tension.
-    boundary : Ends
+    boundary : BoundaryConditions
         How the ends are held; clamped and rigid by default.  Others change the critical loads, the first of them in the
         relation above, and 4 L^2/(pi^2 E S) in it to phi_1(L/2)^2/gamma.
 
@@ -105,7 +105,7 @@ class Beam:
 
     def __post_init__(self) -> None:
         if not isinstance(self.boundary, BoundaryConditions):
-            raise InputTypeError(f"ends = {shown(self.boundary)}: must be Ends")
+            raise InputTypeError(f"boundary = {shown(self.boundary)}: must be BoundaryConditions")
         level: float | None = self.buckling_level
         load: float | None = self.axial_load
         # what followed from the other in the beam that dataclasses.replace starts from is not given

@@ -122,7 +122,7 @@ class PiezoelectricHarvester(Harvester):
         check_fields(self)
         if self.patch_start >= self.patch_end:
             raise InputError(
-                f"start = {self.patch_start:g}: must be less than patch_end = {self.patch_end:g}"
+                f"patch_start = {self.patch_start:g}: must be less than patch_end = {self.patch_end:g}"
             )
 
     @classmethod

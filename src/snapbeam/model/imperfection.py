@@ -176,7 +176,7 @@ class Imperfection:
         if self.antisymmetric_amplitude != 0.0:
             if modes.count < 2:
                 raise InputError(
-                    f"skew = {self.antisymmetric_amplitude:g} m: needs a second mode; give modes = 2 or more"
+                    f"antisymmetric_amplitude = {self.antisymmetric_amplitude:g} m: needs a second mode; give modes = 2 or more"
                 )
             at = np.linspace(0.0, 0.5, _SEARCH) * modes.length
             heights = modes.shape(at)[1]

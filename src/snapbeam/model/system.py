@@ -103,18 +103,18 @@ class System:
     striker : Striker or Shaker, or a sequence of them, optional
         Without one the structure vibrates freely from *initial_state*.  Several strike at once, each with its own place, side,
         law and drive; runs begin in the well that the first one pushes away from.
-    base_excitation : Base, optional
+    base_excitation : BaseExcitation, optional
         The motion of what both ends of the beam are mounted on.
     axial_load : AxialLoadModulation, optional
         How the axial load changes in time.
-    harvester : Piezo or Coil, optional
+    harvester : PiezoelectricHarvester or ElectromagneticHarvester, optional
         A circuit that turns motion into power in a resistor.
     initial_state : State, optional
         Where runs begin, one state; by default at rest in the well that the striker pushes away from, touched by it.
 
     Attributes
     ----------
-    further_contacts : tuple of Another
+    further_contacts : tuple of ContactPair
         The strikers beside the first one, with their laws.
 
     Raises

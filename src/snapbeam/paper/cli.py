@@ -111,7 +111,9 @@ def reproduce(
     add_json(figure=figure, size=size, files=written)
 
 
-def _check_measured(figure: str, names: list[str], measurements: Path | None, measured: list[Path] | None) -> None:
+def _check_measured(
+    figure: str, names: list[str], measurements: Path | None, measured: list[Path] | None
+) -> None:
     """Refuse, before anything is computed, measured responses and runs that cannot be shown."""
     from snapbeam.cli.console import read_overlay
     from snapbeam.model.default_values import BEAM

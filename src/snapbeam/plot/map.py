@@ -81,7 +81,7 @@ def plot_response_map(
         (:func:`plot_points`).
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
-    dots : Dots, optional
+    dots : MeasuredPoints, optional
         Measured responses, drawn as dots in the colours of their classes.  Those measured at another value
         of the map's fixed coordinate (by more than 2 %) are left out, with a warning.
     threshold_line : bool
@@ -102,8 +102,6 @@ def plot_response_map(
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "response_class" in dataset and dataset["response_class"].dims == ("point",):
-        pass  # import-removed
-
         return plot_points(
             dataset, "response_class", ax, dots=dots, threshold_line=threshold_line, legend=legend
         )
@@ -357,8 +355,6 @@ def plot_statistic(
     if instance("name", name, str, "text") not in dataset:
         raise InputError(f"variable = {shown(name)}: the map has {', '.join(map(str, dataset.data_vars))}")
     if dataset[name].dims == ("point",):
-        pass  # import-removed
-
         return plot_points(dataset, name, ax)
     values = dataset[name].squeeze()
     dims = [str(each) for each in values.dims]

@@ -146,7 +146,7 @@ def plot_probability(
         Of :func:`snapbeam.uncertainty.probability_map` over one or two parameters.
     outcome : str
     ax : matplotlib.axes.Axes, optional
-    dots : Dots, optional
+    dots : MeasuredPoints, optional
         Measured responses to lay over it, in the colours of their classes.
     levels : tuple of float
         Probabilities, increasing, each in (0, 1).

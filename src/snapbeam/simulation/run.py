@@ -38,7 +38,7 @@ class Run:
     ----------
     dataset : xarray.Dataset
         Time series: the variables of :data:`snapbeam.simulation.dataset.SCHEMA`.
-    summary : Outcome
+    summary : RunSummary
         The class and the statistics.
     impacts : xarray.Dataset
         Onset, duration, peak force and impulse of each impact.
@@ -46,7 +46,7 @@ class Run:
         What was run, and
     integration : Integration
         how.
-    accuracy : Accuracy or None
+    accuracy : ErrorEstimate or None
         What an asked tolerance gave.
     final_state : State or None
         Where the run stands at its end; None if it failed.

@@ -84,13 +84,11 @@ class RunSummary(Mapping[str, Any]):
 
     def __repr__(self) -> str:
         ended = "" if self.status is RunStatus.OK else f", {self.status.name}"
-        return (
-            f"<Outcome {self.response.label}{ended}, {self.zero_crossings} crossings, {self.impacts} impacts>"
-        )
+        return f"<RunSummary {self.response_class.label}{ended}, {self.zero_crossings} crossings, {self.impacts} impacts>"
 
     def _repr_html_(self) -> str:
         rows = [line.split(maxsplit=1) for line in self.to_text().splitlines()]
-        return html_table(f"Outcome: {self.response.label}", rows)
+        return html_table(f"Outcome: {self.response_class.label}", rows)
 
     def to_text(self) -> str:
         """Every statistic with its unit and its meaning, a line each."""

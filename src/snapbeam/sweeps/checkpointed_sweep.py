@@ -87,7 +87,7 @@ class CheckpointOptions:
         Parameters to keep in the store as a parameter file would hold them.
     note : callable, optional
         Called as ``note(text)`` with what there is to say.
-    report : Tally, optional
+    report : SweepReport, optional
         Filled with what was computed, kept, damaged and given up.
     """
 

@@ -47,7 +47,7 @@ def sweep(
         (``"frequency_ratio"``), with strictly increasing values.  A dataset with one-dimensional variables, or a
         data frame, makes a list of points along the dimension ``point``.
     integration : Integration, optional
-    checkpoint : path or Keeping, optional
+    checkpoint : path or CheckpointOptions, optional
         Folder that keeps the sweep while it is computed.  One that exists is resumed: what is finished and
         undamaged is not computed again.
     cluster : str, optional

@@ -104,10 +104,10 @@ def threshold(
     row = lookup(parameter)
     if not row.is_run or row.quantity.kind is not float:
         raise InputError(
-            f"along = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
+            f"parameter = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
         )
     if not isinstance(axes, Mapping) or not axes:
-        raise InputError(f"over = {shown(axes)}: must map at least one parameter to an array of values")
+        raise InputError(f"axes = {shown(axes)}: must map at least one parameter to an array of values")
     if np.size(values) < 2:
         raise InputError(f"{parameter}: must be an array of at least two values to choose from")
     asked = Integration() if integration is None else integration

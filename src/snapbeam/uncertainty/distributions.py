@@ -208,7 +208,7 @@ class ParameterUncertainty:
     ----------
     of : mapping of str to Distribution
         Distributions by the names of parameters, as :func:`snapbeam.sweep` takes them: :class:`Normal`,
-        :class:`Uniform`, :class:`LogNormal`, about the value of the system or of the point, or :class:`Between`.
+        :class:`UniformTolerance`, :class:`LogNormal`, about the value of the system or of the point, or :class:`UniformRange`.
     correlation : array_like of shape (parameters, parameters), optional
         Correlations of the normal scores behind the distributions (a Gaussian copula), in the order of *of*.
     displacement : float

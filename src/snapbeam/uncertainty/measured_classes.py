@@ -54,7 +54,7 @@ def score_measurements(
     dataset : xarray.Dataset
         Of :func:`snapbeam.uncertainty.probability_map` over frequency ratio, velocity amplitude and location, or some of them, as
         a grid; a dot belongs to the nearest point, and must lie within half a spacing of the grid.
-    measurements : Dots
+    measurements : MeasuredPoints
         As :func:`snapbeam.sweeps.measured_points.read_measured_points` reads them; dots of unknown class are left out.
     samples : int
         Sets of responses drawn from the map, with which the measured ones are compared.
@@ -77,7 +77,7 @@ def score_measurements(
     import xarray as xr
 
     if not hasattr(measurements, "response_class") or not hasattr(measurements, "frequency_ratio"):
-        raise InputTypeError("dots: must be Dots, as read_measured_points reads them")
+        raise InputTypeError("dots: must be MeasuredPoints, as read_measured_points reads them")
     integer("samples", samples, 100, 10**7)
     integer("seed", seed, 0, 2**63 - 1)
     counts = class_counts(dataset)

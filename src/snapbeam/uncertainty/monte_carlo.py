@@ -300,7 +300,7 @@ def trials_of(
         raise InputError("striker = None: what nothing strikes has no outcome to ask for")
     spread = ParameterUncertainty() if spread is None else spread
     if not isinstance(spread, ParameterUncertainty):
-        raise InputTypeError(f"spread = {shown(spread)}: must be a Spread")
+        raise InputTypeError(f"spread = {shown(spread)}: must be a ParameterUncertainty")
     integration = Integration() if integration is None else integration
     if not isinstance(integration, Integration):
         raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")

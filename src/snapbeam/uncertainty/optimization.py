@@ -246,7 +246,7 @@ class Constraint:
     Parameters
     ----------
     quantity : str
-        As of a :class:`Goal`.
+        As of a :class:`Objective`.
     lower, upper : float, optional
         One of them at least.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
     probability : float
@@ -316,10 +316,10 @@ def require_kinds(goals: Any, limits: Any) -> tuple[tuple[Objective, ...], tuple
     kept = (limits,) if isinstance(limits, Constraint) else tuple(limits)
     for each in made:
         if not isinstance(each, Objective):
-            raise InputError(f"goals: {shown(each)} must be a Goal, or the name of a quantity")
+            raise InputError(f"goals: {shown(each)} must be an Objective, or the name of a quantity")
     for each in kept:
         if not isinstance(each, Constraint):
-            raise InputError(f"limits: {shown(each)} must be a Limit")
+            raise InputError(f"limits: {shown(each)} must be a Constraint")
     if not 1 <= len(made) <= 3:
         raise InputError(f"goals: {len(made)} of them; must be one to three")
     labels = [each.label for each in made]
@@ -683,14 +683,14 @@ def optimize_design(
         The nominal one.
     variables : mapping of str to (low, high)
         Real parameters that may be chosen.
-    objectives : Goal or str, or a list of up to three
+    objectives : Objective or str, or a list of up to three
         What to make small; of several the Pareto front is sought.
-    constraints : Limit, or a list of them
-    uncertainty : Spread
+    constraints : Constraint, or a list of them
+    uncertainty : ParameterUncertainty
         What differs between systems that are built and driven alike.
-    settings : Effort, optional
+    settings : OptimizerSettings, optional
     integration : Integration, optional
-    checkpoint : path or Keeping, optional
+    checkpoint : path or CheckpointOptions, optional
         Folder that keeps the runs; one that exists is resumed.
     progress : callable, optional
         Called as ``progress(done, total)`` with generations; True writes a line to standard error.
@@ -721,7 +721,7 @@ def optimize_design(
     """
     settings = OptimizerSettings() if settings is None else settings
     if not isinstance(settings, OptimizerSettings):
-        raise InputTypeError(f"effort = {shown(settings)}: must be an Effort")
+        raise InputTypeError(f"settings = {shown(settings)}: must be an OptimizerSettings")
     problem = design_problem(
         system,
         variables,

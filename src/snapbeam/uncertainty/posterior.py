@@ -606,9 +606,9 @@ def class_likelihood(
         Few samples: :meth:`Posterior.resampled` first.
     system : System
         The nominal one, by which Omega and V of the dots are normalised.
-    measurements : Dots
+    measurements : MeasuredPoints
         Struck with the same Hz and m/s whatever the sample; those of unknown class are left out.
-    uncertainty : Spread
+    uncertainty : ParameterUncertainty
         What differs from test to test, such as ``Spread(displacement=3.5e-6)``: no parameter of the posterior.
     runs : int
         Of each dot and sample, the same draws for all.

@@ -81,7 +81,7 @@ class SamplingPlan:
         integer("max_runs", self.max_runs, 1, 10**7)
         if self.half_width is not None and self.max_runs < self.initial_runs:
             raise InputError(
-                f"most = {self.max_runs} with initial_runs = {self.initial_runs}: must be at least that"
+                f"max_runs = {self.max_runs} with initial_runs = {self.initial_runs}: must be at least that"
             )
         if self.total_runs is not None:
             integer("total_runs", self.total_runs, 1, 10**12)
@@ -213,14 +213,14 @@ def probability_map(
     axes : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
         As of :func:`snapbeam.sweep`: a grid, or a list of points.  A parameter that is drawn too is drawn about the
         value of the point.
-    uncertainty : Spread
+    uncertainty : ParameterUncertainty
         What differs.
-    runs : Allocation or int, optional
+    runs : SamplingPlan or int, optional
         How runs are spent, or the same number of runs for every point; by default until the half width of the 95 %
         interval of P(snap) is 0.05 everywhere.
     integration : Integration, optional
         Runs end once their class is certain, whatever it says.
-    checkpoint : path or Keeping, optional
+    checkpoint : path or CheckpointOptions, optional
         Folder that keeps the runs; one that exists is resumed.
     cluster, progress
         As of :func:`snapbeam.sweep`; progress is told of runs, of which the total grows.

@@ -273,7 +273,7 @@ class QuantileSearchSettings:
     seed : int
         Chooses the values at which runs are made.
     outcome : str
-        What the probability is of, as in :class:`Allocation`.
+        What the probability is of, as in :class:`SamplingPlan`.
     """
 
     probabilities: tuple[float, ...] = (0.05, 0.5, 0.95)
@@ -412,13 +412,13 @@ def quantile_threshold(
         Range in which it is sought.
     axes : mapping of str to array_like, optional
         Axes, as of :func:`snapbeam.sweep`; one point, the system as it stands, by default.
-    uncertainty : Spread, optional
+    uncertainty : ParameterUncertainty, optional
         What differs from run to run.  Without one the response is what it is, and all quantiles are one threshold.
-    options : Search, optional
+    options : QuantileSearchSettings, optional
         Probabilities, runs and rounds.
     integration : Integration, optional
         Runs end once their class is certain, whatever it says.
-    checkpoint : path or Keeping, optional
+    checkpoint : path or CheckpointOptions, optional
         Folder that keeps the runs; one that exists is resumed.
     progress : callable, optional
         Called as ``progress(done, total)`` with runs; True writes a line to standard error.
@@ -444,15 +444,15 @@ def quantile_threshold(
     row = lookup(parameter)
     if not row.is_run or row.quantity.kind is not float or row.section == "start":
         raise InputError(
-            f"along = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
+            f"parameter = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
         )
     low, high = _range(row.name, bounds)
     options = QuantileSearchSettings() if options is None else options
     if not isinstance(options, QuantileSearchSettings):
-        raise InputTypeError(f"how = {shown(options)}: must be a Search")
+        raise InputTypeError(f"options = {shown(options)}: must be a QuantileSearchSettings")
     trials = trials_of(system, uncertainty, integration, store=checkpoint)
     if axes is not None and not isinstance(axes, Mapping):
-        raise InputTypeError(f"over = {shown(axes)}: must map parameters to arrays of values")
+        raise InputTypeError(f"axes = {shown(axes)}: must map parameters to arrays of values")
     points = points_of(axes) if axes else PointList({row.name: np.array([low])})
     assert isinstance(points, (Grid, PointList))
     if axes and row.name in points.names:

@@ -178,7 +178,7 @@ def sobol_indices(
     within("confidence", confidence, 0.0, 1.0)
     integer("seed", seed, 0, 2**63 - 1)
     if integer("samples", samples, 2, 2**24) & (samples - 1):
-        raise InputError(f"size = {samples}: must be a power of 2")
+        raise InputError(f"samples = {samples}: must be a power of 2")
     blocks = np.concatenate([_matrices(inputs, samples, seed, r) for r in range(replicates)], axis=1)
     values = np.asarray(function(blocks), dtype=np.float64)
     table = values.reshape(replicates, inputs + 2, samples)
@@ -302,7 +302,7 @@ class ThresholdQoI:
         row = lookup(self.parameter)
         if not row.is_run or row.quantity.kind is not float:
             raise InputError(
-                f"along = {shown(self.parameter)}: must be a number that may differ between runs"
+                f"parameter = {shown(self.parameter)}: must be a number that may differ between runs"
             )
         axis("bounds", self.bounds, -np.inf, np.inf)
         integer("values", self.values, 2, 100_000)
@@ -423,9 +423,9 @@ class LifetimeQoI:
 
     Parameters
     ----------
-    initial_conditions : Starts
+    initial_conditions : InitialConditions
         The same for every draw.
-    settings : Survival, optional
+    settings : LifetimeSettings, optional
     """
 
     initial_conditions: InitialConditions = field(default_factory=lambda: InitialConditions(count=16))
@@ -509,7 +509,7 @@ def sensitivity(
         The nominal one.
     quantity : str or ThresholdQoI or NotchQoI or LifetimeQoI
         What is asked: a statistic by its name, such as ``"peak_force"``, an outcome, or one of these.
-    uncertainty : Spread
+    uncertainty : ParameterUncertainty
         What differs, at least one parameter.
     method : {"local", "sobol", "given_data"}
         ``"local"``: half the difference of the answers with a parameter one standard normal score up and down, the
@@ -520,7 +520,7 @@ def sensitivity(
         16, 32 and 1000 by default.
     confidence : float
     integration : Integration, optional
-    checkpoint : path or Keeping, optional
+    checkpoint : path or CheckpointOptions, optional
         Folder that keeps the runs of all answers but lifetimes; one that exists is resumed.
 
     Returns

@@ -81,7 +81,7 @@ class Burst(Timed):
         check_fields(self)
         if self.ramp_up_cycles + self.ramp_down_cycles > self.duration_cycles * (1.0 + 1e-12):
             raise InputError(
-                f"rise = {self.ramp_up_cycles:g}, ramp_down_cycles = {self.ramp_down_cycles:g} with duration_cycles = {self.duration_cycles:g}: together at most the length"
+                f"ramp_up_cycles = {self.ramp_up_cycles:g}, ramp_down_cycles = {self.ramp_down_cycles:g} with duration_cycles = {self.duration_cycles:g}: together at most the length"
             )
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:

@@ -56,7 +56,7 @@ def read_checkpoint(checkpoint: str | os.PathLike[str]) -> xr.Dataset:
         If its description is damaged.
     """
     if not isinstance(checkpoint, (str, os.PathLike)):
-        raise InputTypeError(f"store = {shown(checkpoint)}: must be a folder")
+        raise InputTypeError(f"checkpoint = {shown(checkpoint)}: must be a folder")
     folder = file_path("checkpoint", checkpoint)
     file = folder / "map.json"
     if file.is_symlink() or not file.is_file():

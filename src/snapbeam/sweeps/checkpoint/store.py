@@ -500,7 +500,6 @@ class MapStore:
 
     def open_stage(self, stage: Stage) -> None:
         """Check every finished task of a stage against the ledger, and drop those that are damaged."""
-        pass  # import-removed
 
         member(stage.name)
         try:
