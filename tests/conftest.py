@@ -80,9 +80,9 @@ def synthetic_run():
     return trajectory_dataset(
         cycle / freq,
         cycle,
-        displacement=beam,
+        displacement_at_striker=beam,
         midspan_displacement=1.02 * beam,
         striker_displacement=shaker,
-        penetration=shaker - beam,
+        penetration_normalised=shaker - beam,
         contact_force=4e8 * np.maximum(0.335e-3 * depth, 0.0) ** 1.5,
     )

@@ -8,7 +8,6 @@ import pytest
 from small import small_system
 
 import snapbeam as sb
-from snapbeam.lab.calibration import calibrate
 from snapbeam.model import default_values
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.uncertainty.measurements import ContactTest, Measurements
@@ -29,21 +28,6 @@ def measured_of(beam, modes: int = 2, error: float = 0.003, draw=None) -> Measur
         damping_ratio=[0.005, 0.0052, 0.0048],
         contact=[ContactTest(closing_speed=0.1, duration=5e-4, peak_force=4.0)],
     )  # fmt: skip
-
-
-def test_it_is_that_of_the_linear_fit() -> None:
-    """Small errors: medians and widths agree with those of least squares."""
-    measured = measured_of(default_values.BEAM)
-    found = sb.uncertainty.estimate_posterior(measured, default_values.BEAM, PRIOR, modes=2, samples=400)
-    fit = calibrate(measured, default_values.BEAM, modes=2)
-    assert found.effective_sample_size > 200.0 and not found.is_doubtful
-    for name in PRIOR:
-        middle, low, high = found.interval()[f"beam.{name}"]
-        assert middle == pytest.approx(getattr(default_values.BEAM, name), rel=2e-3)
-        assert low < getattr(default_values.BEAM, name) < high
-        assert high - low == pytest.approx(3.92 * fit.standard_errors[name], rel=0.25)
-    damping = found.interval()["model.damping_ratio"]
-    assert damping[1] < 0.005 < damping[2]
 
 
 @pytest.mark.slow

@@ -15,10 +15,10 @@ from snapbeam.lab.cli.compare import compare
 from snapbeam.lab.cli.fit_decay import fit_decay
 from snapbeam.lab.cli.vibrometer import vibrometer
 from snapbeam.lab.map_comparison import compare_measured_points
-from snapbeam.lab.waveform_comparison import compare_waveforms
 from snapbeam.lab.plot.comparison import plot_map_comparison, plot_waveform_comparison, plot_waveform_overlay
 from snapbeam.lab.signal_files import write_signal
 from snapbeam.lab.signals import make_signal
+from snapbeam.lab.waveform_comparison import compare_waveforms
 from snapbeam.simulation.dataset import trajectory_dataset
 from snapbeam.sweeps.measured_points import MeasuredPoints
 from snapbeam.util.status_codes import ResponseClass
@@ -288,7 +288,7 @@ def test_command_of_comparison(program, tmp_path, synthetic_map, synthetic_run):
     synthetic_map.to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
     synthetic_run.to_netcdf(tmp_path / "run.nc", engine="h5netcdf")
     (tmp_path / "t.csv").write_text(
-        "frequency_hz,velocity_m_s,location,response\n80,0.002,0.476,intrawell\n100,0.08,0.476,transient 2\n",
+        "frequency_hz,velocity_m_s,location,response_class\n80,0.002,0.476,intrawell\n100,0.08,0.476,transient 2\n",
         encoding="utf-8",
     )
     told = program("compare", tmp_path / "t.csv", tmp_path / "map.nc", "--json", tmp_path / "t.json")

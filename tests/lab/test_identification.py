@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import snapbeam as sb
-from snapbeam.lab.waveform_comparison import measure_response
 from snapbeam.lab.decay.identify import METHODS, identify_decay
 from snapbeam.lab.decay.model import compare_wells
 from snapbeam.lab.plot.fit_decay import plot_decay
 from snapbeam.lab.signals import make_signal
+from snapbeam.lab.waveform_comparison import measure_response
 from snapbeam.model.default_values import BEAM
 from snapbeam.simulation.dataset import trajectory_dataset
 from snapbeam.util.status_codes import ResponseClass, classify

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from typer.testing import CliRunner
 
 import snapbeam as sb
 from snapbeam.cli.app import app
-from snapbeam.lab.signal_formats import header_values, split_unit
 from snapbeam.model import default_values
 from snapbeam.util.netcdf import read_netcdf
 
@@ -67,26 +65,6 @@ def test_a_description_that_is_none(written, tmp_path, text):
     said = CliRunner().invoke(app, ["map", "--from", str(tmp_path / "m.nc")])
     assert said.exit_code == 2 and isinstance(said.exception, SystemExit)
     assert "its description is damaged" in " ".join(said.output.split())
-
-
-def test_long_headers_are_no_trap():
-    """The patterns that take a header apart need a time that goes with the square of its length."""
-    start = time.perf_counter()
-    assert split_unit("[" * 60_000) == ("[" * 60_000, None)
-    assert header_values(["a" * 60_000 + ":", " " * 60_000, "rate: 5"]) == {"rate": "5"}
-    assert time.perf_counter() - start < 1.0
-
-
-def test_files_that_point_elsewhere_are_refused(tmp_path):
-    h5py = pytest.importorskip("h5py")
-    secret = tmp_path / "secret"
-    secret.write_bytes(bytes(4 * 64 * 64))
-    with h5py.File(tmp_path / "stack.h5", "w") as file:
-        file.create_dataset("frames", (4, 64, 64), "u1", external=[(str(secret), 0, 4 * 64 * 64)])
-    with pytest.raises(sb.InputError, match="in another file"):
-        from snapbeam.lab.camera import open_recording
-
-        open_recording(tmp_path / "stack.h5", frame_rate=1e4, pixel_size=1e-5)
 
 
 def test_an_interrupt_while_it_loads_is_no_traceback():

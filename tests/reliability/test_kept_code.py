@@ -12,7 +12,6 @@ from snapbeam.solver.compilation import private_folder
 
 RUN = """
 import snapbeam as sb
-import snapbeam.lab.synthetic.exposure
 from snapbeam.model import default_values
 system = sb.System(sb.ReducedModel.from_beam(default_values.BEAM, modes=1), contact=default_values.CONTACT,
                    striker=sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.3))

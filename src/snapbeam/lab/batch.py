@@ -19,7 +19,6 @@ import numpy as np
 
 from snapbeam._version import __version__
 from snapbeam.lab.camera import open_recording
-from snapbeam.lab.waveform_comparison import LEAST_CYCLES, measure_response
 from snapbeam.lab.drive_alignment import Alignment, align
 from snapbeam.lab.image_sources import IMAGE_SUFFIXES, RECORDING_SUFFIXES
 from snapbeam.lab.signal_files import read_signal
@@ -27,6 +26,7 @@ from snapbeam.lab.signal_formats import READERS, decoded
 from snapbeam.lab.tracking.settings import TrackingSettings
 from snapbeam.lab.tracking.track import track
 from snapbeam.lab.vibrometer import DriveMeasurement, measure_drive, shaker_signal
+from snapbeam.lab.waveform_comparison import LEAST_CYCLES, measure_response
 from snapbeam.util.diagnostics import Diagnostic, Severity, diagnostics_of
 from snapbeam.util.files import atomic_path, check_writable
 from snapbeam.util.netcdf import write_netcdf

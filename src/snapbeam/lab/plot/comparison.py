@@ -176,7 +176,7 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
         draw_findings(figure, told, 3)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
         pairs = (
-            (top, "displacement_at_striker", "beam, at the shaker"),
+            (top, "displacement", "beam, at the shaker"),
             (middle, "shaker", "shaker"),
         )
         for ax, name, word in pairs:

@@ -7,7 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "lab"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from lab_waveforms import BUCKLING_LEVEL, FRAME_RATE, PIXEL, impacts
 
 from snapbeam import InputError
