@@ -64,7 +64,7 @@ def test_failed_runs_come_with_advice(synthetic_map):
     status[1] = RunStatus.EARLY_STOP
     lines = status_lines(synthetic_map.assign(status=(synthetic_map["response_class"].dims, status)))
     assert lines[0].startswith("[bold red]3 failed[/] (DIVERGED): ") and "smaller step" in lines[0]
-    assert lines[1] == "25 of 1000 runs ended early, their class being certain."
+    assert lines[1] == "25 of 1000 runs ended early because their response class was certain."
     assert ResponseClass.UNKNOWN.label in text(class_table(synthetic_map))
 
 

@@ -35,7 +35,7 @@ dynamics = typer.Typer(
 )
 _ALL = (*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN)
 _AXES = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location", "model.modes")
-_OWN = "Question"
+_OWN = "Analysis"
 _FEW = 4000
 """Maximum size of a variable in the JSON output."""
 Output = Annotated[
@@ -311,10 +311,10 @@ def branch(
 def basins(
     given: Any,
     amplitudes: Annotated[
-        str, typer.Option(help="amplitude[1]: start:stop:count.", rich_help_panel=_OWN)
+        str, typer.Option(help="Values of amplitude[1], start:stop:count.", rich_help_panel=_OWN)
     ] = "-1.6:1.6:200",
     velocities: Annotated[
-        str, typer.Option(help="velocity[1]: start:stop:count.", rich_help_panel=_OWN)
+        str, typer.Option(help="Values of velocity[1], start:stop:count.", rich_help_panel=_OWN)
     ] = "-1:1:200",
     periods: Annotated[
         int | None, opt.count_option("Periods after which a state counts as undecided (200).", _OWN)

@@ -15,7 +15,7 @@ __all__ = ["frequencies"]
 @with_parameters(*BEAM, *BOUNDARY, *MODEL)
 def frequencies(
     given: Any,
-    count: Annotated[int, opt.count_option("How many to print (10).", "Output")] = 10,
+    count: Annotated[int, opt.count_option("Number of frequencies to print (10).", "Output")] = 10,
 ) -> None:
     """Print the natural frequencies about the equilibrium: reduced, exact, and without load.
 

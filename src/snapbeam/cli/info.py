@@ -1,4 +1,4 @@
-"""``snapbeam info``: what a file holds and what made it."""
+"""``snapbeam info``: contents and provenance of a file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["info"]
 def info(
     file: Annotated[Path, typer.Argument(help="NetCDF file written by snapbeam.", metavar="FILE")],
 ) -> None:
-    """Say what a map or a run holds and what made it: parameters, version, command, time."""
+    """Print the contents and the provenance of a file: parameters, version, command, time."""
     from snapbeam.cli.console import open_result
     from snapbeam.cli.summary import class_table, parameter_table, status_lines
 

@@ -8,7 +8,6 @@ from typing import Annotated, Any
 
 import typer
 
-from snapbeam.cli import parameter_options as long
 from snapbeam.cli import parameter_options as opt
 from snapbeam.cli.console import FAILED, add_json, cli_command, out
 from snapbeam.cli.parameter_options import (
@@ -33,7 +32,7 @@ _AXES = (
 
 @cli_command
 @with_parameters(*DRIVE, *STRIKER, *BEAM, *MODEL, *CONTACT, *RUN, axes=_AXES)
-@long.with_checkpoint
+@opt.with_checkpoint
 def compute_map(
     given: Any,
     keeping: Any,
@@ -48,10 +47,10 @@ def compute_map(
     quasi_static_line: opt.QuasiStaticLine = False,
     threads: opt.Threads = None,
 ) -> None:
-    """Compute the map of response types and say what it shows.
+    """Compute a map of response classes and print a summary.
 
-    Runs one simulation for each point of the axes, tells intrawell, transient interwell 1 and 2 and
-    continuous interwell apart, and writes the classes and their statistics to a NetCDF file.
+    The command runs one simulation for each point of the axes.  It writes the response classes (intrawell, transient
+    interwell 1 and 2, continuous interwell) and the statistics to a NetCDF file.
 
     Example: snapbeam map --modes 32 --cycles 200 --frequency-ratio 0.1:4:64 --velocity-amplitude
     0.01:0.65:40 --location 1/2.1 -o map.nc --plot map.png
@@ -60,7 +59,7 @@ def compute_map(
     from snapbeam.cli.summary import map_facts, map_summary
     from snapbeam.util.files import check_writable
 
-    settings = long.resumed(given, keeping, configured(given, _axes_of))
+    settings = opt.resumed(given, keeping, configured(given, _axes_of))
     axes = _axes_of(settings, given)
     check_writable(output, "output", (".nc",))
     check_pictures(("plot", plot))
@@ -77,27 +76,27 @@ def compute_map(
     from snapbeam.sweeps.setup import sweep_setup
 
     setup = sweep_setup(system, axes, settings.integration.replace(threads=threads))
-    asked = long.sweep_options(keeping)
+    asked = opt.sweep_options(keeping)
     total = setup.points.size
     start = time.monotonic()
     tally = SweepReport()
-    with long.report(total, keeping["log"], keeping["checkpoint"]) as say:
+    with opt.report(total, keeping["log"], keeping["checkpoint"]) as say:
         kept = CheckpointOptions(
-            keeping["checkpoint"], keeping["check_checkpoint"], keeping["points_per_task"], long.kept_config(settings, keeping),
+            keeping["checkpoint"], keeping["check_checkpoint"], keeping["points_per_task"], opt.kept_config(settings, keeping),
             say.note, tally,
         )  # fmt: skip
         dataset = compute_sweep(
-            setup, kept, output=output if long.is_long(keeping) and not kept.check_checkpoint else None,
+            setup, kept, output=output if opt.is_long(keeping) and not kept.check_checkpoint else None,
             progress=say.progress, **asked,
         )  # fmt: skip
-        lines = long.tally_lines(tally, keeping["checkpoint"], time.monotonic() - start)
+        lines = opt.tally_lines(tally, keeping["checkpoint"], time.monotonic() - start)
         for line in lines:
             say.log(line)
     if keeping["check_checkpoint"]:
         out().print(*lines, sep="\n", markup=False)
         raise typer.Exit(FAILED if tally.failed else 0)
     elapsed = time.monotonic() - start
-    if not long.is_long(keeping):
+    if not opt.is_long(keeping):
         from snapbeam.cli.console import write_map
 
         write_map(dataset, output)
@@ -105,7 +104,7 @@ def compute_map(
     if plot is not None:
         files.append(draw_map(dataset, plot, overlay, quasi_static_line))
     add_json(**map_facts(dataset), seconds=elapsed, files=files)
-    out().print(map_summary(dataset, files, None if long.is_long(keeping) else elapsed))
+    out().print(map_summary(dataset, files, None if opt.is_long(keeping) else elapsed))
     out().print(*lines, sep="\n", markup=False, end="\n" if lines else "")
     if tally.failed:
         raise typer.Exit(FAILED)
@@ -154,5 +153,5 @@ def _check_two_axes(path: Path, axes: dict[str, Any]) -> None:
     if len(many) != 2:
         raise InputError(
             f"plot = {str(path)!r}: a map is drawn over two axes, not {len(many)} ({', '.join(many)}); "
-            "leave --plot out, and draw one point of an axis with snapbeam plot map.nc --at location=0.3"
+            "leave --plot out, and plot a slice with snapbeam plot map.nc --at location=0.3"
         )

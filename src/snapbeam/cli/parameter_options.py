@@ -1,4 +1,4 @@
-"""Options of commands that set parameters: made from the one table, with its words, units and names."""
+"""Options that set parameters, made from the table of parameters."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ _PANELS = {
     "drive": "Striker and drive",
     "integration": "Integration",
 }
-# Option where it is not the parameter's own name, and words that the table does not have.
+# Options that differ from the name of the parameter, and help texts that the table does not contain.
 _OPTIONS = {
     "contact.stiffness": "--contact-stiffness",
     "contact.radius": "--contact-radius",
@@ -110,20 +110,20 @@ _OPTIONS = {
     "striker.suspension_damping": "--striker-suspension-damping",
 }
 _WORDS = {
-    "contact.radius": "radius of the sphere, with the two next ones in place of a stiffness, m",
+    "contact.radius": "radius of the sphere, m; with the next two options, instead of --contact-stiffness",
     "contact.young_modulus": "Young's moduli of sphere and beam, Pa: E1,E2",
     "contact.poisson_ratio": "Poisson ratios of sphere and beam: nu1,nu2",
-    "contact.coefficient": "coefficient of restitution, for one mode, in place of Hertz's law",
-    "contact.damping_factor": "loss chi of the contact, s/m: Hunt and Crossley's law",
-    "contact.restitution": "share of its speed that a free mass keeps, with the next one in place of a loss",
-    "contact.speed": "speed at which it keeps that share, m/s",
+    "contact.coefficient": "coefficient of Newton's restitution law, for one mode, instead of Hertz's law",
+    "contact.damping_factor": "damping factor of the Hunt-Crossley law, s/m",
+    "contact.restitution": "coefficient of restitution of a free mass; with the next option, instead of --contact-damping-factor",
+    "contact.speed": "impact speed of --hunt-crossley-restitution, m/s",
     "beam.axial_load": "axial load, N, compression positive; instead of --buckling-level",
-    "model.reference_frequency": "frequency that Omega and V are normalised by, Hz; the model's first by default",
+    "model.reference_frequency": "frequency that normalises Omega and V, Hz; the first of the model by default",
     "model.damping_ratio": "damping ratio of every linear mode, or one for each: zeta1,zeta2,...",
     "integration.step": "step in free flight, s; follows from the model by default",
-    "integration.accuracy": "accuracy level: standard, or reference, far finer, to check with",
-    "integration.engine": "what integrates; auto takes the fastest there is",
-    "integration.early_termination": "end a run once its response class is certain; its other statistics then stop there",
+    "integration.accuracy": "accuracy level: standard, or reference (much shorter steps, to check results)",
+    "integration.engine": "solver: cpu, cuda, or auto (the fastest available)",
+    "integration.early_termination": "end a run once its response class is certain; its statistics then cover the time until then",
 }
 _PAIRS = ("contact.young_modulus", "contact.poisson_ratio")
 _LISTS = ("model.damping_ratio",)
@@ -186,22 +186,22 @@ def _identifier(name: str) -> str:
 
 def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
     config = typer.Option(
-        "--config", "-c", help="TOML file of parameters; options given here override it.", metavar="FILE"
+        "--config", "-c", help="TOML parameter file; other options override it.", metavar="FILE"
     )
     anything = typer.Option(
-        "--set", help="Any parameter by its dotted name, such as contact.stiffness=2e8; again for another one.",
+        "--set", help="Any parameter by its dotted name, such as contact.stiffness=2e8; repeat for further parameters.",
         metavar="NAME=VALUE",
     )  # fmt: skip
     source = typer.Option(
-        "--from", help="File of a map or a run whose parameters are taken; options given here override them.",
+        "--from", help="File of a map or a run to take the parameters from; other options override them.",
         metavar="FILE",
     )  # fmt: skip
     point = typer.Option(
-        help="Point of the map of --from, the nearest there is: name=value,name=value.",
+        help="Point of the map of --from, the nearest one: name=value,name=value.",
         metavar="NAME=VALUE,...",
     )
     shown = typer.Option(
-        "--print-config", help="Print every parameter as a parameter file, what was not given too, and stop."
+        "--print-config", help="Print all parameters, defaults included, as a parameter file, and stop."
     )
     found: dict[str, tuple[Any, Any]] = {
         "config": (None, Annotated[Path | None, config]),
@@ -213,8 +213,8 @@ def _general(with_axes: bool) -> dict[str, tuple[Any, Any]]:
     if with_axes:
         sweep = typer.Option(
             "--sweep",
-            help="Sweep any parameter: beam.thickness=3e-4:5e-4:20, model.modes=1,8; again for another axis. Without "
-            "one, the map is over frequency ratio and velocity amplitude.",
+            help="Sweep any parameter: beam.thickness=3e-4:5e-4:20, model.modes=1,8; repeat for further axes. "
+            "Without this option the map is over frequency ratio and velocity amplitude.",
             metavar="NAME=VALUES",
             rich_help_panel="Axes",
         )
@@ -236,7 +236,7 @@ def _option(name: str, is_axis: bool) -> Any:
         words = words or row.quantity.long_name + (f", {unit}" if unit else "")
         symbol = row.quantity.symbol
     elif physical is not None:
-        words = f"{physical.words}, {physical.unit}, in place of a ratio"
+        words = f"{physical.words}, {physical.unit}, instead of a ratio"
     text = f"{words[:1].upper()}{words[1:]}{_symbol(symbol)}."
     options: dict[str, Any] = {"help": text, "rich_help_panel": "Axes" if is_axis else _PANELS[section]}
     if row is not None and row.quantity.kind is bool:
@@ -409,17 +409,17 @@ def count_option(about: str, panel: str) -> Any:
     return typer.Option(help=about, rich_help_panel=panel, parser=parse_count, metavar="COUNT")
 
 
-Threads = Annotated[int | None, count_option("Processor cores to use; all by default.", "Integration")]
+Threads = Annotated[int | None, count_option("Number of processor cores; all by default.", "Integration")]
 Plot = Annotated[
     Path | None,
     typer.Option(
-        "--plot", help="Picture to write: .png, .pdf or .svg.", rich_help_panel=_OUTPUT, metavar="FILE"
+        "--plot", help="Figure file to write: .png, .pdf or .svg.", rich_help_panel=_OUTPUT, metavar="FILE"
     ),
 ]
 Measurements = Annotated[
     Path | None,
     typer.Option(
-        help="CSV of measured responses to lay over the picture: columns frequency_ratio or frequency_hz, "
+        help="CSV file of measured responses to plot on the map: columns frequency_ratio or frequency_hz, "
         "velocity_amplitude or velocity_m_s, location (optional), response_class.",
         rich_help_panel=_OUTPUT,
         metavar="FILE",
@@ -462,7 +462,7 @@ CheckpointOption = Annotated[
     Path | None,
     typer.Option(
         "--checkpoint",
-        help="Folder to keep the map in while it is computed; one that exists is resumed, and grows with longer axes.",
+        help="Checkpoint folder; an existing one is resumed, and extended for longer axes.",
         rich_help_panel=_LONG,
         metavar="DIR",
     ),
@@ -471,7 +471,7 @@ CheckCheckpoint = Annotated[
     bool,
     typer.Option(
         "--check-checkpoint",
-        help="Check the store and compute again only what is damaged.",
+        help="Check the checkpoint and compute damaged tasks again.",
         rich_help_panel=_LONG,
     ),
 ]
@@ -479,30 +479,36 @@ ClusterOption = Annotated[
     str | None,
     typer.Option(
         "--cluster",
-        help="Who computes: local:N, tcp://host:port, or slurm.toml; needs --checkpoint.",
+        help="Dask cluster: local:N, tcp://host:port, or slurm.toml; needs --checkpoint.",
         rich_help_panel=_LONG,
         metavar="WHERE",
     ),
 ]
 RefineLevels = Annotated[
     int | None,
-    count_option("Times to halve the spacing of the axes where neighbours differ in class.", _LONG),
+    count_option(
+        "Number of times to halve the grid spacing where neighbours differ in response class.", _LONG
+    ),
 ]
 Replicates = Annotated[
-    int | None, count_option("Repeats of each run with a slightly different start.", _LONG)
+    int | None,
+    count_option("Number of repeats of each run with slightly different initial conditions.", _LONG),
 ]
 PerturbationRms = Annotated[
     float | None,
-    number_option("Rms change of the centre's start, m (3.5e-6, a camera's pixel).", _LONG),
+    number_option(
+        "Rms perturbation of the initial midspan displacement, m (3.5e-6, the resolution of the camera).",
+        _LONG,
+    ),
 ]
 CheckHalfStep = Annotated[
     bool,
     typer.Option(
-        "--check-half-step", help="One repeat more with the time step halved.", rich_help_panel=_LONG
+        "--check-half-step", help="Repeat each run once more with half the time step.", rich_help_panel=_LONG
     ),
 ]
 PointsPerTask = Annotated[
-    int | None, count_option("Points of a task; follows from the map by default.", _LONG)
+    int | None, count_option("Points in each task; chosen from the size of the map by default.", _LONG)
 ]
 Log = Annotated[
     Path | None,
@@ -550,12 +556,12 @@ def with_checkpoint(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def is_long(keeping: Mapping[str, Any]) -> bool:
-    """Whether anything but a log was asked for."""
+    """Whether any option but --log is set."""
     return any(value not in (None, False) for name, value in keeping.items() if name != "log")
 
 
 def sweep_options(keeping: Mapping[str, Any]) -> dict[str, Any]:
-    """What a sweep is asked for beside its store."""
+    """Arguments of the sweep apart from its checkpoint."""
     from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates
     from snapbeam.util.validation import integer
 
@@ -572,10 +578,10 @@ def sweep_options(keeping: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config) -> Config:
-    """The parameters of the store that is named, with those that are given laid over them.
+    """The parameters of an existing checkpoint, overridden by the given ones.
 
-    So a store is resumed by its name alone, and what is given beside it is compared with what the store holds, not with
-    the paper's beam.  Options that the store keeps are put into *keeping* where they were left out.
+    The path of a checkpoint is enough to resume it.  Given parameters are compared with those of the checkpoint, not with
+    the paper's beam.  Stored options replace missing ones in *keeping*.
     """
     from snapbeam.model.parameter_file import config_from_mapping, override
     from snapbeam.sweeps.checkpoint.store import read_stored_config
@@ -588,7 +594,7 @@ def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config)
         return settings
     options = kept.get("options", {})
     if not isinstance(kept.get("parameters"), dict) or not isinstance(options, dict):
-        raise InputError(f"store = {str(keeping['store'])!r}: keeps no parameters that can be read")
+        raise InputError(f"store = {str(keeping['store'])!r}: contains no readable parameters")
     for name, kind in _STORED.items():
         if not keeping[name] and isinstance(options.get(name), kind):
             keeping[name] = options[name]
@@ -597,7 +603,7 @@ def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config)
 
 
 def kept_config(settings: Config, keeping: Mapping[str, Any]) -> dict[str, Any]:
-    """What a store keeps so that it can be resumed by its name alone."""
+    """Parameters and options that a checkpoint stores, so that its path is enough to resume it."""
     import numpy as np
 
     options = {name: keeping[name] for name in _STORED if keeping[name]}
@@ -672,9 +678,9 @@ def report(total: int, log: Path | None, store: Path | None) -> Iterator[LongRep
             yield said
         except KeyboardInterrupt:
             said.note(
-                "stopped; nothing is kept: with --checkpoint FOLDER it could go on from here another time"
+                "stopped; no result is stored; use --checkpoint FOLDER to be able to resume"
                 if store is None
-                else "stopped; what the store holds is kept, and the same command goes on from there"
+                else "stopped; the checkpoint is complete up to here; run the same command to resume"
             )
             raise
 
@@ -685,12 +691,14 @@ def tally_lines(tally: SweepReport, store: Path | None, elapsed: float) -> list[
     if store is not None:
         lines.append(f"{tally.runs} runs computed in {duration(elapsed)}")
         lines.append(
-            f"Store {store}: {tally.tasks} tasks, {tally.resumed} done before, {tally.computed} computed now, "
-            f"{len(tally.damaged)} damaged, {len(tally.failed)} given up"
+            f"Checkpoint {store}: {tally.tasks} tasks, {tally.resumed} resumed, {tally.computed} computed, "
+            f"{len(tally.damaged)} damaged, {len(tally.failed)} failed"
         )
     if tally.missing:
-        lines.append(f"{tally.missing} tasks were never computed; without --check-checkpoint they will be")
-    lines += [f"given up: {stage} task {task} {reason}" for stage, task, reason in tally.failed]
+        lines.append(
+            f"{tally.missing} tasks are not computed yet; run without --check-checkpoint to compute them"
+        )
+    lines += [f"failed: {stage} task {task} {reason}" for stage, task, reason in tally.failed]
     return lines
 
 
@@ -715,12 +723,14 @@ def config_of_file(path: Path, point: str | None) -> Config:
     dataset = open_result(path)
     text = dataset.attrs.get("system")
     if not isinstance(text, str):
-        raise InputError(f"from = {str(path)!r}: does not hold the parameters it was computed from")
+        raise InputError(f"from = {str(path)!r}: does not contain the parameters of the computation")
     sections: dict[str, dict[str, Any]] = parsed_json(text, f"from = {str(path)!r}")
     if any(isinstance(value, dict) for values in sections.values() for value in values.values()):
-        raise InputError(f"from = {str(path)!r}: was driven by a record, which is too long to be kept in it")
+        raise InputError(
+            f"from = {str(path)!r}: has a recorded drive, which the file does not contain; use it from Python"
+        )
     if "mass" in sections.get("model", {}):
-        raise InputError(f"from = {str(path)!r}: is of a structure given by matrices; use it from Python")
+        raise InputError(f"from = {str(path)!r}: is of a model given by matrices; use it from Python")
     run = {
         name: value
         for name, value in parsed_json(
@@ -730,7 +740,7 @@ def config_of_file(path: Path, point: str | None) -> Config:
     }
     start = sections.pop("initial_state", None)
     if start is not None:
-        raise InputError(f"from = {str(path)!r}: begins in a state of its own; use it from Python")
+        raise InputError(f"from = {str(path)!r}: has its own initial state; use it from Python")
     sections["integration"] = run
     for name, value in _at_point(dataset, point, path).items():
         section, _, field = name.partition(".")
@@ -765,7 +775,7 @@ def _at_point(dataset: xr.Dataset, point: str | None, path: Path) -> dict[str, A
         found[str(axes[short].attrs["parameter"])] = chosen
     missing = [name for name in axes if axes[name].attrs["parameter"] not in found and axes[name].size > 1]
     if missing:
-        raise InputError(f"point = {point!r}: says nothing of {', '.join(missing)}")
+        raise InputError(f"point = {point!r}: must also give {', '.join(missing)}")
     for name in axes:
         if axes[name].size == 1:
             found.setdefault(str(axes[name].attrs["parameter"]), axes[name].values[0].item())

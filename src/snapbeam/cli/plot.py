@@ -16,22 +16,22 @@ if TYPE_CHECKING:
 __all__ = ["plot"]
 
 
-_SLICE = "One point of an axis, the nearest there is"
+_SLICE = "Slice of a map, at the nearest grid value"
 
 
 @cli_command
 def plot(
     file: Annotated[Path, typer.Argument(help="NetCDF file of a map or a run.", metavar="FILE")],
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="Picture to write: .png, .pdf or .svg.", metavar="FILE")
+        Path, typer.Option("--output", "-o", help="Figure file to write: .png, .pdf or .svg.", metavar="FILE")
     ],
-    frequency_ratio: Annotated[float | None, opt.number_option("Omega.", _SLICE)] = None,
-    velocity_amplitude: Annotated[float | None, opt.number_option("V.", _SLICE)] = None,
-    location: Annotated[float | None, opt.number_option("x_s.", _SLICE)] = None,
+    frequency_ratio: Annotated[float | None, opt.number_option("Frequency ratio Omega.", _SLICE)] = None,
+    velocity_amplitude: Annotated[float | None, opt.number_option("Velocity amplitude V.", _SLICE)] = None,
+    location: Annotated[float | None, opt.number_option("Location x_s.", _SLICE)] = None,
     at: Annotated[
         list[str] | None,
         typer.Option(
-            help="One point of any axis, such as beam.thickness=4e-4; again for another axis.",
+            help="Value of any axis, such as beam.thickness=4e-4; repeat for further axes.",
             rich_help_panel=_SLICE,
             metavar="NAME=VALUE",
         ),

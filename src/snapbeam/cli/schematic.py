@@ -28,7 +28,7 @@ __all__ = ["schematic"]
 def schematic(
     given: Any,
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="Picture to write: .png, .pdf or .svg.", metavar="FILE")
+        Path, typer.Option("--output", "-o", help="Figure file to write: .png, .pdf or .svg.", metavar="FILE")
     ],
 ) -> None:
     """Draw a schematic of the system: beam, wells, boundary conditions, strikers and excitation."""

@@ -43,7 +43,7 @@ def simulate(
     recorded_drive: Annotated[
         Path | None,
         typer.Option(
-            help="Recorded drive in place of the sinusoidal one: the file that snapbeam vibrometer "
+            help="Recorded motion instead of the sinusoidal one: a file that snapbeam vibrometer "
             "--drive-output wrote.",
             rich_help_panel="Striker and drive",
             metavar="FILE",
@@ -59,8 +59,8 @@ def simulate(
     animate: Annotated[
         Path | None,
         typer.Option(
-            help="Animation to write, .mp4 or .gif: the moving beam beside the waveform, with slow motion about "
-            "the hardest impact of the window.",
+            help="Animation to write, .mp4 or .gif: the moving beam and the waveform, in slow motion near "
+            "the impact with the highest force.",
             rich_help_panel="Output",
             metavar="FILE",
         ),
@@ -68,14 +68,16 @@ def simulate(
     window: opt.Window = None,
     samples: Annotated[
         int | None,
-        opt.count_option("Samples per cycle, evenly spaced (200, and the steps of each contact).", "Output"),
+        opt.count_option(
+            "Evenly spaced samples per cycle (default: 200, and every step in contact).", "Output"
+        ),
     ] = None,
     stream: Annotated[
         bool,
         typer.Option(
             "--stream",
-            help="Write the file while the run goes on, so that its samples need not fit in memory; for runs of very "
-            "many cycles, which are not drawn.",
+            help="Write the file during the run, for runs whose samples do not fit in memory; "
+            "such runs are not plotted.",
             rich_help_panel="Output",
         ),
     ] = False,

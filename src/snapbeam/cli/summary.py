@@ -1,4 +1,4 @@
-"""What a map and a run say, for a person to read."""
+"""Printed summaries of maps and runs."""
 
 from __future__ import annotations
 
@@ -189,31 +189,31 @@ def status_lines(dataset: xr.Dataset) -> list[str]:
             lines.append(f"[bold red]{count} failed[/] ({status.name}): {status.advice}")
     decided = int((codes == RunStatus.EARLY_STOP).sum())
     if decided:
-        lines.append(f"{decided} of {codes.size} runs ended early, their class being certain.")
+        lines.append(f"{decided} of {codes.size} runs ended early because their response class was certain.")
     inferred = int((codes == RunStatus.FILLED).sum())
     if inferred:
         lines.append(
             f"{codes.size - inferred} of {codes.size} points were run, "
-            "the others inferred from their neighbours."
+            "the others were filled from their neighbours."
         )
     return lines
 
 
 def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, Any] | None) -> list[str]:
-    """Commands that go on from a map, each of the very system that it is of."""
+    """Suggested next commands for a map."""
     lines = []
     file = shlex.quote(str(files[0])) if files else None
     axes = [str(name) for name in dataset["response_class"].dims if name in dataset.coords]
     if low is not None and file is not None and "point" not in dataset.dims:
         point = point_text({name: low[name] for name in axes})
         at = f" --point {shlex.quote(point)}" if point else ""
-        lines.append(f"see that run      snapbeam simulate --from {file}{at} --plot run.png")
+        lines.append(f"run this point    snapbeam simulate --from {file}{at} --plot run.png")
         if {"frequency_ratio", "velocity_amplitude"} <= set(axes) and min(
             dataset.sizes[name] for name in axes
         ) > 1:
             omega, velocity = low["frequency_ratio"], low["velocity_amplitude"]
             lines.append(
-                f"look closer       snapbeam map --from {file}{at} "
+                f"zoom in           snapbeam map --from {file}{at} "
                 f"--frequency-ratio {0.8 * omega:.3g}:{1.2 * omega:.3g}:40 "
                 f"--velocity-amplitude {0.5 * velocity:.3g}:{2.0 * velocity:.3g}:40 "
                 "-o closer.nc --plot closer.png"
@@ -221,9 +221,9 @@ def _suggestions(dataset: xr.Dataset, files: Sequence[Path], low: dict[str, Any]
     if file is not None:
         line = " --quasi-static-line" if set(axes) <= set(_PAPER) else ""
         if sum(dataset.sizes[name] > 1 for name in axes) == 2:
-            lines.append(f"draw it again     snapbeam plot {file}{line} -o map.pdf")
+            lines.append(f"plot again        snapbeam plot {file}{line} -o map.pdf")
         lines.append(
-            f'open it           python -c "import xarray; print(xarray.open_dataset({str(files[0])!r}))"'
+            f'open the file     python -c "import xarray; print(xarray.open_dataset({str(files[0])!r}))"'
         )
     return [escape(line) for line in lines]
 

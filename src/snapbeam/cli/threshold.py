@@ -56,8 +56,8 @@ def threshold(
 ) -> None:
     """Find the threshold of the interwell response over frequency ratio, location or any parameters, as a band.
 
-    The boundary is fractal in places, so two curves are written: the lowest amplitude that snaps the beam
-    through, and the one above which every run does.  Every point of the grid is run.
+    The boundary is fractal in places, so the file contains two curves: the lowest amplitude with an interwell response,
+    and the amplitude above which every response is interwell.  snapbeam runs every point of the grid.
 
     Example: snapbeam threshold --modes 1,32 --frequency-ratio 0.1:4:64 --velocity-amplitude 0.005:0.64:128
     -o threshold.nc --plot threshold.png

@@ -23,9 +23,9 @@ def reproduce(
     figure: Annotated[
         str,
         typer.Argument(
-            help="fig2 to fig8, figA9, figB10, si5 (an animation); low_frequency, resonance, waveforms, "
-            "transients, windows, disturbances, sensitivity (studies beside them); claims (the table of what the "
-            "paper says and what is measured); or all.",
+            help="fig2 to fig8, figA9, figB10, si5 (an animation); low_frequency, resonance, waveforms, transients, "
+            "lifetimes, windows, disturbances, sensitivity, notch, two_tips, switch, harvesting (further studies); "
+            "claims (table of the paper's statements and their verdicts); or all.",
             metavar="FIGURE",
         ),
     ],
