@@ -65,7 +65,7 @@ HEADER = "frequency_ratio,velocity_amplitude,location,response_class\n"
         ),
         (
             "response_class,response_class,frequency_ratio,velocity_amplitude\n",
-            "column 'response_class' stands there twice",
+            "column 'response_class' occurs twice",
         ),
         (
             HEADER + "1,2,0.5,intrawell\n1,x,0.5,intrawell\n",

@@ -124,15 +124,15 @@ def numbered(channels: list[Channel]) -> list[Channel]:
 
 
 def read_numpy(path: Path, _told: Told) -> list[Channel]:
-    loaded = np.load(path, allow_pickle=False)
-    if isinstance(loaded, np.ndarray):
+    with open(path, "rb") as file:  # opened here, since NumPy leaves damaged files open
+        loaded = np.load(file, allow_pickle=False)
+        arrays = None if isinstance(loaded, np.ndarray) else {name: loaded[name] for name in loaded.files}
+    if arrays is None:
         if loaded.ndim != 1 or loaded.dtype.kind not in "iuf":
             raise InputError(
                 f"array of {loaded.dtype} and shape {loaded.shape}: must be one channel of numbers"
             )
         return [{"data": loaded, "name": path.stem, "unit_str": None}]
-    with loaded:
-        arrays = {name: loaded[name] for name in loaded.files}
     scalars = {name: value.item() for name, value in arrays.items() if value.ndim == 0}
     stated = next((scalars[name] for name in RATE_NAMES if name in scalars), None)
     channels: list[Channel] = []
@@ -1058,7 +1058,11 @@ def write_uff(path: Path, signal: xr.DataArray, _full_scale: float | None) -> No
     )
     entry["n_bytes"] = values.nbytes
     path.unlink(missing_ok=True)
-    pyuff.UFF(str(path)).write_sets([entry], mode="add")
+    with warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore", ResourceWarning
+        )  # pyuff leaves a file object to the garbage collector
+        pyuff.UFF(str(path)).write_sets([entry], mode="add")
 
 
 def _first(text: Any, otherwise: str) -> str:

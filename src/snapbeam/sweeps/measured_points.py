@@ -1,4 +1,4 @@
-"""Measured responses to lay over a map, from a CSV table."""
+"""Measured responses from a CSV table."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def read_measured_points(
         text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or error
-        raise InputError(f"dots = {str(path)!r}: cannot be read, {reason}") from error
+        raise InputError(f"measurements = {str(path)!r}: cannot be read, {reason}") from error
     first = next(
         (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
     )
@@ -144,7 +144,7 @@ def _check_header(name: str, header: list[str]) -> None:
         if column not in (*_COLUMNS, *_BESIDE):
             raise InputError(f"{name}: unknown column {column!r}; must be among {', '.join(_COLUMNS)}")
         if header.count(column) > 1:
-            raise InputError(f"{name}: column {column!r} stands there twice")
+            raise InputError(f"{name}: column {column!r} occurs twice")
     for pair in (_FREQUENCY, _VELOCITY, ("response_class",)):
         found = [column for column in pair if column in header]
         if len(found) != 1:
@@ -179,5 +179,5 @@ def _kind(name: str, line: int, cell: str) -> ResponseClass:
     )
     if word not in _CLASSES:
         known = ", ".join(dict.fromkeys(kind.label for kind in ResponseClass))
-        raise InputError(f"{name}, line {line}, column 'response': {cell!r} must be one of {known}")
+        raise InputError(f"{name}, line {line}, column 'response_class': {cell!r} must be one of {known}")
     return _CLASSES[word]

@@ -1,1 +1,1 @@
-"""Natural frequencies and damping ratios from free decays."""
+"""Identification of free decays."""

@@ -1,1 +1,1 @@
-"""Figures of the lab part."""
+"""Plots of the laboratory part."""

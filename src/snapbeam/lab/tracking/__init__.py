@@ -1,1 +1,1 @@
-"""Tracking of beam and shaker in camera recordings."""
+"""Tracking of beam and striker in recordings."""
