@@ -16,16 +16,16 @@ from snapbeam.util.validation import InputError, choice, instance, integer, posi
 __all__ = ["FITTED", "identify_imperfection"]
 
 
-FITTED = ("rise", "point_load", "uniform_load")
+FITTED = ("midspan_amplitude", "point_load", "uniform_load")
 _TOLERANCE = 1e-9
 _TRIES = 60
 
 
 def identify_imperfection(
     beam: Beam,
-    lower_frequencies: float,
-    upper_frequencies: float,
-    kind: str = "rise",
+    lower_frequency: float,
+    upper_frequency: float,
+    kind: str = "midspan_amplitude",
     modes: int = 32,
     imperfection: Imperfection | None = None,
 ) -> ReducedModel:
@@ -38,9 +38,9 @@ def identify_imperfection(
     ----------
     beam : Beam
         All of it but the load is kept.
-    lower_frequencies, upper_frequencies : float
+    lower_frequency, upper_frequency : float
         First natural frequency about the lower and about the upper well, Hz.
-    kind : {"rise", "point_load", "uniform_load"}
+    kind : {"midspan_amplitude", "point_load", "uniform_load"}
         What makes the wells unequal.
     modes : int
     imperfection : Imperfection, optional
@@ -59,8 +59,8 @@ def identify_imperfection(
     instance("beam", beam, Beam, "a Beam")
     wanted = np.array(
         [
-            positive("lower_frequencies", lower_frequencies, "Hz"),
-            positive("upper_frequencies", upper_frequencies, "Hz"),
+            positive("lower_frequency", lower_frequency, "Hz"),
+            positive("upper_frequency", upper_frequency, "Hz"),
         ]
     )
     choice("kind", kind, FITTED)
@@ -71,7 +71,7 @@ def identify_imperfection(
         else instance("imperfection", imperfection, Imperfection, "one")
     )
     level = beam.buckling_level if beam.is_buckled else beam.thickness
-    sizes = np.array([level, level if kind == "rise" else _load_size(beam, kind)])
+    sizes = np.array([level, level if kind == "midspan_amplitude" else _load_size(beam, kind)])
 
     def model_at(at: Any) -> ReducedModel:
         own: dict[str, Any] = {kind: float(at[1] * sizes[1])}
@@ -110,7 +110,7 @@ def identify_imperfection(
         at, found = at + change, new
     if found is None or not np.abs(found).max() < 1e-6:
         raise InputError(
-            f"lower_frequencies = {wanted[0]:g} Hz, upper_frequencies = {wanted[1]:g} Hz: no load of this beam with a {kind} gives "
+            f"lower_frequency = {wanted[0]:g} Hz, upper_frequency = {wanted[1]:g} Hz: no load of this beam with a {kind} gives "
             "them; are thickness and length as measured?"
         )
     return model_at(at)

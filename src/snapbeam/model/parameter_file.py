@@ -297,8 +297,8 @@ def _is_sum(section: str, value: Any) -> bool:
 
 def _special(section: str, name: str, value: Any) -> tuple[str, Any]:
     """What is in no row: the law, the drive's kind, materials, and physical units."""
-    if name in ("type", "type"):
-        known = LAWS if name == "type" else _KINDS[numbered(section)[0]]
+    if name == "type":
+        known = LAWS if numbered(section)[0] == "contact" else _KINDS[numbered(section)[0]]
         if value not in known and not _is_sum(section, value):
             return f"{name} = {value!r}: must be one of {', '.join(map(repr, known))}", None
         return "", value
