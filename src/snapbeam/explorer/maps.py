@@ -1343,7 +1343,7 @@ def plain(sections: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]
     }
 
 
-def _run_section(integration: Integration) -> dict[str, Any]:
+def _integration_section(integration: Integration) -> dict[str, Any]:
     default = integration_mapping(Integration())
     return {
         name: value
@@ -1355,8 +1355,10 @@ def _run_section(integration: Integration) -> dict[str, Any]:
 def system_toml(system: System, integration: Integration, comment: str = "") -> str:
     """A parameter file of a system, which ``--config`` reads back equal."""
     sections = plain(system.to_mapping())
-    run = _run_section(integration)
-    return config_text(config_from_mapping(sections | ({"run": run} if run else {})), comment)
+    settings = _integration_section(integration)
+    return config_text(
+        config_from_mapping(sections | ({"integration": settings} if settings else {})), comment
+    )
 
 
 def _value(value: Any) -> str:
@@ -1387,16 +1389,17 @@ def map_command(axes: Mapping[str, tuple[float, float, int]], fixed: Mapping[str
 
 def python_lines(system: System, integration: Integration) -> str:
     """Lines of Python that compute a run of a system, with nothing beside them."""
-    run = _run_section(integration)
+    run = _integration_section(integration)
     arguments = ", ".join(f"{name}={value!r}" for name, value in run.items())
     sections = plain(system.to_mapping())
-    if "start" in sections:
-        sections["start"] = {name: np.asarray(value).tolist() for name, value in sections["start"].items()}
+    if "initial_state" in sections:
+        state = sections["initial_state"]
+        sections["initial_state"] = {name: np.asarray(value).tolist() for name, value in state.items()}
     text = pprint.pformat(sections, width=100, sort_dicts=False)
     return (
         "import snapbeam as sb\n\n"
         f"system = sb.System.from_mapping({text})\n"
         f"run = sb.simulate(system, sb.Integration({arguments}))\n"
-        "print(run.outcome)\n"
+        "print(run.summary)\n"
         'run.save("run.nc")\n'
     )
