@@ -135,7 +135,7 @@ def test_frequencies_and_thresholds_as_json(tmp_path, monkeypatch):
     found = json.loads(run("threshold", *SMALL, *axes, "--json", "-"))
     ds = xr.load_dataset("threshold.nc")
     np.testing.assert_array_equal(found["lower_threshold"], ds.lower_threshold.values)
-    assert found["axes"]["frequency_ratio"] == pytest.approx([0.8, 1.2, 1.6])
+    assert found["sweep"]["frequency_ratio"] == pytest.approx([0.8, 1.2, 1.6])
 
 
 @pytest.mark.parametrize("words", [

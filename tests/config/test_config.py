@@ -83,16 +83,16 @@ REFUSALS = [
     ({"map": {"location": "0.1:1:5"}}, "[map] location = 1.0: must be a number in (0, 1)"),
     ({"map": {"location": []}}, "location = []: must hold at least one point"),
     ({"map": {"location": True}}, "[map] location = True: must be a number"),
-    ({"run": {"cycles": 0}}, "[integration] cycles = 0: must be an integer in [1, 10000000]"),
+    ({"integration": {"cycles": 0}}, "[integration] cycles = 0: must be an integer in [1, 10000000]"),
     (
         {"map": {"cycles": 20}},
         "[map] cycles: unknown key; must be one of frequency_ratio, velocity_amplitude, location",
     ),
-    ({"run": {"step": "fast"}}, "[integration] step = 'fast': must be a number in s"),
-    ({"run": {"step": 0.0}}, "step = 0.0: must be a finite number greater than 0 s"),
-    ({"run": {"tolerance": 1e-3, "step": 1e-5}}, "[integration] tolerance = 0.001 with step = 1e-05"),
-    ({"run": {"engine": "gpu"}}, "[integration] engine = 'gpu': must be one of 'auto', 'cpu', 'cuda'"),
-    ({"run": {"early_termination": 1}}, "[integration] early_termination = 1: must be True or False"),
+    ({"integration": {"step": "fast"}}, "[integration] step = 'fast': must be a number in s"),
+    ({"integration": {"step": 0.0}}, "step = 0.0: must be a finite number greater than 0 s"),
+    ({"integration": {"tolerance": 1e-3, "step": 1e-5}}, "[integration] tolerance = 0.001 with step = 1e-05"),
+    ({"integration": {"engine": "gpu"}}, "[integration] engine = 'gpu': must be one of 'auto', 'cpu', 'cuda'"),
+    ({"integration": {"early_termination": 1}}, "[integration] early_termination = 1: must be True or False"),
     (
         {"model": {"damping_ratio": [0.1, 0.2]}},
         "[model] damping_ratio of shape (2,): must have the shape (32,)",
@@ -142,47 +142,47 @@ REFUSALS = [
         {"shaker": {"frequency_ratio": 1.0}, "drive": {"frequency_ratio": 2.0}},
         "[drive] frequency_ratio: is given in two sections",
     ),
-    ({"start": {"amplitude[1]": "much"}}, "[initial_state] amplitude[1] = 'much': must be a number"),
+    ({"initial_state": {"amplitude[1]": "much"}}, "[initial_state] amplitude[1] = 'much': must be a number"),
     (
-        {"start": {"amplitude[0]": 1.0}},
+        {"initial_state": {"amplitude[0]": 1.0}},
         "[initial_state] amplitude[0]: unknown key; must be amplitude[i], velocity[i]",
     ),
     (
-        {"start": {"amplitude[40]": 1.0}},
+        {"initial_state": {"amplitude[40]": 1.0}},
         "initial_state.amplitude[40]: mode = 40: must be an integer in [1, 32]",
     ),
     (
-        {"axes": {"beam.thicknes": "1e-4:2e-4:3"}},
+        {"sweep": {"beam.thicknes": "1e-4:2e-4:3"}},
         "[sweep] beam.thicknes: no parameter; did you mean 'beam.thickness'",
     ),
     (
-        {"axes": {"beam.thickness": "0.4:0.5:3"}},
+        {"sweep": {"beam.thickness": "0.4:0.5:3"}},
         "[sweep] thickness = 0.5 m: must be less than length = 0.161 m; is it given in mm?",
     ),
     (
-        {"axes": {"beam.density": "7.5:8:3"}},
+        {"sweep": {"beam.density": "7.5:8:3"}},
         "[sweep] density = 7.5: must be 10 to 30000 kg/m^3; is it given in g/cm^3?",
     ),
     (
-        {"axes": {"modes": "1,x"}},
+        {"sweep": {"modes": "1,x"}},
         "[sweep] modes = '1,x': must be a whole number, whole numbers separated by commas",
     ),
-    ({"axes": {"model.modes": "1:32:3"}}, "[sweep] modes = 16.5: must be an integer in [1, 256]"),
-    ({"axes": {"striker.side": "below,left"}}, "[sweep] side = 'left': must be one of 'below', 'above'"),
+    ({"sweep": {"model.modes": "1:32:3"}}, "[sweep] modes = 16.5: must be an integer in [1, 256]"),
+    ({"sweep": {"striker.side": "below,left"}}, "[sweep] side = 'left': must be one of 'below', 'above'"),
     (
-        {"axes": {"velocity_m_s": "-0.1:0.2:4"}},
+        {"sweep": {"velocity_m_s": "-0.1:0.2:4"}},
         "[sweep] drive.velocity_m_s = -0.1 m/s: is velocity_amplitude = -0.580416, which must",
     ),
     (
-        {"axes": {"frequency_ratio": "0.1:2:3", "frequency_hz": "10:200:3"}},
+        {"sweep": {"frequency_ratio": "0.1:2:3", "frequency_hz": "10:200:3"}},
         "[sweep] frequency_hz: the same axis is given as drive.frequency_ratio",
     ),
     (
-        {"axes": {"frequency_hz": "10:200:3", "beam.thickness": "3e-4:4e-4:2"}},
+        {"sweep": {"frequency_hz": "10:200:3", "beam.thickness": "3e-4:4e-4:2"}},
         "drive.frequency_hz: is made into drive.frequency_ratio, whose unit changes along beam.thickness",
     ),
     (
-        {"axes": {"model.modes": [1, 8]}, "drive": {"velocity_m_s": 0.03}},
+        {"sweep": {"model.modes": [1, 8]}, "drive": {"velocity_m_s": 0.03}},
         "drive.velocity_m_s: is made into drive.velocity_amplitude, whose unit changes along model.modes",
     ),
 ]
@@ -199,7 +199,7 @@ def test_refusal(sections, message):
 
 def test_every_fault_is_named():
     with pytest.raises(InputError) as refusal:
-        config_from_mapping({"run": {"cycles": 1.5, "step": "fast"}, "model": {"modes": "32"}})
+        config_from_mapping({"integration": {"cycles": 1.5, "step": "fast"}, "model": {"modes": "32"}})
     assert len(str(refusal.value).splitlines()) == 3
 
 
@@ -210,7 +210,7 @@ def test_round_trip(tmp_path):
             "model": {"modes": 8},
             "contact": {"radius": 0.005, "young_modulus": [3.5e9, 2e11], "poisson_ratio": [0.36, 0.3]},
             "map": {"frequency_ratio": "0.1:4:3", "location": [0.25, 0.5]},
-            "run": {"early_termination": True},
+            "integration": {"early_termination": True},
         }
     )
     path = tmp_path / "beam.toml"
@@ -239,7 +239,7 @@ def test_an_option_takes_a_contradicting_value_or_axis_away():
     """Given in a file, overridden on a command line: never both, and never the file's in silence."""
     config = config_from_mapping(
         {
-            "axes": {"frequency_ratio": "0.1:2:3", "modes": [1, 2]},
+            "sweep": {"frequency_ratio": "0.1:2:3", "modes": [1, 2]},
             "drive": {"velocity_m_s": 0.05},
             "striker": {"location_m": 0.05},
             "contact": {"stiffness": 1e8},
@@ -257,7 +257,7 @@ def test_an_option_takes_a_contradicting_value_or_axis_away():
         changed = after({"drive": value})
         assert changed["axes"] == {"model.modes": [1, 2]}
         assert value.items() <= changed["drive"].items()
-    assert after({"axes": {"frequency_hz": "50:100:3"}})["axes"] == {
+    assert after({"sweep": {"frequency_hz": "50:100:3"}})["axes"] == {
         "model.modes": [1, 2],
         "drive.frequency_hz": "50:100:3",
     }
@@ -277,7 +277,7 @@ def test_physical_units_are_ratios_of_the_system():
     )
     assert system.get("striker.location") == pytest.approx(0.04 / 0.161, rel=1e-14)
     axes = config_from_mapping(
-        {"axes": {"frequency_hz": "50:100:3", "velocity_m_s": [0.01, 0.03], "location_m": "0.02:0.08:4"}}
+        {"sweep": {"frequency_hz": "50:100:3", "velocity_m_s": [0.01, 0.03], "location_m": "0.02:0.08:4"}}
     ).axes()
     assert list(axes) == ["drive.frequency_ratio", "drive.velocity_amplitude", "striker.location"]
     np.testing.assert_allclose(axes["drive.frequency_ratio"] * freq, [50.0, 75.0, 100.0], rtol=1e-14)
@@ -288,7 +288,7 @@ def test_physical_units_are_ratios_of_the_system():
         )
     # the frequency that is normalised by is given, so that no number of modes changes it
     fixed = config_from_mapping(
-        {"axes": {"modes": [1, 8]}, "drive": {"frequency_hz": 100.0}, "model": {"reference_frequency": 80.0}}
+        {"sweep": {"modes": [1, 8]}, "drive": {"frequency_hz": 100.0}, "model": {"reference_frequency": 80.0}}
     )
     assert fixed.system.get("drive.frequency_ratio") == 1.25
 
@@ -298,7 +298,7 @@ def test_a_file_of_version_0_1_means_what_it_meant():
         {
             "shaker": {"frequency_ratio": 1.1, "velocity_amplitude": 0.2, "location": 0.3, "side": "above"},
             "map": {"frequency_ratio": "0.5:2:4", "velocity_amplitude": 0.25},
-            "run": {"cycles": 20, "reference_frequency": 80.0},
+            "integration": {"cycles": 20, "reference_frequency": 80.0},
         }
     )
     assert old.system.get("model.reference_frequency") == 80.0
@@ -316,7 +316,7 @@ def test_a_file_of_version_0_1_means_what_it_meant():
 
 def test_a_start_by_name():
     config = config_from_mapping(
-        {"model": {"modes": 3}, "start": {"amplitude[1]": -1.0, "velocity[2]": 0.1, "striker_position": 1e-3}}
+        {"model": {"modes": 3}, "initial_state": {"amplitude[1]": -1.0, "velocity[2]": 0.1, "striker_position": 1e-3}}
     )
     model, start = config.system.model, config.system.initial_state
     np.testing.assert_allclose(start.amplitude, model.well_amplitude, rtol=1e-15)

@@ -44,7 +44,7 @@ class Surroundings:
     loss: float = 1.0
     gap: float | None = None
     """Of a stop, m, from below, at LOCATION; None: there is none."""
-    integrate_sticking_run: bool = True
+    striker_on_base: bool = True
     """Whether the stop moves with the base."""
 
 
@@ -98,7 +98,7 @@ def live(beam: PaperBeam, around: Surroundings, times: Array, rtol: float = 1e-1
     def depth(t: float, y: Array, pressing: bool = False) -> float:
         if around.gap is None:
             return -1.0
-        at = start - around.gap - (0.0 if around.integrate_sticking_run else around.base(t)[0])
+        at = start - around.gap - (0.0 if around.striker_on_base else around.base(t)[0])
         return at - float(phi @ y[:n])
 
     def rate(t: float, y: Array, pressing: bool) -> Array:

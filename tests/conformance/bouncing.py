@@ -35,7 +35,7 @@ class Bounced(NamedTuple):
     hits: int
     impulse: Array
     """Of each hit, N s."""
-    integrate_sticking_run: float
+    striker_on_base: float
     """Seconds for which the beam was carried by the tip."""
 
 
@@ -173,7 +173,7 @@ def _released(mode, t, end):
 @njit(cache=True)
 def _bounce(mode, rest, times, found, impulses):
     """Fills in *found* and *impulses*; hits, seconds carried, and whether the impulses found room."""
-    end, t, a, v, hits, integrate_sticking_run, k = times[-1], 0.0, rest, 0.0, 0, 0.0, 0
+    end, t, a, v, hits, striker_on_base, k = times[-1], 0.0, rest, 0.0, 0, 0.0, 0
     rounding = _STILL * mode.stroke * mode.omega
     while t < end:
         # in touch: a hit, or carried on
@@ -181,7 +181,7 @@ def _bounce(mode, rest, times, found, impulses):
         closing = rate - mode.phi * v
         if closing > rounding:
             if hits == impulses.size:
-                return hits, integrate_sticking_run, False
+                return hits, striker_on_base, False
             impulses[hits] = (1.0 + mode.e) * closing * mode.mass / mode.phi**2
             hits += 1
             a, v = place / mode.phi, v + (1.0 + mode.e) * closing / mode.phi
@@ -191,7 +191,7 @@ def _bounce(mode, rest, times, found, impulses):
             while k < times.size and times[k] <= until:
                 found[k] = _tip(mode, times[k])[0]
                 k += 1
-            integrate_sticking_run, t = integrate_sticking_run + until - t, until
+            striker_on_base, t = striker_on_base + until - t, until
             place, rate = _tip(mode, t)
             a, v = place / mode.phi, rate / mode.phi
             if t >= end:
@@ -216,7 +216,7 @@ def _bounce(mode, rest, times, found, impulses):
     while k < times.size:
         found[k] = mode.phi * a
         k += 1
-    return hits, integrate_sticking_run, True
+    return hits, striker_on_base, True
 
 
 class Bouncer:
@@ -244,6 +244,6 @@ class Bouncer:
         scratch, done = 1000, False
         while not done:
             found, impulses = np.empty(times.size), np.empty(scratch)
-            hits, integrate_sticking_run, done = _bounce(self.mode, self.rest, times, found, impulses)
+            hits, striker_on_base, done = _bounce(self.mode, self.rest, times, found, impulses)
             scratch *= 10
-        return Bounced(found / LEVEL, hits, impulses[:hits], integrate_sticking_run)
+        return Bounced(found / LEVEL, hits, impulses[:hits], striker_on_base)

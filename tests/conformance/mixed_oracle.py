@@ -86,7 +86,7 @@ class Around:
 
     base: Callable[[float], tuple[float, float, float]] | None = None
     """Displacement, velocity and acceleration, upwards."""
-    integrate_sticking_run: bool = True
+    striker_on_base: bool = True
     load: Callable[[float], float] | None = None
     coupling: Array | None = None
     inertia: float = 0.0
@@ -108,7 +108,7 @@ def solve(beam: MixedBeam, tips: Sequence[Tip], around: Around, times: Array, rt
     def seen(j: int, t: float, y: Array) -> tuple[float, float]:
         tip = tips[j]
         w, v = tip.motion(t)
-        if around.base is not None and not around.integrate_sticking_run:
+        if around.base is not None and not around.striker_on_base:
             moved = around.base(t)
             w, v = w - tip.side * moved[0], v - tip.side * moved[1]
         if tip.body is not None:
@@ -141,7 +141,7 @@ def solve(beam: MixedBeam, tips: Sequence[Tip], around: Around, times: Array, rt
                 at = 2 * n + 1 + 2 * bodies.index(j)
                 m, k, c = tip.body
                 out[at], out[at + 1] = y[at + 1], (-f - c * y[at + 1] - k * y[at]) / m
-                if around.base is not None and around.integrate_sticking_run:
+                if around.base is not None and around.striker_on_base:
                     # its suspension stands on the base
                     out[at + 1] -= tip.side * around.base(t)[2]
         return out

@@ -118,7 +118,7 @@ def test_struck_with_a_nearly_open_circuit(modes, ratio, velocity, resistance, c
 
     around = Surroundings(
         away, coupling=THETA * (slopes(beam, 0.25 * LENGTH) - slopes(beam, 0.0)), inertia=CAPACITANCE,
-        loss=1.0 / resistance, gap=gap, integrate_sticking_run=False,
+        loss=1.0 / resistance, gap=gap, striker_on_base=False,
     )  # fmt: skip
     times = np.linspace(0.0, cycles * 2.0 * math.pi / omega, 801) * (1.0 - 1e-13)
     truth = live(beam, around, times)

@@ -150,21 +150,21 @@ def mixture(seed: int, modes: int) -> Mixture:
         )
         coupling, loss = 1.2 * beam.shape(0.4 * 0.161), harvester.resistance + 8.0
     words += [str(tap)] if tap != "none" else []
-    base, add_base_acceleration, integrate_sticking_run, load, axial = None, None, True, None, None
+    base, base_row, striker_on_base, load, axial = None, None, True, None, None
     strikers, laws, tips, breaks = [], [], [], []
     count = int(rng.choice([1, 1, 2, 3]))
     if rng.random() < 0.4:
-        ratio, reach, integrate_sticking_run = (
+        ratio, reach, striker_on_base = (
             rng.uniform(0.5, 1.5),
             rng.uniform(0.05, 0.2),
             bool(rng.random() < 0.6),
         )
         motion = sb.DisplacementSine(frequency_ratio=ratio, displacement_amplitude=reach)
-        base, add_base_acceleration = (
-            sb.BaseExcitation(motion=motion, striker_on_base=integrate_sticking_run),
+        base, base_row = (
+            sb.BaseExcitation(motion=motion, striker_on_base=striker_on_base),
             sine(ratio * first, reach * unit, 0.0),
         )
-        words.append("a base" if integrate_sticking_run else "a base under what stands in space")
+        words.append("a base" if striker_on_base else "a base under what stands in space")
     if rng.random() < 0.4:
         ratio, size, phase = rng.uniform(0.5, 2.5), rng.uniform(1.0, 6.0), rng.uniform(-1.0, 1.0)
         axial = sb.AxialLoadModulation(
@@ -182,7 +182,7 @@ def mixture(seed: int, modes: int) -> Mixture:
         place, side = float(rng.uniform(0.25, 0.75)), 1.0 if j == 0 or rng.random() < 0.5 else -1.0
         gap = float(rng.uniform(0.0, 0.1) * unit) if j == 0 else float(rng.uniform(0.05, 0.3) * unit)
         body: tuple[float, float, float] | None = None
-        if j == 0 and integrate_sticking_run and rng.random() < 0.4:
+        if j == 0 and striker_on_base and rng.random() < 0.4:
             body = (rng.uniform(5e-3, 5e-2), rng.uniform(200.0, 900.0), rng.uniform(0.0, 1.0))
         of_body = {} if body is None else dict(zip(("mass", "spring", "damper"), body, strict=True))
         below = "below" if side > 0.0 else "above"
@@ -195,7 +195,7 @@ def mixture(seed: int, modes: int) -> Mixture:
         words.append(f"{name} through {law.name}" + (" by a body" if body else ""))
     system = sb.System(model, laws, strikers, base_excitation=base, axial_load=axial, harvester=harvester)
     around = Around(
-        add_base_acceleration, integrate_sticking_run, load, coupling, inertia, loss, tuple(sorted(breaks))
+        base_row, striker_on_base, load, coupling, inertia, loss, tuple(sorted(breaks))
     )
     return Mixture(system, beam, tips, around, words)
 

@@ -46,7 +46,7 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
         return hardest / omega**2 * s, hardest / omega * c, -hardest * s
 
     around = Surroundings(
-        base, gap=None if stop == "none" else gap, integrate_sticking_run=stop != "in space"
+        base, gap=None if stop == "none" else gap, striker_on_base=stop != "in space"
     )
     times = np.linspace(0.0, cycles * 2.0 * math.pi / omega, 801) * (1.0 - 1e-13)
     truth = live(PaperBeam(modes), around, times)

@@ -38,7 +38,7 @@ def model_of(modes: int, **given: float) -> sb.ReducedModel:
     return sb.ReducedModel.from_beam(default_values.BEAM, modes=modes, imperfection=imperfection(**given))
 
 
-def add_base_acceleration(model: sb.ReducedModel, ratio: float, velocity: float, **more) -> sb.System:
+def struck_system(model: sb.ReducedModel, ratio: float, velocity: float, **more) -> sb.System:
     drive = sb.Sine(frequency_ratio=ratio, velocity_amplitude=velocity)
     return sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, location=LOCATION, **more))
 
@@ -65,7 +65,7 @@ def test_independent_solution(modes, cycles, given) -> None:
     truth = follow(beam, tip, times)
     for accuracy, bound in (("map", 1e-3), ("reference", 1e-7)):
         run = sb.simulate(
-            add_base_acceleration(model, 1.21, velocity),
+            struck_system(model, 1.21, velocity),
             sb.Integration(cycles=cycles, accuracy=accuracy),
             sample_times=times,
         )
@@ -117,8 +117,8 @@ def test_no_equilibrium_is_missed(seed) -> None:
 
 def test_nothing_is_bit_for_bit_the_perfect_beam() -> None:
     perfect = sb.ReducedModel.from_beam(default_values.BEAM, modes=3)
-    system = add_base_acceleration(model_of(3), 1.21, 0.2)
-    assert system == add_base_acceleration(perfect, 1.21, 0.2)
+    system = struck_system(model_of(3), 1.21, 0.2)
+    assert system == struck_system(perfect, 1.21, 0.2)
     assert system.model.imperfection is None
 
 
@@ -126,12 +126,12 @@ def test_nothing_is_bit_for_bit_the_perfect_beam() -> None:
 def test_a_small_shape_recedes_to_the_perfect_beam() -> None:
     """The error falls in proportion to the shape: to the perfect beam's own solution."""
     run = sb.simulate(
-        add_base_acceleration(model_of(3), 1.3, 0.15), sb.Integration(cycles=1, accuracy="reference")
+        struck_system(model_of(3), 1.3, 0.15), sb.Integration(cycles=1, accuracy="reference")
     )
     errors = []
     for rise in (1e-9, 1e-10, 1e-11):
         near = sb.simulate(
-            add_base_acceleration(model_of(3, rise=rise), 1.3, 0.15),
+            struck_system(model_of(3, rise=rise), 1.3, 0.15),
             sb.Integration(cycles=1, accuracy="reference"),
         )
         errors.append(
@@ -155,8 +155,8 @@ def test_mirror_image() -> None:
     )
     np.testing.assert_array_equal(mirrored.wells[::-1], -model.wells)
     for velocity in (0.1, 0.2, 0.35):
-        below = sb.advance(add_base_acceleration(model, 1.3, velocity), periods=5)
-        above = sb.advance(add_base_acceleration(mirrored, 1.3, velocity, side="above"), periods=5)
+        below = sb.advance(struck_system(model, 1.3, velocity), periods=5)
+        above = sb.advance(struck_system(mirrored, 1.3, velocity, side="above"), periods=5)
         np.testing.assert_array_equal(above.amplitude, -below.amplitude)
         np.testing.assert_array_equal(above.velocity, -below.velocity)
         np.testing.assert_array_equal(above.statistics["zero_crossings"], below.statistics["zero_crossings"])
@@ -182,7 +182,7 @@ def test_a_run_knows_nothing_of_the_others_of_its_batch() -> None:
 
 @pytest.mark.slow
 def test_going_on_loses_no_bit() -> None:
-    system = add_base_acceleration(model_of(3, rise=1e-5, skew=5e-6), 1.21, 0.25)
+    system = struck_system(model_of(3, rise=1e-5, skew=5e-6), 1.21, 0.25)
     once = sb.advance(system, periods=4)
     assert once.statistics["zero_crossings"] > 0
     twice = sb.advance(system, sb.advance(system, periods=2), periods=2)
@@ -221,7 +221,7 @@ def random_runs(modes: int, count: int, seed: int, cycles: int) -> tuple[int, in
         side = "above" if rng.random() < 0.5 else "below"
         columns = {"frequency_ratio": (0.3, 3.5), "velocity_amplitude": (0.02, 0.6), "location": (0.1, 0.9)}
         points = xr.Dataset({name: ("point", rng.uniform(*span, 40)) for name, span in columns.items()})
-        system = add_base_acceleration(model, 1.2, 0.2, side=side)
+        system = struck_system(model, 1.2, 0.2, side=side)
         full, early = (
             sb.sweep(system, points, sb.Integration(cycles=cycles, early_termination=flag))
             for flag in (False, True)
@@ -247,7 +247,7 @@ def test_refusals() -> None:
     with pytest.raises(InputError, match=r"skew = .*: needs a second mode"):
         model_of(1, skew=1e-5)
     with pytest.raises(InputError, match="unequal wells is marched by the CPU engine alone"):
-        resolve("cuda", uneven=True)
+        resolve("cuda", unequal_wells=True)
     with pytest.raises(InputError, match="must ascend from 0 to 1"):
         sb.Imperfection(profile=[[0.0, 0.2, 0.4, 0.9], [0.0, 1e-5, 1e-5, 0.0]])
     with pytest.raises(InputError, match="equilibrium beside transverse_force"):

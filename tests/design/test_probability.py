@@ -153,7 +153,7 @@ def test_a_map_is_resumed_after_being_killed(tmp_path) -> None:
         ({"spread": sb.uncertainty.ParameterUncertainty()}, "nothing differs"),
         ({"runs": 0}, "first"),
         ({"runs": "many"}, "Allocation"),
-        ({"axes": {}}, "at least one parameter"),
+        ({"sweep": {}}, "at least one parameter"),
         ({"spread": "wide"}, "Spread"),
     ],
 )

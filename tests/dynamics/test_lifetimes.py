@@ -139,7 +139,7 @@ def test_measured_lifetimes_come_again(point) -> None:
         ),
         ({"after": [50, 20]}, "after = [50, 20]"),
         ({"after": [1000]}, "after[0]"),
-        ({"axes": {"velocity_amplitde": [0.1, 0.2]}}, "did you mean"),
+        ({"sweep": {"velocity_amplitde": [0.1, 0.2]}}, "did you mean"),
     ],
 )
 def test_refusals(given, words: str) -> None:

@@ -41,7 +41,7 @@ def test_a_changed_system_says_what_is_old(tab, served, small_map, system):
         "beam.thickness": 0.0005, "drive.frequency_ratio": x,
         "drive.velocity_amplitude": float(small_map["velocity_amplitude"][11]),
     })  # fmt: skip
-    outcome = sb.simulate(changed, sb.Integration(cycles=30)).outcome
+    outcome = sb.simulate(changed, sb.Integration(cycles=30)).summary
     page.wait(
         lambda: f"{outcome.zero_crossings} crossings, {outcome.impacts} impacts" in page.head(),
         "the changed run",

@@ -66,8 +66,8 @@ def test_numbers_are_typed_in_full(tab, served, system):
         **{"drive.frequency_ratio": 1.2345678901234567, "drive.velocity_amplitude": 0.31415926535897931}
     )
     run = sb.simulate(exact, sb.Integration(cycles=30))
-    assert run.outcome.response_class.label in page.head()
-    assert f"{run.outcome.zero_crossings} crossings, {run.outcome.impacts} impacts" in page.head()
+    assert run.summary.response_class.label in page.head()
+    assert f"{run.summary.zero_crossings} crossings, {run.outcome.impacts} impacts" in page.head()
     page.page.get_by_label("frequency ratio").fill("one")
     page.page.get_by_role("button", name="Run").click()
     page.wait(lambda: "must be a number" in page.head(), "a refusal in words")

@@ -48,7 +48,7 @@ def test_every_view_shows_the_run(opened):
     page.wait(lambda: len(page.data("impacts", "peak")) > 0, "the impacts")
     np.testing.assert_array_equal(page.data("impacts", "peak"), run.impacts["peak_force"].values)
     _turn(page, "Numbers")
-    page.wait(lambda: page.page.locator("table.numbers tr").count() == len(run.outcome), "the numbers")
+    page.wait(lambda: page.page.locator("table.numbers tr").count() == len(run.summary), "the numbers")
 
 
 def test_the_beam_moves_and_is_that_of_the_modes(opened):

@@ -125,9 +125,9 @@ def test_a_start_changes_only_what_is_named() -> None:
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("amplitude[4]", r"start\.amplitude\[4\]: mode = 4: must be an integer in \[1, 3\]"),
-        ("amplitude[0]", r"start\.amplitude\[0\]: no parameter of a start; must be amplitude\[i\]"),
-        ("position", r"start\.position: no parameter of a start"),
+        ("amplitude[4]", r"initial_state\.amplitude\[4\]: mode = 4: must be an integer in \[1, 3\]"),
+        ("amplitude[0]", r"initial_state\.amplitude\[0\]: no parameter of a start; must be amplitude\[i\]"),
+        ("position", r"initial_state\.position: no parameter of a start"),
     ],
 )
 def test_starts_that_are_none(name: str, message: str) -> None:

@@ -123,8 +123,8 @@ def test_files_that_cannot_be_used(tmp_path) -> None:
         sb.System.load(tmp_path / "none.toml")
     with pytest.raises(InputError, match=r"must end in \.toml"):
         PLAIN.save(tmp_path / "system.json")
-    sections = PLAIN.to_mapping() | {"start": {"phase": 1.0}}
-    with pytest.raises(InputError, match=r"\[start\] amplitude: missing"):
+    sections = PLAIN.to_mapping() | {"initial_state": {"phase": 1.0}}
+    with pytest.raises(InputError, match=r"\[initial_state\] amplitude: missing"):
         sb.System.from_mapping(sections)
     with pytest.raises(InputError, match=r"\[drive\] kind = None: must be one of 'burst', 'chirp'"):
         sb.System.from_mapping({name: part for name, part in PLAIN.to_mapping().items() if name != "drive"})
@@ -374,7 +374,7 @@ def test_another_number_of_modes_keeps_the_start() -> None:
         ),
         (
             {"initial_state.amplitude[9]": 1.0},
-            r"start\.amplitude\[9\]: mode = 9: must be an integer in \[1, 3\]",
+            r"initial_state\.amplitude\[9\]: mode = 9: must be an integer in \[1, 3\]",
         ),
         ({"beam": default_values.STRAIGHT_BEAM}, "a run needs a buckled beam: axial_load = 0 N must exceed"),
         ({"beam.buckling_level": 1e-3, "beam.axial_load": 30.0}, "give exactly one of the two"),

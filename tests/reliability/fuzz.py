@@ -89,7 +89,7 @@ def _valid(name: str, draw: random.Random) -> Any:
     pool = {
         "model": MODEL, "contact": default_values.CONTACT, "striker": SHAKER, "shaker": SHAKER, "system": SYSTEM,
         "integration": SHORT, "beam": default_values.BEAM, "modes": 1, "cycles": 1, "periods": 1.0, "count": 2,
-        "axes": {"drive.velocity_amplitude": [0.1, 0.2]}, "frequency_ratio": [0.8, 1.0],
+        "sweep": {"drive.velocity_amplitude": [0.1, 0.2]}, "frequency_ratio": [0.8, 1.0],
         "velocity_amplitude": [0.1, 0.2], "location": 0.4, "length": 0.161, "thickness": 0.4e-3, "width": 15e-3,
         "density": 7800.0, "young_modulus": 200e9, "buckling_level": 0.335e-3, "stiffness": 4e8, "mass": [[1.0]],
         "contact_shape": [1.0], "damping_ratio": 0.01, "along": {"drive.frequency_ratio": [0.8, 1.0]},

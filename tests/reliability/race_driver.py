@@ -20,9 +20,9 @@ import numpy as np
 import zarr.storage  # noqa: F401  (loaded before the first fork, so that a child starts at once)
 
 import snapbeam as sb
-from snapbeam.sweeps.checkpoint.store import MapStore
+from snapbeam.sweeps.checkpoint.store import Checkpoint
 from snapbeam.sweeps.doors import long_map, map_setup
-from snapbeam.sweeps.tasks import MemoryKeeper, PointWork, Stage
+from snapbeam.sweeps.tasks import MemoryRunner, PointWork, Stage
 
 WRITERS = 3
 BEAM = sb.Beam(
@@ -77,7 +77,7 @@ def main(folder, races, seed):
     """Run *races* races and print what was seen as JSON."""
     work = PointWork(map_setup(**ASKED))
     grid = work.setup.points
-    wanted = MemoryKeeper(work, 1).complete(Stage("base", grid, grid.size)).read(0, grid.size).content_hash()
+    wanted = MemoryRunner(work, 1).complete(Stage("base", grid, grid.size)).read(0, grid.size).content_hash()
     stage, draw = Stage("base", grid, 3), random.Random(seed)
     seen = dict.fromkeys(("races", "written", "refused", "died", "silent", "nobody", "unnamed", "wrong"), 0)
     seen["texts"] = []
@@ -94,7 +94,7 @@ def main(folder, races, seed):
             elif each["ended"] == "died":
                 seen["texts"].append(each["text"])
         seen["nobody"] += not any(each["ended"] == "written" for each in said)
-        with MapStore(store, work) as held:
+        with Checkpoint(store, work) as held:
             held.open_stage(stage)
             whole = not held.pending(stage) and not held.damaged
             seen["wrong"] += not whole or held.reader(stage).read(0, grid.size).content_hash() != wanted

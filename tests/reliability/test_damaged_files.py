@@ -8,6 +8,7 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from small_map import swept
 from typer.testing import CliRunner
 
 import snapbeam as sb
@@ -22,7 +23,7 @@ def written(tmp_path_factory):
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=1)
     system = sb.System(model, default_values.CONTACT, sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.1))
     sb.simulate(system, sb.Integration(cycles=2)).save(folder / "run.nc")
-    sb.response_map(
+    swept(
         model, default_values.CONTACT, frequency_ratio=[1.0, 1.5], velocity_amplitude=[0.1, 0.2], cycles=5
     ).to_netcdf(folder / "map.nc", engine="h5netcdf")
     return folder

@@ -9,8 +9,8 @@ import pytest
 
 import snapbeam as sb
 from snapbeam.model.contact.base import LAWS
-from snapbeam.sweeps.checkpoint.records import Ledger, Record
-from snapbeam.sweeps.tasks import differences, this_maker
+from snapbeam.sweeps.checkpoint.records import TaskLog, Record
+from snapbeam.sweeps.tasks import differences, provenance_of
 from snapbeam.util.provenance import arithmetic_hash, code_hash
 from snapbeam.util.validation import InputError
 
@@ -80,7 +80,7 @@ def test_what_computed_stands_in_the_store(tmp_path):
     found = sb.sweep(
         system(), AXES, sb.Integration(cycles=2), checkpoint=sb.CheckpointOptions(tmp_path / "store")
     )
-    (record,) = Ledger(tmp_path / "store" / "ledger.jsonl").records.values()
+    (record,) = TaskLog(tmp_path / "store" / "tasks.jsonl").records.values()
     assert record.code == code_hash() and record.arithmetic == arithmetic_hash()
     assert f"numpy {np.__version__}" in record.libraries and "numba" in record.libraries
     assert found.attrs["reproducible"].startswith("bit for bit")
@@ -106,8 +106,8 @@ def test_parts_that_something_else_computed_are_told(tmp_path, name, value, word
     store, how = tmp_path / "store", sb.Integration(cycles=2)
     axes = {"drive.velocity_amplitude": np.linspace(0.2, 0.5, 4)}
     sb.sweep(system(), axes, how, checkpoint=sb.CheckpointOptions(store, points_per_task=2))
-    ledger = store / "ledger.jsonl"
-    records = list(Ledger(ledger).records.values())
+    ledger = store / "tasks.jsonl"
+    records = list(TaskLog(ledger).records.values())
     changed = Record(**vars(records[0]) | {name: value})
     ledger.write_text("".join(f"{record.line()}\n" for record in (changed, records[1])), encoding="utf-8")
     with pytest.warns(UserWarning, match=words):
@@ -143,7 +143,7 @@ def test_the_code_of_a_foreign_law_counts(monkeypatch):
 
     mine, own = system(), system()
     own = own.replace(contact=OtherLaw(stiffness=4e8))
-    assert this_maker(mine.replace(contact=sb.HertzContact(stiffness=4e8))).code == code_hash()
-    assert this_maker(own).code.startswith(f"{code_hash()}+")
-    assert differences([this_maker(mine), this_maker(own)]) == ["state of its code"]
+    assert provenance_of(mine.replace(contact=sb.HertzContact(stiffness=4e8))).code == code_hash()
+    assert provenance_of(own).code.startswith(f"{code_hash()}+")
+    assert differences([provenance_of(mine), provenance_of(own)]) == ["state of its code"]
     assert differences([]) == []

@@ -15,8 +15,8 @@ import pytest
 
 from snapbeam.sweeps import distributed as workers
 from snapbeam.sweeps.checkpoint.records import CheckpointError
-from snapbeam.sweeps.checkpoint.store import MapStore
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, StoreKeeper, SweepReport
+from snapbeam.sweeps.checkpoint.store import Checkpoint
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, CheckpointRunner, SweepReport
 from snapbeam.sweeps.distributed import ClusterWorkers, open_client, parse_cluster
 from snapbeam.sweeps.tasks import Stage
 
@@ -33,11 +33,11 @@ def client():
 
 
 def computed(path, work, client, **options):
-    stage, tally, said = Stage("base", work.setup.points, CHUNK), SweepReport(), []
-    with MapStore(path, work, CHUNK) as store:
-        keeping = CheckpointOptions(path, note=said.append, report=tally)
-        results = StoreKeeper(store, ClusterWorkers(client, said.append, **options), keeping).complete(stage)
-        return results.read(0, stage.size), tally, said
+    stage, report, said = Stage("base", work.setup.points, CHUNK), SweepReport(), []
+    with Checkpoint(path, work, CHUNK) as store:
+        options = CheckpointOptions(path, note=said.append, report=report)
+        results = CheckpointRunner(store, ClusterWorkers(client, said.append, **options), options).complete(stage)
+        return results.read(0, stage.size), report, said
 
 
 def within(seconds, function, *arguments, **options):
@@ -83,9 +83,9 @@ def between(monkeypatch, client, tried):
 
 def test_a_worker_that_dies_before_it_delivers(tmp_path, work, whole, client, between):
     between += [False, True, False, True]
-    columns, tally, _ = within(120, computed, tmp_path / "store", work, client)
+    columns, report, _ = within(120, computed, tmp_path / "store", work, client)
     assert columns.content_hash() == whole.content_hash()
-    assert tally.computed == 7 and not tally.failed and not between
+    assert report.computed == 7 and not report.failed and not between
 
 
 def test_a_worker_that_never_delivers(tmp_path, work, client, monkeypatch):
@@ -97,9 +97,9 @@ def test_a_worker_that_never_delivers(tmp_path, work, client, monkeypatch):
         raise TimeoutError
 
     monkeypatch.setattr(Future, "result", result)
-    _, tally, _said = within(120, computed, tmp_path / "store", work, client, delivery=0.1)
-    assert len(tally.failed) == 7
-    assert all("gave no results within 0.1 s, 3 times" in reason for _, _, reason in tally.failed)
+    _, report, _said = within(120, computed, tmp_path / "store", work, client, delivery=0.1)
+    assert len(report.failed) == 7
+    assert all("gave no results within 0.1 s, 3 times" in reason for _, _, reason in report.failed)
 
 
 def test_workers_with_other_code_are_refused(tmp_path, work, client, monkeypatch):
@@ -191,7 +191,7 @@ def test_a_scheduler_that_is_killed(tmp_path, work, monkeypatch, tried):
         process.communicate()
     tried("schedulers killed")
     stage = Stage("base", work.setup.points, CHUNK)
-    with MapStore(tmp_path / "store", work) as store:
+    with Checkpoint(tmp_path / "store", work) as store:
         store.open_stage(stage)
         assert 1 <= len(store.pending(stage)) < stage.tasks
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from snapbeam.sweeps.checkpoint.records import CheckpointError
-from snapbeam.sweeps.checkpoint.store import MapStore
+from snapbeam.sweeps.checkpoint.store import Checkpoint
 from snapbeam.sweeps.tasks import Stage
 from snapbeam.util.validation import InputError
 
@@ -49,7 +49,7 @@ def test_three_writers_at_once_a_hundred_times(tmp_path, tried):
 def stored(tmp_path, work):
     """A finished store."""
     stage = Stage("base", work.setup.points, CHUNK)
-    with MapStore(tmp_path / "store", work, CHUNK) as store:
+    with Checkpoint(tmp_path / "store", work, CHUNK) as store:
         store.open_stage(stage)
         for task in store.pending(stage):
             store.commit(stage, task, store.work.compute(stage.columns(task), 1))
@@ -60,24 +60,24 @@ def test_a_refused_writer_touches_nothing(stored, work):
     """What the writer is in the middle of is left alone; who holds it next sweeps what is torn."""
     path, _ = stored
     torn = path / "runs.zarr" / ".c.0.0.1234.partial"
-    with MapStore(path, work):
+    with Checkpoint(path, work):
         torn.write_bytes(b"in the middle of it")
         before = {file: file.stat().st_mtime_ns for file in path.rglob("*")}
         with pytest.raises(CheckpointError, match=rf"another process .process {os.getpid()}."):
-            MapStore(path, work)
+            Checkpoint(path, work)
         assert {file: file.stat().st_mtime_ns for file in path.rglob("*")} == before
-    with MapStore(path, work):
+    with Checkpoint(path, work):
         assert not torn.exists()
 
 
 def test_a_foreign_folder_is_left_as_it_is(tmp_path, work):
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(InputError, match="is not empty and holds no map"):
-        MapStore(tmp_path, work)
+        Checkpoint(tmp_path, work)
     assert [file.name for file in tmp_path.iterdir()] == ["notes.txt"]
 
 
-@pytest.mark.parametrize("name", ["lock", "ledger.jsonl"])
+@pytest.mark.parametrize("name", ["lock", "tasks.jsonl"])
 def test_hard_links_lead_nowhere(stored, work, tmp_path, tried, name):
     """A file of the store that is also one outside is not written to."""
     path, stage = stored
@@ -86,7 +86,7 @@ def test_hard_links_lead_nowhere(stored, work, tmp_path, tried, name):
     os.link(outside, path / name)
     before = outside.read_bytes()
     tried("links in a store")
-    with pytest.raises(InputError, match="is a link or no plain file"), MapStore(path, work) as store:
+    with pytest.raises(InputError, match="is a link or no plain file"), Checkpoint(path, work) as store:
         store.open_stage(stage)
         store.fail(stage, 0, "for this test")
     assert outside.read_bytes() == before
@@ -96,9 +96,9 @@ def test_a_name_of_a_holder_that_is_gone_is_not_told(stored, work):
     """After a kill the old name stands in the lock; the next writer's is told as soon as it is there."""
     path, _ = stored
     (path / "lock").write_text("process 4194304000\n", encoding="utf-8")
-    with MapStore(path, work):
+    with Checkpoint(path, work):
         with pytest.raises(CheckpointError, match=rf"process {os.getpid()}"):
-            MapStore(path, work)
+            Checkpoint(path, work)
     assert (path / "lock").read_text(encoding="utf-8") == ""
 
 
@@ -111,12 +111,12 @@ def test_a_whole_store_is_read_where_nothing_can_be_written(
     disk = mounted("media", "size=4m")
     stage = Stage("base", work.setup.points, CHUNK)
     for name, tasks in (("whole", 4), ("half", 2)):
-        with MapStore(disk / name, work, CHUNK) as store:
+        with Checkpoint(disk / name, work, CHUNK) as store:
             store.open_stage(stage)
             for task in store.pending(stage)[:tasks]:
                 store.commit(stage, task, store.work.compute(stage.columns(task), 1))
     read_only(disk)
-    with MapStore(disk / "whole", work) as store:
+    with Checkpoint(disk / "whole", work) as store:
         assert store.read_only
     result = long_map(**small, store=disk / "whole", output=tmp_path / "map.nc")
     assert (result["response_class"].values.ravel() == work.values("response_class", whole)).all()

@@ -16,13 +16,13 @@ import time
 from pathlib import Path
 
 import numpy as np
+from small_map import setup_of
 
 import snapbeam as sb
-from snapbeam.sweeps.checkpoint.store import MapStore
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, StoreKeeper, SweepReport
+from snapbeam.sweeps.checkpoint.store import Checkpoint
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, CheckpointRunner, SweepReport
 from snapbeam.sweeps.distributed import ClusterWorkers, open_client, parse_cluster
-from snapbeam.sweeps.doors import map_setup
-from snapbeam.sweeps.tasks import MemoryKeeper, PointWork, Stage
+from snapbeam.sweeps.tasks import MemoryRunner, PointWork, Stage
 
 CHUNK = 4
 LONGEST = 180.0
@@ -43,13 +43,13 @@ def compute(store, work, stage, client, said):
     """One map, and again what was given up, as somebody would; leaves the rows or the error in *said*."""
     try:
         for _ in range(4):
-            tally = SweepReport()
-            with MapStore(store, work, CHUNK) as held:
-                keeping = CheckpointOptions(store, note=lambda _: None, report=tally)
-                rows = StoreKeeper(held, ClusterWorkers(client, lambda _: None), keeping).complete(stage)
+            report = SweepReport()
+            with Checkpoint(store, work, CHUNK) as held:
+                options = CheckpointOptions(store, note=lambda _: None, report=report)
+                rows = CheckpointRunner(held, ClusterWorkers(client, lambda _: None), options).complete(stage)
                 found = rows.read(0, stage.size).content_hash()
-            said["given up"] = said.get("given up", 0) + len(tally.failed)
-            if not tally.failed:
+            said["given up"] = said.get("given up", 0) + len(report.failed)
+            if not report.failed:
                 said["hash"] = found
                 return
     except BaseException as error:
@@ -59,10 +59,10 @@ def compute(store, work, stage, client, said):
 def main(folder, maps, kills, seed):
     """Compute *maps* maps under *kills* kills and print what was seen as JSON."""
     faulthandler.register(signal.SIGUSR1, all_threads=True)
-    work = PointWork(map_setup(**ASKED))
+    work = PointWork(setup_of(**ASKED))
     grid = work.setup.points
     stage = Stage("base", grid, CHUNK)
-    wanted = MemoryKeeper(work, 1).complete(Stage("base", grid, grid.size)).read(0, grid.size).content_hash()
+    wanted = MemoryRunner(work, 1).complete(Stage("base", grid, grid.size)).read(0, grid.size).content_hash()
     draw = random.Random(seed)
     seen = {"maps": 0, "kills": 0, "hung": 0, "differ": 0, "raised": 0, "given up": 0, "texts": []}
     with open_client(parse_cluster("local:2")) as client:

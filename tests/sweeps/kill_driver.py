@@ -18,11 +18,11 @@ from pathlib import Path
 
 import numpy as np
 import zarr.storage  # noqa: F401  (loaded before the first fork, so that a child starts at once)
+from small_map import setup_of, swept
 
 import snapbeam as sb
-from snapbeam.sweeps.checkpoint.store import MapStore
-from snapbeam.sweeps.doors import long_map, map_setup
-from snapbeam.sweeps.tasks import MemoryKeeper, PointWork, Stage
+from snapbeam.sweeps.checkpoint.store import Checkpoint
+from snapbeam.sweeps.tasks import MemoryRunner, PointWork, Stage
 
 CHUNK = 3
 BEAM = sb.Beam(
@@ -59,12 +59,12 @@ def compute(store, trace):
         return begin(self, *arguments)
 
     PointWork.compute = counted
-    long_map(**ASKED, store=store, chunk=CHUNK, threads=1)
+    swept(**ASKED, path=store, points_per_task=CHUNK, threads=1)
 
 
 def look(store, work, stage, answer):
     """Say which tasks are done, with the hashes of their data as read back, and which are damaged."""
-    with MapStore(store, work) as held:
+    with Checkpoint(store, work) as held:
         held.open_stage(stage)
         pending = set(held.pending(stage))
         done = {
@@ -72,16 +72,16 @@ def look(store, work, stage, answer):
             for task in range(stage.tasks)
             if task not in pending
         }
-        found = {"done": done, "damaged": held.damaged_in(stage), "torn": held.ledger.torn}
+        found = {"done": done, "damaged": held.damaged_in(stage), "torn": held.task_log.torn}
     os.write(answer, json.dumps(found).encode())
 
 
 def main(folder, kills, seed):
     """Kill *kills* times and print what was seen as JSON."""
-    work = PointWork(map_setup(**ASKED))
+    work = PointWork(setup_of(**ASKED))
     grid = work.setup.points
     stage = Stage("base", grid, CHUNK)
-    whole = MemoryKeeper(work, 1).complete(Stage("base", grid, grid.size))
+    whole = MemoryRunner(work, 1).complete(Stage("base", grid, grid.size))
     wanted = {task: whole.read(*stage.bounds(task)).content_hash() for task in range(stage.tasks)}
     draw = random.Random(seed)
     seen = {"kills": 0, "maps": 0, "lost": 0, "changed": 0, "wrong": 0, "damaged": 0, "begun": 0, "needed": 0}

@@ -10,13 +10,13 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from small_map import setup_of, swept
 
 import snapbeam as sb
 from snapbeam.sweeps.checkpoint.records import CheckpointError
-from snapbeam.sweeps.checkpoint.store import MapStore
-from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, StoreKeeper, SweepReport
+from snapbeam.sweeps.checkpoint.store import Checkpoint
+from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, CheckpointRunner, SweepReport
 from snapbeam.sweeps.distributed import ATTEMPTS, ClusterWorkers, open_client, parse_cluster, slurm_arguments
-from snapbeam.sweeps.doors import long_map, map_setup
 from snapbeam.sweeps.tasks import PointWork, Stage
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError
@@ -61,7 +61,7 @@ def client():
 
 
 def trouble(small, folder, once=None, always=None):
-    work = Trouble(map_setup(**small))
+    work = Trouble(setup_of(**small))
     stage = Stage("base", work.setup.points, CHUNK)
 
     def first(task):
@@ -75,11 +75,11 @@ def trouble(small, folder, once=None, always=None):
 
 
 def computed(path, work, stage, client):
-    tally, said = SweepReport(), []
-    with MapStore(path, work, CHUNK) as store:
-        keeping = CheckpointOptions(path, note=said.append, report=tally)
-        results = StoreKeeper(store, ClusterWorkers(client, said.append), keeping).complete(stage)
-        return results.read(0, stage.size), tally, said, store.made_with()
+    report, said = SweepReport(), []
+    with Checkpoint(path, work, CHUNK) as store:
+        options = CheckpointOptions(path, note=said.append, report=report)
+        results = CheckpointRunner(store, ClusterWorkers(client, said.append), options).complete(stage)
+        return results.read(0, stage.size), report, said, store.made_with()
 
 
 def test_nothing_listens_to_the_network(client):
@@ -96,9 +96,9 @@ def test_nothing_listens_to_the_network(client):
 def test_workers_that_are_killed_in_mid_task(tmp_path, small, whole, client):
     """By SIGKILL and by a segmentation fault: the same numbers, to the last bit."""
     work, stage = trouble(small, tmp_path, once={1: "kill", 4: "segfault"})
-    columns, tally, _, made = computed(tmp_path / "store", work, stage, client)
+    columns, report, _, made = computed(tmp_path / "store", work, stage, client)
     assert columns.content_hash() == whole.content_hash()
-    assert tally.computed == 7 and not tally.failed and "failed_tasks" not in made
+    assert report.computed == 7 and not report.failed and "failed_tasks" not in made
     assert sorted(len(file.read_text(encoding="utf-8")) for file in tmp_path.glob("*-*")) == [
         1,
         1,
@@ -112,9 +112,9 @@ def test_workers_that_are_killed_in_mid_task(tmp_path, small, whole, client):
 
 def test_a_poisonous_task_is_set_apart(tmp_path, small, whole, client):
     work, stage = trouble(small, tmp_path, always={2: "kill"}, once={5: "raise"})
-    columns, tally, said, made = computed(tmp_path / "store", work, stage, client)
-    assert tally.failed == [("base", 2, f"killed its worker, {ATTEMPTS} times")]
-    assert tally.computed == 6 and any("task 2 was given up" in line for line in said)
+    columns, report, said, made = computed(tmp_path / "store", work, stage, client)
+    assert report.failed == [("base", 2, f"killed its worker, {ATTEMPTS} times")]
+    assert report.computed == 6 and any("task 2 was given up" in line for line in said)
     assert "base 2: killed its worker, 3 times" in made["failed_tasks"]
     poisoned = slice(2 * CHUNK, 3 * CHUNK)
     status = work.values("status", columns)
@@ -131,9 +131,9 @@ def test_a_poisonous_task_is_set_apart(tmp_path, small, whole, client):
         2,
         3,
     ]
-    tally = SweepReport()
-    result = long_map(**small, store=tmp_path / "store", tally=tally)  # here, and without the poison
-    assert tally.resumed == 6 and tally.computed == 1
+    report = SweepReport()
+    result = swept(**small, path=tmp_path / "store", report=report)  # here, and without the poison
+    assert report.resumed == 6 and report.computed == 1
     np.testing.assert_array_equal(
         result["response_class"].values.ravel(), PointWork.values(work, "response_class", whole)
     )
@@ -148,8 +148,8 @@ def test_workers_that_cannot_compute_at_all(tmp_path, small, client):
 def test_a_scheduler_that_runs_already(tmp_path, small, whole, client):
     """The address of a scheduler, through the public function; refined as well."""
     address = client.scheduler.address
-    result = long_map(**small, store=tmp_path / "store", cluster=address, chunk=4, refine_levels=1)
-    here = long_map(**small, refine_levels=1)
+    result = swept(**small, path=tmp_path / "store", cluster=address, points_per_task=4, refine_levels=1)
+    here = swept(**small, refine_levels=1)
     for name in here.data_vars:
         np.testing.assert_array_equal(result[name], here[name])
     assert "bit for bit" in result.attrs["reproducible"]
@@ -221,7 +221,7 @@ def test_slurm_files_that_are_wrong(tmp_path, text, message):
 
 def test_a_cluster_needs_a_store(small):
     with pytest.raises(InputError, match="cluster: needs a store"):
-        long_map(**small, cluster="local:2")
+        swept(**small, cluster="local:2")
 
 
 def test_importing_loads_no_cluster():

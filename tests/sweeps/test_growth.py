@@ -7,13 +7,13 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
+from small_map import setup_of, swept
 from typer.testing import CliRunner
 
 import snapbeam as sb
 from snapbeam.cli.app import app
 from snapbeam.sweeps.checkpoint.store import layers_of
 from snapbeam.sweeps.checkpointed_sweep import SweepReport
-from snapbeam.sweeps.doors import long_map, map_setup
 from snapbeam.sweeps.tasks import PointWork
 
 LONGER = {
@@ -33,34 +33,34 @@ def same(left, right):
 
 def test_a_longer_map_takes_what_the_store_holds(tmp_path, small):
     path = tmp_path / "store"
-    long_map(**small, store=path, chunk=6)
-    ledger = (path / "ledger.jsonl").read_bytes()
+    swept(**small, path=path, points_per_task=6)
+    ledger = (path / "tasks.jsonl").read_bytes()
     data = {file: file.read_bytes() for file in (path / "runs.zarr" / "base").rglob("c.*")}
-    tally = SweepReport()
-    grown = long_map(**(small | LONGER), store=path, tally=tally)
-    assert tally.runs == 42 - 20, "only what the store had not was run"
-    assert not tally.damaged and not tally.failed
-    same(grown, long_map(**(small | LONGER)))
-    assert (path / "ledger.jsonl").read_bytes().startswith(ledger), "nothing of before was written again"
+    report = SweepReport()
+    grown = swept(**(small | LONGER), path=path, report=report)
+    assert report.runs == 42 - 20, "only what the store had not was run"
+    assert not report.damaged and not report.failed
+    same(grown, swept(**(small | LONGER)))
+    assert (path / "tasks.jsonl").read_bytes().startswith(ledger), "nothing of before was written again"
     assert {file: file.read_bytes() for file in data} == data
     same(sb.read_checkpoint(path), grown)
     assert json.loads((path / "map.json").read_bytes())["format_version"] == 4, "not for versions before"
 
     again = SweepReport()
-    same(long_map(**(small | LONGER), store=path, tally=again), grown)
+    same(swept(**(small | LONGER), path=path, report=again), grown)
     assert again.runs == 0
 
     wider = small | LONGER | {"velocity_amplitude": np.append(LONGER["velocity_amplitude"], 0.9)}
     once_more = SweepReport()
-    third = long_map(**wider, store=path, tally=once_more)
+    third = swept(**wider, path=path, report=once_more)
     assert once_more.runs == 7
-    same(third, long_map(**wider))
+    same(third, swept(**wider))
     same(sb.read_checkpoint(path), third)
 
 
 def test_layers_hold_each_point_once(small):
     chain = [small, small | {"frequency_ratio": LONGER["frequency_ratio"]}, small | LONGER]
-    works = [PointWork(map_setup(**each)) for each in chain]
+    works = [PointWork(setup_of(**each)) for each in chain]
     earlier = [
         {"points": work.setup.points.describe(), "axes": list(work.setup.points.names)} for work in works[:-1]
     ]
@@ -78,47 +78,47 @@ def test_layers_hold_each_point_once(small):
 
 def test_a_map_that_is_stopped_while_it_grows_goes_on(tmp_path, small):
     path = tmp_path / "store"
-    long_map(**small, store=path, chunk=6)
+    swept(**small, path=path, points_per_task=6)
 
     def stop(done, total):
         if done > 6:  # the first task is kept by then
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        long_map(**(small | LONGER), store=path, progress=stop)
+        swept(**(small | LONGER), path=path, progress=stop)
     half = sb.read_checkpoint(path)
     assert 20 < half.attrs["points_done"] < 42 and half.attrs["points_total"] == 42
-    tally = SweepReport()
-    same(long_map(**(small | LONGER), store=path, tally=tally), long_map(**(small | LONGER)))
-    assert 0 < tally.runs < 22
+    report = SweepReport()
+    same(swept(**(small | LONGER), path=path, report=report), swept(**(small | LONGER)))
+    assert 0 < report.runs < 22
 
 
 @pytest.mark.parametrize("layer", ["base", "more-1"])
 def test_damage_in_any_layer_is_found_and_repaired(tmp_path, small, layer):
     path = tmp_path / "store"
-    long_map(**small, store=path, chunk=6)
-    grown = long_map(**(small | LONGER), store=path)
+    swept(**small, path=path, points_per_task=6)
+    grown = swept(**(small | LONGER), path=path)
     file = sorted((path / "runs.zarr" / layer / "numbers").rglob("c.*"))[1]
     held = bytearray(file.read_bytes())
     held[len(held) // 2] ^= 0x10
     file.write_bytes(bytes(held))
-    tally = SweepReport()
-    same(long_map(**(small | LONGER), store=path, verify=True, tally=tally), grown)
-    assert [stage for stage, _ in tally.damaged] == [layer]
+    report = SweepReport()
+    same(swept(**(small | LONGER), path=path, check_checkpoint=True, report=report), grown)
+    assert [stage for stage, _ in report.damaged] == [layer]
 
 
 def test_values_that_rounding_alone_tells_apart_are_those_of_the_store(tmp_path, small):
-    path, told, tally = tmp_path / "store", [], SweepReport()
+    path, told, report = tmp_path / "store", [], SweepReport()
     first = small | {"velocity_amplitude": np.linspace(0.1, 0.3, 3)}
-    long_map(**first, store=path)
+    swept(**first, path=path)
     asked = np.linspace(0.1, 0.5, 5)
     assert (asked[:3] != first["velocity_amplitude"]).any(), "else this tries nothing"
-    grown = long_map(**(small | {"velocity_amplitude": asked}), store=path, note=told.append, tally=tally)
-    assert tally.runs == 10
+    grown = swept(**(small | {"velocity_amplitude": asked}), path=path, note=told.append, report=report)
+    assert report.runs == 10
     assert any("are those of the store, at most" in words for words in told)
     np.testing.assert_array_equal(grown["velocity_amplitude"][:3], first["velocity_amplitude"])
     exact = np.append(first["velocity_amplitude"], asked[3:])
-    same(grown, long_map(**(small | {"velocity_amplitude": exact})))
+    same(grown, swept(**(small | {"velocity_amplitude": exact})))
 
 
 def test_axes_in_another_order_and_of_other_structures_grow_too(tmp_path, model, contact):
@@ -135,41 +135,41 @@ def test_axes_in_another_order_and_of_other_structures_grow_too(tmp_path, model,
 
 def test_repeats_of_a_point_do_not_depend_on_where_it_stands(tmp_path, small):
     few = small | {"replicas": 2, "perturbation_rms": 1e-4}
-    long_map(**few, store=tmp_path / "store")
-    grown = long_map(**(few | LONGER), store=tmp_path / "store")
-    same(grown, long_map(**(few | LONGER)))
+    swept(**few, path=tmp_path / "store")
+    grown = swept(**(few | LONGER), path=tmp_path / "store")
+    same(grown, swept(**(few | LONGER)))
 
 
 def test_what_cannot_grow_is_refused_with_what_to_do(tmp_path, small):
     path = tmp_path / "store"
-    long_map(**small, store=path)
+    swept(**small, path=path)
     before = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
     with pytest.raises(
         sb.InputError, match=r"not marched on.*Ask for the store's 3 cycles, or give another folder for 6"
     ):
-        long_map(**(small | {"cycles": 6}), store=path)
+        swept(**(small | {"cycles": 6}), path=path)
     with pytest.raises(
         sb.InputError, match=r"2 of its 4 values of drive.velocity_amplitude are not among those asked"
     ):
-        long_map(**(small | {"velocity_amplitude": np.array([0.05, 0.1, 0.6])}), store=path)
+        swept(**(small | {"velocity_amplitude": np.array([0.05, 0.1, 0.6])}), path=path)
     with pytest.raises(sb.InputError, match="location"):
-        long_map(**(small | LONGER | {"location": np.array([0.3, 0.4])}), store=path)
+        swept(**(small | LONGER | {"location": np.array([0.3, 0.4])}), path=path)
     with pytest.raises(sb.InputError, match="holds a map of other parameters"):
-        long_map(**(small | LONGER), store=path, verify=True)
+        swept(**(small | LONGER), path=path, check_checkpoint=True)
     assert {file: file.read_bytes() for file in path.rglob("*") if file.is_file()} == before
 
     refined = tmp_path / "refined"
-    long_map(**small, store=refined, refine_levels=1)
+    swept(**small, path=refined, refine_levels=1)
     with pytest.raises(sb.InputError, match="was refined"):
-        long_map(**(small | LONGER), store=refined)
+        swept(**(small | LONGER), path=refined)
 
 
 def test_a_map_that_has_grown_is_refined_as_any_other(tmp_path, small):
     path = tmp_path / "store"
-    long_map(**small, store=path)
+    swept(**small, path=path)
     wide = small | {"velocity_amplitude": np.linspace(0.05, 0.6, 7)}
-    long_map(**wide, store=path)
-    same(long_map(**wide, store=path, refine_levels=1), long_map(**wide, refine_levels=1))
+    swept(**wide, path=path)
+    same(swept(**wide, path=path, refine_levels=1), swept(**wide, refine_levels=1))
 
 
 def test_the_command_grows_a_store_by_its_name_and_an_axis(tmp_path, monkeypatch):

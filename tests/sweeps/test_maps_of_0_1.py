@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from small_map import swept
 
 import snapbeam as sb
 from snapbeam.model import default_values
@@ -23,7 +24,7 @@ def model_of(modes: int) -> sb.ReducedModel:
 
 def make(modes: int = 1, **changes: Any):
     given: dict[str, Any] = {"frequency_ratio": RATIO, "velocity_amplitude": VELOCITY, "cycles": 6}
-    return sb.response_map(model_of(modes), default_values.CONTACT, **(given | changes))
+    return swept(model_of(modes), default_values.CONTACT, **(given | changes))
 
 
 def assert_equal(one, other) -> None:
@@ -200,10 +201,10 @@ def test_refusals(changes: dict[str, Any], error: type[Exception], message: str)
 def test_refuses_what_is_no_system() -> None:
     axes = {"frequency_ratio": 1.0, "velocity_amplitude": 0.1, "cycles": 1}
     with pytest.raises(sb.InputError, match="needs a buckled beam: axial_load = 0 N must exceed"):
-        sb.response_map(
+        swept(
             sb.ReducedModel.from_beam(default_values.STRAIGHT_BEAM, 2), default_values.CONTACT, **axes
         )
     with pytest.raises(sb.InputError, match="contact = None: must be a law of contact, such as HertzContact"):
-        sb.response_map(model_of(1), None, **axes)  # type: ignore[arg-type]
+        swept(model_of(1), None, **axes)  # type: ignore[arg-type]
     with pytest.raises(sb.InputTypeError, match="model = 'beam': must be a ReducedModel"):
-        sb.response_map("beam", default_values.CONTACT, **axes)  # type: ignore[arg-type]
+        swept("beam", default_values.CONTACT, **axes)  # type: ignore[arg-type]

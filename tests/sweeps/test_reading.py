@@ -49,8 +49,8 @@ def test_what_is_not_done_is_unknown_and_says_so(whole, tmp_path):
     path, dataset = whole
     half = tmp_path / "half.store"
     shutil.copytree(path, half)
-    lines = (half / "ledger.jsonl").read_text(encoding="utf-8").splitlines()
-    (half / "ledger.jsonl").write_text(
+    lines = (half / "tasks.jsonl").read_text(encoding="utf-8").splitlines()
+    (half / "tasks.jsonl").write_text(
         "\n".join([*lines[:3], lines[3][:40]]), encoding="utf-8"
     )  # the last line is torn
     read = sb.read_checkpoint(half)
@@ -103,7 +103,7 @@ def test_the_order_of_the_axes_is_kept_before_anything_is_computed(system, tmp_p
                 checkpoint=sb.CheckpointOptions(path, points_per_task=2),
                 progress=stop,
             )
-        (path / "ledger.jsonl").write_text("", encoding="utf-8")
+        (path / "tasks.jsonl").write_text("", encoding="utf-8")
         read = sb.read_checkpoint(path)
         assert read["response_class"].dims == tuple(lookup(each).short for each in order)
         assert read.attrs["points_done"] == 0

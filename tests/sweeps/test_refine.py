@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from small_map import swept
 
 import snapbeam as sb
 from snapbeam.model.parameters import lookup
 from snapbeam.sweeps.checkpointed_sweep import SweepReport
-from snapbeam.sweeps.doors import long_map
 from snapbeam.sweeps.points import Grid
 from snapbeam.sweeps.refine import refine, refined_grid
 from snapbeam.sweeps.tasks import ResultTable
@@ -33,7 +33,7 @@ class DrawnWork:
         return columns.integers[:, self.integers.index(name)]
 
 
-class DrawnKeeper:
+class DrawnRunner:
     """Counts what is asked for."""
 
     def __init__(self, grid, classify):
@@ -73,7 +73,7 @@ def disc(velocity_amplitude, frequency_ratio=1.1):
 
 def test_a_smooth_boundary_costs_its_length():
     coarse = grid_of(np.linspace(0.0, 2.0, 11), np.linspace(0.0, 2.0, 9))
-    book = DrawnKeeper(coarse, disc)
+    book = DrawnRunner(coarse, disc)
     grid, results = refine(book, 4)
     assert grid.shape == (161, 129)
     np.testing.assert_array_equal(results.columns.integers[:, 0].reshape(grid.shape), truth(grid, disc))
@@ -96,19 +96,19 @@ def test_a_surprise_on_the_border_spreads():
         return np.where((frequency_ratio < 1.5) & left | spike, 3, 0)
 
     coarse = grid_of(np.arange(9.0), np.arange(0.0, 5.0, 2.0))
-    grid, results = refine(DrawnKeeper(coarse, tongue), 1)
+    grid, results = refine(DrawnRunner(coarse, tongue), 1)
     found = results.columns.integers[:, 0].reshape(grid.shape)
     np.testing.assert_array_equal(found, truth(grid, tongue))
 
 
 def test_axes_of_one_point_and_one_axis():
     single = Grid({"drive.velocity_amplitude": np.linspace(0.0, 2.0, 5)})
-    grid, results = refine(DrawnKeeper(single, disc), 3)
+    grid, results = refine(DrawnRunner(single, disc), 3)
     assert grid.shape == (33,)
     np.testing.assert_array_equal(results.columns.integers[:, 0], truth(grid, disc))
     assert results.computed.sum() < 16
     flat = grid_of(np.array([1.1]), np.linspace(0.0, 2.0, 5))
-    grid, results = refine(DrawnKeeper(flat, disc), 2)
+    grid, results = refine(DrawnRunner(flat, disc), 2)
     assert grid.shape == (1, 17)
     np.testing.assert_array_equal(results.columns.integers[:, 0].reshape(grid.shape), truth(grid, disc))
     np.testing.assert_array_equal(
@@ -122,7 +122,7 @@ def test_three_axes():
 
     names = ("drive.frequency_ratio", "drive.velocity_amplitude", "striker.location")
     axes = {name: np.linspace(0.0, 1.0, 5) for name in names}
-    grid, results = refine(DrawnKeeper(Grid(axes), ball), 2)
+    grid, results = refine(DrawnRunner(Grid(axes), ball), 2)
     np.testing.assert_array_equal(results.columns.integers[:, 0].reshape(grid.shape), truth(grid, ball))
     assert results.computed.mean() < 0.6
 
@@ -143,7 +143,7 @@ def test_whole_numbers_and_words_have_nothing_between_them():
         }
     )
     assert coarse.shape == (2, 2, 3, 9), "counted with the structure outermost"
-    book = DrawnKeeper(coarse, by_structure)
+    book = DrawnRunner(coarse, by_structure)
     grid, results = refine(book, 3)
     assert {name: values.size for name, values in grid.axes.items()} == {
         "drive.velocity_amplitude": 65, "model.modes": 2, "striker.side": 2, "beam.thickness": 17,
@@ -154,7 +154,7 @@ def test_whole_numbers_and_words_have_nothing_between_them():
     with pytest.raises(
         InputError, match="needs an axis of at least two numbers that are not whole by nature"
     ):
-        refine(DrawnKeeper(Grid({"model.modes": np.array([1, 8])}), by_structure), 1)
+        refine(DrawnRunner(Grid({"model.modes": np.array([1, 8])}), by_structure), 1)
 
 
 def test_a_list_cannot_be_refined(small):
@@ -167,12 +167,12 @@ def test_a_list_cannot_be_refined(small):
 
 def test_computed_points_are_those_of_a_full_map(tmp_path, small):
     """Bit for bit, in memory and through a store, whole, resumed and cut into other tasks."""
-    refined = long_map(**small, refine_levels=2)
+    refined = swept(**small, refine_levels=2)
     assert dict(refined.sizes) == {"frequency_ratio": 17, "velocity_amplitude": 13}
     computed = refined["computed"]
     assert 0.2 < float(computed.mean()) < 1.0
     fine = dict(small, **{name: refined[name].values for name in refined.dims})
-    full = sb.response_map(**fine)
+    full = swept(**fine)
     for name in full.data_vars:
         xr.testing.assert_equal(refined[name].where(computed), full[name].where(computed))
     assert refined.attrs["points_computed"] == int(computed.sum())
@@ -181,21 +181,21 @@ def test_computed_points_are_those_of_a_full_map(tmp_path, small):
     assert (refined["response_class"].values[inferred] >= 0).all()
     wrong = int((refined["response_class"] != full["response_class"]).sum())
     print(f"{wrong} of {int(inferred.sum())} inferred points differ from the full map")
-    long_map(**small, store=tmp_path / "store", chunk=7)
-    tally = SweepReport()
-    stored = long_map(
-        **small, store=tmp_path / "store", refine_levels=2, output=tmp_path / "m.nc", tally=tally
+    swept(**small, path=tmp_path / "store", points_per_task=7)
+    report = SweepReport()
+    stored = swept(
+        **small, path=tmp_path / "store", refine_levels=2, output=tmp_path / "m.nc", report=report
     )
     xr.testing.assert_equal(stored.load(), refined)
-    assert tally.resumed == 3 and tally.computed > 1
+    assert report.resumed == 3 and report.computed > 1
     again = SweepReport()
-    long_map(**small, store=tmp_path / "store", refine_levels=2, tally=again)
-    assert again.computed == 0 and again.resumed == tally.tasks
+    swept(**small, path=tmp_path / "store", refine_levels=2, report=again)
+    assert again.computed == 0 and again.resumed == report.tasks
     checked = SweepReport()
-    long_map(**small, store=tmp_path / "store", refine_levels=2, verify=True, tally=checked)
+    swept(**small, path=tmp_path / "store", refine_levels=2, check_checkpoint=True, report=checked)
     assert checked.computed == 0 and not checked.damaged and checked.missing == 0
 
 
 def test_levels_are_checked(small):
     with pytest.raises(InputError, match="refine_levels = 11: must be an integer in"):
-        long_map(**small, refine_levels=11)
+        swept(**small, refine_levels=11)

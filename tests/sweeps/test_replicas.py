@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
+from small_map import swept
 
 import snapbeam as sb
 from snapbeam.model.default_values import BEAM, CONTACT
-from snapbeam.sweeps.doors import long_map
 from snapbeam.sweeps.replicates import MEASURING_ERROR, Replicates, perturbed_start
 from snapbeam.util.validation import InputError
 
@@ -55,8 +55,8 @@ def test_starts_are_reproducible_and_mirror():
 
 
 def test_shares(small):
-    plain = sb.response_map(**small)
-    sure = long_map(**small, replicas=6, check_half_step=True)
+    plain = swept(**small)
+    sure = swept(**small, replicas=6, check_half_step=True)
     share = sure["class_fraction"]
     assert share.dims == ("frequency_ratio", "velocity_amplitude", "response_class")
     np.testing.assert_allclose(share.sum("response_class"), 1.0)
@@ -65,11 +65,11 @@ def test_shares(small):
         xr.testing.assert_equal(sure[name], plain[name])
     own = share.sel(response_class=sure["response_class"])
     assert (own >= 1.0 / 8.0).all()
-    halved = sb.response_map(**small, step=0.5 * plain.attrs["step"])
+    halved = swept(**small, step=0.5 * plain.attrs["step"])
     np.testing.assert_array_equal(sure["response_half_step"], halved["response_class"])
     assert sure.attrs["replicas"] == 6 and sure.attrs["perturbation_rms"] == MEASURING_ERROR
-    tiny = long_map(**small, replicas=2, perturbation_rms=1e-15)
-    wild = long_map(**small, replicas=6, perturbation_rms=1e-4)
+    tiny = swept(**small, replicas=2, perturbation_rms=1e-15)
+    wild = swept(**small, replicas=6, perturbation_rms=1e-4)
     assert float(tiny["class_fraction"].max("response_class").mean()) > float(
         wild["class_fraction"].max("response_class").mean()
     )
@@ -94,6 +94,6 @@ def test_repeats_of_starts_that_are_swept():
 
 def test_what_is_refused(small):
     with pytest.raises(InputError, match="replicas = -1"):
-        long_map(**small, replicas=-1)
+        swept(**small, replicas=-1)
     with pytest.raises(InputError, match="perturbation_rms = 0"):
-        long_map(**small, replicas=1, perturbation_rms=0.0)
+        swept(**small, replicas=1, perturbation_rms=0.0)

@@ -13,14 +13,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from small_map import setup_of, swept
 from typer.testing import CliRunner
 
 import snapbeam as sb
 from snapbeam.cli.app import app
 from snapbeam.model.default_values import BEAM, CONTACT, DAMPING_RATIO, LOCATION
-from snapbeam.sweeps.checkpoint.store import MapStore
+from snapbeam.sweeps.checkpoint.store import Checkpoint
 from snapbeam.sweeps.checkpointed_sweep import SweepReport
-from snapbeam.sweeps.doors import long_map, map_setup
 from snapbeam.sweeps.replicates import Replicates
 from snapbeam.sweeps.tasks import PointWork, Stage, chunk_size
 
@@ -73,7 +73,7 @@ def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
         "map.nc",
     ]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    ledger = tmp_path / "store" / "ledger.jsonl"
+    ledger = tmp_path / "store" / "tasks.jsonl"
     deadline = time.monotonic() + 300.0
     while not ledger.exists() or ledger.read_text(encoding="utf-8").count("\n") < 2:
         assert process.poll() is None and time.monotonic() < deadline, process.stderr.read()
@@ -84,21 +84,21 @@ def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
     assert done < 16 and not (tmp_path / "map.nc").exists()
     again = CliRunner().invoke(app, ["map", "--checkpoint", "store", "-o", "map.nc", "--log", "map.log"])
     assert again.exit_code == 0, again.output
-    assert f"16 tasks, {done} done before, {16 - done} computed now, 0 damaged, 0 given up" in again.stdout
+    assert f"16 tasks, {done} resumed, {16 - done} computed, 0 damaged, 0 failed" in again.stdout
     log = (tmp_path / "map.log").read_text(encoding="utf-8").splitlines()
     assert log[0].endswith("map of 64 points") and "T" in log[0].split()[0]
     assert any(f"{4 * done} of 64 points are done" in line for line in log)
     assert any("(100.0 %)" in line and "points/s" in line for line in log)
     resumed = xr.load_dataset(tmp_path / "map.nc", engine="h5netcdf")
     model = sb.ReducedModel.from_beam(BEAM, modes=1, damping_ratio=DAMPING_RATIO)
-    whole = sb.response_map(
+    whole = swept(
         model, CONTACT, cycles=60, frequency_ratio=np.linspace(0.5, 2.0, 8),
         velocity_amplitude=np.linspace(0.05, 0.6, 8), location=LOCATION,
     )  # fmt: skip
     xr.testing.assert_equal(resumed, whole)
     assert "bit for bit" in resumed.attrs["reproducible"]
     verified = CliRunner().invoke(app, ["map", "--checkpoint", "store", "--check-checkpoint"])
-    assert verified.exit_code == 0 and "16 done before, 0 computed now, 0 damaged" in verified.stdout
+    assert verified.exit_code == 0 and "16 resumed, 0 computed, 0 damaged" in verified.stdout
     refused = CliRunner().invoke(app, ["map", "--checkpoint", "store", "--cycles", "61"])
     assert refused.exit_code == 2 and "cycles: 60 in the store, 61 asked for" in refused.stderr
 
@@ -110,7 +110,7 @@ def test_interrupt_keeps_what_is_finished(tmp_path):
     process = subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
-    ledger = tmp_path / "store" / "ledger.jsonl"
+    ledger = tmp_path / "store" / "tasks.jsonl"
     deadline = time.monotonic() + 300.0
     while not ledger.exists():
         assert process.poll() is None and time.monotonic() < deadline
@@ -127,12 +127,12 @@ def test_bits_do_not_depend_on_tasks_order_or_threads(tmp_path, small, early):
     """Over location too, where the rows of a task's structure are computed together, and with repeats."""
     asked = dict(small, location=[0.21, 0.3, 0.4762], early_termination=early)
     asked["model"] = sb.ReducedModel.from_beam(asked["model"].beam, modes=4)
-    work = PointWork(map_setup(**asked), Replicates(1, check_half_step=True))
+    work = PointWork(setup_of(**asked), Replicates(1, check_half_step=True))
     grid = work.setup.points
     wanted = work.compute(grid.take(np.arange(grid.size)), 2).content_hash()
     for chunk, threads, reverse in ((7, 1, True), (1, 2, False), (60, 3, False)):
         stage = Stage("base", grid, chunk)
-        with MapStore(tmp_path / f"{chunk}", work, chunk) as store:
+        with Checkpoint(tmp_path / f"{chunk}", work, chunk) as store:
             store.open_stage(stage)
             for task in sorted(store.pending(stage), reverse=reverse):
                 store.commit(stage, task, work.compute(stage.columns(task), threads))
@@ -141,10 +141,10 @@ def test_bits_do_not_depend_on_tasks_order_or_threads(tmp_path, small, early):
 
 def test_the_file_is_the_map(tmp_path, small):
     """Written a block at a time, the file is what xarray would write of the map in memory."""
-    whole = sb.response_map(**small)
-    tally = SweepReport()
-    stored = long_map(**small, store=tmp_path / "store", chunk=6, output=tmp_path / "a.nc", tally=tally)
-    assert (tally.tasks, tally.resumed, tally.computed, tally.runs) == (4, 0, 4, 20)
+    whole = swept(**small)
+    report = SweepReport()
+    stored = swept(**small, path=tmp_path / "store", points_per_task=6, output=tmp_path / "a.nc", report=report)
+    assert (report.tasks, report.resumed, report.computed, report.runs) == (4, 0, 4, 20)
     whole.to_netcdf(tmp_path / "b.nc", engine="h5netcdf")
     expected = xr.load_dataset(tmp_path / "b.nc", engine="h5netcdf")
     stored = stored.load()
@@ -155,11 +155,11 @@ def test_the_file_is_the_map(tmp_path, small):
     xr.testing.assert_identical(stored, expected)
     assert all(stored[name].dtype == expected[name].dtype for name in expected.variables)
     flat = dict(small, frequency_ratio=1.0, velocity_amplitude=0.4)
-    point = long_map(**flat, store=tmp_path / "point", output=tmp_path / "point.nc")
-    xr.testing.assert_equal(point.load(), sb.response_map(**flat))
+    point = swept(**flat, path=tmp_path / "point", output=tmp_path / "point.nc")
+    xr.testing.assert_equal(point.load(), swept(**flat))
     deep = dict(small, location=[0.3, 0.45])
     xr.testing.assert_equal(
-        long_map(**deep, store=tmp_path / "deep", output=tmp_path / "deep.nc").load(), sb.response_map(**deep)
+        swept(**deep, path=tmp_path / "deep", output=tmp_path / "deep.nc").load(), swept(**deep)
     )
 
 
@@ -176,7 +176,7 @@ side, folder = int(sys.argv[1]), sys.argv[2]
 beam = sb.Beam(length=0.161, thickness=0.4e-3, width=15e-3, density=7800.0, young_modulus=200e9,
                buckling_level=0.335e-3)
 model = sb.ReducedModel.from_beam(beam, modes=1)
-sb.long_map(model, sb.HertzContact(stiffness=4e8), cycles=1, frequency_ratio=np.linspace(2.0, 4.0, side),
+swept(model, sb.HertzContact(stiffness=4e8), cycles=1, frequency_ratio=np.linspace(2.0, 4.0, side),
             velocity_amplitude=np.linspace(0.01, 0.6, 1000), step=7e-4, store=folder + "/store",
             output=folder + "/map.nc")
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
@@ -209,9 +209,9 @@ def test_a_store_costs_little(tmp_path, small):
     asked = dict(small, cycles=200, frequency_ratio=np.linspace(1.0, 3.0, 8))
     asked["velocity_amplitude"] = np.linspace(0.05, 0.6, 16)
     asked["model"] = sb.ReducedModel.from_beam(asked["model"].beam, modes=32)
-    work = PointWork(map_setup(**asked))
+    work = PointWork(setup_of(**asked))
     computing = storing = 0.0
-    with MapStore(tmp_path / "store", work) as store:
+    with Checkpoint(tmp_path / "store", work) as store:
         stage = Stage("base", work.setup.points, store.chunk)
         store.open_stage(stage)
         for task in range(stage.tasks):

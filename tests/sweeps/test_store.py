@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from small_map import setup_of, swept
 from typer.testing import CliRunner
 
 import snapbeam
@@ -21,10 +22,9 @@ from snapbeam.cli.app import app
 from snapbeam.sweeps.checkpoint import records as durable
 from snapbeam.sweeps.checkpoint import records as ledger
 from snapbeam.sweeps.checkpoint import store as tables
-from snapbeam.sweeps.checkpoint.records import CheckpointError, Ledger, Record, StoreLock, append_line
-from snapbeam.sweeps.checkpoint.store import MapStore
+from snapbeam.sweeps.checkpoint.records import CheckpointError, TaskLog, Record, CheckpointLock, append_line
+from snapbeam.sweeps.checkpoint.store import Checkpoint
 from snapbeam.sweeps.checkpointed_sweep import SweepReport
-from snapbeam.sweeps.doors import long_map, map_setup
 from snapbeam.sweeps.tasks import PointWork, Stage
 from snapbeam.util.validation import InputError
 
@@ -43,7 +43,7 @@ def fill(store, stage):
 def stored(tmp_path, work):
     """A finished store, and its only stage."""
     stage = Stage("base", work.setup.points, CHUNK)
-    with MapStore(tmp_path / "store", work, CHUNK) as store:
+    with Checkpoint(tmp_path / "store", work, CHUNK) as store:
         assert fill(store, stage) == [0, 1, 2, 3]
     return tmp_path / "store", stage
 
@@ -88,7 +88,7 @@ def test_damage_in_any_chunk_is_found_and_repaired(stored, work, whole, damage):
             continue  # the short last chunk holds another number of rows: covered by the others' exchange
         before = {each: each.read_bytes() for each in chunks(path)}
         broken = {task} | (damage(file) or set())
-        with MapStore(path, work) as store:
+        with Checkpoint(path, work) as store:
             store.open_stage(stage)
             assert set(store.damaged_in(stage)) == broken == set(store.pending(stage))
             for again in store.pending(stage):
@@ -105,14 +105,14 @@ def test_each_bit_of_a_chunk_counts(stored, work):
         data = bytearray(sound)
         data[at // 8] ^= 1 << (at % 8)
         file.write_bytes(bytes(data))
-        with MapStore(path, work) as store:
+        with Checkpoint(path, work) as store:
             store.open_stage(stage)
             assert store.damaged_in(stage) == [0], f"bit {at}"
 
 
 def test_damage_after_the_check_is_not_read(stored, work):
     path, stage = stored
-    with MapStore(path, work) as store:
+    with Checkpoint(path, work) as store:
         store.open_stage(stage)
         flip(chunks(path)[-1])
         with pytest.raises(CheckpointError, match="task 3 of stage base was damaged after"):
@@ -123,14 +123,14 @@ def test_descriptions_of_arrays_are_written_again(stored, work, whole):
     path, stage = stored
     for file in sorted(path.glob("runs.zarr/**/zarr.json")):
         file.write_text("{}", encoding="utf-8")
-    with MapStore(path, work) as store:
+    with Checkpoint(path, work) as store:
         assert fill(store, stage) == []
         assert store.reader(stage).read(0, 20).content_hash() == whole.content_hash()
 
 
 def test_done_is_what_the_ledger_says(stored, work, tmp_path):
     path, stage = stored
-    lines = (path / "ledger.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)
+    lines = (path / "tasks.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)
     assert len(lines) == 4
     altered = lines[1].replace('"task":1', '"task":0', 1)
     for content, pending in (
@@ -140,15 +140,15 @@ def test_done_is_what_the_ledger_says(stored, work, tmp_path):
         ("", [0, 1, 2, 3]),
         ("\x00\xff not a record\n" + "".join(lines), []),
     ):
-        (path / "ledger.jsonl").write_text(content, encoding="utf-8")
-        with MapStore(path, work) as store:
+        (path / "tasks.jsonl").write_text(content, encoding="utf-8")
+        with Checkpoint(path, work) as store:
             store.open_stage(stage)
             assert store.pending(stage) == pending and store.damaged == []
-    (path / "ledger.jsonl").write_text("".join(lines[:3]) + lines[3][:40], encoding="utf-8")
-    with MapStore(path, work) as store:
-        assert store.ledger.torn == 1
+    (path / "tasks.jsonl").write_text("".join(lines[:3]) + lines[3][:40], encoding="utf-8")
+    with Checkpoint(path, work) as store:
+        assert store.task_log.torn == 1
         assert fill(store, stage) == [3]
-    kept = Ledger(path / "ledger.jsonl")
+    kept = TaskLog(path / "tasks.jsonl")
     assert sorted(task for _, task in kept.records) == [0, 1, 2, 3] and kept.torn == 1
     record = kept.records["base", 2]
     assert record.engine == work.setup.integration.engine and record.step == work.setup.plan.step
@@ -159,24 +159,24 @@ def test_other_parameters_are_refused_with_the_differences(stored, small):
     path, _ = stored
     other = dict(small, cycles=4, velocity_amplitude=np.linspace(0.05, 0.7, 6), location=0.4)
     with pytest.raises(InputError) as refused:
-        MapStore(path, PointWork(map_setup(**other)))
+        Checkpoint(path, PointWork(setup_of(**other)))
     text = str(refused.value)
     assert "cycles: 3 in the store, 4 asked for" in text
     assert re.search(r"velocity_amplitude: .* in the store, 6 points from 0\.05 to 0\.7 asked for", text)
     assert "location: 0.476" in text and "0.4 asked for" in text
     assert "damping_ratio" not in text and "frequency_ratio" not in text
     with pytest.raises(InputError, match=r"replicas\.count: nothing in the store, 2 asked for"):
-        long_map(**small, store=path, replicas=2)
+        swept(**small, path=path, replicas=2)
 
 
 def test_a_folder_that_is_no_store(tmp_path, work):
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
     with pytest.raises(InputError, match="is not empty and holds no map"):
-        MapStore(tmp_path, work)
+        Checkpoint(tmp_path, work)
     with pytest.raises(InputError, match="must be a folder, not a file"):
-        MapStore(tmp_path / "notes.txt", work)
+        Checkpoint(tmp_path / "notes.txt", work)
     with pytest.raises(InputError, match="is not an existing folder"):
-        MapStore(tmp_path / "none" / "store", work)
+        Checkpoint(tmp_path / "none" / "store", work)
 
 
 def test_a_damaged_description_is_told(stored, work):
@@ -185,14 +185,14 @@ def test_a_damaged_description_is_told(stored, work):
     for text in ("", "{", json.dumps(held | {"parameters": held["parameters"] | {"cycles": 4}})):
         (path / "map.json").write_text(text, encoding="utf-8")
         with pytest.raises(CheckpointError, match=r"map\.json is damaged"):
-            MapStore(path, work)
+            Checkpoint(path, work)
     (path / "map.json").write_text(json.dumps(held | {"format_version": 99}), encoding="utf-8")
     with pytest.raises(InputError, match=r"another format \(99\)"):
-        MapStore(path, work)
+        Checkpoint(path, work)
 
 
 @pytest.mark.parametrize(
-    "where", ["map.json", "ledger.jsonl", "runs.zarr/base/numbers/c.1.0", "runs.zarr/base"]
+    "where", ["map.json", "tasks.jsonl", "runs.zarr/base/numbers/c.1.0", "runs.zarr/base"]
 )
 def test_links_are_refused(stored, work, tmp_path, where):
     path, _ = stored
@@ -200,26 +200,26 @@ def test_links_are_refused(stored, work, tmp_path, where):
     (path / where).rename(moved)
     (path / where).symlink_to(moved)
     with pytest.raises(InputError, match="is a link or no plain file"):
-        MapStore(path, work)
+        Checkpoint(path, work)
 
 
 @pytest.mark.parametrize("name", ["../outside", "/etc", "a/b", "..", ".hidden", ""])
 def test_names_that_leave_the_store_are_refused(stored, work, name):
     path, stage = stored
-    good = Ledger(path / "ledger.jsonl").records["base", 0]
-    append_line(path / "ledger.jsonl", Record(**(vars(good) | {"stage": name})).line())
+    good = TaskLog(path / "tasks.jsonl").records["base", 0]
+    append_line(path / "tasks.jsonl", Record(**(vars(good) | {"stage": name})).line())
     with pytest.raises(InputError, match="is no name of a member of a store"):
-        MapStore(path, work)
-    (path / "ledger.jsonl").unlink()
-    with MapStore(path, work) as store, pytest.raises(InputError, match="is no name of a member"):
+        Checkpoint(path, work)
+    (path / "tasks.jsonl").unlink()
+    with Checkpoint(path, work) as store, pytest.raises(InputError, match="is no name of a member"):
         store.open_stage(Stage(name, stage.points, CHUNK))
 
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from snapbeam.sweeps.keep.durable import StoreLock
-with StoreLock(Path(sys.argv[1]) / "lock"):
+from snapbeam.sweeps.keep.durable import CheckpointLock
+with CheckpointLock(Path(sys.argv[1]) / "lock"):
     print("held", flush=True)
     time.sleep(120)
 """
@@ -232,12 +232,12 @@ def test_a_second_writer_is_refused_until_the_first_is_gone(stored, work):
         try:
             assert process.stdout.readline() == "held\n"
             with pytest.raises(CheckpointError, match=f"written by another process .process {process.pid}."):
-                MapStore(path, work)
+                Checkpoint(path, work)
         finally:
             process.send_signal(signal.SIGKILL)
-    with MapStore(path, work), pytest.raises(CheckpointError, match=f"process {os.getpid()}"):
-        MapStore(path, work)
-    with StoreLock(path / "lock"):
+    with Checkpoint(path, work), pytest.raises(CheckpointError, match=f"process {os.getpid()}"):
+        Checkpoint(path, work)
+    with CheckpointLock(path / "lock"):
         pass
 
 
@@ -259,7 +259,7 @@ class Full:
 @pytest.mark.parametrize("writes", [0, 1, 3])
 def test_a_full_disk_loses_nothing(tmp_path, work, whole, monkeypatch, where, writes):
     stage = Stage("base", work.setup.points, CHUNK)
-    store = MapStore(tmp_path / "store", work, CHUNK)
+    store = Checkpoint(tmp_path / "store", work, CHUNK)
     store.open_stage(stage)
     place, name = (tables, "durable_write") if where == "data" else (ledger, "append_line")
     with monkeypatch.context() as patch, store:
@@ -268,7 +268,7 @@ def test_a_full_disk_loses_nothing(tmp_path, work, whole, monkeypatch, where, wr
             for task in range(stage.tasks):
                 store.commit(stage, task, work.compute(stage.columns(task), 1))
     finished = writes // 2 if where == "data" else writes
-    with MapStore(tmp_path / "store", work) as store:
+    with Checkpoint(tmp_path / "store", work) as store:
         store.open_stage(stage)
         assert store.pending(stage) == list(range(finished, 4)) and store.damaged == []
         fill(store, stage)
@@ -312,11 +312,11 @@ def test_a_full_file_system(small_disk, tmp_path, monkeypatch):
     assert "No space left on device; no finished task is lost: make room" in full.stderr
     assert "Traceback" not in full.output and not Path("a.nc").exists()
     filler.unlink()
-    done = Ledger(small_disk / "store" / "ledger.jsonl").records
+    done = TaskLog(small_disk / "store" / "tasks.jsonl").records
     assert 0 < len(done) < 40
     again = CliRunner().invoke(app, [*command, "--checkpoint", str(small_disk / "store"), "-o", "a.nc"])
     assert again.exit_code == 0, again.output
-    assert f"{len(done)} done before, {40 - len(done)} computed now, 0 damaged" in again.stdout
+    assert f"{len(done)} resumed, {40 - len(done)} computed, 0 damaged" in again.stdout
     CliRunner().invoke(app, [*command, "-o", "b.nc"])
     xr.testing.assert_equal(
         xr.load_dataset("a.nc", engine="h5netcdf"), xr.load_dataset("b.nc", engine="h5netcdf")
@@ -325,28 +325,28 @@ def test_a_full_file_system(small_disk, tmp_path, monkeypatch):
 
 def test_verify_repairs_and_computes_nothing_else(tmp_path, small, work):
     path, stage = tmp_path / "store", Stage("base", work.setup.points, CHUNK)
-    with MapStore(path, work, CHUNK) as store:
+    with Checkpoint(path, work, CHUNK) as store:
         store.open_stage(stage)
         for task in (0, 2):
             store.commit(stage, task, work.compute(stage.columns(task), 1))
     flip(path / "runs.zarr/base/integers/c.2.0")
-    tally = SweepReport()
-    checked = long_map(**small, store=path, verify=True, tally=tally, threads=1)
-    assert tally.damaged == [("base", 2)] and tally.computed == 1 and tally.missing == 2
+    report = SweepReport()
+    checked = swept(**small, path=path, check_checkpoint=True, report=report, threads=1)
+    assert report.damaged == [("base", 2)] and report.computed == 1 and report.missing == 2
     assert int((checked["response_class"] == -1).sum()) == 8
     assert (checked["status"].values.ravel()[6:12] == snapbeam.RunStatus.NOT_RUN).all()
     with pytest.raises(InputError, match="there is no map to verify"):
-        long_map(**small, store=tmp_path / "none", verify=True)
+        swept(**small, path=tmp_path / "none", check_checkpoint=True)
 
 
 def test_another_version_is_told(stored, work, small):
     path, _ = stored
     lines = []
-    for record in Ledger(path / "ledger.jsonl").records.values():
+    for record in TaskLog(path / "tasks.jsonl").records.values():
         lines.append(Record(**(vars(record) | {"version": "0.0.1", "processor": "i386"})).line())
-    (path / "ledger.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (path / "tasks.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
     with pytest.warns(UserWarning, match=r"begun with snapbeam 0\.0\.1 on a i386 processor"):
-        result = long_map(**small, store=path)
+        result = swept(**small, path=path)
     assert "snapbeam 0.0.1, processor i386" in result.attrs["computed_by"]
 
 

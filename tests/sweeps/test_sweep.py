@@ -102,13 +102,13 @@ def test_parts_stores_and_threads(whole, system, tmp_path) -> None:
         np.testing.assert_array_equal(
             part[name], whole[name].isel(modes=[1], frequency_ratio=slice(1, None)), err_msg=name
         )
-    keeping = sb.CheckpointOptions(tmp_path / "store", points_per_task=5)
-    stored = sb.sweep(system, AXES, ASKED.replace(threads=1), checkpoint=keeping, output=tmp_path / "map.nc")
+    options = sb.CheckpointOptions(tmp_path / "store", points_per_task=5)
+    stored = sb.sweep(system, AXES, ASKED.replace(threads=1), checkpoint=options, output=tmp_path / "map.nc")
     xr.testing.assert_equal(stored.load(), whole)
-    tally = sb.SweepReport()
-    again = sb.sweep(system, AXES, ASKED, checkpoint=sb.CheckpointOptions(tmp_path / "store", report=tally))
+    report = sb.SweepReport()
+    again = sb.sweep(system, AXES, ASKED, checkpoint=sb.CheckpointOptions(tmp_path / "store", report=report))
     xr.testing.assert_equal(again, whole)
-    assert (tally.tasks, tally.resumed, tally.computed) == (7, 7, 0)
+    assert (report.tasks, report.resumed, report.computed) == (7, 7, 0)
     with pytest.raises(InputError, match=r"points\.model\.modes: \[1, 4\] in the store, \[1, 3\] asked for"):
         sb.sweep(system, AXES | {"modes": [1, 3]}, ASKED, checkpoint=tmp_path / "store")
     with pytest.raises(
@@ -351,13 +351,13 @@ def test_points_that_differ_in_structure_alone(system) -> None:
 def test_a_structure_that_is_none_is_refused_before_any_run(system, monkeypatch) -> None:
     from snapbeam.sweeps.setup import SweepSetup
 
-    monkeypatch.setattr(SweepSetup, "march", None)
+    monkeypatch.setattr(SweepSetup, "integrate", None)
     loaded = system.replace(**{"beam.axial_load": 30.0})
     with pytest.raises(
         InputError, match=r"at beam\.thickness = 0\.0005: a run needs a buckled beam: axial_load = 30 N"
     ):
         sb.sweep(loaded, {"beam.thickness": [4e-4, 5e-4], "frequency_ratio": [1.0, 1.2]}, ASKED)
-    with pytest.raises(InputError, match=r"start\.amplitude\[2\]: mode = 2: must be an integer in \[1, 1\]"):
+    with pytest.raises(InputError, match=r"initial_state\.amplitude\[2\]: mode = 2: must be an integer in \[1, 1\]"):
         sb.sweep(system, pd.DataFrame({"modes": [2, 1], "initial_state.amplitude[2]": [0.1, 0.1]}), ASKED)
 
 

@@ -26,9 +26,9 @@ def stand_in(monkeypatch, columns: str) -> np.ndarray:
     """
     table = np.array([[_SIGNS[sign] for sign in word] for word in columns.split()], dtype=np.int8)
     ratio = np.linspace(1.0, 2.0, len(table))
-    true = SweepSetup.march
+    true = SweepSetup.integrate
 
-    def march(self, points, threads=None, progress=None, **more):
+    def integrate(self, points, threads=None, progress=None, **more):
         found = true(self, points, threads, progress, **more)
         at = np.rint((points["drive.frequency_ratio"] - 1.0) * (len(table) - 1)).astype(int)
         row = np.rint(points["drive.velocity_amplitude"] * 10.0).astype(int) - 1
@@ -37,7 +37,7 @@ def stand_in(monkeypatch, columns: str) -> np.ndarray:
         found["status"] = np.where(failed, RunStatus.DIVERGED, RunStatus.OK).astype(found["status"].dtype)
         return found
 
-    monkeypatch.setattr(SweepSetup, "march", march)
+    monkeypatch.setattr(SweepSetup, "integrate", march)
     return ratio
 
 

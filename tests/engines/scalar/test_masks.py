@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from snapbeam.solver.compilation import compiled
-from snapbeam.solver.events import Clock, contact_level
 from snapbeam.solver.simd import (
     bits,
     both,
@@ -23,6 +22,7 @@ from snapbeam.solver.simd import (
     vmin,
     vtrunc,
 )
+from snapbeam.solver.step_control import Clock, contact_level
 
 
 @compiled
