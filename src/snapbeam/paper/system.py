@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ __all__ = [
     "TOLERANCE",
     "class_map",
     "legend_handles",
+    "paper_map",
     "paper_model",
     "paper_run",
     "relative_map",
@@ -59,11 +61,37 @@ def paper_run(
     return sb.simulate(sb.System(model, CONTACT, shaker.striker()), integration, sample_times=sample_times)
 
 
-def class_map(results: Results, what: str, model: sb.ReducedModel, **axes: Any) -> xr.Dataset:
-    """A map of classes of the paper's shaker on *model*, each run ended once its class is certain."""
-    contact = axes.pop("contact", CONTACT)
-    axes = {"location": LOCATION, "early_termination": True, **axes}
-    ds = sb.response_map(model, contact, progress=results.progress(what), **axes)
+def paper_map(
+    model: sb.ReducedModel,
+    *,
+    frequency_ratio: ArrayLike,
+    velocity_amplitude: ArrayLike,
+    location: ArrayLike = LOCATION,
+    contact: sb.ContactLaw = CONTACT,
+    reference_frequency: float | None = None,
+    progress: Callable[[int, int], object] | None = None,
+    **options: Any,
+) -> xr.Dataset:
+    """Sweep the paper's shaker on *model* over those of its parameters that are arrays.
+
+    A number applies to the whole map.  *options* are those of an :class:`~snapbeam.Integration`.
+    """
+    if reference_frequency is not None:
+        model = replace(model, given_reference_frequency=reference_frequency)
+    given = {
+        "drive.frequency_ratio": frequency_ratio,
+        "drive.velocity_amplitude": velocity_amplitude,
+        "striker.location": location,
+    }
+    first = {name.split(".")[1]: float(np.ravel(value)[0]) for name, value in given.items()}
+    axes = {name: value for name, value in given.items() if np.ndim(value)}
+    system = sb.System(model, contact, sb.Shaker(**first).striker())
+    return sb.sweep(system, axes, sb.Integration(**options), progress=progress)
+
+
+def class_map(results: Results, what: str, model: sb.ReducedModel, **options: Any) -> xr.Dataset:
+    """Compute the response classes of a :func:`paper_map`, and end each run once its class is certain."""
+    ds = paper_map(model, progress=results.progress(what), **{"early_termination": True, **options})
     return ds[list(KEPT)]
 
 
@@ -87,9 +115,8 @@ def relative_map(
     columns, made = [], []
     for at, x in enumerate(locations):
         static = float(sb.model.quasi_static_threshold(x, frequency_ratio))
-        ds = sb.response_map(
+        ds = paper_map(
             model,
-            CONTACT,
             frequency_ratio=frequency_ratio,
             velocity_amplitude=relative * static,
             location=float(x),

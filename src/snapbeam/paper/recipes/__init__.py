@@ -1,1 +1,1 @@
-"""recipes"""
+"""Figures of the source paper."""

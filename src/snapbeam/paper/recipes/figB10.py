@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-import snapbeam as sb
-from snapbeam.model.default_values import CONTACT, LOCATION, LONG_CYCLES
-from snapbeam.paper.system import paper_model
+from snapbeam.model.default_values import LONG_CYCLES
+from snapbeam.paper.system import paper_map, paper_model
 from snapbeam.plot.style import fix_ticks, house_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
@@ -33,10 +32,9 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     ratio = results.pick(np.linspace(0.5, 4.0, 36), np.linspace(0.25, 4.0, 151))
     found = {}
     for modes in (1, results.pick(4, 32)):
-        ds = sb.response_map(
-            paper_model(modes), CONTACT, frequency_ratio=ratio, velocity_amplitude=np.array(LEVELS),
-            location=LOCATION, cycles=results.pick(100, LONG_CYCLES),
-            progress=results.progress(f"figB10, N = {modes}"),
+        ds = paper_map(
+            paper_model(modes), frequency_ratio=ratio, velocity_amplitude=np.array(LEVELS),
+            cycles=results.pick(100, LONG_CYCLES), progress=results.progress(f"figB10, N = {modes}"),
         )  # fmt: skip
         found[f"modes_{modes}"] = ds[
             ["max_displacement", "response_class", "status", "contact_time_fraction"]

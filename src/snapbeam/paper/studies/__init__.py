@@ -1,1 +1,1 @@
-"""studies"""
+"""Computations beyond the figures that the claims need."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam.model.default_values import CONTACT, CYCLES, LOCATION
-from snapbeam.paper.system import paper_model
+from snapbeam.paper.system import paper_map, paper_model
 from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
 from snapbeam.util.provenance import made_by
 
@@ -104,11 +104,11 @@ def _record(
 
 def _at_border(model: sb.ReducedModel, omega: float, drive: float, cycles: int) -> bool:
     """Whether a neighbour, a cell of Fig. 6 away, has another class."""
-    around = sb.response_map(
-        model, CONTACT, frequency_ratio=omega + _NEIGHBOUR[0] * np.array([-1.0, 0.0, 1.0]),
-        velocity_amplitude=drive + _NEIGHBOUR[1] * np.array([-1.0, 0.0, 1.0]), location=LOCATION,
+    around = paper_map(
+        model, frequency_ratio=omega + _NEIGHBOUR[0] * np.array([-1.0, 0.0, 1.0]),
+        velocity_amplitude=drive + _NEIGHBOUR[1] * np.array([-1.0, 0.0, 1.0]),
         cycles=cycles, early_termination=True,
-    ).response.values  # fmt: skip
+    ).response_class.values  # fmt: skip
     return bool((around != around[1, 1]).any())
 
 

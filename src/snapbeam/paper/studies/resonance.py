@@ -11,9 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-import snapbeam as sb
-from snapbeam.model.default_values import CONTACT, LOCATION
-from snapbeam.paper.system import paper_model
+from snapbeam.paper.system import paper_map, paper_model
 from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
 from snapbeam.sweeps.threshold import interwell_threshold, is_interwell
 
@@ -38,8 +36,8 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     found = {}
     for modes, top in ((1, 0.064), (results.pick(4, 32), 0.16)):
         drives = np.linspace(0.0, top, results.pick(5, 17))[1:]
-        ds = sb.response_map(
-            paper_model(modes), CONTACT, frequency_ratio=ratio, velocity_amplitude=drives, location=LOCATION,
+        ds = paper_map(
+            paper_model(modes), frequency_ratio=ratio, velocity_amplitude=drives,
             cycles=results.pick(60, 400), progress=results.progress(f"resonance, N = {modes}"),
         )  # fmt: skip
         found[f"modes_{modes}"] = ds[["max_displacement", "response_class", "status"]]

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import snapbeam as sb
-from snapbeam.model.default_values import CONTACT, CYCLES
-from snapbeam.paper.system import KEPT, legend_handles, paper_model
+from snapbeam.model.default_values import CYCLES
+from snapbeam.paper.system import KEPT, legend_handles, paper_map, paper_model
 from snapbeam.plot.style import class_cells, figure_legend, fix_ticks, house_style, new_figure, panel_letters
 
 if TYPE_CHECKING:
@@ -40,8 +40,8 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     for ratio in FREQUENCY_RATIOS:
         count = results.pick(24, 160)
         drives = np.linspace(0.0, 2.0 * ratio, count + 1)[1:]
-        ds = sb.response_map(
-            paper_model(modes), CONTACT, frequency_ratio=ratio, velocity_amplitude=drives,
+        ds = paper_map(
+            paper_model(modes), frequency_ratio=ratio, velocity_amplitude=drives,
             location=locations, cycles=results.pick(30, CYCLES), early_termination=True,
             progress=results.progress(f"windows, Omega = {ratio:g}"),
         )  # fmt: skip

@@ -1,1 +1,1 @@
-"""topics"""
+"""Claims of the source paper by topic."""
