@@ -573,7 +573,7 @@ def sweep_options(keeping: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "cluster": keeping["cluster"],
         "refine_levels": keeping["refine_levels"] or 0,
-        "replicas": repeats,
+        "replicates": repeats,
     }
 
 
@@ -594,11 +594,11 @@ def resumed(given: Mapping[str, Any], keeping: dict[str, Any], settings: Config)
         return settings
     options = kept.get("options", {})
     if not isinstance(kept.get("parameters"), dict) or not isinstance(options, dict):
-        raise InputError(f"store = {str(keeping['store'])!r}: contains no readable parameters")
+        raise InputError(f"checkpoint = {str(keeping['checkpoint'])!r}: contains no readable parameters")
     for name, kind in _STORED.items():
         if not keeping[name] and isinstance(options.get(name), kind):
             keeping[name] = options[name]
-    own = config_from_mapping(kept["parameters"], source=f"{keeping['store'].name}/map.json")
+    own = config_from_mapping(kept["parameters"], source=f"{keeping['checkpoint'].name}/map.json")
     return override(own, settings.to_mapping())
 
 
