@@ -88,7 +88,7 @@ def parts_to_mapping(system: Any) -> dict[str, dict[str, Any]]:
         sections["contact"] = {"type": contact.name} | _fields(contact)
     if striker is not None:
         # without a mass there is no suspension
-        left_out = ("spring", "damper") if striker.mass is None else ()
+        left_out = ("suspension_stiffness", "suspension_damping") if striker.mass is None else ()
         own = {name: getattr(striker, name) for name in quantities(Striker) if name not in left_out}
         sections["striker"] = {name: value for name, value in own.items() if value is not None}
         sections["drive"] = {"type": striker.drive.name} | _fields(striker.drive)
