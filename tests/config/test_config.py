@@ -102,10 +102,10 @@ REFUSALS = [
         "[beam] buckling_level = 0.0: must be a finite number greater than 0 m",
     ),
     (
-        {"contact": {"law": "spring"}},
-        "[contact] law = 'spring': must be one of 'hertz', 'hunt_crossley'",
+        {"contact": {"type": "spring"}},
+        "[contact] type = 'spring': must be one of 'hertz', 'hunt_crossley'",
     ),
-    ({"contact": {"type": "restitution"}}, "[contact] coefficient: missing for law = 'restitution'"),
+    ({"contact": {"type": "restitution"}}, "[contact] coefficient: missing for type = 'restitution'"),
     (
         {"contact": {"coefficient": 0.5}},
         "modes = 32: Newton's law needs one mode, since the mass met by an impulse at a point falls to zero",
@@ -114,10 +114,10 @@ REFUSALS = [
         {"contact": {"coefficient": 0.5, "stiffness": 1e8}},
         "[contact] give stiffness, of Hertz's law, or coefficient, of Newton's, not both",
     ),
-    ({"drive": {"kind": "triangle"}}, "[drive] kind = 'triangle': must be one of 'burst', 'chirp'"),
+    ({"drive": {"type": "triangle"}}, "[drive] type = 'triangle': must be one of 'burst', 'chirp'"),
     (
         {"drive": {"type": "recorded_motion"}},
-        "[drive] displacement, velocity, sampling_frequency, frequency: missing for kind = 'recorded'",
+        "[drive] displacement, velocity, sampling_frequency, frequency: missing for type = 'recorded_motion'",
     ),
     (
         {"drive": {"frequency_hz": -100.0}},
@@ -252,12 +252,12 @@ def test_an_option_takes_a_contradicting_value_or_axis_away():
 
     assert after({"drive": {"velocity_amplitude": 0.3}})["drive"] == {"velocity_amplitude": 0.3}
     assert after({"striker": {"location": 0.3}})["striker"] == {"location": 0.3}
-    assert after({"model": {"modes": 3}})["axes"] == {"drive.frequency_ratio": "0.1:2:3"}
+    assert after({"model": {"modes": 3}})["sweep"] == {"drive.frequency_ratio": "0.1:2:3"}
     for value in ({"frequency_ratio": 1.2}, {"frequency_hz": 99.0}):
         changed = after({"drive": value})
-        assert changed["axes"] == {"model.modes": [1, 2]}
+        assert changed["sweep"] == {"model.modes": [1, 2]}
         assert value.items() <= changed["drive"].items()
-    assert after({"sweep": {"frequency_hz": "50:100:3"}})["axes"] == {
+    assert after({"sweep": {"frequency_hz": "50:100:3"}})["sweep"] == {
         "model.modes": [1, 2],
         "drive.frequency_hz": "50:100:3",
     }

@@ -22,14 +22,14 @@ from snapbeam.util.validation import InputError
 TABLE = parameters()
 CLASSES = {
     "beam": [sb.Beam],
-    "ends": [sb.BoundaryConditions],
+    "boundary": [sb.BoundaryConditions],
     "imperfection": [sb.Imperfection],
     "striker": [sb.Striker],
-    "run": [sb.Integration],
+    "integration": [sb.Integration],
     "contact": list(LAWS.values()),
     "drive": list(DRIVES.values()),
-    "base": [sb.BaseExcitation, *(kind for kind in DRIVES.values() if kind.can_excite_base())],
-    "axial": list(LOADS.values()),
+    "base_excitation": [sb.BaseExcitation, *(kind for kind in DRIVES.values() if kind.can_excite_base())],
+    "axial_load": list(LOADS.values()),
     "harvester": list(HARVESTERS.values()),
 }
 
@@ -41,11 +41,11 @@ def test_every_quantity_of_every_class_is_in_it(section: str) -> None:
     for kind in CLASSES[section]:
         for name, item in quantities(kind).items():
             own = TABLE[f"{section}.{name}"].quantity
-            if section == "base" and kind is not sb.BaseExcitation:
+            if section == "base_excitation" and kind is not sb.BaseExcitation:
                 assert own.long_name == f"{item.long_name}, of the base"
-                own = dataclasses.replace(own, words=item.long_name)
+                own = dataclasses.replace(own, long_name=item.long_name)
             assert own == item
-            if section in ("contact", "drive", "axial", "harvester"):
+            if section in ("contact", "drive", "axial_load", "harvester"):
                 assert kind.name in TABLE[f"{section}.{name}"].kinds
 
 
@@ -54,7 +54,7 @@ def test_every_field_of_every_class_is_a_quantity(section: str) -> None:
     """What a person can give to a class is in the table; but for the one of two that the other follows from."""
     for kind in CLASSES[section]:
         fields = {item.name for item in dataclasses.fields(kind) if item.init}
-        parts = {sb.Striker: {"drive"}, sb.Beam: {"ends"}, sb.BaseExcitation: {"motion"}}.get(kind, set())
+        parts = {sb.Striker: {"drive"}, sb.Beam: {"boundary"}, sb.BaseExcitation: {"motion"}}.get(kind, set())
         assert fields - parts == set(quantities(kind)), kind
 
 
@@ -188,9 +188,9 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
         "burst": sb.Burst(**pair, duration_cycles=5.0),
         "chirp": sb.Chirp(start_ratio=0.5, stop_ratio=2.0, velocity_amplitude=0.1, sweep_cycles=20.0),
         "half_sine": sb.HalfSine(displacement_amplitude=0.1, duration=0.5),
-        "noise": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
+        "band_limited_noise": sb.BandLimitedNoise(low_ratio=0.5, high_ratio=2.0, velocity_rms=0.1),
         "two_tone": sb.TwoTone(**pair, second_ratio=2.0, second_amplitude=0.1),
-        "flight": sb.ConstantVelocity(speed=0.4),
+        "constant_velocity": sb.ConstantVelocity(speed=0.4),
         "displacement_sine": sb.DisplacementSine(frequency_ratio=1.0, displacement_amplitude=0.1),
         "acceleration_sine": sb.AccelerationSine(frequency_ratio=1.0, acceleration_amplitude=0.1),
     }
@@ -199,8 +199,8 @@ def test_scopes_are_what_an_ensemble_shares() -> None:
         "sine": sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0),
     }
     around = {
-        "base": lambda kind: sb.BaseExcitation(motion=drives.get(kind, sb.Sine(**pair))),
-        "axial": lambda kind: sb.AxialLoadModulation(motion=loads[kind]),
+        "base_excitation": lambda kind: sb.BaseExcitation(motion=drives.get(kind, sb.Sine(**pair))),
+        "axial_load": lambda kind: sb.AxialLoadModulation(motion=loads[kind]),
         "harvester": lambda kind: sb.PiezoelectricHarvester(
             moment_per_volt=1e-3, capacitance=1e-8, resistance=1e4
         ),
