@@ -1,1 +1,1 @@
-"""sweeps"""
+"""Sweeps, thresholds, refinement, replicates and their checkpoints."""

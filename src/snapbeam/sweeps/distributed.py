@@ -17,7 +17,7 @@ from snapbeam._version import __version__
 from snapbeam.solver.cpu.driver import usable_cores
 from snapbeam.sweeps.checkpoint.records import CheckpointError
 from snapbeam.sweeps.points import Columns
-from snapbeam.sweeps.tasks import Maker, PointWork, ResultTable, Stage, this_maker
+from snapbeam.sweeps.tasks import PointWork, Provenance, ResultTable, Stage, provenance_of
 from snapbeam.util.provenance import code_hash
 from snapbeam.util.validation import InputError, integer, shown
 
@@ -28,10 +28,10 @@ __all__ = [
     "ATTEMPTS",
     "Cluster",
     "ClusterWorkers",
-    "Crew",
-    "Failure",
-    "HereWorkers",
+    "LocalThreads",
+    "TaskError",
     "TaskResult",
+    "WorkerPool",
     "Workers",
     "open_client",
     "parse_cluster",
@@ -50,11 +50,11 @@ _PATIENCE = 20.0
 _MOST_MENDED = 5
 
 
-class Crew:
+class WorkerPool:
     """Who is there.
 
     Tells when that changes between nobody and somebody, gives up when too many went without a result, and starts
-    workers of this machine anew that their keeper has lost, as it does one that is killed while it starts.
+    workers of this machine anew that their runner has lost, as it does one that is killed while it starts.
     """
 
     def __init__(self, client: Client, note: Callable[[str], object]) -> None:
@@ -140,13 +140,13 @@ _GONE = (OSError, TimeoutError, asyncio.TimeoutError, CancelledError, asyncio.Ca
 
 
 class TaskResult(NamedTuple):
-    """Results of a task, and what computed them; the maker of this process if none is given."""
+    """Results of a task, and what computed them; the provenance of this process if none is given."""
 
     columns: ResultTable
-    maker: Maker | None = None
+    provenance: Provenance | None = None
 
 
-class Failure(NamedTuple):
+class TaskError(NamedTuple):
     """Why a task was given up."""
 
     reason: str
@@ -157,18 +157,18 @@ class Workers(Protocol):
 
     def run(
         self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
-    ) -> Iterator[tuple[int, TaskResult | Failure]]: ...
+    ) -> Iterator[tuple[int, TaskResult | TaskError]]: ...
 
 
 @dataclass(frozen=True)
-class HereWorkers:
+class LocalThreads:
     """This process, with all its threads on one task after another."""
 
     threads: int | None = None
 
     def run(
         self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
-    ) -> Iterator[tuple[int, TaskResult | Failure]]:
+    ) -> Iterator[tuple[int, TaskResult | TaskError]]:
         """Compute the tasks in order; *progress* gets the points done of the present one."""
         for task in tasks:
             columns = work.compute(stage.columns(task), self.threads, lambda done, _: progress(done))
@@ -177,11 +177,11 @@ class HereWorkers:
 
 def compute_task(work: PointWork, points: Columns, threads: int, version: str, code: str) -> tuple[Any, ...]:
     """What a worker of a cluster does: one task, with all its threads, if its code is that of who asks."""
-    maker = this_maker(work.setup.system)
-    if (maker.version, maker.code) != (version, code):
-        return None, None, astuple(maker)
+    provenance = provenance_of(work.setup.system)
+    if (provenance.version, provenance.code) != (version, code):
+        return None, None, astuple(provenance)
     columns = work.compute(points, threads)
-    return columns.integers, columns.numbers, astuple(maker)
+    return columns.integers, columns.numbers, astuple(provenance)
 
 
 @dataclass(frozen=True)
@@ -200,24 +200,24 @@ class ClusterWorkers:
 
     def run(
         self, work: PointWork, stage: Stage, tasks: Sequence[int], progress: Callable[[int], object]
-    ) -> Iterator[tuple[int, TaskResult | Failure]]:
+    ) -> Iterator[tuple[int, TaskResult | TaskError]]:
         """Compute the tasks as workers come and go."""
-        maker = this_maker(work.setup.system)
+        provenance = provenance_of(work.setup.system)
         queue = deque(tasks)
         flying: dict[Future, tuple[int, str]] = {}
         trouble: Counter[int] = Counter()
-        crew = Crew(self.client, self.note)
+        pool = WorkerPool(self.client, self.note)
         try:
             while queue or flying:
                 there = self._workers()
                 with _answered():
-                    crew.now(there)
+                    pool.now(there)
                 idle = there.keys() - {address for _, address in flying.values()}
                 for address in sorted(idle)[: len(queue)]:
                     task = queue.popleft()
                     with _answered():
                         future = self.client.submit(
-                            compute_task, work, stage.columns(task), there[address], maker.version, maker.code,
+                            compute_task, work, stage.columns(task), there[address], provenance.version, provenance.code,
                             workers=[address], allow_other_workers=False, pure=False, retries=0,
                         )  # fmt: skip
                     flying[future] = task, address
@@ -227,16 +227,16 @@ class ClusterWorkers:
                         outcome = self._outcome(future, address)
                     future.release()
                     if isinstance(outcome, TaskResult):
-                        crew.finished()
+                        pool.finished()
                         yield task, outcome
                         continue
                     trouble[task] += 1
                     if trouble[task] < ATTEMPTS:
                         queue.append(task)
                         continue
-                    if not crew.succeeded and outcome.reason.startswith("raised"):
+                    if not pool.succeeded and outcome.reason.startswith("raised"):
                         raise CheckpointError(f"the workers cannot compute this map: a task {outcome.reason}")
-                    yield task, Failure(f"{outcome.reason}, {ATTEMPTS} times")
+                    yield task, TaskError(f"{outcome.reason}, {ATTEMPTS} times")
         finally:
             if flying:
                 with suppress(*_GONE):
@@ -264,7 +264,7 @@ class ClusterWorkers:
             return []
         return [(f, task, at) for f, (task, at) in flying.items() if f.done() or at not in there]
 
-    def _outcome(self, future: Future, address: str) -> TaskResult | Failure:
+    def _outcome(self, future: Future, address: str) -> TaskResult | TaskError:
         """What came of a task that ended; one whose results do not come is as one that killed its worker."""
         from distributed import KilledWorker
 
@@ -273,13 +273,15 @@ class ClusterWorkers:
         if future.status == "finished":
             return self._delivered(future, address)
         if future.status == "cancelled":
-            return Failure("was cancelled") if address in self._workers() else Failure("killed its worker")
+            return (
+                TaskError("was cancelled") if address in self._workers() else TaskError("killed its worker")
+            )
         error = future.exception(timeout=self.delivery)
         if isinstance(error, KilledWorker):
-            return Failure("killed its worker")
-        return Failure(f"raised {type(error).__name__}: {error}")
+            return TaskError("killed its worker")
+        return TaskError(f"raised {type(error).__name__}: {error}")
 
-    def _delivered(self, future: Future, address: str) -> TaskResult | Failure:
+    def _delivered(self, future: Future, address: str) -> TaskResult | TaskError:
         """The results of a finished task, as long as the worker that holds them lives.
 
         When it dies before it handed them over, the scheduler would compute them again on the same worker, which
@@ -299,18 +301,18 @@ class ClusterWorkers:
                     return self._dropped(future, f"gave no results within {self.delivery:g} s")
             except (KilledWorker, CancelledError, asyncio.CancelledError):
                 return self._dropped(future, "lost its worker before its results came")
-        maker = Maker(*by)
+        provenance = Provenance(*by)
         if integers is None:
             raise CheckpointError(
-                f"a worker runs snapbeam {maker.version} with code {maker.code}, this is {__version__} with code "
+                f"a worker runs snapbeam {provenance.version} with code {provenance.code}, this is {__version__} with code "
                 f"{code_hash()}: install the same in both places"
             )
-        return TaskResult(ResultTable(integers, numbers), maker)
+        return TaskResult(ResultTable(integers, numbers), provenance)
 
-    def _dropped(self, future: Future, reason: str) -> Failure:
+    def _dropped(self, future: Future, reason: str) -> TaskError:
         with suppress(*_GONE):
             future.cancel(force=True)
-        return Failure(reason)
+        return TaskError(reason)
 
 
 def _gone(why: object) -> CheckpointError:

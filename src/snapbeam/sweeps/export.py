@@ -1,4 +1,4 @@
-"""From the rows of a store to a labelled map, a block at a time or in memory."""
+"""Labelled datasets and NetCDF files from the rows of a sweep."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ __all__ = ["class_coordinate", "to_dataset", "to_netcdf"]
 
 _CLASS_DIM = "response_class"
 _BLOCK = 65536
-"""Points held at a time, or one index of the first dimension if that is more."""
+"""Points of a block; a block is at least one index of the first dimension."""
 
 
 def class_coordinate() -> tuple[tuple[str], Any, dict[str, Any]]:
-    """The coordinate of the shares of the classes."""
+    """Return the coordinate of the fractions of the classes."""
     values = np.array([int(kind) for kind in CLASSES], dtype=np.int8)
     return (_CLASS_DIM,), values, {"units": "1", "long_name": "response class"} | code_flags(ResponseClass)
 
 
 def to_dataset(work: PointWork, points: Points, rows: Rows, attrs: dict[str, Any]) -> xr.Dataset:
-    """The map in memory."""
+    """Return the dataset of a sweep."""
     import xarray as xr
 
     table = rows.read(0, points.size)
@@ -45,15 +45,15 @@ def to_dataset(work: PointWork, points: Points, rows: Rows, attrs: dict[str, Any
 
 def _coordinates(work: PointWork, points: Points) -> dict[str, Any]:
     coords = work.setup.with_points(points).coordinates()
-    if work.replicas is not None:
+    if work.replicates is not None:
         coords[_CLASS_DIM] = class_coordinate()
     return coords
 
 
 def to_netcdf(work: PointWork, points: Points, rows: Rows, attrs: dict[str, Any], path: Path) -> None:
-    """Write the map to a NetCDF file, whole or not at all, holding only a block of it in memory.
+    """Write the dataset of a sweep to a NetCDF file atomically, block by block.
 
-    The file is the one that :func:`to_dataset` and xarray would write.
+    The file is equal to the file that xarray writes from the result of :func:`to_dataset`.
     """
     import h5py
 
@@ -103,7 +103,7 @@ _COMPRESSION: dict[str, Any] = {"compression": "gzip", "compression_opts": 4, "s
 
 
 def _put(variable: Any, points: Points, place: tuple[slice, ...], block: np.ndarray) -> None:
-    """Write a block, which is in the order of counting, where it belongs among the dimensions."""
+    """Write a block, whose points are in the order of counting, with the dimensions of the dataset."""
     if isinstance(points, PointList):
         variable[(*place, ...)] = block
         return
@@ -113,7 +113,7 @@ def _put(variable: Any, points: Points, place: tuple[slice, ...], block: np.ndar
 
 
 def _blocks(points: Points) -> Iterator[tuple[tuple[slice, ...], int, int]]:
-    """Ranges of the first axis in the order of counting, and the points they hold."""
+    """Yield ranges of the first axis in the order of counting, and the numbers of their points."""
     rows, row = points.shape[0], points.size // points.shape[0]
     step = max(1, _BLOCK // row)
     for first in range(0, rows, step):

@@ -1,4 +1,4 @@
-"""Points of a sweep: values of any parameters, a grid of them or a list."""
+"""Points of a sweep: a grid or a list of values of any parameters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["Columns", "Grid", "PointList", "Points", "points_of"]
 
 
 Columns = dict[str, NDArray[Any]]
-"""Values of some points by dotted name, arrays of shape (points,)."""
+"""Values of points by dotted name: arrays of shape (points,)."""
 POINT = "point"
 """Dimension of a list of points."""
 _NOT_SWEPT = (
@@ -37,10 +37,10 @@ _NOT_SWEPT = (
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Every combination of the values of some axes.
+    """All combinations of the values of some axes.
 
-    Points are counted with the axes that need another structure outermost, so that those of one structure follow
-    each other; the dimensions of the dataset keep the order in which the axes were given.
+    In the order of counting, the axes of model-level parameters are the outermost, so that points with the same model
+    follow each other.  The dimensions of the dataset have the order in which the axes were given.
     """
 
     axes: dict[str, NDArray[Any]]
@@ -48,13 +48,13 @@ class Grid:
 
     @cached_property
     def order(self) -> tuple[str, ...]:
-        """The axes in the order in which points are counted."""
+        """Axes in the order in which points are counted."""
         structural = [name for name in self.axes if not lookup(name).is_run]
         return (*structural, *(name for name in self.axes if name not in structural))
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What differs among the points."""
+        """Names of the parameters that differ among the points."""
         return tuple(self.axes)
 
     @property
@@ -64,77 +64,77 @@ class Grid:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Points along each axis, in the order of counting."""
+        """Number of values of each axis, in the order of counting."""
         return tuple(self.axes[name].size for name in self.order)
 
     @property
     def size(self) -> int:
-        """Points in all."""
+        """Number of points."""
         return int(np.prod(self.shape, dtype=np.int64))
 
     def take(self, which: NDArray[np.int64]) -> Columns:
-        """The values of the points of the given numbers."""
+        """Return the values of the points with the given numbers."""
         at = np.unravel_index(which, self.shape) if self.axes else ()
         return {name: self.axes[name][i] for name, i in zip(self.order, at, strict=True)}
 
     def arranged(self, values: NDArray[Any]) -> NDArray[Any]:
-        """An array over all points, in the order of counting, with the dimensions of the dataset first."""
+        """Reshape an array over all points, in the order of counting, to the dimensions of the dataset."""
         inside = values.reshape(*self.shape, *values.shape[1:])
         moved = [self.order.index(name) for name in self.axes]
         return inside.transpose(*moved, *range(len(moved), inside.ndim))
 
     def coordinates(self) -> dict[str, Any]:
-        """Dimensions, values and labels of the axes, by name."""
+        """Return dimensions, values and attributes of the axes, by name."""
         return {lookup(name).short: _coordinate(lookup(name), values) for name, values in self.axes.items()}
 
     def describe(self) -> dict[str, Any]:
-        """What tells this grid from another one."""
+        """Return plain values that identify the grid."""
         return {name: values.tolist() for name, values in self.axes.items()}
 
 
 @dataclass(frozen=True, eq=False)
 class PointList:
-    """Points one after the other."""
+    """List of points."""
 
     columns: Columns
     labels: dict[str, NDArray[Any]] = field(default_factory=dict)
-    """Whatever else stands beside the points in the table that they came from."""
+    """Further columns of the table of points."""
 
     @property
     def axes(self) -> dict[str, NDArray[Any]]:
-        """None of its own."""
+        """An empty mapping: a list has no axes."""
         return {}
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What differs among the points."""
+        """Names of the parameters that differ among the points."""
         return tuple(self.columns)
 
     @property
     def dims(self) -> tuple[str, ...]:
-        """One, called ``point``."""
+        """The dimension ``point``."""
         return (POINT,)
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Points."""
+        """Number of points."""
         return (self.size,)
 
     @property
     def size(self) -> int:
-        """Points in all."""
+        """Number of points."""
         return int(next(iter(self.columns.values())).size)
 
     def take(self, which: NDArray[np.int64]) -> Columns:
-        """The values of the points of the given numbers."""
+        """Return the values of the points with the given numbers."""
         return {name: values[which] for name, values in self.columns.items()}
 
     def arranged(self, values: NDArray[Any]) -> NDArray[Any]:
-        """As it is."""
+        """Return the array."""
         return values
 
     def coordinates(self) -> dict[str, Any]:
-        """The values of each parameter along the points, by name."""
+        """Return dimension, values and attributes of each parameter and label, by name."""
         found: dict[str, Any] = {
             lookup(name).short: ((POINT,), values, _labels(lookup(name)))
             for name, values in self.columns.items()
@@ -142,7 +142,7 @@ class PointList:
         return found | {name: ((POINT,), values, {}) for name, values in self.labels.items()}
 
     def describe(self) -> dict[str, Any]:
-        """What tells this list from another one."""
+        """Return plain values that identify the list."""
         return {
             name: {"points": values.size, "sha256": array_hash(values)}
             for name, values in self.columns.items()
@@ -153,15 +153,14 @@ Points = Grid | PointList
 
 
 def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
-    """The points that were asked for.
+    """Return the points of a request.
 
     Parameters
     ----------
     given : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
-        A mapping makes a grid: parameters by dotted name, or by the name that datasets use, with strictly increasing
-        numbers, or different words.  A dataset with one-dimensional variables along one dimension, or a data frame,
-        makes a list; its columns that are no parameters are kept as labels, unless their names are almost those of
-        parameters.
+        A mapping defines a grid: names of parameters, dotted or short, with strictly increasing numbers or different
+        words.  A dataset with one-dimensional variables along one dimension, or a data frame, defines a list.  Its
+        columns that are not parameters become labels; a name that is almost a parameter's is refused.
 
     Raises
     ------
@@ -184,7 +183,7 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
     for name, values in given.items():
         row = _swept(str(name))
         if row.name in axes:
-            raise InputError(f"{name}: stands twice among the axes")
+            raise InputError(f"{name}: is given twice among the axes; give it once")
         axes[row.name] = _axis(row, str(name), values)
     return Grid(axes)
 
@@ -192,12 +191,12 @@ def points_of(given: Mapping[str, Any] | xr.Dataset | Any) -> Points:
 def _swept(name: str) -> Parameter:
     row = lookup(name)
     if row.name in _NOT_SWEPT:
-        raise InputError(f"{name}: cannot be swept")
+        raise InputError(f"{name}: cannot be swept; set it in the system or the integration")
     return row
 
 
 def _axis(row: Parameter, name: str, values: Any) -> NDArray[Any]:
-    """The values of one axis, checked: numbers that increase, or different words."""
+    """Return the checked values of one axis: increasing numbers, or different words."""
     item = row.quantity
     if item.kind in (str, bool):
         words = [item.check(name, value) for value in np.atleast_1d(np.asarray(values)).tolist()]
@@ -227,7 +226,7 @@ def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
             continue
         row = _swept(name)
         if row.name in known:
-            raise InputError(f"{name}: stands twice among the points, as {row.name} too")
+            raise InputError(f"{name}: is given twice among the points, also as {row.name}; give it once")
         item = row.quantity
         if item.kind in (str, bool):
             known[row.name] = np.array([item.check(name, value) for value in values.tolist()])
@@ -237,7 +236,7 @@ def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
                 [item.check(f"{name}[{i}]", value) for i, value in enumerate(numbers.tolist())]
             )
     if not known:
-        raise InputError(f"points with {', '.join(columns)}: none of these is a parameter")
+        raise InputError(f"points with {', '.join(columns)}: must contain a parameter")
     lengths = {name: values.size for name, values in (known | labels).items()}
     if len(set(lengths.values())) > 1 or min(lengths.values()) == 0:
         raise InputError(f"points of lengths {lengths}: must be equal, and at least one")
@@ -245,19 +244,17 @@ def _list_of(columns: dict[str, NDArray[Any]]) -> PointList:
 
 
 def _is_label(name: str) -> bool:
-    """Whether a column of a table of points is no parameter; refused if it looks as if it were meant to be one.
+    """Return whether a column of a table of points is a label, not a parameter.
 
     Raises
     ------
     InputError
-        For a parameter in a physical unit, and for a name that differs from a parameter's by a slip.
+        For a parameter in a physical unit, and for a name that is almost the name of a parameter.
     """
     physical = physical_name(name)
     if physical is not None:
         ratio = lookup(PHYSICAL[physical].parameter).short
-        raise InputError(
-            f"{name}: give {ratio}, which snapbeam.model.parameter_axes.from_physical makes of it"
-        )
+        raise InputError(f"{name}: give {ratio}; snapbeam.model.parameter_axes.from_physical converts it")
     table = parameters()
     known = [*table, *short_names(), *(full.partition(".")[2] for full in table)]
     if name in known:
@@ -268,7 +265,7 @@ def _is_label(name: str) -> bool:
         close = difflib.get_close_matches(name, known, 1, 0.85)
         if close:
             raise InputError(
-                f"{name}: no parameter; did you mean {close[0]!r}?  Give a column that is only a label another name"
+                f"{name}: is not a parameter; did you mean {close[0]!r}?  If the column is a label, give it another name"
             ) from None
         return True
     return False

@@ -1,8 +1,8 @@
-"""Refined maps: the resolution where classes meet, without the runs where they do not.
+"""Adaptive refinement of maps near the boundaries of response classes.
 
-Each level halves the spacing of every axis.  The new points of a cell are computed if its corners are of
-different classes, or if a point computed on its border disagrees with them; otherwise they take the class
-that all its corners share.
+Each level halves the grid spacing of every axis.  snapbeam computes the new points of a cell if its corners have
+different classes, or if a computed point on its border has another class than the corners.  Otherwise the new points
+get the class of the corners, with the status FILLED.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from snapbeam.sweeps.points import Grid
 from snapbeam.sweeps.setup import Progress
-from snapbeam.sweeps.tasks import Keeper, ResultTable, Rows, Stage
+from snapbeam.sweeps.tasks import ResultTable, Rows, Stage, StageRunner
 from snapbeam.util.status_codes import ResponseClass, RunStatus
 from snapbeam.util.validation import InputError
 
@@ -31,7 +31,7 @@ _Split = tuple[bool, ...]
 
 
 class RefinedRows:
-    """Rows of a refined map: those that were computed, and those that were inferred."""
+    """Rows of a refined map, computed and filled."""
 
     def __init__(self, columns: ResultTable, computed: _Mask) -> None:
         self.columns = columns
@@ -39,14 +39,14 @@ class RefinedRows:
         """Whether each point was run, shape of the grid."""
 
     def read(self, start: int, stop: int) -> ResultTable:
-        """Rows *start* to *stop*."""
+        """Return the rows *start* to *stop*."""
         return ResultTable(self.columns.integers[start:stop], self.columns.numbers[start:stop])
 
 
 def refined_grid(grid: Grid) -> Grid:
-    """The grid with a point more between each two neighbours of an axis of numbers.
+    """Return the grid with half the spacing of its axes of real numbers.
 
-    Whole numbers and words have nothing between them.
+    Axes of integers and of words stay as they are.
     """
     axes = {}
     for name, values in grid.axes.items():
@@ -59,8 +59,8 @@ def refined_grid(grid: Grid) -> Grid:
     return Grid(axes)
 
 
-def refine(keeper: Keeper, levels: int, progress: Progress | None = None) -> tuple[Grid, RefinedRows]:
-    """Compute a map and refine it *levels* times where neighbours differ in class.
+def refine(runner: StageRunner, levels: int, progress: Progress | None = None) -> tuple[Grid, RefinedRows]:
+    """Compute a map and refine it *levels* times where neighbours differ in response class.
 
     Returns
     -------
@@ -69,53 +69,55 @@ def refine(keeper: Keeper, levels: int, progress: Progress | None = None) -> tup
     results : RefinedRows
         The rows of all of its points.
     """
-    work = keeper.work
+    work = runner.work
     grid = work.setup.points
     if not isinstance(grid, Grid):
         raise InputError("refine_levels: a list of points cannot be refined; give axes")
     split = _split(grid)
     if not any(split):
-        raise InputError("refine_levels: needs an axis of at least two numbers that are not whole by nature")
-    base = Stage("base", grid, keeper.chunk)
-    parts: list[tuple[_Index, Rows]] = [(np.arange(grid.size), keeper.complete(base, progress))]
-    classes = _classes(keeper, parts[0][1], grid.size).reshape(grid.shape)
+        raise InputError(
+            "refine_levels: needs an axis of at least two real numbers; add one, or set refine_levels = 0"
+        )
+    base = Stage("base", grid, runner.chunk)
+    parts: list[tuple[_Index, Rows]] = [(np.arange(grid.size), runner.complete(base, progress))]
+    classes = _classes(runner, parts[0][1], grid.size).reshape(grid.shape)
     computed = np.ones(grid.shape, dtype=bool)
     for level in range(1, levels + 1):
         finer = refined_grid(grid)
         parts = [(_finer_index(index, grid, finer), results) for index, results in parts]
         corners = classes
-        classes = _spread(corners, finer.shape, split, ResponseClass.UNKNOWN)
-        computed = _spread(computed, finer.shape, split, False)
+        classes = _embed(corners, finer.shape, split, ResponseClass.UNKNOWN)
+        computed = _embed(computed, finer.shape, split, False)
         active = _differ(corners, split)
         part = 0
         while True:
             missing = np.flatnonzero(_points_of(active, finer.shape, split) & ~computed)
             if missing.size:
                 part += 1
-                stage = Stage(f"level-{level}-{part}", finer, keeper.chunk, missing)
-                results = keeper.complete(stage, progress)
+                stage = Stage(f"level-{level}-{part}", finer, runner.chunk, missing)
+                results = runner.complete(stage, progress)
                 parts.append((missing, results))
-                classes.flat[missing] = _classes(keeper, results, missing.size)
+                classes.flat[missing] = _classes(runner, results, missing.size)
                 computed.flat[missing] = True
-            surprised = _surprised(corners, classes, computed, split) & ~active
-            if not surprised.any():
+            contradicted = _contradicted(corners, classes, computed, split) & ~active
+            if not contradicted.any():
                 break
-            active |= surprised
-        _infer(corners, classes, computed, active, split)
+            active |= contradicted
+        _fill(corners, classes, computed, active, split)
         grid = finer
-    return grid, _assemble(keeper, grid, parts, classes, computed)
+    return grid, _assemble(runner, grid, parts, classes, computed)
 
 
-def _classes(keeper: Keeper, results: Rows, size: int) -> _Classes:
+def _classes(runner: StageRunner, results: Rows, size: int) -> _Classes:
     blocks = [
-        keeper.work.values("response_class", results.read(start, min(start + _BLOCK, size)))
+        runner.work.values("response_class", results.read(start, min(start + _BLOCK, size)))
         for start in range(0, size, _BLOCK)
     ]
     return np.concatenate(blocks).astype(np.int8)
 
 
 def _split(grid: Grid) -> _Split:
-    """Which axes are halved, in the order of counting."""
+    """Return which axes are refined, in the order of counting."""
     return tuple(grid.axes[name].dtype.kind == "f" and grid.axes[name].size > 1 for name in grid.order)
 
 
@@ -126,25 +128,25 @@ def _finer_index(index: _Index, grid: Grid, finer: Grid) -> _Index:
 
 
 def _every(split: _Split) -> tuple[slice, ...]:
-    """Where the points of a coarse grid lie in the fine one."""
+    """Return the slices of a fine grid that are the points of the coarse one."""
     return tuple(slice(None, None, 2) if halved else slice(None) for halved in split)
 
 
-def _spread(coarse: NDArray, shape: tuple[int, ...], split: _Split, fill: int) -> NDArray:
+def _embed(coarse: NDArray, shape: tuple[int, ...], split: _Split, fill: int) -> NDArray:
     fine = np.full(shape, fill, dtype=coarse.dtype)
     fine[_every(split)] = coarse
     return fine
 
 
 def _corner_views(coarse: _Classes, split: _Split) -> list[_Classes]:
-    """The corners of all cells, corner by corner; an axis that is not halved has flat cells, one a point."""
+    """Return the corners of all cells, one array for each corner; along an axis that is not refined a cell is a point."""
     cells = tuple(count - 1 if halved else count for count, halved in zip(coarse.shape, split, strict=True))
     offsets = product(*((0, 1) if halved else (0,) for halved in split))
     return [coarse[tuple(slice(o, o + c) for o, c in zip(at, cells, strict=True))] for at in offsets]
 
 
 def _fine_slices(shape: tuple[int, ...], split: _Split) -> list[tuple[slice, ...]]:
-    """For each of the 3^d points of a refined cell, where it lies in the fine grid, all cells at once."""
+    """Return for each of the 3^d points of a refined cell its slices of the fine grid, for all cells at once."""
     offsets = product(*((0, 1, 2) if halved else (0,) for halved in split))
     cells = tuple((count - 1) // 2 if halved else count for count, halved in zip(shape, split, strict=True))
     return [
@@ -157,7 +159,7 @@ def _fine_slices(shape: tuple[int, ...], split: _Split) -> list[tuple[slice, ...
 
 
 def _differ(coarse: _Classes, split: _Split) -> _Mask:
-    """Cells whose corners are not all of one class."""
+    """Return the cells whose corners have different classes."""
     first, *others = _corner_views(coarse, split)
     different = np.zeros(first.shape, dtype=bool)
     for other in others:
@@ -172,8 +174,8 @@ def _points_of(active: _Mask, shape: tuple[int, ...], split: _Split) -> _Mask:
     return inside
 
 
-def _surprised(corners: _Classes, fine: _Classes, computed: _Mask, split: _Split) -> _Mask:
-    """Cells with a computed point that is not of the class of the first corner."""
+def _contradicted(corners: _Classes, fine: _Classes, computed: _Mask, split: _Split) -> _Mask:
+    """Return the cells with a computed point whose class is not that of the first corner."""
     expected = _corner_views(corners, split)[0]
     found = np.zeros(expected.shape, dtype=bool)
     for at in _fine_slices(fine.shape, split):
@@ -181,16 +183,16 @@ def _surprised(corners: _Classes, fine: _Classes, computed: _Mask, split: _Split
     return found
 
 
-def _infer(corners: _Classes, fine: _Classes, computed: _Mask, active: _Mask, split: _Split) -> None:
+def _fill(corners: _Classes, fine: _Classes, computed: _Mask, active: _Mask, split: _Split) -> None:
     expected = _corner_views(corners, split)[0]
     for at in _fine_slices(fine.shape, split):
         fine[at] = np.where(computed[at] | active, fine[at], expected)
 
 
 def _assemble(
-    keeper: Keeper, grid: Grid, parts: list[tuple[_Index, Rows]], classes: _Classes, computed: _Mask
+    runner: StageRunner, grid: Grid, parts: list[tuple[_Index, Rows]], classes: _Classes, computed: _Mask
 ) -> RefinedRows:
-    work = keeper.work
+    work = runner.work
     columns = work.unfinished(grid.size, RunStatus.FILLED)
     columns.integers[:, work.integers.index("response_class")] = classes.ravel()
     for index, results in parts:

@@ -1,7 +1,6 @@
-"""How sure is a point: repeats of every run with slightly different starts and with a finer step.
+"""Replicates of runs with perturbed initial conditions and with half the step.
 
-Where neighbouring starts give different classes, the class is a matter of chance; where they agree, it
-is a property of the system.
+If the replicates of a point have different response classes, its class is a matter of chance.
 """
 
 from __future__ import annotations
@@ -19,23 +18,23 @@ __all__ = ["MEASURING_ERROR", "Replicates", "perturbed_start"]
 
 
 MEASURING_ERROR = 12e-6 / 12.0**0.5
-"""Error of a position read to one pixel of the paper's camera, 12 um: the rms of rounding to a pixel, m."""
+"""Standard deviation of a position that is rounded to one pixel of the paper's camera (12 um), in m."""
 
 
 @dataclass(frozen=True)
 class Replicates:
-    """Repeats of every point of a map.
+    """Replicates of every point of a sweep.
 
     Attributes
     ----------
     count : int
-        Repeats with a changed start, beside the run from rest.
+        Number of replicates with a perturbed initial condition, in addition to the unperturbed run.
     perturbation_rms : float
-        Root mean square of the change of the centre displacement, m.
+        Root mean square of the perturbation of the mid-span displacement, m.
     check_half_step : bool
-        One repeat more, from rest with every step halved.
+        Whether to add a run with the unperturbed initial condition and half the step.
     seed : int
-        Chooses the changes.
+        Seed of the random perturbations.
     """
 
     count: int
@@ -44,27 +43,25 @@ class Replicates:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        integer("replicas", self.count, 0, 10_000)
+        integer("replicates", self.count, 0, 10_000)
         flag("check_half_step", self.check_half_step)
         positive("perturbation_rms", self.perturbation_rms, "m")
         integer("replicate_seed", self.seed, 0, 2**63 - 1)
         if self.count == 0 and not self.check_half_step:
-            raise InputError("replicas = 0: must be at least 1, or with the step halved")
+            raise InputError("replicates = 0: must be at least 1; or set check_half_step = True")
 
     @property
     def runs(self) -> int:
-        """Runs of each point, the one from rest included."""
+        """Runs of each point, the unperturbed run included."""
         return 1 + self.count + int(self.check_half_step)
 
 
-def perturbed_start(system: System, replicas: Replicates, repeat: int, state: State | None = None) -> State:
-    """The start of one repeat: a beam that still rings faintly in all its modes, the same for every point of a map.
+def perturbed_start(system: System, replicates: Replicates, repeat: int, state: State | None = None) -> State:
+    """Return the perturbed initial condition of one replicate; the perturbation is the same at every point of a sweep.
 
-    It is added to *state*, or a batch of states, or else to the system's own start.
-
-    Each linear mode gets a normally distributed displacement and velocity of equal mean energy,
-    q_j ~ N(0, s/omega_j) and q_j' ~ N(0, s), with s such that the displacement of the centre has the
-    root mean square asked for.
+    The perturbation is added to *state*, which may be a batch, or to the initial condition of the system.  Each
+    linear mode gets a normally distributed displacement and velocity of equal mean energy, q_j ~ N(0, s/omega_j) and
+    q_j' ~ N(0, s).  The factor s gives the mid-span displacement its root mean square, ``perturbation_rms``.
     """
     model = system.model
     rest = state if state is not None else system.initial_state
@@ -75,9 +72,11 @@ def perturbed_start(system: System, replicas: Replicates, repeat: int, state: St
     per_unit = np.where(moving, 1.0 / np.where(moving, model.omega, 1.0), 0.0)
     reach = float(np.sqrt(np.sum(((model.midspan_shape @ model.linear_modes) * per_unit) ** 2)))
     if reach == 0.0:
-        raise InputError("replicas: no mode moves the centre, so its start cannot be changed")
-    speed = replicas.perturbation_rms / reach
-    generator = np.random.Generator(np.random.Philox(key=[replicas.seed, repeat]))
+        raise InputError(
+            "replicates: no mode of this model moves the mid-span; use another model, or no replicates"
+        )
+    speed = replicates.perturbation_rms / reach
+    generator = np.random.Generator(np.random.Philox(key=[replicates.seed, repeat]))
     q, velocity = generator.standard_normal((2, model.modes)) * speed
     return dataclasses.replace(
         rest,

@@ -49,7 +49,11 @@ def require_parameters(system: System, points: Points) -> None:
     """Refuse axes over what the system does not have, by its first point."""
     first = {name: values[0] for name, values in points.take(np.zeros(1, dtype=np.int64)).items()}
     for name in first:
-        if name.startswith(("run.", "start.")) or not lookup(name).is_run or name in system.parameters:
+        if (
+            name.startswith(("integration.", "initial_state."))
+            or not lookup(name).is_run
+            or name in system.parameters
+        ):
             continue
         section, _, field = name.partition(".")
         if field != "gap" or section not in {each.partition(".")[0] for each in system.parameters}:
@@ -58,7 +62,7 @@ def require_parameters(system: System, points: Points) -> None:
         system.striker is None
         and system.initial_state is None
         and not system.moving
-        and not any(name.startswith("start.") for name in first)
+        and not any(name.startswith("initial_state.") for name in first)
     ):
         raise InputError("striker = None: a beam that nothing strikes needs a start to move from")
     _at(system, first)
@@ -67,7 +71,9 @@ def require_parameters(system: System, points: Points) -> None:
 def _at(system: System, point: dict[str, Any]) -> System:
     """The system at a point."""
     plain = {name: value.item() if isinstance(value, np.generic) else value for name, value in point.items()}
-    return system.replace(**{name: value for name, value in plain.items() if not name.startswith("run.")})
+    return system.replace(
+        **{name: value for name, value in plain.items() if not name.startswith("integration.")}
+    )
 
 
 def diagnostics_of(system: System, points: Points) -> Iterator[Diagnostic]:
@@ -98,13 +104,13 @@ def require_every_structure(setup: SweepSetup) -> None:
     """
     names = setup.points.names
     stepped = setup.integration.step is not None or "integration.step" in names
-    if not stepped and all(lookup(name).is_run and not name.startswith("start.") for name in names):
+    if not stepped and all(lookup(name).is_run and not name.startswith("initial_state.") for name in names):
         return
     columns = setup.points.take(np.arange(setup.points.size))
     for system, integration, _, points in setup.groups(columns):
         setup.start_of(system, points)
         if stepped:
-            own = {name: values for name, values in points.items() if not name.startswith("start.")}
+            own = {name: values for name, values in points.items() if not name.startswith("initial_state.")}
             require_resolved(system, integration, cycles_of(system, run_columns(system, own)))
 
 
@@ -131,7 +137,7 @@ class SweepSetup:
         """The same sweep over other points."""
         return SweepSetup(self.system, self.integration, points)
 
-    def march(
+    def integrate(
         self,
         columns: Columns,
         threads: int | None = None,
@@ -163,7 +169,7 @@ class SweepSetup:
             state = self.start_of(system, points)
             if start is not None:
                 state = start(system, state)
-            own = {name: values for name, values in points.items() if not name.startswith("start.")}
+            own = {name: values for name, values in points.items() if not name.startswith("initial_state.")}
             for part in _alike(system, state, which.size):
                 columns_of_part = {name: values[part] for name, values in own.items()}
                 begun = state[part] if state is not None and state.batch else state
@@ -181,7 +187,7 @@ class SweepSetup:
                     law=ensemble.law,
                     drive=ensemble.drive,
                     body=ensemble.structure.body_mass is not None,
-                    uneven=ensemble.structure.model.transverse_force is not None,
+                    unequal_wells=ensemble.structure.model.transverse_force is not None,
                     around=system.has_environment,
                     several=bool(system.further_contacts),
                 )[1]
@@ -218,15 +224,22 @@ class SweepSetup:
 
     def neighbour(self, changes: dict[str, Any]) -> tuple[System, Integration]:
         """The system and the integration with some parameters of their structure changed."""
-        of_run = {name[4:]: value for name, value in changes.items() if name.startswith("run.")}
-        of_system = {name: value for name, value in changes.items() if not name.startswith("run.")}
+        of_run = {
+            name.removeprefix("integration."): value
+            for name, value in changes.items()
+            if name.startswith("integration.")
+        }
+        of_system = {name: value for name, value in changes.items() if not name.startswith("integration.")}
         system = self.system.replace(**of_system) if of_system else self.system
         return system, self.integration.replace(**of_run) if of_run else self.integration
 
     @staticmethod
     def start_of(system: System, points: dict[str, NDArray[np.float64]]) -> State | None:
         """Where runs of a system begin, if the points say something of it."""
-        own = {name[6:]: values for name, values in points.items() if name.startswith("start.")}
+        prefix = "initial_state."
+        own = {
+            name.removeprefix(prefix): values for name, values in points.items() if name.startswith(prefix)
+        }
         return started(system.model, system.striker, system.initial_state, own) if own else None
 
     @cached_property
@@ -249,7 +262,7 @@ class SweepSetup:
             name
             for name in self.points.names
             if name.startswith(
-                ("beam.", "model.", "ends.", "imperfection.", "integration.step", "integration.accuracy")
+                ("beam.", "model.", "boundary.", "imperfection.", "integration.step", "integration.accuracy")
             )
         ]
 
@@ -287,7 +300,7 @@ class SweepSetup:
                 "length_scale",
             }
         beam = self.system.model.beam
-        if beam is not None and any(name.startswith(("beam.", "ends.")) for name in self.points.names):
+        if beam is not None and any(name.startswith(("beam.", "boundary.")) for name in self.points.names):
             # the one of the two that follows from the other follows anew at every point
             pair = {"beam.buckling_level", "beam.axial_load"}
             given = pair & set(self.points.names) or {f"beam.{beam.given}"}
@@ -374,7 +387,7 @@ def sweep_setup(system: System, axes: Any, integration: Integration | None = Non
         modes=system.model.modes,
         law=law,
         body=system.striker is not None and system.striker.mass is not None,
-        uneven=system.model.transverse_force is not None,
+        unequal_wells=system.model.transverse_force is not None,
         around=system.has_environment,
         several=bool(system.further_contacts),
         **({} if system.striker is None else {"drive": type(system.striker.drive)}),

@@ -1,4 +1,4 @@
-"""Many runs: a sweep over any parameters, kept, resumed, spread over a cluster, refined, repeated."""
+"""Sweeps over any parameters."""
 
 from __future__ import annotations
 
@@ -32,65 +32,67 @@ def sweep(
     output: str | os.PathLike[str] | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
-    """Class and statistics of the response over any parameters, and any mixture of them.
+    """Compute the response class and the statistics of a run at every point of a grid or list of parameters.
 
-    Points that share a structure are marched together; the numbers depend on neither batch, order, tasks, threads,
-    workers nor interruptions, bit for bit.
+    Points with the same structure are integrated together.  The results do not depend on the batches, the order, the
+    tasks, the threads, the workers or interruptions: they are bitwise identical on the same engine, version and
+    processor type.
 
     Parameters
     ----------
     system : System
-        What is studied; what is not swept is as it says.
+        The model; parameters that are not swept keep its values.
     axes : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
-        A mapping from parameters to values makes a grid, with a dimension for each: names as in
-        :func:`snapbeam.model.parameters`, dotted (``"beam.thickness"``) or as datasets have them
-        (``"frequency_ratio"``), with strictly increasing values.  A dataset with one-dimensional variables, or a
-        data frame, makes a list of points along the dimension ``point``.
+        A mapping from parameters to values defines a grid with one dimension for each parameter.  Names are those of
+        :func:`snapbeam.model.parameters`, dotted (``"beam.thickness"``) or short (``"frequency_ratio"``); values
+        increase strictly.  A dataset with one-dimensional variables, or a data frame, defines a list of points along
+        the dimension ``point``.
     integration : Integration, optional
+        Solver settings.
     checkpoint : path or CheckpointOptions, optional
-        Folder that keeps the sweep while it is computed.  One that exists is resumed: what is finished and
-        undamaged is not computed again.
+        Folder in which snapbeam stores finished tasks.  If it exists, the sweep is resumed: only tasks that are
+        missing or damaged are computed.
     cluster : str, optional
-        Who computes: ``"local:4"``, ``"tcp://host:8786"`` or a TOML file with a section ``[slurm]``; this
-        process by default.  Needs a store.
+        Workers: ``"local:4"``, ``"tcp://host:8786"`` or a TOML file with a section ``[slurm]``.  By default this
+        process computes the sweep.  A cluster needs a checkpoint.
     refine_levels : int
-        Times the spacing of the axes of numbers is halved where neighbours differ in class.
+        Number of times that the grid spacing is halved where neighbours differ in response class.
     replicates : Replicates or int, optional
-        Repeats of each run with a changed start; adds ``class_fraction``.
+        Repeats of each run with a perturbed initial condition; they add ``class_fraction``.
     output : path, optional
-        NetCDF file to write, a block at a time, so that memory does not grow with the sweep.
+        NetCDF file, which is written block by block, so that the memory does not grow with the sweep.
     progress : callable, optional
-        Called as ``progress(done, total)`` with points; True writes a line to standard error.
+        Function that receives ``(done, total)``, numbers of points; True writes a line to standard error.
 
     Returns
     -------
     xarray.Dataset
-        The variables of :data:`snapbeam.STATISTICS` over the axes; every parameter in the attributes.  With *output*,
-        opened from that file.
+        The variables of :data:`snapbeam.STATISTICS` over the axes, with all parameters in the attributes.  With
+        *output*, the dataset is opened from that file.
 
     Raises
     ------
     InputError
-        For bad input, and for a store that holds another sweep.  Runs that fail numerically are UNKNOWN points with
-        a ``status``.
+        For bad input, and for a checkpoint of another sweep.  Runs that fail numerically do not raise: their class is
+        UNKNOWN, and their ``status`` gives the reason.
     CheckpointError
-        If the store is in use, cannot be written or is damaged beyond repair.
+        If the checkpoint is in use, cannot be written or is damaged beyond repair.
 
     Examples
     --------
     >>> ds = sb.sweep(system, {"model.damping_ratio": [0.002, 0.005], "frequency_ratio": omega})  # doctest: +SKIP
     """
     setup = sweep_setup(system, axes, integration)
-    keeping = checkpoint if isinstance(checkpoint, CheckpointOptions) else CheckpointOptions(checkpoint)
+    options = checkpoint if isinstance(checkpoint, CheckpointOptions) else CheckpointOptions(checkpoint)
     if replicates is not None and not isinstance(replicates, Replicates):
         replicates = integer("replicates", replicates, 0, 10_000)
     repeats = Replicates(replicates) if isinstance(replicates, int) and replicates else replicates or None
     return compute_sweep(
         setup,
-        keeping,
+        options,
         cluster=cluster,
         refine_levels=refine_levels,
-        replicas=repeats,
+        replicates=repeats,
         output=output,
         progress=counting(progress, "sweep"),
     )

@@ -1,4 +1,4 @@
-"""What is computed at each point of a sweep: its runs, as rows of two plain tables."""
+"""Runs at the points of a sweep as rows of two tables, and the stages and tasks that they are divided into."""
 
 from __future__ import annotations
 
@@ -34,33 +34,33 @@ from snapbeam.util.status_codes import ResponseClass, RunStatus
 
 __all__ = [
     "CLASSES",
-    "Keeper",
-    "Maker",
-    "MemoryKeeper",
+    "MemoryRunner",
     "PointWork",
+    "Provenance",
     "ResultTable",
     "Rows",
     "Stage",
+    "StageRunner",
     "chunk_size",
     "differences",
-    "this_maker",
+    "provenance_of",
 ]
 
 
 CLASSES = tuple(ResponseClass)
-"""Classes in the order in which repeats are counted."""
+"""Response classes in the order of the columns that count replicates."""
 _COUNTS = tuple(f"runs_{kind.name.lower()}" for kind in CLASSES)
 _HALVED = "response_half_step"
 
 
 class ResultTable(NamedTuple):
-    """Results of runs: whole numbers and real numbers, a row a run."""
+    """Results of runs: integers and real numbers, one row for each run."""
 
     integers: NDArray[np.int32]
     numbers: NDArray[np.float64]
 
     def content_hash(self) -> str:
-        """SHA-256 of what the tables hold."""
+        """SHA-256 of the contents of the tables."""
         digest = hashlib.sha256()
         tables: tuple[tuple[NDArray[Any], str], ...] = ((self.integers, "<i4"), (self.numbers, "<f8"))
         for table, kind in tables:
@@ -71,22 +71,22 @@ class ResultTable(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PointWork:
-    """How the points of a sweep become rows of results, repeats included."""
+    """Computation of rows of results from the points of a sweep, replicates included."""
 
     setup: SweepSetup
-    replicas: Replicates | None = None
+    replicates: Replicates | None = None
 
     @cached_property
     def statistics(self) -> dict[str, Statistic]:
-        """The table's rows, with those of each of several strikers."""
+        """Statistics of the sweep, with those of each of several strikers."""
         return rows_for(1 + len(self.setup.system.further_contacts))
 
     @cached_property
     def integers(self) -> tuple[str, ...]:
-        """Names of the columns of whole numbers."""
+        """Names of the columns of integers."""
         names = [name for name, row in self.statistics.items() if row.dtype != "float64"]
-        if self.replicas is not None:
-            names += [*_COUNTS, _HALVED] if self.replicas.check_half_step else _COUNTS
+        if self.replicates is not None:
+            names += [*_COUNTS, _HALVED] if self.replicates.check_half_step else _COUNTS
         return tuple(names)
 
     @cached_property
@@ -96,19 +96,19 @@ class PointWork:
 
     @property
     def runs_per_point(self) -> int:
-        """Runs that a point takes."""
-        return 1 if self.replicas is None else self.replicas.runs
+        """Number of runs at each point."""
+        return 1 if self.replicates is None else self.replicates.runs
 
     @cached_property
     def parameters(self) -> dict[str, Any]:
-        """Everything the numbers depend on, plain: what two maps must share to be one."""
+        """Plain values of everything that the results depend on; sweeps with equal values have equal results."""
         found = self.setup.identity() | {"statistics": list(self.statistics)}
-        if self.replicas is not None:
-            found["replicas"] = {
-                "count": self.replicas.count,
-                "size": self.replicas.perturbation_rms,
-                "seed": self.replicas.seed,
-                "check_half_step": self.replicas.check_half_step,
+        if self.replicates is not None:
+            found["replicates"] = {
+                "count": self.replicates.count,
+                "perturbation_rms": self.replicates.perturbation_rms,
+                "seed": self.replicates.seed,
+                "check_half_step": self.replicates.check_half_step,
             }
         return found
 
@@ -123,7 +123,7 @@ class PointWork:
         return hashlib.sha256((self.parameter_hash + canonical_json(places)).encode()).hexdigest()
 
     def model_hash(self) -> str:
-        """SHA-256 of the model's numbers, which may differ in their last digits between processors."""
+        """SHA-256 of the matrices of the model, whose last digits may differ between processors."""
         model = self.setup.system.model
         digest = hashlib.sha256()
         for values in (model.mass, model.stiffness, model.omega, model.linear_modes, model.well_amplitude):
@@ -133,7 +133,7 @@ class PointWork:
     def compute(
         self, points: Columns, threads: int | None = None, progress: Progress | None = None
     ) -> ResultTable:
-        """Integrate every run of *points*, repeats included."""
+        """Integrate all runs of *points*, replicates included."""
         setup, size = self.setup, next(iter(points.values())).size
         total = size * self.runs_per_point
         before = 0
@@ -142,19 +142,19 @@ class PointWork:
             if progress is not None:
                 progress((before + done) // self.runs_per_point, size)
 
-        results = setup.march(points, threads, report)
-        if self.replicas is not None:
-            repeats, replicas = [results["response_class"]], self.replicas
-            for repeat in range(replicas.count):
+        results = setup.integrate(points, threads, report)
+        if self.replicates is not None:
+            repeats, replicates = [results["response_class"]], self.replicates
+            for repeat in range(replicates.count):
                 before += size
 
                 def start(system: System, state: State | None, number: int = repeat) -> State:
-                    return perturbed_start(system, replicas, number, state)
+                    return perturbed_start(system, replicates, number, state)
 
-                repeats.append(setup.march(points, threads, report, start=start)["response_class"])
-            if replicas.check_half_step:
+                repeats.append(setup.integrate(points, threads, report, start=start)["response_class"])
+            if replicates.check_half_step:
                 before = total - size
-                repeats.append(setup.march(points, threads, report, step_factor=0.5)["response_class"])
+                repeats.append(setup.integrate(points, threads, report, step_factor=0.5)["response_class"])
                 results[_HALVED] = repeats[-1]
             kinds = np.array(repeats)
             results |= {
@@ -166,7 +166,7 @@ class PointWork:
         )
 
     def unfinished(self, size: int, status: RunStatus = RunStatus.NOT_RUN) -> ResultTable:
-        """Rows of points that were not computed: class unknown, and the status that says why."""
+        """Return rows of points that were not computed, with the class UNKNOWN and the given status."""
         integers = np.zeros((size, len(self.integers)), dtype=np.int32)
         integers[:, self.integers.index("response_class")] = ResponseClass.UNKNOWN
         integers[:, self.integers.index("status")] = status
@@ -175,20 +175,20 @@ class PointWork:
         return ResultTable(integers, np.full((size, len(self.numbers)), np.nan))
 
     def variables(self) -> dict[str, tuple[str, bool, dict[str, Any]]]:
-        """Kind, whether there is one value a class, and attributes of each variable of the map."""
+        """Return for each variable its data type, whether it has one value for each class, and its attributes."""
         variables = {
             name: (row.dtype, False, variable_attributes(name)) for name, row in self.statistics.items()
         }
-        if self.replicas is not None:
-            labels = {"units": "1", "long_name": "share of the runs of a point, by response class"}
+        if self.replicates is not None:
+            labels = {"units": "1", "long_name": "fraction of the runs of a point, by response class"}
             variables["class_fraction"] = ("float64", True, labels)
-            if self.replicas.check_half_step:
-                labels = {"units": "1", "long_name": "response class with the step halved"}
+            if self.replicates.check_half_step:
+                labels = {"units": "1", "long_name": "response class with half the step"}
                 variables[_HALVED] = ("int8", False, labels | code_flags(ResponseClass))
         return variables
 
     def values(self, name: str, columns: ResultTable) -> NDArray[Any]:
-        """One variable of the map from rows of results, shape (runs,) or (runs, classes)."""
+        """Return one variable from rows of results, of shape (runs,) or (runs, classes)."""
         if name == "class_fraction":
             first = self.integers.index(_COUNTS[0])
             counts = columns.integers[:, first : first + len(CLASSES)]
@@ -200,7 +200,7 @@ class PointWork:
         return columns.integers[:, self.integers.index(name)].astype(kind)
 
     def join(self, parts: Iterable[ResultTable]) -> ResultTable:
-        """Rows of several parts as one."""
+        """Return the rows of several parts as one table."""
         whole = [self.unfinished(0), *parts]
         return ResultTable(
             np.concatenate([part.integers for part in whole]),
@@ -209,12 +209,12 @@ class PointWork:
 
 
 # ----------------------------------------------------------------------------------------------------
-# Stages of a map, cut into tasks: which points each holds, and the results of a finished stage.
+# Stages of a sweep and their tasks.
 
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """Points computed together: all of a sweep, or the listed ones, cut into tasks of *chunk* points."""
+    """Points that are computed together, all or some of a sweep, in tasks of *chunk* points."""
 
     name: str
     points: Points
@@ -232,11 +232,11 @@ class Stage:
         return -(-self.size // self.chunk)
 
     def bounds(self, task: int) -> tuple[int, int]:
-        """First point of a task and the one after its last."""
+        """Return the first point of a task and the point after its last."""
         return task * self.chunk, min((task + 1) * self.chunk, self.size)
 
     def columns(self, task: int) -> Columns:
-        """The points of a task."""
+        """Return the points of a task."""
         start, stop = self.bounds(task)
         return self.points.take(np.arange(start, stop) if self.which is None else self.which[start:stop])
 
@@ -244,24 +244,26 @@ class Stage:
 class Rows(Protocol):
     """Rows of results of a stage, in the order of its points."""
 
-    def read(self, start: int, stop: int) -> ResultTable: ...
+    def read(self, start: int, stop: int) -> ResultTable:
+        """Return the rows *start* to *stop*."""
+        ...
 
 
-class Keeper(Protocol):
-    """Where the stages of a map are computed and kept."""
+class StageRunner(Protocol):
+    """Computes the stages of a sweep and stores their results."""
 
     work: PointWork
     chunk: int
 
     def complete(self, stage: Stage, progress: Progress | None = None) -> Rows:
-        """Compute what is missing of a stage and return its results."""
+        """Compute the missing tasks of a stage and return its results."""
         ...
 
 
 def chunk_size(points: int, engine: str) -> int:
-    """Points of a task: some two hundred tasks a map, each large enough to keep the cores busy.
+    """Return the points per task: about 200 tasks for a sweep, each large enough for all cores.
 
-    What a run gives does not depend on it.
+    The results do not depend on it.
     """
     low, high = (64, 4096) if engine == "cpu" else (4096, 65536)
     return int(np.clip(-(-points // 200), low, high))
@@ -275,8 +277,8 @@ class _Rows:
         return ResultTable(self.columns.integers[start:stop], self.columns.numbers[start:stop])
 
 
-class MemoryKeeper:
-    """A map that lives in memory and is gone with the process."""
+class MemoryRunner:
+    """Computes a sweep in memory."""
 
     def __init__(self, work: PointWork, threads: int | None = None) -> None:
         self.work = work
@@ -284,13 +286,13 @@ class MemoryKeeper:
         self.chunk = max(work.setup.points.size, 1)
 
     def complete(self, stage: Stage, progress: Progress | None = None) -> Rows:
-        """Compute the stage in one go."""
+        """Compute all points of the stage."""
         points = stage.points.take(np.arange(stage.size) if stage.which is None else stage.which)
         return _Rows(self.work.compute(points, self.threads, progress))
 
 
 # ----------------------------------------------------------------------------------------------------
-# What computes: everything beside the parameters that the digits of a number depend on.
+# Provenance: everything except the parameters that the last digits of a result depend on.
 
 
 _WORDS = {
@@ -303,8 +305,8 @@ _WORDS = {
 
 
 @dataclass(frozen=True)
-class Maker:
-    """What computes in one process."""
+class Provenance:
+    """Versions, code and processor of a process."""
 
     version: str
     code: str
@@ -313,13 +315,13 @@ class Maker:
     processor: str
 
 
-def this_maker(system: System) -> Maker:
-    """What computes here, for a system with its law of contact and its drive."""
-    return Maker(__version__, _code(system), _libraries(), arithmetic_hash(), processor_name())
+def provenance_of(system: System) -> Provenance:
+    """Return the provenance of this process, for a system with its contact law and its drive."""
+    return Provenance(__version__, _code(system), _libraries(), arithmetic_hash(), processor_name())
 
 
 def _code(system: System) -> str:
-    """Of the package, and of a law or a drive that somebody else wrote."""
+    """Return the hash of the code of the package, and of a contact law or drive that is defined outside it."""
     parts = [system.contact, system.striker and system.striker.drive]
     foreign = tuple(
         type(part) for part in parts if part and not type(part).__module__.startswith("snapbeam.")
@@ -340,8 +342,8 @@ def _libraries() -> str:
     return ", ".join([*found, f"python {platform.python_version()}"])
 
 
-def differences(makers: Iterable[Maker]) -> list[str]:
-    """In words, what is not the same among them; nothing if there is at most one."""
-    columns = list(zip(*map(astuple, makers), strict=True))
-    names = [field.name for field in fields(Maker)]
+def differences(provenances: Iterable[Provenance]) -> list[str]:
+    """Return the names of the parts in which provenances differ; an empty list if they are equal."""
+    columns = list(zip(*map(astuple, provenances), strict=True))
+    names = [field.name for field in fields(Provenance)]
     return [_WORDS[name] for name, values in zip(names, columns, strict=False) if len(set(values)) > 1]

@@ -1,1 +1,1 @@
-"""checkpoint"""
+"""Checkpoints of sweeps on disk."""

@@ -1,7 +1,7 @@
-"""The ledger of a store: which tasks are done, by records that are written after the data and synced.
+"""Files of a checkpoint: durable writes, the lock of the writer, and the task log.
 
-One line a record, a JSON object and its check sum.  A line that was torn or altered counts for nothing, and
-its task is computed again.
+The task log has one line for each finished or failed task: a JSON object and its check sum.  A line is written and
+synced after the data of its task.  snapbeam ignores a torn or altered line and computes its task again.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ from snapbeam.util.validation import InputError
 __all__ = [
     "PARTIAL",
     "CheckpointError",
-    "Ledger",
+    "CheckpointLock",
     "Record",
-    "StoreLock",
+    "TaskLog",
     "append_line",
     "durable_write",
     "member",
@@ -39,15 +39,15 @@ __all__ = [
 
 
 # ----------------------------------------------------------------------------------------------------
-# What goes wrong with stores and clusters.
+# Errors of checkpoints and clusters.
 
 
 class CheckpointError(OSError):
-    """A store that cannot be written, read or trusted, or workers that cannot compute; the message says what to do."""
+    """A checkpoint cannot be written or read, or its workers cannot compute; the message contains the remedy."""
 
 
 # ----------------------------------------------------------------------------------------------------
-# Files of a store: on the disk when a call returns, owned by one writer, and never anyone else's.
+# Files of a checkpoint: each is on the disk when the call returns, and only one process writes them.
 
 
 PARTIAL = ".partial"
@@ -56,7 +56,7 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}")
 
 
 def durable_write(path: Path, data: bytes | memoryview) -> None:
-    """Write a file so that it is whole or not there, whatever stops the process or the machine."""
+    """Write a file atomically: after a crash the file is complete or absent."""
     temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}{PARTIAL}")
     try:
         with temporary.open("wb") as stream:
@@ -71,7 +71,7 @@ def durable_write(path: Path, data: bytes | memoryview) -> None:
 
 
 def append_line(path: Path, line: str) -> None:
-    """Append a line to a file and have it on the disk; a line torn by an earlier failure stays apart."""
+    """Append a line to a file and sync it; a torn last line is ended first."""
     handle = open_own(path, os.O_RDWR | os.O_APPEND)
     try:
         size = os.fstat(handle).st_size
@@ -97,17 +97,17 @@ def _sync_folder(folder: Path) -> None:
 
 
 def member(name: str) -> str:
-    """Return *name* if it can name a member of a store: no path, nothing hidden, nothing upward."""
+    """Return *name* if it is a valid name of a member of a checkpoint: not a path, not hidden, without dots upward."""
     if not isinstance(name, str) or not _NAME.fullmatch(name) or ".." in name:
-        raise InputError(f"store: {name!r} is no name of a member of a store")
+        raise InputError(f"checkpoint: {name!r} is not a name of a member of a checkpoint")
     return name
 
 
 def refuse_links(folder: Path, *, sweep: bool) -> None:
-    """Refuse a store in which anything is neither a plain file nor a plain folder.
+    """Refuse a checkpoint that contains anything except plain files and folders.
 
-    A link could make a resumed map read, or write, outside its store.  *sweep* removes torn files; only the holder of
-    the store's lock may, for they may be another writer's that is at work.
+    A link could make a resumed sweep read or write outside its checkpoint.  *sweep* removes partial files.  Only the
+    process that holds the lock may remove them, because another process may be writing them.
     """
     pending = [folder]
     while pending:
@@ -124,11 +124,11 @@ def refuse_links(folder: Path, *, sweep: bool) -> None:
 
 def _link(path: Path, folder: Path) -> InputError:
     inside = path.relative_to(folder)
-    return InputError(f"store = {str(folder)!r}: {str(inside)!r} is a link or no plain file")
+    return InputError(f"checkpoint = {str(folder)!r}: {str(inside)!r} is a link or not a plain file")
 
 
 def open_own(path: Path, flags: int) -> int:
-    """Open a file of a store that is written in place; refuse one that is a link or that also has another name.
+    """Open a file of a checkpoint for writing in place; refuse a link and a file with a second name.
 
     Raises
     ------
@@ -147,8 +147,8 @@ def open_own(path: Path, flags: int) -> int:
     return handle
 
 
-class StoreLock:
-    """The right to write a store: held by one process, given back by the system however it ends."""
+class CheckpointLock:
+    """Exclusive lock for writing a checkpoint; the operating system releases it when the process ends."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -162,7 +162,7 @@ class StoreLock:
             holder = _holder(handle)
             os.close(handle)
             raise CheckpointError(
-                f"store = {str(self.path.parent)!r}: is being written by another process ({holder}); "
+                f"checkpoint = {str(self.path.parent)!r}: another process is writing it ({holder}); "
                 "wait for it, or stop it"
             ) from None
         self._handle = handle
@@ -182,15 +182,15 @@ class StoreLock:
 
 
 def _holder(handle: int) -> str:
-    """Who holds a lock: waits a moment for one that has only just taken it, and writes down that it has."""
-    said = ""
+    """Return the process that holds a lock; waits up to a second for a new holder to write its number."""
+    holder = ""
     for _ in range(20):
-        said = os.pread(handle, 32, 0).decode(errors="replace").strip()
-        kind, _, number = said.partition(" ")
+        holder = os.pread(handle, 32, 0).decode(errors="replace").strip()
+        kind, _, number = holder.partition(" ")
         if kind == "process" and number.isdecimal() and lives(int(number)):
-            return said
+            return holder
         time.sleep(0.05)
-    return said or "unknown"
+    return holder or "unknown"
 
 
 def _lock(handle: int) -> None:
@@ -212,7 +212,7 @@ _CHECK_DIGITS = 16
 
 @dataclass(frozen=True, kw_only=True)
 class Record:
-    """What the ledger says of one task."""
+    """Entry of the task log: how one task ended, and what computed it."""
 
     stage: str
     task: int
@@ -221,29 +221,29 @@ class Record:
     parameters: str
     """Hash of the parameters and of the task's points."""
     content: str
-    """Hash of the results; of a failed task, why it failed."""
+    """Hash of the results; the reason if the task failed."""
     engine: str
     step: float
     model: str
-    """Hash of the model's numbers."""
+    """Hash of the matrices of the model."""
     version: str
     code: str
-    """Hash of the package's code, and of what a law or a drive of somebody else's brings along."""
+    """Hash of the code of the package, and of contact laws and drives that are defined outside it."""
     libraries: str
-    """NumPy, Numba and Python with their versions."""
+    """Versions of NumPy, Numba and Python."""
     arithmetic: str
-    """Hash of how products, sums and functions were rounded."""
+    """Hash of the rounding of products, sums and elementary functions."""
     processor: str
     created: str = ""
 
     def line(self) -> str:
-        """The record as a line of the ledger."""
+        """Return the record as a line of the task log."""
         text = json.dumps(asdict(self), sort_keys=True, separators=(",", ":"), allow_nan=False)
         return f"{text}\t{_check(text)}"
 
     @classmethod
     def from_line(cls, line: str) -> Record | None:
-        """The record a line holds; None if it is torn, altered or none."""
+        """Return the record of a line; None if the line is torn or altered."""
         text, tab, check = line.rstrip("\n").rpartition("\t")
         if not tab or check != _check(text):
             return None
@@ -261,8 +261,8 @@ def _check(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:_CHECK_DIGITS]
 
 
-class Ledger:
-    """The records of a store, the last one of each task."""
+class TaskLog:
+    """Records of a checkpoint: the last one of each task."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -278,7 +278,7 @@ class Ledger:
                         self.records[member(record.stage), record.task] = record
 
     def write(self, record: Record) -> None:
-        """Append a record and have it on the disk."""
+        """Append a record and sync the file."""
         record = Record(**(asdict(record) | {"created": record.created or created_now()}))
         append_line(self.path, record.line())
         self.records[record.stage, record.task] = record

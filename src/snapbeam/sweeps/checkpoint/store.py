@@ -1,13 +1,14 @@
-"""A map on disk while it is computed: Zarr for the numbers, a ledger for what is done, a lock for the writer.
+"""Checkpoint of a sweep: Zarr arrays with the results, a log of finished tasks and a lock for the writer.
 
 Layout of the folder::
 
     map.json       the parameters
-    ledger.jsonl   one record a finished task, written after its data and synced
-    lock           held while a process writes
-    runs.zarr/     a group a stage; in it ``integers`` and ``numbers``, a row a run, a chunk a task
+    tasks.jsonl    one record for each finished task, written and synced after its data
+    lock           locked while a process writes
+    runs.zarr/     one group for each stage, with the arrays ``integers`` and ``numbers``: one row for each run and
+                   one chunk for each task
 
-What is done is read from the ledger and the hash of the data, never from the data's fill values.
+The task log and the hashes of the data determine which tasks are finished, never the fill values of the arrays.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from numpy.typing import NDArray
 from snapbeam.sweeps.checkpoint.records import (
     PARTIAL,
     CheckpointError,
-    Ledger,
+    CheckpointLock,
     Record,
-    StoreLock,
+    TaskLog,
     durable_write,
     member,
     refuse_links,
@@ -40,14 +41,14 @@ from snapbeam.sweeps.checkpoint.records import (
 from snapbeam.sweeps.points import Grid
 from snapbeam.sweeps.setup import SweepSetup
 from snapbeam.sweeps.tasks import (
-    Maker,
     PointWork,
+    Provenance,
     ResultTable,
     Rows,
     Stage,
     chunk_size,
     differences,
-    this_maker,
+    provenance_of,
 )
 from snapbeam.util.provenance import canonical_json, parameter_hash
 from snapbeam.util.validation import InputError, file_path, integer, shown
@@ -58,11 +59,12 @@ if TYPE_CHECKING:
 __all__ = [
     "BASE",
     "FORMAT",
+    "Checkpoint",
+    "CheckpointRows",
     "JoinedRows",
     "Layer",
-    "MapStore",
-    "StoredRows",
     "axes_apart",
+    "checkpoint_folder",
     "grown",
     "is_growth",
     "layers_of",
@@ -73,23 +75,19 @@ __all__ = [
     "refuse_foreign",
     "refuse_other",
     "snapped",
-    "store_folder",
 ]
 
 
 # ----------------------------------------------------------------------------------------------------
-# What a store says that it holds: read, compared with what is asked for, and refused in words.
+# The description of a checkpoint: reading it, and comparing it with the requested sweep.
 
 
-FORMAT = {"format": "snapbeam map", "format_version": 3}
-"""Of a new store."""
-_VERSIONS = (3, 4)
-"""4: a store that has grown, which earlier versions would take for another map."""
-_KNOWN = {"map.json", "ledger.jsonl", "lock", "runs.zarr"}
+FORMAT = {"format": "snapbeam checkpoint", "format_version": 5}
+_KNOWN = {"map.json", "tasks.jsonl", "lock", "runs.zarr"}
 
 
 def axes_apart(there: Mapping[str, Any], here: Mapping[str, Any]) -> dict[str, int]:
-    """How many values of each axis of one map another one has not."""
+    """Return for each axis the number of values of one sweep that the other sweep does not have."""
     return {
         name: len(set(values) - set(here[name]))
         for name, values in there.items()
@@ -97,61 +95,75 @@ def axes_apart(there: Mapping[str, Any], here: Mapping[str, Any]) -> dict[str, i
     }
 
 
-def store_folder(path: str | Path) -> Path:
+def checkpoint_folder(path: str | Path) -> Path:
+    """Return the folder of a checkpoint, which may not exist yet; its parent must exist."""
     if not isinstance(path, (str, Path)):
-        raise InputError(f"store = {shown(path)}: must be a folder")
-    folder = file_path("store", path)
+        raise InputError(f"checkpoint = {shown(path)}: must be a folder")
+    folder = file_path("checkpoint", path)
     if folder.exists() and not folder.is_dir():
-        raise InputError(f"store = {str(path)!r}: must be a folder, not a file")
+        raise InputError(f"checkpoint = {str(path)!r}: must be a folder, not a file")
     if not folder.parent.is_dir():
-        raise InputError(f"store = {str(path)!r}: {str(folder.parent)!r} is not an existing folder")
+        raise InputError(f"checkpoint = {str(path)!r}: {str(folder.parent)!r} is not an existing folder")
     return folder
 
 
 def refuse_foreign(folder: Path) -> None:
-    """Refuse a folder that holds something and no map, before anything is written into it."""
+    """Refuse a folder that is not empty and is not a checkpoint, before anything is written into it."""
     names = {entry.name for entry in folder.iterdir() if not entry.name.endswith(PARTIAL)}
     if "map.json" not in names and names - _KNOWN:
-        raise InputError(f"store = {str(folder)!r}: is not empty and holds no map")
+        raise InputError(
+            f"checkpoint = {str(folder)!r}: is not empty and is not a checkpoint; give another folder"
+        )
 
 
 def read_description(file: Path) -> dict[str, Any]:
+    """Return the contents of map.json.
+
+    Raises
+    ------
+    CheckpointError
+        If the file is damaged.
+    InputError
+        If the file has another format.
+    """
     damaged = CheckpointError(
-        f"store = {str(file.parent)!r}: map.json is damaged; put it back from a copy, or start another store"
+        f"checkpoint = {str(file.parent)!r}: map.json is damaged; restore it from a copy, or give another folder"
     )
     try:
         held = json.loads(file.read_bytes())
+        if not isinstance(held, dict):
+            raise damaged
+        if {name: held.get(name) for name in FORMAT} != FORMAT:
+            raise InputError(
+                f"checkpoint = {str(file.parent)!r}: has the format {held.get('format')} "
+                f"{held.get('format_version')}, not {FORMAT['format']} {FORMAT['format_version']}; give another folder"
+            )
         sound = (
-            isinstance(held, dict)
-            and isinstance(held["parameters"], dict)
+            isinstance(held["parameters"], dict)
             and held["parameter_hash"] == parameter_hash(held["parameters"])
-            and isinstance(held["chunk"], int)
-            and held["chunk"] >= 1
+            and isinstance(held["points_per_task"], int)
+            and held["points_per_task"] >= 1
         )
     except (ValueError, KeyError, RecursionError):
         raise damaged from None
     if not sound:
         raise damaged
-    if held.get("format") != FORMAT["format"] or held.get("format_version") not in _VERSIONS:
-        raise InputError(
-            f"store = {str(file.parent)!r}: was written in another format ({held.get('format_version')})"
-        )
     return held
 
 
 def read_stored_config(path: str | Path) -> dict[str, Any] | None:
-    """The parameter file a store keeps, as nested plain values; None if there is none."""
-    file = store_folder(path) / "map.json"
+    """Return the parameter file of a checkpoint as nested plain values; None if it has none."""
+    file = checkpoint_folder(path) / "map.json"
     if not file.exists():
         return None
     if file.is_symlink():
-        raise InputError(f"store = {str(path)!r}: 'map.json' is a link or no plain file")
+        raise InputError(f"checkpoint = {str(path)!r}: 'map.json' is a link or not a plain file")
     config = read_description(file).get("config")
     return config if isinstance(config, dict) else None
 
 
 def read_stored_points(path: str | Path) -> dict[str, Any] | None:
-    """What a store says of its points, by dotted name; None if there is none."""
+    """Return the points of a checkpoint by dotted name; None if there is no checkpoint."""
     file = Path(path) / "map.json"
     if file.is_symlink() or not file.is_file():
         return None
@@ -160,38 +172,43 @@ def read_stored_points(path: str | Path) -> dict[str, Any] | None:
 
 
 def refuse_other(path: Path, held: dict[str, Any], wanted: dict[str, Any]) -> None:
+    """Refuse a checkpoint whose parameters differ from those of the requested sweep; lists the differences."""
     there, here = _flat(held), _flat(wanted)
     lines = [
-        f"  {name}: {_brief(there.get(name))} in the store, {_brief(here.get(name))} asked for"
+        f"  {name}: {_brief(there.get(name))} in the checkpoint, {_brief(here.get(name))} requested"
         for name in sorted(there.keys() | here.keys())
         if there.get(name) != here.get(name)
     ]
     if lines:
         lines += [f"  {words}" for words in _advice(held, wanted)]
-        raise InputError(f"store = {str(path)!r}: holds a map of other parameters\n" + "\n".join(lines))
+        raise InputError(
+            f"checkpoint = {str(path)!r}: contains a sweep with other parameters; give another folder, or the same "
+            "parameters\n" + "\n".join(lines)
+        )
 
 
 def _advice(held: dict[str, Any], wanted: dict[str, Any]) -> list[str]:
-    """What to do about parameters by which people would have a store go on."""
+    """Return advice for the two changes that users expect to work: more cycles, and fewer values of an axis."""
     found = []
     cycles = [each.get("integration", {}).get("cycles") for each in (held, wanted)]
     if cycles[0] != cycles[1]:
         found.append(
-            "A finished run is not marched on: a store keeps what came of each run, not the state in which it "
-            f"ended. Ask for the store's {cycles[0]} cycles, or give another folder for {cycles[1]}."
+            "A finished run cannot be continued: a checkpoint contains the statistics of each run, not its final "
+            f"state. Request the {cycles[0]} cycles of the checkpoint, or give another folder for {cycles[1]}."
         )
     there, here = held.get("points", {}), wanted.get("points", {})
     for name, count in axes_apart(there, here).items():
         if count:
             found.append(
-                f"A store only grows: {count} of its {len(there[name])} values of {name} are not among those asked "
-                "for. Give values that hold them too, a list or a longer range of the same spacing, or another folder."
+                f"A checkpoint can only be extended: {count} of its {len(there[name])} values of {name} are not among "
+                "the requested values. Request these values too (a list, or a longer range of the same spacing), or "
+                "give another folder."
             )
     return found
 
 
 def _flat(values: dict[str, Any], before: str = "") -> dict[str, Any]:
-    """Nested parameters by dotted name."""
+    """Return nested parameters by dotted name."""
     found: dict[str, Any] = {}
     for name, value in values.items():
         full = f"{before}{name}"
@@ -208,40 +225,41 @@ def _brief(value: Any) -> str:
 
 
 # ----------------------------------------------------------------------------------------------------
-# A store that grows: its map is asked for again over more values of its axes, and what it holds is kept as it is.
+# Extending a checkpoint: the sweep is requested again with more values of its axes, and only new points are computed.
 #
-# The points of each map that was asked for, less those of the map before, are a stage of their own.  Nothing that was
-# computed is written again: a grown store is the stages of its earlier maps and one more.
+# Each extension is a stage of its own, with the points that the sweep before did not have.  No result is written
+# again: an extended checkpoint contains the stages of its earlier sweeps and one more.
 
 
 BASE = "base"
-"""The stage of all points of a map, whatever it grew from."""
+"""Name of the stage that contains all points of a sweep that was not extended."""
 _SAME = 1e-12
-"""Relative distance within which a value asked for is one that the store has: ranges are rounded as they are cut."""
+"""Relative difference up to which a requested value is a value of the checkpoint: ranges of different length round
+their values differently."""
 
 _Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """The points that a store got when its map was asked for, or when it grew."""
+    """Points that a checkpoint got when its sweep was first requested, or in one extension."""
 
     work: PointWork
-    """Of the map that was asked for then."""
+    """Work of the sweep that was requested then."""
     stage: Stage
     places: _Index
-    """Numbers of the stage's points in the grid that the store has now."""
+    """Numbers of the points of the stage in the present grid."""
 
 
 @dataclass(frozen=True, eq=False)
 class JoinedRows:
-    """Rows of the layers of a store, in the order of the grid that it has now."""
+    """Rows of the layers of a checkpoint, in the order of the present grid."""
 
     layers: Sequence[Layer]
     rows: Sequence[Rows]
 
     def read(self, start: int, stop: int) -> ResultTable:
-        """Rows *start* to *stop*."""
+        """Return the rows *start* to *stop*."""
         found = self.layers[-1].work.unfinished(stop - start)
         for layer, rows in zip(self.layers, self.rows, strict=True):
             own = np.flatnonzero((layer.places >= start) & (layer.places < stop))
@@ -255,7 +273,7 @@ class JoinedRows:
 
 
 def is_growth(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
-    """Whether the parameters *wanted* are those *held* but for more values along some axes."""
+    """Whether the parameters *wanted* differ from *held* only by additional values of some axes."""
     there, here = held.get("points"), wanted.get("points")
     if not isinstance(there, dict) or not isinstance(here, dict) or there == here:
         return False
@@ -265,7 +283,7 @@ def is_growth(held: Mapping[str, Any], wanted: Mapping[str, Any]) -> bool:
 
 
 def grown(description: Mapping[str, Any], wanted: Mapping[str, Any], names: Sequence[str]) -> dict[str, Any]:
-    """The description of a store that has grown to other axes, whose hash is still to be written."""
+    """Return the description of a checkpoint after an extension, without its new hash."""
     before = {"points": description["parameters"]["points"], "axes": description["axes"]}
     layers = [*description.get("grown", []), before]
     return {
@@ -273,14 +291,13 @@ def grown(description: Mapping[str, Any], wanted: Mapping[str, Any], names: Sequ
         "parameters": dict(wanted),
         "axes": list(names),
         "grown": layers,
-        "format_version": 4,
     }
 
 
 def layers_of(work: PointWork, earlier: Sequence[Mapping[str, Any]], chunk: int) -> list[Layer]:
-    """The layers of a store: of its *earlier* maps as :func:`grown` keeps them, and of *work*, in their order."""
+    """Return the layers of a checkpoint: those of its *earlier* sweeps, as :func:`grown` stores them, and of *work*."""
     now = work.setup.points
-    if not isinstance(now, Grid):  # a list of points does not grow
+    if not isinstance(now, Grid):  # a list of points cannot be extended
         return [Layer(work, Stage(BASE, now, chunk), np.arange(now.size))]
     grids = [
         Grid({name: np.array(each["points"][name], now.axes[name].dtype) for name in each["axes"]})
@@ -297,7 +314,7 @@ def layers_of(work: PointWork, earlier: Sequence[Mapping[str, Any]], chunk: int)
 
 
 def _beyond(grid: Grid, before: Grid) -> _Index:
-    """The points of a grid that the one before has not."""
+    """Return the numbers of the points of a grid that the one before does not contain."""
     known = np.ones(grid.shape, dtype=bool)
     for at, name in enumerate(grid.order):
         shape = [1] * len(grid.shape)
@@ -307,7 +324,7 @@ def _beyond(grid: Grid, before: Grid) -> _Index:
 
 
 def _places(grid: Grid, now: Grid, which: _Index) -> _Index:
-    """Numbers of points of a grid in one that holds them all."""
+    """Return the numbers of points of a grid in a grid that contains all of them."""
     at = dict(zip(grid.order, np.unravel_index(which, grid.shape), strict=True))
     places = []
     for name in now.order:
@@ -318,7 +335,10 @@ def _places(grid: Grid, now: Grid, which: _Index) -> _Index:
 
 
 def snapped(setup: SweepSetup, path: str | os.PathLike[str] | None) -> tuple[SweepSetup, str]:
-    """A sweep with the values of a store where it asks for the same but for rounding, and words for that."""
+    """Replace values of the axes that differ from those of a checkpoint only by rounding.
+
+    Returns the sweep, and a note about the replaced values, which is empty if there are none.
+    """
     points = setup.points
     if path is None or not isinstance(points, Grid):
         return setup, ""
@@ -338,7 +358,10 @@ def snapped(setup: SweepSetup, path: str | os.PathLike[str] | None) -> tuple[Swe
         moved, most = moved + int(same.sum()), max(most, float(apart[same].max(initial=0.0)))
     if not moved:
         return setup, ""
-    words = f"{moved} values of the axes are those of the store, at most {most:.1g} from what was asked for"
+    words = (
+        f"{moved} values of the axes differ from those of the checkpoint only by rounding, by at most {most:.1g}; the "
+        "values of the checkpoint are used"
+    )
     return setup.with_points(Grid(axes)), words
 
 
@@ -350,29 +373,29 @@ _TABLES = ("integers", "numbers")
 _NOT_HERE = (errno.EROFS, errno.EACCES, errno.EPERM)
 
 
-class MapStore:
-    """The store of one map, open for writing.  Use it as a context manager: it holds the store's lock.
+class Checkpoint:
+    """Checkpoint of one sweep, open for writing; a context manager, because it holds the lock.
 
     Parameters
     ----------
     path : path
-        Folder of the store; made if it is not there, in a folder that is.
+        Folder of the checkpoint; it is created if its parent exists.
     work : PointWork
-        What is computed.
+        Computation of the points.
     chunk : int, optional
-        Points of a task of a new store.
+        Points per task of a new checkpoint.
     config : dict, optional
-        The parameter file that made the map, kept so that it can be resumed without it.
+        Parameter file of the sweep, stored so that the sweep can be resumed without the file.
     grow : bool
-        Whether a map that is there may get more values along its axes.
+        Whether the sweep of an existing checkpoint may get more values of its axes.
 
     Raises
     ------
     InputError
-        If the folder is no store, holds links, or holds a map of other parameters (the differences are
-        listed).
+        If the folder is not a checkpoint, contains links, or contains a sweep with other parameters; the message
+        lists the differences.
     CheckpointError
-        If another process writes it, or its description is damaged.
+        If another process is writing the checkpoint, or its description is damaged.
     """
 
     def __init__(
@@ -383,33 +406,33 @@ class MapStore:
         config: dict[str, Any] | None = None,
         grow: bool = False,
     ) -> None:
-        self.path = store_folder(path)
+        self.path = checkpoint_folder(path)
         self.work = work
         if chunk is not None:
-            chunk = integer("chunk", chunk, 1, 10**7)
+            chunk = integer("points_per_task", chunk, 1, 10**7)
         try:
             self.path.mkdir(exist_ok=True)
         except OSError as error:
             raise self._cannot_write(error) from error
         refuse_foreign(self.path)
-        self._lock = StoreLock(self.path / "lock")
+        self._lock = CheckpointLock(self.path / "lock")
         self.read_only = False
-        """Whether it stands where nothing can be written, so that it can only be read."""
+        """Whether the file system is read-only."""
         try:
             self._take_lock()
             refuse_links(self.path, sweep=not self.read_only)
-            self.ledger = Ledger(self.path / "ledger.jsonl")
+            self.task_log = TaskLog(self.path / "tasks.jsonl")
             self.layers: list[Layer] = []
-            """What a store that has grown consists of; empty for any other."""
+            """Layers of an extended checkpoint; empty for any other."""
             self.chunk = self._describe(chunk, config, grow)
         except BaseException:
             self.close()
             raise
         self.damaged: list[tuple[str, int]] = []
-        """Tasks whose data did not match the ledger when this store was opened."""
+        """Tasks whose data did not match the task log when the checkpoint was opened."""
         self._arrays: dict[str, Any] = {}
-        self.maker = this_maker(work.setup.system)
-        """What computes in this process."""
+        self.provenance = provenance_of(work.setup.system)
+        """Versions, code and processor of this process."""
         self._model = work.model_hash()
         self._warn_of_mixture()
 
@@ -422,7 +445,7 @@ class MapStore:
         self.close()
 
     def close(self) -> None:
-        """Let another process write the store."""
+        """Release the lock."""
         self._lock.__exit__(None, None, None)
 
     def _take_lock(self) -> None:
@@ -442,14 +465,18 @@ class MapStore:
                 held = self._grown(file, held, wanted, config)
             refuse_other(self.path, held["parameters"], wanted)
             if "grown" in held:
-                self.layers = layers_of(self.work, held["grown"], int(held["chunk"]))
-            return int(held["chunk"])
+                self.layers = layers_of(self.work, held["grown"], int(held["points_per_task"]))
+            return int(held["points_per_task"])
         setup = self.work.setup
         chunk = chunk_size(setup.points.size, setup.integration.engine) if chunk is None else chunk
-        held = FORMAT | {"parameters": wanted, "parameter_hash": parameter_hash(wanted), "chunk": chunk}
+        held = FORMAT | {
+            "parameters": wanted,
+            "parameter_hash": parameter_hash(wanted),
+            "points_per_task": chunk,
+        }
         if isinstance(
             setup.points, Grid
-        ):  # the parameters are sorted by name: the order of the axes is said apart
+        ):  # the parameters are sorted by name, so the order of the axes is separate
             held["axes"] = list(setup.points.names)
         if config is not None:
             held["config"] = config
@@ -459,16 +486,11 @@ class MapStore:
     def _grown(
         self, file: Path, held: dict[str, Any], wanted: dict[str, Any], config: dict[str, Any] | None
     ) -> dict[str, Any]:
-        """Describe a store anew that is asked for more values of its axes."""
-        where = f"store = {str(self.path)!r}"
-        refined = {stage for stage, _ in self.ledger.records if stage.startswith("level-")}
-        if refined:
+        """Write the description of a checkpoint whose sweep is requested with more values of its axes."""
+        if any(stage.startswith("level-") for stage, _ in self.task_log.records):
             raise InputError(
-                f"{where}: was refined, and the refinement of a longer map is another one: give another folder"
-            )
-        if "axes" not in held:
-            raise InputError(
-                f"{where}: was begun by a version that did not say the order of its axes: give another folder"
+                f"checkpoint = {str(self.path)!r}: contains a refined sweep, which cannot be extended; give another "
+                "folder"
             )
         now = grown(held, wanted, self.work.setup.points.names) | {"parameter_hash": parameter_hash(wanted)}
         if config is not None:
@@ -483,24 +505,27 @@ class MapStore:
             raise self._cannot_write(error) from error
 
     def work_of(self, stage: Stage) -> PointWork:
-        """What the tasks of a stage were asked for by: the map that there is, or the one that it has grown from."""
+        """Return the work of a stage: that of the present sweep, or of the sweep before an extension."""
         return next((layer.work for layer in self.layers if layer.stage.name == stage.name), self.work)
 
     def _warn_of_mixture(self) -> None:
-        done = [record for record in self.ledger.records.values() if record.state == "done"]
-        if words := _mixture([*map(_maker_of, done), self.maker], {*(r.model for r in done), self._model}):
+        done = [record for record in self.task_log.records.values() if record.state == "done"]
+        if words := _mixture(
+            [*map(_recorded_provenance, done), self.provenance], {*(r.model for r in done), self._model}
+        ):
             version, processor = next(
-                (r.version, r.processor) for r in done if _maker_of(r) != self.maker or r.model != self._model
+                (r.version, r.processor)
+                for r in done
+                if _recorded_provenance(r) != self.provenance or r.model != self._model
             )
             warnings.warn(
-                f"the store was begun with snapbeam {version} on a {processor} processor and goes on with snapbeam "
-                f"{self.maker.version} on {self.maker.processor}: its points are equal {words}",
+                f"the checkpoint was started with snapbeam {version} on a {processor} processor and is continued with "
+                f"snapbeam {self.provenance.version} on {self.provenance.processor}: its results are identical {words}",
                 stacklevel=4,
             )
 
     def open_stage(self, stage: Stage) -> None:
         """Check every finished task of a stage against the ledger, and drop those that are damaged."""
-
         member(stage.name)
         try:
             self._arrays[stage.name] = open_tables(
@@ -509,19 +534,19 @@ class MapStore:
         except OSError as error:
             raise self._cannot_write(error) from error
         for task in range(stage.tasks):
-            record = self.ledger.records.get((stage.name, task))
+            record = self.task_log.records.get((stage.name, task))
             if record is None or record.state != "done":
                 continue
             if (
                 record.parameters != self.work_of(stage).task_hash(stage.columns(task))
                 or self._load(stage, task) is None
             ):
-                del self.ledger.records[stage.name, task]
+                del self.task_log.records[stage.name, task]
                 self.damaged.append((stage.name, task))
 
     def pending(self, stage: Stage) -> list[int]:
-        """Tasks of a stage that are not done, those that failed included."""
-        records = self.ledger.records
+        """Return the tasks of a stage that are not finished; failed tasks are included."""
+        records = self.task_log.records
         return [
             task
             for task in range(stage.tasks)
@@ -529,11 +554,13 @@ class MapStore:
         ]
 
     def damaged_in(self, stage: Stage) -> list[int]:
-        """Tasks of a stage that were found damaged when it was opened."""
+        """Return the tasks of a stage that were damaged when the stage was opened."""
         return [task for name, task in self.damaged if name == stage.name]
 
-    def commit(self, stage: Stage, task: int, columns: ResultTable, maker: Maker | None = None) -> None:
-        """Write the results of a task, have them on the disk, and then say in the ledger that it is done."""
+    def commit(
+        self, stage: Stage, task: int, columns: ResultTable, provenance: Provenance | None = None
+    ) -> None:
+        """Write and sync the results of a task, and then record the task as done."""
         start, stop = stage.bounds(task)
         if any(len(table) != stop - start for table in columns):
             raise CheckpointError(
@@ -542,20 +569,20 @@ class MapStore:
         try:
             for name, table in zip(_TABLES, columns, strict=True):
                 self._arrays[stage.name][name][start:stop] = table
-            self._record(stage, task, "done", columns.content_hash(), maker or self.maker)
+            self._record(stage, task, "done", columns.content_hash(), provenance or self.provenance)
         except OSError as error:
             raise self._cannot_write(error) from error
 
     def fail(self, stage: Stage, task: int, reason: str) -> None:
-        """Say in the ledger that a task could not be computed, and why."""
+        """Record that a task could not be computed, with the reason."""
         try:
-            self._record(stage, task, "failed", reason, self.maker)
+            self._record(stage, task, "failed", reason, self.provenance)
         except OSError as error:
             raise self._cannot_write(error) from error
 
-    def _record(self, stage: Stage, task: int, state: str, content: str, maker: Maker) -> None:
+    def _record(self, stage: Stage, task: int, state: str, content: str, provenance: Provenance) -> None:
         setup = self.work.setup
-        self.ledger.write(
+        self.task_log.write(
             Record(
                 stage=stage.name,
                 task=task,
@@ -565,19 +592,19 @@ class MapStore:
                 engine=setup.integration.engine,
                 step=setup.plan.step,
                 model=self._model,
-                **asdict(maker),
+                **asdict(provenance),
             )
         )
 
     def _cannot_write(self, error: OSError) -> CheckpointError:
         what = "make room" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "make it writable"
         return CheckpointError(
-            f"store = {str(self.path)!r}: cannot be written, {error.strerror or error}; no finished task is "
+            f"checkpoint = {str(self.path)!r}: cannot be written, {error.strerror or error}; no finished task is "
             f"lost: {what} and give the same command again"
         )
 
     def _load(self, stage: Stage, task: int) -> ResultTable | None:
-        """The results of a finished task, or None if they are not what the ledger says."""
+        """Return the results of a finished task; None if they do not match the task log."""
         start, stop = stage.bounds(task)
         try:
             columns = ResultTable(
@@ -585,74 +612,73 @@ class MapStore:
             )
         except Exception:  # whatever a codec makes of damaged bytes
             return None
-        return columns if columns.content_hash() == self.ledger.records[stage.name, task].content else None
+        return columns if columns.content_hash() == self.task_log.records[stage.name, task].content else None
 
     def reader(self, stage: Stage) -> Rows:
-        """The results of a stage, read as they are asked for."""
+        """Return the results of a stage, which are read when they are needed."""
         if self.layers and stage.name == BASE:
-            return JoinedRows(self.layers, [StoredRows(self, layer.stage) for layer in self.layers])
-        return StoredRows(self, stage)
+            return JoinedRows(self.layers, [CheckpointRows(self, layer.stage) for layer in self.layers])
+        return CheckpointRows(self, stage)
 
     def made_with(self) -> dict[str, str]:
-        """Attributes that say what computed the finished tasks, and how far their numbers can be trusted."""
-        done = [record for record in self.ledger.records.values() if record.state == "done"]
-        kinds = Counter((record.engine, _maker_of(record)) for record in done)
+        """Return attributes: what computed the finished tasks, and whether the results are reproducible."""
+        done = [record for record in self.task_log.records.values() if record.state == "done"]
+        kinds = Counter((record.engine, _recorded_provenance(record)) for record in done)
         made = "; ".join(
             f"{count} tasks by engine {engine}, snapbeam {by.version}, processor {by.processor}, {by.libraries}, "
             f"code {by.code}, arithmetic {by.arithmetic}"
             for (engine, by), count in kinds.items()
         )
         words = _mixture([by for _, by in kinds], {record.model for record in done})
-        same = (
-            words
-            or "bit for bit, whatever the tasks, their order, the threads, the workers and the interruptions"
-        )
-        failed = [record for record in self.ledger.records.values() if record.state == "failed"]
+        same = words or "bitwise identical for any tasks, order of tasks, threads, workers and interruptions"
+        failed = [record for record in self.task_log.records.values() if record.state == "failed"]
         attrs = {"computed_by": made, "reproducible": same}
         if failed:
             attrs["failed_tasks"] = "; ".join(f"{r.stage} {r.task}: {r.content}" for r in failed)
         return attrs
 
 
-def _maker_of(record: Record) -> Maker:
-    return Maker(**{field.name: getattr(record, field.name) for field in fields(Maker)})
+def _recorded_provenance(record: Record) -> Provenance:
+    return Provenance(**{field.name: getattr(record, field.name) for field in fields(Provenance)})
 
 
-def _mixture(makers: list[Maker], models: set[str]) -> str:
-    """How far numbers agree that several made; nothing where they agree in every bit."""
-    found = differences(makers)
+def _mixture(provenances: list[Provenance], models: set[str]) -> str:
+    """Return how far results of several provenances agree; an empty text if they are bitwise identical."""
+    found = differences(provenances)
     if len(models) > 1 and not found:
         found = ["reduction of the model"]
     if not found:
         return ""
     how = (
-        "as far as the code does" if {"code", "version"} & _apart(makers) else "to rounding, not bit for bit"
+        "only as far as the code agrees"
+        if {"code", "version"} & _apart(provenances)
+        else "to rounding, not bitwise"
     )
-    return f"{how}: more than one {' and '.join(found)} took part"
+    return f"{how}: more than one {' and '.join(found)} was used"
 
 
-def _apart(makers: list[Maker]) -> set[str]:
-    return {name for name in ("version", "code") if len({getattr(each, name) for each in makers}) > 1}
+def _apart(provenances: list[Provenance]) -> set[str]:
+    return {name for name in ("version", "code") if len({getattr(each, name) for each in provenances}) > 1}
 
 
-class StoredRows:
-    """Rows of a stage, read from its store; what is not done is unknown, with the status NOT_RUN."""
+class CheckpointRows:
+    """Rows of a stage, read from its checkpoint; points that are not computed have the status NOT_RUN."""
 
-    def __init__(self, store: MapStore, stage: Stage) -> None:
+    def __init__(self, store: Checkpoint, stage: Stage) -> None:
         self.store = store
         self.stage = stage
 
     def read(self, start: int, stop: int) -> ResultTable:
-        """Rows *start* to *stop*, each task checked against the ledger again."""
+        """Return the rows *start* to *stop*, after comparing each task with the task log again."""
         store, stage, parts = self.store, self.stage, []
         for task in range(start // stage.chunk, -(-stop // stage.chunk)):
             first, last = stage.bounds(task)
-            record = store.ledger.records.get((stage.name, task))
+            record = store.task_log.records.get((stage.name, task))
             if record is not None and record.state == "done":
                 columns = store._load(stage, task)
                 if columns is None:
                     raise CheckpointError(
-                        f"store = {str(store.path)!r}: task {task} of stage {stage.name} was damaged after "
+                        f"checkpoint = {str(store.path)!r}: task {task} of stage {stage.name} was damaged after "
                         "it was checked; give the same command again to repair it"
                     )
             else:
@@ -663,14 +689,14 @@ class StoredRows:
 
 
 # ----------------------------------------------------------------------------------------------------
-# The Zarr arrays of a store: a row a run, a chunk a task, every chunk with its check sum.
+# The Zarr arrays of a checkpoint: one row for each run, one chunk with a check sum for each task.
 
 
 _MISSING = "zarr is needed for --checkpoint: install snapbeam[cluster]"
 
 
 def open_tables(folder: Path, stage: Stage, work: PointWork, read_only: bool = False) -> dict[str, Any]:
-    """The arrays of a stage, made if they are not there; damaged descriptions are written again."""
+    """Open the arrays of a stage; creates missing arrays and repairs damaged descriptions."""
     try:
         import zarr
     except ImportError as error:
@@ -727,7 +753,7 @@ def _durable_store(folder: Path) -> Any:
     from zarr.storage import LocalStore
 
     class DurableStore(LocalStore):
-        """A local store whose chunks are on the disk when a write returns."""
+        """Local Zarr store that syncs every chunk."""
 
         async def set(self, key: str, value: Buffer) -> None:
             await asyncio.to_thread(durable_write, self.root / key, value.to_bytes())
