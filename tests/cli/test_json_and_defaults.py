@@ -135,7 +135,7 @@ def test_frequencies_and_thresholds_as_json(tmp_path, monkeypatch):
     found = json.loads(run("threshold", *SMALL, *axes, "--json", "-"))
     ds = xr.load_dataset("threshold.nc")
     np.testing.assert_array_equal(found["lower_threshold"], ds.lower_threshold.values)
-    assert found["sweep"]["frequency_ratio"] == pytest.approx([0.8, 1.2, 1.6])
+    assert found["axes"]["frequency_ratio"] == pytest.approx([0.8, 1.2, 1.6])
 
 
 @pytest.mark.parametrize("words", [
@@ -241,5 +241,5 @@ def test_what_is_given_beside_a_store_is_compared_with_the_store(tmp_path, monke
     np.testing.assert_array_equal(xr.load_dataset("again.nc").response_class, before)
     refused = RUNNER.invoke(app, ["map", "--checkpoint", "kept", "--cycles", "13"])
     assert refused.exit_code == 2
-    differences = [line for line in refused.stderr.splitlines() if "in the store" in line]
-    assert len(differences) == 1 and "cycles: 12 in the store, 13 asked for" in differences[0]
+    differences = [line for line in refused.stderr.splitlines() if "in the checkpoint" in line]
+    assert len(differences) == 1 and "cycles: 12 in the checkpoint, 13 requested" in differences[0]
