@@ -23,7 +23,7 @@ import alone  # noqa: E402
 def test_one_version_everywhere():
     for name, pattern in (
         ("CITATION.cff", r"^version: (\S+)$"), ("docs/citing.md", r"version = \{(\S+)\}"),
-        ("src/snapbeam/core/version.py", r'^__version__ = "(\S+)"$'),
+        ("src/snapbeam/_version.py", r'^__version__ = "(\S+)"$'),
     ):  # fmt: skip
         found = re.search(pattern, (ROOT / name).read_text(encoding="utf-8"), re.MULTILINE)
         assert found and found[1] == sb.__version__, name

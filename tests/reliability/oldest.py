@@ -11,7 +11,7 @@ import tomllib
 from pathlib import Path
 
 PYPROJECT = Path(__file__).parents[2] / "pyproject.toml"
-_BOUND = re.compile(r"(?P<name>[A-Za-z0-9_.-]+(?:\[[a-z0-9,]+\])?)>=(?P<version>[0-9.]+)")
+_BOUND = re.compile(r"(?P<name>[A-Za-z0-9_.-]+(?:\[[a-z0-9,]+\])?)>=(?P<version>[0-9.]+)(?:,<[0-9.]+)?")
 
 
 def oldest(extras: list[str], pyproject: Path = PYPROJECT) -> list[str]:
@@ -20,7 +20,7 @@ def oldest(extras: list[str], pyproject: Path = PYPROJECT) -> list[str]:
     Raises
     ------
     ValueError
-        For a dependency without a lower bound, or with more than that.
+        For a dependency without a lower bound, or with more than a lower and an upper bound.
     """
     project = tomllib.loads(pyproject.read_text(encoding="utf-8"))["project"]
     asked = list(project["dependencies"])
