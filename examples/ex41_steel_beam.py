@@ -64,7 +64,7 @@ sure = sb.sweep(
     sb.Integration(cycles=60),
     replicates=sb.Replicates(5, check_half_step=True),
 )
-print(sure.class_fraction.max("response_class").values)
+print(sure.class_fraction.max("class_code").values)
 
 # %%
 # And one run, with everything that it did:

@@ -132,7 +132,7 @@ def test_shares_of_replicas_are_told(one_mode):
     words = chances(source.layers, source.point(plane.indexers(1, 1)))
     shares = found["class_fraction"].isel(frequency_ratio=1, velocity_amplitude=1)
     first = int(shares.values.argmax())
-    kind = sb.ResponseClass(int(found["response_class"][first]))
+    kind = sb.ResponseClass(int(found["class_code"][first]))
     assert f"{kind.label} {100 * float(shares[first]):.0f} %" in words
 
 

@@ -138,11 +138,11 @@ def test_what_is_no_threshold(curve):
 
 def test_paler_where_repeats_disagree(synthetic_map, tmp_path):
     kinds = synthetic_map["response_class"]
-    classes = xr.DataArray([int(k) for k in ResponseClass], dims="response_class")
+    classes = xr.DataArray([int(k) for k in ResponseClass], dims="class_code")
     share = xr.where(kinds == classes, 1.0, 0.0)
     unsure = (kinds["frequency_ratio"] > 2.0) & (kinds["velocity_amplitude"] < 0.1)
     share = xr.where(unsure, 0.5 * share + 0.5 * (classes == 3), share)
-    share = share.transpose(*kinds.dims, "response_class").assign_coords(response_class=classes)
+    share = share.transpose(*kinds.dims, "class_code").assign_coords(class_code=classes)
     ax = plot_response_map(synthetic_map.assign(class_fraction=share), legend=False)
     path = save_figure(ax.figure, tmp_path / "map.png")
     image = plt.imread(path)[..., :3]
@@ -160,8 +160,8 @@ def test_paler_where_repeats_disagree(synthetic_map, tmp_path):
 
 def test_legend_says_how_many_disagree(synthetic_map):
     kinds = synthetic_map["response_class"]
-    classes = xr.DataArray([int(k) for k in ResponseClass], dims="response_class")
-    share = xr.where(kinds == classes, 1.0, 0.0).assign_coords(response_class=classes)
+    classes = xr.DataArray([int(k) for k in ResponseClass], dims="class_code")
+    share = xr.where(kinds == classes, 1.0, 0.0).assign_coords(class_code=classes)
     ax = plot_response_map(synthetic_map.assign(class_fraction=share))
     texts = [text.get_text() for text in ax.figure.legends[0].get_texts()]
     assert texts[-1] == "repeats agree, 100 to 25 %;\n0.0 % of cells are split"
@@ -169,8 +169,8 @@ def test_legend_says_how_many_disagree(synthetic_map):
 
 def test_the_legends_shades_are_those_of_the_map(synthetic_map):
     kinds = synthetic_map["response_class"]
-    classes = xr.DataArray([int(k) for k in ResponseClass], dims="response_class")
-    share = xr.where(kinds == classes, 1.0, 0.0).assign_coords(response_class=classes)
+    classes = xr.DataArray([int(k) for k in ResponseClass], dims="class_code")
+    share = xr.where(kinds == classes, 1.0, 0.0).assign_coords(class_code=classes)
     ax = plot_response_map(synthetic_map.assign(class_fraction=share))
     ax.figure.canvas.draw()
     legend = ax.figure.legends[0]

@@ -1128,7 +1128,7 @@ def _draw_map(cut: xr.Dataset, name: str, quasi: bool, dots: Any, path: Any) -> 
 
     with drawing:
         if name == "response_class":
-            ax = plot_response_map(cut, threshold_line=quasi, dots=dots)
+            ax = plot_response_map(cut, quasi_static_line=quasi, measurements=dots)
         else:
             ax = plot_statistic(cut, name)
         _save(save_figure, ax, path)
@@ -1141,7 +1141,7 @@ def _draw_points(
     from snapbeam.plot.style import save_figure
 
     with drawing:
-        ax = plot_points(cut, name, across=along[0], upward=along[1], dots=dots, threshold_line=quasi)
+        ax = plot_points(cut, name, across=along[0], upward=along[1], measurements=dots, quasi_static_line=quasi)
         _save(save_figure, ax, path)
 
 

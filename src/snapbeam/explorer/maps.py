@@ -157,7 +157,7 @@ def layers_of(skeleton: xr.Dataset) -> dict[str, Layer]:
 
 
 def _entry(dimension: str, value: Any) -> str:
-    if dimension == "response_class":
+    if dimension == "class_code":
         return ResponseClass(int(value)).label
     return f"{value:g}" if isinstance(value, float) else str(value)
 

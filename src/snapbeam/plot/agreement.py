@@ -34,9 +34,9 @@ def draw_agreement(
 
     Returns what a legend needs to say so: a scale of the shades.
     """
-    share = dataset["class_fraction"].squeeze().transpose(dims[1], dims[0], "response_class")
+    share = dataset["class_fraction"].squeeze().transpose(dims[1], dims[0], "class_code")
     kinds = dataset["response_class"].squeeze().transpose(dims[1], dims[0]).values
-    own = kinds[..., None] == share["response_class"].values
+    own = kinds[..., None] == share["class_code"].values
     agreement = np.where(own, share.values, 0.0).sum(axis=-1)
     unknown = np.isnan(share.values).any(axis=-1)
     white = np.where(unknown, 0.0, _PALEST * (1.0 - agreement))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["class_coordinate", "to_dataset", "to_netcdf"]
 
 
-_CLASS_DIM = "response_class"
+_CLASS_DIM = "class_code"
 _BLOCK = 65536
 """Points of a block; a block is at least one index of the first dimension."""
 
