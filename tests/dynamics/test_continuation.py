@@ -116,7 +116,7 @@ def test_restitution_orbits_are_followed_to_grazing() -> None:
         and branch.special_points[-1].error < 1e-4
     )
     ds = branch.to_dataset()
-    assert set(ds["event_kind"].values) <= {"fold", "flip", "Neimark-Sacker", "branch point", "grazing"}
+    assert set(ds["special_point_kind"].values) <= {"fold", "flip", "Neimark-Sacker", "branch point", "grazing"}
 
 
 @pytest.mark.slow

@@ -53,7 +53,7 @@ def test_orbits_with_one_impact_in_n_periods(ratio: float, restitution: float, p
     orbit = sb.dynamics.periodic_orbit(oscillator(ratio, restitution), state * 1.003, periods, phase=math.pi)
     np.testing.assert_allclose(orbit.coordinates, state, rtol=0.0, atol=1e-8)
     assert orbit.contact_summary.impacts == 1
-    assert orbit.contact_summary.least_impulse == pytest.approx((1.0 + restitution) * speed, rel=1e-8)
+    assert orbit.contact_summary.min_impulse == pytest.approx((1.0 + restitution) * speed, rel=1e-8)
     assert math.exp(orbit.log_determinant) == pytest.approx(restitution**2, abs=1e-8)
 
 

@@ -49,7 +49,7 @@ def test_sweeps_meet_the_branch() -> None:
     values = np.linspace(0.02, 0.06, 5)
     ds = sb.dynamics.bifurcation_diagram(system, "velocity_amplitude", values, periods=(400, 16))
     assert ds["midspan_displacement"].dims == ("sweep", "velocity_amplitude", "period")
-    assert (ds["least_period"] == 1).all() and not ds["failed"].any()
+    assert (ds["minimal_period"] == 1).all() and not ds["failed"].any()
     orbit = sb.dynamics.periodic_orbit(system.replace(**{"drive.velocity_amplitude": 0.04}), transient=300)
     model = orbit.flow.system.model
     center = float(model.midspan_shape @ orbit.state.amplitude) / orbit.flow.system.scale.length
@@ -88,7 +88,7 @@ def test_approaches_are_told() -> None:
         periods=(600, 8),
         grazing=True,
     )
-    assert (ds["clearance"] > 0.0).any() and (ds["least_penetration"] > 0.0).all()
+    assert (ds["clearance"] > 0.0).any() and (ds["min_penetration"] > 0.0).all()
 
 
 def test_a_parameter_of_the_structure_may_be_swept() -> None:
@@ -131,9 +131,9 @@ def test_refusals(call, words: str) -> None:
 
 
 def test_points_of_a_period() -> None:
-    from snapbeam.dynamics.bifurcation import least_period
+    from snapbeam.dynamics.bifurcation import minimal_period
 
     turn = np.arange(24) * 2.0 * math.pi
     for m in (1, 2, 3, 5):
-        assert int(least_period(np.cos(turn / m)[:, None])) == m
-    assert int(least_period(np.random.default_rng(0).normal(size=(24, 1)))) == 0
+        assert int(minimal_period(np.cos(turn / m)[:, None])) == m
+    assert int(minimal_period(np.random.default_rng(0).normal(size=(24, 1)))) == 0

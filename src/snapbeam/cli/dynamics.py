@@ -177,7 +177,7 @@ def diagram(
         )  # fmt: skip
     lines = [f"{points.size} values in {duration(time.monotonic() - begun)}"]
     for sweep in dataset["sweep"].values[:2]:
-        periods = dataset["least_period"].sel(sweep=sweep).values
+        periods = dataset["minimal_period"].sel(sweep=sweep).values
         kinds = ", ".join(f"{int((periods == m).sum())} of period {m}" for m in np.unique(periods) if m > 0)
         lines.append(
             f"{sweep}: {kinds or 'no value repeats'}, {int((periods == 0).sum())} that do not repeat"

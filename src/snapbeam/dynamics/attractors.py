@@ -1,4 +1,4 @@
-"""The attractors of a system: found by marching many states, and certified one by one."""
+"""The attractors of a system: found by integrating many states, and verified one by one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solve_discrete_lyapunov
 from scipy.spatial import cKDTree
 
-from snapbeam.dynamics.bifurcation import least_period
+from snapbeam.dynamics.bifurcation import minimal_period
 from snapbeam.dynamics.flow import Flow, Marched, Stroboscope, flow_of
 from snapbeam.dynamics.lyapunov import lyapunov_spectrum
 from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, shoot
@@ -183,7 +183,7 @@ class Attractor:
 
 @dataclass(frozen=True, eq=False)
 class Attractors:
-    """The attractors that were found, certified, and where every state went."""
+    """The verified attractors, and the attractor that each state goes to."""
 
     flow: Flow
     attractors: list[Attractor]
@@ -233,7 +233,7 @@ class Attractors:
                 "label": ("state", self.labels, labels("attractor that a state goes to; -1: undecided")),
             },
             {"coordinate": list(names)},
-            {"title": "find_attractors", "undecided": self.undecided, "check_periods": self.check_periods},
+            {"title": "attractors", "undecided": self.undecided, "check_periods": self.check_periods},
         )  # fmt: skip
 
 
@@ -272,9 +272,9 @@ def find_attractors(
     integration: Integration | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> Attractors:
-    """The attractors that many states lead to, each certified or else left undecided.
+    """Find the attractors that many states lead to, and verify each; other states are undecided.
 
-    A periodic attractor is certified when shooting converges from where a state came to and every multiplier is inside
+    A periodic attractor is verified when shooting converges from where a state came to and every multiplier is inside
     the unit circle, at accuracy level "reference" too.  A chaotic one, when its largest exponent is above 0 by three
     standard errors and none of its states left it in *check_periods* more periods: slow transients are so told from
     attractors as far as that time goes.
@@ -293,7 +293,7 @@ def find_attractors(
     seed : int
         Of states that are spread.
     tolerance : float
-        As of :func:`periodic_orbit`.
+        Of the orbits, as in :func:`periodic_orbit`.
     integration : Integration, optional
     progress : callable, optional
         Called as ``progress(done, total)`` with parts of the work.
@@ -321,11 +321,11 @@ def find_attractors(
     report(1)
     assert seen.every is not None
     known = np.asarray(np.isfinite(seen.states).all(axis=1))
-    repeats = np.where(known, least_period(np.where(known[:, None, None], seen.every, 0.0), _REPEATS), 0)
-    certified = _orbits(flow, seen, repeats, allowed)
-    orbits = [orbit for orbit, _ in certified]
+    repeats = np.where(known, minimal_period(np.where(known[:, None, None], seen.every, 0.0), _REPEATS), 0)
+    verified = _orbits(flow, seen, repeats, allowed)
+    orbits = [orbit for orbit, _ in verified]
     report(2)
-    regular = [_periodic(orbit, certificate) for orbit, certificate in certified]
+    regular = [_periodic(orbit, verification) for orbit, verification in verified]
     labels = np.full(len(rows), UNDECIDED)
     for s in np.flatnonzero(repeats > 0):
         labels[s] = _nearest(orbits, seen.states[s])
@@ -343,7 +343,7 @@ def find_attractors(
 def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
     if isinstance(states, (int, np.integer)) and not isinstance(states, bool):
         if not isinstance(flow, Stroboscope):
-            raise InputError(f"states = {states}: must be an array of states for a flow that is no System")
+            raise InputError(f"states = {states}: must be an array of states for a flow that is not a System")
         return spread_states(flow, integer("states", states, 1, 10**7), integer("seed", seed, 0, 2**63 - 1))
     rows = finite_array("states", states, 2)
     if rows.shape[1] != flow.dimension or not len(rows):
@@ -354,9 +354,9 @@ def _states_of(flow: Flow, states: ArrayLike | int, seed: int) -> _Array:
 def _orbits(
     flow: Flow, seen: Marched, repeats: NDArray[np.int64], tolerance: float
 ) -> list[tuple[PeriodicOrbit, PeriodicOrbit]]:
-    """The stable orbits that states which repeat are on, each once and with its certificate."""
+    """The stable orbits that states which repeat are on, each once and with its verification."""
     found: list[PeriodicOrbit] = []
-    certificates: list[PeriodicOrbit] = []
+    verifications: list[PeriodicOrbit] = []
     missed: list[_Array] = []
     for s in np.flatnonzero(repeats > 0):
         x = seen.states[s]
@@ -370,16 +370,16 @@ def _orbits(
         if orbit.minimal_period != orbit.period:
             orbit = shoot(flow, orbit.coordinates, orbit.minimal_period, tolerance, 40)
         near = np.abs(orbit.points - x).max(axis=1).min() < 10.0 * _REPEATS
-        certificate = _certificate(orbit, tolerance) if near and orbit.is_stable else None
-        if certificate is None:
+        verification = _verify(orbit, tolerance) if near and orbit.is_stable else None
+        if verification is None:
             missed.append(x)
         elif not any(_is_same(orbit, other) for other in found):
             found.append(orbit)
-            certificates.append(certificate)
-    return list(zip(found, certificates, strict=True))
+            verifications.append(verification)
+    return list(zip(found, verifications, strict=True))
 
 
-def _certificate(orbit: PeriodicOrbit, tolerance: float) -> PeriodicOrbit | None:
+def _verify(orbit: PeriodicOrbit, tolerance: float) -> PeriodicOrbit | None:
     """The same orbit by fine steps, if it is there and stable: tangents of coarse ones are a per cent off."""
     if not isinstance(orbit.flow, Stroboscope) or orbit.flow.integration.accuracy == "reference":
         return orbit
@@ -405,10 +405,10 @@ def _nearest(orbits: list[PeriodicOrbit], x: _Array) -> int:
     return UNDECIDED
 
 
-def _periodic(orbit: PeriodicOrbit, certificate: PeriodicOrbit) -> Attractor:
-    size = max(float(np.abs(certificate.multipliers[0])), 1e-300)
+def _periodic(orbit: PeriodicOrbit, verification: PeriodicOrbit) -> Attractor:
+    size = max(float(np.abs(verification.multipliers[0])), 1e-300)
     exponent = float(np.log(size)) / (orbit.period * orbit.flow.period)
-    return Attractor("periodic", orbit.points, orbit, exponent, 0.0, certificate)
+    return Attractor("periodic", orbit.points, orbit, exponent, 0.0, verification)
 
 
 def _chaotic(
@@ -425,7 +425,7 @@ def _chaotic(
         return [], []
     later = flow.march(flow.march(seen.states[which], lasts), 2 * most + 62, every=True)
     assert later.every is not None
-    rest = least_period(np.nan_to_num(later.every[:, : 2 * most], nan=0.0), _REPEATS)
+    rest = minimal_period(np.nan_to_num(later.every[:, : 2 * most], nan=0.0), _REPEATS)
     left = (rest > 0) | ~np.isfinite(later.states).all(axis=1)
     found, members = [], []
     for group in _groups(later.every):
@@ -478,6 +478,6 @@ def _ordered(found: list[Attractor]) -> tuple[list[Attractor], NDArray[np.int64]
         return (KINDS.index(each.kind), each.period, *np.round(lowest, 6).tolist())
 
     order = sorted(range(len(found)), key=key)
-    workspace = np.empty(len(found), dtype=np.int64)
-    workspace[order] = np.arange(len(found))
-    return [found[i] for i in order], workspace
+    position = np.empty(len(found), dtype=np.int64)
+    position[order] = np.arange(len(found))
+    return [found[i] for i in order], position

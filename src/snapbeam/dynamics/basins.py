@@ -1,4 +1,4 @@
-"""Basins of attraction on a plane of states: which certified attractor each state goes to, or undecided."""
+"""Basins of attraction on a plane of states: the verified attractor that each state goes to, or undecided."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def basins_of_attraction(
     Parameters
     ----------
     attractors : Attractors
-        Of :func:`attractors`.
+        Result of :func:`find_attractors`.
     grid : mapping of str to array_like
         Two coordinates with their values, such as ``{"amplitude[1]": ..., "velocity[1]": ...}``, strictly increasing.
     fixed_coordinates : State or array_like of shape (d,), optional
@@ -86,23 +86,23 @@ def basins_of_attraction(
 
 
 def _plane(
-    flow: Flow, plane: Mapping[str, ArrayLike], rest: State | ArrayLike | None
+    flow: Flow, grid: Mapping[str, ArrayLike], rest: State | ArrayLike | None
 ) -> tuple[list[str], list[_Array], _Array]:
     known = list(getattr(flow, "names", tuple(f"x[{i + 1}]" for i in range(flow.dimension))))
-    if not isinstance(plane, Mapping) or len(plane) != 2:
-        raise InputTypeError(f"plane = {shown(plane)}: must map two coordinates to their values")
-    for name in plane:
+    if not isinstance(grid, Mapping) or len(grid) != 2:
+        raise InputTypeError(f"grid = {shown(grid)}: must map two coordinates to their values")
+    for name in grid:
         if name not in known:
-            raise InputError(f"plane {name}: no coordinate; must be one of {', '.join(known[:4])}, ...")
-    names = list(plane)
-    columns = [axis(name, plane[name], -np.inf, np.inf) for name in names]
+            raise InputError(f"grid {name}: is not a coordinate; must be one of {', '.join(known[:4])}, ...")
+    names = list(grid)
+    columns = [axis(name, grid[name], -np.inf, np.inf) for name in names]
     if isinstance(rest, State) or (rest is None and isinstance(flow, Stroboscope)):
         assert isinstance(flow, Stroboscope)
         base = flow.coordinates(rest)[0]
     else:
         base = np.zeros(flow.dimension) if rest is None else finite_array("fixed_coordinates", rest)
     if base.shape != (flow.dimension,):
-        raise InputError(f"rest of shape {base.shape}: must have the shape ({flow.dimension},)")
+        raise InputError(f"fixed_coordinates of shape {base.shape}: must have the shape ({flow.dimension},)")
     first, second = np.meshgrid(*columns, indexing="ij")
     rows = np.repeat(base[None], first.size, axis=0)
     rows[:, known.index(names[0])] = first.ravel()
@@ -175,7 +175,7 @@ def _dataset(
             "basin": (names, label.reshape(shape), words),
             "captured_after": (names, after.reshape(shape), {"units": "1", "long_name": "periods until certain"}),
             "attractor_points": (
-                ("attractor", "point", "grid"), _shown(found, names), {"units": "1", "long_name": "attractors there"}
+                ("attractor", "point", "coordinate"), _shown(found, names), {"units": "1", "long_name": "attractors there"}
             ),
         },
         of,

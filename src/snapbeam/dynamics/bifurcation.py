@@ -1,4 +1,4 @@
-"""Bifurcation diagrams by brute force: what is seen once a period as a parameter goes up, down or from many starts."""
+"""Bifurcation diagrams by brute force: states once a period over a parameter, swept or from many initial conditions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from snapbeam.util.validation import InputError, InputTypeError, axis, checked, 
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["bifurcation_diagram", "least_period"]
+__all__ = ["bifurcation_diagram", "minimal_period"]
 
 
 _Array = NDArray[np.float64]
@@ -42,9 +42,10 @@ def bifurcation_diagram(
     grazing: bool = False,
     progress: Callable[[int, int], object] | None = None,
 ) -> xr.Dataset:
-    """What a system does once a period, over one parameter that is swept with the state carried on.
+    """Compute a bifurcation diagram: states once a period over one parameter that is swept up and down.
 
-    Up and down sweeps differ where attractors coexist (hysteresis); many starts show those that neither meets.
+    Each sweep continues from the last state.  The sweeps differ where attractors coexist (hysteresis); runs from many
+    initial conditions show further attractors.
 
     Parameters
     ----------
@@ -56,11 +57,11 @@ def bifurcation_diagram(
     integration : Integration, optional
     sweeps : sequence of {"up", "down"}
     initial_conditions : InitialConditions or int
-        Starts of every value beside the sweeps; none by default.
+        Initial conditions at every value, in addition to the sweeps; none by default.
     periods : pair of int
         Periods to leave out at each value, and to keep.
     grazing : bool
-        Whether to look at every approach within four of the kept periods: ``clearance``, ``least_penetration``.
+        Whether to look at every approach within four of the kept periods: ``clearance``, ``min_penetration``.
     progress : callable, optional
         Called as ``progress(done, total)`` with values.
 
@@ -69,7 +70,7 @@ def bifurcation_diagram(
     xarray.Dataset
         Over ``sweep``, the parameter and ``period``: displacements over b and velocities over b omega_1 of the centre
         and of the contact point at the phase of the start; over ``sweep`` and the parameter: ``impacts_per_period``,
-        ``crossings_per_period`` and ``least_period`` (0: none seen).  Runs that failed are NaN, as are all that follow
+        ``crossings_per_period`` and ``minimal_period`` (0: none seen).  Runs that failed are NaN, as are all that follow
         them in their sweep; ``failed`` says so.
 
     Raises
@@ -92,7 +93,7 @@ def bifurcation_diagram(
         else None
     )
     if not kinds and many is None:
-        raise InputError("sweeps = (): must be at least one, or starts at least 1")
+        raise InputError("sweeps = (): must be at least one, or initial_conditions at least 1")
     flow = Stroboscope(system, Integration() if integration is None else integration)
     diagram = _Diagram(flow, row.name, points, leave, keep)
     total = points.size * (bool(kinds) + (many.count if many is not None else 0))
@@ -122,7 +123,7 @@ def _periods(periods: tuple[int, int]) -> tuple[int, int]:
     return integer("periods[0]", leave, 0, 10**7), integer("periods[1]", keep, 2, 10**6)
 
 
-def least_period(rows: _Array, tolerance: float = 1e-4) -> NDArray[np.int64]:
+def minimal_period(rows: _Array, tolerance: float = 1e-4) -> NDArray[np.int64]:
     """After how many periods states of shape (..., periods, d) repeat, at most half of them; 0 if they do not."""
     keep = rows.shape[-2]
     found = np.zeros(rows.shape[:-2], dtype=np.int64)
@@ -169,8 +170,8 @@ class _Diagram:
         for step in range(count):
             at = np.array([step if kind == "up" else count - 1 - step for kind in kinds])
             kept, passed = self._go(x, at)
-            for i, workspace in enumerate(at):
-                rows[i, workspace], counts[i, workspace] = kept[i], passed[i]
+            for i, k in enumerate(at):
+                rows[i, k], counts[i, k] = kept[i], passed[i]
             x = kept[:, -1]
             report(1)
         self.sweeps += kinds
@@ -182,9 +183,9 @@ class _Diagram:
     ) -> None:
         """Every value from one start."""
         system = self.flow.system
-        workspace = self.values if self.name == "striker.location" else None
+        location = self.values if self.name == "striker.location" else None
         state = starts.state(
-            system, number, system.initial_state or rest_state(system.model, system.striker), workspace
+            system, number, system.initial_state or rest_state(system.model, system.striker), location
         )
         rows = np.broadcast_to(self.flow.coordinates(state), (self.values.size, self.flow.dimension))
         kept, counts = self._go(rows, np.arange(self.values.size))
@@ -202,16 +203,16 @@ class _Diagram:
         model, scale = system.model, system.scale
         full = rows * self.flow.scales
         location = 0.5 if system.striker is None else system.striker.location
-        shapes = {"center": model.midspan_shape, "": model.shape_at(location)}
+        shapes = {"midspan_{}": model.midspan_shape, "{}_at_striker": model.shape_at(location)}
         labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": row.name}
         dataset = xr.Dataset(
             coords={"sweep": self.sweeps, row.short: (row.short, self.values, labels)},
-            attrs={"title": "bifurcation diagram", "along": row.short, "periods_left_out": self.leave}
+            attrs={"title": "bifurcation diagram", "parameter": row.short, "periods_left_out": self.leave}
             | {"system_hash": system.hash, "modes": modes},
         )
         dims = ("sweep", row.short)
         for part, shape in shapes.items():
-            prefix, words = (f"{part}_", "centre") if part else ("", "contact point's")
+            words = "mid-span" if part.startswith("midspan") else "contact point's"
             of = {
                 "displacement": (full[..., :modes], scale.length),
                 "velocity": (full[..., modes:], scale.length * scale.omega),
@@ -219,9 +220,9 @@ class _Diagram:
             for what, (values, unit) in of.items():
                 over = "b" if what == "displacement" else "b omega_1"
                 text = {"units": "1", "long_name": f"{words} {what} once a period, over {over}"}
-                dataset[f"{prefix}{what}"] = ((*dims, "period"), values @ shape / unit, text)
+                dataset[part.format(what)] = ((*dims, "period"), values @ shape / unit, text)
         known = np.asarray(np.isfinite(rows).all(axis=(-1, -2)))
-        periods = least_period(np.where(np.isfinite(rows), rows, 0.0))
+        periods = minimal_period(np.where(np.isfinite(rows), rows, 0.0))
         table: dict[str, tuple[Any, str]] = {
             "impacts_per_period": (
                 np.where(known, counts[..., 0], np.nan),
@@ -229,15 +230,18 @@ class _Diagram:
             ),
             "crossings_per_period": (
                 np.where(known, counts[..., 1], np.nan),
-                "crossings of the centre per period",
+                "zero crossings of mid-span per period",
             ),
-            "least_period": (np.where(known, periods, 0), "periods after which it repeats; 0: not seen to"),
+            "minimal_period": (np.where(known, periods, 0), "periods after which it repeats; 0: not seen to"),
             "failed": (~known, "whether a run failed there"),
         }
         if grazing and system.striker is not None:
             near = self._approaches(rows, known)
-            table["clearance"] = near[..., 0], "least gap at which it turns back without touching, over b"
-            table["least_penetration"] = near[..., 1], "penetration of the lightest impact, over b"
+            table["clearance"] = (
+                near[..., 0],
+                "minimum gap at which the beam turns back without contact, over b",
+            )
+            table["min_penetration"] = near[..., 1], "penetration of the lightest impact, over b"
         for name, (values, about) in table.items():
             dataset[name] = (dims, values, {"units": "1", "long_name": about})
         return dataset
@@ -248,5 +252,5 @@ class _Diagram:
             if known[at]:
                 flow = self.flow.neighbour(self.name, float(self.values[at[-1]]))
                 passage = passage_of(flow, rows[at][-1], _PASSAGE)
-                found[at] = passage.clearance, passage.least_penetration
+                found[at] = passage.clearance, passage.min_penetration
         return found

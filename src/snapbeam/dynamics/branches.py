@@ -1,4 +1,4 @@
-"""Branches of periodic orbits: pseudo-arclength continuation in any parameter, and what happens on the way.
+"""Branches of periodic orbits: pseudo-arclength continuation in any parameter, with its special points.
 
 With the return map P^m(x; lambda), a branch solves P^m(x; lambda) = x; each orbit is predicted along the tangent of the
 branch and corrected on the plane across it (Keller, in Applications of Bifurcation Theory, 1977).
@@ -29,22 +29,30 @@ from snapbeam.util.validation import InputError, checked, choice, integer, posit
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["EVENTS", "Branch", "SpecialPoint", "between", "continuation", "grazing_end", "switch_branch"]
+__all__ = [
+    "SPECIAL_POINTS",
+    "Branch",
+    "SpecialPoint",
+    "between",
+    "continuation",
+    "grazing_end",
+    "switch_branch",
+]
 
 
 # ----------------------------------------------------------------------------------------------------
-# A branch of periodic orbits, and the events on it, labelled.
+# A branch of periodic orbits and its special points, as datasets.
 
 
-EVENTS = ("fold", "flip", "Neimark-Sacker", "branch point", "grazing")
+SPECIAL_POINTS = ("fold", "flip", "Neimark-Sacker", "branch point", "grazing")
 
 
 @dataclass(frozen=True, eq=False)
 class SpecialPoint:
-    """Something that happens on a branch."""
+    """A special point of a branch: a bifurcation or a grazing orbit."""
 
     kind: str
-    """One of :data:`EVENTS`."""
+    """One of :data:`SPECIAL_POINTS`."""
     orbit: PeriodicOrbit
     value: float
     """Of the parameter."""
@@ -75,7 +83,7 @@ class Branch:
     def __repr__(self) -> str:
         low, high = self.values.min(), self.values.max()
         text = f"{len(self.orbits)} orbits of period {self.orbits[0].period}, {self.name} from {low:.6g} to {high:.6g}"
-        return f"<Branch: {text}, {len(self.special_points)} events, end: {self.termination_reason}>"
+        return f"<Branch: {text}, {len(self.special_points)} special points, end: {self.termination_reason}>"
 
     @cached_property
     def values(self) -> NDArray[np.float64]:
@@ -88,8 +96,10 @@ class Branch:
         return np.array([orbit.is_stable for orbit in self.orbits])
 
     def to_dataset(self) -> xr.Dataset:
-        """The branch labelled: over ``orbit`` the parameter, the state, the multipliers, stability, impacts and
-        the centre's displacement, that at every ``return`` too; over ``event`` what happens where.
+        """Return the branch as a dataset.
+
+        Over ``orbit``: the parameter, the state, the multipliers, stability, impacts and the mid-span displacement,
+        once and at every ``return``.  Over ``special_point``: kind, value, error, state and the orbit before it.
         """
         import xarray as xr
 
@@ -129,29 +139,29 @@ class Branch:
                     _labels("length of the branch in states"),
                 ),
                 "residual": ("orbit", [orbit.residual for orbit in self.orbits], _labels("of the return")),
-                "event_kind": (
-                    "event",
-                    [event.kind for event in self.special_points],
-                    {"long_name": "what happens"},
+                "special_point_kind": (
+                    "special_point",
+                    [point.kind for point in self.special_points],
+                    {"long_name": "kind of the special point"},
                 ),
-                "event_after": (
-                    "event",
-                    [event.index for event in self.special_points],
+                "special_point_index": (
+                    "special_point",
+                    [point.index for point in self.special_points],
                     _labels("orbit before it"),
                 ),
-                "event_value": (
-                    "event",
-                    [event.value for event in self.special_points],
+                "special_point_value": (
+                    "special_point",
+                    [point.value for point in self.special_points],
                     {"units": unit, "long_name": words},
                 ),
-                "event_error": (
-                    "event",
-                    np.array([event.error for event in self.special_points], dtype=np.float64),
+                "special_point_error": (
+                    "special_point",
+                    np.array([point.error for point in self.special_points], dtype=np.float64),
                     {"units": unit, "long_name": f"by how much it may be off at these steps: {words}"},
                 ),
-                "event_state": (
-                    ("event", "coordinate"),
-                    np.array([event.orbit.coordinates for event in self.special_points]).reshape(
+                "special_point_state": (
+                    ("special_point", "coordinate"),
+                    np.array([point.orbit.coordinates for point in self.special_points]).reshape(
                         -1, states.shape[1]
                     ),
                     _labels("state of the orbit there"),
@@ -163,7 +173,7 @@ class Branch:
             },
             {
                 "title": "branch of periodic orbits",
-                "along": short,
+                "parameter": short,
                 "period": first.period,
                 "termination_reason": self.termination_reason,
                 "diagnostics": to_json(first.diagnostics),
@@ -176,7 +186,7 @@ class Branch:
                 centers[:, 0],
                 _labels("centre displacement there, over b"),
             )
-            dataset["center_returns"] = (
+            dataset["midspan_returns"] = (
                 ("orbit", "return"),
                 centers,
                 _labels("centre displacement once a period of the drive, over b"),
@@ -202,7 +212,7 @@ def _labels(words: str) -> dict[str, str]:
 
 
 # ----------------------------------------------------------------------------------------------------
-# What happens on a branch of periodic orbits, located between the orbits that it is found between, with an error.
+# Special points, located between two orbits of a branch, with an error.
 #
 # The error of a value holds what is left of the bracket, what the residual of the orbit moves, and what the error of the
 # return map's derivative moves; that of the steps themselves, which other steps show, it does not hold.
@@ -230,7 +240,7 @@ def _counts(came: Return) -> tuple[int, int, int]:
 
 
 def between(corrector: Corrector, one: Spot, other: Spot, at: int) -> list[SpecialPoint]:
-    """What happens between two orbits of a branch, located."""
+    """Locate the special points between two orbits of a branch."""
     found = []
     up, flip, pair = (b - a for a, b in zip(_counts(one.came), _counts(other.came), strict=True))
     if one.tangent[-1] * other.tangent[-1] < 0.0:
@@ -422,7 +432,7 @@ def continuation(
         First and greatest distance between orbits, in units of the well's amplitude for the state and of the range
         for the parameter.
     tolerance : float
-        As of :func:`periodic_orbit`.
+        Of the orbits, as in :func:`periodic_orbit`.
 
     Returns
     -------
@@ -436,7 +446,7 @@ def continuation(
     low, high = _limits(bounds)
     begun = orbit.flow.value(name)
     if not low <= begun <= high:
-        raise InputError(f"between = ({low:g}, {high:g}): must hold the orbit's own {name} = {begun:g}")
+        raise InputError(f"bounds = ({low:g}, {high:g}): must contain the orbit's own {name} = {begun:g}")
     choice("direction", direction, ("up", "down"))
     count = integer("max_points", max_points, 2, 10**6)
     length, max_step = positive("step", step), positive("max_step", max_step)
@@ -452,24 +462,29 @@ def continuation(
     return _follow(corrector, first, (low, high), count, min(length, max_step), max_step)
 
 
-def _limits(between: tuple[float, float]) -> tuple[float, float]:
+def _limits(bounds: tuple[float, float]) -> tuple[float, float]:
     try:
-        low, high = (float(value) for value in between)
+        low, high = (float(value) for value in bounds)
     except (TypeError, ValueError):
-        raise InputError(f"between = {shown(between)}: must be a least and a greatest number") from None
+        raise InputError(f"bounds = {shown(bounds)}: must be a minimum and a maximum") from None
     if not low < high:
-        raise InputError(f"between = ({low:g}, {high:g}): must be increasing")
+        raise InputError(f"bounds = ({low:g}, {high:g}): must be increasing")
     return low, high
 
 
 def _follow(
-    corrector: Corrector, first: Spot, limits: tuple[float, float], most: int, length: float, longest: float
+    corrector: Corrector,
+    first: Spot,
+    limits: tuple[float, float],
+    max_points: int,
+    length: float,
+    max_step: float,
 ) -> Branch:
     spots, events = [first], list[SpecialPoint]()
-    end = f"{most} orbits"
-    shortest = 1e-7 * longest
+    end = f"{max_points} orbits"
+    shortest = 1e-7 * max_step
     limit = tuple(value / corrector.span for value in limits)
-    while len(spots) < most:
+    while len(spots) < max_points:
         last = spots[-1]
         guess = last.y + length * last.tangent
         over = next((value for value in limit if (guess[-1] - value) * (last.y[-1] - value) < 0.0), None)
@@ -510,7 +525,7 @@ def _follow(
             end = "closed"
             break
         if spot.iterations <= _EASY and turned > 0.95:
-            length = min(1.4 * length, longest)
+            length = min(1.4 * length, max_step)
         elif spot.iterations >= _HARD or turned < 0.8:
             length *= 0.6
     orbits = [corrector.orbit(spot) for spot in spots]
@@ -522,27 +537,27 @@ def _follow(
 def switch_branch(
     special_point: SpecialPoint, name: str, bounds: tuple[float, float], *, size: float = 0.01
 ) -> PeriodicOrbit:
-    """An orbit of the branch that is born at a flip or a branch point, *size* away from it.
+    """Find an orbit of the branch that begins at a flip or a branch point, *size* away from it.
 
     At a flip it has twice the period.  It is sought on the plane at that distance along the critical eigenvector.
 
     Parameters
     ----------
     special_point : SpecialPoint
-    name, between
-        As of :func:`continuation`.
+    name, bounds
+        Parameter and its limits, as in :func:`continuation`.
     size : float
         Distance, in units of the well's amplitude.
 
     Returns
     -------
-    Orbit
-        From which :func:`continuation` goes on.
+    PeriodicOrbit
+        Start of the new branch, for :func:`continuation`.
 
     Raises
     ------
     InputError
-        For an event at which no other branch is born.
+        For a special point at which no other branch begins.
     OrbitNotFoundError
         If there is none at that distance; try another.
     """

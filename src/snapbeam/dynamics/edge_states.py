@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from snapbeam.dynamics.bifurcation import least_period
+from snapbeam.dynamics.bifurcation import minimal_period
 from snapbeam.dynamics.flow import Flow, Stroboscope, flow_of
 from snapbeam.dynamics.periodic_orbits import OrbitNotFoundError, PeriodicOrbit, shoot
 from snapbeam.model.integration import Integration
@@ -51,7 +51,7 @@ class EdgeState:
         return xr.Dataset(
             {
                 "state": (("period", "coordinate"), self.states, labels),
-                "bisect_threshold": (
+                "distance": (
                     "period",
                     self.distance,
                     {"units": "1", "long_name": "distance of the two that hold it"},
@@ -92,8 +92,8 @@ def edge_tracking(
 ) -> EdgeState:
     """Follow the border between snapping and not (Skufca, Yorke and Eckhardt, Phys. Rev. Lett. 96 (2006) 174101).
 
-    Of the states between a quiet one and one that snaps, two are found that are *bisect_threshold* apart and differ in their
-    outcome; both are marched on until they are *diverge_threshold*, and the search is taken up again between them.
+    Bisection between *u1* and *u2* finds two states of different outcome that are *bisect_threshold* apart.  Both are
+    integrated until their distance is *diverge_threshold*; then the bisection starts again between them.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def edge_tracking(
     periods : int
         To follow the border for.
     horizon : int
-        Periods after which the outcome is told.
+        Periods after which the outcome is evaluated.
     bisect_threshold, diverge_threshold : float
         In units of the well's amplitude.
     outcome : callable, optional
@@ -127,13 +127,13 @@ def edge_tracking(
         positive("diverge_threshold", diverge_threshold),
     )
     if not near < far:
-        raise InputError(f"distance = {near:g}: must be less than diverge_threshold = {far:g}")
+        raise InputError(f"bisect_threshold = {near:g}: must be less than diverge_threshold = {far:g}")
     decide = _snaps if outcome is None else outcome
     low, high = _row(flow, u1, "u1"), _row(flow, u2, "u2")
     told = decide(flow, np.stack([low, high]), ahead)
     if bool(told[0]) or not bool(told[1]):
         raise InputError(
-            f"quiet, snapping: the outcomes within {ahead} periods are {bool(told[0])} and {bool(told[1])}; must be "
+            f"u1, u2: the outcomes within {ahead} periods are {bool(told[0])} and {bool(told[1])}; must be "
             "False and True"
         )
     low, high = _bisect(flow, low, high, near, ahead, decide)
@@ -186,7 +186,7 @@ def _row(flow: Flow, state: State | ArrayLike, name: str) -> _Array:
 def _snaps(flow: Flow, states: _Array, horizon: int) -> NDArray[np.bool_]:
     marched = flow.march(states, horizon)
     if "zero_crossings" not in marched.statistics:
-        raise InputError("outcome: is needed for a flow that is no System")
+        raise InputError("outcome: is needed for a flow that is not a System")
     crossed = np.asarray(marched.statistics["zero_crossings"] > 0)
     if isinstance(flow, Stroboscope):
         # on the border's way some have crossed before they are looked at again
@@ -218,7 +218,7 @@ def _bisect(
 def _settled(flow: Flow, path: _Array) -> PeriodicOrbit | None:
     """The unstable orbit that the last periods repeat."""
     tail = path[-max(4, len(path) // 3) :]
-    period = int(least_period(tail[None], 1e-3)[0])
+    period = int(minimal_period(tail[None], 1e-3)[0])
     if period == 0:
         return None
     try:

@@ -1,7 +1,7 @@
-"""What questions of dynamics are put to: a map that takes states a period on.
+"""Flows: maps that take batches of states over one period.
 
-Anything that can take batches of states a period on is a :class:`Flow`; :class:`Stroboscope` is that of a system, seen
-once a period of its drive.
+:class:`Flow` is the protocol of such a map; :class:`Stroboscope` is the stroboscopic map of a system over one period of
+its drive.
 """
 
 from __future__ import annotations
@@ -72,13 +72,13 @@ class InitialConditions:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        integer("starts", self.count, 1, 100_000)
+        integer("count", self.count, 1, 100_000)
         nonnegative("displacement", self.displacement, "m")
         flag("phase", self.phase)
         integer("seed", self.seed, 0, 2**63 - 1)
         if self.count > 1 and self.displacement == 0.0 and not self.phase:
             raise InputError(
-                f"starts = {self.count} with displacement = 0 and phase = False: all would be the same"
+                f"count = {self.count} with displacement = 0 and phase = False: all would be the same; set one of them"
             )
 
     def describe(self) -> dict[str, Any]:
@@ -126,10 +126,10 @@ def leaving(system: System, rest: State, begun: State, location: ArrayLike | Non
     striker = system.striker
     if striker is None:
         return begun
-    workspace = np.asarray(striker.location if location is None else location, dtype=np.float64)
+    at = np.asarray(striker.location if location is None else location, dtype=np.float64)
     change: list[NDArray[np.float64]] = [begun.amplitude - rest.amplitude, begun.velocity - rest.velocity]
     away = 1.0 if striker.side == "below" else -1.0
-    reach = np.sum(system.model.shape_at(workspace) * change[0], axis=-1)
+    reach = np.sum(system.model.shape_at(at) * change[0], axis=-1)
     turn = np.where(away * reach < 0.0, -1.0, 1.0)[..., None]
     return dataclasses.replace(
         begun,
@@ -152,7 +152,9 @@ def starts_of(given: InitialConditions | int) -> InitialConditions:
     if isinstance(given, InitialConditions):
         return given
     if isinstance(given, (bool, np.bool_)) or not isinstance(given, (int, np.integer)):
-        raise InputTypeError(f"starts = {shown(given)}: must be a number of starts, or Starts")
+        raise InputTypeError(
+            f"initial_conditions = {shown(given)}: must be InitialConditions, or their number"
+        )
     return InitialConditions(count=int(given))
 
 
@@ -174,8 +176,8 @@ def held_in_space(system: System) -> System:
         )
     if system.harvester is not None:
         raise InputError(
-            "harvester: has a state of its own, which the tools of dynamics do not carry; march such a system by "
-            "sb.advance(system, every=True), which lands after each cycle"
+            "harvester: has a state of its own, which the dynamics tools do not include; integrate such a system by "
+            "sb.advance(system, save_every_period=True), which returns the state after each cycle"
         )
     _require_common_period(system)
     if striker is None:
@@ -183,10 +185,12 @@ def held_in_space(system: System) -> System:
     if striker.mass is not None:
         raise InputError(
             f"striker.mass = {striker.mass:g}: the tools of dynamics know a tip that moves as prescribed; "
-            "march a system with a body of its own by sb.advance(system, every=True), which lands after each cycle"
+            "integrate a system with a striker of its own mass by sb.advance(system, save_every_period=True)"
         )
     if not striker.drive.harmonic:
-        raise InputError("striker.drive: is recorded; dynamics need a drive that repeats, such as a Sine")
+        raise InputError(
+            "striker.drive: is recorded; the dynamics tools need a periodic drive, such as a Sine"
+        )
     from snapbeam.model.integration import Integration
     from snapbeam.solver.assemble import make_ensemble
 
@@ -206,7 +210,7 @@ def _require_common_period(system: System) -> None:
     (section, first), *others = system.moving
     for name, drive in system.moving if system.has_environment else ():
         if not drive.harmonic:
-            raise InputError(f"{name}: is no sine; dynamics need what repeats")
+            raise InputError(f"{name}: is not a sine; the dynamics tools need a periodic excitation")
     for name, drive in others:
         times = float(drive.frequency_ratio) / float(first.frequency_ratio)  # type: ignore[attr-defined]
         if round(times) < 1 or abs(times - round(times)) > 1e-12 * times:
@@ -355,7 +359,7 @@ class Stroboscope:
         return (
             Diagnostic(
                 "dynamics.coarse_tangent",
-                "accuracy = 'map': derivatives, and so multipliers and where a branch has its events, are off by up to "
+                "accuracy = 'standard': derivatives, and so multipliers and the special points of a branch, are off by up to "
                 "2 %, since the steps in contact are long; take accuracy = 'reference' (--accuracy reference)",
                 {"relative_error": 0.02},
             ),
@@ -394,7 +398,7 @@ class Stroboscope:
 
     def starting(self, state: State) -> System:
         """The system with *state* as its start, at the phase at which the map takes states."""
-        changes: dict[str, Any] = {"start": state}
+        changes: dict[str, Any] = {"initial_state": state}
         if self.phase is not None and self.system.striker is not None:
             changes["drive.phase"] = self.phase
         return self.system.replace(**changes)
@@ -589,7 +593,7 @@ def _joined(parts: list[Marched]) -> Marched:
 def _joined_states(states: list[State]) -> State:
     from snapbeam.model.state import ModalState
 
-    names = ("amplitude", "velocity_at_striker", "phase", "striker_position", "contact_time")
+    names = ("amplitude", "velocity", "phase", "striker_position", "contact_time")
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(each, name) for each in states]) for name in names
     }

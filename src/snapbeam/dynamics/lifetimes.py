@@ -1,4 +1,4 @@
-"""How long snapping lasts, and how it ends: many starts at every point of a sweep."""
+"""Lifetimes of chaotic snapping, and how it ends: many initial conditions at every point of a sweep."""
 
 from __future__ import annotations
 
@@ -241,34 +241,34 @@ the first one and -1 for that, and whether that end is proved."""
 class LifetimeWork(PointWork):
     """The points of a sweep, each run from many starts."""
 
-    starts: InitialConditions = field(default_factory=InitialConditions)
+    initial_conditions: InitialConditions = field(default_factory=InitialConditions)
 
     @cached_property
     def integers(self) -> tuple[str, ...]:
         """Names of the columns of whole numbers."""
-        return tuple(f"{name}_{s}" for name in _PER_START for s in range(self.starts.count))
+        return tuple(f"{name}_{s}" for name in _PER_START for s in range(self.initial_conditions.count))
 
     @cached_property
     def numbers(self) -> tuple[str, ...]:
         """Names of the columns of real numbers."""
-        return tuple(f"last_snap_{s}" for s in range(self.starts.count))
+        return tuple(f"last_snap_{s}" for s in range(self.initial_conditions.count))
 
     @property
     def runs_per_point(self) -> int:
         """Runs that a point takes."""
-        return self.starts.count
+        return self.initial_conditions.count
 
     @cached_property
     def parameters(self) -> dict[str, Any]:
         """Everything the numbers depend on, plain."""
         kept = list(_PER_START)
-        return self.setup.identity() | {"lifetimes": kept, "starts": self.starts.describe()}
+        return self.setup.identity() | {"lifetimes": kept, "starts": self.initial_conditions.describe()}
 
     def compute(
         self, points: Columns, threads: int | None = None, progress: Progress | None = None
     ) -> ResultTable:
         """Integrate every run of *points*."""
-        size, count = next(iter(points.values())).size, self.starts.count
+        size, count = next(iter(points.values())).size, self.initial_conditions.count
         integers = np.zeros((len(_PER_START), count, size), dtype=np.int32)
         numbers = np.full((count, size), np.nan)
         cycle = self._cycles(points)
@@ -298,10 +298,10 @@ class LifetimeWork(PointWork):
         setup, found, done = self.setup, dict[str, NDArray[Any]](), 0
         size = next(iter(points.values())).size
         for system, integration, which, own in setup.groups(points):
-            begun = self.starts.state(
+            begun = self.initial_conditions.state(
                 system, number, setup.start_of(system, own), own.get("striker.location")
             )
-            columns = {name: values for name, values in own.items() if not name.startswith("start.")}
+            columns = {name: values for name, values in own.items() if not name.startswith("initial_state.")}
             ensemble = make_ensemble(system, integration, columns, start=begun)
             ensemble.runs["decide_crossings"] = -1
             engine = resolve(
@@ -321,19 +321,19 @@ class LifetimeWork(PointWork):
         """Seconds of a cycle of each point."""
         cycle = np.empty(next(iter(points.values())).size)
         for system, _, which, own in self.setup.groups(points):
-            columns = {name: values for name, values in own.items() if not name.startswith("start.")}
+            columns = {name: values for name, values in own.items() if not name.startswith("initial_state.")}
             cycle[which] = cycles_of(system, run_columns(system, columns))
         return cycle
 
     def unfinished(self, size: int, status: RunStatus = RunStatus.NOT_RUN) -> ResultTable:
         """Rows of points that were not computed."""
         integers = np.zeros((size, len(self.integers)), dtype=np.int32)
-        integers[:, : self.starts.count] = status
+        integers[:, : self.initial_conditions.count] = status
         return ResultTable(integers, np.full((size, len(self.numbers)), np.nan))
 
     def columns(self, table: ResultTable) -> dict[str, NDArray[Any]]:
         """What was kept by name, arrays of shape (points, starts)."""
-        count = self.starts.count
+        count = self.initial_conditions.count
         found: dict[str, NDArray[Any]] = {
             name: table.integers[:, i * count : (i + 1) * count] for i, name in enumerate(_PER_START)
         }
@@ -375,18 +375,18 @@ def lifetime_map(
     ----------
     system : System
     axes : optional
-        As of :func:`snapbeam.sweep`; one point, the system as it stands, by default.
+        As in :func:`snapbeam.sweep`; one point, the system as it stands, by default.
     integration : Integration, optional
         1000 cycles by default.  Runs end early once they provably snap no more, whatever it says.
     initial_conditions : InitialConditions or int
         Starts of each point, the same for all of them.
     settings : LifetimeSettings, optional
-        Delay, quiet cycles and confidence.
+        Delay, settling cycles and confidence.
     after : array_like of int, optional
         Cycles n for the probability that a run still snaps then; an eighth, a quarter and a half of the cycles, and
-        all of them less the quiet ones, by default.
-    store, cluster, progress
-        As of :func:`snapbeam.sweep`.
+        all of them less ``settling_cycles``, by default.
+    checkpoint, cluster, progress
+        As in :func:`snapbeam.sweep`.
 
     Returns
     -------
@@ -400,20 +400,20 @@ def lifetime_map(
     Raises
     ------
     InputError
-        For bad input, and for a store that holds something else.
+        For bad input, and for a checkpoint of another sweep.
     CheckpointError
-        If the store is in use, cannot be written or is damaged beyond repair.
+        If the checkpoint is in use, cannot be written or is damaged beyond repair.
 
     Examples
     --------
-    >>> ds = sb.dynamics.lifetime_map(system, {"velocity_amplitude": np.linspace(0.1, 0.6, 20)}, starts=100)  # doctest: +SKIP
+    >>> ds = sb.dynamics.lifetime_map(system, {"velocity_amplitude": np.linspace(0.1, 0.6, 20)}, initial_conditions=100)  # doctest: +SKIP
     """
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if system.striker is None or system.has_environment:
         raise InputError(
-            "base, axial, harvester: starts differ by the phase of a striker, and what else moves has a phase to it; "
-            "march a batch of states by sb.advance(system, every=True) and count"
+            "base_excitation, axial_load, harvester: initial conditions differ by the phase of a striker, and what else moves has a phase to it; "
+            "integrate a batch of states by sb.advance(system, save_every_period=True) and count"
             if system.has_environment
             else "striker = None: a beam that nothing strikes does not go on snapping"
         )
@@ -424,21 +424,21 @@ def lifetime_map(
     if not isinstance(settings, LifetimeSettings):
         raise InputTypeError(f"settings = {shown(settings)}: must be a LifetimeSettings")
     cycles = CYCLES if integration.cycles is None else integration.cycles
-    kernel_input = _after(after, cycles, settings)
+    cycles_after = _after(after, cycles, settings)
     integration = integration.replace(cycles=cycles, early_termination=True)
     setup = _setup(held_in_space(system), axes, integration)
     work = LifetimeWork(setup, None, starts_of(initial_conditions))
     keeping = checkpoint if isinstance(checkpoint, CheckpointOptions) else CheckpointOptions(checkpoint)
     table, made = compute_table(work, keeping, cluster=cluster, progress=progress)
     dataset = _runs(work, table, made)
-    return _single(setup, refit(dataset, settings, kernel_input))
+    return _single(setup, refit(dataset, settings, cycles_after))
 
 
-def _after(after: ArrayLike | None, cycles: int, survival: LifetimeSettings) -> NDArray[np.int64]:
-    observed = cycles - survival.settling_cycles
+def _after(after: ArrayLike | None, cycles: int, settings: LifetimeSettings) -> NDArray[np.int64]:
+    observed = cycles - settings.settling_cycles
     if observed <= 0.0:
         raise InputError(
-            f"cycles = {cycles} with quiet = {survival.settling_cycles:g}: must be more than the quiet cycles"
+            f"cycles = {cycles} with settling_cycles = {settings.settling_cycles:g}: must be more than settling_cycles"
         )
     if after is None:
         after = sorted(
@@ -464,7 +464,9 @@ def _runs(work: LifetimeWork, table: ResultTable, made: dict[str, Any]) -> xr.Da
     import xarray as xr
 
     setup, points = work.setup, work.setup.points
-    more = made | {f"starts_{name}": _plain(value) for name, value in work.starts.describe().items()}
+    more = made | {
+        f"starts_{name}": _plain(value) for name, value in work.initial_conditions.describe().items()
+    }
     attrs = setup.attributes(TITLE, more)
     dataset = xr.Dataset(coords=setup.coordinates(), attrs=attrs)
     dims = (*points.dims, START)
@@ -495,9 +497,9 @@ def _plain(value: Any) -> Any:
 
 
 def refit(
-    dataset: xr.Dataset, survival: LifetimeSettings | None = None, after: ArrayLike | None = None
+    dataset: xr.Dataset, settings: LifetimeSettings | None = None, after: ArrayLike | None = None
 ) -> xr.Dataset:
-    """The lifetimes and probabilities of a lifetime map again, with another delay, quiet time or confidence.
+    """The lifetimes and probabilities of a lifetime map again, with other settings.
 
     Parameters
     ----------
@@ -505,7 +507,7 @@ def refit(
         Of :func:`lifetime_map`.
     settings : LifetimeSettings, optional
     after : array_like of int, optional
-        As of :func:`lifetime_map`; those of the dataset by default.
+        As in :func:`lifetime_map`; those of the dataset by default.
 
     Returns
     -------
@@ -513,11 +515,11 @@ def refit(
     """
     if "last_snap" not in dataset or START not in dataset["last_snap"].dims:
         raise InputError("dataset: holds no lifetimes of starts")
-    survival = LifetimeSettings() if survival is None else survival
+    settings = LifetimeSettings() if settings is None else settings
     cycles = float(dataset.attrs["cycles"])
     if after is None:
         after = dataset[AFTER].values if AFTER in dataset.coords else None
-    kernel_input = _after(after, int(cycles), survival)
+    cycles_after = _after(after, int(cycles), settings)
     result = dataset.drop_dims([name for name in (AFTER, WELL) if name in dataset.dims])
     runs = result.transpose(..., START)
     dims = runs["last_snap"].dims[:-1]
@@ -526,10 +528,10 @@ def refit(
     snapped = good & np.isfinite(last)
     # what ended early provably snaps no more
     settled = runs["final_well_proven"].values.astype(bool) | (status == int(RunStatus.EARLY_STOP))
-    observed = cycles - survival.settling_cycles
+    observed = cycles - settings.settling_cycles
     lasting = snapped & ~settled & (last > observed)
     time = np.where(snapped, np.where(lasting, np.minimum(last, observed), last), np.nan)
-    fit = fit_lifetime(time, snapped & ~lasting, survival.delay, survival.confidence)
+    fit = fit_lifetime(time, snapped & ~lasting, settings.delay, settings.confidence)
     words: dict[str, tuple[Any, str]] = {
         "lifetime": (fit.lifetime, "lifetime of snapping, in cycles"),
         "lifetime_low": (fit.low, "lower limit of the lifetime"),
@@ -543,8 +545,8 @@ def refit(
     }
     for name, (values, text) in words.items():
         result[name] = (dims, values, {"units": "1", "long_name": text})
-    _probabilities(result, dims, good, time, lasting, runs["end_well"].values, kernel_input, survival)
-    result.attrs |= {"quiet": survival.settling_cycles, "confidence": survival.confidence}
+    _probabilities(result, dims, good, time, lasting, runs["end_well"].values, cycles_after, settings)
+    result.attrs |= {"settling_cycles": settings.settling_cycles, "confidence": settings.confidence}
     return result
 
 
@@ -555,20 +557,20 @@ def _probabilities(
     time: NDArray[np.float64],
     lasting: NDArray[np.bool_],
     well: NDArray[np.int8],
-    kernel_input: NDArray[np.int64],
-    survival: LifetimeSettings,
+    cycles_after: NDArray[np.int64],
+    settings: LifetimeSettings,
 ) -> None:
     """Enter the probability of each end, and of snapping on after some cycles."""
     total = good.sum(axis=-1)
     ended = good & ~lasting
     hits = np.stack([(ended & (well == side)).sum(axis=-1) for side in (-1, 1)], axis=-1)
     result[WELL] = ((WELL,), list(WELLS), {"long_name": "well that a run ends about"})
-    _enter(result, "end_probability", (*dims, WELL), hits, total, "probability of ending in a well", survival)
+    _enter(result, "end_probability", (*dims, WELL), hits, total, "probability of ending in a well", settings)
     on = np.stack([(good & (time > cycle)).sum(axis=-1) + (lasting & (time == cycle)).sum(axis=-1)
-                   for cycle in kernel_input], axis=-1)  # fmt: skip
-    result[AFTER] = ((AFTER,), kernel_input, {"units": "1", "long_name": "cycles"})
+                   for cycle in cycles_after], axis=-1)  # fmt: skip
+    result[AFTER] = ((AFTER,), cycles_after, {"units": "1", "long_name": "cycles"})
     words = "probability of snapping on after so many cycles"
-    _enter(result, "snapping_probability", (*dims, AFTER), on, total, words, survival)
+    _enter(result, "snapping_probability", (*dims, AFTER), on, total, words, settings)
 
 
 def _enter(
@@ -578,9 +580,9 @@ def _enter(
     hits: NDArray[np.int64],
     total: NDArray[np.int64],
     words: str,
-    survival: LifetimeSettings,
+    settings: LifetimeSettings,
 ) -> None:
-    parts = proportion(hits, np.broadcast_to(total[..., None], hits.shape), survival.confidence)
+    parts = proportion(hits, np.broadcast_to(total[..., None], hits.shape), settings.confidence)
     for ending, values, text in zip(
         ("", "_low", "_high"), parts, ("", "lower limit: ", "upper limit: "), strict=True
     ):

@@ -222,12 +222,12 @@ def largest_lyapunov(
 ) -> xr.Dataset:
     """The largest exponent from two trajectories, brought back to a small distance at every whole period.
 
-    An independent check of :func:`lyapunov`, and the way under a law of contact whose force jumps.
+    An independent check of :func:`lyapunov_spectrum`, and the way under a law of contact whose force jumps.
 
     Parameters
     ----------
     system, periods, transient, states, integration
-        As of :func:`lyapunov`.
+        As in :func:`lyapunov_spectrum`.
     distance : float
         To which they are brought back, in units of the well's amplitude.
 

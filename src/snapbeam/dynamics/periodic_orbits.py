@@ -62,7 +62,7 @@ _SPLIT = 16
 _LONGEST = 0.25
 """Longest step of Newton's method, in units of the well's amplitude."""
 _SLOW = 0.25
-"""Factor by which a step must lessen the residual, or else the derivative is taken anew."""
+"""Factor by which a step must lessen the residual, or else the derivative is computed again."""
 
 
 class OrbitNotFoundError(RuntimeError):
@@ -155,8 +155,8 @@ def _by_differences(family: Family, x: _Array, periods: int, value: float | None
     for _ in range(_SHRINKINGS):
         moves = np.concatenate([sign * k * step * np.eye(size) for k, _ in _STENCIL for sign in (1.0, -1.0)])
         marched = family.march(np.concatenate([x[None], x + moves]), periods, value)
-        contact_event = marched.statistics.get("impacts")
-        if contact_event is None or (contact_event == contact_event[0]).all():
+        impacts = marched.statistics.get("impacts")
+        if impacts is None or (impacts == impacts[0]).all():
             break
         step *= 0.25
     table = marched.states[1:].reshape(len(_STENCIL), 2, size, size)
@@ -274,9 +274,9 @@ class Passage(NamedTuple):
     impacts: int
     clearance: float
     """Least gap, over the length scale b, at which the beam turns back from the tip without touching; NaN: never."""
-    least_penetration: float
+    min_penetration: float
     """Greatest penetration of the lightest impact, over b; NaN: none."""
-    least_impulse: float
+    min_impulse: float
     """Of an impact, N s; NaN: none."""
     peak_displacement: float
     """Greatest distance of the contact point from the straight beam, over b."""
@@ -412,7 +412,7 @@ class PeriodicOrbit:
     @property
     def _stroboscope(self) -> Stroboscope:
         if not isinstance(self.flow, Stroboscope):
-            raise InputTypeError("orbit: is of a flow that is no System")
+            raise InputTypeError("orbit: its flow is not a System")
         return self.flow
 
     def to_dataset(self) -> xr.Dataset:
@@ -467,7 +467,7 @@ def periodic_orbit(
     iterations: int = 40,
     deflate: Sequence[PeriodicOrbit] = (),
 ) -> PeriodicOrbit:
-    """The periodic orbit near a state, stable or not, by Newton shooting with the tangent flow.
+    """Find the periodic orbit near a state, stable or not, by Newton shooting with the tangent flow.
 
     The tip's mid-position is fixed in space, where it is at the system's start.  Solves P^m(x) = x for the map P over
     one period of the drive.
@@ -480,7 +480,7 @@ def periodic_orbit(
     period : int
         Periods of the drive after which it closes, m.
     integration : Integration, optional
-        ``accuracy="reference"`` by default: a derivative is no better than the steps it is taken of.  At level
+        ``accuracy="reference"`` by default: a derivative is only as accurate as the steps.  At level
         ``"standard"`` it is off by up to 2 %, which is warned of.
     phase : float, optional
         Of the drive at which the orbit is seen, rad; where no contact begins, ends or lasts no time.
@@ -494,7 +494,7 @@ def periodic_orbit(
 
     Returns
     -------
-    Orbit
+    PeriodicOrbit
 
     Raises
     ------
@@ -506,7 +506,7 @@ def periodic_orbit(
     flow = flow_of(system, integration, "reference")
     if isinstance(flow, Stroboscope):
         if flow.system.primary_excitation is None:
-            raise InputError("striker = None: a beam that nothing moves has no orbit but rest")
+            raise InputError("striker = None: a beam without excitation has no orbit except its equilibrium")
         if phase is not None:
             flow = Stroboscope(flow.system, flow.integration, phase)
     elif phase is not None:

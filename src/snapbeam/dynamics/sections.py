@@ -76,7 +76,7 @@ def poincare_section(
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if system.primary_excitation is None:
-        raise InputError("striker = None: a section of a beam that nothing moves is of no drive")
+        raise InputError("striker = None: a section needs a drive, a base excitation or an axial load")
     total, before = integer("periods", periods, 1, 10**6), integer("transient", transient, 0, 10**7)
     flow = Stroboscope(system, Integration() if integration is None else integration, phase)
     level = _level(section)
