@@ -432,7 +432,7 @@ def draw_map(dataset: xr.Dataset, path: Path, overlay: Any, quasi_static_line: b
     matplotlib.use("Agg")
     from snapbeam.plot.map import plot_response_map
 
-    return _save(plot_response_map(dataset, dots=overlay, threshold_line=quasi_static_line), path)
+    return _save(plot_response_map(dataset, measurements=overlay, quasi_static_line=quasi_static_line), path)
 
 
 def draw_threshold(dataset: xr.Dataset, path: Path) -> Path:

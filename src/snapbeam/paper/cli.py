@@ -87,7 +87,9 @@ def reproduce(
     for name in names:
         start = time.monotonic()
         given: dict[str, Any] = (
-            {"dots": measurements} if measurements is not None and name in ("fig6", "fig7", "fig8") else {}
+            {"measurements": measurements}
+            if measurements is not None and name in ("fig6", "fig7", "fig8")
+            else {}
         )
         if measured and name == "fig4":
             given["measured"] = [str(file) for file in measured]

@@ -1,4 +1,4 @@
-"""The beam and the shaker in motion beside their waveform, as MP4 or GIF."""
+"""An animation of a run as MP4 or GIF: beam and striker, next to their waveform."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from matplotlib.gridspec import GridSpec
 from numpy.typing import NDArray
 
 from snapbeam.model.boundary_conditions import BoundaryConditions, modes_between
+from snapbeam.model.parameters import lookup
 from snapbeam.model.reduced_model import displacement_along
 from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, caption, fix_ticks, house_style, new_figure
 from snapbeam.simulation.dataset import check_trajectory
@@ -86,7 +87,7 @@ def animate_run(
 ) -> Path:
     """Write an animation of a run: beam and striker, and their waveform with the present instant.
 
-    An MP4 has 1280 by 720 pixels, a GIF half of each.  Parameters, class and how much slower than life it is are on it.
+    An MP4 has 1280 by 720 pixels, a GIF half of each.  The frames show the parameters, the response class and the slow-down factor.
 
     Parameters are those of :func:`frame_times`, and *path*, ending in ``.mp4`` (H.264) or ``.gif``, and
     *progress*, called as ``progress(frames done, frames in all)``.  The shape of the beam is the sum of its
@@ -323,14 +324,17 @@ class _BeamShape:
         self.length, self.scale = (float(dataset.attrs[name]) for name in ("beam_length", "length_scale"))
         self.time = dataset["time"].values
         self.alpha = dataset["modal_amplitude"].values
-        held = {name: dataset.attrs.get(f"ends_{name}") for name in ("left", "right")}
+        given = {
+            name: dataset.attrs.get(lookup(f"boundary.{name}").short)
+            for name in ("left_rotational_stiffness", "right_rotational_stiffness")
+        }
         self.modes = None
-        if any(each is not None for each in held.values()):
+        if any(each is not None for each in given.values()):
             young, width, thickness = (
                 float(dataset.attrs[f"beam_{name}"]) for name in ("young_modulus", "width", "thickness")
             )
             stiff = young * width * thickness**3 / 12.0
-            self.modes = modes_between(BoundaryConditions(**held), self.length, stiff, self.alpha.shape[-1])
+            self.modes = modes_between(BoundaryConditions(**given), self.length, stiff, self.alpha.shape[-1])
 
     def at(self, time: float) -> _Array:
         after = int(np.clip(np.searchsorted(self.time, time), 1, self.time.size - 1))

@@ -1,4 +1,4 @@
-"""Bifurcation diagrams, with the orbits that branches follow."""
+"""Figures of the dynamics: bifurcation diagrams, lifetimes, Lyapunov exponents, sections, basins, edge states."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ __all__ = [
 
 _UP, _DOWN, _LINE = "#16245E", "#B03A27", "#000000"
 _STARTS = "#8A8A8A"
-_EVENTS = {"fold": "s", "flip": "D", "Neimark-Sacker": "o", "branch point": "^", "grazing": "x"}
+_SPECIAL_POINTS = {"fold": "s", "flip": "D", "Neimark-Sacker": "o", "branch point": "^", "grazing": "x"}
 
 
 @checked
@@ -51,7 +51,7 @@ def plot_diagram(
     dataset : xarray.Dataset, optional
         Of :func:`snapbeam.dynamics.bifurcation_diagram`.
     branches : sequence of xarray.Dataset
-        Of :meth:`snapbeam.dynamics.Branch.to_dataset`: stable solid, unstable dashed, events as marks.
+        Of :meth:`snapbeam.dynamics.Branch.to_dataset`: stable solid, unstable dashed, special points as markers.
     variable : str
         What is drawn of the diagram; branches have ``midspan_displacement`` alone, at every return.
 
@@ -67,7 +67,7 @@ def plot_diagram(
             f"variable = {variable!r}: branches have midspan_displacement alone; draw one or the other"
         )
     first = dataset if dataset is not None else branches[0]
-    along = str(first.attrs.get("along", ""))
+    along = str(first.attrs.get("parameter", ""))
     with house_style():
         ax = axes_or_new(ax, "double", 84.0)
         handles: list[Line2D] = []
@@ -108,7 +108,7 @@ def _points(dataset: xr.Dataset, ax: Axes, along: str, variable: str) -> list[Li
 
 def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
     x, stable = branch[along].values, branch["stable"].values
-    returns = branch["center_returns"].transpose("return", "orbit").values
+    returns = branch["midspan_returns"].transpose("return", "orbit").values
     # up to the stable orbits beside them, so that no gap is left
     beside = ~stable | np.append(~stable[1:], False) | np.append(False, ~stable[:-1])
     for y in returns:
@@ -119,11 +119,14 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
         Line2D([], [], color=_LINE, linewidth=0.9, dashes=(3, 2), label="unstable orbit"),
     ]
     for kind, value, after in zip(
-        branch["event_kind"].values, branch["event_value"].values, branch["event_after"].values, strict=True
+        branch["special_point_kind"].values,
+        branch["special_point_value"].values,
+        branch["special_point_index"].values,
+        strict=True,
     ):
         at = int(after)
         near = returns[:, at : at + 2].mean(axis=1)
-        mark = _EVENTS[str(kind)]
+        mark = _SPECIAL_POINTS[str(kind)]
         ax.plot(
             np.full(near.size, value),
             near,
@@ -149,7 +152,7 @@ def _branch(branch: xr.Dataset, ax: Axes, along: str) -> list[Line2D]:
 
 
 # ----------------------------------------------------------------------------------------------------
-# Lifetimes over one parameter or two, and what still snaps over time.
+# Lifetimes over one parameter or two, and survival curves.
 
 
 _UP_LIFETIMES = "#16245E"
@@ -228,10 +231,10 @@ def _lifetime_cells(
 def plot_survival(
     dataset: xr.Dataset, ax: Axes | None = None, *, labels: Sequence[str] | None = None
 ) -> Axes:
-    """Draw the share of runs that still snap over cycles, and the fitted exponential, for up to five points.
+    """Draw the fraction of runs that still snap over cycles, and the fitted exponential, for up to five points.
 
-    The curve ends where nothing more can be known, the quiet cycles before the end; a ring there is the share of runs
-    that were still snapping, whose lifetimes are longer than was seen.
+    The curve ends ``settling_cycles`` before the end of the runs.  A ring there marks the fraction of right-censored
+    runs, which were still snapping.
     """
     if "last_snap" not in dataset:
         raise InputError("dataset: holds no lifetimes of starts")
@@ -242,7 +245,7 @@ def plot_survival(
     tau, delay = (np.atleast_1d(runs[name].values).ravel() for name in ("lifetime", "delay"))
     with house_style():
         ax = axes_or_new(ax)
-        seen = float(dataset.attrs["cycles"]) - float(dataset.attrs["quiet"])
+        seen = float(dataset.attrs["cycles"]) - float(dataset.attrs["settling_cycles"])
         settled = runs["final_well_proven"].values.astype(bool) | (
             runs["status"].values == int(RunStatus.EARLY_STOP)
         )
@@ -272,7 +275,7 @@ def plot_survival(
                 )
         ax.set(
             xlabel="Cycles",
-            ylabel="Share of runs still snapping",
+            ylabel="Fraction of runs still snapping",
             yscale="log",
             ylim=(0.6 / rows.shape[1], 1.3),
         )
@@ -282,7 +285,7 @@ def plot_survival(
         if open_ends:
             ring = Line2D(
                 [], [], linestyle="none", marker="o", color="0.3", markerfacecolor="white", markersize=4.0,
-                label="still snapping",
+                label="right-censored",
             )  # fmt: skip
             handles.append(ring)
         ax.legend(handles=handles, loc="best", handlelength=1.0, fontsize=6)
@@ -291,7 +294,7 @@ def plot_survival(
 
 
 # ----------------------------------------------------------------------------------------------------
-# What is seen in the space of states: exponents, sections, basins, the state between.
+# State space: Lyapunov exponents, Poincare sections, basins, edge states.
 
 
 _UP_STATES, _DOWN_STATES = "#16245E", "#B03A27"
@@ -346,7 +349,7 @@ def plot_exponents(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
 @checked
 def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_displacement") -> Axes:
     """Draw a Poincare section: a displacement against its velocity."""
-    y = x.replace("displacement_at_striker", "velocity_at_striker")
+    y = x.replace("displacement", "velocity")
     if x not in dataset or y not in dataset:
         raise InputError(f"no {x} and {y} among {list(map(str, dataset.variables))}")
     with house_style():
@@ -360,7 +363,7 @@ def plot_section(dataset: xr.Dataset, ax: Axes | None = None, x: str = "midspan_
             markeredgewidth=0.0,
             rasterized=True,
         )
-        where = "Centre" if x.startswith("center") else "Contact point's"
+        where = "Centre" if x.startswith("midspan") else "Contact point's"
         ax.set(xlabel=f"{where} displacement, over $b$", ylabel=rf"{where} velocity, over $b\,\omega_1$")
         fix_ticks(ax)
     return ax

@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 __all__ = [
     "UPWARD",
     "class_handles",
-    "draw_dots",
-    "draw_threshold_line",
+    "draw_measurements",
+    "draw_quasi_static_line",
     "plot_points",
     "plot_response_map",
     "plot_statistic",
@@ -64,8 +64,8 @@ def plot_response_map(
     dataset: xr.Dataset,
     ax: Axes | None = None,
     *,
-    dots: MeasuredPoints | None = None,
-    threshold_line: bool = False,
+    measurements: MeasuredPoints | None = None,
+    quasi_static_line: bool = False,
     legend: bool = True,
 ) -> Axes:
     """Draw the response class of every run of a map as one cell; over one axis, with how far the centre moves.
@@ -77,17 +77,17 @@ def plot_response_map(
     Parameters
     ----------
     dataset : xarray.Dataset
-        A map with the variable ``response`` over one or two axes of more than one point, or over a list of points
+        A map with the variable ``response_class`` over one or two axes of more than one point, or over a list of points
         (:func:`plot_points`).
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
-    dots : MeasuredPoints, optional
+    measurements : MeasuredPoints, optional
         Measured responses, drawn as dots in the colours of their classes.  Those measured at another value
         of the map's fixed coordinate (by more than 2 %) are left out, with a warning.
-    threshold_line : bool
+    quasi_static_line : bool
         Whether to draw the quasi-static threshold V_QS1 of one mode (Eq. 21), dashed.
     legend : bool
-        Whether to say below the map what the colours mean, and how many of the runs have each.
+        Whether to draw a legend below the map: response classes and their fractions of the runs.
 
     Returns
     -------
@@ -96,17 +96,22 @@ def plot_response_map(
     Raises
     ------
     InputError
-        If the dataset is no map of one or two axes.
+        If the dataset is not a map of one or two axes.
     """
     import xarray as xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "response_class" in dataset and dataset["response_class"].dims == ("point",):
         return plot_points(
-            dataset, "response_class", ax, dots=dots, threshold_line=threshold_line, legend=legend
+            dataset,
+            "response_class",
+            ax,
+            measurements=measurements,
+            quasi_static_line=quasi_static_line,
+            legend=legend,
         )
     if "response_class" in dataset and _is_line(dataset):
-        return _line(dataset, ax, dots is not None or threshold_line, legend)
+        return _line(dataset, ax, measurements is not None or quasi_static_line, legend)
     across, upward, kinds = _two_axes(dataset)
     edges = tuple(edges_of(dataset, name) for name in (across, upward))
     fixed = {
@@ -128,10 +133,10 @@ def plot_response_map(
         if "class_fraction" in dataset:
             handles.append(draw_agreement(ax, dataset, (across, upward), edges))
         ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
-        if threshold_line:
-            handles.append(draw_threshold_line(ax, across, upward, fixed))
-        if dots is not None:
-            handles.append(draw_dots(ax, dots, across, upward, fixed))
+        if quasi_static_line:
+            handles.append(draw_quasi_static_line(ax, across, upward, fixed))
+        if measurements is not None:
+            handles.append(draw_measurements(ax, measurements, across, upward, fixed))
         if legend and own is not None:
             own.legend(handles=handles, loc="outside lower center", ncols=2)
         elif legend:
@@ -147,7 +152,7 @@ def _is_line(dataset: xr.Dataset) -> bool:
 def _line(dataset: xr.Dataset, ax: Axes | None, overlaid: bool, legend: bool) -> Axes:
     """A map over one axis."""
     if overlaid:
-        raise InputError("dots, threshold_line: are drawn over two axes; this map has one")
+        raise InputError("measurements, quasi_static_line: are drawn over two axes; this map has one")
     name = str(dataset["response_class"].squeeze().dims[0])
     with house_style():
         own = new_figure("single", 84.0 if legend else 62.0) if ax is None else None
@@ -188,7 +193,9 @@ def _two_axes(dataset: xr.Dataset) -> tuple[str, str, NDArray[np.int8]]:
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "response_class" not in dataset:
-        raise InputError(f"no map: it has no variable 'response' among {list(map(str, dataset.variables))}")
+        raise InputError(
+            f"dataset: is not a map; it has no variable 'response_class' among {list(map(str, dataset.variables))}"
+        )
     response = dataset["response_class"].squeeze()
     named = [str(name) for name in response.dims]
     if len(named) != 2 or "point" in named:
@@ -222,7 +229,7 @@ def subtitle(dataset: xr.Dataset, axes: tuple[str, ...]) -> str:
 
 
 def class_handles(kinds: NDArray[np.int8] | None = None) -> list[Patch | Line2D]:
-    """Return what a legend needs to say which colour is which class.
+    """Return legend handles of the response classes.
 
     Parameters
     ----------
@@ -250,12 +257,12 @@ def _percent(count: int, total: int) -> str:
     return "<0.1 %" if 0.0 < share < 0.1 else f"{share:.1f} %"
 
 
-def draw_threshold_line(ax: Axes, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
+def draw_quasi_static_line(ax: Axes, across: str, upward: str, fixed: dict[str, float | None]) -> Line2D:
     """Draw V_QS1 of one mode (Eq. 21) over two of the paper's coordinates, the third of them fixed."""
     x = np.linspace(*ax.get_xlim(), 402)[1:-1]
     if {across, upward} - {"frequency_ratio", "location", "velocity_amplitude"}:
         raise InputError(
-            f"threshold_line: is drawn over frequency ratio, location and velocity amplitude, not {across}, {upward}"
+            f"quasi_static_line: is drawn over frequency ratio, location and velocity amplitude, not {across}, {upward}"
         )
     if (across, upward) == ("frequency_ratio", "location"):
         height = np.linspace(*ax.get_ylim(), 402)[1:-1]
@@ -272,29 +279,29 @@ def draw_threshold_line(ax: Axes, across: str, upward: str, fixed: dict[str, flo
 def _given(fixed: dict[str, float | None], name: str) -> float:
     value = fixed[name]
     if value is None:
-        raise InputError(f"threshold_line: needs the map's {name}, which the dataset does not say")
+        raise InputError(f"quasi_static_line: needs the map's {name}, which the dataset does not contain")
     return value
 
 
-def draw_dots(
-    ax: Axes, dots: MeasuredPoints, across: str, upward: str, fixed: dict[str, float | None]
+def draw_measurements(
+    ax: Axes, measurements: MeasuredPoints, across: str, upward: str, fixed: dict[str, float | None]
 ) -> Line2D:
     """Draw measured responses over a map, those at other values of its fixed coordinates left out with a warning."""
-    keep = np.ones(len(dots), dtype=bool)
+    keep = np.ones(len(measurements), dtype=bool)
     for name, value in fixed.items():
-        there = getattr(dots, name)
+        there = getattr(measurements, name)
         if value is not None:
             keep &= np.isnan(there) | (np.abs(there - value) <= _NEAR * abs(value))
     for name in (across, upward):
-        keep &= ~np.isnan(getattr(dots, name))
+        keep &= ~np.isnan(getattr(measurements, name))
     if not keep.all():
         named = ", ".join(f"{name} = {value:.4g}" for name, value in fixed.items() if value is not None)
         warnings.warn(
-            f"{int((~keep).sum())} of {len(dots)} measured points do not belong to {named} and are left out",
+            f"{int((~keep).sum())} of {len(measurements)} measured points do not belong to {named} and are left out",
             stacklevel=3,
         )
-    colors = [CLASS_COLORS[ResponseClass(int(kind))] for kind in dots.response_class[keep]]
-    where = getattr(dots, across)[keep], getattr(dots, upward)[keep]
+    colors = [CLASS_COLORS[ResponseClass(int(kind))] for kind in measurements.response_class[keep]]
+    where = getattr(measurements, across)[keep], getattr(measurements, upward)[keep]
     outside = (
         (where[0] < ax.get_xlim()[0])
         | (where[0] > ax.get_xlim()[1])
@@ -303,7 +310,7 @@ def draw_dots(
     )
     if outside.any():
         warnings.warn(
-            f"{int(outside.sum())} of {len(dots)} measured points lie outside the map", stacklevel=3
+            f"{int(outside.sum())} of {len(measurements)} measured points lie outside the map", stacklevel=3
         )
     ax.scatter(*where, s=26, c="white", linewidths=0.0, zorder=3)
     ax.scatter(*where, s=14, c=colors, edgecolors="black", linewidths=0.6, zorder=4)
@@ -448,8 +455,8 @@ def plot_points(
     *,
     across: str | None = None,
     upward: str | None = None,
-    dots: MeasuredPoints | None = None,
-    threshold_line: bool = False,
+    measurements: MeasuredPoints | None = None,
+    quasi_static_line: bool = False,
     legend: bool = True,
 ) -> Axes:
     """Draw the response class, or a statistic, of each point of a list where its own values stand.
@@ -457,18 +464,18 @@ def plot_points(
     Parameters
     ----------
     dataset : xarray.Dataset
-        What :func:`snapbeam.sweep` made of a list of points: variables over ``point``, parameters as coordinates.
+        Result of :func:`snapbeam.sweep` over a list of points: variables over ``point``, parameters as coordinates.
     name : str
         ``"response_class"``, one of :data:`snapbeam.STATISTICS`, or any other variable over the points.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure one column wide by default.
     across, upward : str, optional
         Parameters along the axes; by default two of those that differ, velocity amplitude or location upward.
-    dots, threshold_line
+    measurements, quasi_static_line
         Measured responses and V_QS1, as :func:`plot_response_map` draws them; they need axes, and values common to all
         points, of the paper's coordinates.
     legend : bool
-        Whether to say below what the colours mean, and how many of the points have each class.
+        Whether to draw a legend below: response classes and their fractions of the points.
 
     Returns
     -------
@@ -477,7 +484,7 @@ def plot_points(
     Raises
     ------
     InputError
-        If the dataset is no list of points, or its points have no such variable or parameters.
+        If the dataset is not a list of points, or its points have no such variable or parameters.
     """
     import xarray as xr
 
@@ -504,7 +511,7 @@ def plot_points(
             handles += class_handles(kinds)
         else:
             _statistic(ax, dataset, name, at, look)
-        handles += _over(ax, dataset, along, dots, threshold_line)
+        handles += _over(ax, dataset, along, measurements, quasi_static_line)
         if legend and handles and own is not None:
             own.legend(handles=handles, loc="outside lower center", ncols=2)
         elif legend and handles:
@@ -514,22 +521,26 @@ def plot_points(
 
 
 def _over(
-    ax: Axes, dataset: xr.Dataset, along: tuple[str, str], dots: MeasuredPoints | None, threshold_line: bool
+    ax: Axes,
+    dataset: xr.Dataset,
+    along: tuple[str, str],
+    measurements: MeasuredPoints | None,
+    quasi_static_line: bool,
 ) -> list[Any]:
     """Draw what lies over the points; what a legend needs for it."""
-    if dots is None and not threshold_line:
+    if measurements is None and not quasi_static_line:
         return []
     if along not in _PAPER:
         raise InputError(
-            "dots, threshold_line: need velocity amplitude, or location, upward over frequency or location, "
+            "measurements, quasi_static_line: need velocity amplitude, or location, upward over frequency or location, "
             f"not {along[1]} over {along[0]}"
         )
     fixed: dict[str, float | None] = {}
     for name in {name for pair in _PAPER for name in pair} - set(along):
         values = np.unique(dataset[name].values) if name in dataset.coords else np.empty(0)
         fixed[name] = float(values[0]) if values.size == 1 else None
-    handles: list[Any] = [draw_threshold_line(ax, *along, fixed)] if threshold_line else []
-    return handles if dots is None else [*handles, draw_dots(ax, dots, *along, fixed)]
+    handles: list[Any] = [draw_quasi_static_line(ax, *along, fixed)] if quasi_static_line else []
+    return handles if measurements is None else [*handles, draw_measurements(ax, measurements, *along, fixed)]
 
 
 def _along(dataset: xr.Dataset, across: str | None, upward: str | None) -> tuple[str, str]:

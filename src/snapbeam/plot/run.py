@@ -1,4 +1,4 @@
-"""The waveform of one run: who is where, how deep they meet, how hard they push (Fig. 3 of the paper)."""
+"""The waveform of one run: displacements, penetration and contact force (Fig. 3 of the paper)."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ __all__ = [
 
 
 # ----------------------------------------------------------------------------------------------------
-# What else a run shows: amplitudes of its modes, energies, spectrum, phase portrait.
+# Amplitudes of the modes, energies, spectrum and phase portrait of a run.
 
 
 _ENERGIES = (
@@ -126,7 +126,7 @@ def _legend(ax: Axes, entries: int) -> None:
 
 @checked
 def plot_energies(run: Run | xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Draw where the striker's work went: into the beam, the contact, and damping.
+    """Draw the energy of the beam and the contact, the dissipated energy and the striker's work.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def plot_spectrum(
 
 @checked
 def plot_phase_portrait(
-    run: Run | xr.Dataset, ax: Axes | None = None, *, of: str = "center", strobe: bool = True
+    run: Run | xr.Dataset, ax: Axes | None = None, *, of: str = "midspan", strobe: bool = True
 ) -> Axes:
     """Draw velocity over displacement, with a dot at each whole cycle of excitation.
 
@@ -216,8 +216,8 @@ def plot_phase_portrait(
     ----------
     run : Run or xarray.Dataset
     ax : matplotlib.axes.Axes, optional
-    of : {"center", "striker"}
-        The point of the beam.
+    of : {"midspan", "striker"}
+        The point of the beam: mid-span, or the location of the striker.
     strobe : bool
         Whether to mark whole cycles.
 
@@ -225,9 +225,11 @@ def plot_phase_portrait(
     -------
     matplotlib.axes.Axes
     """
-    before = "center_" if choice("of", of, ("center", "striker")) == "center" else ""
-    dataset = dataset_of(run, f"{before}displacement", f"{before}velocity")
-    w, v = (dataset[f"{before}{name}"].values for name in ("displacement_at_striker", "velocity_at_striker"))
+    at_midspan = choice("of", of, ("midspan", "striker")) == "midspan"
+    names = ("midspan_displacement", "midspan_velocity")
+    names = names if at_midspan else ("displacement_at_striker", "velocity_at_striker")
+    dataset = dataset_of(run, *names)
+    w, v = (dataset[name].values for name in names)
     with house_style():
         ax = _axes(ax, dataset)
         ax.plot(w, v, color="0.6", linewidth=0.4, rasterized=w.size > 20_000)
@@ -314,14 +316,14 @@ def plot_run(
             around = seconds / scale
             right = _column(figure, grid, 1, near, around, force)
             right[-1].set_xlabel(
-                f"Time after $\\tau$ = {peak:.4g} ({unit})" if across == "cycle" else f"Time ({unit})"
+                f"Time after $\\tau$ = {peak:.4g} ({unit})" if axis_name == "cycle" else f"Time ({unit})"
             )
             right[0].set_xlim(min(around[0], -0.12 * around[-1]), around[-1])
     return left[0]
 
 
 def _alone(ax: Axes, part: xr.Dataset, x: np.ndarray, label: str) -> Axes:
-    """The displacements, on axes that somebody else made."""
+    """Draw the displacements on the given axes."""
     with house_style():
         for name, words, color in _CURVES:
             if name in part:
@@ -387,7 +389,7 @@ def _column(
 
 
 def _hardest_impact(part: xr.Dataset) -> tuple[xr.Dataset, np.ndarray, float]:
-    """The samples about the greatest force: the contact around it and as much again on either side."""
+    """Return the samples near the maximum force: the contact, and a margin of 0.6 of its length on either side."""
     force, time = part["contact_force"].values, part["time"].values
     peak = int(np.nanargmax(force))
     apart = np.flatnonzero(~(force > 0.0))

@@ -417,24 +417,24 @@ def _damper(ax: Axes, x: float, one: float, other: float) -> None:
 
 
 def _draw_drive(ax: Axes, system: System, section: str, drive: Any) -> None:
-    """Displacement of the tip from its mid-position over the first cycles, as long as nothing touches it, of the base,
-    or the change of the axial load.
-    """
+    """Draw the motion of the tip without contact, the base motion, or the change of the axial load."""
     scale = system.scale
     columns = {name: np.array([value]) for name, value in drive.values().items()} or {"": np.zeros(1)}
     period = float(drive.cycle(columns, scale)[0])
     cycles = np.linspace(0.0, 2.0 if isinstance(drive, ConstantVelocity) else _CYCLES, 1601)
     phase = float(columns.get("phase", np.zeros(1))[0])
     moved = motion_of(drive, columns, scale, cycles * period, phase)
-    per = 1.0 if section == "axial" else scale.length
+    per = 1.0 if section == "axial_load" else scale.length
     down = (
-        section == "base"
+        section == "base_excitation"
         and system.base_excitation is not None
         and system.base_excitation.direction == "down"
     )
     color = SHAKER_COLOR if section == "drive" else _LOAD_COLOR
     ax.plot(cycles, (-moved if down else moved) / per, color=color)
     ax.set_xlabel("Cycles of the drive" if section == "drive" else "Cycles")
-    ax.set_ylabel({"drive": "Tip / $b$", "base": "Base $y/b$", "axial": r"$P(t) - P$ (N)"}[section])
+    ax.set_ylabel(
+        {"drive": "Tip / $b$", "base_excitation": "Base $y/b$", "axial_load": r"$P(t) - P$ (N)"}[section]
+    )
     ax.set_xlim(0.0, cycles[-1])
     ax.set_title(drive.name.replace("_", " "), loc="left")

@@ -1,4 +1,4 @@
-"""One house style for every picture: widths of a journal, one font, colours anyone can tell apart."""
+"""One style for all figures: column widths of a journal, one font, colours that colour-blind readers distinguish."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ __all__ = [
     "caption",
     "cell_edges",
     "class_cells",
-    "draw_findings",
+    "diagnostics_height",
+    "draw_diagnostics",
     "figure_legend",
-    "findings_height",
     "fix_ticks",
     "house_style",
     "new_figure",
@@ -56,7 +56,7 @@ FIGURE_SUFFIXES = (".png", ".pdf", ".svg")
 
 # Chosen so that any two differ clearly in colour (CIE 1976 colour difference) for normal vision and under
 # simulated protanopia, deuteranopia and tritanopia (Machado, Oliveira and Fernandes 2009, severity 1); the
-# tests hold the difference above 28 and the five lightnesses at least 8 apart.
+# tests keep the difference above 28 and the five lightnesses at least 8 apart.
 CLASS_COLORS = {
     ResponseClass.INTRAWELL: "#B03A27",
     ResponseClass.TRANSIENT_1: "#16245E",
@@ -157,7 +157,7 @@ def save_figure(figure: Figure | Axes, path: str | os.PathLike[str]) -> Path:
 
 
 # ----------------------------------------------------------------------------------------------------
-# What stands on a picture: numbers with prefixes that suit them, the beam and the drive, the class.
+# Captions: the beam, the drive and the response class, with prefixes of the units.
 
 
 def beam_text(attrs: Any) -> str:
@@ -262,7 +262,7 @@ def figure_legend(figure: Figure, handles: Sequence[Artist], columns: int = 4) -
 
 
 # ----------------------------------------------------------------------------------------------------
-# Diagnostics of a measurement in its picture: a box of words below, red where the numbers are doubtful.
+# Diagnostics of a measurement: a text box below its figure; warnings and errors are red.
 
 
 _LINE = 2.9  # mm
@@ -283,14 +283,14 @@ def _lines(diagnostics: Iterable[Diagnostic], width: float, most: int) -> list[t
     return out
 
 
-def findings_height(diagnostics: Iterable[Diagnostic], width: float, most: int = 6) -> float:
+def diagnostics_height(diagnostics: Iterable[Diagnostic], width: float, most: int = 6) -> float:
     """Height [mm] that the diagnostics take below a picture of *width* [mm]; 0 if there are none."""
     lines = _lines(diagnostics, width, most)
     return _LINE * len(lines) + 2.0 if lines else 0.0
 
 
-def draw_findings(figure: Figure, diagnostics: Iterable[Diagnostic], most: int = 6) -> None:
-    """Write diagnostics along the lower edge of a figure made *findings_height* taller, and keep axes off it."""
+def draw_diagnostics(figure: Figure, diagnostics: Iterable[Diagnostic], most: int = 6) -> None:
+    """Write diagnostics along the lower edge of a figure made *diagnostics_height* taller, and keep axes off it."""
     width, height = (25.4 * float(size) for size in figure.get_size_inches())
     lines = _lines(diagnostics, width, most)
     if not lines:

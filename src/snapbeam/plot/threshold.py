@@ -67,7 +67,7 @@ def plot_threshold(
         )
     along = dims[-1] if len(dims) == 1 or dims[-1] != "modes" else dims[0]
     others = [name for name in dims if name != along]
-    raised = str(dataset.attrs.get("along", "velocity_amplitude"))
+    raised = str(dataset.attrs.get("parameter", "velocity_amplitude"))
     x, _ = positions(dataset, along)
     edges = edges_of(dataset, along)
     curves = (
@@ -113,7 +113,7 @@ def plot_threshold(
 def _draw_curve(ax: Axes, curve: xr.Dataset, x: _Array, style: tuple[str, str], label: str) -> None:
     """Draw one band, its isolated points and the intervals that failed runs leave open."""
     color, dashes = style
-    end = float(curve[str(curve.attrs.get("along", "velocity_amplitude"))][-1])
+    end = float(curve[str(curve.attrs.get("parameter", "velocity_amplitude"))][-1])
     first, always, least, most = (np.atleast_1d(curve[name].values) for name in _NEEDED[:4])
     found = np.isfinite(first)
     always = np.where(found & ~np.isfinite(always), end, always)

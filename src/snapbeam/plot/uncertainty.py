@@ -1,4 +1,4 @@
-"""Designs that were tried, and what was found among them: a goal against another, or over a variable."""
+"""Figures of the uncertainty tools: optimised designs, probabilities, quantile thresholds, sensitivities."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def plot_probability(
     outcome: str = "snap",
     ax: Axes | None = None,
     *,
-    dots: MeasuredPoints | None = None,
+    measurements: MeasuredPoints | None = None,
     levels: tuple[float, ...] = _LEVELS,
 ) -> Axes:
     """Draw a probability map of one outcome.
@@ -146,7 +146,7 @@ def plot_probability(
         Of :func:`snapbeam.uncertainty.probability_map` over one or two parameters.
     outcome : str
     ax : matplotlib.axes.Axes, optional
-    dots : MeasuredPoints, optional
+    measurements : MeasuredPoints, optional
         Measured responses to lay over it, in the colours of their classes.
     levels : tuple of float
         Probabilities, increasing, each in (0, 1).
@@ -176,8 +176,8 @@ def plot_probability(
             _line(data, ax, dims[0], outcome, levels)
         else:
             _cells(data, ax, dims, outcome, levels)
-        if dots is not None and len(dims) == 2:
-            _lay_dots(ax, dims, dots)
+        if measurements is not None and len(dims) == 2:
+            _draw_measurements(ax, dims, measurements)
         fix_ticks(ax)
     return ax
 
@@ -238,12 +238,12 @@ def _cells(data: xr.Dataset, ax: Axes, dims: list[str], outcome: str, levels: tu
         ax.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
 
 
-def _lay_dots(ax: Axes, dims: list[str], dots: MeasuredPoints) -> None:
+def _draw_measurements(ax: Axes, dims: list[str], measurements: MeasuredPoints) -> None:
     for kind in ResponseClass:
-        own = dots.response_class == kind
+        own = measurements.response_class == kind
         if own.any():
             ax.scatter(
-                getattr(dots, dims[0])[own], getattr(dots, dims[1])[own], s=12, color=CLASS_COLORS[kind],
+                getattr(measurements, dims[0])[own], getattr(measurements, dims[1])[own], s=12, color=CLASS_COLORS[kind],
                 edgecolors="black", linewidths=0.5, zorder=3, label=kind.label,
             )  # fmt: skip
 
@@ -292,8 +292,8 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
         raise InputError(
             f"dataset: has {data.sizes['quantile']} lines; at most {len(_STYLES)} can be told apart"
         )
-    along, raised = dims[0], str(data.attrs["along"])
-    bottom, top = (float(each) for each in data.attrs["between"])
+    along, raised = dims[0], str(data.attrs["parameter"])
+    bottom, top = (float(each) for each in data.attrs["bounds"])
     x, _ = positions(data, along)
     with house_style():
         if ax is None:

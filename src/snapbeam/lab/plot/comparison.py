@@ -15,8 +15,8 @@ from snapbeam.plot.style import (
     CENTER_COLOR,
     COLUMN_WIDTHS,
     SHAKER_COLOR,
-    draw_findings,
-    findings_height,
+    draw_diagnostics,
+    diagnostics_height,
     fix_ticks,
     house_style,
     new_figure,
@@ -45,7 +45,7 @@ def plot_map_comparison(dataset: xr.Dataset, points: MeasuredPoints, result: Map
     with house_style():
         figure = new_figure("double", 92.0)
         grid = figure.add_gridspec(1, 2, width_ratios=(1.15, 1.0))
-        left = plot_response_map(dataset, figure.add_subplot(grid[0]), dots=points)
+        left = plot_response_map(dataset, figure.add_subplot(grid[0]), measurements=points)
         _mark_disagreeing(left, dataset, result)
         ax = figure.add_subplot(grid[1])
         _confusion(ax, result.confusion)
@@ -127,8 +127,8 @@ def plot_waveform_comparison(
     )
     with house_style():
         told = result.diagnostics
-        figure = new_figure("double", 100.0 + findings_height(told, COLUMN_WIDTHS["double"], 3))
-        draw_findings(figure, told, 3)
+        figure = new_figure("double", 100.0 + diagnostics_height(told, COLUMN_WIDTHS["double"], 3))
+        draw_diagnostics(figure, told, 3)
         axes = figure.subplots(2, 2, sharey="row", height_ratios=(1.5, 1.0))
         for i, (name, beam, shaker, impacts) in enumerate(columns):
             top, bottom = axes[0, i], axes[1, i]
@@ -172,8 +172,8 @@ def plot_waveform_overlay(result: WaveformComparison, window: tuple[float, float
     cycle = waveforms["cycle"].values
     told = result.diagnostics
     with house_style():
-        figure = new_figure("double", 105.0 + findings_height(told, COLUMN_WIDTHS["double"], 3))
-        draw_findings(figure, told, 3)
+        figure = new_figure("double", 105.0 + diagnostics_height(told, COLUMN_WIDTHS["double"], 3))
+        draw_diagnostics(figure, told, 3)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(2.0, 1.0, 1.0))
         pairs = (
             (top, "displacement", "beam, at the shaker"),

@@ -16,8 +16,8 @@ from snapbeam.plot.style import (
     CENTER_COLOR,
     COLUMN_WIDTHS,
     SHAKER_COLOR,
-    draw_findings,
-    findings_height,
+    draw_diagnostics,
+    diagnostics_height,
     fix_ticks,
     house_style,
     new_figure,
@@ -54,8 +54,8 @@ def plot_decay(signal: xr.DataArray, fit: DecayFit) -> Figure:
     middle = float(values.mean())
     told = fit.diagnostics
     with house_style():
-        figure = new_figure("double", 105.0 + findings_height(told, COLUMN_WIDTHS["double"]))
-        draw_findings(figure, told)
+        figure = new_figure("double", 105.0 + diagnostics_height(told, COLUMN_WIDTHS["double"]))
+        draw_diagnostics(figure, told)
         grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 1.1))
         top = figure.add_subplot(grid[0, :])
         top.plot(time, scale * (values - middle), color=BEAM_COLOR, linewidth=0.5, label="measured")

@@ -18,8 +18,8 @@ from snapbeam.plot.style import (
     BEAM_COLOR,
     COLUMN_WIDTHS,
     SHAKER_COLOR,
-    draw_findings,
-    findings_height,
+    draw_diagnostics,
+    diagnostics_height,
     house_style,
     new_figure,
 )
@@ -101,11 +101,11 @@ def plot_frame(recording: Recording, dataset: xr.Dataset, frame: int = 0) -> Fig
     height, width = picture.shape
     told = doubtful(diagnostics_of(dataset))
     size = (
-        77.0 * min(max(height / width, 0.12), 1.4) + 26.0 + findings_height(told, COLUMN_WIDTHS["single"], 3)
+        77.0 * min(max(height / width, 0.12), 1.4) + 26.0 + diagnostics_height(told, COLUMN_WIDTHS["single"], 3)
     )
     with house_style():
         figure = new_figure("single", size)
-        draw_findings(figure, told, 3)
+        draw_diagnostics(figure, told, 3)
         axes = figure.subplots()
         low, high = np.percentile(picture, (0.2, 99.8))
         axes.imshow(picture, cmap="gray", vmin=low, vmax=max(high, low + 1), interpolation="nearest")
@@ -145,8 +145,8 @@ def plot_tracking_quality(dataset: xr.Dataset) -> Figure:
     shaker = "shaker_displacement_mm" in dataset
     told = diagnostics_of(dataset)
     with house_style():
-        figure = new_figure("double", 120.0 + findings_height(told, COLUMN_WIDTHS["double"]))
-        draw_findings(figure, told)
+        figure = new_figure("double", 120.0 + diagnostics_height(told, COLUMN_WIDTHS["double"]))
+        draw_diagnostics(figure, told)
         top, middle, bottom = figure.subplots(3, 1, sharex=True, height_ratios=(3.0, 1.6, 1.8))
         top.plot(time, dataset["displacement_mm"], color=BEAM_COLOR, label="beam at the shaker")
         if shaker:

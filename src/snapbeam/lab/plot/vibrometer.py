@@ -13,8 +13,8 @@ from snapbeam.plot.style import (
     CENTER_COLOR,
     COLUMN_WIDTHS,
     SHAKER_COLOR,
-    draw_findings,
-    findings_height,
+    draw_diagnostics,
+    diagnostics_height,
     fix_ticks,
     house_style,
     new_figure,
@@ -49,8 +49,8 @@ def plot_drive(signal: xr.DataArray, drive: DriveMeasurement, cycles: float = 12
     begin = fit.start if drive.startup is None else drive.startup.onset
     told = drive.diagnostics
     with house_style():
-        figure = new_figure("double", 105.0 + findings_height(told, COLUMN_WIDTHS["double"]))
-        draw_findings(figure, told)
+        figure = new_figure("double", 105.0 + diagnostics_height(told, COLUMN_WIDTHS["double"]))
+        draw_diagnostics(figure, told)
         grid = figure.add_gridspec(2, 2, height_ratios=(1.1, 1.0))
         top = figure.add_subplot(grid[0, :])
         period = 1.0 / fit.frequency

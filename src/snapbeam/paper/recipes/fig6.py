@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
     from snapbeam.paper.recipe import Results
 
-__all__ = ["OPTIONS", "compute", "draw", "frequency_maps", "measured_dots"]
+__all__ = ["OPTIONS", "compute", "draw", "frequency_maps", "read_measurements"]
 
 
-OPTIONS = ("dots",)
+OPTIONS = ("measurements",)
 
 
 def frequency_maps(results: Results, name: str, cycles: int) -> dict[str, xr.Dataset]:
@@ -44,25 +44,25 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     return frequency_maps(results, "fig6", results.pick(40, CYCLES))
 
 
-def measured_dots(dots: str | os.PathLike[str] | None, ds: xr.Dataset) -> MeasuredPoints | None:
+def read_measurements(measurements: str | os.PathLike[str] | None, ds: xr.Dataset) -> MeasuredPoints | None:
     """The measured responses of a CSV table, normalised as the map is."""
     from snapbeam.sweeps.measured_points import read_measured_points
 
-    if dots is None:
+    if measurements is None:
         return None
     return read_measured_points(
-        dots, reference_frequency=ds.attrs["reference_frequency"], buckling_level=BEAM.buckling_level
+        measurements, reference_frequency=ds.attrs["reference_frequency"], buckling_level=BEAM.buckling_level
     )
 
 
-def draw(results: Results, dots: str | os.PathLike[str] | None = None) -> Figure:
+def draw(results: Results, measurements: str | os.PathLike[str] | None = None) -> Figure:
     """A panel a model, measured responses laid over both if a table of them is given."""
     data = results["fig6"]
     with house_style():
         figure = new_figure("double", 84.0)
         axes = figure.subplots(1, 2, sharey=True)
         for ax, ds in zip(axes, data.values(), strict=True):
-            plot_response_map(ds, ax, dots=measured_dots(dots, ds), legend=False)
+            plot_response_map(ds, ax, measurements=read_measurements(measurements, ds), legend=False)
         axes[1].set_ylabel("")
         panel_letters(axes)
         figure_legend(figure, legend_handles(np.stack([ds.response_class.values for ds in data.values()])))

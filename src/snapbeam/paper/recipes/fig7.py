@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from snapbeam.model.default_values import LONG_CYCLES
-from snapbeam.paper.recipes.fig6 import frequency_maps, measured_dots
+from snapbeam.paper.recipes.fig6 import frequency_maps, read_measurements
 from snapbeam.paper.system import legend_handles
 from snapbeam.plot.map import plot_response_map
 from snapbeam.plot.style import figure_legend, house_style, new_figure, panel_letters
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["OPTIONS", "compute", "draw"]
 
 
-OPTIONS = ("dots",)
+OPTIONS = ("measurements",)
 
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
@@ -31,7 +31,7 @@ def compute(results: Results) -> dict[str, xr.Dataset]:
     return frequency_maps(results, "fig7", results.pick(120, LONG_CYCLES))
 
 
-def draw(results: Results, dots: str | os.PathLike[str] | None = None) -> Figure:
+def draw(results: Results, measurements: str | os.PathLike[str] | None = None) -> Figure:
     """Above, the maps with the quasi-static threshold; below, the new class of the points that changed."""
     long, short = results["fig7"], results["fig6"]
     with house_style():
@@ -39,12 +39,18 @@ def draw(results: Results, dots: str | os.PathLike[str] | None = None) -> Figure
         axes = figure.subplots(2, 2, sharex=True, sharey=True)
         for (above, below), name in zip(axes.T, long, strict=True):
             ds = long[name]
-            plot_response_map(ds, above, dots=measured_dots(dots, ds), threshold_line=True, legend=False)
+            plot_response_map(
+                ds,
+                above,
+                measurements=read_measurements(measurements, ds),
+                quasi_static_line=True,
+                legend=False,
+            )
             changed = ds.response_class.values != short[name].response_class.values
             plot_response_map(
                 ds.assign(response_class=ds.response_class.where(changed)),
                 below,
-                threshold_line=True,
+                quasi_static_line=True,
                 legend=False,
             )
             cycles = int(short[name].attrs["cycles"])

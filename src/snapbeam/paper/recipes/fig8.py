@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import snapbeam as sb
 from snapbeam.model.default_values import CYCLES, LOCATION
-from snapbeam.paper.recipes.fig6 import measured_dots
+from snapbeam.paper.recipes.fig6 import read_measurements
 from snapbeam.paper.system import legend_handles, paper_model, relative_map, shapes_along
 from snapbeam.plot.style import (
     BEAM_COLOR,
@@ -40,7 +40,7 @@ __all__ = ["FREQUENCY_RATIOS", "OPTIONS", "compute", "draw", "draw_relative_map"
 _Array = NDArray[np.float64]
 
 FREQUENCY_RATIOS = (0.05, 0.625, 1.625)
-OPTIONS = ("dots",)
+OPTIONS = ("measurements",)
 _SHARES = {0.625: 0.2, 1.625: 0.05}
 """Share of V_QS1 that the paper's dash-dot line stands at."""
 _STARTS = (0.1, 0.25, LOCATION)
@@ -94,7 +94,7 @@ def draw_relative_map(ax: Axes, ds: xr.Dataset) -> list[Artist]:
     return handles
 
 
-def draw(results: Results, dots: str | os.PathLike[str] | None = None) -> Figure:
+def draw(results: Results, measurements: str | os.PathLike[str] | None = None) -> Figure:
     """The start positions, and a row of maps a frequency."""
     data = results["fig8"]
     with house_style():
@@ -111,7 +111,7 @@ def draw(results: Results, dots: str | os.PathLike[str] | None = None) -> Figure
                 ax.set_ylabel("Velocity amplitude $V$")
             if at // 2 == 2:
                 ax.set_xlabel(r"Shaker location $x_\mathrm{s}$")
-                _lay_dots(ax, measured_dots(dots, ds), float(ds.frequency_ratio))
+                _draw_measurements(ax, read_measurements(measurements, ds), float(ds.frequency_ratio))
             axes.append(ax)
         panel_letters([top, *axes])
         kinds = np.concatenate([ds.response_class.values.ravel() for ds in data.values()])
@@ -141,12 +141,12 @@ def _starts(ax: Axes) -> None:
     ax.set_axis_off()
 
 
-def _lay_dots(ax: Axes, dots: MeasuredPoints | None, ratio: float) -> None:
+def _draw_measurements(ax: Axes, measurements: MeasuredPoints | None, ratio: float) -> None:
     from snapbeam.plot.style import CLASS_COLORS
 
-    if dots is None:
+    if measurements is None:
         return
-    keep = np.isfinite(dots.location) & (np.abs(dots.frequency_ratio - ratio) <= 0.02 * ratio)
-    x, y = dots.location[keep], dots.velocity_amplitude[keep]
-    colors = [CLASS_COLORS[sb.ResponseClass(int(kind))] for kind in dots.response_class[keep]]
+    keep = np.isfinite(measurements.location) & (np.abs(measurements.frequency_ratio - ratio) <= 0.02 * ratio)
+    x, y = measurements.location[keep], measurements.velocity_amplitude[keep]
+    colors = [CLASS_COLORS[sb.ResponseClass(int(kind))] for kind in measurements.response_class[keep]]
     ax.scatter(np.minimum(x, 1.0 - x), y, s=14, c=colors, edgecolors="black", linewidths=0.6, zorder=4)
