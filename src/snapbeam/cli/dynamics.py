@@ -177,10 +177,10 @@ def diagram(
         )  # fmt: skip
     lines = [f"{points.size} values in {duration(time.monotonic() - begun)}"]
     for sweep in dataset["sweep"].values[:2]:
-        periods = dataset["minimal_period"].sel(sweep=sweep).values
-        kinds = ", ".join(f"{int((periods == m).sum())} of period {m}" for m in np.unique(periods) if m > 0)
+        found = dataset["minimal_period"].sel(sweep=sweep).values
+        kinds = ", ".join(f"{int((found == m).sum())} of period {m}" for m in np.unique(found) if m > 0)
         lines.append(
-            f"{sweep}: {kinds or 'no value repeats'}, {int((periods == 0).sum())} that do not repeat"
+            f"{sweep}: {kinds or 'no value repeats'}, {int((found == 0).sum())} that do not repeat"
         )
     _finish(dataset, output, plot, "diagram", lines)
 
