@@ -91,7 +91,10 @@ REFUSALS = [
     ({"integration": {"step": "fast"}}, "[integration] step = 'fast': must be a number in s"),
     ({"integration": {"step": 0.0}}, "step = 0.0: must be a finite number greater than 0 s"),
     ({"integration": {"tolerance": 1e-3, "step": 1e-5}}, "[integration] tolerance = 0.001 with step = 1e-05"),
-    ({"integration": {"engine": "gpu"}}, "[integration] engine = 'gpu': must be one of 'auto', 'cpu', 'cuda'"),
+    (
+        {"integration": {"engine": "gpu"}},
+        "[integration] engine = 'gpu': must be one of 'auto', 'cpu', 'cuda'",
+    ),
     ({"integration": {"early_termination": 1}}, "[integration] early_termination = 1: must be True or False"),
     (
         {"model": {"damping_ratio": [0.1, 0.2]}},
@@ -316,7 +319,10 @@ def test_a_file_of_version_0_1_means_what_it_meant():
 
 def test_a_start_by_name():
     config = config_from_mapping(
-        {"model": {"modes": 3}, "initial_state": {"amplitude[1]": -1.0, "velocity[2]": 0.1, "striker_position": 1e-3}}
+        {
+            "model": {"modes": 3},
+            "initial_state": {"amplitude[1]": -1.0, "velocity[2]": 0.1, "striker_position": 1e-3},
+        }
     )
     model, start = config.system.model, config.system.initial_state
     np.testing.assert_allclose(start.amplitude, model.well_amplitude, rtol=1e-15)

@@ -136,7 +136,7 @@ def test_label_and_limits(name: str, label: str, limits: str) -> None:
         ("frequency", "drive.frequency"),
         ("initial_state.amplitude[3]", "initial_state.amplitude[3]"),
         ("initial_state.velocity[1]", "initial_state.velocity[1]"),
-        ("start_striker_position", "initial_state.striker_position"),
+        ("initial_state_striker_position", "initial_state.striker_position"),
     ],
 )
 def test_looked_up_by_any_of_its_names(asked: str, name: str) -> None:
@@ -153,7 +153,7 @@ def test_starts_are_parameters_of_runs() -> None:
     row = lookup("initial_state.amplitude[2]")
     assert isinstance(row, Parameter)
     assert row.is_run
-    assert row.short == "start_amplitude_2"
+    assert row.short == "initial_state_amplitude_2"
     assert "mode 2" in row.label
     assert lookup("initial_state.striker_position").quantity.unit == "m"
 

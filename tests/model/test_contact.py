@@ -98,7 +98,7 @@ def test_presets_say_what_they_give() -> None:
 def test_kelvin_voigt_restitution(e) -> None:
     law, mass = KelvinVoigt.from_restitution(1e6, e, 2e-3), 2e-3
     assert law.restitution(mass) == pytest.approx(e, abs=1e-12)
-    zeta = law.damping / (2.0 * math.sqrt(1e6 * mass))
+    zeta = law.linear_damping / (2.0 * math.sqrt(1e6 * mass))
     # the force k d + c d' of the free mass vanishes where its speed is e times that of arrival
     rate = np.roots([1.0, 2.0 * zeta, 1.0]).astype(complex)
     if abs(rate[0] - rate[1]) > 1e-3 and e < 1.0:

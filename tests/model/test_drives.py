@@ -72,7 +72,9 @@ def test_burst_comes_and_goes() -> None:
     after = cycles > 7.0
     np.testing.assert_allclose(moved[after], -0.4 * SCALE.length, rtol=1e-12)
     assert (speed[after] == 0.0).all()
-    with pytest.raises(InputError, match=r"rise = 3, fall = 1 with length = 2: together at most the length"):
+    with pytest.raises(
+        InputError, match=r"ramp_up_cycles = 3, ramp_down_cycles = 1 with duration_cycles = 2: the ramps must"
+    ):
         sb.Burst(frequency_ratio=1.0, velocity_amplitude=0.1, duration_cycles=2.0, ramp_up_cycles=3.0)
 
 

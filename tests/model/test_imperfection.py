@@ -77,8 +77,8 @@ def test_gone_past_a_fold() -> None:
     low, high = 0.0, 1e-4
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if model_of(rise=middle).is_bistable else (low, middle)
-    near, past = model_of(rise=low), model_of(rise=high)
+        low, high = (middle, high) if model_of(midspan_amplitude=middle).is_bistable else (low, middle)
+    near, past = model_of(midspan_amplitude=low), model_of(midspan_amplitude=high)
     # one mode: kappa + 3 gamma a^2 = 0 at the fold, so that B = 2 (-kappa/3)^1.5/gamma^0.5
     kappa, gamma = near.stiffness[0], near.nonlinear_stiffness
     assert near.transverse_force[0] == pytest.approx(2.0 * (-kappa / 3.0) ** 1.5 / gamma**0.5, rel=1e-6)
@@ -122,7 +122,7 @@ def test_bound_behind_early_decision(modes) -> None:
     from scipy.optimize import minimize
 
     rng = np.random.default_rng(modes)
-    given = {"rise": 1.2e-5, "point_load": 0.02, "point_location": 0.3}
+    given = {"midspan_amplitude": 1.2e-5, "point_load": 0.02, "point_location": 0.3}
     model = model_of(modes, **given)
     size = float(np.abs(model.wells).max())
     depth = model.saddle_energy - model.landscape.deepest.energy
@@ -166,7 +166,7 @@ def test_bound_behind_early_decision(modes) -> None:
 
 def test_measured_wells_are_explained() -> None:
     """The paper's own beam: 81.3 and 80.5 Hz."""
-    for kind in ("rise", "point_load", "uniform_load"):
+    for kind in ("midspan_amplitude", "point_load", "uniform_load"):
         model = identify_imperfection(default_values.BEAM, 81.3, 80.5, kind)
         np.testing.assert_allclose(model.well_frequencies[:, 0], [81.3, 80.5], rtol=1e-6)
         assert model.beam.buckling_level == pytest.approx(0.331e-3, abs=1e-6)
@@ -183,7 +183,7 @@ def test_measured_wells_are_explained() -> None:
 
 def test_by_dotted_name_and_in_files(tmp_path) -> None:
     system = sb.System(
-        model_of(rise=1e-5, skew=2e-6),
+        model_of(midspan_amplitude=1e-5, antisymmetric_amplitude=2e-6),
         default_values.CONTACT,
         sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.1),
     )
@@ -207,12 +207,17 @@ def test_by_dotted_name_and_in_files(tmp_path) -> None:
     with pytest.raises(InputError, match=r"imperfection.tilt: no parameter"):
         system.replace(**{"imperfection.tilt": 1.0})
     config = config_from_mapping(
-        {"imperfection": {"rise": 1e-5, "profile": [[0.0, 0.3, 0.7, 1.0], [0.0, 1e-6, 2e-6, 0.0]]}}
+        {
+            "imperfection": {
+                "midspan_amplitude": 1e-5,
+                "profile": [[0.0, 0.3, 0.7, 1.0], [0.0, 1e-6, 2e-6, 0.0]],
+            }
+        }
     )
     assert config.system.model.is_bistable
     assert config.system.model.imperfection.profile.shape == (2, 4)
     with pytest.raises(InputError, match="is it given in mm"):
-        config_from_mapping({"imperfection": {"rise": 3.0}})
+        config_from_mapping({"imperfection": {"midspan_amplitude": 3.0}})
     matrices = sb.ReducedModel.from_matrices(
         [[1.0]], [-1.0], contact_shape=[1.0], nonlinear_stiffness=1.0, transverse_force=[0.1]
     )
@@ -230,7 +235,7 @@ def test_swept_by_name() -> None:
     )  # fmt: skip
     axes = {"imperfection.midspan_amplitude": [-1e-5, 0.0, 1e-5], "velocity_amplitude": [0.1, 0.3]}
     swept = sb.sweep(system, axes, sb.Integration(cycles=6))
-    assert swept.response.dims == ("imperfection_rise", "velocity_amplitude")
+    assert swept.response_class.dims == ("imperfection_midspan_amplitude", "velocity_amplitude")
     plain = sb.sweep(system, {"velocity_amplitude": [0.1, 0.3]}, sb.Integration(cycles=6))
     np.testing.assert_array_equal(swept.max_displacement[1], plain.max_displacement)
     assert (swept.reference_frequency[0] != swept.reference_frequency[1]).all()

@@ -13,7 +13,7 @@ from snapbeam.util.validation import InputError, InputTypeError
 def test_what_is_not_given() -> None:
     asked = sb.Integration()
     assert (asked.cycles, asked.cycles_or_default) == (None, 200)
-    assert (asked.step, asked.accuracy, asked.tolerance, asked.engine) == (None, "map", None, "auto")
+    assert (asked.step, asked.accuracy, asked.tolerance, asked.engine) == (None, "standard", None, "auto")
     assert not asked.early_termination
     assert asked == sb.Integration(accuracy="standard")
     assert sb.Integration(cycles=7).cycles_or_default == 7
@@ -37,7 +37,7 @@ def test_replace() -> None:
         ({"cycles": 0}, InputError, r"cycles = 0: must be an integer in \[1, 10000000\]"),
         ({"cycles": 1.5}, InputError, "cycles = 1.5: must be an integer"),
         ({"step": 0.0}, InputError, "step = 0.0: must be a finite number greater than 0 s"),
-        ({"accuracy": "best"}, InputError, "accuracy = 'best': must be one of 'map', 'reference'"),
+        ({"accuracy": "best"}, InputError, "accuracy = 'best': must be one of 'standard', 'reference'"),
         ({"engine": "gpu"}, InputError, "engine = 'gpu': must be one of 'auto', 'cpu', 'cuda'"),
         ({"tolerance": 1e-12}, InputError, r"tolerance = 1e-12: must be a number in \[1e-10, 0.1\]"),
         ({"tolerance": 1e-3, "step": 1e-5}, InputError, "tolerance = 0.001 with step = 1e-05.*give one"),

@@ -126,8 +126,11 @@ def test_a_start_changes_only_what_is_named() -> None:
     ("name", "message"),
     [
         ("amplitude[4]", r"initial_state\.amplitude\[4\]: mode = 4: must be an integer in \[1, 3\]"),
-        ("amplitude[0]", r"initial_state\.amplitude\[0\]: no parameter of a start; must be amplitude\[i\]"),
-        ("position", r"initial_state\.position: no parameter of a start"),
+        (
+            "amplitude[0]",
+            r"initial_state\.amplitude\[0\]: not a parameter of an initial state; must be amplitude\[i\]",
+        ),
+        ("position", r"initial_state\.position: not a parameter of an initial state"),
     ],
 )
 def test_starts_that_are_none(name: str, message: str) -> None:

@@ -129,6 +129,6 @@ def test_refuses_what_is_no_lower_well(equilibrium: list[float], message: str) -
 
 def test_one_well_has_no_barrier() -> None:
     with pytest.raises(
-        InputError, match="the map needs a bistable structure: give an equilibrium other than"
+        InputError, match="the map needs a bistable structure: give a well_amplitude other than"
     ):
         ReducedModel.from_matrices(**TWO).require_bistable("the map")

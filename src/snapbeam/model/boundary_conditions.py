@@ -32,14 +32,13 @@ class BoundaryConditions:
 
     left_rotational_stiffness: float | None = quantity(
         "N m/rad", "rotational stiffness of the left end", default=None, optional=True, low=0.0, closed="left",
-        symbol=r"k_\theta", short="ends_left",
+        symbol=r"k_\theta",
     )  # fmt: skip
     right_rotational_stiffness: float | None = quantity(
         "N m/rad", "rotational stiffness of the right end", default=None, optional=True, low=0.0, closed="left",
-        short="ends_right",
     )  # fmt: skip
     axial_support_stiffness: float | None = quantity(
-        "N/m", "axial stiffness of the supports", default=None, optional=True, low=0.0, short="ends_axial"
+        "N/m", "axial stiffness of the supports", default=None, optional=True, low=0.0
     )
 
     def __post_init__(self) -> None:

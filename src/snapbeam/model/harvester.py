@@ -105,7 +105,6 @@ class PiezoelectricHarvester(Harvester):
         low=0.0,
         high=1.0,
         closed="both",
-        short="patch_start",
     )
     patch_end: float = quantity(
         "1",
@@ -114,7 +113,6 @@ class PiezoelectricHarvester(Harvester):
         low=0.0,
         high=1.0,
         closed="both",
-        short="patch_stop",
     )
     name = "piezo"
 
@@ -135,8 +133,8 @@ class PiezoelectricHarvester(Harvester):
         layer_width: float,
         beam: Any,
         resistance: float,
-        start: float = 0.0,
-        stop: float = 0.25,
+        patch_start: float = 0.0,
+        patch_end: float = 0.25,
         wiring: str = "parallel",
     ) -> PiezoelectricHarvester:
         """Two equal layers, one on each face, by their material (Erturk and Inman, Piezoelectric Energy Harvesting,
@@ -165,7 +163,7 @@ class PiezoelectricHarvester(Harvester):
         two = 2.0 if choice("wiring", wiring, WIRINGS) == "parallel" else 0.5
         first, last = (
             within(name, at, 0.0, 1.0, closed="both")
-            for name, at in (("patch_start", start), ("patch_end", stop))
+            for name, at in (("patch_start", patch_start), ("patch_end", patch_end))
         )
         area = wide * (last - first) * instance("beam", beam, Beam, "a Beam").length
         arm = 0.5 * (beam.thickness + thick)
@@ -176,8 +174,8 @@ class PiezoelectricHarvester(Harvester):
             * arm,
             capacitance=two * positive("permittivity", permittivity, "F/m") * area / thick,
             resistance=resistance,
-            patch_start=start,
-            patch_end=stop,
+            patch_start=patch_start,
+            patch_end=patch_end,
         )
 
     def row(self, model: ReducedModel) -> _Array:
@@ -272,6 +270,6 @@ def _beam_of(model: ReducedModel) -> Any:
     if model.beam is None:
         raise InputError(
             "harvester: layers are glued to a beam; "
-            "of a structure given by matrices the slopes are not known; use a Coil"
+            "of a structure given by matrices the slopes are not known; use an ElectromagneticHarvester"
         )
     return model.beam

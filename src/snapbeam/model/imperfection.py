@@ -108,15 +108,20 @@ class Imperfection:
     """
 
     midspan_amplitude: float = quantity(
-        "m", "height at the centre of the initial shape", default=0.0, symbol="a_0", short="imperfection_rise",
+        "m", "height at the centre of the initial shape", default=0.0, symbol="a_0", short="imperfection_midspan_amplitude",
         plausible=(0.0, 1.0, "mm"),
     )  # fmt: skip
     shape: str = quantity(
-        "1", "form of the initial shape", default="mode", kind=str, choices=FORMS, short="imperfection_form"
+        "1",
+        "shape of the initial deflection",
+        default="mode",
+        kind=str,
+        choices=FORMS,
+        short="imperfection_shape",
     )
     antisymmetric_amplitude: float = quantity(
         "m", "greatest height of the antisymmetric part of the initial shape", default=0.0,
-        short="imperfection_skew", plausible=(0.0, 1.0, "mm"),
+        short="imperfection_antisymmetric_amplitude", plausible=(0.0, 1.0, "mm"),
     )  # fmt: skip
     profile: _Array | None = quantity(
         "m", "places over the length and heights of a measured initial shape", default=None, kind=object,

@@ -352,7 +352,7 @@ def _around(part: Any, section: str, values: Mapping[str, Any]) -> Any:
 
 def _ends(model: ReducedModel, whole: Mapping[str, Any], values: Mapping[str, Any]) -> Any:
     if model.beam is None:
-        raise InputError("ends: this model was given by matrices, it has no beam")
+        raise InputError("boundary: this model was given by matrices, it has no beam")
     ends = whole.get("boundary", whole.get("beam", model.beam).boundary)
     ends = CLAMPED if ends is None else ends
     return _changed(ends, "boundary", values) if values else ends

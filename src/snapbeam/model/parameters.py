@@ -110,7 +110,7 @@ def _rows() -> Iterable[Parameter]:
     for section, part in own:
         yield from _of_class(section, part)
     for row in _of_class("base_excitation", BaseExcitation):
-        yield dataclasses.replace(row, short=f"base_{row.short}")
+        yield dataclasses.replace(row, short=f"base_excitation_{row.short}")
     for name, (item, default) in MODEL_QUANTITIES.items():
         yield Parameter(f"model.{name}", item.short or name, item, default)
     shaking = {name: kind for name, kind in DRIVES.items() if kind.can_excite_base()}
@@ -240,12 +240,14 @@ def lookup(name: str) -> Parameter:
         over = "that of the well" if of == "amplitude" else "omega_1 times the amplitude of the well"
         words = f"{of} of buckling mode {mode} at the start, over {over}"
         return Parameter(
-            f"initial_state.{of}[{mode}]", f"start_{of}_{mode}", ParameterField("1", words, scope=RUN)
+            f"initial_state.{of}[{mode}]", f"initial_state_{of}_{mode}", ParameterField("1", words, scope=RUN)
         )
-    if name in ("initial_state.striker_position", "start_striker_position"):
+    if name in ("initial_state.striker_position", "initial_state_striker_position"):
         words = "mid-position of the striker's tip in space"
         return Parameter(
-            "initial_state.striker_position", "start_striker_position", ParameterField("m", words, scope=RUN)
+            "initial_state.striker_position",
+            "initial_state_striker_position",
+            ParameterField("m", words, scope=RUN),
         )
     shorts = short_names()
     if name in shorts:

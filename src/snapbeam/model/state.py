@@ -271,7 +271,7 @@ def started(
         found = START_NAME.fullmatch(name)
         if found is None and name not in parts:
             raise InputError(
-                f"initial_state.{name}: no parameter of a start; must be amplitude[i], velocity[i], phase or striker_position"
+                f"initial_state.{name}: not a parameter of an initial state; must be amplitude[i], velocity[i], phase or striker_position"
             )
         if found is None:
             parts[name] = column

@@ -70,7 +70,7 @@ class Striker:
         symbol=r"k_\mathrm{s}", short="striker_suspension_stiffness",
     )  # fmt: skip
     suspension_damping: float = quantity(
-        "N s/m", "damper of the striker's suspension", default=0.0, low=0.0, closed="left",
+        "N s/m", "damping coefficient of the striker's suspension", default=0.0, low=0.0, closed="left",
         symbol=r"c_\mathrm{s}", short="striker_suspension_damping",
     )  # fmt: skip
 
@@ -89,8 +89,8 @@ class Striker:
         elif self.damping_ratio >= 1.0:
             critical = 2.0 * math.sqrt(self.suspension_stiffness * self.mass)
             raise InputError(
-                f"suspension_damping = {self.suspension_damping:g} N s/m: must be less than {critical:g} N s/m, critical for its mass and "
-                "spring; a stiffer spring lets it be greater"
+                f"suspension_damping = {self.suspension_damping:g} N s/m: must be less than {critical:g} N s/m, the "
+                "critical damping; increase suspension_stiffness or decrease suspension_damping"
             )
 
     @property
@@ -192,7 +192,9 @@ def parted(striker: Any, contact: Any, others: tuple[ContactPair, ...]) -> dict[
             f"contact = {shown(contact)}: laws in a sequence belong to strikers in a sequence, one each"
         )
     if others:
-        raise InputError("others: the sequence striker = [...] says all of them; leave others out")
+        raise InputError(
+            "further_contacts: striker = [...] already lists every striker; leave further_contacts out"
+        )
     laws: Sequence[Any] = contact if isinstance(contact, (list, tuple)) else [contact] * len(striker)
     if len(laws) != len(striker):
         raise InputError(
@@ -207,21 +209,23 @@ def check_others(system: Any) -> None:
     """Refuse strikers beside the first that are none, or that do not go with the rest of a system."""
     others = system.further_contacts
     if not isinstance(others, tuple) or not all(isinstance(each, ContactPair) for each in others):
-        raise InputTypeError(f"others = {shown(others)}: must be a tuple of Another; or give striker = [...]")
+        raise InputTypeError(
+            f"further_contacts = {shown(others)}: must be a tuple of ContactPair; or give striker = [...]"
+        )
     if not others:
         return
     if system.striker is None:
-        raise InputError("others: strikers beside a first one; give striker = [...]")
+        raise InputError("further_contacts: need a first striker; give striker = [...]")
     if len(others) >= MOST_STRIKERS:
         raise InputError(f"striker: {len(others) + 1} strikers; must be at most {MOST_STRIKERS}")
     if system.contact is not None and system.contact.impulsive:
         raise InputError(
-            f"contact = {system.contact!r} with several strikers: Newton's law knows one wall; use a HertzContact, or "
+            f"contact = {system.contact!r} with several strikers: Newton's law allows one striker; use a HertzContact, or "
             "a HuntCrossley of the same restitution for the first striker"
         )
     if isinstance(system.striker.drive, RecordedMotion):
         raise InputError(
-            "drive = 'recorded' with several strikers: a record has a clock of its own; drive them by formulas"
+            "drive = 'recorded_motion' with several strikers: a recording has its own time axis; use drives given by formulas"
         )
     for number, each in enumerate(others, 2):
         _check_one(number, each)
@@ -247,5 +251,5 @@ def _check_one(number: int, another: ContactPair) -> None:
         )
     if isinstance(striker.drive, RecordedMotion):
         raise InputError(
-            f"drive_{number} = 'recorded': a record has a clock of its own; drive it by a formula, or let it be still"
+            f"drive_{number} = 'recorded_motion': a recording has its own time axis; use a drive given by a formula, or a FixedStop"
         )

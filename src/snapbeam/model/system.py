@@ -38,9 +38,9 @@ __all__ = ["System", "check_world"]
 
 
 _A = {
-    "base": "a Base(motion=AccelerationSine(...))",
-    "axial": "an AxialLoadModulation(motion=HarmonicLoad(...))",
-    "harvester": "a Piezo(...) or a Coil(...)",
+    "base_excitation": "a BaseExcitation(motion=AccelerationSine(...))",
+    "axial_load": "an AxialLoadModulation(motion=HarmonicLoad(...))",
+    "harvester": "a PiezoelectricHarvester(...) or an ElectromagneticHarvester(...)",
 }
 
 
@@ -48,8 +48,8 @@ def check_world(system: Any) -> None:
     """Refuse surroundings that are none, or that do not go with the rest of a :class:`~snapbeam.System`."""
     base, load, harvester = system.base_excitation, system.axial_load, system.harvester
     for name, part, kind in (
-        ("base", base, BaseExcitation),
-        ("axial", load, AxialLoadModulation),
+        ("base_excitation", base, BaseExcitation),
+        ("axial_load", load, AxialLoadModulation),
         ("harvester", harvester, Harvester),
     ):
         if part is not None and not isinstance(part, kind):
@@ -65,7 +65,7 @@ def check_world(system: Any) -> None:
     contact, striker = system.contact, system.striker
     if contact is not None and contact.impulsive:
         raise InputError(
-            f"contact = {contact!r} with {words}: the carried phase of Newton's law knows the tip's force alone; use a "
+            f"contact = {contact!r} with {words}: sticking under Newton's law includes the tip's force only; use a "
             "HertzContact, or a HuntCrossley with the same restitution"
         )
     if contact is not None and contact.rate_dependent and harvester is not None:
@@ -79,12 +79,12 @@ def check_world(system: Any) -> None:
         and (base is not None or load is not None)
     ):
         raise InputError(
-            f"drive = 'recorded' with {words}: a record has a clock of its own; drive the striker by a formula, or let "
-            "it stand still"
+            f"drive = 'recorded_motion' with {words}: a recording has its own time axis; use a drive given by a formula, "
+            "or a FixedStop"
         )
     if load is not None and system.model.beam is None:
         raise InputError(
-            "axial: changes the axial load of a beam; a structure given by matrices has its load in its stiffness"
+            "axial_load: changes the axial load of a beam; a structure given by matrices has its load in its stiffness"
         )
 
 
@@ -179,12 +179,12 @@ class System:
             model.require_bistable("a run")
         if start is not None:
             if not isinstance(start, State):
-                raise InputTypeError(f"start = {shown(start)}: must be a State")
+                raise InputTypeError(f"initial_state = {shown(start)}: must be a State")
             if start.batch:
-                raise InputError(f"start: a batch of shape {start.batch}: must be one state")
+                raise InputError(f"initial_state: a batch of shape {start.batch}: must be one state")
             if start.modes != model.modes:
                 raise InputError(
-                    f"start of {start.modes} modes: must have the {model.modes} modes of the model"
+                    f"initial_state of {start.modes} modes: must have the {model.modes} modes of the model"
                 )
             # what a system is made of is what it is hashed and saved by: a state's way here is no part of it
             object.__setattr__(
@@ -196,7 +196,7 @@ class System:
     def replace(self, **changes: Any) -> System:
         """A neighbour: the same system with parameters changed by dotted name.
 
-        Names are those of the table of parameters (:data:`snapbeam.config.PARAMETERS`), such as
+        Names are those of the table of parameters (:func:`snapbeam.model.parameters.parameters`), such as
         ``beam.thickness``, ``model.modes``, ``contact.stiffness``, ``striker.location`` and
         ``drive.frequency_ratio`` (of the second striker ``striker_2.location``, ``drive_2.frequency_ratio``,
         ``contact_2.stiffness``), or whole parts: ``beam``, ``model``, ``contact``, ``striker``, ``drive``, ``initial_state``,
@@ -353,7 +353,9 @@ class System:
     def __repr__(self) -> str:
         parts = [f"modes={self.model.modes}", f"contact={self.contact!r}"]
         if self.striker is not None:
-            parts.append(f"striker={self.striker!r}" if self.striker.drive.harmonic else "striker=recorded")
+            parts.append(
+                f"striker={self.striker!r}" if self.striker.drive.harmonic else "striker=recorded_motion"
+            )
         if self.further_contacts:
             parts.append(f"strikers={1 + len(self.further_contacts)}")
         return f"<System {', '.join(parts)}, hash {self.hash[:12]}>"

@@ -247,9 +247,9 @@ def test_by_name_and_in_files(tmp_path) -> None:
     swept = sb.sweep(
         system, {"boundary.left_rotational_stiffness": [0.0, 3.0 * UNIT]}, sb.Integration(cycles=2)
     )
-    assert swept.response.dims == ("ends_left",)
+    assert swept.response_class.dims == ("left_rotational_stiffness",)
     assert (np.diff(swept.reference_frequency.values) != 0.0).all()
     with pytest.raises(InputError, match="left"):
         sb.BoundaryConditions(left_rotational_stiffness=-1.0)
-    with pytest.raises(InputError, match="Ends"):
+    with pytest.raises(InputError, match="boundary = 3.0: must be"):
         BEAM.replace(boundary=3.0)

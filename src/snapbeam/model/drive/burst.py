@@ -52,16 +52,13 @@ class Burst(Timed):
     velocity_amplitude: float = quantity(
         "1", "velocity amplitude over b omega_1", low=0.0, closed="left", scope=RUN, symbol="V"
     )
-    duration_cycles: float = quantity("1", "cycles of the burst", low=0.0, scope=RUN, short="burst_length")
-    ramp_up_cycles: float = quantity(
-        "1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN, short="drive_rise"
-    )
+    duration_cycles: float = quantity("1", "cycles of the burst", low=0.0, scope=RUN)
+    ramp_up_cycles: float = quantity("1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN)
     ramp_down_cycles: float = quantity(
-        "1", "cycles in which the drive falls", default=1.0, low=0.0, scope=RUN, short="drive_fall"
+        "1", "cycles in which the drive falls", default=1.0, low=0.0, scope=RUN
     )
     retraction: float = quantity(
         "1", "distance that the tip withdraws after the burst, over b", default=0.0, low=0.0, closed="left", scope=RUN,
-        short="drive_retreat",
     )  # fmt: skip
 
     name = "burst"
@@ -81,7 +78,7 @@ class Burst(Timed):
         check_fields(self)
         if self.ramp_up_cycles + self.ramp_down_cycles > self.duration_cycles * (1.0 + 1e-12):
             raise InputError(
-                f"ramp_up_cycles = {self.ramp_up_cycles:g}, ramp_down_cycles = {self.ramp_down_cycles:g} with duration_cycles = {self.duration_cycles:g}: together at most the length"
+                f"ramp_up_cycles = {self.ramp_up_cycles:g}, ramp_down_cycles = {self.ramp_down_cycles:g} with duration_cycles = {self.duration_cycles:g}: the ramps must together be at most duration_cycles"
             )
 
     def cycle(self, columns: Mapping[str, _Array], scale: Scale) -> _Array:

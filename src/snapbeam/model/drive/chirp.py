@@ -46,8 +46,7 @@ class Chirp(Timed):
     )
     sweep_cycles: float = quantity("1", "duration of the sweep, in its first period", low=0.0, scope=RUN)
     sweep_type: str = quantity(
-        "1", "how the frequency wanders", default="linear", kind=str, choices=("linear", "log"), scope=STRUCTURE,
-        short="sweep_spacing",
+        "1", "how the frequency changes in time", default="linear", kind=str, choices=("linear", "log"), scope=STRUCTURE,
     )  # fmt: skip
 
     name = "chirp"

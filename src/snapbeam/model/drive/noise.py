@@ -71,9 +71,7 @@ class BandLimitedNoise(Timed):
         scope=STRUCTURE,
         short="noise_seed",
     )
-    ramp_up_cycles: float = quantity(
-        "1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN, short="drive_rise"
-    )
+    ramp_up_cycles: float = quantity("1", "cycles in which the drive rises", default=1.0, low=0.0, scope=RUN)
 
     name = "band_limited_noise"
     number_names = ("omega", "fastest", "low", "high", "strength", "ramp_up_cycles", "seed")

@@ -162,7 +162,7 @@ def mixture(kinds: tuple[type[Drive], ...]) -> type[SumDrive]:
     for kind in kinds:
         if kind.name in ("recorded_motion", "fixed") or DRIVES.get(kind.name) is not kind:
             raise InputError(
-                f"{words}: {kind.name!r} is no term of a sum; a record has a clock of its own, and a stop adds nothing"
+                f"{words}: {kind.name!r} cannot be a term of a sum; a recording has its own time axis, and a stop adds nothing"
             )
     name = _SEPARATOR.join(["SumDrive", *(kind.name for kind in kinds)])
     if name not in globals():
