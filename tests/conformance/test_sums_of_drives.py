@@ -52,7 +52,7 @@ def test_kept_and_told() -> None:
     assert sb.System.from_mapping(system.to_mapping()) == system
     assert system.to_mapping()["drive"]["kind"] == "sine+burst"
     assert system.replace(**{"drive.duration_cycles_2": 4.0}).get("drive.duration_cycles_2") == 4.0
-    with pytest.raises(sb.InputError, match="clock of its own"):
+    with pytest.raises(sb.InputError, match="its own time axis"):
         SINE + sb.FixedStop()
     with pytest.raises(sb.InputError, match="2 to 4 terms"):
         SINE + BURST + KICK + SINE + BURST

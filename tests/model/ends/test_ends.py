@@ -251,5 +251,5 @@ def test_by_name_and_in_files(tmp_path) -> None:
     assert (np.diff(swept.reference_frequency.values) != 0.0).all()
     with pytest.raises(InputError, match="left"):
         sb.BoundaryConditions(left_rotational_stiffness=-1.0)
-    with pytest.raises(InputError, match="boundary = 3.0: must be"):
+    with pytest.raises(InputError, match=r"boundary = 3\.0: must be"):
         BEAM.replace(boundary=3.0)
