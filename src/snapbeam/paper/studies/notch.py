@@ -52,10 +52,9 @@ def _system(modes: int, beam: sb.Beam = BEAM, **parts: Any) -> sb.System:
     return sb.System(model, contact, sb.Striker(drive=drive, **parts))
 
 
-def _ended(**ends: float) -> sb.Beam:
-    """The paper's beam between other ends."""
-    parts: dict[str, Any] = {"ends": sb.BoundaryConditions(**ends)}
-    return BEAM.replace(**parts)
+def _supported(**stiffness: float) -> sb.Beam:
+    """The paper's beam on elastic supports."""
+    return BEAM.replace(boundary=sb.BoundaryConditions(**stiffness))
 
 
 def _body(mass: float, frequency: float, zeta: float = 0.1) -> dict[str, Any]:
@@ -75,7 +74,10 @@ def _start_up(rise: float) -> sb.Burst:
     )
 
 
-_SOFT = {k: _ended(left=k * _UNIT, right=k * _UNIT) for k in (100.0, 30.0)}
+_SOFT = {
+    k: _supported(left_rotational_stiffness=k * _UNIT, right_rotational_stiffness=k * _UNIT)
+    for k in (100.0, 30.0)
+}
 _GIVING = BEAM.young_modulus * BEAM.thickness * BEAM.width / BEAM.length
 
 VARIANTS: dict[str, tuple[str, Callable[[int], sb.System]]] = {
@@ -90,7 +92,7 @@ VARIANTS: dict[str, tuple[str, Callable[[int], sb.System]]] = {
     "rises over 20 cycles": ("start-up", lambda n: _system(n, drive=_start_up(20.0))),
     r"$k_\theta = 100\,EI/L$": ("ends", lambda n: _system(n, _SOFT[100.0])),
     r"$k_\theta = 30\,EI/L$": ("ends", lambda n: _system(n, _SOFT[30.0])),
-    "supports give as the beam": ("ends", lambda n: _system(n, _ended(axial=_GIVING))),
+    "supports give as the beam": ("ends", lambda n: _system(n, _supported(axial_support_stiffness=_GIVING))),
     "higher well struck": ("asymmetry", lambda n: _system(n, imperfection=sb.Imperfection(midspan_amplitude=1.2e-6))),
     "lower well struck": ("asymmetry", lambda n: _system(n, imperfection=sb.Imperfection(midspan_amplitude=-1.2e-6))),
     "crooked by 5 µm": ("asymmetry", lambda n: _system(n, imperfection=sb.Imperfection(antisymmetric_amplitude=5e-6))),
