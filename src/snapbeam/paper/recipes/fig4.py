@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 import snapbeam as sb
 from snapbeam.model.default_values import BEAM, CYCLES, LOCATION
 from snapbeam.paper.system import TOLERANCE, class_map, paper_model, paper_run
+from snapbeam.parts import installed_parts
 from snapbeam.plot.style import BEAM_COLOR, SHAKER_COLOR, fix_ticks, house_style, new_figure, panel_letters
 from snapbeam.simulation.dataset import check_trajectory
 from snapbeam.util.netcdf import read_netcdf
@@ -50,7 +51,17 @@ _REST_FRAMES = 40
 
 
 def compute(results: Results) -> dict[str, xr.Dataset]:
-    """The map that was searched, the three runs, and a tracked synthetic recording of each."""
+    """The map that was searched, the three runs, and a tracked synthetic recording of each.
+
+    Raises
+    ------
+    InputError
+        If the lab part is not installed, or if the grid lacks one of the kinds of response.
+    """
+    if "lab" not in installed_parts():
+        raise InputError(
+            "fig4: needs the package snapbeam.lab to track recordings; install snapbeam with its lab part"
+        )
     modes, cycles = results.pick(4, 32), results.pick(40, CYCLES)
     amplitude = results.pick(np.linspace(0.05, 0.3, 6), np.linspace(0.04, 0.4, 37))
     ratio = results.pick(np.array([1.4]), np.linspace(0.8, 2.0, 13))

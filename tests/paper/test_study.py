@@ -35,7 +35,7 @@ def test_three_measurements_of_sensitivity_agree() -> None:
 
 
 def test_the_documentation_says_what_is_stored() -> None:
-    """Made again by ``python tests/dynamics/study_table.py``."""
+    """Made again by ``python tests/paper/study_table.py``."""
     assert study.FILE.read_text(encoding="utf-8") == study.text()
 
 

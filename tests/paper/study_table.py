@@ -1,6 +1,6 @@
 """What the stored study of lifetimes says, each number with its uncertainty, for the documentation.
 
-``python tests/dynamics/study_table.py`` reads docs/data/lifetimes.nc, fig6.nc and fig7.nc and writes
+``python tests/paper/study_table.py`` reads docs/data/lifetimes.nc, fig6.nc and fig7.nc and writes
 docs/data/lifetimes.md.
 """
 
@@ -92,7 +92,7 @@ def sensitivity() -> dict[str, tuple[float, float]]:
 def lasting(ds: xr.Dataset) -> str:
     """How many runs of one point snap on, with an interval, and when the others ended."""
     last = np.nan_to_num(ds["last_snap"].values)
-    end = ds.attrs["cycles"] - ds.attrs["quiet"]
+    end = ds.attrs["cycles"] - ds.attrs["settling_cycles"]
     still = last > end
     _, low, high = proportion(int(still.sum()), last.size)
     share = f"{int(still.sum())} of {last.size} ({low:.2f} to {high:.2f})"
@@ -101,10 +101,10 @@ def lasting(ds: xr.Dataset) -> str:
 
 def _many(data: dict[str, xr.Dataset]) -> list[str]:
     """The same of 32 modes, once data hold it."""
-    if "long_many_map" not in data:
+    if "long_many_standard" not in data:
         return []
     ratio, velocity = (
-        float(data["long_many_map"].attrs[name]) for name in ("frequency_ratio", "velocity_amplitude")
+        float(data["long_many_standard"].attrs[name]) for name in ("frequency_ratio", "velocity_amplitude")
     )
     told = [f"at level {level} {lasting(data[f'long_many_{level}'])}" for level in ("standard", "reference")]
     return ["", f"32 modes at ({ratio:g}, {velocity:g}), 10,000 cycles: still snapping {'; '.join(told)}."]
@@ -169,7 +169,7 @@ def text() -> str:
     lines += [
         "",
         "One mode at (1.625, 0.3), 10,000 cycles: still snapping at accuracy level standard "
-        f"{lasting(data['long_map'])}; at level reference {lasting(data['long_reference'])}.",
+        f"{lasting(data['long_standard'])}; at level reference {lasting(data['long_reference'])}.",
         *_many(data),
         "",
         "| at (1.625, 0.3), 32 modes | value | from |",

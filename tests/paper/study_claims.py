@@ -104,7 +104,7 @@ def _attractor(data: Mapping[str, xr.Dataset]) -> Row:
     for level in ("standard", "reference"):
         ds = data[f"long_{level}"]
         last = np.nan_to_num(ds["last_snap"].values)
-        on = last > float(ds.attrs["cycles"]) - float(ds.attrs["quiet"])
+        on = last > float(ds.attrs["cycles"]) - float(ds.attrs["settling_cycles"])
         shares.append(_share(int(on.sum()), last.size))
         gaps.append(float(last[~on].max(initial=0.0)))
     both = _all(*(above(each, 0.0) & below(each, 1.0 - 1e-9) for each in shares))
