@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import signal
 
@@ -27,23 +26,28 @@ def pytest_configure():
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-WITHOUT_KERNELS = ("lab", "model", "config", "core", "docs", "figures")
-"""Folders whose tests compile hardly any kernel; each takes ten seconds."""
+FIRST = (
+    "conformance/test_frozen.py",
+    "lab/test_mistakes.py",
+    "conformance/test_independence.py",
+    "lab/",
+    "conformance/",
+)
+"""The files and folders to begin with.  The first and the third file compile the kernels that most tests use."""
 
 
 def pytest_collection_modifyitems(items):
-    """Take in turn a file that needs kernels and one that does not.
+    """Sort the files so that two workers hardly ever compile the same kernel, which takes ten seconds.
 
-    One of two workers (``--dist loadfile --no-loadscope-reorder``) then compiles the common kernels, and the other
-    finds them on disk.
+    With ``--dist loadfile --no-loadscope-reorder`` one worker begins with the first and the third file.  The other
+    runs tests of the laboratory, which need no kernel, and later finds the common kernels on disk.
     """
-    files = {}
-    for item in items:
-        files.setdefault(item.path, []).append(item)
-    without = [path for path in files if path.parent.name in WITHOUT_KERNELS]
-    needing = [path for path in files if path not in without]
-    pairs = itertools.zip_longest(needing, without)
-    items[:] = [item for pair in pairs for path in pair if path is not None for item in files[path]]
+
+    def place(item):
+        path = item.path.as_posix()
+        return next((k for k, part in enumerate(FIRST) if f"/tests/{part}" in path), len(FIRST))
+
+    items.sort(key=place)
 
 
 @pytest.fixture

@@ -41,7 +41,8 @@ def test_exponents_add_up_to_the_damping(name):
     assert found.sum() == pytest.approx(expected, rel=1e-8)
 
 
-@pytest.mark.parametrize("name", ["both", LONG[0]])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["both", "base"])
 def test_an_orbit_is_one_of_the_run_itself(name):
     """From the orbit a recorded run comes back to it, period after period; the multipliers' product is known."""
     system = SHAKEN[name].replace(**{"base_excitation.acceleration_amplitude": 0.02})

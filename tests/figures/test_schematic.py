@@ -53,6 +53,30 @@ def test_beam_and_tip_are_where_they_are(model) -> None:
     plt.close(figure)
 
 
+def test_what_surrounds_the_beam_is_drawn_and_named(model) -> None:
+    """A base, a load that changes, and a harvester of each kind, beside the beam that has none of them."""
+    striker = sb.Shaker(frequency_ratio=1.2, velocity_amplitude=0.2)
+    base = sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25))
+    load = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))
+    piezo = sb.PiezoelectricHarvester(
+        moment_per_volt=4e-3, capacitance=60e-9, resistance=2e4, patch_start=0.0, patch_end=0.25
+    )
+    coil = sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)
+
+    def drawn(**around) -> tuple[int, str]:
+        figure = plot_system(sb.System(model, default_values.CONTACT, striker, **around))
+        shapes = sum(len(ax.get_children()) for ax in figure.axes)
+        return shapes, words(figure)
+
+    plain, said = drawn()
+    for around in ({"base_excitation": base}, {"harvester": piezo}, {"harvester": coil}):
+        shapes, more = drawn(**around)
+        assert shapes > plain, around
+        assert len(more) > len(said), around
+    # the arrow of the load is there anyway
+    assert drawn(axial_load=load) == (plain, said.replace("$P$", "$P(t)$")) and "$P$" in said
+
+
 def test_free_beam_and_refusal(model) -> None:
     figure = plot_system(sb.System(model))
     assert len(figure.axes) == 1

@@ -228,6 +228,7 @@ def test_by_dotted_name_and_in_files(tmp_path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_swept_by_name() -> None:
     system = sb.System(
         sb.ReducedModel.from_beam(default_values.BEAM, modes=2), default_values.CONTACT,

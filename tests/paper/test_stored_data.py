@@ -98,7 +98,10 @@ def test_a_point_of_the_map_is_computed_again():
     np.testing.assert_array_equal(again.response.values, part.response.values)
 
 
-@pytest.mark.parametrize("name", [name for name in ("fig2", "fig6", "fig8", "figA9") if name in KEPT])
+@pytest.mark.parametrize(
+    "name",
+    [name for name in ("fig2", "fig6", "fig7", "fig8", "figA9", "figB10", "si5", "two_tips") if name in KEPT],
+)
 def test_draws(name):
     figure = paper.FIGURES[name]("full", data=DATA)
     assert figure.axes
