@@ -86,7 +86,7 @@ def test_runs(tmp_path) -> None:
     assert check(run.dataset) == len(SCHEMA) - len(OF_OTHERS)
     assert check(run.impacts) == 5
     run.save(tmp_path / "run.nc")
-    assert check(xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="outcome")) == len(STATISTICS)
+    assert check(xr.load_dataset(tmp_path / "run.nc", engine="h5netcdf", group="summary")) == len(STATISTICS)
     check(sb.perturbation_growth(SYSTEM, sb.Integration(cycles=1)))
 
 

@@ -17,9 +17,9 @@ def system():
 
 def test_short_words_and_tables(system):
     run = sb.simulate(system, sb.Integration(cycles=3))
-    for value in (run, run.outcome, system, system.model):
+    for value in (run, run.summary, system, system.model):
         assert len(repr(value)) < 400
-    html = run._repr_html_() + system._repr_html_() + run.outcome._repr_html_()
+    html = run._repr_html_() + system._repr_html_() + run.summary._repr_html_()
     assert "<table>" in html and "thickness = 0.0004" in html and "peak contact force" in html
 
 
@@ -29,7 +29,7 @@ def test_progress_in_words(system, capsys):
     capsys.readouterr()
     told = sb.sweep(system, axes, sb.Integration(cycles=3), progress=True)
     assert "sweep: 3 of 3 points" in capsys.readouterr().err
-    assert told.response.equals(plain.response_class)
+    assert told.response_class.equals(plain.response_class)
     sb.simulate(system, sb.Integration(cycles=3), progress=True)
     assert "run: 100 %" in capsys.readouterr().err
     assert counting(None, "a") is counting(False, "a") is sharing(None, "a") is None
@@ -51,7 +51,7 @@ def test_several_systems_at_once(system):
     assert seen == [(1, 3), (2, 3), (3, 3)]
     for one, run in zip(others, runs, strict=True):
         alone = sb.simulate(one, sb.Integration(cycles=5))
-        assert run.system == one and dict(run.summary) == pytest.approx(dict(alone.outcome), nan_ok=True)
+        assert run.system == one and dict(run.summary) == pytest.approx(dict(alone.summary), nan_ok=True)
         assert run.dataset.midspan_displacement.equals(alone.dataset.midspan_displacement)
     with pytest.raises(sb.InputTypeError, match=r"system\[1\] = 3: must be a System"):
         sb.simulate([system, 3])
