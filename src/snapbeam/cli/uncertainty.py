@@ -74,7 +74,7 @@ def read(file: Path, section: str) -> tuple[Config, ParameterUncertainty, dict[s
         If the file cannot be read, has no section [uncertainty], or has an unknown section or name.
     """
     from snapbeam.model.parameter_file import config_from_mapping
-    from snapbeam.uncertainty.distributions import spread_from_mapping
+    from snapbeam.uncertainty.distributions import uncertainty_from_mapping
     from snapbeam.util.validation import InputError
 
     try:
@@ -85,7 +85,7 @@ def read(file: Path, section: str) -> tuple[Config, ParameterUncertainty, dict[s
         raise InputError(
             f"{file.name}: has no section [uncertainty]; add one, or use snapbeam map for a system without uncertainty"
         )
-    uncertainty = spread_from_mapping(sections.pop("uncertainty"), "uncertainty")
+    uncertainty = uncertainty_from_mapping(sections.pop("uncertainty"), "uncertainty")
     question = sections.pop(section, {})
     for other in ("probability", "design"):
         sections.pop(other, None)
@@ -223,7 +223,7 @@ def _question(asked: dict[str, Any]) -> tuple[Any, Any, Any, Any]:
 def _lines(dataset: xr.Dataset, elapsed: float) -> list[str]:
     runs, count = int(dataset.attrs["runs_made"]), dataset.sizes["design"]
     lines = [f"{runs} runs of {dataset.sizes['tried']} designs in {duration(elapsed)}"]
-    words = str(dataset["holds"].attrs["flag_meanings"]).split()
+    words = str(dataset["constraints_satisfied"].attrs["flag_meanings"]).split()
     share = 100.0 * float(dataset.attrs["confidence"])
     for i in range(min(count, 12)):
         one = dataset.isel(design=i)
@@ -235,12 +235,12 @@ def _lines(dataset: xr.Dataset, elapsed: float) -> list[str]:
                 continue
             low, high, unit = float(one[f"{name}_low"]), float(one[f"{name}_high"]), one[name].attrs["units"]
             kind, _, of = name.partition("_")
-            head = f"kept: {of}" if kind == "kept" else of
+            head = f"satisfied: {of}" if kind == "satisfied" else of
             lines.append(
                 f"  {head} {float(one[name]):.4g} ({low:.4g} to {high:.4g} at {share:g} %)"
                 f"{'' if unit == '1' else ' ' + unit}"
             )
-        lines.append(f"  limits on fresh draws: {words[int(one['holds'])]}")
+        lines.append(f"  constraints on validation samples: {words[int(one['constraints_satisfied'])]}")
     return lines
 
 

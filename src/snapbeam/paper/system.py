@@ -83,9 +83,10 @@ def paper_map(
         "drive.velocity_amplitude": velocity_amplitude,
         "striker.location": location,
     }
-    first = {name.split(".")[1]: float(np.ravel(value)[0]) for name, value in given.items()}
     axes = {name: value for name, value in given.items() if np.ndim(value)}
-    system = sb.System(model, contact, sb.Shaker(**first).striker())
+    ratio, amplitude, place = (float(np.ravel(value)[0]) for value in given.values())
+    shaker = sb.Shaker(frequency_ratio=ratio, velocity_amplitude=amplitude, location=place)
+    system = sb.System(model, contact, shaker.striker())
     return sb.sweep(system, axes, sb.Integration(**options), progress=progress)
 
 

@@ -29,23 +29,23 @@ __all__ = ["plot_designs", "plot_probability", "plot_quantiles", "plot_tornado"]
 
 
 _TRIED, _BROKEN = "#4C97C8", "0.8"
-_STATES = (("fails", "X", "#B03A27"), ("undecided", "D", "#C3DD8A"), ("holds", "o", "#16245E"))
-_GOAL = "tried_goal_"
+_STATES = (("violated", "X", "#B03A27"), ("undecided", "D", "#C3DD8A"), ("satisfied", "o", "#16245E"))
+_OBJECTIVE = "tried_objective_"
 _DECADE = 10.0
 """Greatest over least value from which an axis is one of powers."""
 
 
 def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None = None) -> Axes:
-    """Draw what :func:`snapbeam.uncertainty.optimize_design` found: the first goal over the second, or over a variable.
+    """Draw the result of :func:`snapbeam.uncertainty.optimize_design`: the first objective over the second, or a variable.
 
-    Designs that kept their limits while they were sought are small dots; those reported have the intervals of fresh
-    draws, and a sign that says whether their limits hold there.
+    Small dots are designs of the search that satisfy the constraints.  The reported designs have the intervals of the
+    validation samples, and a marker for whether the constraints are satisfied there.
 
     Parameters
     ----------
     dataset : xarray.Dataset
     over : str, optional
-        A variable, such as ``"location"``; the second goal by default, or the first variable if there is one goal.
+        A variable, such as ``"location"``; the second objective by default, or the first variable if there is one objective.
     ax : matplotlib.axes.Axes, optional
 
     Raises
@@ -56,28 +56,28 @@ def plot_designs(dataset: xr.Dataset, over: str | None = None, ax: Axes | None =
     import xarray as xr
 
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
-    if "holds" not in dataset or "tried" not in dataset.dims:
+    if "constraints_satisfied" not in dataset or "tried" not in dataset.dims:
         raise InputError(f"no designs among {list(map(str, dataset.variables))}")
     names = [str(name) for name in dataset.data_vars]
-    goals = [name[len(_GOAL) :] for name in names if name.startswith(_GOAL)]
-    variables = [name[6:] for name in names if name.startswith("tried_") and not name.startswith(_GOAL)]
+    objectives = [name[len(_OBJECTIVE) :] for name in names if name.startswith(_OBJECTIVE)]
+    variables = [name[6:] for name in names if name.startswith("tried_") and not name.startswith(_OBJECTIVE)]
     if over is None:
-        across = f"goal_{goals[1]}" if len(goals) > 1 else variables[0]
+        across = f"objective_{objectives[1]}" if len(objectives) > 1 else variables[0]
     elif over in variables:
         across = over
     else:
         raise InputError(f"over = {shown(over)}: must be one of {', '.join(variables)}")
-    up = f"goal_{goals[0]}"
+    up = f"objective_{objectives[0]}"
     with house_style():
         if ax is None:
             ax = new_figure("single", 74.0).add_subplot()
         x, y = dataset[f"tried_{across}"].values, dataset[f"tried_{up}"].values
         kept = (dataset["violation"].values == 0.0) & np.isfinite(y)
-        ax.scatter(x[kept], y[kept], s=4, color=_TRIED, linewidths=0.0, label="tried, limits kept")
+        ax.scatter(x[kept], y[kept], s=4, color=_TRIED, linewidths=0.0, label="tried, constraints satisfied")
         for code, (word, marker, color) in enumerate(_STATES):
-            own = dataset["holds"].values == code
+            own = dataset["constraints_satisfied"].values == code
             if own.any():
-                _reported(dataset, ax, across, up, own, marker, color, f"limits: {word}")
+                _reported(dataset, ax, across, up, own, marker, color, f"constraints {word}")
         ax.set(xlabel=_label(dataset, across), ylabel=_label(dataset, up))
         for values, scale in ((x[kept], ax.set_xscale), (y[kept], ax.set_yscale)):
             if values.size and values.min() > 0.0 and values.max() > _DECADE * values.min():
@@ -262,7 +262,7 @@ _STYLES = (
 
 
 def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static: bool = False) -> Axes:
-    """Draw what :func:`snapbeam.uncertainty.quantile_threshold` found over one parameter.
+    """Draw the result of :func:`snapbeam.uncertainty.quantile_threshold` over one parameter.
 
     A line a probability with its interval as a band; a cross where the probability is seen to fall somewhere, so that
     the threshold is not one.
@@ -284,8 +284,8 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
     instance("dataset", dataset, xr.Dataset, "an xarray.Dataset")
     if "threshold" not in dataset or "quantile" not in dataset["threshold"].dims:
         raise InputError(f"no quantile thresholds among {list(map(str, dataset.variables))}")
-    data = dataset.squeeze([name for name in dataset["monotone"].dims if dataset.sizes[name] == 1])
-    dims = [str(name) for name in data["monotone"].dims]
+    data = dataset.squeeze([name for name in dataset["is_monotonic"].dims if dataset.sizes[name] == 1])
+    dims = [str(name) for name in data["is_monotonic"].dims]
     if len(dims) != 1 or "point" in dims:
         raise InputError(f"thresholds over {dims}: are drawn over one parameter")
     if data.sizes["quantile"] > len(_STYLES):
@@ -312,7 +312,7 @@ def plot_quantiles(dataset: xr.Dataset, ax: Axes | None = None, *, quasi_static:
             )
         if quasi_static:
             _quasi_static(data, ax, along, x)
-        falls = ~data["monotone"].values
+        falls = ~data["is_monotonic"].values
         if falls.any():
             middle = data["threshold"].sel(quantile=0.5, method="nearest").values
             ax.plot(x[falls], middle[falls], "x", color="black", markersize=4, label="not monotone")
@@ -345,7 +345,7 @@ _UP, _DOWN, _TOTAL = "#B03A27", "#16245E", "#70BBF0"
 
 
 def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
-    """Draw what :func:`snapbeam.uncertainty.sensitivity` found, a bar a parameter, with intervals.
+    """Draw the result of :func:`snapbeam.uncertainty.sensitivity`: a bar for each parameter, with intervals.
 
     Locally, bars reach from the mean answer to those with the parameter one standard score down and up; how much that
     is in the parameter's own unit stands beside its name.  Of indices, the first order and, if there is one, the total.
@@ -380,7 +380,7 @@ def plot_tornado(dataset: xr.Dataset, ax: Axes | None = None) -> Axes:
 
 
 def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
-    middle = float(data.attrs["answer_mean"])
+    middle = float(data.attrs["quantity_mean"])
     half, low, high = (data[f"effect{end}"].values for end in ("", "_low", "_high"))
     for sign, color, label in ((-1.0, _DOWN, "parameter lower"), (1.0, _UP, "parameter higher")):
         ax.barh(place, sign * half, left=middle, height=0.62, color=color, label=label)
@@ -390,8 +390,8 @@ def _bars(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
         label=f"{100.0 * float(data.attrs['confidence']):g} % interval",
     )  # fmt: skip
     ax.axvline(middle, color="black", linewidth=0.6)
-    unit = str(data.attrs["answer_units"])
-    words = str(data.attrs["answer"]).replace("omega_1", r"$\omega_1$")
+    unit = str(data.attrs["quantity_units"])
+    words = str(data.attrs["quantity"]).replace("omega_1", r"$\omega_1$")
     text = f"{words[:1].upper()}{words[1:]}{'' if unit == '1' else f' ({unit})'}"
     ax.set_xlabel(textwrap.fill(text, 40))
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2, columnspacing=0.9)
@@ -410,7 +410,7 @@ def _indices(data: xr.Dataset, ax: Axes, place: np.ndarray) -> None:
             elinewidth=0.8, capsize=2.0,
         )  # fmt: skip
     ax.axvline(0.0, color="black", linewidth=0.6)
-    ax.set_xlabel(f"Share of the variance: {data.attrs['answer']}")
+    ax.set_xlabel(f"Share of the variance: {data.attrs['quantity']}")
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.2)
 
 

@@ -1,4 +1,4 @@
-"""What a question costs before it is asked: runs, time on this machine, memory and disk."""
+"""Cost of a computation, estimated before it starts: runs, time on this machine, memory and disk."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LONG = 600.0
 _RUN_BYTES = 700
 """Memory of a run until its round is done."""
 _KEPT_BYTES = 320
-"""Disk of a run in a store."""
+"""Disk space of a run in a checkpoint."""
 _GOLDEN = 0.6180339887498949
 _BATCH = 32
 Point = Callable[[NDArray[np.float64]], Columns]
@@ -35,7 +35,7 @@ Point = Callable[[NDArray[np.float64]], Columns]
 
 @dataclass(frozen=True)
 class CostEstimate:
-    """What a question will take.
+    """Estimated cost of a computation.
 
     Attributes
     ----------
@@ -44,9 +44,9 @@ class CostEstimate:
     seconds : float
         Of this machine, with the threads asked for; kernels that must be compiled are not counted.
     memory, disk : float
-        Bytes, the second in a store.
+        Bytes, the second in a checkpoint.
     trial_runs : int
-        Runs that this was told from.
+        Runs of the trial.
     """
 
     runs: int
@@ -67,7 +67,7 @@ class CostEstimate:
         most = "" if self.max_runs == self.runs else f" (at most {self.max_runs})"
         return (
             f"about {self.runs} runs{most}, {text} on this machine, {self.memory / 2**20:.0f} MiB of memory, "
-            f"{self.disk / 2**20:.1f} MiB in a store; told from {self.trial_runs} runs"
+            f"{self.disk / 2**20:.1f} MiB in a checkpoint; estimated from {self.trial_runs} runs"
         )
 
 
@@ -75,7 +75,7 @@ class CostEstimate:
 def estimate_cost(
     question: Callable[..., Any], *arguments: Any, trial: float = 10.0, **options: Any
 ) -> CostEstimate:
-    """What a question costs, from a trial of some seconds with runs scattered over it.
+    """Estimate the cost of a computation from a trial of some seconds.
 
     Parameters
     ----------
@@ -83,18 +83,18 @@ def estimate_cost(
         :func:`snapbeam.sweep`, :func:`snapbeam.uncertainty.probability_map`, :func:`snapbeam.uncertainty.quantile_threshold` or
         :func:`snapbeam.uncertainty.optimize_design`.
     *arguments, **options
-        As it would be called with; nothing is written to its store.
+        Its arguments; nothing is written to a checkpoint.
     trial : float
         Seconds that the trial may take, after compilation.
 
     Raises
     ------
     InputError
-        For a question that has no plan, and for bad input of the question.
+        For a function without a cost estimate, and for bad input of the question.
 
     Examples
     --------
-    >>> print(sb.uncertainty.estimate_cost(sb.uncertainty.probability_map, system, axes, spread))  # doctest: +SKIP
+    >>> print(sb.uncertainty.estimate_cost(sb.uncertainty.probability_map, system, axes, uncertainty))  # doctest: +SKIP
     """
     positive("trial", trial, "s")
     if question is sweep:
@@ -112,7 +112,7 @@ def _of_sweep(
     trial: float, system: Any, axes: Any, integration: Integration | None = None, **options: Any
 ) -> CostEstimate:
     points = points_of(axes)
-    repeats = options.get("replicas") or 0
+    repeats = options.get("replicates") or 0
     each = 1 + int(getattr(repeats, "count", repeats))
     early = bool(integration is not None and integration.early_termination)
     trials = trials_of(system, None, integration, early=early)
@@ -121,10 +121,10 @@ def _of_sweep(
 
 
 def _of_probability(
-    trial: float, system: Any, axes: Any, spread: Any = None, runs: Any = None, **options: Any
+    trial: float, system: Any, axes: Any, uncertainty: Any = None, runs: Any = None, **options: Any
 ) -> CostEstimate:
     allocation = allocation_of(runs)
-    trials = trials_of(system, spread, options.get("integration"))
+    trials = trials_of(system, uncertainty, options.get("integration"))
     points = points_of(axes)
     where: list[NDArray[np.int64]] = []
 
@@ -172,41 +172,48 @@ def _expected(
 
 
 def _of_threshold(
-    trial: float, system: Any, along: str, between: Any, over: Any = None, spread: Any = None, how: Any = None,
-    **options: Any,
+    trial: float, system: Any, parameter: str, bounds: Any, axes: Any = None, uncertainty: Any = None,
+    options: Any = None, **more: Any,
 ) -> CostEstimate:  # fmt: skip
-    how = QuantileSearchSettings() if how is None else how
-    trials = trials_of(system, spread, options.get("integration"))
-    points = points_of(over) if over else None
-    low, high = between
+    options = QuantileSearchSettings() if options is None else options
+    trials = trials_of(system, uncertainty, more.get("integration"))
+    points = points_of(axes) if axes else None
+    low, high = bounds
 
     def point(ranks: NDArray[np.float64]) -> Columns:
         own = {} if points is None else points.take((ranks * points.size).astype(np.int64))
-        return own | points_of_along(along, low + (high - low) * np.modf(ranks * 7919.0)[0])
+        return own | _column(parameter, low + (high - low) * np.modf(ranks * 7919.0)[0])
 
     made, seconds, _ = _trial(trials, point, trial)
-    total = how.runs * (1 if points is None else points.size)
+    total = options.runs * (1 if points is None else points.size)
     return _cost(total, total, seconds / made, made)
 
 
-def points_of_along(along: str, values: NDArray[np.float64]) -> Columns:
+def _column(parameter: str, values: NDArray[np.float64]) -> Columns:
     """The column of a parameter."""
     import xarray as xr
 
-    found = points_of(xr.Dataset({along: ("point", values)}))
+    found = points_of(xr.Dataset({parameter: ("point", values)}))
     assert isinstance(found, PointList)
     return found.columns
 
 
 def _of_design(
-    trial: float, system: Any, variables: Any, goals: Any, limits: Any, spread: Any, effort: Any = None,
+    trial: float, system: Any, variables: Any, objectives: Any, constraints: Any, uncertainty: Any,
+    settings: Any = None,
     **options: Any,
 ) -> CostEstimate:  # fmt: skip
     from snapbeam.uncertainty.optimization import design_problem
 
-    effort = OptimizerSettings() if effort is None else effort
+    settings = OptimizerSettings() if settings is None else settings
     problem = design_problem(
-        system, variables, goals, limits, spread, samples=effort.draws, integration=options.get("integration")
+        system,
+        variables,
+        objectives,
+        constraints,
+        uncertainty,
+        samples=settings.samples,
+        integration=options.get("integration"),
     )
     bounds = np.array(list(problem.bounds.values()))
 
@@ -217,8 +224,8 @@ def _of_design(
 
     made, seconds, _ = _trial(problem.trials, point, trial)
     # of designs far from the limits only a quarter of the runs is made
-    expected = round(effort.most_runs * 0.6)
-    return _cost(expected, effort.most_runs, seconds / made, made)
+    expected = round(settings.max_runs * 0.6)
+    return _cost(expected, settings.max_runs, seconds / made, made)
 
 
 def _trial(trials: Trials, point: Point, limit: float) -> tuple[int, float, dict[str, NDArray[Any]]]:

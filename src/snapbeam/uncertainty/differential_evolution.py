@@ -1,7 +1,7 @@
-"""Differential evolution for one goal or several under limits, asked for designs and told what they are worth.
+"""Differential evolution for one objective or several under constraints, asked for designs and told what they are worth.
 
 Generalised differential evolution (GDE3; Kukkonen and Lampinen, IEEE Congress on Evolutionary Computation 2005, 443):
-DE/rand/1/bin, in which a design that keeps its limits beats one that does not, of two that do not the one that breaks
+DE/rand/1/bin, in which a design that satisfies its constraints beats one that does not, of two that do not the one that breaks
 them less, and of two that do the one that is nowhere worse; where neither is, both stay until the population is
 cut back to its size by fronts and crowding (Deb et al., IEEE Trans. Evol. Comput. 6 (2002) 182).
 """
@@ -21,7 +21,7 @@ _Array = NDArray[np.float64]
 
 
 class DifferentialEvolution:
-    """A population that is asked for designs and told their goals and violations.
+    """A population that is asked for designs and told their objectives and violations.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class DifferentialEvolution:
         self.generation = 0
         self.designs: _Array = np.empty((0, len(self.bounds)))
         """The population, the best first."""
-        self.goals: _Array = np.empty((0, 0))
+        self.objectives: _Array = np.empty((0, 0))
         self.violation: _Array = np.empty(0)
         self._asked: _Array | None = None
 
@@ -75,30 +75,30 @@ class DifferentialEvolution:
             self._asked = low + (high - low) * unit
         return self._asked.copy()
 
-    def tell(self, goals: ArrayLike, violation: ArrayLike) -> None:
+    def tell(self, objectives: ArrayLike, violation: ArrayLike) -> None:
         """What the designs last asked for are worth.
 
         Parameters
         ----------
-        goals : array_like of shape (population, goals)
+        objectives : array_like of shape (population, objectives)
             To be made small; what is not known is infinite.
         violation : array_like of shape (population,)
-            0 where all limits are kept.
+            0 where all constraints are satisfied.
         """
         if self._asked is None:
             raise InputError("tell: nothing was asked for")
-        values, broken = np.asarray(goals, dtype=np.float64), np.asarray(violation, dtype=np.float64)
+        values, broken = np.asarray(objectives, dtype=np.float64), np.asarray(violation, dtype=np.float64)
         if values.ndim != 2 or len(values) != len(self._asked) or broken.shape != (len(self._asked),):
             raise InputError(
-                f"goals of shape {values.shape}: must have a row for each of {len(self._asked)} designs"
+                f"objectives of shape {values.shape}: must have a row for each of {len(self._asked)} designs"
             )
         if np.isnan(values).any() or np.isnan(broken).any() or (broken < 0.0).any():
-            raise InputError("goals, violation: must be numbers, violations at least 0")
+            raise InputError("objectives, violation: must be numbers, violations at least 0")
         x = self._asked
         if self.generation > 0:
             x, values, broken = self._survivors(x, values, broken)
         order = _ranked(values, broken)[: self.population]
-        self.designs, self.goals, self.violation = x[order], values[order], broken[order]
+        self.designs, self.objectives, self.violation = x[order], values[order], broken[order]
         self._asked = None
         self.generation += 1
 
@@ -122,11 +122,11 @@ class DifferentialEvolution:
             made[i] = np.where(taken, mutant, unit[i])
         return made
 
-    def _survivors(self, x: _Array, goals: _Array, broken: _Array) -> tuple[_Array, _Array, _Array]:
+    def _survivors(self, x: _Array, objectives: _Array, broken: _Array) -> tuple[_Array, _Array, _Array]:
         kept: list[tuple[_Array, _Array, float]] = []
         for i in range(len(x)):
-            old = (self.designs[i], self.goals[i], float(self.violation[i]))
-            new = (x[i], goals[i], float(broken[i]))
+            old = (self.designs[i], self.objectives[i], float(self.violation[i]))
+            new = (x[i], objectives[i], float(broken[i]))
             if _beats(new[1], new[2], old[1], old[2]):
                 kept.append(new)
             elif _beats(old[1], old[2], new[1], new[2]) or (old[1] == new[1]).all():
@@ -141,41 +141,43 @@ class DifferentialEvolution:
 
 
 def dominates(one: _Array, other: _Array) -> bool:
-    """Whether goals are nowhere worse and somewhere better."""
+    """Whether objectives are nowhere worse and somewhere better."""
     return bool((one <= other).all() and (one < other).any())
 
 
-def _beats(goals: _Array, broken: float, others: _Array, others_broken: float) -> bool:
+def _beats(objectives: _Array, broken: float, others: _Array, others_broken: float) -> bool:
     if broken > 0.0 or others_broken > 0.0:
         return broken < others_broken
-    return dominates(goals, others)
+    return dominates(objectives, others)
 
 
-def front_of(goals: _Array) -> NDArray[np.bool_]:
+def front_of(objectives: _Array) -> NDArray[np.bool_]:
     """Which of some designs no other one dominates."""
-    return np.array([not any(dominates(other, own) for other in goals) for own in goals], dtype=bool)
+    return np.array(
+        [not any(dominates(other, own) for other in objectives) for own in objectives], dtype=bool
+    )
 
 
-def _ranked(goals: _Array, broken: _Array) -> NDArray[np.int64]:
-    """Order of designs: fronts of those that keep their limits, uncrowded first, then the rest by what they break."""
+def _ranked(objectives: _Array, broken: _Array) -> NDArray[np.int64]:
+    """Order of designs: fronts of those that satisfy their constraints, uncrowded first, then the rest by what they break."""
     good = np.flatnonzero(broken == 0.0)
     order: list[int] = []
     while good.size:
-        first = front_of(goals[good])
+        first = front_of(objectives[good])
         members = good[first]
-        order += members[np.argsort(-_crowding(goals[members]), kind="stable")].tolist()
+        order += members[np.argsort(-_crowding(objectives[members]), kind="stable")].tolist()
         good = good[~first]
     bad = np.flatnonzero(broken > 0.0)
     order += bad[np.argsort(broken[bad], kind="stable")].tolist()
     return np.array(order, dtype=np.int64)
 
 
-def _crowding(goals: _Array) -> _Array:
+def _crowding(objectives: _Array) -> _Array:
     """Distance of the neighbours of each member of a front, along every goal; the ends are infinitely far."""
-    found = np.zeros(len(goals))
-    if goals.shape[1] == 1:
+    found = np.zeros(len(objectives))
+    if objectives.shape[1] == 1:
         return found
-    for column in goals.T:
+    for column in objectives.T:
         order = np.argsort(column, kind="stable")
         span = column[order[-1]] - column[order[0]]
         found[order[[0, -1]]] = np.inf

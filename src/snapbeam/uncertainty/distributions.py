@@ -1,4 +1,4 @@
-"""How a parameter differs from its nominal value: tolerances as distributions."""
+"""Tolerances of parameters as probability distributions."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ __all__ = [
     "ParameterUncertainty",
     "UniformRange",
     "UniformTolerance",
-    "spread_from_mapping",
+    "uncertainty_from_mapping",
 ]
 
 
@@ -44,7 +44,7 @@ _Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Distribution:
-    """What a parameter is drawn from, given its nominal value."""
+    """Distribution of a parameter, given its nominal value."""
 
     kind: ClassVar[str] = ""
 
@@ -134,7 +134,7 @@ class LogNormal(Distribution):
 
 @dataclass(frozen=True)
 class UniformRange(Distribution):
-    """Uniformly distributed between two values, whatever the nominal value: a phase that nobody sets.
+    """Uniformly distributed between two values, whatever the nominal value: for example an uncontrolled phase.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class UniformRange(Distribution):
 
     low: float
     high: float
-    kind: ClassVar[str] = "between"
+    kind: ClassVar[str] = "range"
 
     def __post_init__(self) -> None:
         for name in ("low", "high"):
@@ -189,19 +189,19 @@ KINDS: dict[str, type[Distribution]] = {
 
 
 # ----------------------------------------------------------------------------------------------------
-# What is not known exactly of a system, as distributions of any parameters, and its numbered draws.
+# Parameter uncertainty: distributions of any parameters of a system, and numbered samples of them.
 
 
-HELD = ("physical", "ratios")
+HOLD_FIXED = ("physical", "normalised")
 _OWN = ("displacement", "phase", "hold_fixed", "seed", "correlation")
 _PHASE = UniformRange(math.pi, 2.0 * math.pi)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ParameterUncertainty:
-    """How systems that are built, driven and started alike differ from each other.
+    """Uncertainty of the parameters and the initial state of a system.
 
-    Draw number s comes from the seed and s alone (Philox with the key (seed, s)): it is the same at every point, in
+    Sample number s comes from the seed and s alone (Philox with the key (seed, s)): it is the same at every point, in
     every order, on any number of threads or workers.
 
     Parameters
@@ -216,16 +216,16 @@ class ParameterUncertainty:
         that would be pressed by the tip at rest begins on the other side of its rest instead.
     phase : bool
         Whether the drive begins at any phase of the half of its cycle in which the tip is drawn back.
-    hold_fixed : {"physical", "ratios"}
-        What a beam that differs from the nominal one is struck with.  ``"physical"``: the same frequency in Hz,
+    hold_fixed : {"physical", "normalised"}
+        Which excitation stays fixed if the beam differs from the nominal one.  ``"physical"``: the same frequency in Hz,
         velocity in m/s and location in m, so that Omega, V and x_s change with the beam's own frequency, buckling level
-        and length.  ``"ratios"``: the same Omega, V and x_s.
+        and length.  ``"normalised"``: the same Omega, V and x_s.
     seed : int
 
     Raises
     ------
     InputError
-        For unknown names, what cannot be drawn, and correlations that are none.
+        For unknown names, parameters that cannot be uncertain, and matrices that are not correlations.
 
     Notes
     -----
@@ -249,14 +249,14 @@ class ParameterUncertainty:
                 raise InputTypeError(
                     f"{name} = {shown(each)}: must be a distribution, such as sb.uncertainty.Normal(0.01, relative=True)"
                 )
-            if row.quantity.kind is not float or row.section == "run":
-                raise InputError(f"{name}: cannot be drawn; must be a real number of the system")
+            if row.quantity.kind is not float or row.section == "integration":
+                raise InputError(f"{name}: cannot be uncertain; must be a real number of the system")
             if row.name in of:
-                raise InputError(f"{name}: stands twice in the spread")
+                raise InputError(f"{name}: is given twice")
             of[row.name] = each
         nonnegative("displacement", self.displacement, "m")
         integer("seed", self.seed, 0, 2**63 - 1)
-        choice("hold_fixed", self.hold_fixed, HELD)
+        choice("hold_fixed", self.hold_fixed, HOLD_FIXED)
         if flag("phase", self.phase):
             if "drive.phase" in of:
                 raise InputError("phase = True with drive.phase: give one of the two")
@@ -279,16 +279,16 @@ class ParameterUncertainty:
     @classmethod
     @checked
     def from_calibration(cls, calibration: Any, **more: Any) -> ParameterUncertainty:
-        """The spread that a calibration leaves: its standard errors and their correlation, damping and contact too.
+        """Return the uncertainty of a calibration: standard errors and their correlation, with damping and contact.
 
         Raises
         ------
         InputError
-            If the data left a fitted parameter undetermined: its spread is not known.
+            If the data leave a fitted parameter undetermined.
         """
         if calibration.undetermined:
             raise InputError(
-                f"calibration: {', '.join(calibration.undetermined)} not determined by the data, so no spread is known"
+                f"calibration: {', '.join(calibration.undetermined)} not determined by the data, so its uncertainty is unknown; leave it out of the fit"
             )
         of: dict[str, Distribution] = {
             f"beam.{name}": Normal(error) for name, error in calibration.standard_errors.items()
@@ -304,17 +304,17 @@ class ParameterUncertainty:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """What is drawn, by dotted name."""
+        """The uncertain parameters, by dotted name."""
         return tuple(self.of)
 
     @property
     def structural(self) -> tuple[str, ...]:
-        """What is drawn and makes another structure."""
+        """The uncertain parameters that change the structure."""
         return tuple(name for name in self.of if not lookup(name).is_run)
 
     @property
     def is_empty(self) -> bool:
-        """Whether all draws are alike."""
+        """Whether all samples are equal."""
         return not self.of and self.displacement == 0.0
 
     @property
@@ -341,7 +341,7 @@ class ParameterUncertainty:
         return np.asarray(scores[back])
 
     def describe(self) -> dict[str, Any]:
-        """What tells this spread from another one, plain."""
+        """Return everything that identifies this uncertainty, as plain values."""
         found: dict[str, Any] = {name: each.describe() for name, each in self.of.items()}
         own = {"displacement": self.displacement, "hold_fixed": self.hold_fixed, "seed": self.seed}
         if self.correlation is not None:
@@ -349,11 +349,11 @@ class ParameterUncertainty:
         return found | own
 
 
-def spread_from_mapping(given: Mapping[str, Any], name: str = "spread") -> ParameterUncertainty:
-    """The spread that a section of a parameter file describes.
+def uncertainty_from_mapping(given: Mapping[str, Any], name: str = "uncertainty") -> ParameterUncertainty:
+    """Read the uncertainty from a section of a parameter file.
 
     Each parameter stands with a table that names one distribution: ``{normal = 0.02, relative = true}``,
-    ``{uniform = 1e-5}``, ``{lognormal = 0.3}`` or ``{between = [3.14, 6.28]}``; beside them stand ``displacement``,
+    ``{uniform = 1e-5}``, ``{lognormal = 0.3}`` or ``{range = [3.14, 6.28]}``; further keys are ``displacement``,
     ``phase``, ``hold_fixed`` and ``seed``.
 
     Raises
@@ -392,9 +392,9 @@ def _distribution(name: str, table: Mapping[str, Any]) -> Distribution:
         )
     value = table[kinds[0]]
     more = {key: table[key] for key in table if key == "relative"}
-    if kinds[0] == "between":
+    if kinds[0] == "range":
         if more or not isinstance(value, (list, tuple)) or len(value) != 2:
-            raise InputError(f"{name}.between = {shown(value)}: must be two numbers [low, high] alone")
+            raise InputError(f"{name}.range = {shown(value)}: must be two numbers [low, high] alone")
         return UniformRange(*value)
     if kinds[0] == "lognormal" and more:
         raise InputError(f"{name}: a lognormal is relative by itself; leave relative out")

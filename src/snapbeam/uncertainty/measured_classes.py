@@ -34,7 +34,7 @@ _COORDINATES = ("frequency_ratio", "velocity_amplitude", "location")
 def class_counts(dataset: xr.Dataset) -> NDArray[np.int64]:
     """Runs of each response class at every point of a probability map, of shape (points..., 4)."""
     if "hits" not in dataset or "outcome" not in dataset["hits"].dims:
-        raise InputError("dataset: is no probability map")
+        raise InputError("dataset: is not a probability map")
     hits = dataset["hits"].transpose(..., "outcome")
     of = {str(name): hits.sel(outcome=name).values for name in hits["outcome"].values}
     intrawell = dataset["runs"].transpose(*hits.dims[:-1]).values - of["snap"]
@@ -53,9 +53,9 @@ def score_measurements(
     ----------
     dataset : xarray.Dataset
         Of :func:`snapbeam.uncertainty.probability_map` over frequency ratio, velocity amplitude and location, or some of them, as
-        a grid; a dot belongs to the nearest point, and must lie within half a spacing of the grid.
+        a grid; a measured point belongs to the nearest point of the grid, and must lie within half a spacing of the grid.
     measurements : MeasuredPoints
-        As :func:`snapbeam.sweeps.measured_points.read_measured_points` reads them; dots of unknown class are left out.
+        As :func:`snapbeam.sweeps.measured_points.read_measured_points` reads them; points of unknown class are left out.
     samples : int
         Sets of responses drawn from the map, with which the measured ones are compared.
     seed : int
@@ -63,27 +63,27 @@ def score_measurements(
     Returns
     -------
     xarray.Dataset
-        Along ``dot``: ``response``, ``probability`` of that class with its 95 % limits, ``most_likely`` class and its
-        probability ``best``.  In the attributes: ``log_likelihood`` of all dots; ``log_likelihood_low``,
-        ``log_likelihood_mean`` and ``log_likelihood_high`` (the 95 % range) of dots drawn from the map itself;
-        ``p_value``, the share of those that are no likelier than the measured ones; ``agree``, dots of the most likely
-        class, with ``agree_expected``, as many as a right map lets expect.
+        Along ``measurement``: ``response_class``, ``probability`` of that class with its 95 % limits, ``most_likely`` class and its
+        probability ``best``.  In the attributes: ``log_likelihood`` of all measurements; ``log_likelihood_low``,
+        ``log_likelihood_mean`` and ``log_likelihood_high`` (the 95 % range) of responses sampled from the map itself;
+        ``p_value``, the share of those that are no likelier than the measured ones; ``agree``, measurements of the most
+        likely class, with ``agree_expected``, as many as a right map lets expect.
 
     Raises
     ------
     InputError
-        If the dataset is no such map, no dot has a class, or a dot lies outside.
+        If the dataset is not such a map, or a measurement is outside it or none has a class.
     """
     import xarray as xr
 
     if not hasattr(measurements, "response_class") or not hasattr(measurements, "frequency_ratio"):
-        raise InputTypeError("dots: must be MeasuredPoints, as read_measured_points reads them")
+        raise InputTypeError("measurements: must be MeasuredPoints, as read_measured_points reads them")
     integer("samples", samples, 100, 10**7)
     integer("seed", seed, 0, 2**63 - 1)
     counts = class_counts(dataset)
     known = np.isin(measurements.response_class, _KINDS)
     if not known.any():
-        raise InputError("dots: none has a known class")
+        raise InputError("measurements: none has a known class")
     at = _nearest(dataset, measurements, known)
     mine = counts[at]
     total = mine.sum(axis=-1)
@@ -103,16 +103,16 @@ def score_measurements(
     flags = code_flags(ResponseClass)
     return xr.Dataset(
         {
-            "response_class": ("dot", measurements.response_class[known], labels | {"long_name": "measured response class"} | flags),
-            "probability": ("dot", share[rows, kind], labels | {"long_name": "probability of that class"}),
-            "probability_low": ("dot", low, labels | {"long_name": "its lower limit"}),
-            "probability_high": ("dot", high, labels | {"long_name": "its upper limit"}),
+            "response_class": ("measurement", measurements.response_class[known], labels | {"long_name": "measured response class"} | flags),
+            "probability": ("measurement", share[rows, kind], labels | {"long_name": "probability of that class"}),
+            "probability_low": ("measurement", low, labels | {"long_name": "its lower limit"}),
+            "probability_high": ("measurement", high, labels | {"long_name": "its upper limit"}),
             "most_likely": (
-                "dot", np.array(_KINDS, dtype=np.int8)[best], labels | {"long_name": "most likely class"} | flags
+                "measurement", np.array(_KINDS, dtype=np.int8)[best], labels | {"long_name": "most likely class"} | flags
             ),
-            "best": ("dot", share[rows, best], labels | {"long_name": "its probability"}),
+            "best": ("measurement", share[rows, best], labels | {"long_name": "its probability"}),
         },
-        {name: ("dot", getattr(measurements, name)[known]) for name in _COORDINATES},
+        {name: ("measurement", getattr(measurements, name)[known]) for name in _COORDINATES},
         {
             "title": "measured responses under a probability map",
             "log_likelihood": measured,
@@ -128,23 +128,25 @@ def score_measurements(
 
 
 def _nearest(
-    dataset: xr.Dataset, dots: MeasuredPoints, known: NDArray[np.bool_]
+    dataset: xr.Dataset, measurements: MeasuredPoints, known: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], ...]:
-    """The point of the grid that each dot belongs to."""
+    """Return the point of the grid that each measurement belongs to."""
     dims = [str(name) for name in dataset["runs"].dims]
     found = []
     for name in dims:
         if name not in _COORDINATES:
-            raise InputError(f"dataset over {name}: dots say nothing of it; choose one of its points")
-        axis, values = dataset[name].values, getattr(dots, name)[known]
+            raise InputError(
+                f"dataset over {name}: the measurements do not contain it; choose one of its points"
+            )
+        axis, values = dataset[name].values, getattr(measurements, name)[known]
         if np.isnan(values).any():
-            raise InputError(f"dots: {name} is not given for all of them, but is an axis of the map")
+            raise InputError(f"measurements: {name} is not given for all of them, but is an axis of the map")
         index = np.abs(values[:, None] - axis[None, :]).argmin(axis=1)
         spacing = np.gradient(axis) if axis.size > 1 else np.array([np.inf])
         away = np.abs(values - axis[index]) > 0.5001 * np.abs(spacing[index])
         if away.any():
             raise InputError(
-                f"dots: {name} = {values[away][0]:g} lies outside the map, {axis[0]:g} to {axis[-1]:g}"
+                f"measurements: {name} = {values[away][0]:g} lies outside the map, {axis[0]:g} to {axis[-1]:g}"
             )
         found.append(index)
     return tuple(found)

@@ -1,4 +1,4 @@
-"""Runs of drawn systems: points and numbers of draws in, statistics out; kept, resumed and spread like a sweep."""
+"""Monte Carlo runs: statistics of numbered samples of a system, with checkpoints and workers as in a sweep."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class _DrawnSetup(SweepSetup):
 
     def neighbour(self, changes: dict[str, Any]) -> tuple[System, Integration]:
         """As of any sweep."""
-        if any(name.startswith("run.") for name in changes):
+        if any(name.startswith("integration.") for name in changes):
             return super().neighbour(changes)
         return _made(self.made, self.system, changes), self.integration
 
@@ -85,7 +85,7 @@ class Trials:
     system: System
     """With its tip held in space if starts differ."""
     integration: Integration
-    spread: ParameterUncertainty
+    uncertainty: ParameterUncertainty
     keeping: CheckpointOptions = field(default_factory=CheckpointOptions)
     cluster: str | None = None
     runs: int = 0
@@ -108,16 +108,16 @@ class Trials:
         scores : array of shape (runs, parameters), optional
             Standard normal scores of the parameters, in place of those of the draws; the start is that of the draw.
         """
-        spread, found = self.spread, dict(points)
+        uncertainty, found = self.uncertainty, dict(points)
         if scores is None:
-            scores = spread.normals(numbers)
-        for j, (name, each) in enumerate(spread.of.items()):
+            scores = uncertainty.normals(numbers)
+        for j, (name, each) in enumerate(uncertainty.of.items()):
             nominal = points[name] if name in points else np.full(numbers.size, self._nominal(name))
             found[name] = each.at(nominal, scores[:, j])
             _require_allowed(name, found[name])
-        if spread.hold_fixed == "physical" and spread.structural:
+        if uncertainty.hold_fixed == "physical" and uncertainty.structural:
             self._hold(points, found, numbers.size)
-        if spread.displacement > 0.0:
+        if uncertainty.displacement > 0.0:
             found |= self._ringing(found, numbers)
         return found
 
@@ -181,7 +181,7 @@ class Trials:
 
     def _is_held(self, ratio: str) -> bool:
         if ratio == "striker.location":
-            return "beam.length" in self.spread.of and self.system.striker is not None
+            return "beam.length" in self.uncertainty.of and self.system.striker is not None
         return ratio in self.system.parameters
 
     def in_hz(self, points: Columns) -> Columns:
@@ -211,7 +211,7 @@ class Trials:
 
     def _structures(self, columns: Columns, size: int) -> Iterator[tuple[System, list[int]]]:
         """The structures among runs, and which runs have each."""
-        names = [name for name in columns if not lookup(name).is_run and not name.startswith("run.")]
+        names = [name for name in columns if not lookup(name).is_run and not name.startswith("integration.")]
         if not names:
             yield self.system, list(range(size))
             return
@@ -223,17 +223,19 @@ class Trials:
 
     def _ringing(self, columns: Columns, numbers: _Numbers) -> Columns:
         """The start of every draw, as columns; one that would press the tip is turned about, so that it leaves it."""
-        given = [name for name in columns if name.startswith("start.")]
+        given = [name for name in columns if name.startswith("initial_state.")]
         if given:
             raise InputError(
-                f"{given[0]}: starts of a spread with a displacement are drawn; leave one of the two out"
+                f"{given[0]}: is sampled by the displacement of the uncertainty; leave one of the two out"
             )
         striker, size = self.system.striker, numbers.size
         assert striker is not None
         modes = self.system.model.modes
         location = columns.get("striker.location", np.full(size, striker.location))
         table = np.empty((size, 2, modes))
-        starts = InitialConditions(count=1, displacement=self.spread.displacement, seed=self.spread.seed)
+        starts = InitialConditions(
+            count=1, displacement=self.uncertainty.displacement, seed=self.uncertainty.seed
+        )
         for system, which in self._structures(columns, size):
             scale = amplitude_scale(system.model)
             speed = scale * 2.0 * np.pi * system.model.reference_frequency
@@ -244,7 +246,7 @@ class Trials:
                 state = starts.state(system, number, location=location[alike])
                 table[alike] = np.stack((state.amplitude / scale, state.velocity / speed), axis=1)
         return {
-            f"start.{what}[{mode + 1}]": table[:, k, mode]
+            f"initial_state.{what}[{mode + 1}]": table[:, k, mode]
             for k, what in enumerate(("amplitude", "velocity"))
             for mode in range(modes)
         }
@@ -259,11 +261,13 @@ def _folder(path: Path) -> Path:
         If it cannot be one, or holds a sweep.
     """
     if path.exists() and not path.is_dir():
-        raise InputError(f"store = {str(path)!r}: is a file; must be a folder")
+        raise InputError(f"checkpoint = {str(path)!r}: is a file; must be a folder")
     if not path.absolute().parent.is_dir():
-        raise InputError(f"store = {str(path)!r}: {str(path.absolute().parent)!r} is not an existing folder")
+        raise InputError(
+            f"checkpoint = {str(path)!r}: {str(path.absolute().parent)!r} is not an existing folder"
+        )
     if (path / "map.json").exists():
-        raise InputError(f"store = {str(path)!r}: holds a sweep; give another folder")
+        raise InputError(f"checkpoint = {str(path)!r}: holds a sweep; give another folder")
     path.mkdir(exist_ok=True)
     return path
 
@@ -275,16 +279,16 @@ def _require_allowed(name: str, values: NDArray[np.float64]) -> None:
             lookup(name).quantity.check(name, float(value))
         except InputError as error:
             raise InputError(
-                f"{error}; a draw of the spread is out of range: make it narrower, or draw from a LogNormal or Between"
+                f"{error}; a sample is out of range; make the uncertainty smaller, or use a LogNormal or a UniformRange"
             ) from None
 
 
 def trials_of(
     system: System,
-    spread: ParameterUncertainty | None,
+    uncertainty: ParameterUncertainty | None,
     integration: Integration | None,
     *,
-    store: str | os.PathLike[str] | CheckpointOptions | None = None,
+    checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
     cluster: str | None = None,
     early: bool = True,
 ) -> Trials:
@@ -297,27 +301,27 @@ def trials_of(
     if not isinstance(system, System):
         raise InputTypeError(f"system = {shown(system)}: must be a System")
     if system.striker is None:
-        raise InputError("striker = None: what nothing strikes has no outcome to ask for")
-    spread = ParameterUncertainty() if spread is None else spread
-    if not isinstance(spread, ParameterUncertainty):
-        raise InputTypeError(f"spread = {shown(spread)}: must be a ParameterUncertainty")
+        raise InputError("striker = None: must be a Striker; the outcomes are those of a struck beam")
+    uncertainty = ParameterUncertainty() if uncertainty is None else uncertainty
+    if not isinstance(uncertainty, ParameterUncertainty):
+        raise InputTypeError(f"uncertainty = {shown(uncertainty)}: must be a ParameterUncertainty")
     integration = Integration() if integration is None else integration
     if not isinstance(integration, Integration):
         raise InputTypeError(f"integration = {shown(integration)}: must be an Integration")
     if (
-        spread.hold_fixed == "physical"
-        and spread.structural
+        uncertainty.hold_fixed == "physical"
+        and uncertainty.structural
         and system.striker.drive.name not in ("sine", "fixed")
     ):
         raise InputError(
-            f"held = 'physical' with a drive of kind {system.striker.drive.name!r}: only a sine's frequency and "
-            "velocity are held in Hz and m/s; give held = 'ratios'"
+            f"hold_fixed = 'physical' with a drive of type {system.striker.drive.name!r}: must be a sine to stay fixed in Hz "
+            "and m/s; give hold_fixed = 'normalised'"
         )
-    keeping = store if isinstance(store, CheckpointOptions) else CheckpointOptions(store)
-    if spread.moves_start and "striker.gap" not in spread.of:
+    keeping = checkpoint if isinstance(checkpoint, CheckpointOptions) else CheckpointOptions(checkpoint)
+    if uncertainty.moves_start and "striker.gap" not in uncertainty.of:
         if system.parameters.get("striker.gap") is None:
             system = held_in_space(system)
-    return Trials(system, integration.replace(early_termination=early), spread, keeping, cluster)
+    return Trials(system, integration.replace(early_termination=early), uncertainty, keeping, cluster)
 
 
 Ask = Callable[[_Numbers, _Numbers], dict[str, NDArray[Any]]]
@@ -336,7 +340,7 @@ _FIRST = (ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_1)
 class Event(NamedTuple):
     """Something that a run does or does not."""
 
-    words: str
+    long_name: str
     happened: Callable[[Statistics], NDArray[np.bool_]]
 
 

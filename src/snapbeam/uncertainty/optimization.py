@@ -1,4 +1,4 @@
-"""The best design under limits that hold with a stated probability, sought on common draws and judged on fresh ones."""
+"""Optimal designs under chance constraints, searched with common samples and checked with validation samples."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ __all__ = [
     "OWN",
     "Constraint",
     "DesignProblem",
+    "DesignQuantity",
     "Estimate",
     "Objective",
     "OptimizerSettings",
-    "QuantityOfInterest",
     "Worth",
     "design_problem",
     "optimize_design",
@@ -68,12 +68,12 @@ __all__ = [
 Values = dict[str, NDArray[Any]]
 
 
-class QuantityOfInterest(NamedTuple):
+class DesignQuantity(NamedTuple):
     """Something with a number for every run, or for every design."""
 
     name: str
     unit: str
-    words: str
+    long_name: str
     kind: str
     """``"outcome"`` and ``"run"``: of a run; ``"design"``: of the nominal design alone."""
     of: Callable[[System, Values], NDArray[Any]]
@@ -112,21 +112,19 @@ CYCLE = "cycle"
 """Seconds of a cycle, beside the statistics of a run."""
 
 
-OWN: dict[str, QuantityOfInterest] = {
+OWN: dict[str, DesignQuantity] = {
     row.name: row
     for row in (
-        QuantityOfInterest("speed", "m/s", "velocity amplitude of the tip", "design", _speed),
-        QuantityOfInterest("stroke", "m", "displacement amplitude of the tip", "design", _stroke),
-        QuantityOfInterest(
-            "acceleration", "m/s^2", "acceleration amplitude of the tip", "design", _acceleration
-        ),
-        QuantityOfInterest("cycles_to_settle", "1", "cycles to the last snap", "run", _settled),
+        DesignQuantity("speed", "m/s", "velocity amplitude of the tip", "design", _speed),
+        DesignQuantity("stroke", "m", "displacement amplitude of the tip", "design", _stroke),
+        DesignQuantity("acceleration", "m/s^2", "acceleration amplitude of the tip", "design", _acceleration),
+        DesignQuantity("cycles_to_settle", "1", "cycles to the last snap", "run", _settled),
     )
 }
 """Quantities beside statistics, outcomes and parameters; the first three are of a sine."""
 
 
-def quantity_of(name: str) -> QuantityOfInterest:
+def quantity_of(name: str) -> DesignQuantity:
     """A quantity by name: an outcome, a statistic, one of :data:`OWN`, or a parameter of the design.
 
     Raises
@@ -138,21 +136,23 @@ def quantity_of(name: str) -> QuantityOfInterest:
         return OWN[name]
     if name in OUTCOMES:
         event = OUTCOMES[name]
-        return QuantityOfInterest(name, "1", event.words, "outcome", lambda _, found: event.happened(found))
+        return DesignQuantity(name, "1", event.long_name, "outcome", lambda _, found: event.happened(found))
     if name in STATISTICS:
         row = STATISTICS[name]
         if row.dtype not in ("float64", "int32"):
-            raise InputError(f"{name}: is no number that could be small or large")
-        return QuantityOfInterest(
+            raise InputError(f"{name}: is not a number that can be minimised")
+        return DesignQuantity(
             name, row.unit, row.long_name, "run", lambda _, found: found[name].astype(np.float64)
         )
     try:
         parameter = lookup(name)
     except InputError:
         known = ", ".join((*OWN, *OUTCOMES))
-        raise InputError(f"{name}: no quantity; must be one of {known}, a statistic or a parameter") from None
+        raise InputError(
+            f"{name}: is not a quantity; must be one of {known}, a statistic or a parameter"
+        ) from None
     full = parameter.name
-    return QuantityOfInterest(
+    return DesignQuantity(
         full, parameter.quantity.unit, parameter.quantity.long_name, "design", lambda s, v: _own(full, v, s)
     )
 
@@ -187,7 +187,7 @@ class Objective:
                 )
 
     @property
-    def _quantity(self) -> QuantityOfInterest:
+    def _quantity(self) -> DesignQuantity:
         """What it is of."""
         return quantity_of(self.quantity)
 
@@ -198,15 +198,15 @@ class Objective:
         return name if self.quantile is None else f"{name}_q{100.0 * self.quantile:g}".replace(".", "_")
 
     @property
-    def words(self) -> str:
+    def long_name(self) -> str:
         """What is made small or large."""
         quantity = self._quantity
         if quantity.kind == "outcome":
-            return f"probability that {quantity.words}"
+            return f"probability that {quantity.long_name}"
         if self.quantile is not None:
             share = "median" if self.quantile == 0.5 else f"{self.quantile:g} quantile"
-            return f"{share} of the {quantity.words}"
-        return quantity.words if quantity.kind == "design" else f"mean {quantity.words}"
+            return f"{share} of the {quantity.long_name}"
+        return quantity.long_name if quantity.kind == "design" else f"mean {quantity.long_name}"
 
     def estimate(self, values: NDArray[Any], failed: int, confidence: float) -> tuple[float, float, float]:
         """Value and interval from runs that came to an end.
@@ -246,7 +246,7 @@ class Constraint:
     Parameters
     ----------
     quantity : str
-        As of a :class:`Objective`.
+        As in :class:`Objective`.
     lower, upper : float, optional
         One of them at least.  Of an outcome *lower* is its probability, such as 0.95 of ``"other_well"``.
     probability : float
@@ -261,20 +261,22 @@ class Constraint:
     def __post_init__(self) -> None:
         kind = quantity_of(self.quantity).kind
         if self.lower is None and self.upper is None:
-            raise InputError(f"limit of {self.quantity}: must have at_least or at_most")
+            raise InputError(f"constraint of {self.quantity}: must have lower or upper")
         for name in ("lower", "upper"):
             if getattr(self, name) is not None:
                 finite(name, getattr(self, name))
         within("probability", self.probability, 0.0, 1.0)
         if kind == "outcome":
             if self.upper is not None or self.lower is None:
-                raise InputError(f"limit of {self.quantity}: give the probability it must have at_least")
+                raise InputError(f"constraint of {self.quantity}: give its minimum probability as lower")
             within("lower", self.lower, 0.0, 1.0)
         elif self.lower is not None and self.upper is not None and self.lower > self.upper:
-            raise InputError(f"limit of {self.quantity}: lower = {self.lower:g} is more than at_most")
+            raise InputError(
+                f"constraint of {self.quantity}: lower = {self.lower:g} must not be more than upper = {self.upper:g}"
+            )
 
     @property
-    def _quantity(self) -> QuantityOfInterest:
+    def _quantity(self) -> DesignQuantity:
         """What it is of."""
         return quantity_of(self.quantity)
 
@@ -304,27 +306,27 @@ class Constraint:
         return np.asarray(np.maximum(np.maximum(low - values, values - high), 0.0) / size)
 
 
-def require_kinds(goals: Any, limits: Any) -> tuple[tuple[Objective, ...], tuple[Constraint, ...]]:
+def require_kinds(objectives: Any, constraints: Any) -> tuple[tuple[Objective, ...], tuple[Constraint, ...]]:
     """Goals and limits as tuples.
 
     Raises
     ------
     InputError
     """
-    listed = (goals,) if isinstance(goals, (str, Objective)) else tuple(goals)
+    listed = (objectives,) if isinstance(objectives, (str, Objective)) else tuple(objectives)
     made = tuple(Objective(quantity=each) if isinstance(each, str) else each for each in listed)
-    kept = (limits,) if isinstance(limits, Constraint) else tuple(limits)
+    kept = (constraints,) if isinstance(constraints, Constraint) else tuple(constraints)
     for each in made:
         if not isinstance(each, Objective):
-            raise InputError(f"goals: {shown(each)} must be an Objective, or the name of a quantity")
+            raise InputError(f"objectives: {shown(each)} must be an Objective, or the name of a quantity")
     for each in kept:
         if not isinstance(each, Constraint):
-            raise InputError(f"limits: {shown(each)} must be a Constraint")
+            raise InputError(f"constraints: {shown(each)} must be a Constraint")
     if not 1 <= len(made) <= 3:
-        raise InputError(f"goals: {len(made)} of them; must be one to three")
+        raise InputError(f"objectives: {len(made)} of them; must be one to three")
     labels = [each.label for each in made]
     if len(set(labels)) < len(labels):
-        raise InputError(f"goals {labels}: must differ from each other")
+        raise InputError(f"objectives {labels}: must differ from each other")
     return made, kept
 
 
@@ -339,7 +341,7 @@ _SURE = 0.99
 class Worth(NamedTuple):
     """What some designs are worth, by the runs that were made of them."""
 
-    goals: _Array
+    objectives: _Array
     """Of shape (designs, goals), to be made small: a goal that is to be large is negated; infinite where not known."""
     violation: _Array
     """Of shape (designs,): 0 where every limit is kept by the share of the runs that it asks for, and a margin."""
@@ -349,9 +351,9 @@ class Worth(NamedTuple):
 class Estimate(NamedTuple):
     """What one design is worth on fresh draws, with intervals."""
 
-    goals: _Array
+    objectives: _Array
     """Value, lower and upper limit, of shape (goals, 3), in their own signs."""
-    limits: _Array
+    constraints: _Array
     """Share of the runs that keep each limit with its interval, of shape (limits, 3)."""
     runs: int
     failed: int
@@ -367,9 +369,9 @@ class DesignProblem:
     trials: Trials
     bounds: dict[str, tuple[float, float]]
     """By dotted name."""
-    goals: tuple[Objective, ...]
-    limits: tuple[Constraint, ...]
-    draws: int = 64
+    objectives: tuple[Objective, ...]
+    constraints: tuple[Constraint, ...]
+    samples: int = 64
     """Runs of a design while it is sought, the same draws for every one."""
     margin: float = 0.5
     """Share of the misses that a limit allows which is not used up while designs are sought."""
@@ -396,31 +398,31 @@ class DesignProblem:
         table = np.array(list(self.bounds.values()))
         if (x < table[:, 0] - 1e-12).any() or (x > table[:, 1] + 1e-12).any():
             raise InputError("designs: must lie within their bounds")
-        goals = np.full((len(x), len(self.goals)), np.inf)
+        objectives = np.full((len(x), len(self.objectives)), np.inf)
         violation = self._own_excess(x)
         runs = np.zeros(len(x), dtype=np.int64)
         alive = np.flatnonzero(violation == 0.0)
         if not self._needs_runs:
-            goals[alive] = self._own_goals(x[alive])
-            return Worth(goals, violation, runs)
-        first = max(4, self.draws // 4)
+            objectives[alive] = self._own_goals(x[alive])
+            return Worth(objectives, violation, runs)
+        first = max(4, self.samples // 4)
         parts: dict[int, list[dict[str, NDArray[Any]]]] = {int(i): [] for i in alive}
-        for begin, end in ((0, first), (first, self.draws)):
+        for begin, end in ((0, first), (first, self.samples)):
             if not alive.size or end <= begin:
                 break
             for i, found in zip(alive.tolist(), self.runs_of(x[alive], np.arange(begin, end)), strict=True):
                 parts[i].append(found)
                 runs[i] = end
             joined = {i: _joined(parts[i]) for i in alive.tolist()}
-            last = end == self.draws
+            last = end == self.samples
             for i in alive.tolist():
                 if last or self._missing(joined[i], hopeful=True) > 0.0:
                     violation[i] = self._missing(joined[i])
             if last:
                 for i in alive[violation[alive] == 0.0].tolist():
-                    goals[i] = self._goals_of(x[i : i + 1], joined[i])
+                    objectives[i] = self._goals_of(x[i : i + 1], joined[i])
             alive = alive[violation[alive] == 0.0]
-        return Worth(goals, violation, runs)
+        return Worth(objectives, violation, runs)
 
     def estimate(self, design: ArrayLike, numbers: NDArray[np.int64], confidence: float = 0.95) -> Estimate:
         """What one design is worth on the draws of the given numbers, with intervals."""
@@ -428,15 +430,15 @@ class DesignProblem:
         found = self.runs_of(x, numbers)[0]
         good = reached(found)
         failed = int((~good).sum())
-        goals = np.empty((len(self.goals), 3))
-        for row, goal in zip(goals, self.goals, strict=True):
+        objectives = np.empty((len(self.objectives), 3))
+        for row, goal in zip(objectives, self.objectives, strict=True):
             if goal._quantity.kind == "design":
                 row[:] = self._own(goal, x)[0]
             else:
                 values = goal._quantity.of(self.trials.system, found)[good]
                 row[:] = goal.estimate(values, failed, confidence)
-        limits = np.ones((len(self.limits), 3))
-        for row, limit in zip(limits, self.limits, strict=True):
+        constraints = np.ones((len(self.constraints), 3))
+        for row, limit in zip(constraints, self.constraints, strict=True):
             if limit._quantity.kind == "design":
                 row[:] = float(limit.excess(self._own(limit, x))[0] == 0.0)
                 continue
@@ -444,7 +446,7 @@ class DesignProblem:
             row[0] = kept.sum() / max(int(good.sum()), 1)
             row[1] = float(wilson(int(kept.sum()), good.size, confidence)[1])
             row[2] = float(wilson(int(kept.sum()) + failed, good.size, confidence)[2])
-        return Estimate(goals, limits, int(good.size), failed)
+        return Estimate(objectives, constraints, int(good.size), failed)
 
     def runs_of(self, x: _Array, numbers: NDArray[np.int64]) -> list[dict[str, NDArray[Any]]]:
         """Statistics and columns of the runs of designs, each on the same draws."""
@@ -459,8 +461,8 @@ class DesignProblem:
         }
         whole = fixed | columns | found
         if "cycles_to_settle" in {
-            *(goal.quantity for goal in self.goals),
-            *(limit.quantity for limit in self.limits),
+            *(goal.quantity for goal in self.objectives),
+            *(limit.quantity for limit in self.constraints),
         }:
             whole[CYCLE] = self.trials.cycles(columns)
         return [{name: values[each == i] for name, values in whole.items()} for i in range(len(x))]
@@ -468,8 +470,8 @@ class DesignProblem:
     @property
     def _needs_runs(self) -> bool:
         kinds = {
-            *(goal._quantity.kind for goal in self.goals),
-            *(limit._quantity.kind for limit in self.limits),
+            *(goal._quantity.kind for goal in self.objectives),
+            *(limit._quantity.kind for limit in self.constraints),
         }
         return kinds != {"design"}
 
@@ -486,15 +488,15 @@ class DesignProblem:
         return values
 
     def _own_excess(self, x: _Array) -> _Array:
-        own = [limit for limit in self.limits if limit._quantity.kind == "design"]
+        own = [limit for limit in self.constraints if limit._quantity.kind == "design"]
         found = np.zeros(len(x))
         for limit in own:
             found += limit.excess(self._own(limit, x))
         # beyond what any share of runs can break: such a design is never run
-        return np.where(found > 0.0, found + len(self.limits), 0.0)
+        return np.where(found > 0.0, found + len(self.constraints), 0.0)
 
     def _own_goals(self, x: _Array) -> _Array:
-        return np.stack([self._sign(goal) * self._own(goal, x) for goal in self.goals], axis=1)
+        return np.stack([self._sign(goal) * self._own(goal, x) for goal in self.objectives], axis=1)
 
     @staticmethod
     def _sign(goal: Objective) -> float:
@@ -503,13 +505,15 @@ class DesignProblem:
     def _goals_of(self, x: _Array, found: dict[str, NDArray[Any]]) -> _Array:
         good = reached(found)
         values = []
-        for goal in self.goals:
+        for goal in self.objectives:
             if goal._quantity.kind == "design":
                 values.append(float(self._own(goal, x)[0]))
             else:
                 runs = goal._quantity.of(self.trials.system, found)[good]
                 values.append(goal.estimate(runs, 0, 0.95)[0] if runs.size else np.inf)
-        signed = np.array([self._sign(goal) * value for goal, value in zip(self.goals, values, strict=True)])
+        signed = np.array(
+            [self._sign(goal) * value for goal, value in zip(self.objectives, values, strict=True)]
+        )
         return np.where(np.isfinite(signed), signed, np.inf)
 
     def _missing(self, found: dict[str, NDArray[Any]], *, hopeful: bool = False) -> float:
@@ -519,7 +523,7 @@ class DesignProblem:
         """
         good = reached(found)
         total = 0.0
-        for limit in self.limits:
+        for limit in self.constraints:
             if limit._quantity.kind == "design":
                 continue
             kept = limit.kept(limit._quantity.of(self.trials.system, found)) & good
@@ -536,7 +540,7 @@ def _joined(parts: list[dict[str, NDArray[Any]]]) -> dict[str, NDArray[Any]]:
 
 
 def problem_of(
-    trials: Trials, variables: Any, goals: Any, limits: Any, draws: int, margin: float = 0.5
+    trials: Trials, variables: Any, objectives: Any, constraints: Any, samples: int, margin: float = 0.5
 ) -> DesignProblem:
     """Check what may be chosen and what is asked of it.
 
@@ -551,7 +555,7 @@ def problem_of(
     bounds: dict[str, tuple[float, float]] = {}
     for name, pair in variables.items():
         row = lookup(str(name))
-        if row.quantity.kind is not float or row.section == "run":
+        if row.quantity.kind is not float or row.section == "integration":
             raise InputError(f"{name}: cannot be chosen; must be a real number of the system")
         try:
             low, high = (float(row.quantity.check(str(name), each)) for each in pair)
@@ -562,14 +566,14 @@ def problem_of(
         if not low < high:
             raise InputError(f"{name} = ({low:g}, {high:g}): low must be less than high")
         if row.name in bounds:
-            raise InputError(f"{name}: stands twice among the variables")
+            raise InputError(f"{name}: is given twice among the variables")
         bounds[row.name] = (low, high)
-    made, kept = require_kinds(goals, limits)
+    made, kept = require_kinds(objectives, constraints)
     require_held([*(goal.quantity for goal in made), *(limit.quantity for limit in kept)], trials.system)
-    integer("draws", draws, 8, 10**6)
-    if trials.spread.is_empty:
-        raise InputError("spread: nothing differs, so no probability can be promised; give tolerances")
-    return DesignProblem(trials, bounds, made, kept, draws, margin)
+    integer("samples", samples, 8, 10**6)
+    if trials.uncertainty.is_empty:
+        raise InputError("uncertainty: nothing is uncertain, so every probability is 0 or 1; give tolerances")
+    return DesignProblem(trials, bounds, made, kept, samples, margin)
 
 
 # ----------------------------------------------------------------------------------------------------
@@ -578,7 +582,7 @@ def problem_of(
 _Array = NDArray[np.float64]
 CHECK, REPORT = 10**9, 2 * 10**9
 """First numbers of the draws by which candidates are chosen, and of those by which the chosen are reported."""
-HOLDS = ("fails", "undecided", "holds")
+SATISFIED = ("violated", "undecided", "satisfied")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -594,7 +598,7 @@ class OptimizerSettings:
     samples : int
         Runs of a design while it is sought, at least 8.
     validation_samples : int
-        Runs on fresh draws of a design that is checked, and again of one that is reported.
+        Validation samples of a design that is checked, and again of one that is reported.
     candidates : int
         Designs that are checked at most, the best first, until one holds.
     confidence : float
@@ -639,7 +643,7 @@ def design_problem(
     integration: Integration | None = None,
     checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
 ) -> DesignProblem:
-    """A design problem for an optimiser of one's own, such as pymoo's, Optuna's or Ax's; as of :func:`design`.
+    """A design problem for an optimiser of one's own, such as pymoo's, Optuna's or Ax's; as in :func:`optimize_design`.
 
     Returns
     -------
@@ -650,10 +654,10 @@ def design_problem(
     Raises
     ------
     InputError
-        For variables, goals and limits that cannot be, and a spread in which nothing differs.
+        For variables, goals and limits that cannot be, and an uncertainty without uncertain parameters.
     """
     trials = trials_of(
-        system, uncertainty, integration, store=checkpoint, early=_early(objectives, constraints)
+        system, uncertainty, integration, checkpoint=checkpoint, early=_early(objectives, constraints)
     )
     return problem_of(trials, variables, objectives, constraints, samples)
 
@@ -671,11 +675,11 @@ def optimize_design(
     checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
-    """Where and how to strike so that limits hold with a stated probability and goals are least.
+    """Minimise objectives under constraints that hold with a stated probability.
 
-    Designs are sought by generalised differential evolution on common draws.  The best are checked on fresh draws
-    until one holds its limits for certain, and what is found is reported from draws that neither saw: the reported
-    intervals owe nothing to the search.
+    Generalised differential evolution searches designs on common samples.  The best designs are checked on validation
+    samples until one satisfies its constraints for certain.  The result is reported from further samples, so that the
+    search does not bias the intervals.
 
     Parameters
     ----------
@@ -684,10 +688,10 @@ def optimize_design(
     variables : mapping of str to (low, high)
         Real parameters that may be chosen.
     objectives : Objective or str, or a list of up to three
-        What to make small; of several the Pareto front is sought.
+        Quantities to minimise; of several the result is the Pareto front.
     constraints : Constraint, or a list of them
     uncertainty : ParameterUncertainty
-        What differs between systems that are built and driven alike.
+        Uncertain parameters and initial state of the system.
     settings : OptimizerSettings, optional
     integration : Integration, optional
     checkpoint : path or CheckpointOptions, optional
@@ -698,10 +702,10 @@ def optimize_design(
     Returns
     -------
     xarray.Dataset
-        Along ``design``, one, or a front by its first goal: a variable a parameter; ``goal_...`` with ``_low`` and
-        ``_high`` and, as the search saw it, ``_sought``; ``kept_...``, the share of systems that keep a limit, with
-        ``_low`` and ``_high``, beside ``required_...``; ``holds``: whether every lower limit is as great as
-        required, some upper one is less, or neither is known.  Along ``tried``: every design that was looked at,
+        Along ``design``, one, or a front by its first goal: a variable a parameter; ``objective_...`` with ``_low`` and
+        ``_high`` and, as the search saw it, ``_sought``; ``satisfied_...``, the fraction of systems that satisfy
+        a constraint, with ``_low`` and ``_high``, and ``required_...``; ``constraints_satisfied``: whether every lower
+        limit is at least the required fraction, some upper limit is less, or neither is known.  Along ``tried``: every design that was looked at,
         its goals and ``violation``.
 
     Raises
@@ -715,8 +719,8 @@ def optimize_design(
     ...     system,
     ...     {"location": (0.2, 0.5), "frequency_ratio": (0.5, 2.0), "velocity_amplitude": (0.05, 0.5)},
     ...     "peak_force",
-    ...     [sb.uncertainty.Constraint(of="other_well", at_least=0.95), sb.uncertainty.Constraint(of="stroke", at_most=1e-3)],
-    ...     spread,
+    ...     [sb.uncertainty.Constraint(quantity="other_well", lower=0.95), sb.uncertainty.Constraint(quantity="stroke", upper=1e-3)],
+    ...     uncertainty,
     ... )
     """
     settings = OptimizerSettings() if settings is None else settings
@@ -738,8 +742,8 @@ def optimize_design(
     for generation in range(settings.generations):
         asked = search.ask()
         worth = problem.evaluate(asked)
-        tried.append((asked, worth.goals, worth.violation))
-        search.tell(worth.goals, worth.violation)
+        tried.append((asked, worth.objectives, worth.violation))
+        search.tell(worth.objectives, worth.violation)
         if report is not None:
             report(generation + 1, settings.generations)
     x, goal_values, violation = (np.concatenate(parts) for parts in zip(*tried, strict=True))
@@ -748,10 +752,10 @@ def optimize_design(
     return _dataset(problem, settings, (x, goal_values, violation), chosen, found)
 
 
-def _early(goals: Any, limits: Any) -> bool:
+def _early(objectives: Any, constraints: Any) -> bool:
     """Whether runs may end once their class is certain: not where a statistic of theirs is asked for."""
-    listed = [*([goals] if isinstance(goals, (str, Objective)) else goals)]
-    listed += [limits] if isinstance(limits, Constraint) else list(limits)
+    listed = [*([objectives] if isinstance(objectives, (str, Objective)) else objectives)]
+    listed += [constraints] if isinstance(constraints, Constraint) else list(constraints)
     made = [Objective(quantity=each) if isinstance(each, str) else each for each in listed]
     return all(getattr(each, "quantity", None) is not None and each._quantity.kind != "run" for each in made)
 
@@ -761,7 +765,7 @@ def _fresh(problem: DesignProblem, effort: OptimizerSettings, x: _Array, begin: 
 
 
 def _chosen(
-    problem: DesignProblem, effort: OptimizerSettings, x: _Array, goals: _Array, violation: _Array
+    problem: DesignProblem, effort: OptimizerSettings, x: _Array, objectives: _Array, violation: _Array
 ) -> list[int]:
     """Designs to be reported: the best that holds on fresh draws, or the front."""
     good = np.flatnonzero(violation == 0.0)
@@ -769,14 +773,16 @@ def _chosen(
         best = int(np.argmin(violation))
         where = ", ".join(f"{name} = {value:.4g}" for name, value in zip(problem.names, x[best], strict=True))
         raise InputError(
-            f"limits: no design of {len(x)} that were tried keeps them; {where} breaks them least.  Widen the bounds, "
-            "loosen a limit or give more generations"
+            f"constraints: none of {len(x)} designs satisfies them; {where} violates them least.  Widen the bounds, "
+            "loosen a constraint or use more generations"
         )
-    if len(problem.goals) > 1:
-        front = good[front_of(goals[good])]
-        _, unique = np.unique(goals[front], axis=0, return_index=True)
-        return front[np.sort(unique)][np.argsort(goals[front[np.sort(unique)], 0], kind="stable")].tolist()
-    order = good[np.argsort(goals[good, 0], kind="stable")]
+    if len(problem.objectives) > 1:
+        front = good[front_of(objectives[good])]
+        _, unique = np.unique(objectives[front], axis=0, return_index=True)
+        return front[np.sort(unique)][
+            np.argsort(objectives[front[np.sort(unique)], 0], kind="stable")
+        ].tolist()
+    order = good[np.argsort(objectives[good, 0], kind="stable")]
     ranked: list[int] = []
     for i in order.tolist():  # a population that has converged holds the same design many times over
         if not any(np.allclose(x[i], x[j], rtol=1e-3, atol=0.0) for j in ranked[-20:]):
@@ -795,13 +801,13 @@ def _chosen(
 
 def _holds(problem: DesignProblem, found: Estimate) -> tuple[int, float]:
     """Whether limits hold for certain (2), fail for certain (0) or neither (1), and by how much they may lack."""
-    required = np.array([limit.required for limit in problem.limits])
-    own = np.array([limit._quantity.kind == "design" for limit in problem.limits], dtype=bool)
+    required = np.array([limit.required for limit in problem.constraints])
+    own = np.array([limit._quantity.kind == "design" for limit in problem.constraints], dtype=bool)
     wanted = np.where(own, 1.0, required)
-    short = float(np.maximum(wanted - found.limits[:, 1], 0.0).sum()) if required.size else 0.0
+    short = float(np.maximum(wanted - found.constraints[:, 1], 0.0).sum()) if required.size else 0.0
     if short == 0.0:
         return 2, 0.0
-    return (0 if (found.limits[:, 2] < wanted).any() else 1), short
+    return (0 if (found.constraints[:, 2] < wanted).any() else 1), short
 
 
 def _dataset(
@@ -816,54 +822,56 @@ def _dataset(
     trials = problem.trials
     attrs: dict[str, Any] = {
         "title": "designs of a struck bistable beam", "system": trials.system.hash,
-        "uncertainty": canonical_json(trials.spread.describe()), "samples": effort.samples, "validation_samples": effort.validation_samples,
+        "uncertainty": canonical_json(trials.uncertainty.describe()), "samples": effort.samples, "validation_samples": effort.validation_samples,
         "generations": effort.generations, "population": effort.population, "confidence": effort.confidence,
-        "seed": effort.seed, "spread_seed": trials.spread.seed, "runs_made": trials.runs,
+        "seed": effort.seed, "uncertainty_seed": trials.uncertainty.seed, "runs_made": trials.runs,
         "cycles": trials.integration.cycles_or_default, "modes": trials.system.model.modes,
     }  # fmt: skip
     attrs |= {f"fixed_{lookup(name).short}": value for name, value in trials.system.parameters.items()
               if isinstance(value, (int, float)) and name not in problem.bounds}  # fmt: skip
     dataset = xr.Dataset(attrs=attrs)
-    x, goals, violation = tried
+    x, objectives, violation = tried
     for j, name in enumerate(problem.names):
         row = lookup(name)
         labels = {"units": row.quantity.unit, "long_name": row.quantity.long_name, "parameter": name}
         dataset[row.short] = (("design",), x[chosen, j], labels)
         dataset[f"tried_{row.short}"] = (("tried",), x[:, j], labels)
-    for k, goal in enumerate(problem.goals):
+    for k, goal in enumerate(problem.objectives):
         sign = -1.0 if goal.maximize else 1.0
-        own = {"units": goal._quantity.unit, "long_name": goal.words}
+        own = {"units": goal._quantity.unit, "long_name": goal.long_name}
         for end, values in zip(
-            ("", "_low", "_high"), np.array([each.goals[k] for each in found]).T, strict=True
+            ("", "_low", "_high"), np.array([each.objectives[k] for each in found]).T, strict=True
         ):
-            dataset[f"goal_{goal.label}{end}"] = (("design",), values, own)
-        dataset[f"goal_{goal.label}_sought"] = (("design",), sign * goals[chosen, k], own)
-        seen = np.where(np.isfinite(goals[:, k]), sign * goals[:, k], np.nan)
-        dataset[f"tried_goal_{goal.label}"] = (("tried",), seen, own)
-    for k, limit in enumerate(problem.limits):
-        own = {"units": "1", "long_name": f"share of systems that keep the limit of {limit.quantity}"}
-        own |= {
-            name: value for name in ("at_least", "at_most") if (value := getattr(limit, name)) is not None
+            dataset[f"objective_{goal.label}{end}"] = (("design",), values, own)
+        dataset[f"objective_{goal.label}_sought"] = (("design",), sign * objectives[chosen, k], own)
+        seen = np.where(np.isfinite(objectives[:, k]), sign * objectives[:, k], np.nan)
+        dataset[f"tried_objective_{goal.label}"] = (("tried",), seen, own)
+    for k, limit in enumerate(problem.constraints):
+        own = {
+            "units": "1",
+            "long_name": f"fraction of systems that satisfy the constraint of {limit.quantity}",
         }
+        own |= {name: value for name in ("lower", "upper") if (value := getattr(limit, name)) is not None}
         for end, values in zip(
-            ("", "_low", "_high"), np.array([each.limits[k] for each in found]).T, strict=True
+            ("", "_low", "_high"), np.array([each.constraints[k] for each in found]).T, strict=True
         ):
-            dataset[f"kept_{limit.label}{end}"] = (("design",), values, own)
+            dataset[f"satisfied_{limit.label}{end}"] = (("design",), values, own)
         required = 1.0 if limit._quantity.kind == "design" else limit.required
         dataset[f"required_{limit.label}"] = (
             (),
             required,
-            {"units": "1", "long_name": "share that is required"},
+            {"units": "1", "long_name": "required fraction"},
         )
     states = np.array([_holds(problem, each)[0] for each in found], dtype=np.int8)
-    flags = {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(HOLDS)}
-    dataset["holds"] = (("design",), states, {"units": "1", "long_name": "whether the limits hold"} | flags)
+    flags = {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(SATISFIED)}
+    words = {"units": "1", "long_name": "whether the constraints are satisfied"}
+    dataset["constraints_satisfied"] = (("design",), states, words | flags)
     failed = np.array([each.failed for each in found])
     dataset["runs_failed"] = (
         ("design",),
         failed,
-        {"units": "1", "long_name": "runs that failed; they keep no limit"},
+        {"units": "1", "long_name": "runs that failed; they satisfy no constraint"},
     )
-    labels = {"units": "1", "long_name": "by how much the limits are broken; 0 where they are kept"}
+    labels = {"units": "1", "long_name": "violation of the constraints; 0 where they are satisfied"}
     dataset["violation"] = (("tried",), violation, labels)
     return dataset

@@ -1,4 +1,4 @@
-"""What is known of a beam after it was measured: samples of its parameters with weights."""
+"""Bayesian update of the parameters of a beam: weighted samples."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ _TINY = 1e-13
 """Relative change of the drive whose response is measured."""
 _LOST = 1e3
 """Standard errors of a run that fails, at every sample."""
-_SEEN = {"contact": "displacement_at_striker", "center": "midspan_displacement"}
+_SEEN = {"striker": "displacement_at_striker", "midspan": "midspan_displacement"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -154,7 +154,7 @@ class Waveform:
         m, from the straight beam; NaN where nothing was found.
     standard_error : float
         Of a sample, m.  Errors are taken as independent: thin samples that are not.
-    at : {"contact", "center"}
+    at : {"striker", "midspan"}
         Where it was measured.
     drive_error : float
         Relative error of what is known of the drive's amplitude.
@@ -164,7 +164,7 @@ class Waveform:
     time: ArrayLike
     displacement: ArrayLike
     standard_error: float
-    at: str = "contact"
+    at: str = "striker"
     drive_error: float = 1e-4
 
     def __post_init__(self) -> None:
@@ -195,7 +195,7 @@ class Waveform:
     @classmethod
     @checked
     def from_dataset(
-        cls, dataset: xr.Dataset, system: System, standard_error: float, *, at: str = "contact", **more: Any
+        cls, dataset: xr.Dataset, system: System, standard_error: float, *, at: str = "striker", **more: Any
     ) -> Waveform:
         """That of a tracked or simulated run, whose displacements are over the system's own buckling level.
 
@@ -325,7 +325,7 @@ class Posterior:
         within("confidence", confidence, 0.0, 1.0)
         if self.is_doubtful:
             raise InputError(
-                f"posterior: its samples are worth {self.effective_sample_size:.0f}, fewer than {_FEWEST:.0f}; ask for more draws"
+                f"posterior: its samples are worth {self.effective_sample_size:.0f}, fewer than {_FEWEST:.0f}; use more samples"
             )
         shares = (0.5, 0.5 * (1.0 - confidence), 0.5 * (1.0 + confidence))
         return {
@@ -356,8 +356,8 @@ class Posterior:
         which = np.minimum(np.searchsorted(np.cumsum(self.weights), ranks), self.weights.size - 1)
         return Posterior(self.parameters, self.values[which], np.full(count, 1.0 / count))
 
-    def spread(self, **more: Any) -> ParameterUncertainty:
-        """What it leaves open, to be drawn from: the samples' own distributions, tied by correlations of their ranks.
+    def uncertainty(self, **more: Any) -> ParameterUncertainty:
+        """Return the parameter uncertainty: the distributions of the samples, with the correlations of their ranks.
 
         *more* are other arguments of :class:`snapbeam.uncertainty.ParameterUncertainty`; distributions in *of* stand beside.
         """
@@ -380,8 +380,8 @@ class Posterior:
 
         dataset = xr.Dataset(
             attrs={
-                "title": "what is known of a beam after it was measured",
-                "effective_samples": self.effective_sample_size,
+                "title": "posterior samples of the parameters of a beam",
+                "effective_sample_size": self.effective_sample_size,
             }
         )
         for name, column in zip(self.parameters, self.values.T, strict=True):
@@ -417,7 +417,7 @@ def estimate_posterior(
         waveforms also damping_ratio and contact_stiffness, about those of the first waveform's system, unless
         *measured* knows them.
     waveforms : Waveform or sequence of them
-        Tracked motions of the beam under a striker; each counts as far as its conditioning lets it.
+        Tracked motions of the beam under a striker; each counts up to its predictability horizon.
     modes : int
         For the frequencies; a waveform has those of its system.
     samples : int
@@ -427,7 +427,7 @@ def estimate_posterior(
     Returns
     -------
     Posterior
-        ``posterior.effective`` says how many samples the weighted ones are worth.
+        ``posterior.effective_sample_size`` is the number of independent samples that the weighted ones are worth.
 
     Raises
     ------
@@ -437,7 +437,7 @@ def estimate_posterior(
     Notes
     -----
     Population Monte Carlo (Cappe et al., J. Comput. Graph. Stat. 13 (2004) 907): samples of a Student's t about the
-    most likely beam, weighed by likelihood times prior over their density, twice fitted anew to what they say.
+    most likely beam, weighed by likelihood times prior over their density, twice fitted again to the weighted samples.
     """
     if measured is not None and not isinstance(measured, Measurements):
         raise InputTypeError(f"measured = {shown(measured)}: must be Measurements")
@@ -596,7 +596,7 @@ def class_likelihood(
 ) -> _Array:
     """Log likelihood of measured classes under every sample of a posterior, for :meth:`Posterior.updated`.
 
-    The class of a dot is one outcome of *runs* and one more draw from the same unknown chances: with c of m runs of its
+    The class of a measured point is one outcome of *runs* and one more draw from the same unknown chances: with c of m runs of its
     class, a Dirichlet-multinomial of Jeffreys' prior gives it (c + 1/2)/(m + 2).  So a class that no run had is
     unlikely, not impossible, and few runs say little.
 
@@ -605,15 +605,15 @@ def class_likelihood(
     posterior : Posterior
         Few samples: :meth:`Posterior.resampled` first.
     system : System
-        The nominal one, by which Omega and V of the dots are normalised.
+        The nominal one, by which Omega and V of the measurements are normalised.
     measurements : MeasuredPoints
         Struck with the same Hz and m/s whatever the sample; those of unknown class are left out.
     uncertainty : ParameterUncertainty
-        What differs from test to test, such as ``Spread(displacement=3.5e-6)``: no parameter of the posterior.
+        What differs from test to test, such as ``ParameterUncertainty(displacement=3.5e-6)``: no parameter of the posterior.
     runs : int
-        Of each dot and sample, the same draws for all.
-    integration, store
-        As of :func:`snapbeam.uncertainty.probability_map`.
+        Of each measured point and sample, the same random samples for all.
+    integration, checkpoint
+        As in :func:`snapbeam.uncertainty.probability_map`.
 
     Returns
     -------
@@ -622,16 +622,16 @@ def class_likelihood(
     Raises
     ------
     InputError
-        For bad input, a spread that draws a parameter of the posterior, and dots without a class.
+        For bad input, an uncertainty with a parameter of the posterior, and measurements without a class.
     """
     integer("runs", runs, 2, 10**6)
     shared = sorted(set(posterior.parameters) & set(uncertainty.of))
     if shared:
-        raise InputError(f"spread: draws {', '.join(shared)}, which the posterior says")
+        raise InputError(f"uncertainty: contains {', '.join(shared)}, which the posterior has")
     known = np.isin(measurements.response_class, _KINDS)
     if not known.any():
-        raise InputError("dots: none has a known class")
-    trials = trials_of(system, uncertainty, integration, store=checkpoint)
+        raise InputError("measurements: none has a known class")
+    trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint)
     samples, count = len(posterior.values), int(known.sum())
     sample, dot, number = (
         each.ravel()

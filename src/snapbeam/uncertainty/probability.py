@@ -1,4 +1,4 @@
-"""How likely a struck beam snaps, and where it ends, over any parameters, under its tolerances."""
+"""Probability maps: probabilities of snap-through and of each final well over any parameters."""
 
 from __future__ import annotations
 
@@ -202,19 +202,19 @@ def probability_map(
     cluster: str | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
-    """How likely each outcome is at every point, over systems, drives and starts that differ by their tolerances.
+    """Compute the probability of each outcome at every point under parameter uncertainty.
 
-    Draw s is the same at every point.  Runs are spent where the interval is widest, until each is as narrow as asked.
+    Sample s is the same at every point.  Runs are spent where the interval is widest, until each is as narrow as asked.
 
     Parameters
     ----------
     system : System
         The nominal one.
     axes : mapping of str to array_like, or xarray.Dataset, or pandas.DataFrame
-        As of :func:`snapbeam.sweep`: a grid, or a list of points.  A parameter that is drawn too is drawn about the
+        As in :func:`snapbeam.sweep`: a grid, or a list of points.  A parameter that is drawn too is drawn about the
         value of the point.
     uncertainty : ParameterUncertainty
-        What differs.
+        Uncertain parameters and initial state.
     runs : SamplingPlan or int, optional
         How runs are spent, or the same number of runs for every point; by default until the half width of the 95 %
         interval of P(snap) is 0.05 everywhere.
@@ -223,7 +223,7 @@ def probability_map(
     checkpoint : path or CheckpointOptions, optional
         Folder that keeps the runs; one that exists is resumed.
     cluster, progress
-        As of :func:`snapbeam.sweep`; progress is told of runs, of which the total grows.
+        As in :func:`snapbeam.sweep`; progress counts runs, of which the total grows.
 
     Returns
     -------
@@ -235,9 +235,9 @@ def probability_map(
     Raises
     ------
     InputError
-        For bad input, a spread in which nothing differs, and for a store that holds something else.
+        For bad input, an uncertainty without uncertain parameters, and for a checkpoint of another computation.
     CheckpointError
-        If the store is in use, cannot be written or is damaged beyond repair.
+        If the checkpoint is in use, cannot be written or is damaged beyond repair.
 
     Notes
     -----
@@ -247,13 +247,13 @@ def probability_map(
 
     Examples
     --------
-    >>> spread = sb.uncertainty.ParameterUncertainty(of={"beam.thickness": sb.uncertainty.Normal(0.01, relative=True)}, phase=True)  # doctest: +SKIP
-    >>> ds = sb.uncertainty.probability_map(system, {"velocity_amplitude": v, "location": x}, spread)  # doctest: +SKIP
+    >>> uncertainty = sb.uncertainty.ParameterUncertainty(of={"beam.thickness": sb.uncertainty.Normal(0.01, relative=True)}, phase=True)  # doctest: +SKIP
+    >>> ds = sb.uncertainty.probability_map(system, {"velocity_amplitude": v, "location": x}, uncertainty)  # doctest: +SKIP
     """
     allocation = allocation_of(runs)
-    trials = trials_of(system, uncertainty, integration, store=checkpoint, cluster=cluster)
-    if trials.spread.is_empty:
-        raise InputError("spread: nothing differs, so every probability is 0 or 1; use sb.sweep")
+    trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint, cluster=cluster)
+    if trials.uncertainty.is_empty:
+        raise InputError("uncertainty: nothing is uncertain, so every probability is 0 or 1; use sb.sweep")
     points = axes if isinstance(axes, Points) else points_of(axes)
     setup = sweep_setup(trials.system, points, trials.integration)
     counts = _counted(trials, points, allocation, counting(progress, "probability map", "runs"))
@@ -272,7 +272,7 @@ def allocation_of(runs: SamplingPlan | int | None) -> SamplingPlan:
     if isinstance(runs, SamplingPlan):
         return runs
     if isinstance(runs, (bool, np.bool_)) or not isinstance(runs, (int, np.integer)):
-        raise InputTypeError(f"runs = {shown(runs)}: must be a number of runs a point, or an Allocation")
+        raise InputTypeError(f"runs = {shown(runs)}: must be a number of runs a point, or a SamplingPlan")
     return SamplingPlan(half_width=None, initial_runs=int(runs), max_runs=max(int(runs), 1))
 
 
@@ -307,10 +307,10 @@ def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: Samp
     import xarray as xr
 
     points = setup.points
-    drawn = dict(trials.spread.describe())
+    drawn = dict(trials.uncertainty.describe())
     more: dict[str, Any] = {
         "uncertainty": canonical_json(drawn),
-        "seed": trials.spread.seed,
+        "seed": trials.uncertainty.seed,
         "confidence": allocation.confidence,
         "interval": allocation.interval,
         "watched_outcome": allocation.outcome,
@@ -320,8 +320,8 @@ def _dataset(setup: SweepSetup, trials: Trials, counts: Counts, allocation: Samp
     if allocation.half_width is not None:
         more["half_width"] = allocation.half_width
     dataset = xr.Dataset(coords=setup.coordinates(), attrs=setup.attributes(TITLE, more))
-    words = {"long_name": "; ".join(f"{name}: {each.words}" for name, each in OUTCOMES.items())}
-    dataset[OUTCOME] = ((OUTCOME,), list(OUTCOMES), words)
+    labels = {"long_name": "; ".join(f"{name}: {each.long_name}" for name, each in OUTCOMES.items())}
+    dataset[OUTCOME] = ((OUTCOME,), list(OUTCOMES), labels)
     found = [counts.limits(allocation, i) for i in range(len(OUTCOMES))]
     for k, (ending, text) in enumerate((("", ""), ("_low", "lower limit: "), ("_high", "upper limit: "))):
         table = np.stack([points.arranged(each[k]) for each in found], axis=-1)

@@ -309,8 +309,8 @@ class Runs:
 def search(
     ask: Ask,
     columns: int,
-    between: tuple[float, float],
-    how: QuantileSearchSettings,
+    bounds: tuple[float, float],
+    options: QuantileSearchSettings,
     tell: Callable[[int, int], object] | None = None,
 ) -> list[Runs]:
     """Make the runs of every column.
@@ -319,10 +319,10 @@ def search(
     no grid hides anything; and a draw of its own.  Columns share the numbers of draws.
     """
     found = [Runs() for _ in range(columns)]
-    share = np.diff(np.linspace(0, how.runs, how.rounds + 1).astype(np.int64))
-    total = columns * how.runs
+    share = np.diff(np.linspace(0, options.runs, options.rounds + 1).astype(np.int64))
+    total = columns * options.runs
     for number, count in enumerate(share.tolist()):
-        asked = [_values(column, between, how, number, count, c) for c, column in enumerate(found)]
+        asked = [_values(column, bounds, options, number, count, c) for c, column in enumerate(found)]
         which = np.repeat(np.arange(columns), count)
         draws = np.concatenate([np.arange(column.made, column.made + count) for column in found])
         hits, failed = ask(which, np.concatenate(asked), draws)
@@ -340,15 +340,15 @@ def search(
 
 def _values(
     column: Runs,
-    between: tuple[float, float],
-    how: QuantileSearchSettings,
+    bounds: tuple[float, float],
+    options: QuantileSearchSettings,
     number: int,
     count: int,
     place: int,
 ) -> _Array:
     """Values of the runs of one round."""
-    generator = np.random.Generator(np.random.Philox(key=[how.seed, place * 64 + number]))
-    windows = [between] if number == 0 or column.values.size == 0 else _windows(column, between, how)
+    generator = np.random.Generator(np.random.Philox(key=[options.seed, place * 64 + number]))
+    windows = [bounds] if number == 0 or column.values.size == 0 else _windows(column, bounds, options)
     each = np.diff(np.linspace(0, count, len(windows) + 1).astype(np.int64))
     parts = []
     for (low, high), size in zip(windows, each.tolist(), strict=True):
@@ -357,15 +357,15 @@ def _values(
 
 
 def _windows(
-    column: Runs, between: tuple[float, float], how: QuantileSearchSettings
+    column: Runs, bounds: tuple[float, float], options: QuantileSearchSettings
 ) -> list[tuple[float, float]]:
     """A little more than the interval of each probability."""
     found = []
-    for probability in how.probabilities:
+    for probability in options.probabilities:
         _, low, high = crossing(column.values, column.hits, probability, _SURE)
-        low, high = max(low, between[0]), min(high, between[1])
+        low, high = max(low, bounds[0]), min(high, bounds[1])
         reach = _WIDER * (high - low)
-        found.append((max(low - reach, between[0]), min(high + reach, between[1])))
+        found.append((max(low - reach, bounds[0]), min(high + reach, bounds[1])))
     return found
 
 
@@ -394,12 +394,12 @@ def quantile_threshold(
     checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
     progress: Callable[[int, int], object] | bool | None = None,
 ) -> xr.Dataset:
-    """Where the probability of snapping passes given values along one parameter, over any others, with intervals.
+    """Find the values of a parameter at which the probability of snap-through has given values, with intervals.
 
     Every run has a value of its own.  The first round covers the range, each later one what is left open.  The
     interval is that of the isotonic regression, of which nothing but a rise is assumed (Banerjee and Wellner, Ann.
     Stat. 29 (2001) 1699); within it the threshold is where a logistic curve fitted to the runs about it passes the
-    value.  Where the probability is seen to fall, which fractal borders do, ``monotone`` is False and the interval
+    value.  Where the probability is seen to fall, which fractal borders do, ``is_monotonic`` is False and the interval
     reaches from the first value at which the probability may be so great to the last at which it may be so small.
 
     Parameters
@@ -411,9 +411,9 @@ def quantile_threshold(
     bounds : tuple of two floats
         Range in which it is sought.
     axes : mapping of str to array_like, optional
-        Axes, as of :func:`snapbeam.sweep`; one point, the system as it stands, by default.
+        Axes, as in :func:`snapbeam.sweep`; one point, the system as it stands, by default.
     uncertainty : ParameterUncertainty, optional
-        What differs from run to run.  Without one the response is what it is, and all quantiles are one threshold.
+        Uncertain parameters.  Without uncertainty all quantiles are one threshold.
     options : QuantileSearchSettings, optional
         Probabilities, runs and rounds.
     integration : Integration, optional
@@ -427,22 +427,22 @@ def quantile_threshold(
     -------
     xarray.Dataset
         ``threshold`` with ``threshold_low`` and ``threshold_high`` over the axes and ``quantile``; infinite limits
-        where no run bounds it, NaN where ``outcome_of_search`` says why.  ``monotone``, with the probability
+        where no run bounds it, NaN where ``outcome_of_search`` says why.  ``is_monotonic``, with the probability
         ``monotonicity_p_value`` of so much falling if it rises; ``runs``, ``runs_failed``.
 
     Raises
     ------
     InputError
-        For bad input, such as a parameter that needs another structure, and for a store that holds something else.
+        For bad input, such as a parameter that needs another structure, and for a checkpoint of another computation.
 
     Examples
     --------
     >>> ds = sb.uncertainty.quantile_threshold(  # doctest: +SKIP
-    ...     system, "velocity_amplitude", (0.01, 0.6), {"frequency_ratio": omega}, spread
+    ...     system, "velocity_amplitude", (0.01, 0.6), {"frequency_ratio": omega}, uncertainty
     ... )
     """
     row = lookup(parameter)
-    if not row.is_run or row.quantity.kind is not float or row.section == "start":
+    if not row.is_run or row.quantity.kind is not float or row.section == "initial_state":
         raise InputError(
             f"parameter = {shown(parameter)}: must be a number that may differ between runs, such as velocity_amplitude"
         )
@@ -450,13 +450,13 @@ def quantile_threshold(
     options = QuantileSearchSettings() if options is None else options
     if not isinstance(options, QuantileSearchSettings):
         raise InputTypeError(f"options = {shown(options)}: must be a QuantileSearchSettings")
-    trials = trials_of(system, uncertainty, integration, store=checkpoint)
+    trials = trials_of(system, uncertainty, integration, checkpoint=checkpoint)
     if axes is not None and not isinstance(axes, Mapping):
         raise InputTypeError(f"axes = {shown(axes)}: must map parameters to arrays of values")
     points = points_of(axes) if axes else PointList({row.name: np.array([low])})
     assert isinstance(points, (Grid, PointList))
     if axes and row.name in points.names:
-        raise InputError(f"over: has {row.name}, which is what is raised")
+        raise InputError(f"axes: contains {row.name}, the parameter itself; leave it out")
     sweep_setup(
         trials.system, PointList(points.take(np.arange(points.size)) | {row.name: np.full(points.size, high)})
     )
@@ -466,8 +466,8 @@ def quantile_threshold(
     columns = [_column(runs, options, (low, high)) for runs in found]
     more = {
         "parameter": row.short, "bounds": [low, high], "confidence": options.confidence, "watched_outcome": options.outcome,
-        "uncertainty": canonical_json(trials.spread.describe()), "rounds": options.rounds, "runs_made": trials.runs,
-        "seed": trials.spread.seed, "search_seed": options.seed,
+        "uncertainty": canonical_json(trials.uncertainty.describe()), "rounds": options.rounds, "runs_made": trials.runs,
+        "seed": trials.uncertainty.seed, "search_seed": options.seed,
     }  # fmt: skip
     dataset = _labelled(
         setup.coordinates(), setup.attributes(TITLE, more), points, columns, options, row.name
@@ -475,27 +475,27 @@ def quantile_threshold(
     return dataset if axes else dataset.isel(point=0).drop_vars(row.short)
 
 
-def _range(name: str, between: Any) -> tuple[float, float]:
+def _range(name: str, bounds: Any) -> tuple[float, float]:
     quantity = lookup(name).quantity
     try:
-        low, high = between
+        low, high = bounds
     except (TypeError, ValueError):
-        raise InputTypeError(f"between = {shown(between)}: must be two numbers") from None
+        raise InputTypeError(f"bounds = {shown(bounds)}: must be two numbers") from None
     low, high = (float(quantity.check("bounds", each)) for each in (low, high))
     if not low < high:
-        raise InputError(f"between = ({low:g}, {high:g}): the first must be less than the second")
+        raise InputError(f"bounds = ({low:g}, {high:g}): the first must be less than the second")
     return low, high
 
 
 def _searched(
     trials: Trials,
     points: Grid | PointList,
-    along: str,
-    between: tuple[float, float],
-    how: QuantileSearchSettings,
+    parameter: str,
+    bounds: tuple[float, float],
+    options: QuantileSearchSettings,
     report: Callable[[int, int], object] | None,
 ) -> list[Runs]:
-    total, before = points.size * how.runs, [0]
+    total, before = points.size * options.runs, [0]
 
     def ask(
         columns: NDArray[np.int64], values: NDArray[np.float64], numbers: NDArray[np.int64]
@@ -504,31 +504,31 @@ def _searched(
             if report is not None:
                 report(before[0] + done, total)
 
-        found = trials.statistics(points.take(columns) | {along: values}, numbers, tell)
+        found = trials.statistics(points.take(columns) | {parameter: values}, numbers, tell)
         before[0] += columns.size
-        return np.asarray(OUTCOMES[how.outcome].happened(found)), ~reached(found)
+        return np.asarray(OUTCOMES[options.outcome].happened(found)), ~reached(found)
 
-    return search(ask, points.size, between, how, report)
+    return search(ask, points.size, bounds, options, report)
 
 
-def _column(runs: Runs, how: QuantileSearchSettings, between: tuple[float, float]) -> dict[str, Any]:
+def _column(runs: Runs, options: QuantileSearchSettings, bounds: tuple[float, float]) -> dict[str, Any]:
     """Thresholds of one column, with their intervals."""
-    size = len(how.probabilities)
+    size = len(options.probabilities)
     table = np.full((3, size), np.nan)
     codes = np.zeros(size, dtype=np.int8)
-    p = rises(runs.values, runs.hits, seed=how.seed) if runs.values.size else np.nan
+    p = rises(runs.values, runs.hits, seed=options.seed) if runs.values.size else np.nan
     monotone = not p < _FALLS
-    for i, probability in enumerate(how.probabilities):
+    for i, probability in enumerate(options.probabilities):
         if not runs.values.size:
             table[1:, i], codes[i] = (-np.inf, np.inf), 1
             continue
-        value, low, high = crossing(runs.values, runs.hits, probability, how.confidence)
+        value, low, high = crossing(runs.values, runs.hits, probability, options.confidence)
         if not monotone:
-            first, last = spans(runs.values, runs.hits, probability, how.confidence)
+            first, last = spans(runs.values, runs.hits, probability, options.confidence)
             low, high = min(low, first), max(high, last)
         codes[i] = 1 if value == np.inf else 2 if value == -np.inf else 0
         if codes[i] == 0:
-            ends = max(low, between[0]), min(high, between[1])
+            ends = max(low, bounds[0]), min(high, bounds[1])
             near = local_crossing(runs.values, runs.hits, probability, *ends, _REACH)
             value = near if monotone and not _is_step(runs) and low <= near <= high else value
         table[:, i] = value if np.isfinite(value) else np.nan, low, high
@@ -545,18 +545,18 @@ def _labelled(
     attributes: dict[str, Any],
     points: Grid | PointList,
     columns: list[dict[str, Any]],
-    how: QuantileSearchSettings,
-    along: str,
+    options: QuantileSearchSettings,
+    parameter: str,
 ) -> xr.Dataset:
     import xarray as xr
 
-    row = lookup(along)
+    row = lookup(parameter)
     dataset = xr.Dataset(coords=coordinates, attrs=attributes)
-    dataset[LEVEL] = ((LEVEL,), list(how.probabilities), {"units": "1", "long_name": "probability"})
+    dataset[LEVEL] = ((LEVEL,), list(options.probabilities), {"units": "1", "long_name": "probability"})
     table = np.array([column["table"] for column in columns])
     for k, (ending, text) in enumerate((("", ""), ("_low", "lower limit: "), ("_high", "upper limit: "))):
-        words = f"{text}{row.quantity.long_name} at which the probability is passed"
-        labels = {"units": row.quantity.unit, "long_name": words}
+        long_name = f"{text}{row.quantity.long_name} at which the probability is passed"
+        labels = {"units": row.quantity.unit, "long_name": long_name}
         dataset[f"threshold{ending}"] = ((*points.dims, LEVEL), points.arranged(table[:, k]), labels)
     flags = {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": _FOUND}
     codes = points.arranged(np.array([column["codes"] for column in columns]))
@@ -566,7 +566,7 @@ def _labelled(
         {"units": "1", "long_name": "what was found"} | flags,
     )
     plain = {
-        "monotone": (
+        "is_monotonic": (
             np.array([bool(column["monotone"]) for column in columns]), "whether the probability is not seen to fall"
         ),
         "monotonicity_p_value": (np.array([column["p"] for column in columns]), "probability of so much falling if it rises"),

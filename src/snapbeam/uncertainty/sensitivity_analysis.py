@@ -1,4 +1,4 @@
-"""Which parameter moves an answer most, and per its real tolerance."""
+"""Sensitivity of a quantity of interest to uncertain parameters."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "METHODS",
-    "Answer",
     "Indices",
     "LifetimeQoI",
     "NotchQoI",
+    "QuantityOfInterest",
     "Sobol",
     "StatisticQoI",
     "ThresholdQoI",
-    "answer_of",
+    "quantity_of_interest",
     "sensitivity",
     "sobol_indices",
     "sobol_indices_from_samples",
@@ -225,14 +225,18 @@ def _mean(table: _Array, confidence: float) -> Indices:
 _Numbers = NDArray[np.int64]
 
 
-class Answer(Protocol):
-    """One number of every draw."""
+class QuantityOfInterest(Protocol):
+    """A number for every sample of a system."""
 
     @property
-    def unit(self) -> str: ...
+    def unit(self) -> str:
+        """Unit of the quantity."""
+        ...
 
     @property
-    def words(self) -> str: ...
+    def long_name(self) -> str:
+        """Description of the quantity."""
+        ...
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
         """The numbers of draws with the given scores and starts; NaN where there is none."""
@@ -263,9 +267,9 @@ class StatisticQoI:
         return STATISTICS[self.name].unit if self.name in STATISTICS else "1"
 
     @property
-    def words(self) -> str:
+    def long_name(self) -> str:
         """What it is."""
-        return STATISTICS[self.name].long_name if self.name in STATISTICS else OUTCOMES[self.name].words
+        return STATISTICS[self.name].long_name if self.name in STATISTICS else OUTCOMES[self.name].long_name
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
         """One run a draw."""
@@ -314,7 +318,7 @@ class ThresholdQoI:
         return lookup(self.parameter).quantity.unit
 
     @property
-    def words(self) -> str:
+    def long_name(self) -> str:
         """What it is."""
         return f"least {lookup(self.parameter).quantity.long_name} that snaps"
 
@@ -378,7 +382,7 @@ class NotchQoI:
         return self.threshold.unit if self.depth else lookup(self.parameter).quantity.unit
 
     @property
-    def words(self) -> str:
+    def long_name(self) -> str:
         """What it is."""
         place = lookup(self.parameter).quantity.long_name
         return f"lowest threshold over {place}" if self.depth else f"{place} at which the threshold is lowest"
@@ -437,16 +441,16 @@ class LifetimeQoI:
         return "1"
 
     @property
-    def words(self) -> str:
+    def long_name(self) -> str:
         """What it is."""
         return "lifetime of snapping, in cycles"
 
     def of(self, trials: Trials, scores: _Array, numbers: _Numbers) -> _Array:
         """A lifetime map over the draws."""
         columns = trials.columns({}, numbers, scores)
-        if any(name.startswith("start.") for name in columns):
+        if any(name.startswith("initial_state.") for name in columns):
             raise InputError(
-                "displacement: lifetimes have the starts of LifetimeQoI; leave it out of the spread"
+                "displacement: lifetimes have the initial conditions of LifetimeQoI; leave it out of the uncertainty"
             )
         found = lifetime_map(
             trials.system,
@@ -463,8 +467,8 @@ def _listed(columns: dict[str, Any]) -> PointList:
     return PointList(columns)
 
 
-def answer_of(given: Answer | str) -> Answer:
-    """An answer, or that of a statistic by its name.
+def quantity_of_interest(given: QuantityOfInterest | str) -> QuantityOfInterest:
+    """Return the quantity of interest, or that of a statistic by its name.
 
     Raises
     ------
@@ -474,7 +478,7 @@ def answer_of(given: Answer | str) -> Answer:
         return StatisticQoI(given)
     if not hasattr(given, "of") or not hasattr(given, "unit"):
         raise InputError(
-            f"answer = {shown(given)}: must be the name of a statistic, a ThresholdQoI, a NotchQoI or a LifetimeQoI"
+            f"quantity = {shown(given)}: must be the name of a statistic, a ThresholdQoI, a NotchQoI or a LifetimeQoI"
         )
     return given
 
@@ -492,7 +496,7 @@ PARAMETER = "parameter"
 @checked
 def sensitivity(
     system: System,
-    quantity: Answer | str,
+    quantity: QuantityOfInterest | str,
     uncertainty: ParameterUncertainty,
     method: str = "local",
     *,
@@ -501,18 +505,18 @@ def sensitivity(
     integration: Integration | None = None,
     checkpoint: str | os.PathLike[str] | CheckpointOptions | None = None,
 ) -> xr.Dataset:
-    """Which parameter of a spread moves an answer most, with intervals.
+    """Compute which uncertain parameter changes a quantity of interest most, with intervals.
 
     Parameters
     ----------
     system : System
         The nominal one.
     quantity : str or ThresholdQoI or NotchQoI or LifetimeQoI
-        What is asked: a statistic by its name, such as ``"peak_force"``, an outcome, or one of these.
+        A statistic by its name, such as ``"peak_force"``, an outcome, or one of these.
     uncertainty : ParameterUncertainty
-        What differs, at least one parameter.
+        At least one uncertain parameter.
     method : {"local", "sobol", "given_data"}
-        ``"local"``: half the difference of the answers with a parameter one standard normal score up and down, the
+        ``"local"``: half the difference of the quantities with a parameter one standard normal score up and down, the
         others and the start as in *samples* draws (common random numbers).  ``"sobol"``: indices of the first order and
         in total over sixteen scrambled sequences of *samples* points, all from one start.  ``"given_data"``: indices of
         the first order from *samples* plain draws, which may be correlated.
@@ -521,32 +525,32 @@ def sensitivity(
     confidence : float
     integration : Integration, optional
     checkpoint : path or CheckpointOptions, optional
-        Folder that keeps the runs of all answers but lifetimes; one that exists is resumed.
+        Folder that keeps the runs of all quantities except lifetimes; one that exists is resumed.
 
     Returns
     -------
     xarray.Dataset
         Over ``parameter``, with ``unit``: locally ``effect`` (of +1 standard score), ``derivative`` (per unit of the
-        parameter) and ``answer_minus`` and ``answer_plus``, the first two with limits; else ``first_order``, and
-        ``total_order`` of Sobol's, with limits.  The answer's mean and standard deviation are attributes.
+        parameter) and ``quantity_minus`` and ``quantity_plus``, the first two with limits; else ``first_order``, and
+        ``total_order`` of Sobol's, with limits.  Mean and standard deviation of the quantity are attributes.
 
     Raises
     ------
     InputError
-        For bad input, an answer that is not there for some draws, such as a threshold out of range, correlated
-        parameters with Sobol's indices, and an answer that does not vary.
+        For bad input, a quantity that is missing for some samples, such as a threshold out of range, correlated
+        parameters with Sobol's indices, and a quantity that does not vary.
     """
     choice("method", method, METHODS)
     within("confidence", confidence, 0.0, 1.0)
-    asked = answer_of(quantity)
+    asked = quantity_of_interest(quantity)
     trials = trials_of(
-        system, uncertainty, integration, store=checkpoint, early=not isinstance(quantity, str)
+        system, uncertainty, integration, checkpoint=checkpoint, early=not isinstance(quantity, str)
     )
-    names = trials.spread.parameters
+    names = trials.uncertainty.parameters
     if not names:
-        raise InputError("spread: draws no parameter, so there is nothing to compare")
+        raise InputError("uncertainty: has no uncertain parameter, so there is nothing to compare")
     count = integer("samples", _DEFAULT[method] if samples is None else samples, 2, 2**24)
-    if trials.spread.correlation is not None and method == "sobol":
+    if trials.uncertainty.correlation is not None and method == "sobol":
         raise InputError(
             "correlation with method = 'sobol': its indices are of independent parameters; use 'given_data'"
         )
@@ -555,33 +559,35 @@ def sensitivity(
     return _dataset(trials, asked, method, count, confidence, table, values)
 
 
-def _ask(trials: Trials, answer: Answer, scores: _Array, numbers: NDArray[np.int64]) -> _Array:
-    values = answer.of(trials, scores, numbers)
+def _ask(trials: Trials, quantity: QuantityOfInterest, scores: _Array, numbers: NDArray[np.int64]) -> _Array:
+    values = quantity.of(trials, scores, numbers)
     lost = ~np.isfinite(values)
     if lost.any():
         raise InputError(
-            f"answer: {answer.words} is not there for {int(lost.sum())} of {values.size} draws; give it a wider range, "
-            "or a spread in which every system has it"
+            f"quantity: {quantity.long_name} is missing for {int(lost.sum())} of {values.size} samples; give it a wider "
+            "range, or an uncertainty in which every system has it"
         )
     return values
 
 
-def _local(trials: Trials, answer: Answer, count: int, confidence: float) -> tuple[dict[str, _Array], _Array]:
-    spread = trials.spread
-    inputs = len(spread.of)
+def _local(
+    trials: Trials, quantity: QuantityOfInterest, count: int, confidence: float
+) -> tuple[dict[str, _Array], _Array]:
+    uncertainty = trials.uncertainty
+    inputs = len(uncertainty.of)
     numbers = np.arange(count)
-    base = spread.normals(numbers)
+    base = uncertainty.normals(numbers)
     stack = []
     for j in range(inputs):
         for score in (-1.0, 1.0):
             moved = base.copy()
             moved[:, j] = score
             stack.append(moved)
-    values = _ask(trials, answer, np.concatenate(stack), np.tile(numbers, 2 * inputs))
+    values = _ask(trials, quantity, np.concatenate(stack), np.tile(numbers, 2 * inputs))
     both = values.reshape(inputs, 2, count)
     half = 0.5 * (both[:, 1] - both[:, 0])
-    width = np.array([_width(trials, name) for name in spread.of])
-    table = {"answer_minus": both[:, 0].mean(axis=1), "answer_plus": both[:, 1].mean(axis=1)}
+    width = np.array([_width(trials, name) for name in uncertainty.of])
+    table = {"quantity_minus": both[:, 0].mean(axis=1), "quantity_plus": both[:, 1].mean(axis=1)}
     table |= _limits("effect", half, confidence) | {"step": width}
     table |= _limits("derivative", half / width[:, None], confidence)
     return table, values
@@ -590,7 +596,7 @@ def _local(trials: Trials, answer: Answer, count: int, confidence: float) -> tup
 def _width(trials: Trials, name: str) -> float:
     """Half of what a parameter differs by between the scores -1 and +1."""
     nominal = np.full(2, trials.system.parameters.get(name, 0.0) or 0.0, dtype=np.float64)
-    return 0.5 * float(np.ptp(trials.spread.of[name].at(nominal, np.array([-1.0, 1.0]))))
+    return 0.5 * float(np.ptp(trials.uncertainty.of[name].at(nominal, np.array([-1.0, 1.0]))))
 
 
 def _limits(name: str, pairs: _Array, confidence: float) -> dict[str, _Array]:
@@ -600,16 +606,18 @@ def _limits(name: str, pairs: _Array, confidence: float) -> dict[str, _Array]:
     return {name: middle, f"{name}_low": middle - reach, f"{name}_high": middle + reach}
 
 
-def _sobol(trials: Trials, answer: Answer, count: int, confidence: float) -> tuple[dict[str, _Array], _Array]:
+def _sobol(
+    trials: Trials, quantity: QuantityOfInterest, count: int, confidence: float
+) -> tuple[dict[str, _Array], _Array]:
     kept: list[_Array] = []
 
     def function(ranks: _Array) -> _Array:
-        values = _ask(trials, answer, special.ndtri(ranks).T, np.zeros(ranks.shape[1], dtype=np.int64))
+        values = _ask(trials, quantity, special.ndtri(ranks).T, np.zeros(ranks.shape[1], dtype=np.int64))
         kept.append(values)
         return values
 
     found = sobol_indices(
-        function, len(trials.spread.of), count, replicates=_REPLICATES, confidence=confidence, seed=trials.spread.seed
+        function, len(trials.uncertainty.of), count, replicates=_REPLICATES, confidence=confidence, seed=trials.uncertainty.seed
     )  # fmt: skip
     table: dict[str, _Array] = {}
     for name, indices in (("first_order", found.first), ("total_order", found.total)):
@@ -618,12 +626,12 @@ def _sobol(trials: Trials, answer: Answer, count: int, confidence: float) -> tup
 
 
 def _given_data(
-    trials: Trials, answer: Answer, count: int, confidence: float
+    trials: Trials, quantity: QuantityOfInterest, count: int, confidence: float
 ) -> tuple[dict[str, _Array], _Array]:
     numbers = np.arange(count)
-    scores = trials.spread.normals(numbers)
-    values = _ask(trials, answer, scores, numbers)
-    found = sobol_indices_from_samples(scores, values, confidence=confidence, seed=trials.spread.seed)
+    scores = trials.uncertainty.normals(numbers)
+    values = _ask(trials, quantity, scores, numbers)
+    found = sobol_indices_from_samples(scores, values, confidence=confidence, seed=trials.uncertainty.seed)
     return {
         "first_order": found.estimate,
         "first_order_low": found.low,
@@ -632,19 +640,19 @@ def _given_data(
 
 
 _WORDS = {
-    "effect": "change of the answer for +1 standard score",
-    "derivative": "change of the answer for a unit of the parameter",
-    "answer_minus": "mean answer at the score -1",
-    "answer_plus": "mean answer at the score +1",
+    "effect": "change of the quantity for +1 standard score",
+    "derivative": "change of the quantity for a unit of the parameter",
+    "quantity_minus": "mean quantity at the score -1",
+    "quantity_plus": "mean quantity at the score +1",
     "step": "half of what the parameter differs by between the scores -1 and +1, in its unit",
-    "first_order": "share of the variance of the answer that the parameter makes by itself",
-    "total_order": "share of the variance of the answer that the parameter has a part in",
+    "first_order": "share of the variance of the quantity that the parameter makes by itself",
+    "total_order": "share of the variance of the quantity that the parameter has a part in",
 }
 
 
 def _dataset(
     trials: Trials,
-    answer: Answer,
+    quantity: QuantityOfInterest,
     method: str,
     count: int,
     confidence: float,
@@ -653,12 +661,12 @@ def _dataset(
 ) -> xr.Dataset:
     import xarray as xr
 
-    names = list(trials.spread.of)
+    names = list(trials.uncertainty.of)
     attrs: dict[str, Any] = {
         "title": "sensitivity of a struck bistable beam", "method": method, "samples": count, "runs_made": trials.runs,
-        "confidence": confidence, "quantity": answer.words, "answer_units": answer.unit,
-        "answer_mean": float(values.mean()), "answer_sd": float(values.std(ddof=1)),
-        "uncertainty": canonical_json(trials.spread.describe()), "system": trials.system.hash, "seed": trials.spread.seed,
+        "confidence": confidence, "quantity": quantity.long_name, "quantity_units": quantity.unit,
+        "quantity_mean": float(values.mean()), "quantity_sd": float(values.std(ddof=1)),
+        "uncertainty": canonical_json(trials.uncertainty.describe()), "system": trials.system.hash, "seed": trials.uncertainty.seed,
     }  # fmt: skip
     dataset = xr.Dataset(attrs=attrs)
     dataset[PARAMETER] = ((PARAMETER,), names, {"long_name": "parameter"})
@@ -666,6 +674,6 @@ def _dataset(
     for name, array in table.items():
         plain, _, end = name.rpartition("_") if name.endswith(("_low", "_high")) else (name, "", "")
         text = {"low": "lower limit: ", "high": "upper limit: "}.get(end, "") + _WORDS[plain]
-        unit = answer.unit if plain in ("effect", "answer_minus", "answer_plus") else "1"
+        unit = quantity.unit if plain in ("effect", "quantity_minus", "quantity_plus") else "1"
         dataset[name] = ((PARAMETER,), array, {"units": unit, "long_name": text})
     return dataset

@@ -54,13 +54,18 @@ def _system(modes: int, beam: sb.Beam = BEAM, **parts: Any) -> sb.System:
 
 def _supported(**stiffness: float) -> sb.Beam:
     """The paper's beam on elastic supports."""
-    return BEAM.replace(boundary=sb.BoundaryConditions(**stiffness))
+    changes: dict[str, Any] = {"boundary": sb.BoundaryConditions(**stiffness)}
+    return BEAM.replace(**changes)
 
 
 def _body(mass: float, frequency: float, zeta: float = 0.1) -> dict[str, Any]:
     """A shaker of moving mass (kg) on a suspension of its own frequency (Hz) and damping ratio."""
     omega = 2.0 * np.pi * frequency
-    return {"mass": mass, "spring": float(mass * omega**2), "damper": float(2.0 * zeta * mass * omega)}
+    return {
+        "mass": mass,
+        "suspension_stiffness": float(mass * omega**2),
+        "suspension_damping": float(2.0 * zeta * mass * omega),
+    }
 
 
 def _start_up(rise: float) -> sb.Burst:
