@@ -33,11 +33,12 @@ def requested(
     """
     values = {name: given.pop(name) for name in ("frequency_ratio", "velocity_amplitude")}
     values["location"] = given.pop("location", 1.0 / 2.1)
-    axes = {name: value for name, value in values.items() if np.ndim(value)}
+    axes: Any = {name: value for name, value in values.items() if np.ndim(value)}
     own = {"frequency_ratio": 1.0, "velocity_amplitude": 0.0, "location": 0.5}
     shaker = sb.Shaker(**own | {name: value for name, value in values.items() if name not in axes}, side=side)
-    one_point = xr.Dataset({"location": ("point", [values["location"]])})
-    return sb.System(model, contact, shaker), axes or one_point, sb.Integration(**given)
+    if not axes:
+        axes = xr.Dataset({"location": ("point", [values["location"]])})
+    return sb.System(model, contact, shaker), axes, sb.Integration(**given)
 
 
 def setup_of(model: sb.ReducedModel, contact: sb.ContactLaw | None, **given: Any) -> SweepSetup:

@@ -1,7 +1,7 @@
 """Record the numbers of about 2,000 runs, and compare the package with them bitwise.
 
 A refactoring must not change a number.  This script computes ensembles, recorded runs, advanced states, tangents and
-small analyses of every entry of ``worlds.WORLDS`` and stores them::
+small analyses of every entry of ``systems.SYSTEMS`` and stores them::
 
     python tests/conformance/reference_corpus.py record tests/conformance/data/reference_corpus.npz
     python tests/conformance/reference_corpus.py compare tests/conformance/data/reference_corpus.npz
@@ -44,13 +44,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from worlds import WORLDS, World
+from systems import SYSTEMS, ExtendedSystem
 
 import snapbeam as sb
 from snapbeam.model import default_values
 
 DATA = Path(__file__).parent / "data" / "reference_corpus.npz"
-ACCURACY = {"order 4": "map", "order 6": "reference"}
+ACCURACY = {"order 4": "standard", "order 6": "reference"}
 """Accuracy of an integration by the order of its composition."""
 LAYOUTS = ("mode lanes", "run lanes")
 """CPU layouts: eight modes of a run in a register, or eight runs."""
@@ -165,7 +165,7 @@ class Case:
 
     name: str
     entry: str
-    """Of ``worlds.WORLDS``, or "analyses"."""
+    """Of ``systems.SYSTEMS``, or "analyses"."""
     table: str
     system: Callable[[], sb.System]
     rows: Callable[[], list[Row] | None]
@@ -185,10 +185,10 @@ def columns_of(records: NDArray[Any]) -> dict[str, NDArray[Any]]:
 
 
 def ensemble_rows(
-    world: World, modes: int, runs: int, seed: int, layout: str, **how: Any
+    entry: ExtendedSystem, modes: int, runs: int, seed: int, layout: str, **how: Any
 ) -> list[Row] | None:
     """Kernel records and statistics of random runs."""
-    system, points = world.system(modes), world.points(runs, seed)
+    system, points = entry.system(modes), entry.points(runs, seed)
     found = integrate(system, sb.Integration(threads=1, **how), points, layout)
     if found is None:
         return None
@@ -267,21 +267,21 @@ TANGENTS = (
 """Entries whose tangents are recorded: each has a kernel of its own, which compiles for about 10 s."""
 
 
-def modes_of(name: str, world: World) -> tuple[int, ...]:
-    if world.modes == 1:
+def modes_of(name: str, entry: ExtendedSystem) -> tuple[int, ...]:
+    if entry.modes == 1:
         return (1,)
-    return tuple(n for n in (1, 3, 8) if n >= world.fewest) if world.fewest < 2 else (2, 3, 8)
+    return tuple(n for n in (1, 3, 8) if n >= entry.fewest) if entry.fewest < 2 else (2, 3, 8)
 
 
 def ensemble_cases() -> Iterator[Case]:
     """Random runs of every entry, by modes, order, early termination and layout."""
-    for number, (name, world) in enumerate(WORLDS.items()):
+    for number, (name, entry) in enumerate(SYSTEMS.items()):
         settings: list[tuple[int, str, bool, int, int]] = []  # modes, order, early, runs, cycles
-        for modes in modes_of(name, world):
-            settings.append((modes, "order 4", False, 9, min(10, world.cycles)))
-            if world.decides:
-                settings.append((modes, "order 4", True, 8, min(40, world.cycles)))
-        middle = modes_of(name, world)[-1 if world.modes == 1 else 1]
+        for modes in modes_of(name, entry):
+            settings.append((modes, "order 4", False, 9, min(10, entry.cycles)))
+            if entry.decides:
+                settings.append((modes, "order 4", True, 8, min(40, entry.cycles)))
+        middle = modes_of(name, entry)[-1 if entry.modes == 1 else 1]
         settings.append((middle, "order 6", False, 8, 3))
         if name == "the paper's":
             settings += [(modes, "order 4", False, 16, 8) for modes in (2, 16, 32)]
@@ -298,27 +298,27 @@ def ensemble_cases() -> Iterator[Case]:
                     title,
                     name,
                     "ensembles",
-                    lambda world=world, modes=modes: world.system(modes),
-                    lambda world=world, modes=modes, runs=runs, seed=100 * number + at, layout=layout, how=how: (
-                        ensemble_rows(world, modes, runs, seed, layout, **how)
+                    lambda entry=entry, modes=modes: entry.system(modes),
+                    lambda entry=entry, modes=modes, runs=runs, seed=100 * number + at, layout=layout, how=how: (
+                        ensemble_rows(entry, modes, runs, seed, layout, **how)
                     ),
                     name in QUICK and layout == "mode lanes" and modes <= 8 and order == "order 4",
                 )
 
 
-def moved(world: World, modes: int, seed: int) -> sb.System:
+def moved(entry: ExtendedSystem, modes: int, seed: int) -> sb.System:
     """The system of an entry with random values of the parameters that its runs differ in."""
-    changes = {name: float(values[0]) for name, values in world.points(1, seed).items()}
-    return world.system(modes).replace(**changes)
+    changes = {name: float(values[0]) for name, values in entry.points(1, seed).items()}
+    return entry.system(modes).replace(**changes)
 
 
 def run_cases() -> Iterator[Case]:
     """Recorded runs of every entry; requests of a tolerance."""
-    for number, (name, world) in enumerate(WORLDS.items()):
-        few, many = modes_of(name, world)[0], modes_of(name, world)[-1]
-        long = min(8, world.cycles)
+    for number, (name, entry) in enumerate(SYSTEMS.items()):
+        few, many = modes_of(name, entry)[0], modes_of(name, entry)[-1]
+        long = min(8, entry.cycles)
         settings = [
-            (world.modes, "order 4", long, False),
+            (entry.modes, "order 4", long, False),
             (few, "order 4", long, True),
             (many, "order 6", 2, False),
         ]
@@ -327,8 +327,8 @@ def run_cases() -> Iterator[Case]:
         for at, (modes, order, cycles, early) in enumerate(settings):
             how = sb.Integration(cycles=cycles, accuracy=ACCURACY[order], early_termination=early)
 
-            def system(world: World = world, modes: int = modes, seed: int = 10 * number + at) -> sb.System:
-                return world.system(modes) if seed % 10 == 0 else moved(world, modes, seed)
+            def system(entry: ExtendedSystem = entry, modes: int = modes, seed: int = 10 * number + at) -> sb.System:
+                return entry.system(modes) if seed % 10 == 0 else moved(entry, modes, seed)
 
             title = f"run {at}: {name}, {modes} modes, {order}{', early' if early else ''}"
             yield Case(
@@ -346,36 +346,36 @@ def run_cases() -> Iterator[Case]:
         ("hunt_crossley", 2, 1e-5),
         ("unequal wells", 3, 1e-5),
     ):
-        world = WORLDS[name]
+        entry = SYSTEMS[name]
         how = sb.Integration(cycles=2, tolerance=tolerance)
         yield Case(
             f"tolerance {tolerance:g}: {name}, {modes} modes",
             name,
             "runs",
-            lambda world=world, modes=modes: world.system(modes),
-            lambda world=world, modes=modes, how=how: [
-                run_row(world.system(modes), how, np.linspace(0.0, 0.01, 50))
+            lambda entry=entry, modes=modes: entry.system(modes),
+            lambda entry=entry, modes=modes, how=how: [
+                run_row(entry.system(modes), how, np.linspace(0.0, 0.01, 50))
             ],
         )
 
 
 def state_cases() -> Iterator[Case]:
     """Advanced states and tangents of every entry."""
-    for name, world in WORLDS.items():
-        for modes in dict.fromkeys((world.modes, modes_of(name, world)[-1])):
+    for name, entry in SYSTEMS.items():
+        for modes in dict.fromkeys((entry.modes, modes_of(name, entry)[-1])):
             for order in ACCURACY:
                 periods = 3 if order == "order 4" else 1
                 for tangents in (0, 2):
-                    if tangents and (modes != world.modes or name not in TANGENTS):
+                    if tangents and (modes != entry.modes or name not in TANGENTS):
                         continue
                     title = f"advance: {name}, {modes} modes, {order}{', tangents' if tangents else ''}"
                     yield Case(
                         title,
                         name,
                         "states",
-                        lambda world=world, modes=modes: world.system(modes),
-                        lambda world=world, modes=modes, order=order, periods=periods, tangents=tangents: (
-                            advanced_rows(world.system(modes), order, periods, tangents)
+                        lambda entry=entry, modes=modes: entry.system(modes),
+                        lambda entry=entry, modes=modes, order=order, periods=periods, tangents=tangents: (
+                            advanced_rows(entry.system(modes), order, periods, tangents)
                         ),
                         name in ("the paper's", "a body") and order == "order 4" and not tangents,
                     )
@@ -432,12 +432,12 @@ def a_run() -> Any:
 ANALYSES: dict[str, Callable[[], xr.Dataset]] = {
     "run": lambda: a_run().dataset,
     "impacts of a run": lambda: a_run().impacts,
-    "run with everything": lambda: sb.simulate(WORLDS["a bit of all"].system(), SHORT).dataset,
-    "run with two strikers, impacts": lambda: sb.simulate(WORLDS["two strikers"].system(), SHORT).impacts,
-    "conditioning": lambda: sb.perturbation_growth(small_system(3), sb.Integration(cycles=4)),
+    "run with everything": lambda: sb.simulate(SYSTEMS["a bit of all"].system(), SHORT).dataset,
+    "run with two strikers, impacts": lambda: sb.simulate(SYSTEMS["two strikers"].system(), SHORT).impacts,
+    "perturbation growth": lambda: sb.perturbation_growth(small_system(3), sb.Integration(cycles=4)),
     "sweep": lambda: sb.sweep(small_system(3), PLANE, SHORT),
     "sweep with two strikers": lambda: sb.sweep(
-        WORLDS["two strikers"].system(), {"velocity_amplitude": [0.1, 0.2]}, SHORT
+        SYSTEMS["two strikers"].system(), {"velocity_amplitude": [0.1, 0.2]}, SHORT
     ),
     "sweep with replicates": lambda: sb.sweep(small_system(), PLANE, SHORT, replicates=sb.Replicates(3, check_half_step=True)),
     "sweep with refinement": lambda: sb.sweep(small_system(), PLANE, SHORT, refine_levels=1),
@@ -454,7 +454,7 @@ ANALYSES: dict[str, Callable[[], xr.Dataset]] = {
     ),
     "Poincare section": lambda: sb.dynamics.poincare_section(quiet_system(), periods=20, transient=10),
     "Lyapunov exponents": lambda: sb.dynamics.lyapunov_spectrum(small_system(3), 3, periods=20, transient=10),
-    "separation exponent": lambda: sb.dynamics.largest_lyapunov(small_system(3), periods=20, transient=10),
+    "largest Lyapunov exponent": lambda: sb.dynamics.largest_lyapunov(small_system(3), periods=20, transient=10),
     "branch": branch,
     "probability map": lambda: sb.uncertainty.probability_map(small_system(), PLANE, SPREAD, 12, integration=SHORT),
     "quantile threshold": lambda: sb.uncertainty.quantile_threshold(
@@ -534,7 +534,7 @@ PRINTED = (
     f"simulate {SMALL} --frequency-ratio 1.21 --velocity-amplitude 0.18 --json -",
     "map --modes 1 --cycles 5 --frequency-ratio 0.5:2:4 --velocity-amplitude 0.1:0.6:3",
     "threshold --modes 1 --cycles 5 --frequency-ratio 0.8:1.4:2 --velocity-amplitude 0.05:0.5:6",
-    "wells --modes 3",
+    "equilibria --modes 3",
     "frequencies --modes 3",
 )
 VARYING = re.compile(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from oracle import LEVEL, PaperBeam
 from scipy.optimize import brentq
-from world_oracle import Tip, differences, follow, missing
+from extended_oracle import Tip, differences, follow, missing
 
 import snapbeam as sb
 from snapbeam.model import default_values

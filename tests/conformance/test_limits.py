@@ -1,4 +1,4 @@
-"""Where one world becomes another: a part that no longer matters leaves the run that is without it."""
+"""Limits in which a part has no effect: the run is that of the system without the part."""
 
 from __future__ import annotations
 

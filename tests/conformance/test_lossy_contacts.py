@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from oracle import LEVEL, PaperBeam
 from scipy.integrate import solve_ivp
-from world_oracle import Tip, follow
+from extended_oracle import Tip, follow
 
 import snapbeam as sb
 from snapbeam.model import default_values

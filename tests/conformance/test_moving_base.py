@@ -51,7 +51,7 @@ def test_against_an_independent_solution(modes, cycles, stop) -> None:
     times = np.linspace(0.0, cycles * 2.0 * math.pi / omega, 801) * (1.0 - 1e-13)
     truth = live(PaperBeam(modes), around, times)
     motion = sb.AccelerationSine(frequency_ratio=ratio, acceleration_amplitude=strength)
-    own = {"base": sb.BaseExcitation(motion=motion, striker_on_base=stop != "in space")}
+    own = {"base_excitation": sb.BaseExcitation(motion=motion, striker_on_base=stop != "in space")}
     if stop != "none":
         own |= {
             "contact": default_values.CONTACT,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from oracle import LEVEL, LOCATION
 from sprung_beam import BENDING, SprungBeam
-from world_oracle import Tip, follow
+from extended_oracle import Tip, follow
 
 import snapbeam as sb
 from snapbeam.model import default_values

@@ -40,15 +40,15 @@ def system_of(names: tuple[str, ...], **phases: float) -> sb.System:
         parts |= {"contact": default_values.CONTACT, "striker": sb.Striker(drive=drive, location=LOCATION)}
     if "base" in names:
         motion = sb.AccelerationSine(frequency_ratio=RATIO, acceleration_amplitude=HARDEST, phase=at["base"])
-        parts["base"] = sb.BaseExcitation(motion=motion)
+        parts["base_excitation"] = sb.BaseExcitation(motion=motion)
     if "load" in names:
         motion = sb.HarmonicLoad(frequency_ratio=2.0 * RATIO, amplitude=load_amplitude(), phase=at["load"])
-        parts["axial"] = sb.AxialLoadModulation(motion=motion)
+        parts["axial_load"] = sb.AxialLoadModulation(motion=motion)
     return sb.System(MODEL, **parts)
 
 
 def advanced(system: sb.System, flow: Stroboscope, **how) -> np.ndarray:
-    found = sb.advance(system, periods=PERIODS, every=True, **how)
+    found = sb.advance(system, periods=PERIODS, save_every_period=True, **how)
     return np.concatenate([found.amplitude, found.velocity], axis=1) / flow.scales
 
 
@@ -59,7 +59,7 @@ def test_the_map_is_advance(names) -> None:
     flow = Stroboscope(system)
     wanted = advanced(system, flow)
     np.testing.assert_allclose(
-        flow.march(flow.coordinates(), PERIODS, every=True).every[0], wanted, atol=1e-12
+        flow.march(flow.coordinates(), PERIODS, save_every_period=True).every[0], wanted, atol=1e-12
     )
     here = flow.coordinates()
     for period in range(PERIODS):
@@ -101,7 +101,7 @@ def test_against_an_independent_solution(names) -> None:
     else:
         own = {name: motion for name, motion in (("base", base), ("load", load)) if name in names}
         truth = live(PaperBeam(2), Surroundings(**own), times).midspan_displacement
-    every = flow.march(flow.coordinates(), PERIODS, every=True).every[0] * flow.scales
+    every = flow.march(flow.coordinates(), PERIODS, save_every_period=True).every[0] * flow.scales
     found = every[:, :2] @ MODEL.midspan_shape / MODEL.length_scale
     np.testing.assert_allclose(found, truth[40::40], rtol=0.0, atol=2e-6)
 
@@ -135,7 +135,7 @@ def test_the_phase_of_a_start_counts() -> None:
     start = sb.State(amplitude=0.9 * MODEL.mirrored.equilibrium, phase=0.4)
     system = system_of(("base",)).replace(initial_state=start)
     flow = Stroboscope(system)
-    found = flow.march(flow.coordinates(), PERIODS, every=True).every[0]
+    found = flow.march(flow.coordinates(), PERIODS, save_every_period=True).every[0]
     np.testing.assert_allclose(found, advanced(system, flow), atol=1e-12)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from oracle import LEVEL, PaperBeam
 from test_timed_drives import smooth
-from world_oracle import Tip, differences, follow, missing
+from extended_oracle import Tip, differences, follow, missing
 
 import snapbeam as sb
 from snapbeam.model import default_values
@@ -139,17 +139,11 @@ CASES: dict[str, Callable[[float], Case]] = {
 }
 CYCLES: dict[object, int] = {1: 3, 3: 3, 8: 1} | {("logarithmic sweep", 1): 2, ("shock", 3): 2}
 """As long as conditioning allows: after another cycle these two answer a relative change of 1e-10 by 1e-7 b."""
-NORMAL = {("shock", 3)}
 
 
-@pytest.mark.parametrize(
-    ("name", "modes"),
-    [
-        pytest.param(name, modes, marks=() if (name, modes) in NORMAL else pytest.mark.slow)
-        for name in CASES
-        for modes in (1, 3, 8)
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("modes", [1, 3, 8])
+@pytest.mark.parametrize("name", CASES)
 def test_against_an_independent_solution(name, modes) -> None:
     beam = PaperBeam(modes)
     case = CASES[name](float(beam.omega[0]))
@@ -176,7 +170,8 @@ ENDS = {
 }
 
 
-@pytest.mark.parametrize("name", ["alone", pytest.param("over a sine", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["alone", "over a sine"])
 def test_a_shock_that_ends_in_touch(name) -> None:
     """Its velocity jumps while it presses: no step goes across, or the ledger would miss a hundredth of its work."""
     drive, cycles = ENDS[name]

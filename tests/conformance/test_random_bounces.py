@@ -103,6 +103,7 @@ def judge(runs: list[Bounced]) -> None:
     assert not beyond
 
 
+@pytest.mark.slow
 def test_some_bounces() -> None:
     rng = np.random.default_rng(2026)
     judge([bounced(drawn(rng)) for _ in range(12)])

@@ -10,9 +10,9 @@ from functools import cache
 import numpy as np
 import pytest
 import reference_corpus as rc
-from worlds import WORLDS
+from systems import SYSTEMS
 
-ENTRIES = [*WORLDS, "analyses"]
+ENTRIES = [*SYSTEMS, "analyses"]
 
 
 @cache
@@ -74,7 +74,7 @@ def test_coverage() -> None:
     without_states = {"two strikers"}
     for table, exempt in (("ensembles", set()), ("runs", set()), ("states", without_states)):
         covered = {case.entry for case in cases() if case.table == table and case.name in stored}
-        assert covered == set(WORLDS) - exempt, table
+        assert covered == set(SYSTEMS) - exempt, table
     words = [set(name.split(", ")) for name in stored if name.startswith("ensemble")]
     for layout in rc.LAYOUTS:
         for order in rc.ACCURACY:

@@ -79,6 +79,7 @@ def judge(kernel_output: list[KernelOutput]) -> None:
     assert len(below) <= 0.05 * len(kernel_output)
 
 
+@pytest.mark.slow
 def test_some_requests() -> None:
     rng = np.random.default_rng(2026)
     judge([request_of(rng) for _ in range(8)])

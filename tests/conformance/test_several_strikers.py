@@ -163,6 +163,7 @@ def test_order() -> None:
     assert math.log2(errors[0] / errors[1]) > 3.3, errors
 
 
+@pytest.mark.slow
 def test_swept_by_dotted_names(tmp_path) -> None:
     """A map over the place and the gap of the second striker has the runs of its points; its store is read again."""
     system = sb.System(model(3), default_values.CONTACT, [FIRST, stop()])

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from oracle import LEVEL, PaperBeam
-from world_oracle import Tip, follow
+from extended_oracle import Tip, follow
 
 import snapbeam as sb
 from snapbeam.model import default_values

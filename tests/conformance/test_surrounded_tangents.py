@@ -19,22 +19,22 @@ BASE = sb.BaseExcitation(
     motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25), striker_on_base=False
 )
 LOAD = sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0))
-WORLDS = {
-    "base": ({"base": BASE}, sb.FixedStop(), 0.9),
-    "load": ({"axial": LOAD}, sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.05), 1.21),
-    "both": ({"base": BASE, "axial": LOAD}, sb.FixedStop(), 0.9),
+SYSTEMS = {
+    "base": ({"base_excitation": BASE}, sb.FixedStop(), 0.9),
+    "load": ({"axial_load": LOAD}, sb.Sine(frequency_ratio=1.21, velocity_amplitude=0.05), 1.21),
+    "both": ({"base_excitation": BASE, "axial_load": LOAD}, sb.FixedStop(), 0.9),
 }
 
 
-@pytest.mark.slow  # three worlds are six kernels to compile
+@pytest.mark.slow  # three systems are six kernels to compile
 @pytest.mark.parametrize("modes", [1, 3])
-@pytest.mark.parametrize("world", list(WORLDS))
-def test_tangents_are_the_derivatives(world: str, modes: int) -> None:
+@pytest.mark.parametrize("name", list(SYSTEMS))
+def test_tangents_are_the_derivatives(name: str, modes: int) -> None:
     """Every column of the derivative after two periods, impacts on the way: central differences at level *reference*.
 
     The determinant is that of damping, exp(-2 T sum zeta omega), at every level, since kicks are shears.
     """
-    around, drive, ratio = WORLDS[world]
+    around, drive, ratio = SYSTEMS[name]
     model = sb.ReducedModel.from_beam(default_values.BEAM, modes=modes)
     system = sb.System(model, default_values.CONTACT, sb.Striker(drive=drive, gap=GAP), **around)
     well, omega = model.wells[0], float(model.omega[0])

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from oracle import LEVEL, LOCATION
 from uneven_beam import UnevenBeam
-from world_oracle import Tip, follow
+from extended_oracle import Tip, follow
 
 import snapbeam as sb
 from snapbeam.model import default_values

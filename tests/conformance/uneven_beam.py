@@ -7,7 +7,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 from oracle import DAMPING_RATIO, LENGTH, PaperBeam
 from scipy.optimize import minimize
-from world_oracle import Tip
+from extended_oracle import Tip
 
 Array = NDArray[np.float64]
 

@@ -21,8 +21,10 @@ import zarr.storage  # noqa: F401  (loaded before the first fork, so that a chil
 
 import snapbeam as sb
 from snapbeam.sweeps.checkpoint.store import Checkpoint
-from snapbeam.sweeps.doors import long_map, map_setup
 from snapbeam.sweeps.tasks import MemoryRunner, PointWork, Stage
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from small_map import setup_of, swept
 
 WRITERS = 3
 BEAM = sb.Beam(
@@ -42,7 +44,7 @@ def write(store, gate, answer, pause):
     os.read(gate, 1)
     time.sleep(pause)
     try:
-        long_map(**ASKED, store=store, chunk=3, threads=1)
+        swept(**ASKED, path=store, points_per_task=3, threads=1)
         said = {"ended": "written"}
     except sb.CheckpointError as error:
         said = {"ended": "refused", "text": str(error)}
@@ -75,7 +77,7 @@ def race(store, pauses):
 
 def main(folder, races, seed):
     """Run *races* races and print what was seen as JSON."""
-    work = PointWork(map_setup(**ASKED))
+    work = PointWork(setup_of(**ASKED))
     grid = work.setup.points
     wanted = MemoryRunner(work, 1).complete(Stage("base", grid, grid.size)).read(0, grid.size).content_hash()
     stage, draw = Stage("base", grid, 3), random.Random(seed)

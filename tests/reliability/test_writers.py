@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from small_map import swept
 
 from snapbeam.sweeps.checkpoint.records import CheckpointError
 from snapbeam.sweeps.checkpoint.store import Checkpoint
@@ -63,7 +64,7 @@ def test_a_refused_writer_touches_nothing(stored, work):
     with Checkpoint(path, work):
         torn.write_bytes(b"in the middle of it")
         before = {file: file.stat().st_mtime_ns for file in path.rglob("*")}
-        with pytest.raises(CheckpointError, match=rf"another process .process {os.getpid()}."):
+        with pytest.raises(CheckpointError, match=rf"another process is writing it .process {os.getpid()}."):
             Checkpoint(path, work)
         assert {file: file.stat().st_mtime_ns for file in path.rglob("*")} == before
     with Checkpoint(path, work):
@@ -72,7 +73,7 @@ def test_a_refused_writer_touches_nothing(stored, work):
 
 def test_a_foreign_folder_is_left_as_it_is(tmp_path, work):
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
-    with pytest.raises(InputError, match="is not empty and holds no map"):
+    with pytest.raises(InputError, match="is not empty and is not a checkpoint"):
         Checkpoint(tmp_path, work)
     assert [file.name for file in tmp_path.iterdir()] == ["notes.txt"]
 
@@ -86,7 +87,7 @@ def test_hard_links_lead_nowhere(stored, work, tmp_path, tried, name):
     os.link(outside, path / name)
     before = outside.read_bytes()
     tried("links in a store")
-    with pytest.raises(InputError, match="is a link or no plain file"), Checkpoint(path, work) as store:
+    with pytest.raises(InputError, match="is a link or not a plain file"), Checkpoint(path, work) as store:
         store.open_stage(stage)
         store.fail(stage, 0, "for this test")
     assert outside.read_bytes() == before
@@ -106,8 +107,6 @@ def test_a_whole_store_is_read_where_nothing_can_be_written(
     mounted, read_only, work, whole, small, tmp_path, tried
 ):
     """A complete store on read-only media is exported; one that is not says so."""
-    from snapbeam.sweeps.doors import long_map
-
     disk = mounted("media", "size=4m")
     stage = Stage("base", work.setup.points, CHUNK)
     for name, tasks in (("whole", 4), ("half", 2)):
@@ -118,11 +117,11 @@ def test_a_whole_store_is_read_where_nothing_can_be_written(
     read_only(disk)
     with Checkpoint(disk / "whole", work) as store:
         assert store.read_only
-    result = long_map(**small, store=disk / "whole", output=tmp_path / "map.nc")
+    result = swept(**small, path=disk / "whole", output=tmp_path / "map.nc")
     assert (result["response_class"].values.ravel() == work.values("response_class", whole)).all()
     result.close()
     with pytest.raises(CheckpointError, match="is read-only, and 2 of 4 tasks are to be computed"):
-        long_map(**small, store=disk / "half")
+        swept(**small, path=disk / "half")
     with pytest.raises(CheckpointError, match="cannot be written, Read-only file system"):
-        long_map(**small, store=disk / "none")
+        swept(**small, path=disk / "none")
     tried("stores on read-only media", 3)

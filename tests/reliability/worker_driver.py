@@ -16,13 +16,15 @@ import time
 from pathlib import Path
 
 import numpy as np
-from small_map import setup_of
 
 import snapbeam as sb
 from snapbeam.sweeps.checkpoint.store import Checkpoint
 from snapbeam.sweeps.checkpointed_sweep import CheckpointOptions, CheckpointRunner, SweepReport
 from snapbeam.sweeps.distributed import ClusterWorkers, open_client, parse_cluster
 from snapbeam.sweeps.tasks import MemoryRunner, PointWork, Stage
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from small_map import setup_of
 
 CHUNK = 4
 LONGEST = 180.0

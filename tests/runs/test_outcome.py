@@ -21,7 +21,7 @@ INTRAWELL, FIRST, SECOND, CONTINUOUS = (
 
 
 @pytest.mark.parametrize(
-    ("zero_crossings", "last_quarter", "cycles", "side", "expected"),
+    ("crossings", "last_quarter", "cycles", "side", "expected"),
     [
         (0, 0, 200, -1, INTRAWELL),
         (0, 0, 1, -1, INTRAWELL),
@@ -97,13 +97,13 @@ def test_outcome_from_statistics() -> None:
 def test_outcome_says_what_it_is() -> None:
     values = {name: np.zeros(1, dtype=row.dtype) for name, row in STATISTICS.items()}
     outcome = RunSummary.from_statistics(values)
-    assert repr(outcome) == "<Outcome intrawell, 0 crossings, 0 impacts>"
+    assert repr(outcome) == "<RunSummary intrawell, 0 zero crossings, 0 impacts>"
     lines = outcome.to_text().splitlines()
     assert len(lines) == len(STATISTICS)
-    assert lines[0].split() == ["response_class", "intrawell", "response_class", "class"]
+    assert lines[0].split() == ["response_class", "intrawell", "response", "class"]
     (force,) = [line for line in lines if line.startswith("peak_force")]
     assert force.split() == ["peak_force", "0", "N", "peak", "contact", "force"]
-    with pytest.raises(AttributeError, match="Outcome has no 'crossing'; it has response, status, crossings"):
+    with pytest.raises(AttributeError, match="RunSummary has no 'crossing'; it has response_class, status, zero_crossings"):
         _ = outcome.crossing
     with pytest.raises(KeyError):
         outcome["crossing"]

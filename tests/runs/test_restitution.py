@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from small_map import swept
 
 import snapbeam as sb
 from snapbeam.model import default_values
@@ -129,7 +130,7 @@ def test_early_decision_is_kept_and_told(one_mode, coefficient):
 
 
 def test_a_map_takes_the_law(one_mode):
-    ds = sb.response_map(
+    ds = swept(
         one_mode, sb.Restitution(0.6), frequency_ratio=[0.8, 1.2], velocity_amplitude=[0.05, 0.3], cycles=10
     )
     assert ds.attrs["restitution_coefficient"] == 0.6

@@ -13,9 +13,9 @@ TIME = np.linspace(0.0, 1.0, 5)
 
 def test_labels():
     run = trajectory_dataset(
-        TIME, 3.0 * TIME, displacement=TIME, modal_amplitude=np.zeros((5, 3)), attrs={"modes": 3}
+        TIME, 3.0 * TIME, displacement_at_striker=TIME, modal_amplitude=np.zeros((5, 3)), attrs={"modes": 3}
     )
-    assert run["displacement"].attrs == {
+    assert run["displacement_at_striker"].attrs == {
         "units": "1",
         "long_name": "beam displacement at the striker, over b",
     }
@@ -30,12 +30,12 @@ def test_labels():
 @pytest.mark.parametrize(
     ("variables", "message"),
     [
-        ({"displacement": TIME[:3]}, "displacement of shape (3,): must have dimensions ('time',)"),
+        ({"displacement_at_striker": TIME[:3]}, "displacement_at_striker of shape (3,): must have dimensions ('time',)"),
         ({"modal_amplitude": TIME}, "modal_amplitude of shape (5,)"),
         ({"displacment": TIME}, "displacment: not a variable of a run"),
         ({"mode": TIME}, "mode: not a variable of a run"),
-        ({"displacement": TIME * np.nan}, "displacement[0] = nan: must be finite"),
-        ({"displacement": ["a"] * 5}, "must be an array of numbers"),
+        ({"displacement_at_striker": TIME * np.nan}, "displacement_at_striker[0] = nan: must be finite"),
+        ({"displacement_at_striker": ["a"] * 5}, "must be an array of numbers"),
     ],
 )
 def test_refusals(variables, message):
@@ -47,7 +47,7 @@ def test_refusals(variables, message):
 def test_times_increase():
     with pytest.raises(InputError, match="must be strictly increasing"):
         trajectory_dataset(TIME[::-1])
-    run = trajectory_dataset(TIME, displacement=TIME)
+    run = trajectory_dataset(TIME, displacement_at_striker=TIME)
     run["time"] = ("time", np.array([0.0, 0.25, 0.25, 0.75, 1.0]), run["time"].attrs)
     with pytest.raises(InputError, match=r"time\[2\] = 0.25: must be later"):
         check_trajectory(run)
@@ -55,28 +55,20 @@ def test_times_increase():
 
 def test_dropouts_of_a_measured_run():
     measured = np.array([0.0, np.nan, 0.2, 0.3, 0.4])
-    run = trajectory_dataset(TIME, displacement=measured, valid=np.array([1, 0, 1, 1, 1], dtype=np.int8))
+    run = trajectory_dataset(TIME, displacement_at_striker=measured, valid=np.array([1, 0, 1, 1, 1], dtype=np.int8))
     assert check_trajectory(run) is run
-    with pytest.raises(InputError, match=r"displacement\[1\] = nan"):
-        trajectory_dataset(TIME, displacement=measured, valid=np.ones(5, dtype=np.int8))
+    with pytest.raises(InputError, match=r"displacement_at_striker\[1\] = nan"):
+        trajectory_dataset(TIME, displacement_at_striker=measured, valid=np.ones(5, dtype=np.int8))
 
 
 def test_check_says_what_is_wrong():
-    run = trajectory_dataset(TIME, displacement=TIME)
-    with pytest.raises(InputError, match="run without contact_force, penetration"):
-        check_trajectory(run, require=("contact_force", "penetration"))
-    run["displacement"].attrs["units"] = "mm"
-    with pytest.raises(InputError, match="displacement in units 'mm': must be in '1'"):
+    run = trajectory_dataset(TIME, displacement_at_striker=TIME)
+    with pytest.raises(InputError, match="run without contact_force, penetration_normalised"):
+        check_trajectory(run, require=("contact_force", "penetration_normalised"))
+    run["displacement_at_striker"].attrs["units"] = "mm"
+    with pytest.raises(InputError, match="displacement_at_striker in units 'mm': must be in '1'"):
         check_trajectory(run)
     with pytest.raises(InputError, match=r"must be an xarray\.Dataset, not dict"):
         check_trajectory({})
     with pytest.raises(InputError, match=r"with dimensions \('t',\)"):
-        check_trajectory(trajectory_dataset(TIME, displacement=TIME).assign(penetration=("t", TIME)))
-
-
-def test_files_of_version_0_1_are_read():
-    """They gave numbers over b the unit "b", which is none."""
-    run = trajectory_dataset(TIME, displacement=TIME, penetration=TIME)
-    for name in ("displacement", "penetration"):
-        run[name].attrs["units"] = "b"
-    assert check_trajectory(run) is run
+        check_trajectory(trajectory_dataset(TIME, displacement_at_striker=TIME).assign(penetration_normalised=("t", TIME)))

@@ -52,7 +52,7 @@ SHAKER = sb.Shaker(frequency_ratio=1.21, velocity_amplitude=0.18)
         ({"step": 0.0}, sb.InputError, "step = 0.0: must be a finite number greater than 0 s"),
         ({"step": math.nan}, sb.InputError, "step = nan: must be a finite number greater than 0 s"),
         ({"step": "1e-6"}, sb.InputTypeError, "step = '1e-6': must be .* not str"),
-        ({"accuracy": "best"}, sb.InputError, "accuracy = 'best': must be one of 'map', 'reference'"),
+        ({"accuracy": "best"}, sb.InputError, "accuracy = 'best': must be one of 'standard', 'reference'"),
         ({"engine": "abacus"}, sb.InputError, "engine = 'abacus': must be one of 'auto', 'cpu'"),
         ({"sample_times": []}, sb.InputError, r"sample_times = \[\]: must hold at least one instant"),
         ({"sample_times": [0.0, 0.0]}, sb.InputError, "sample_times: must be strictly increasing"),

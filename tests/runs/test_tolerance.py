@@ -85,7 +85,7 @@ def test_chaos_shortens_the_horizon() -> None:
 def test_a_request_beyond_reach_is_said(monkeypatch) -> None:
     """What the finest steps do not meet is a warning and a shorter horizon, not a claim."""
     monkeypatch.setattr("snapbeam.simulation.tolerance._FINE", (("standard", 1.0),))
-    monkeypatch.setattr("snapbeam.simulation.tolerance._ROUGH", (("map", 4.0), ("map", 2.0)))
+    monkeypatch.setattr("snapbeam.simulation.tolerance._ROUGH", (("standard", 4.0), ("standard", 2.0)))
     model, shaker = model_of(8), shaker_at(0.7, 0.4)
     with pytest.warns(RuntimeWarning, match="met only up to"):
         run = sb.simulate(
@@ -98,7 +98,7 @@ def test_a_request_beyond_reach_is_said(monkeypatch) -> None:
 
 
 def test_named_levels() -> None:
-    """(1.21, 0.18), 32 modes, five cycles: map within 1e-3, reference within 1e-8."""
+    """(1.21, 0.18), 32 modes, five cycles: standard within 1e-3, reference within 1e-8."""
     model, shaker = model_of(32), shaker_at(1.21, 0.18)
     times = np.linspace(0.0, 5 / (1.21 * model.reference_frequency), 101)
     system = sb.System(model, CONTACT, shaker)
@@ -114,7 +114,7 @@ def test_named_levels() -> None:
     recorded = joined(list(cpu_engine.record(ensemble, times, False)))
     alpha = ensemble.structure.amplitudes(recorded.q)
     truth = alpha @ model.shape_at(1 / 2.1) / model.length_scale
-    assert np.abs(levels["map"].dataset.displacement_at_striker.values - truth).max() < 1e-3
+    assert np.abs(levels["standard"].dataset.displacement_at_striker.values - truth).max() < 1e-3
     assert np.abs(levels["reference"].dataset.displacement_at_striker.values - truth).max() < 1e-8
 
 
@@ -243,8 +243,8 @@ def test_all_that_drives_is_changed() -> None:
     """A base under a stop, a load, a second striker: the numbers of each."""
     stop = sb.Striker(drive=sb.FixedStop(), gap=1e-4)
     around = {
-        "base": sb.BaseExcitation(motion=MOTIONS["chirp"]),
-        "axial": sb.AxialLoadModulation(motion=sb.LoadRamp(change=2.0, duration=3.0)),
+        "base_excitation": sb.BaseExcitation(motion=MOTIONS["chirp"]),
+        "axial_load": sb.AxialLoadModulation(motion=sb.LoadRamp(change=2.0, duration=3.0)),
     }
     second = sb.Striker(drive=MOTIONS["noise"], location=0.3, gap=1e-4)
     ensemble = make_ensemble(

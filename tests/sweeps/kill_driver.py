@@ -18,11 +18,13 @@ from pathlib import Path
 
 import numpy as np
 import zarr.storage  # noqa: F401  (loaded before the first fork, so that a child starts at once)
-from small_map import setup_of, swept
 
 import snapbeam as sb
 from snapbeam.sweeps.checkpoint.store import Checkpoint
 from snapbeam.sweeps.tasks import MemoryRunner, PointWork, Stage
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from small_map import setup_of, swept
 
 CHUNK = 3
 BEAM = sb.Beam(

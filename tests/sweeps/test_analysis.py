@@ -25,20 +25,20 @@ def test_threshold_of_a_known_map(synthetic_map):
 
 def test_no_threshold_where_nothing_snaps(synthetic_map):
     calm = synthetic_map.copy(deep=True)
-    calm.response[0] = ResponseClass.INTRAWELL
+    calm.response_class[0] = ResponseClass.INTRAWELL
     assert np.isnan(interwell_threshold(calm)[0])
 
 
 def test_a_failed_run_below_leaves_the_threshold_open(synthetic_map):
     found = interwell_threshold(synthetic_map)
     failed = synthetic_map.copy(deep=True)
-    failed.response[4, 0] = ResponseClass.UNKNOWN  # below the threshold
-    failed.response[6, -1] = ResponseClass.UNKNOWN  # above it
+    failed.response_class[4, 0] = ResponseClass.UNKNOWN  # below the threshold
+    failed.response_class[6, -1] = ResponseClass.UNKNOWN  # above it
     expected = found.copy()
     expected[4] = np.nan
     np.testing.assert_array_equal(interwell_threshold(failed), expected)
-    status = np.where(failed.response == ResponseClass.UNKNOWN, RunStatus.NOT_RUN, RunStatus.OK)
-    never_started = failed.assign(status=(failed.response.dims, status))
+    status = np.where(failed.response_class == ResponseClass.UNKNOWN, RunStatus.NOT_RUN, RunStatus.OK)
+    never_started = failed.assign(status=(failed.response_class.dims, status))
     np.testing.assert_array_equal(interwell_threshold(never_started), found)
 
 

@@ -76,7 +76,7 @@ def test_damaged_rows_are_not_read(whole, tmp_path):
 
 
 def test_what_is_no_store_is_refused(tmp_path):
-    with pytest.raises(sb.InputError, match="holds no map"):
+    with pytest.raises(sb.InputError, match="is not the folder of a sweep"):
         sb.read_checkpoint(tmp_path)
     with pytest.raises(sb.InputTypeError, match="must be a folder"):
         sb.read_checkpoint(3)

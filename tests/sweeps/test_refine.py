@@ -152,7 +152,7 @@ def test_whole_numbers_and_words_have_nothing_between_them():
     np.testing.assert_array_equal(found, truth(grid, by_structure))
     assert results.computed.mean() < 0.3
     with pytest.raises(
-        InputError, match="needs an axis of at least two numbers that are not whole by nature"
+        InputError, match="needs an axis of at least two real numbers"
     ):
         refine(DrawnRunner(Grid({"model.modes": np.array([1, 8])}), by_structure), 1)
 

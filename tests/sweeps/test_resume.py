@@ -87,7 +87,7 @@ def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
     assert f"16 tasks, {done} resumed, {16 - done} computed, 0 damaged, 0 failed" in again.stdout
     log = (tmp_path / "map.log").read_text(encoding="utf-8").splitlines()
     assert log[0].endswith("map of 64 points") and "T" in log[0].split()[0]
-    assert any(f"{4 * done} of 64 points are done" in line for line in log)
+    assert any(f"{4 * done} of 64 points are finished" in line for line in log)
     assert any("(100.0 %)" in line and "points/s" in line for line in log)
     resumed = xr.load_dataset(tmp_path / "map.nc", engine="h5netcdf")
     model = sb.ReducedModel.from_beam(BEAM, modes=1, damping_ratio=DAMPING_RATIO)
@@ -96,11 +96,11 @@ def test_killed_command_goes_on_from_its_store_alone(tmp_path, monkeypatch):
         velocity_amplitude=np.linspace(0.05, 0.6, 8), location=LOCATION,
     )  # fmt: skip
     xr.testing.assert_equal(resumed, whole)
-    assert "bit for bit" in resumed.attrs["reproducible"]
+    assert "bitwise identical" in resumed.attrs["reproducible"]
     verified = CliRunner().invoke(app, ["map", "--checkpoint", "store", "--check-checkpoint"])
     assert verified.exit_code == 0 and "16 resumed, 0 computed, 0 damaged" in verified.stdout
     refused = CliRunner().invoke(app, ["map", "--checkpoint", "store", "--cycles", "61"])
-    assert refused.exit_code == 2 and "cycles: 60 in the store, 61 asked for" in refused.stderr
+    assert refused.exit_code == 2 and "cycles: 60 in the checkpoint, 61 requested" in refused.stderr
 
 
 def test_interrupt_keeps_what_is_finished(tmp_path):
@@ -176,9 +176,9 @@ side, folder = int(sys.argv[1]), sys.argv[2]
 beam = sb.Beam(length=0.161, thickness=0.4e-3, width=15e-3, density=7800.0, young_modulus=200e9,
                buckling_level=0.335e-3)
 model = sb.ReducedModel.from_beam(beam, modes=1)
-swept(model, sb.HertzContact(stiffness=4e8), cycles=1, frequency_ratio=np.linspace(2.0, 4.0, side),
-            velocity_amplitude=np.linspace(0.01, 0.6, 1000), step=7e-4, store=folder + "/store",
-            output=folder + "/map.nc")
+system = sb.System(model, sb.HertzContact(stiffness=4e8), sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.0))
+axes = {"frequency_ratio": np.linspace(2.0, 4.0, side), "velocity_amplitude": np.linspace(0.01, 0.6, 1000)}
+sb.sweep(system, axes, sb.Integration(cycles=1, step=7e-4), checkpoint=folder + "/store", output=folder + "/map.nc")
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 """
 

@@ -161,17 +161,17 @@ def test_other_parameters_are_refused_with_the_differences(stored, small):
     with pytest.raises(InputError) as refused:
         Checkpoint(path, PointWork(setup_of(**other)))
     text = str(refused.value)
-    assert "cycles: 3 in the store, 4 asked for" in text
-    assert re.search(r"velocity_amplitude: .* in the store, 6 points from 0\.05 to 0\.7 asked for", text)
-    assert "location: 0.476" in text and "0.4 asked for" in text
+    assert "cycles: 3 in the checkpoint, 4 requested" in text
+    assert re.search(r"velocity_amplitude: .* in the checkpoint, 6 points from 0\.05 to 0\.7 requested", text)
+    assert "location: 0.476" in text and "0.4 requested" in text
     assert "damping_ratio" not in text and "frequency_ratio" not in text
-    with pytest.raises(InputError, match=r"replicas\.count: nothing in the store, 2 asked for"):
-        swept(**small, path=path, replicas=2)
+    with pytest.raises(InputError, match=r"replicates\.count: nothing in the checkpoint, 2 requested"):
+        swept(**small, path=path, replicates=2)
 
 
 def test_a_folder_that_is_no_store(tmp_path, work):
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
-    with pytest.raises(InputError, match="is not empty and holds no map"):
+    with pytest.raises(InputError, match="is not empty and is not a checkpoint"):
         Checkpoint(tmp_path, work)
     with pytest.raises(InputError, match="must be a folder, not a file"):
         Checkpoint(tmp_path / "notes.txt", work)
@@ -187,7 +187,7 @@ def test_a_damaged_description_is_told(stored, work):
         with pytest.raises(CheckpointError, match=r"map\.json is damaged"):
             Checkpoint(path, work)
     (path / "map.json").write_text(json.dumps(held | {"format_version": 99}), encoding="utf-8")
-    with pytest.raises(InputError, match=r"another format \(99\)"):
+    with pytest.raises(InputError, match=r"has the format .*'format_version': 99"):
         Checkpoint(path, work)
 
 
@@ -199,7 +199,7 @@ def test_links_are_refused(stored, work, tmp_path, where):
     moved = tmp_path / "elsewhere"
     (path / where).rename(moved)
     (path / where).symlink_to(moved)
-    with pytest.raises(InputError, match="is a link or no plain file"):
+    with pytest.raises(InputError, match="is a link or not a plain file"):
         Checkpoint(path, work)
 
 
@@ -208,17 +208,17 @@ def test_names_that_leave_the_store_are_refused(stored, work, name):
     path, stage = stored
     good = TaskLog(path / "tasks.jsonl").records["base", 0]
     append_line(path / "tasks.jsonl", Record(**(vars(good) | {"stage": name})).line())
-    with pytest.raises(InputError, match="is no name of a member of a store"):
+    with pytest.raises(InputError, match="is not a name of a member of a checkpoint"):
         Checkpoint(path, work)
     (path / "tasks.jsonl").unlink()
-    with Checkpoint(path, work) as store, pytest.raises(InputError, match="is no name of a member"):
+    with Checkpoint(path, work) as store, pytest.raises(InputError, match="is not a name of a member"):
         store.open_stage(Stage(name, stage.points, CHUNK))
 
 
 HOLDER = """
 import sys, time
 from pathlib import Path
-from snapbeam.sweeps.keep.durable import CheckpointLock
+from snapbeam.sweeps.checkpoint.records import CheckpointLock
 with CheckpointLock(Path(sys.argv[1]) / "lock"):
     print("held", flush=True)
     time.sleep(120)
@@ -231,7 +231,7 @@ def test_a_second_writer_is_refused_until_the_first_is_gone(stored, work):
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout.readline() == "held\n"
-            with pytest.raises(CheckpointError, match=f"written by another process .process {process.pid}."):
+            with pytest.raises(CheckpointError, match=f"another process is writing it .process {process.pid}."):
                 Checkpoint(path, work)
         finally:
             process.send_signal(signal.SIGKILL)
@@ -335,7 +335,7 @@ def test_verify_repairs_and_computes_nothing_else(tmp_path, small, work):
     assert report.damaged == [("base", 2)] and report.computed == 1 and report.missing == 2
     assert int((checked["response_class"] == -1).sum()) == 8
     assert (checked["status"].values.ravel()[6:12] == snapbeam.RunStatus.NOT_RUN).all()
-    with pytest.raises(InputError, match="there is no map to verify"):
+    with pytest.raises(InputError, match="is not the folder of a sweep, so it cannot be checked"):
         swept(**small, path=tmp_path / "none", check_checkpoint=True)
 
 
@@ -345,7 +345,7 @@ def test_another_version_is_told(stored, work, small):
     for record in TaskLog(path / "tasks.jsonl").records.values():
         lines.append(Record(**(vars(record) | {"version": "0.0.1", "processor": "i386"})).line())
     (path / "tasks.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    with pytest.warns(UserWarning, match=r"begun with snapbeam 0\.0\.1 on a i386 processor"):
+    with pytest.warns(UserWarning, match=r"started with snapbeam 0\.0\.1 on a i386 processor"):
         result = swept(**small, path=path)
     assert "snapbeam 0.0.1, processor i386" in result.attrs["computed_by"]
 
@@ -362,10 +362,10 @@ def test_nothing_on_the_way_to_a_number_runs_code_of_a_file():
     )
     package = Path(snapbeam.__file__).parent
     for file in set(package.rglob("*.py")) - {
-        package / "engines" / "scalar" / "kept_code.py",
-        package / "engines" / "cpu" / "few" / "text.py",
-        package / "engines" / "scalar" / "joined.py",
-        package / "engines" / "scalar" / "several.py",
+        package / "solver" / "compilation.py",
+        package / "solver" / "cpu" / "run_lanes" / "step.py",
+        package / "solver" / "excitation.py",
+        package / "solver" / "further_contacts.py",
     }:
         hits = [line for line in file.read_text(encoding="utf-8").splitlines() if forbidden.search(line)]
         assert hits == [], file

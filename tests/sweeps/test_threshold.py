@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 
 import snapbeam as sb
 from snapbeam.cli.app import app
-from snapbeam.model.default_values import BEAM
 from snapbeam.util.validation import InputError
 
 RUNNER = CliRunner()
@@ -58,7 +57,7 @@ def test_thresholds_are_those_of_the_full_map(along, values, over, modes, cycles
     asked = sb.Integration(cycles=cycles, early_termination=True)
     full = sb.sweep(system, {**over, along: values}, asked)
     found = sb.threshold(system, along, values, over, sb.Integration(cycles=cycles))
-    short = found.attrs["along"]
+    short = found.attrs["parameter"]
     first, always = brute_force(full, short)
     np.testing.assert_array_equal(found["lower_threshold"], first)
     np.testing.assert_array_equal(found["upper_threshold"], always)
@@ -118,35 +117,41 @@ def test_runs_of_an_engine_that_fail():
     np.testing.assert_array_equal(found["upper_threshold_max"], [np.nan, np.nan])
 
 
-def test_several_numbers_of_modes(contact):
-    models = [sb.ReducedModel.from_beam(BEAM, modes=n) for n in (1, 2)]
-    axes = {"frequency_ratio": np.linspace(0.5, 1.5, 4), "velocity_amplitude": np.linspace(0.02, 0.6, 8)}
-    seen = []
-    both = sb.threshold_curve(
-        models, contact, cycles=4, **axes, progress=lambda done, total: seen.append((done, total))
+def test_several_numbers_of_modes():
+    axes = {"modes": [1, 2], "frequency_ratio": np.linspace(0.5, 1.5, 4)}
+    amplitude, asked, seen = np.linspace(0.02, 0.6, 8), sb.Integration(cycles=4), []
+    both = sb.threshold(
+        SYSTEM,
+        "velocity_amplitude",
+        amplitude,
+        axes,
+        asked,
+        progress=lambda done, total: seen.append((done, total)),
     )
     assert both["lower_threshold"].dims == ("modes", "frequency_ratio")
     assert both["modes"].values.tolist() == [1, 2]
     assert both["reference_frequency"].values == pytest.approx([83.93, 83.93], abs=0.01)
     assert both.attrs["runs"] == 64
     assert seen[-1] == (64, 64) and all(a[0] <= b[0] for a, b in itertools.pairwise(seen))
-    alone = sb.threshold_curve(models[1], contact, cycles=4, **axes)
+    two = SYSTEM.replace(**{"model.modes": 2})
+    alone = sb.threshold(
+        two, "velocity_amplitude", amplitude, {"frequency_ratio": axes["frequency_ratio"]}, asked
+    )
     np.testing.assert_array_equal(both["lower_threshold"].sel(modes=2), alone["lower_threshold"])
 
 
-def test_what_is_refused(model, contact):
-    ratio, amplitude = [0.5, 1.0], [0.1, 0.2, 0.3]
-    for arguments, message in (
-        ({"frequency_ratio": 1.0, "velocity_amplitude": amplitude}, "one of them must be an array"),
-        ({"frequency_ratio": ratio, "velocity_amplitude": amplitude, "location": [0.3, 0.4]}, "not 2 arrays"),
-        ({"frequency_ratio": ratio, "velocity_amplitude": 0.3}, "at least two amplitudes"),
-    ):
-        with pytest.raises(InputError, match=message):
-            sb.threshold_curve(model, contact, **arguments)
-    with pytest.raises(InputError, match=r"numbers of modes \[1, 1\] must differ"):
-        sb.threshold_curve([model, model], contact, frequency_ratio=ratio, velocity_amplitude=amplitude)
-    with pytest.raises(InputError, match="must be a ReducedModel or a list"):
-        sb.threshold_curve([], contact, frequency_ratio=ratio, velocity_amplitude=amplitude)
+@pytest.mark.parametrize(
+    ("parameter", "values", "axes", "message"),
+    [
+        ("modes", [1, 2], {"frequency_ratio": [0.5, 1.0]}, "parameter = 'modes': must be a number that may differ"),
+        ("velocity_amplitude", AMPLITUDE, {}, "axes = {}: must map at least one parameter"),
+        ("velocity_amplitude", 0.3, {"frequency_ratio": [0.5, 1.0]}, "at least two values to choose from"),
+        ("velocity_amplitude", [0.3, 0.1], {"frequency_ratio": [0.5, 1.0]}, "must be strictly increasing"),
+    ],
+)
+def test_what_is_refused(parameter, values, axes, message):
+    with pytest.raises(InputError, match=message):
+        sb.threshold(SYSTEM, parameter, values, axes)
 
 
 def test_command(tmp_path, monkeypatch):
@@ -195,7 +200,7 @@ def test_command_counts_only_what_was_run(tmp_path, monkeypatch):
         "highest run is intrawell, at 1 of 8 points",
         "failed runs leave the threshold open, down to V = 0.2, at 1 of 8 points",
         "failed runs leave the top of the band open, at 1 of 8 points",
-        "8 failed (NOT_FINITE)",
+        "8 failed (DIVERGED)",
     ):
         assert text in " ".join(done.stdout.split()), text
     assert (tmp_path / "t.png").stat().st_size > 10_000

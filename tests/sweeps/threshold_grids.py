@@ -37,7 +37,7 @@ def stand_in(monkeypatch, columns: str) -> np.ndarray:
         found["status"] = np.where(failed, RunStatus.DIVERGED, RunStatus.OK).astype(found["status"].dtype)
         return found
 
-    monkeypatch.setattr(SweepSetup, "integrate", march)
+    monkeypatch.setattr(SweepSetup, "integrate", integrate)
     return ratio
 
 

@@ -1,1 +1,1 @@
-"""simulation"""
+"""Single runs: simulate, advance, the dataset of a run, saving and loading."""

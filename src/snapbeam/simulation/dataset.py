@@ -84,8 +84,6 @@ SCHEMA: dict[str, Variable] = {
 
 _MODAL = ("modal_amplitude", "modal_velocity")
 _OF_STRIKERS = ("striker_displacements", "striker_penetrations", "striker_forces")
-_FORMER_UNITS = {"b": "1"}
-"""Units that files of version 0.1 give to numbers over b."""
 _COORDINATES = ("time", "cycle", "mode", "striker")
 
 
@@ -190,7 +188,7 @@ def check_trajectory(
         if variable.dims != quantity.dims:
             raise InputError(f"{name} with dimensions {variable.dims}: must have dimensions {quantity.dims}")
         units = variable.attrs.get("units")
-        if _FORMER_UNITS.get(str(units), units) != quantity.units:
+        if units != quantity.units:
             raise InputError(f"{name} in units {shown(units)}: must be in {quantity.units!r}")
         good = np.isfinite(variable.values)
         if valid is not None and name not in _COORDINATES:
@@ -252,7 +250,7 @@ def _follows(ensemble: Ensemble, system: System, recorded: Recorded) -> _Array:
     """What a base does to tips that stand in space, in its frame, as seen from the first striker's side."""
     if system.base_excitation is None or system.base_excitation.striker_on_base:
         return np.zeros(recorded.times.size)
-    moved = motions_of(ensemble, system, recorded.times)["base"][0]
+    moved = motions_of(ensemble, system, recorded.times)["base_excitation"][0]
     return np.asarray(-ensemble.structure.sign * moved)
 
 
@@ -392,11 +390,11 @@ def _around(ensemble: Ensemble, system: System, recorded: Recorded, values: _Arr
         return found
     motions = motions_of(ensemble, system, recorded.times)
     if system.base_excitation is not None:
-        found["base_displacement"] = motions["base"][0] / system.scale.length
-        found["base_velocity"] = motions["base"][1] / (system.scale.length * system.scale.omega)
+        found["base_displacement"] = motions["base_excitation"][0] / system.scale.length
+        found["base_velocity"] = motions["base_excitation"][1] / (system.scale.length * system.scale.omega)
         found["base_work"] = values[:, 7]
     if system.axial_load is not None:
-        found["load_change"] = motions["axial"][0]
+        found["load_change"] = motions["axial_load"][0]
         found["load_work"] = values[:, 8]
     return found
 

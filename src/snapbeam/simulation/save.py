@@ -25,11 +25,11 @@ from snapbeam.util.validation import InputError, file_path
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["compressed", "description", "load", "outcome_dataset", "save_run"]
+__all__ = ["compressed", "description", "load", "summary_dataset", "save_run"]
 
 
-_FORMAT = "snapbeam run 2"
-_GROUPS = ("impacts", "outcome")
+_FORMAT = "snapbeam run 3"
+_GROUPS = ("impacts", "summary")
 _END = ("amplitude", "velocity", "phase", "striker_position", "contact_time", "striker_shift", "striker_rate")
 _COMPRESSION = {"zlib": True, "complevel": 4, "shuffle": True}
 
@@ -42,7 +42,7 @@ def save_run(run: Run, path: str | os.PathLike[str]) -> None:
     """
     target = check_writable(path, "path", (".nc",))
     root = run.dataset.assign_attrs(description(run.system, run.integration, run.accuracy, run.final_state))
-    groups = {None: root, "impacts": run.impacts.assign_attrs({}), "outcome": outcome_dataset(run.summary)}
+    groups = {None: root, "impacts": run.impacts.assign_attrs({}), "summary": summary_dataset(run.summary)}
     write_netcdf(groups, target, {name: compressed(dataset) for name, dataset in groups.items()})
 
 
@@ -58,7 +58,7 @@ def description(
     if accuracy is not None:
         described["snapbeam_accuracy"] = _json(vars(accuracy))
     if end is not None:
-        described["snapbeam_end"] = _json({name: getattr(end, name) for name in _END})
+        described["snapbeam_final_state"] = _json({name: getattr(end, name) for name in _END})
     return described
 
 
@@ -84,15 +84,15 @@ def load(path: str | os.PathLike[str]) -> Run:
             if "snapbeam_accuracy" in attrs
             else None
         )
-        end = _state(json.loads(attrs.pop("snapbeam_end"))) if "snapbeam_end" in attrs else None
+        end = _state(json.loads(attrs.pop("snapbeam_final_state"))) if "snapbeam_final_state" in attrs else None
     except (KeyError, TypeError, ValueError, RecursionError) as error:
         raise InputError(f"path = {str(path)!r}: its description is damaged ({error})") from None
     dataset = check_trajectory(dataset.drop_attrs(deep=False).assign_attrs(attrs))
-    values = {str(name): array.values.item() for name, array in parts["outcome"].variables.items()}
+    values = {str(name): array.values.item() for name, array in parts["summary"].variables.items()}
     return Run(dataset, RunSummary(values), parts["impacts"], system, integration, accuracy, end)
 
 
-def outcome_dataset(outcome: RunSummary) -> xr.Dataset:
+def summary_dataset(outcome: RunSummary) -> xr.Dataset:
     """The statistics of a run as scalar variables, with what their codes mean."""
     import xarray as xr
 

@@ -74,7 +74,7 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
         "shortest_contact_step": plan.step / 2**plan.finest,
     }
     if system.contact is not None:
-        attrs["contact_law"] = system.contact.name
+        attrs["contact_type"] = system.contact.name
         attrs |= _short(system.contact)
     if model.beam is not None:
         attrs |= {name: float(value) for name, value in _short(model.beam).items()}
@@ -82,9 +82,9 @@ def describe_system(system: System, plan: Plan) -> dict[str, Any]:
     if model.imperfection is not None:
         attrs |= _short(model.imperfection)
     sections = system.to_mapping() if system.has_environment else {}
-    for section in ("base", "axial", "harvester"):
+    for section in ("base_excitation", "axial_load", "harvester"):
         for name, value in sections.get(section, {}).items():
-            short = f"{section}_kind" if name == "type" else lookup(f"{section}.{name}").short
+            short = f"{section}_type" if name == "type" else lookup(f"{section}.{name}").short
             attrs[short] = int(value) if isinstance(value, bool) else value
     return attrs | _of_others(system)
 
@@ -93,11 +93,11 @@ def _of_others(system: System) -> dict[str, Any]:
     """What is said of the strikers beside the first."""
     attrs: dict[str, Any] = {"strikers": 1 + len(system.further_contacts)} if system.further_contacts else {}
     for section, values in system.to_mapping().items() if system.further_contacts else ():
-        number = numbered(section)[1]
+        part, number = numbered(section)
         if number > 1:
             attrs |= {
-                f"{name}_striker_{number}"
-                if name in ("type", "type")
+                f"{part}_type_striker_{number}"
+                if name == "type"
                 else lookup(f"{section}.{name}").short: value
                 for name, value in values.items()
             }
@@ -236,7 +236,7 @@ def _own_attributes(system: System, integration: Integration, lasted: float) -> 
         }
     elif striker is not None and isinstance(striker.drive, RecordedMotion):
         attrs |= {
-            "drive": "recorded_motion",
+            "drive_type": "recorded_motion",
             "frequency_ratio": striker.drive.frequency / system.model.reference_frequency,
         }
     if striker is not None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from snapbeam.model.integration import Integration
 from snapbeam.model.system import System
 from snapbeam.simulation.dataset import impact_table, joined, run_dataset
-from snapbeam.simulation.save import compressed, description, outcome_dataset
+from snapbeam.simulation.save import compressed, description, summary_dataset
 from snapbeam.simulation.simulate import Prepared, end_state, prepared, reached_by, said_of
 from snapbeam.simulation.summary import RunSummary
 from snapbeam.solver.registry import resolve
@@ -126,7 +126,7 @@ class _Writer:
         self.file.attrs.update(attrs | description(run.system, run.integration, run.accuracy, end))
         tables = {
             "impacts": impact_table(np.concatenate(self.impacts), attrs).assign_attrs({}),
-            "outcome": outcome_dataset(outcome),
+            "summary": summary_dataset(outcome),
         }
         for name, table in tables.items():
             table.dump_to_store(H5NetCDFStore(self.file.create_group(name)), encoding=compressed(table))

@@ -1,4 +1,4 @@
-"""The outcome of a run: its class and its statistics, by name."""
+"""The summary of a run: its response class and its statistics, by name."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ __all__ = ["RunSummary"]
 
 
 class RunSummary(Mapping[str, Any]):
-    """What one run did, in a few numbers: a mapping, and the same as attributes.
+    """Response class and statistics of one run: a mapping whose items are also attributes.
 
-    The names, units and meanings are those of :data:`snapbeam.STATISTICS`; displacements are over b, velocities
-    over b omega_1.  A run that failed has ``response`` UNKNOWN and a ``status`` whose ``advice`` says why.  A run
-    decided early (``early_stop_time`` in seconds, NaN otherwise) has the certain class, but extremes and counts that
-    stop there.  ``final_well_proven`` says whether the run provably stays in the well it ended in; ``final_well`` is the
-    sign of w(1/2) at the end.
+    :data:`snapbeam.STATISTICS` defines the names, units and meanings; displacements are in units of b, velocities in
+    units of b omega_1.  A run that failed has the ``response_class`` UNKNOWN, and the ``advice`` of its ``status``
+    gives the reason.  If a run ends early (``early_stop_time`` in seconds, NaN otherwise), its class is certain, but
+    its extremes and counts stop at that time.  ``final_well`` is the sign of w(1/2) at the end; ``final_well_proven``
+    is True if the run provably stays in that well.
     """
 
-    response: ResponseClass
+    response_class: ResponseClass
     status: RunStatus
-    crossings: int
+    zero_crossings: int
     zero_crossings_last_quarter: int
     last_zero_crossing: float
     final_well: int
@@ -45,7 +45,7 @@ class RunSummary(Mapping[str, Any]):
     def __init__(self, values: Mapping[str, Any]) -> None:
         mapping("values", values)
         if missing := {"response_class", "status"} - set(values):
-            raise InputError(f"values: without {', '.join(sorted(missing))}")
+            raise InputError(f"values: must contain {', '.join(sorted(missing))}")
         found = {
             name: value.item() if isinstance(value, np.generic) else value for name, value in values.items()
         }
@@ -57,7 +57,7 @@ class RunSummary(Mapping[str, Any]):
 
     @classmethod
     def from_statistics(cls, statistics: Mapping[str, NDArray[np.generic]], index: int = 0) -> RunSummary:
-        """One run of what :func:`snapbeam.solver.statistics.statistics_of` returns."""
+        """Summary of one run of the statistics that :func:`snapbeam.solver.statistics.statistics_of` returns."""
         mapping("statistics", statistics)
         index = integer(
             "index", index, 0, max(0, min((np.size(each) for each in statistics.values()), default=1) - 1)
@@ -84,14 +84,15 @@ class RunSummary(Mapping[str, Any]):
 
     def __repr__(self) -> str:
         ended = "" if self.status is RunStatus.OK else f", {self.status.name}"
-        return f"<RunSummary {self.response_class.label}{ended}, {self.zero_crossings} crossings, {self.impacts} impacts>"
+        counts = f"{self.zero_crossings} zero crossings, {self.impacts} impacts"
+        return f"<RunSummary {self.response_class.label}{ended}, {counts}>"
 
     def _repr_html_(self) -> str:
         rows = [line.split(maxsplit=1) for line in self.to_text().splitlines()]
-        return html_table(f"Outcome: {self.response_class.label}", rows)
+        return html_table(f"Run summary: {self.response_class.label}", rows)
 
     def to_text(self) -> str:
-        """Every statistic with its unit and its meaning, a line each."""
+        """Table of the statistics as text: name, value, unit and meaning."""
         lines = []
         for name, value in self._values.items():
             row = STATISTICS.get(name)

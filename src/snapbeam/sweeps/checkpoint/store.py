@@ -131,24 +131,22 @@ def read_description(file: Path) -> dict[str, Any]:
     )
     try:
         held = json.loads(file.read_bytes())
-        if not isinstance(held, dict):
-            raise damaged
-        if {name: held.get(name) for name in FORMAT} != FORMAT:
-            raise InputError(
-                f"checkpoint = {str(file.parent)!r}: has the format {held.get('format')} "
-                f"{held.get('format_version')}, not {FORMAT['format']} {FORMAT['format_version']}; give another folder"
-            )
+        described = {name: held[name] for name in FORMAT}
         sound = (
             isinstance(held["parameters"], dict)
             and held["parameter_hash"] == parameter_hash(held["parameters"])
             and isinstance(held["points_per_task"], int)
             and held["points_per_task"] >= 1
         )
-    except (ValueError, KeyError, RecursionError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         raise damaged from None
+    if described != FORMAT:
+        raise InputError(
+            f"checkpoint = {str(file.parent)!r}: has the format {described}, not {FORMAT}; give another folder"
+        )
     if not sound:
         raise damaged
-    return held
+    return dict(held)
 
 
 def read_stored_config(path: str | Path) -> dict[str, Any] | None:

@@ -21,9 +21,9 @@ def test_measuring_error_is_that_of_a_pixel():
     assert MEASURING_ERROR / BEAM.buckling_level == pytest.approx(0.0103, abs=1e-4)
 
 
-def starts_of(model, replicas, side="below"):
+def starts_of(model, replicates, side="below"):
     system = sb.System(model, CONTACT, sb.Shaker(frequency_ratio=1.0, velocity_amplitude=0.1, side=side))
-    return [perturbed_start(system, replicas, repeat) for repeat in range(replicas.count)]
+    return [perturbed_start(system, replicates, repeat) for repeat in range(replicates.count)]
 
 
 @pytest.mark.parametrize("modes", [1, 4, 32])
@@ -56,22 +56,22 @@ def test_starts_are_reproducible_and_mirror():
 
 def test_shares(small):
     plain = swept(**small)
-    sure = swept(**small, replicas=6, check_half_step=True)
+    sure = swept(**small, replicates=Replicates(6, check_half_step=True))
     share = sure["class_fraction"]
-    assert share.dims == ("frequency_ratio", "velocity_amplitude", "response_class")
-    np.testing.assert_allclose(share.sum("response_class"), 1.0)
+    assert share.dims == ("frequency_ratio", "velocity_amplitude", "class_code")
+    np.testing.assert_allclose(share.sum("class_code"), 1.0)
     np.testing.assert_allclose(share.values * 8.0, np.rint(share.values * 8.0))
     for name in plain.data_vars:
         xr.testing.assert_equal(sure[name], plain[name])
-    own = share.sel(response_class=sure["response_class"])
+    own = share.sel(class_code=sure["response_class"])
     assert (own >= 1.0 / 8.0).all()
     halved = swept(**small, step=0.5 * plain.attrs["step"])
     np.testing.assert_array_equal(sure["response_half_step"], halved["response_class"])
-    assert sure.attrs["replicas"] == 6 and sure.attrs["perturbation_rms"] == MEASURING_ERROR
-    tiny = swept(**small, replicas=2, perturbation_rms=1e-15)
-    wild = swept(**small, replicas=6, perturbation_rms=1e-4)
-    assert float(tiny["class_fraction"].max("response_class").mean()) > float(
-        wild["class_fraction"].max("response_class").mean()
+    assert sure.attrs["replicates"] == 6 and sure.attrs["perturbation_rms"] == MEASURING_ERROR
+    tiny = swept(**small, replicates=Replicates(2, perturbation_rms=1e-15))
+    wild = swept(**small, replicates=Replicates(6, perturbation_rms=1e-4))
+    assert float(tiny["class_fraction"].max("class_code").mean()) > float(
+        wild["class_fraction"].max("class_code").mean()
     )
 
 
@@ -82,18 +82,18 @@ def test_repeats_of_starts_that_are_swept():
     axes = {"initial_state.velocity[1]": [0.0, 1.0, 2.0], "velocity_amplitude": [0.02, 0.03]}
     asked = sb.Integration(cycles=3)
     ds = sb.sweep(system, axes, asked, replicates=Replicates(2, perturbation_rms=1e-15))
-    assert (ds.class_fraction.max("response_class") == 1.0).all(), "hardly changed, every repeat is the run"
+    assert (ds.class_fraction.max("class_code") == 1.0).all(), "hardly changed, every repeat is the run"
     assert len(np.unique(ds.response_class)) > 1, "and the runs differ"
-    replicas = Replicates(1, perturbation_rms=1e-6)
+    replicates = Replicates(1, perturbation_rms=1e-6)
     batch = sb.State(amplitude=np.array([[1e-3, 0.0], [2e-3, 1e-4]]), phase=[0.0, 0.5])
-    moved = perturbed_start(system, replicas, 0, batch)
-    change = perturbed_start(system, replicas, 0).amplitude - model.well_amplitude
+    moved = perturbed_start(system, replicates, 0, batch)
+    change = perturbed_start(system, replicates, 0).amplitude - model.well_amplitude
     np.testing.assert_allclose(moved.amplitude - batch.amplitude, [change, change], rtol=1e-9)
     np.testing.assert_array_equal(moved.phase, batch.phase)
 
 
 def test_what_is_refused(small):
-    with pytest.raises(InputError, match="replicas = -1"):
-        swept(**small, replicas=-1)
+    with pytest.raises(InputError, match="replicates = -1"):
+        swept(**small, replicates=-1)
     with pytest.raises(InputError, match="perturbation_rms = 0"):
-        swept(**small, replicas=1, perturbation_rms=0.0)
+        Replicates(1, perturbation_rms=0.0)

@@ -1,4 +1,4 @@
-"""What is asked of every world: its mirror image, sweeps of all of its parameters, early decisions."""
+"""What is asked of every extended system: its mirror image, sweeps of all of its parameters, early decisions."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from killed_worlds import NOT_SWEPT
-from worlds import WORLDS, mirror_image
+from killed_systems import NOT_SWEPT
+from systems import SYSTEMS, mirror_image
 
 import snapbeam as sb
 from snapbeam.model.axial_load import LOADS
@@ -29,32 +29,32 @@ MIRRORED = {
     "max_midspan_displacement": "min_midspan_displacement",
 }
 EVERY = [
-    pytest.param(name, marks=pytest.mark.slow if world.own_kernel else ()) for name, world in WORLDS.items()
+    pytest.param(name, marks=pytest.mark.slow if extended.own_kernel else ()) for name, extended in SYSTEMS.items()
 ]
 
 
 def swept(name: str, count: int, seed: int, *, mirrored: bool = False, modes: int | None = None, **how):
-    world = WORLDS[name]
-    system = world.system(modes)
-    columns = {key: ("point", values) for key, values in world.points(count, seed).items()}
+    extended = SYSTEMS[name]
+    system = extended.system(modes)
+    columns = {key: ("point", values) for key, values in extended.points(count, seed).items()}
     system = mirror_image(system) if mirrored else system
     return sb.sweep(system, xr.Dataset(columns), sb.Integration(**how))
 
 
 def test_none_is_missing() -> None:
     """Every kind of law, drive, motion of a base, load and harvester, and every parameter but those of runs."""
-    systems = [world.system() for world in WORLDS.values()]
+    systems = [extended.system() for extended in SYSTEMS.values()]
     there = {(section, type(drive).name) for each in systems for section, drive in each.moving}
     there |= {("contact", type(each.contact).name) for each in systems}
     there |= {("harvester", type(each.harvester).name) for each in systems if each.harvester is not None}
     there |= {("drive", type(each.striker.drive).name) for each in systems}
     shaking = [name for name, kind in DRIVES.items() if kind.can_excite_base() and name != "still"]
-    known = {"contact": LAWS, "drive": DRIVES, "base": shaking, "axial": LOADS, "harvester": HARVESTERS}
+    known = {"contact": LAWS, "drive": DRIVES, "base_excitation": shaking, "axial_load": LOADS, "harvester": HARVESTERS}
     for section, names in known.items():
         missing = {name for name in names if (section, name) not in there}
-        assert not missing, f"{section}: no world has {missing}"
+        assert not missing, f"{section}: no extended system has {missing}"
     own = set().union(*(each.parameters for each in systems))
-    missing = {name for name, row in parameters().items() if row.section not in ("run", "start")} - own
+    missing = {name for name, row in parameters().items() if row.section not in ("integration", "initial_state")} - own
     assert not missing
 
 
@@ -73,7 +73,7 @@ def test_mirror_image(name) -> None:
 
 
 def killed(*names: str, only: str = "") -> None:
-    command = [sys.executable, str(HERE / "killed_worlds.py"), "--only", only, *names]
+    command = [sys.executable, str(HERE / "killed_systems.py"), "--only", only, *names]
     done = subprocess.run(command, capture_output=True, text=True, timeout=3600)
     assert done.returncode == 0, done.stderr[-3000:]
     seen = json.loads(done.stdout.splitlines()[-1])
@@ -82,12 +82,12 @@ def killed(*names: str, only: str = "") -> None:
 
 
 def test_swept_killed_and_resumed() -> None:
-    """A few parameters of the paper's world, of structures and of runs."""
+    """A few parameters of the paper's system, of structures and of runs."""
     killed("the paper's", only="beam.thickness,model.modes,contact.stiffness,striker.side,integration.cycles")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", list(WORLDS))
+@pytest.mark.parametrize("name", list(SYSTEMS))
 def test_every_parameter_swept_killed_and_resumed(name) -> None:
     """SIGKILL at the second task, resumed: the file of an undisturbed sweep, bit for bit."""
     assert set(NOT_SWEPT) <= set(parameters())
@@ -96,24 +96,24 @@ def test_every_parameter_swept_killed_and_resumed(name) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("modes", [1, 8])
-@pytest.mark.parametrize("name", [name for name, world in WORLDS.items() if world.decides])
+@pytest.mark.parametrize("name", [name for name, extended in SYSTEMS.items() if extended.decides])
 def test_never_decided_wrongly(name, modes) -> None:
     """4,000 random runs with and without early decision."""
-    world = WORLDS[name]
-    if modes > 1 and world.modes == 1:
+    extended = SYSTEMS[name]
+    if modes > 1 and extended.modes == 1:
         pytest.skip("a law of one mode")
     decided, wrong = early_decisions(name, modes, 4000)
     print(f"{name}, N = {modes}: {decided} of 4000 decided early, {wrong} wrongly")
     assert wrong == 0
-    if not world.system(world.fewest).has_environment:
+    if not extended.system(extended.fewest).has_environment:
         assert decided > 40
 
 
 def early_decisions(name: str, modes: int, count: int) -> tuple[int, int]:
     """How many of *count* random runs were decided early, and how many of those have another class than whole."""
-    modes = 1 if WORLDS[name].modes == 1 else max(modes, WORLDS[name].fewest)
+    modes = 1 if SYSTEMS[name].modes == 1 else max(modes, SYSTEMS[name].fewest)
     early, whole = (
-        swept(name, count, 7, modes=modes, cycles=WORLDS[name].cycles, early_termination=flag)
+        swept(name, count, 7, modes=modes, cycles=SYSTEMS[name].cycles, early_termination=flag)
         for flag in (True, False)
     )
     decided = early.status.values == RunStatus.EARLY_STOP

@@ -1,4 +1,4 @@
-"""Every world there is, small: a system of each kind of part, its mirror image, and what differs among random runs."""
+"""Small systems with every kind of part, their mirror images, and ranges of parameters for random runs."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ SHAKEN = {
 
 
 @dataclass(frozen=True)
-class World:
-    """What is built of a reduced model, by its number of modes, and ranges of what random runs differ in."""
+class ExtendedSystem:
+    """Parts of a system, as a function of its reduced model, and ranges of parameters for random runs."""
 
     parts: Callable[[sb.ReducedModel], dict[str, object]]
     varied: dict[str, tuple[float, float]]
@@ -79,7 +79,12 @@ def mirror_image(system: sb.System) -> sb.System:
         striker = dataclasses.replace(striker, side=side, drive=drive)
     if base is not None:
         base = dataclasses.replace(base, direction="down" if base.direction == "up" else "up")
-    more = {"base": base, "axial": system.axial_load, "harvester": system.harvester, "others": others}
+    more = {
+        "base_excitation": base,
+        "axial_load": system.axial_load,
+        "harvester": system.harvester,
+        "further_contacts": others,
+    }
     return sb.System(model, system.contact, striker, **more)  # type: ignore[arg-type]
 
 
@@ -97,7 +102,7 @@ def on_a_base(motion: sb.Drive, **more: object):
     return lambda model: {
         "contact": default_values.CONTACT,
         "striker": stop,
-        "base": sb.BaseExcitation(motion=motion, **more),
+        "base_excitation": sb.BaseExcitation(motion=motion, **more),
     }
 
 
@@ -125,7 +130,7 @@ def loaded(motion: sb.LoadMotion):
     return lambda model: {
         "contact": default_values.CONTACT,
         "striker": sb.Striker(drive=sine()),
-        "axial": sb.AxialLoadModulation(motion=motion),
+        "axial_load": sb.AxialLoadModulation(motion=motion),
     }
 
 
@@ -170,57 +175,57 @@ MEASURED = sb.Imperfection(
     shape="sine",
 )
 
-WORLDS: dict[str, World] = {
-    "the paper's": World(struck(sine()), SINE | PLACE, own_kernel=False),
-    "restitution": World(struck(sine(), sb.Restitution(0.6)), SINE | PLACE, modes=1, own_kernel=False),
-    "power": World(struck(sine(), sb.PowerLaw.from_stiffness(4e11, 2.0)), SINE | PLACE),
-    "layer": World(struck(sine(), sb.LayeredHertz(stiffness=4e8, layer_stiffness=1e10)), SINE | PLACE),
-    "hunt_crossley": World(
+SYSTEMS: dict[str, ExtendedSystem] = {
+    "the paper's": ExtendedSystem(struck(sine()), SINE | PLACE, own_kernel=False),
+    "restitution": ExtendedSystem(struck(sine(), sb.Restitution(0.6)), SINE | PLACE, modes=1, own_kernel=False),
+    "power": ExtendedSystem(struck(sine(), sb.PowerLaw.from_stiffness(4e11, 2.0)), SINE | PLACE),
+    "layer": ExtendedSystem(struck(sine(), sb.LayeredHertz(stiffness=4e8, layer_stiffness=1e10)), SINE | PLACE),
+    "hunt_crossley": ExtendedSystem(
         struck(sine(), sb.HuntCrossley.from_restitution(4e8, 0.6, 0.05)), SINE | PLACE
     ),
-    "kelvin_voigt": World(struck(sine(), sb.KelvinVoigt(2e6, 20.0)), SINE | PLACE),
-    "a gap": World(struck(sine(), gap=4e-5), SINE | {"striker.gap": (-5e-5, 1e-4)}, own_kernel=False),
-    "a phase": World(
+    "kelvin_voigt": ExtendedSystem(struck(sine(), sb.KelvinVoigt(2e6, 20.0)), SINE | PLACE),
+    "a gap": ExtendedSystem(struck(sine(), gap=4e-5), SINE | {"striker.gap": (-5e-5, 1e-4)}, own_kernel=False),
+    "a phase": ExtendedSystem(
         struck(sb.DisplacementSine(frequency_ratio=1.3, displacement_amplitude=0.2, phase=0.7)),
         {"drive.frequency_ratio": (0.3, 3.0), "drive.displacement_amplitude": (0.02, 0.5), "drive.phase": (-3.0, 3.0)},
         own_kernel=False,
     ),
-    "acceleration_sine": World(
+    "acceleration_sine": ExtendedSystem(
         struck(sb.AccelerationSine(frequency_ratio=1.3, acceleration_amplitude=0.3)),
         {"drive.frequency_ratio": (0.3, 3.0), "drive.acceleration_amplitude": (0.02, 1.2)},
         own_kernel=False,
     ),
-    "burst": World(
+    "burst": ExtendedSystem(
         struck(BURST),
         {"drive.frequency_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.1, 0.8), "drive.duration_cycles": (2.0, 12.0)},
     ),
-    "chirp": World(
+    "chirp": ExtendedSystem(
         struck(CHIRP),
         {"drive.start_ratio": (0.5, 2.0), "drive.stop_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.02, 0.5)},
     ),
-    "logarithmic chirp": World(
-        struck(dataclasses.replace(CHIRP, spacing="log")),
+    "logarithmic chirp": ExtendedSystem(
+        struck(dataclasses.replace(CHIRP, sweep_type="log")),
         {"drive.start_ratio": (0.5, 2.0), "drive.stop_ratio": (0.5, 3.0), "drive.velocity_amplitude": (0.02, 0.5)},
     ),
-    "half_sine": World(
+    "half_sine": ExtendedSystem(
         struck(sb.HalfSine(displacement_amplitude=0.6, duration=0.5)),
         {"drive.displacement_amplitude": (0.1, 2.0), "drive.duration": (0.05, 2.0)},
     ),
-    "noise": World(
+    "noise": ExtendedSystem(
         struck(NOISE), {"drive.velocity_rms": (0.02, 0.4), "drive.low_ratio": (0.2, 1.0)}
     ),
-    "two_tone": World(
+    "two_tone": ExtendedSystem(
         struck(TWO), SINE | {"drive.second_amplitude": (0.0, 0.3), "drive.second_phase": (-3.0, 3.0)}
     ),
-    "recorded": World(record, PLACE, cycles=11),
-    "still": World(struck(sb.FixedStop(), gap=-1e-4), {"striker.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
-    "a body": World(
+    "recorded": ExtendedSystem(record, PLACE, cycles=11),
+    "still": ExtendedSystem(struck(sb.FixedStop(), gap=-1e-4), {"striker.gap": (-3e-4, 1e-4)} | PLACE, own_kernel=False),
+    "a body": ExtendedSystem(
         struck(sine(), mass=0.02, spring=700.0, damper=0.7), SINE | PLACE, own_kernel=False, decides=False
     ),
-    "a sphere": World(
+    "a sphere": ExtendedSystem(
         struck(sb.ConstantVelocity(speed=0.4), mass=2e-3, gap=5e-5), {"drive.speed": (0.1, 2.0)} | PLACE, decides=False
     ),
-    "two strikers": World(
+    "two strikers": ExtendedSystem(
         lambda model: {
             "contact": [default_values.CONTACT, sb.PowerLaw.from_stiffness(4e11, 2.0)],
             "striker": [
@@ -232,52 +237,52 @@ WORLDS: dict[str, World] = {
         SINE | {"striker_2.gap": (-2e-5, 1e-4), "drive_2.displacement_amplitude": (0.0, 0.2)},
         decides=False,
     ),
-    "unequal wells": World(struck(sine()), SINE | PLACE, imperfection=UNEVEN, fewest=2),
-    "a measured shape": World(struck(sine()), SINE | PLACE, imperfection=MEASURED),
-    "other ends": World(struck(sine()), SINE | PLACE, beam=SPRUNG, own_kernel=False),
-    "a given load": World(
+    "unequal wells": ExtendedSystem(struck(sine()), SINE | PLACE, imperfection=UNEVEN, fewest=2),
+    "a measured shape": ExtendedSystem(struck(sine()), SINE | PLACE, imperfection=MEASURED),
+    "other ends": ExtendedSystem(struck(sine()), SINE | PLACE, beam=SPRUNG, own_kernel=False),
+    "a given load": ExtendedSystem(
         struck(sine()),
         SINE | PLACE,
         beam=default_values.BEAM.replace(axial_load=1.5 * default_values.BEAM.critical_load),
         reference_frequency=80.0,
         own_kernel=False,
     ),
-    "a base": World(
+    "a base": ExtendedSystem(
         on_a_base(sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.25, phase=0.3)), SHAKEN,
     ),
-    "a base under a stop in space": World(
+    "a base under a stop in space": ExtendedSystem(
         on_a_base(sb.Sine(frequency_ratio=0.9, velocity_amplitude=0.25), striker_on_base=False),
         {"base_excitation.frequency_ratio": (0.4, 2.0), "base_excitation.velocity_amplitude": (0.05, 0.5)},
     ),
-    "a base by its displacement": World(
+    "a base by its displacement": ExtendedSystem(
         on_a_base(sb.DisplacementSine(frequency_ratio=0.9, displacement_amplitude=0.25)),
         {"base_excitation.frequency_ratio": (0.4, 2.0), "base_excitation.displacement_amplitude": (0.05, 0.5)},
     ),
-    "a base of two sines": World(on_a_base(TWO), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
-    "a burst of the base": World(on_a_base(BURST), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
-    "a swept base": World(on_a_base(CHIRP), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
-    "a noisy base": World(on_a_base(NOISE), {"base_excitation.velocity_rms": (0.02, 0.3)}),
-    "a changing load": World(
+    "a base of two sines": ExtendedSystem(on_a_base(TWO), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
+    "a burst of the base": ExtendedSystem(on_a_base(BURST), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
+    "a swept base": ExtendedSystem(on_a_base(CHIRP), {"base_excitation.velocity_amplitude": (0.05, 0.5)}),
+    "a noisy base": ExtendedSystem(on_a_base(NOISE), {"base_excitation.velocity_rms": (0.02, 0.3)}),
+    "a changing load": ExtendedSystem(
         loaded(sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0)), SINE | {"axial_load.amplitude": (0.0, 20.0)}
     ),
-    "a load that falls": World(
+    "a load that falls": ExtendedSystem(
         loaded(sb.LoadRamp(change=-5.0, duration=3.0, hold_periods=4.0)), SINE | {"axial_load.change": (-20.0, 10.0)}
     ),
-    "a piezo": World(harvested(PIEZO), SINE | {"harvester.resistance": (1e3, 1e6)}),
-    "a coil": World(
+    "a piezo": ExtendedSystem(harvested(PIEZO), SINE | {"harvester.resistance": (1e3, 1e6)}),
+    "a coil": ExtendedSystem(
         harvested(sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0, location=0.4)),
         SINE | {"harvester.resistance": (1.0, 100.0)},
     ),
-    "a coil with inductance": World(
+    "a coil with inductance": ExtendedSystem(
         harvested(sb.ElectromagneticHarvester(force_factor=1.5, resistance=30.0, coil_resistance=10.0, inductance=0.01)),
         SINE | {"harvester.resistance": (1.0, 100.0)},
     ),
-    "a bit of all": World(
+    "a bit of all": ExtendedSystem(
         lambda model: {
             "contact": default_values.CONTACT,
             "striker": sb.Striker(drive=sine(), mass=0.02, suspension_stiffness=700.0, suspension_damping=0.7, gap=1e-5),
-            "base": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1)),
-            "axial": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0)),
+            "base_excitation": sb.BaseExcitation(motion=sb.AccelerationSine(frequency_ratio=0.9, acceleration_amplitude=0.1)),
+            "axial_load": sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=3.0)),
             "harvester": PIEZO,
         },
         SINE | PLACE,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -24,7 +25,10 @@ def model_of(modes: int) -> sb.ReducedModel:
 
 def make(modes: int = 1, **changes: Any):
     given: dict[str, Any] = {"frequency_ratio": RATIO, "velocity_amplitude": VELOCITY, "cycles": 6}
-    return swept(model_of(modes), default_values.CONTACT, **(given | changes))
+    model = model_of(modes)
+    if "reference_frequency" in changes:
+        model = replace(model, given_reference_frequency=changes.pop("reference_frequency"))
+    return swept(model, default_values.CONTACT, **(given | changes))
 
 
 def assert_equal(one, other) -> None:
@@ -96,7 +100,7 @@ def test_a_point_does_not_depend_on_the_other_locations() -> None:
 
 def test_mirror_image() -> None:
     below, above = make(2), make(2, side="above")
-    np.testing.assert_array_equal(below.response, above.response)
+    np.testing.assert_array_equal(below.response_class, above.response_class)
     np.testing.assert_array_equal(below.final_well, -above.final_well)
     np.testing.assert_array_equal(below.min_displacement, -above.max_displacement)
 
@@ -111,7 +115,7 @@ def test_reference_frequency() -> None:
     )
     whole = make()
     assert half.attrs["reference_frequency"] == 0.5 * freq
-    np.testing.assert_array_equal(half.response_class, whole.response)
+    np.testing.assert_array_equal(half.response_class, whole.response_class)
     np.testing.assert_allclose(half.peak_force, whole.peak_force, rtol=1e-6)
 
 
@@ -121,7 +125,7 @@ def test_early_decision_keeps_the_classes() -> None:
         make(frequency_ratio=ratio, velocity_amplitude=velocity, cycles=24, early_termination=flag)
         for flag in (False, True)
     )
-    np.testing.assert_array_equal(full.response, early.response_class)
+    np.testing.assert_array_equal(full.response_class, early.response_class)
     assert np.isfinite(early.early_stop_time).any()
     assert not np.isfinite(full.early_stop_time).any()
 
@@ -149,18 +153,18 @@ def test_progress_and_interruption() -> None:
             r"frequency_ratio\[0\] = 1.2, .* must be strictly increasing",
         ),
         ({"frequency_ratio": [1.0, 1.0]}, sb.InputError, "must be strictly increasing"),
-        ({"frequency_ratio": 0.0}, sb.InputError, r"frequency_ratio = 0.0: must be a number in \(0, inf\)"),
+        ({"frequency_ratio": 0.0}, sb.InputError, r"frequency_ratio = 0.0: must be a finite number greater than 0"),
         ({"frequency_ratio": [-1.0, 1.0]}, sb.InputError, "frequency_ratio = -1.0: must be a number in"),
         (
             {"frequency_ratio": [1.0, math.nan]},
             sb.InputError,
             r"frequency_ratio\[1\] = .*nan.*: must be finite",
         ),
-        ({"frequency_ratio": math.inf}, sb.InputError, r"frequency_ratio = inf: must be a number in"),
+        ({"frequency_ratio": math.inf}, sb.InputError, r"frequency_ratio = inf: must be a finite number greater than 0"),
         (
             {"frequency_ratio": "1.2"},
             sb.InputTypeError,
-            "frequency_ratio = '1.2': must be a number in",
+            "frequency_ratio = '1.2': must be a finite number greater than 0",
         ),
         (
             {"frequency_ratio": [[1.0]]},
@@ -175,7 +179,7 @@ def test_progress_and_interruption() -> None:
         (
             {"velocity_amplitude": None},
             sb.InputTypeError,
-            "velocity_amplitude = None: must be a number in",
+            "velocity_amplitude = None: must be a finite number of at least 0",
         ),
         ({"location": [0.5, 1.0]}, sb.InputError, r"location = 1.0: must be a number in \(0, 1\)"),
         ({"location": 0.0}, sb.InputError, r"location = 0.0: must be a number in \(0, 1\)"),
@@ -186,11 +190,6 @@ def test_progress_and_interruption() -> None:
         ({"engine": "abacus"}, sb.InputError, "engine = 'abacus': must be one of"),
         ({"side": "left"}, sb.InputError, "side = 'left': must be one of 'below', 'above'"),
         ({"threads": 0}, sb.InputError, r"threads = 0: must be an integer in \[1, "),
-        (
-            {"reference_frequency": 0.0},
-            sb.InputError,
-            "reference_frequency = 0.0: must be a finite number greater than 0",
-        ),
     ],
 )
 def test_refusals(changes: dict[str, Any], error: type[Exception], message: str) -> None:
@@ -204,7 +203,7 @@ def test_refuses_what_is_no_system() -> None:
         swept(
             sb.ReducedModel.from_beam(default_values.STRAIGHT_BEAM, 2), default_values.CONTACT, **axes
         )
-    with pytest.raises(sb.InputError, match="contact = None: must be a law of contact, such as HertzContact"):
+    with pytest.raises(sb.InputError, match="contact = None: a striker needs a law of contact, such as HertzContact"):
         swept(model_of(1), None, **axes)  # type: ignore[arg-type]
     with pytest.raises(sb.InputTypeError, match="model = 'beam': must be a ReducedModel"):
         swept("beam", default_values.CONTACT, **axes)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""An independent solution of other worlds: the paper's coordinates beside those of the bodies, SciPy's DOP853.
+"""Independent reference solution of extended systems: the paper's coordinates and those of the bodies, SciPy's DOP853.
 
 Nothing is taken from the package.  The tip moves as prescribed or is a body with equations of its own; the force is
 any function of the penetration and its rate; onsets, releases and vanishing forces are events.

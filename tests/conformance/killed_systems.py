@@ -1,6 +1,6 @@
-"""Sweeps every parameter of a world, each killed at its second task and resumed; says what was not as it should be.
+"""Sweeps every parameter of an extended system, each killed at its second task and resumed; says what was not as it should be.
 
-Run as a program, since forks go before threads: ``python killed_worlds.py WORLD [...] [--only NAME,NAME]``.
+Run as a program, since forks go before threads: ``python killed_systems.py SYSTEM [...] [--only NAME,NAME]``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 import zarr.storage  # noqa: F401  (loaded before the first fork)
-from worlds import WORLDS
+from systems import SYSTEMS
 
 import snapbeam as sb
 from snapbeam.model.parameters import lookup, parameters
@@ -170,32 +170,32 @@ NOTHING = {("still", "striker.gap"), ("a measured shape", "imperfection.point_lo
 def main() -> None:
     """Print what was seen as JSON."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("worlds", nargs="+")
+    parser.add_argument("systems", nargs="+")
     parser.add_argument("--only", default="")
-    kernel_input = parser.parse_args()
+    arguments = parser.parse_args()
     failures: list[str] = []
     count = 0
-    for world in kernel_input.worlds:
-        system = WORLDS[world].system()
+    for key in arguments.systems:
+        system = SYSTEMS[key].system()
         names = [name for name in system.parameters if has_row(name)]
-        names += [name for name in parameters() if name.startswith("run.")]
-        if WORLDS[world].modes == 1:
+        names += [name for name in parameters() if name.startswith("integration.")]
+        if SYSTEMS[key].modes == 1:
             names.remove("model.modes")
         if system.base_excitation is not None and type(system.base_excitation.motion).name == "chirp":
             names.remove("base_excitation.striker_on_base")  # a sweep is refused under a striker in space
         if "striker.suspension_damping" in names and not system.get("striker.suspension_stiffness"):
             names.remove("striker.suspension_damping")  # of a suspension, which a mass in flight has not
         chosen = (
-            kernel_input.only.split(",")
-            if kernel_input.only
+            arguments.only.split(",")
+            if arguments.only
             else [name for name in names if name not in NOT_SWEPT]
         )
         for name in chosen:
             with tempfile.TemporaryDirectory() as folder:
                 said = try_one(system, name, Path(folder))
             count += 1
-            if said and not ((world, name) in NOTHING and said == "changes nothing"):
-                failures.append(f"{world}, {name}: {said}")
+            if said and not ((key, name) in NOTHING and said == "changes nothing"):
+                failures.append(f"{key}, {name}: {said}")
                 print(failures[-1], file=sys.stderr, flush=True)
     print(json.dumps({"swept": count, "failures": failures}))
 
