@@ -70,6 +70,10 @@ plot_quantiles(threshold)
 # For each parameter one standard score down and up; how much that is in its own unit stands beside it.
 
 sensitivity = sb.uncertainty.sensitivity(
-    system, "peak_force", uncertainty, samples=16, integration=sb.Integration(cycles=5)
+    system,
+    "peak_force",
+    uncertainty,
+    samples=16,
+    integration=sb.Integration(cycles=5),
 )
 plot_tornado(sensitivity)

@@ -73,9 +73,9 @@ def test_design(tmp_path) -> None:
     assert result.exit_code == 0, result.output
     with xr.open_dataset(target, engine="h5netcdf") as dataset:
         assert 0.012 < float(dataset["velocity_amplitude"][0]) < 0.0145
-    assert "limits on fresh draws: " in result.output and picture.stat().st_size > 5_000
+    assert "constraints on validation samples: " in result.output and picture.stat().st_size > 5_000
     found = json.loads(told.read_text(encoding="utf-8"))
-    assert found["estimated_cost"]["runs"] > 0 and found["designs"]["kept_snap"]
+    assert found["estimated_cost"]["runs"] > 0 and found["designs"]["satisfied_snap"]
 
 
 @pytest.mark.parametrize(

@@ -179,9 +179,7 @@ def diagram(
     for sweep in dataset["sweep"].values[:2]:
         found = dataset["minimal_period"].sel(sweep=sweep).values
         kinds = ", ".join(f"{int((found == m).sum())} of period {m}" for m in np.unique(found) if m > 0)
-        lines.append(
-            f"{sweep}: {kinds or 'no value repeats'}, {int((found == 0).sum())} that do not repeat"
-        )
+        lines.append(f"{sweep}: {kinds or 'no value repeats'}, {int((found == 0).sum())} that do not repeat")
     _finish(dataset, output, plot, "diagram", lines)
 
 
