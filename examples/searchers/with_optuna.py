@@ -41,9 +41,9 @@ def speed(trial: optuna.Trial) -> float:
         trial.suggest_float(name, low, high)
         for name, (low, high) in variables.items()
     ]
-    goals, violation, _ = problem.evaluate([x])
+    objectives, violation, _ = problem.evaluate([x])
     trial.set_constraint("limit", float(violation[0]))
-    return float(goals[0, 0])
+    return float(objectives[0, 0])
 
 
 optuna.logging.set_verbosity(optuna.logging.WARNING)

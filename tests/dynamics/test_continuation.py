@@ -27,7 +27,7 @@ def test_flips_of_the_logistic_map() -> None:
     first = next(event for event in second.special_points if event.kind == "flip")
     for event, exact in ((flip, 3.0), (first, 1.0 + math.sqrt(6.0))):
         assert abs(event.value - exact) <= event.error < 1e-7
-    assert "±" in repr(flip) and float(branch.to_dataset()["event_error"][0]) == flip.error
+    assert "±" in repr(flip) and float(branch.to_dataset()["special_point_error"][0]) == flip.error
     np.testing.assert_allclose(branch.orbits[-1].coordinates, 1.0 - 1.0 / 3.7, atol=1e-9)
 
 
@@ -116,7 +116,13 @@ def test_restitution_orbits_are_followed_to_grazing() -> None:
         and branch.special_points[-1].error < 1e-4
     )
     ds = branch.to_dataset()
-    assert set(ds["special_point_kind"].values) <= {"fold", "flip", "Neimark-Sacker", "branch point", "grazing"}
+    assert set(ds["special_point_kind"].values) <= {
+        "fold",
+        "flip",
+        "Neimark-Sacker",
+        "branch point",
+        "grazing",
+    }
 
 
 @pytest.mark.slow
@@ -145,7 +151,7 @@ def test_a_branch_of_the_beam() -> None:
 
 def test_refusals() -> None:
     orbit = sb.dynamics.periodic_orbit(logistic(2.5), [0.6])
-    with pytest.raises(sb.InputError, match="must hold the orbit's own"):
+    with pytest.raises(sb.InputError, match="must contain the orbit's own"):
         sb.dynamics.continuation(orbit, "r", (3.0, 4.0))
     with pytest.raises(sb.InputError, match="must be increasing"):
         sb.dynamics.continuation(orbit, "r", (4.0, 3.0))

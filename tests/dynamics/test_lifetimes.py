@@ -22,7 +22,7 @@ def system_of(modes: int, ratio: float = 1.625, velocity: float = 0.3) -> sb.Sys
 
 AXES = {"frequency_ratio": [1.2, 1.625], "velocity_amplitude": [0.01, 0.2, 0.3]}
 SHORT = sb.Integration(cycles=120)
-TELL = {"survival": sb.dynamics.LifetimeSettings(settling_cycles=20.0), "starts": 6}
+TELL = {"settings": sb.dynamics.LifetimeSettings(settling_cycles=20.0), "starts": 6}
 
 
 def test_nothing_depends_on_threads_order_or_the_other_points(tmp_path) -> None:
@@ -131,15 +131,15 @@ def test_measured_lifetimes_come_again(point) -> None:
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"starts": 0}, "starts = 0"),
-        ({"starts": 2.5}, "starts = 2.5"),
+        ({"initial_conditions": 0}, "count = 0"),
+        ({"initial_conditions": 2.5}, "initial_conditions = 2.5"),
         (
-            {"survival": sb.dynamics.LifetimeSettings(settling_cycles=500.0)},
-            "must be more than the quiet cycles",
+            {"settings": sb.dynamics.LifetimeSettings(settling_cycles=500.0)},
+            "must be more than settling_cycles",
         ),
         ({"after": [50, 20]}, "after = [50, 20]"),
         ({"after": [1000]}, "after[0]"),
-        ({"sweep": {"velocity_amplitde": [0.1, 0.2]}}, "did you mean"),
+        ({"axes": {"velocity_amplitde": [0.1, 0.2]}}, "did you mean"),
     ],
 )
 def test_refusals(given, words: str) -> None:

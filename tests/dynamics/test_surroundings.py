@@ -75,7 +75,7 @@ def test_periods_one_by_one_are_periods_at_once():
     [
         (sb.System(MODEL, base_excitation=BASE, axial_load=sb.AxialLoadModulation(motion=sb.HarmonicLoad(frequency_ratio=2.0, amplitude=1.0))),
          "axial_load.frequency_ratio = 2: must be a whole multiple"),
-        (sb.System(MODEL, axial_load=sb.AxialLoadModulation(motion=sb.LoadRamp(change=1.0, duration=3.0))), "axial: is no sine"),
+        (sb.System(MODEL, axial_load=sb.AxialLoadModulation(motion=sb.LoadRamp(change=1.0, duration=3.0))), "axial_load: is not a sine"),
     ],
 )  # fmt: skip
 def test_what_does_not_repeat_is_refused(system, words):

@@ -81,7 +81,7 @@ def test_proportions() -> None:
         (lambda: fit_lifetime([-1.0], True), "time: must be at least 0"),
         (lambda: fit_lifetime([1.0], True, confidence=1.0), "confidence = 1.0"),
         (lambda: proportion(3, 2), "hits: must be between 0"),
-        (lambda: LifetimeSettings(settling_cycles=0.0), "quiet = 0.0"),
+        (lambda: LifetimeSettings(settling_cycles=0.0), "settling_cycles = 0.0"),
         (lambda: LifetimeSettings(delay=-1.0), "delay = -1.0"),
     ],
 )

@@ -150,15 +150,15 @@ def test_a_map_is_resumed_after_being_killed(tmp_path) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"spread": sb.uncertainty.ParameterUncertainty()}, "nothing differs"),
-        ({"runs": 0}, "first"),
-        ({"runs": "many"}, "Allocation"),
-        ({"sweep": {}}, "at least one parameter"),
-        ({"spread": "wide"}, "Spread"),
+        ({"uncertainty": sb.uncertainty.ParameterUncertainty()}, "nothing is uncertain"),
+        ({"runs": 0}, "initial_runs"),
+        ({"runs": "many"}, "SamplingPlan"),
+        ({"axes": {}}, "at least one parameter"),
+        ({"uncertainty": "wide"}, "ParameterUncertainty"),
     ],
 )
 def test_refusals(change, words: str) -> None:
-    given = {"system": small_system(), "axes": AXES, "spread": SPREAD, "runs": 16} | change
+    given = {"system": small_system(), "axes": AXES, "uncertainty": SPREAD, "runs": 16} | change
     with pytest.raises(InputError, match=words):
         sb.uncertainty.probability_map(**given)
 

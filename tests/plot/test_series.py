@@ -35,7 +35,7 @@ def test_captions(run):
     text = caption(run.dataset)
     for part in ("161 mm × 400 µm", "335 µm", "$N$ = 3", "= 1.21 (", "$V$ = 0.18 (", "mm/s", "= 0.476"):
         assert part in text
-    assert text.endswith(f": {run.outcome.response_class.label}")
+    assert text.endswith(f": {run.summary.response_class.label}")
     assert caption(run.dataset, 2).count("\n") == 1
     assert caption(xr.Dataset()) == ""
 
@@ -77,8 +77,8 @@ def test_spectrum_of_a_sine():
 
 def test_statistics_of_a_map(synthetic_map):
     force = xr.DataArray(
-        np.geomspace(1e-5, 1e-1, synthetic_map.response.size).reshape(synthetic_map.response.shape),
-        dims=synthetic_map.response.dims, attrs={"units": "N", "long_name": "peak contact force"},
+        np.geomspace(1e-5, 1e-1, synthetic_map.response_class.size).reshape(synthetic_map.response_class.shape),
+        dims=synthetic_map.response_class.dims, attrs={"units": "N", "long_name": "peak contact force"},
     )  # fmt: skip
     ds = synthetic_map.assign(peak_force=force)
     ax = plots.plot_statistic(ds, "peak_force")
@@ -97,4 +97,4 @@ def test_a_map_over_one_axis(synthetic_map):
     ax = plots.plot_response_map(synthetic_map.isel(frequency_ratio=3))
     assert ax.get_xlabel() == "Velocity amplitude $V$" and "Centre displacement" in ax.get_ylabel()
     with pytest.raises(InputError, match="are drawn over two axes"):
-        plots.plot_response_map(synthetic_map.isel(frequency_ratio=3), threshold_line=True)
+        plots.plot_response_map(synthetic_map.isel(frequency_ratio=3), quasi_static_line=True)

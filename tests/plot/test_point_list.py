@@ -76,17 +76,17 @@ def test_a_statistic_of_a_list(points):
 def test_what_lies_over_the_points(points):
     kind = np.array([ResponseClass.INTRAWELL], dtype=np.int8)
     dots = MeasuredPoints(np.array([1.0]), np.array([0.2]), np.array([0.4762]), kind)
-    ax = plot_response_map(points, threshold_line=True, dots=dots)
+    ax = plot_response_map(points, quasi_static_line=True, measurements=dots)
     labels = [text.get_text() for text in ax.figure.legends[0].get_texts()]
     assert "measured, 1" in labels and any("QS1" in label for label in labels)
     with pytest.raises(InputError, match="need velocity amplitude"):
-        plot_points(points, across="velocity_amplitude", upward="frequency_ratio", threshold_line=True)
+        plot_points(points, across="velocity_amplitude", upward="frequency_ratio", quasi_static_line=True)
 
 
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"name": "nothing"}, "the points have response, peak_force"),
+        ({"name": "nothing"}, "the points have response_class, peak_force"),
         ({"across": "gap"}, "the points are given by"),
         ({"across": "side", "upward": "side"}, "over two parameters"),
     ],

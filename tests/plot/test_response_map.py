@@ -62,7 +62,7 @@ def test_every_pixel_of_a_cell_has_its_colour(synthetic_map, tmp_path):
 
 
 def test_legend_counts_the_runs(synthetic_map):
-    texts = legend_texts(plot_response_map(synthetic_map, threshold_line=True))
+    texts = legend_texts(plot_response_map(synthetic_map, quasi_static_line=True))
     kinds = synthetic_map["response_class"].values
     share = 100.0 * (kinds == ResponseClass.INTRAWELL).mean()
     assert texts[0] == f"intrawell, {share:.1f} %"
@@ -79,19 +79,19 @@ def test_legend_counts_the_runs(synthetic_map):
 
 
 def test_threshold_line(synthetic_map):
-    line = plot_response_map(synthetic_map, threshold_line=True).lines[-1]
+    line = plot_response_map(synthetic_map, quasi_static_line=True).lines[-1]
     ratio, velocity = line.get_data()
     np.testing.assert_allclose(velocity, ratio * np.sin(np.pi / 2.1) ** 2)
     location = np.linspace(0.02, 0.98, 40)
     across = synthetic_map.rename(frequency_ratio="location", location="frequency_ratio")
     across = across.assign_coords(location=location, frequency_ratio=0.625)
-    ax = plot_response_map(across.transpose(), threshold_line=True)
+    ax = plot_response_map(across.transpose(), quasi_static_line=True)
     place, velocity = ax.lines[-1].get_data()
     np.testing.assert_allclose(velocity, 0.625 * np.sin(np.pi * place) ** 2)
     assert ax.get_xlabel().startswith("Striker location")
     nameless = synthetic_map.drop_vars("location")
-    with pytest.raises(InputError, match="threshold_line: needs the map's location"):
-        plot_response_map(nameless, threshold_line=True)
+    with pytest.raises(InputError, match="quasi_static_line: needs the map's location"):
+        plot_response_map(nameless, quasi_static_line=True)
 
 
 def test_dots_lie_where_they_were_measured(synthetic_map):
@@ -102,7 +102,7 @@ def test_dots_lie_where_they_were_measured(synthetic_map):
         np.array([0, 2, 3], dtype=np.int8),
     )
     with pytest.warns(UserWarning, match="1 of 3 measured points do not belong to location = 0.4762"):
-        ax = plot_response_map(synthetic_map, dots=dots)
+        ax = plot_response_map(synthetic_map, measurements=dots)
     points = ax.collections[-1]
     np.testing.assert_allclose(points.get_offsets(), [[1.0, 0.2], [2.0, 0.3]])
     colors = [to_rgb(CLASS_COLORS[kind]) for kind in (ResponseClass.INTRAWELL, ResponseClass.TRANSIENT_2)]
@@ -113,11 +113,11 @@ def test_dots_lie_where_they_were_measured(synthetic_map):
 def test_dots_outside_are_told(synthetic_map):
     dots = MeasuredPoints(np.array([9.0]), np.array([0.2]), np.array([np.nan]), np.array([0], dtype=np.int8))
     with pytest.warns(UserWarning, match="1 of 1 measured points lie outside the map"):
-        plot_response_map(synthetic_map, dots=dots)
+        plot_response_map(synthetic_map, measurements=dots)
 
 
 def test_what_is_no_map_of_two_axes(synthetic_map):
-    with pytest.raises(InputError, match="no variable 'response'"):
+    with pytest.raises(InputError, match="no variable 'response_class'"):
         plot_response_map(synthetic_map.drop_vars("response_class"))
     with pytest.raises(InputError, match="this one has none"):
         plot_response_map(synthetic_map.isel(frequency_ratio=0, velocity_amplitude=0))
@@ -129,7 +129,7 @@ def test_what_is_no_map_of_two_axes(synthetic_map):
 
 @pytest.mark.parametrize("dpi", [72, 150, 300])
 def test_legend_fits_the_column(synthetic_map, dpi):
-    ax = plot_response_map(synthetic_map, threshold_line=True)
+    ax = plot_response_map(synthetic_map, quasi_static_line=True)
     ax.figure.set_dpi(dpi)
     ax.figure.canvas.draw()
     box, page = ax.figure.legends[0].get_window_extent(), ax.figure.bbox

@@ -1,6 +1,6 @@
 """How often intervals hold the truth: what is claimed as 95 %, counted over synthetic trials, and kept for the page.
 
-``python tests/design/covering.py [name ...]`` counts and writes docs/data/coverage.json and coverage.md.
+``python tests/uncertainty/covering.py [name ...]`` counts and writes docs/data/coverage.json and coverage.md.
 """
 
 from __future__ import annotations

@@ -108,7 +108,7 @@ def test_the_quasi_static_threshold() -> None:
     )  # fmt: skip
     expected = sb.model.quasi_static_threshold(place, 0.02)
     np.testing.assert_allclose(ds["threshold"].sel(quantile=0.5), expected, rtol=0.03)
-    assert ds["monotone"].all() and (ds["outcome_of_search"] == 0).all()
+    assert ds["is_monotonic"].all() and (ds["outcome_of_search"] == 0).all()
     assert (ds["threshold_low"] <= ds["threshold"]).all() and (ds["threshold"] <= ds["threshold_high"]).all()
 
 
@@ -149,16 +149,16 @@ def test_out_of_range_is_told() -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"along": "beam.thickness"}, "may differ between runs"),
-        ({"between": (0.3, 0.1)}, "less than the second"),
-        ({"between": 0.3}, "two numbers"),
-        ({"between": (-1.0, 0.1)}, "between"),
-        ({"over": {"velocity_amplitude": [0.1, 0.2]}}, "what is raised"),
-        ({"how": 100}, "Search"),
+        ({"parameter": "beam.thickness"}, "may differ between runs"),
+        ({"bounds": (0.3, 0.1)}, "less than the second"),
+        ({"bounds": 0.3}, "two numbers"),
+        ({"bounds": (-1.0, 0.1)}, "bounds"),
+        ({"axes": {"velocity_amplitude": [0.1, 0.2]}}, "the parameter itself"),
+        ({"options": 100}, "QuantileSearchSettings"),
     ],
 )
 def test_refusals(change, words: str) -> None:
-    given = {"system": small_system(), "along": "velocity_amplitude", "between": (0.01, 0.3)} | change
+    given = {"system": small_system(), "parameter": "velocity_amplitude", "bounds": (0.01, 0.3)} | change
     with pytest.raises(InputError, match=words):
         sb.uncertainty.quantile_threshold(**given)
     with pytest.raises(InputError):

@@ -100,11 +100,11 @@ def test_what_is_beyond_the_horizon_does_not_count() -> None:
 def test_from_a_tracked_run() -> None:
     nominal = nominal_system()
     run = sb.simulate(nominal, sb.Integration(cycles=2))
-    for at in ("contact", "center"):
+    for at in ("striker", "midspan"):
         waveform = sb.uncertainty.Waveform.from_dataset(run.dataset, nominal, 1e-6, at=at)
         assert np.abs(waveform.misfit({})).max() < 1e-6
     with pytest.raises(InputError, match="has no displacement"):
-        sb.uncertainty.Waveform.from_dataset(run.dataset.drop_vars("displacement"), nominal, 1e-6)
+        sb.uncertainty.Waveform.from_dataset(run.dataset.drop_vars("displacement_at_striker"), nominal, 1e-6)
 
 
 def test_refusals() -> None:

@@ -68,9 +68,9 @@ def test_quantiles() -> None:
     monotone[3] = False
     dataset = xr.Dataset(
         {"threshold": (dims, table), "threshold_low": (dims, table - 0.01), "threshold_high": (dims, high),
-         "monotone": (dims[:1], monotone), "runs": (dims[:1], np.full(7, 200))},
+         "is_monotonic": (dims[:1], monotone), "runs": (dims[:1], np.full(7, 200))},
         {"frequency_ratio": ratio, "quantile": [0.05, 0.5, 0.95], "location": 0.4},
-        {"along": "velocity_amplitude", "between": [0.0, 0.5], "confidence": 0.95},
+        {"parameter": "velocity_amplitude", "bounds": [0.0, 0.5], "confidence": 0.95},
     )  # fmt: skip
     ax = plot_quantiles(dataset, quasi_static=True)
     lines = {line.get_label(): line for line in ax.lines}
@@ -90,7 +90,7 @@ def test_tornado() -> None:
         {"effect": ("parameter", half), "effect_low": ("parameter", half - 0.002),
          "effect_high": ("parameter", half + 0.002), "step": ("parameter", [1e7, 0.01])},
         {"parameter": names},
-        {"answer_mean": 0.2, "answer": "threshold", "answer_units": "1", "confidence": 0.95},
+        {"quantity_mean": 0.2, "quantity": "threshold", "quantity_units": "1", "confidence": 0.95},
     )  # fmt: skip
     ax = plot_tornado(dataset)
     assert [text.get_text().split("\n")[0] for text in ax.get_yticklabels()] == [
@@ -107,14 +107,14 @@ def test_designs() -> None:
     draw = np.random.default_rng(1)
     x, goal = draw.random(50), draw.random(50)
     dataset = xr.Dataset(
-        {"location": ("design", [0.3]), "tried_location": ("tried", x), "goal_speed": ("design", [0.5]),
-         "goal_speed_low": ("design", [0.4]), "goal_speed_high": ("design", [0.7]),
-         "tried_goal_speed": ("tried", goal), "violation": ("tried", np.where(goal < 0.4, 0.1, 0.0)),
-         "holds": ("design", [2])}
+        {"location": ("design", [0.3]), "tried_location": ("tried", x), "objective_speed": ("design", [0.5]),
+         "objective_speed_low": ("design", [0.4]), "objective_speed_high": ("design", [0.7]),
+         "tried_objective_speed": ("tried", goal), "violation": ("tried", np.where(goal < 0.4, 0.1, 0.0)),
+         "constraints_satisfied": ("design", [2])}
     )  # fmt: skip
     ax = plot_designs(dataset)
     words = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert words == ["tried, limits kept", "limits: holds"]
+    assert words == ["tried, constraints satisfied", "constraints satisfied"]
     assert ax.collections[0].get_offsets().shape == (int((goal >= 0.4).sum()), 2)
     with pytest.raises(InputError, match="must be one of location"):
         plot_designs(dataset, "gap")

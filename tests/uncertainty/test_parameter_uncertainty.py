@@ -9,7 +9,7 @@ import pytest
 from small import small_system
 
 import snapbeam as sb
-from snapbeam.uncertainty.distributions import spread_from_mapping
+from snapbeam.uncertainty.distributions import uncertainty_from_mapping
 from snapbeam.uncertainty.monte_carlo import trials_of
 from snapbeam.util.validation import InputError
 
@@ -71,7 +71,7 @@ def test_hz_and_metres_per_second_are_held() -> None:
     )
     numbers = np.arange(5)
     points = {"drive.frequency_ratio": np.full(5, 1.3)}
-    for held in ("physical", "ratios"):
+    for held in ("physical", "normalised"):
         trials = trials_of(system, sb.uncertainty.ParameterUncertainty(of=spread.of, hold_fixed=held), None)
         found = trials.columns(points, numbers)
         hz, speed = [], []
@@ -114,11 +114,11 @@ def test_a_ringing_start_never_presses_the_tip() -> None:
         (lambda: sb.uncertainty.ParameterUncertainty(of={"beam.thickness": 0.01}), "distribution"),
         (
             lambda: sb.uncertainty.ParameterUncertainty(of={"model.modes": sb.uncertainty.Normal(1.0)}),
-            "cannot be drawn",
+            "cannot be uncertain",
         ),
         (
             lambda: sb.uncertainty.ParameterUncertainty(of={"integration.step": sb.uncertainty.Normal(1.0)}),
-            "cannot be drawn",
+            "cannot be uncertain",
         ),
         (
             lambda: sb.uncertainty.ParameterUncertainty(
@@ -133,7 +133,7 @@ def test_a_ringing_start_never_presses_the_tip() -> None:
             "shape",
         ),
         (lambda: sb.uncertainty.ParameterUncertainty(displacement=-1.0), "displacement"),
-        (lambda: sb.uncertainty.ParameterUncertainty(hold_fixed="hz"), "held"),
+        (lambda: sb.uncertainty.ParameterUncertainty(hold_fixed="hz"), "hold_fixed"),
         (lambda: sb.uncertainty.Normal(0.0), "standard_deviation"),
         (lambda: sb.uncertainty.UniformRange(2.0, 1.0), "less than high"),
     ],
@@ -159,7 +159,7 @@ def test_files() -> None:
         "phase": True,
         "seed": 4,
     }
-    spread = spread_from_mapping(table)
+    spread = uncertainty_from_mapping(table)
     assert spread.of["beam.thickness"] == sb.uncertainty.Normal(0.01, relative=True)
     assert spread.of["contact.stiffness"] == sb.uncertainty.LogNormal(0.3)
     assert spread.parameters[-1] == "drive.phase" and spread.seed == 4
@@ -169,4 +169,4 @@ def test_files() -> None:
         {"phases": True},
     ):
         with pytest.raises(InputError):
-            spread_from_mapping(bad)
+            uncertainty_from_mapping(bad)

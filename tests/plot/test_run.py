@@ -28,7 +28,7 @@ def test_panels_and_curves(synthetic_run, tmp_path):
         "striker",
     ]
     displacement, penetration, force = figure.axes[:3]
-    np.testing.assert_array_equal(displacement.lines[1].get_ydata(), synthetic_run["displacement"])
+    np.testing.assert_array_equal(displacement.lines[1].get_ydata(), synthetic_run["displacement_at_striker"])
     assert force.get_ylabel().endswith("(mN)")
     np.testing.assert_allclose(force.lines[0].get_ydata(), 1e3 * synthetic_run["contact_force"], rtol=1e-12)
     assert displacement.get_xlim()[0] < 0.0, "an impact that begins at once is seen"
@@ -55,7 +55,7 @@ def test_window(synthetic_run):
 
 
 def test_measured_run_without_force(synthetic_run):
-    measured = synthetic_run.drop_vars(["contact_force", "penetration", "midspan_displacement"])
+    measured = synthetic_run.drop_vars(["contact_force", "penetration_normalised", "midspan_displacement"])
     figure = plot_run(measured).figure
     assert len(figure.axes) == 1
     assert len(figure.legends[0].get_texts()) == 2
@@ -70,5 +70,5 @@ def test_never_touching(synthetic_run):
 
 
 def test_no_run(synthetic_map):
-    with pytest.raises(InputError, match="run without time, displacement"):
+    with pytest.raises(InputError, match="run without time, displacement_at_striker"):
         plot_run(synthetic_map)

@@ -54,7 +54,7 @@ def test_what_follows_is_drawn_from_it() -> None:
     found = sb.uncertainty.estimate_posterior(
         measured_of(default_values.BEAM, error=0.02), default_values.BEAM, PRIOR, modes=2, samples=400
     )
-    spread = found.spread(of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)})
+    spread = found.uncertainty(of={"velocity_amplitude": sb.uncertainty.Normal(0.02, relative=True)})
     scores = spread.normals(np.arange(2000))
     for j, name in enumerate(found.parameters):
         values = spread.of[name].at(np.zeros(2000), scores[:, j])
@@ -77,7 +77,7 @@ def test_classes_weigh_samples() -> None:
         np.array([0.02]), np.array([1.02 * limit]), np.array([0.4]), np.array([2], dtype=np.int8)
     )
     spread = sb.uncertainty.ParameterUncertainty(
-        of={"velocity_amplitude": sb.uncertainty.Normal(0.01, relative=True)}, hold_fixed="ratios"
+        of={"velocity_amplitude": sb.uncertainty.Normal(0.01, relative=True)}, hold_fixed="normalised"
     )
     likelihood = sb.uncertainty.class_likelihood(
         found, system, one, spread, runs=8, integration=sb.Integration(cycles=1)
