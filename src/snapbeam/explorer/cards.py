@@ -1141,7 +1141,9 @@ def _draw_points(
     from snapbeam.plot.style import save_figure
 
     with drawing:
-        ax = plot_points(cut, name, across=along[0], upward=along[1], measurements=dots, quasi_static_line=quasi)
+        ax = plot_points(
+            cut, name, across=along[0], upward=along[1], measurements=dots, quasi_static_line=quasi
+        )
         _save(save_figure, ax, path)
 
 

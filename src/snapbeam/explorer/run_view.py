@@ -213,6 +213,7 @@ class BeamView(Part):
     title = "Beam"
 
     def build(self) -> list[Any]:
+        """Return the models of this view."""
         look = self.look
         self.run: Run | None = None
         self.fresh = True
@@ -298,6 +299,7 @@ class BeamView(Part):
         ]
 
     def show(self, run: Run, low: float, high: float) -> None:
+        """Show a run between two cycles."""
         self.run = run
         dataset, model = run.dataset, run.system.model
         if "modal_amplitude" not in dataset or model.beam is None:
@@ -412,6 +414,7 @@ class Energy(Part):
     title = "Energy"
 
     def build(self) -> list[Any]:
+        """Return the models of this view."""
         look = self.look
         colors = (look.striker, look.faint, look.center, look.second)
         self.sources = {name: columns(x=[], y=[]) for name in _CURVES}
@@ -430,6 +433,7 @@ class Energy(Part):
         return [self.wrap(self.plot), self.words]
 
     def show(self, run: Run, low: float, high: float) -> None:
+        """Show a run between two cycles."""
         dataset = run.dataset
         x, label = across(run)
         self.plot.xaxis.axis_label = label
@@ -478,6 +482,7 @@ class Impacts(Part):
         self.closer = closer
 
     def build(self) -> list[Any]:
+        """Return the models of this view."""
         names = {
             "cycle": ("onset (cycles)", "0.0000"), "time": ("onset (ms)", "0.000"),
             "duration": ("duration (µs)", "0.0"), "peak": ("peak force (N)", "0.000"),
@@ -501,6 +506,7 @@ class Impacts(Part):
         return [self.words, pn.pane.Bokeh(table, sizing_mode="stretch_width")]
 
     def show(self, run: Run, low: float, high: float) -> None:
+        """Show a run between two cycles."""
         found = run.impacts.isel(impact=slice(0, _MOST))
         time = found["onset"].values
         cycle = (
@@ -528,10 +534,12 @@ class Numbers(Part):
     title = "Numbers"
 
     def build(self) -> list[Any]:
+        """Return the models of this view."""
         self.table = pn.pane.HTML("", sizing_mode="stretch_width")
         return [self.table]
 
     def show(self, run: Run, low: float, high: float) -> None:
+        """Show a run between two cycles."""
         rows = []
         for name, value in run.summary.items():
             row = STATISTICS.get(name)
@@ -567,6 +575,7 @@ class Modal(Part):
     title = "Modes"
 
     def build(self) -> list[Any]:
+        """Return the models of this view."""
         look = self.look
         plot = figure(
             look, height=260, x_range=self.cursor.range, y_axis_label="αᵢ over α₁ of the well", y_range=(-1.5, 1.5),
@@ -590,6 +599,7 @@ class Modal(Part):
         return [self.wrap(plot), self.wrap(low)]
 
     def show(self, run: Run, low: float, high: float) -> None:
+        """Show a run between two cycles."""
         if "modal_amplitude" not in run.dataset:
             return
         x, label = across(run)
@@ -634,6 +644,7 @@ class Phase(Part):
     title = "Phase"
 
     def build(self) -> list[Any]:
+        """Return the models of this view."""
         look = self.look
         self.run: Run | None = None
         self.span = (0.0, 1.0)
@@ -668,6 +679,7 @@ class Phase(Part):
         ]
 
     def show(self, run: Run, low: float, high: float) -> None:
+        """Show a run between two cycles."""
         self.run, self.span = run, (low, high)
         self._draw()
 
@@ -724,6 +736,7 @@ class Spectrum(Part):
     title = "Spectrum"
 
     def build(self) -> list[Any]:
+        """Return the models of this view."""
         look = self.look
         self.sources = {
             name: columns(x=[], y=[]) for name in ("midspan_displacement", "displacement_at_striker")
@@ -750,6 +763,7 @@ class Spectrum(Part):
         return [self.wrap(plot)]
 
     def show(self, run: Run, low: float, high: float) -> None:
+        """Show a run between two cycles."""
         x, _ = across(run)
         inside = within(x, low, high)
         time, first = run.dataset["time"].values[inside], run.system.model.reference_frequency
@@ -780,6 +794,7 @@ class Waveform(Part):
     title = "Waveform"
 
     def build(self) -> list[Any]:
+        """Return the models of this view."""
         look = self.look
         self.sources = {name: columns(x=[], y=[]) for name in (*_CURVES_WAVEFORM, "contact_force")}
         self.sources["midspan_displacement"].name = self.named("waveform")
@@ -815,6 +830,7 @@ class Waveform(Part):
         return [self.wrap(top), self.wrap(low)]
 
     def show(self, run: Run, low: float, high: float) -> None:
+        """Show a run between two cycles."""
         x, label = across(run)
         self.low.xaxis.axis_label = label
         shown = []

@@ -1,4 +1,4 @@
-"""What a diagnostic can be: its code, its severity, what it is seen by and what it says."""
+"""The kinds of diagnostics of the lab part: code, severity, criterion and message."""
 
 from __future__ import annotations
 

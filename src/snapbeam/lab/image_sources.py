@@ -200,6 +200,7 @@ class TiffSource(FrameSource):
         return grey_of(image) if self._colors else image
 
     def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
+        """Return some frames, in some rows."""
         kind = np.uint16 if self._full else self._dtype
         out = np.empty((stop - start, rows[1] - rows[0], self.shape[1]), dtype=kind)
         for index in range(start, stop):
@@ -213,6 +214,7 @@ class TiffSource(FrameSource):
         return out
 
     def close(self) -> None:
+        """Close the file."""
         self._file.close()
 
 
@@ -315,6 +317,7 @@ class ArraySource(FrameSource):
         return None
 
     def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
+        """Return some frames, in some rows."""
         part = np.asarray(self._stack[start:stop, rows[0] : rows[1]])
         if self._colors:
             part = grey_of(part)
@@ -328,6 +331,7 @@ class ArraySource(FrameSource):
         return levels
 
     def close(self) -> None:
+        """Close the file."""
         if self._file is not None:
             self._file.close()
             self._file = None
@@ -384,6 +388,7 @@ class PhotronSource(FrameSource):
                 self.diagnostics += (KINDS_RECORDING["mosaic"].found(spread_percent=100.0 * spread),)
 
     def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
+        """Return some frames, in some rows."""
         frames = read_mraw(self.header, start, stop, rows)
         if self._gains is None:
             return frames
@@ -526,6 +531,7 @@ class ImageSource(FrameSource):
         return image
 
     def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
+        """Return some frames, in some rows."""
         kind = np.uint16 if self._full else self._dtype
         out = np.empty((stop - start, rows[1] - rows[0], self.shape[1]), dtype=kind)
         for index in range(start, stop):
@@ -620,6 +626,7 @@ class VideoSource(FrameSource):
             yield frame.to_ndarray(format=self._format)
 
     def read(self, start: int, stop: int, rows: tuple[int, int]) -> NDArray[np.integer]:
+        """Return some frames, in some rows."""
         out = np.empty(
             (stop - start, rows[1] - rows[0], self.shape[1]), np.uint16 if self.max_value > 255 else np.uint8
         )
@@ -643,6 +650,7 @@ class VideoSource(FrameSource):
         return out
 
     def close(self) -> None:
+        """Close the file."""
         if self._container is not None:
             self._container.close()
             self._container = None

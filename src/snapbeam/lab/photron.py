@@ -82,9 +82,11 @@ class Fields:
         return next((one for one in plain if one in self.values), plain[0] if plain else tags)
 
     def error(self, key: str, why: str) -> InputError:
+        """Return the error for a field that cannot be used."""
         return InputError(f"{self.path}: field {self.name(key)!r} {why}")
 
     def text(self, key: str, default: str | None = None) -> str:
+        """Return a field as text."""
         value = self.values.get(self.name(key))
         if value is None or value == "":
             if default is None:
@@ -93,6 +95,7 @@ class Fields:
         return value
 
     def number(self, key: str) -> float | None:
+        """Return a field as a number; None if it is absent."""
         raw = self.text(key, "")
         if raw == "":
             return None
@@ -109,12 +112,14 @@ class Fields:
         return value
 
     def positive(self, key: str) -> float | None:
+        """Return a field as a number greater than 0; None if it is absent."""
         value = self.number(key)
         if value is not None and value <= 0.0:
             raise self.error(key, f"= {value:g}: must be greater than 0")
         return value
 
     def integer(self, key: str, low: int, high: int, default: int | None = None) -> int:
+        """Return a field as an integer between two limits."""
         value = self.number(key)
         if value is None:
             if default is None:

@@ -124,6 +124,7 @@ def numbered(channels: list[Channel]) -> list[Channel]:
 
 
 def read_numpy(path: Path, _told: Told) -> list[Channel]:
+    """Return the channels of a NumPy file, ``.npy`` or ``.npz``."""
     with open(path, "rb") as file:  # opened here, since NumPy leaves damaged files open
         loaded = np.load(file, allow_pickle=False)
         arrays = None if isinstance(loaded, np.ndarray) else {name: loaded[name] for name in loaded.files}
@@ -149,6 +150,7 @@ def read_numpy(path: Path, _told: Told) -> list[Channel]:
 
 
 def write_npz(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+    """Write a signal to a NumPy file with its times and its unit."""
     values, time, _ = check_signal(signal)
     name = str(signal.name)
     arrays: dict[str, Any] = {name: values, "time": time}
@@ -161,6 +163,7 @@ def write_npz(path: Path, signal: xr.DataArray, _full_scale: float | None) -> No
 
 
 def read_hdf5(path: Path, _told: Told) -> list[Channel]:
+    """Return the channels of an HDF5 file."""
     import h5py
 
     channels: list[Channel] = []
@@ -187,6 +190,7 @@ def read_hdf5(path: Path, _told: Told) -> list[Channel]:
 
 
 def write_hdf5(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+    """Write a signal to an HDF5 file."""
     import h5py
 
     values, time, _ = check_signal(signal)
@@ -940,6 +944,7 @@ def split_unit(column: str) -> tuple[str, str | None]:
 
 
 def read_tdms(path: Path, _told: Told) -> list[Channel]:
+    """Return the channels of a TDMS file."""
     from nptdms import TdmsFile
 
     file = TdmsFile.read(path)
@@ -962,6 +967,7 @@ def read_tdms(path: Path, _told: Told) -> list[Channel]:
 
 
 def write_tdms(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+    """Write a signal to a TDMS file."""
     from nptdms import ChannelObject, TdmsWriter
 
     values, time, rate = check_signal(signal)
@@ -984,6 +990,7 @@ _UFF_TYPES = {unit: code for code, unit in _UFF_UNITS.items()}
 
 
 def read_uff(path: Path, _told: Told) -> list[Channel]:
+    """Return the channels of a universal file (dataset 58)."""
     import pyuff
 
     sets = pyuff.UFF(str(path)).read_sets()
@@ -1030,6 +1037,7 @@ def _undo_rounding(step: float) -> float:
 
 
 def write_uff(path: Path, signal: xr.DataArray, _full_scale: float | None) -> None:
+    """Write a signal to a universal file (dataset 58)."""
     import pyuff
 
     values, time, rate = check_signal(signal)
@@ -1078,6 +1086,7 @@ _INTEGER_SCALE = {"int16": (0.0, 2.0**15), "int32": (0.0, 2.0**31), "uint8": (12
 
 
 def read_wav(path: Path, _told: Told) -> list[Channel]:
+    """Return the channels of a sound file."""
     from scipy.io import wavfile
 
     with warnings.catch_warnings(record=True) as caught:
@@ -1104,6 +1113,7 @@ def read_wav(path: Path, _told: Told) -> list[Channel]:
 
 
 def write_wav(path: Path, signal: xr.DataArray, full_scale: float | None) -> None:
+    """Write a signal to a sound file."""
     from scipy.io import wavfile
 
     values, _, rate = check_signal(signal)

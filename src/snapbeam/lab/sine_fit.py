@@ -379,9 +379,7 @@ def sound_samples(size: int, flaws: list[Flaw]) -> NDArray[np.bool_]:
 
 
 def find_clipping(samples: SignalSamples, fit: SineFit) -> Clipping:
-    """Tops that are flatter than those of a sine, in the mean cycle of a record; or levels hit exactly, again
-    and again.
-    """
+    """Find clipped tops: flatter than those of a sine in the mean cycle, or levels that are hit exactly many times."""
     none = Clipping(-math.inf, math.inf, 0.0, 0.0)
     turn = np.mod(fit.frequency * samples.time + fit.phase / (2.0 * math.pi), 1.0)
     bins = int(np.clip(samples.values.size // 20, 16, 128))

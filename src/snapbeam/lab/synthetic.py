@@ -1,5 +1,4 @@
-"""A synthetic laboratory camera: what a recording of a known motion would look like, with the truth beside
-it.
+"""A synthetic camera: recordings of known motions, together with the true motions.
 
 An ideal scene of a beam and a rounded shaker with a sticker is drawn as sharp edges, blurred by the optics,
 integrated over each pixel and over the exposure, lit unevenly, spoiled as asked, and given noise and a finite
@@ -458,8 +457,9 @@ FRAME_LISTS = ("glare_frames", "blurred_frames", "repeated_frames", "blank_frame
 
 @dataclass(frozen=True)
 class Fixture:
-    """A bar that crosses the picture and never moves: ``row`` of its middle in the turned picture and
-    ``thickness`` [px], grey ``level`` from 0 to 1.
+    """A bar that crosses the picture and never moves.
+
+    ``row`` of its middle in the turned picture and ``thickness`` [px], grey ``level`` from 0 to 1.
     """
 
     row: float

@@ -119,8 +119,9 @@ def judged(
 def _halves(
     cycles: Cycles, mode: ModeEstimate, start: float, soften: bool
 ) -> tuple[tuple[float, float], tuple[float, float]]:
-    """By how much the rate of decay [1/s] and the angular frequency [rad/s] of the two halves of a decay differ,
-    each with its standard error, after what the fit says of them is taken out.
+    """Differences of the rate of decay [1/s] and of the angular frequency [rad/s] between the halves of a decay.
+
+    Each difference comes with its standard error; the changes that the fit explains are taken out first.
     """
     t = cycles.time - start
     if t.size < 12:

@@ -18,8 +18,8 @@ from snapbeam.plot.style import (
     BEAM_COLOR,
     COLUMN_WIDTHS,
     SHAKER_COLOR,
-    draw_diagnostics,
     diagnostics_height,
+    draw_diagnostics,
     house_style,
     new_figure,
 )
@@ -101,7 +101,9 @@ def plot_frame(recording: Recording, dataset: xr.Dataset, frame: int = 0) -> Fig
     height, width = picture.shape
     told = doubtful(diagnostics_of(dataset))
     size = (
-        77.0 * min(max(height / width, 0.12), 1.4) + 26.0 + diagnostics_height(told, COLUMN_WIDTHS["single"], 3)
+        77.0 * min(max(height / width, 0.12), 1.4)
+        + 26.0
+        + diagnostics_height(told, COLUMN_WIDTHS["single"], 3)
     )
     with house_style():
         figure = new_figure("single", size)

@@ -224,9 +224,7 @@ def contact_shift(touch: Touch, known: float) -> float:
 
 
 def rounding_shift(beam: BeamView) -> float:
-    """By how much [px] grey levels that were rounded to few move edges; 0 where they are many, or noise evens it
-    out.
-    """
+    """Shift [px] of edges by grey levels rounded to few; 0 where they are many or noise cancels the rounding."""
     if beam.noise > _EVENED or beam.contrast > _LEVELS:
         return 0.0
     return 1.5 * max(beam.edge_width, 0.5) / beam.contrast

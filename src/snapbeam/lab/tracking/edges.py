@@ -65,8 +65,7 @@ def _pair(data: Floats, first: NDArray[np.intp], second: NDArray[np.intp]) -> Fl
 
 
 def _terms(position: Floats, rows: int, width: float) -> tuple[Floats, Floats, Floats]:
-    """The profile over a window of *rows* about an edge at *position*, and its derivatives by position and
-    width.
+    """Return the profile over *rows* about an edge at *position*, and its derivatives by position and width.
 
     Neighbouring pixels share a border, so everything follows from values at rows + 1 borders.
     """

@@ -409,8 +409,10 @@ class EdgeShape:
 
 @dataclass(frozen=True)
 class NoiseShape:
-    """Correlation of a pixel's noise ``in_time`` with that of the next frame, ``along`` the beam with that of the next
-    pixel, and ``across`` it; 0 where it is a sensor's own, or too little to tell.
+    """Correlations of the noise of pixels.
+
+    ``in_time`` with the same pixel in the next frame, ``along`` the beam with the next pixel, and ``across`` the
+    beam; 0 where the noise is that of a sensor or too small to decide.
     """
 
     in_time: float
@@ -435,8 +437,10 @@ class NoiseShape:
 
 @dataclass(frozen=True)
 class Fields:
-    """Odd and even rows of a picture that lie ``apart`` by a share of the step from frame to frame, and the ``shift``
-    [px] of every other frame; 0 where there is none.
+    """Signs of interlaced video: differences between odd and even rows.
+
+    The rows lie ``apart`` by a share of the step from frame to frame; ``shift`` [px] is that of every other frame.
+    Both are 0 where there is no difference.
     """
 
     apart: float
